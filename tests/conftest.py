@@ -98,7 +98,7 @@ def pytest_collection() -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Leave what stays out of collections of garbage, each of which would take half a second to look at it."""
+    """Exclude present objects from garbage collections, each of which would take half a second to look at them."""
     gc.enable()
     gc.freeze()
 

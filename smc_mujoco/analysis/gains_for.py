@@ -92,7 +92,9 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
     if amplitude is None and frequency is None:
         raise ScenarioError("gains_for needs a wanted amplitude, a frequency or both: give amplitude=1e-3")
     if not base.law.uniform:
-        raise ScenarioError(f"gains_for searches one number for each gain of all channels, not {base.law}: give one")
+        raise ScenarioError(
+            f"gains_for needs gains that all channels share, not {base.law}: give one number for each gain"
+        )
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if value is not None:
             number(name, value, above=0.0)

@@ -85,7 +85,7 @@ class Loop:
         for joint, low, high in plant.ranges:
             if not low <= 0.0 <= high:
                 raise ScenarioError(
-                    f"chattering is predicted about x = 0, and joint {joint!r} of {plant.name} is from {low:g} to "
+                    f"chattering is predicted about x = 0, and joint {joint!r} of {plant.name} moves from {low:g} to "
                     f"{high:g}: measure it in a run, with smc.score, or choose another plant"
                 )
         self.partner = channel + plant.driven if channel + plant.driven < plant.n else None

@@ -159,7 +159,7 @@ class Kind:
 
     def expected(self, base: Scenario) -> float | None:
         """Return the largest level by linear theory; None if there is none for the law, the plant or the condition."""
-        if base.disturbance or base.friction or base.mismatch or base.jump or base.sensor:  # theory has none of these
+        if base.disturbance or base.friction or base.mismatch or base.jump or base.sensor:  # not in the theory
             return None
         if base.resolved.model == "nominal" or base.resolved.reference != REST:
             return None
@@ -186,7 +186,7 @@ def _doubled(largest: float) -> tuple[float, ...]:
 
 def _critical_delay(base: Scenario) -> float | None:
     estimated = base.resolved.velocity.name != "measured"
-    lam_k1 = None if base.actuator or estimated else linearisation.local(base.law)  # the theory has neither
+    lam_k1 = None if base.actuator or estimated else linearisation.local(base.law)  # neither is in the theory
     return None if lam_k1 is None else theory.critical_delay(base.plant, *lam_k1, base.control_period)
 
 

@@ -7,11 +7,10 @@
 
 All channels of a network start from the same state. x is not wrapped: a pendulum at rest a turn away has not converged.
 
-The rule. X and V are the largest |x| and |v| of the grid, and e = x - r is the distance from the reference. A run is
-home while |e| <= 2 % of X and |v| <= 2 % of V on every channel, and near while its distance (e/X)^2 + (v/V)^2 is below
-(0.2 %)^2, a tenth of that. Every state is run for
-15 % of the duration. Undecided states are run again, from the beginning, for 40 %, and the rest for the whole duration.
-(Runs are deterministic. All this costs at most 1.55 times a whole run.)
+The rule. X and V are the largest |x| and |v| of the grid, and e = x - r is the error. A run is home while |e| <= 2 % of
+X and |v| <= 2 % of V on every channel, and near while its distance (e/X)^2 + (v/V)^2 is below (0.2 %)^2, a tenth of
+that. Every state is run for 15 % of the duration. Undecided states are run again, from the beginning, for 40 %, and the
+rest for the whole duration. (Runs are deterministic. All this costs at most 1.55 times a whole run.)
 - It converges, early: home throughout the last third of the run, with a distance that is smaller by a tenth in the
   second half of this third than in the first; or near in the second half. Near the reference the size does not matter,
   because a law that switches leaves a ripple. But a state that starts near must shrink: a run that leaves slowly is

@@ -85,7 +85,7 @@ def print_pages(name: str | None, console: Console) -> None:
             formula = with_package(parts.formula, known.package(template.name))
             table.add_row(template.name, *degrees, Text(formula), Text(brief(parts.source)))
         console.print(table, "")
-    one, some = (("smc-mujoco laws NAME", "cyan"), ("smc-mujoco laws --needs continuous,two-gains", "cyan"))
+    one, some = ("smc-mujoco laws NAME", "cyan"), ("smc-mujoco laws --needs continuous,two-gains", "cyan")
     console.print(Text.assemble("One in full: ", one, ". Only some: ", some))
 
 

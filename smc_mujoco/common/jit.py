@@ -299,7 +299,7 @@ WHEREABOUTS = re.compile(
 )
 
 
-COLOURS = re.compile(r"\x1b\[[\d;]*m")  # which numba writes where NUMBA_COLOR_SCHEME asks for them
+COLOURS = re.compile(r"\x1b\[[\d;]*m")  # numba writes them if NUMBA_COLOR_SCHEME is set
 
 
 def reason(error: Exception) -> str:

@@ -378,7 +378,7 @@ def as_gains(gains: object, known: Mapping[str, Value] = frozen({})) -> dict[str
     """Return the gains of a decorator, numbers or Gains, as Gains.
 
     Args:
-      known: gains that come first, and whose defaults `gains` change.
+      known: other gains, which come first. `gains` can change their defaults.
 
     Raises:
       ScenarioError: not a mapping, a bad name or default, or a gain over an unknown one.

@@ -31,7 +31,7 @@ BESIDE = ("phase", "transient", "end")
 PANELS = (*OVER_TIME, "channels", *BESIDE)
 ROW = 1.5  # inches on a full page, height of a panel over time
 HEIGHTS = {"phase": 1.5, "transient": 1.0, "end": 1.0}  # relative heights of the panels in BESIDE
-Row = tuple[Axes, Panel, Sequence[str]]  # axes, with what they show and in which colours
+Row = tuple[Axes, Panel, Sequence[str]]  # axes, what they show, and the colours of its traces
 LOW, FILLED = 0.32, 0.6  # relative height of a row, in a panel that has one for each trace; the part below its name
 
 
@@ -355,7 +355,7 @@ def _key(
     traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], shown: Sequence[Panel], rests: bool
 ) -> list[Handle]:
     """Return the entries of a legend: the traces, the reference with its band, the meaning of lines and bands."""
-    handles = pages.runs(traces, names, colours)
+    handles = pages.run_handles(traces, names, colours)
     if rests:
         diamond = {"marker": "D", "ms": style.points(5), "lw": 0, "color": style.MUTED, "mec": style.PAPER}
         handles.append(Line2D([], [], **diamond, label=f"held by friction for {HOLD:g} s or longer"))

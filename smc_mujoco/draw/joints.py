@@ -75,7 +75,7 @@ def joints(
         look = panels.dotted()
         happened = [Line2D([], [], **look, label=f"{what} at {time:g} s") for time, what in marks.items()]
         title = title or style.plant_name(traces[0].scenario.plant)
-        pages.set_head(page, width, title, [*pages.runs(traces, names, colours), *happened])
+        pages.set_head(page, width, title, [*pages.run_handles(traces, names, colours), *happened])
         pages.write(page, paths)
     return page
 
@@ -94,7 +94,10 @@ def shown(traces: Sequence[Trace]) -> list[Panel]:
 
 
 def draw(ax: Axes, panel: Panel, names: Sequence[str], colours: Sequence[str], letters: float) -> None:
-    """Draw a panel, whose title has letters of a size in points. A run far off leaves it, which says so."""
+    """Draw a panel, with a title of `letters` points.
+
+    A run that is far off leaves the panel. Its name and largest value stand at the top.
+    """
     panels.over_time(ax, panel, colours)
     ax.set_xlim(0.0, end(panel.traces))
     ax.set_title(panel.label, fontsize=letters)

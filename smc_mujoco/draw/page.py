@@ -144,7 +144,7 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
         label.set_parse_math(False)
 
 
-def runs(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) -> list[Handle]:
+def run_handles(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) -> list[Handle]:
     """Return the entries of a legend for runs: a line each, and how it failed if it did."""
     handles: list[Handle] = []
     for trace, name, colour in zip(traces, names, colours, strict=True):

@@ -233,14 +233,14 @@ def over_time(
 ) -> list[Artist]:
     """Draw the panel with the first trace on top, set its vertical range, and return the artists of the traces.
 
-    The reference of x is drawn in front, its settling band behind. `label`: whether to print the size of blows outside
-    the range. `among`: traces that set the range; default: the panel's own.
+    The reference of x is drawn in front, its settling band behind. `label`: whether to print the size of impacts
+    outside the range. `among`: traces that set the range; default: the panel's own.
     """
     artists: list[Artist] = []
     name, means = panel.quantity, [QUANTITIES[panel.quantity](trace).mean(axis=1) for trace in panel.traces]
     ax.set_ylim(limits(among or panel.traces, name))
     if name == "reaction":
-        clip_blows(ax, panel, colours, label)
+        clip_impacts(ax, panel, colours, label)
     if name in ("x", "e"):
         target(ax, panel)
     lines = [curve(trace, mean, name) for trace, mean in zip(panel.traces, means, strict=True)]
@@ -298,12 +298,12 @@ def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], limits: tuple[float, 
     return styles
 
 
-def clip_blows(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True) -> None:
-    """Fit the vertical range to lasting reactions. Mark short blows outside the range, and print their size."""
+def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True) -> None:
+    """Fit the vertical range to lasting reactions. Mark short impacts outside the range, and print their size."""
     sizes = [np.abs(trace.reaction[np.isfinite(trace.reaction)]) for trace in panel.traces]
     peak = max(size.max(initial=0.0) for size in sizes)
-    lasting = [float(np.quantile(size, LASTING)) for size in sizes if size.size]
-    usual = max(*lasting, *map(abs, span(panel.traces, "u")))
+    levels = [float(np.quantile(size, LASTING)) for size in sizes if size.size]
+    usual = max(*levels, *map(abs, span(panel.traces, "u")))
     if not peak > 2.0 * usual > 0.0:
         return
     top = 1.16 * usual
@@ -392,7 +392,7 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Seque
 
     A ring is the start of a trace, a diamond a sample in `held`, where friction holds it.
     """
-    drawn = list(zip(traces, colours, held, orbits(traces), strict=True))
+    drawn = list(zip(traces, colours, held, phase_dashes(traces), strict=True))
     for trace, colour, samples, dash in reversed(drawn):
         x, v = trace.x, trace.v
         for i in light(x.shape[1]) if x.shape[1] > 1 else ():
@@ -417,10 +417,10 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Seque
     ax.set_ylim(low, high)
 
 
-def orbits(traces: Sequence[Trace]) -> list[Any]:
+def phase_dashes(traces: Sequence[Trace]) -> list[Any]:
     """Return a style for the curve of each trace in a phase portrait, see `dashes`."""
     (left, right), (low, high) = limits(traces, "x"), limits(traces, "v")
-    lines = []
+    lines = []  # x, then v, as one curve: traces coincide if both do
     for trace in traces:
         x, v = trace.x.mean(axis=1) / (right - left), trace.v.mean(axis=1) / (high - low)
         lines.append((np.concatenate([trace.t, trace.t + trace.t[-1]]), np.concatenate([x, v])))
@@ -521,7 +521,7 @@ def lasting(traces: Sequence[Trace], name: str) -> dict[int, np.ndarray]:
 
 
 def far_off(traces: Sequence[Trace], name: str) -> int | None:
-    """Return the index of the run that is so far off that a panel of an arm shows the others; or None."""
+    """Return the index of the one run that is too far off for a panel of an arm to show in full; or None."""
     sizes = {k: float(np.abs(y).max()) for k, y in lasting(traces, name).items()} if name in OF_ARMS else {}
     if len(sizes) < 2:
         return None

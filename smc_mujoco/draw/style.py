@@ -341,7 +341,7 @@ def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
 def wrapped(text: str, room: float, size: float, lines: int) -> str:
     """Return the text on so many lines at most, broken between words; an ellipsis is at the end of one too long.
 
-    A number and its unit stay together.
+    A number and a short word after it, such as its unit, stay together.
     """
     found, words = [], re.split(r"(?<!\d)\s+|\s+(?!\S{1,4}(?:\s|$))", text.strip())
     while words and len(found) < lines - 1:

@@ -59,7 +59,7 @@ class Agent:
     Attributes:
       episode: the environment's Episode, which counts the samples.
       loop: the reference loop of the scenario with the law in it. Only its controller is used.
-      begun: the number of the episode in which it acted last.
+      begun: `episode.begun` when it acted last.
     """
 
     def __init__(self, episode: Episode, loop: reference.Loop):

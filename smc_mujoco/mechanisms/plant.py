@@ -260,7 +260,7 @@ class Plant:
         return model
 
     def change(self, factors: Mapping[str, float]) -> str:
-        """Return what `values` does with factors, in words: "m × 1.3, payload + 2 kg"."""
+        """Return a change of the parameters in words: "m × 1.3, payload + 2 kg". Factors are those of `values`."""
         return ", ".join(
             f"{name} + {factor:g} {self.added[name]}" if name in self.added else f"{name} × {factor:g}"
             for name, factor in factors.items()

@@ -38,10 +38,10 @@ SETTLED = 0.2
 
 
 class Contacts(NamedTuple):
-    """Contacts of a run at its samples.
+    """Contacts of a run at its samples. All values are NaN after a failure.
 
     Attributes:
-      force: sum of the normal forces, N, (K + 1,); 0 without contact, and as the others NaN after a failure.
+      force: sum of the normal forces, N, (K + 1,); 0 without contact.
       depth: penetration of the deepest contact, m, (K + 1,); 0 without contact.
       push: sum of the normal forces on the arm, as a vector in space, N, (K + 1, 3).
     """

@@ -55,7 +55,7 @@ class Chunk:
         for i, scenario in enumerate(scenarios):
             qpos[i], qvel[i] = assembly.start(self.model, scenario)
         self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
-        # those that the first scenario sets in the shared model, as they are where a scenario leaves them alone
+        # Fields that the first scenario sets in the shared model, with their values for scenarios that do not set them.
         set_fields = assembly.field_values(self.compiled, first, 0)
         self.untouched = {name: array(self.compiled, name) for name in set_fields}
         self.errors: dict[int, str] = {}

@@ -434,7 +434,9 @@ def check_signals(s: Resolved) -> None:
             raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
     for name, signal in [*(("disturbance", d) for d in s.disturbance), ("feedforward", s.feedforward)]:
         if isinstance(signal, PerChannel):
-            raise ScenarioError(f"{name} has a signal for each channel, as only references have: give one for all")
+            raise ScenarioError(
+                f"{name} has a signal for each channel, and only a reference may: give one signal for all"
+            )
     for push in [d for d in s.disturbance if isinstance(d, Push)]:
         find(f"body of {s.plant.name} in a Push", push.body, dict.fromkeys(bodies(s.plant)))
     if s.plant.direct and (forces := [d for d in s.disturbance if d.cartesian and not isinstance(d, Push)]):

@@ -223,7 +223,7 @@ class Push(Signal):
 
     (x, y, z) sin(pi (t - time) / width) for time <= t <= time + width, else 0: of impulse 2 width / pi times the peak.
     A trace's d does not show it where disturbances act on joints, as on the panda and on users' models. Elsewhere d has
-    its force along the slide, or the torque of its horizontal part about the hinge, of the body that it pushes.
+    what acts on the joint of the body: the force along a slide, or the torque of its horizontal part about a hinge.
 
     Attributes:
       body: its name in the model.

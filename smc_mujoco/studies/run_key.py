@@ -111,7 +111,7 @@ def _codes(s: Scenario, plants: Hashes) -> list[str]:
 def _plant_codes(plant: Plant) -> list[str]:
     """Return hashes of a user's plant: of its functions, and of the model, which its build may read from a file.
 
-    Of a plant of this package with some functions replaced, these count.
+    For a plant of this package, hashes only of the functions that a user replaced.
     """
     builds = *plant.contacts.items(), *plant.mechanisms.items()
     if plant.build.__module__.startswith(PACKAGE):

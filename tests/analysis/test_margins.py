@@ -180,7 +180,7 @@ def test_dry_friction_is_tolerated_beside_what_a_condition_has():
     assert margins.MARGIN_KINDS["friction"].put(none, 0.2).friction == (smc.Coulomb(0.2),)
 
 
-def test_theory_says_nothing_of_a_loop_that_is_another():
+def test_linear_theory_is_only_for_the_loop_that_it_describes():
     """A plant that is pushed or changed, a law that sees a sensor or the model, and another reference."""
     base = smc.grid("duffing", "observer_free", "nominal")[0]
     others = [{"model": "nominal"}, {"reference": smc.Constant(0.1)}, {"reference": smc.Sine(0.1, 1.0)}]

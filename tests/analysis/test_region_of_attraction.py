@@ -94,7 +94,7 @@ def test_a_run_that_fails_does_not_converge():
     assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]] * 2
 
 
-def test_a_joint_that_sticks_while_an_unbounded_command_grows_is_not_decided_early():
+def test_sticking_under_a_growing_command_is_not_decided_early():
     stuck = base("duffing", smc.law("pid"), 10.0)
     stuck = dataclasses.replace(stuck, friction=smc.Coulomb(3.0), u_max=math.inf)
     early, whole = (maps.of(stuck, [0.1, 0.5], [0.0], early=one).outcome.tolist() for one in (True, False))
@@ -102,7 +102,7 @@ def test_a_joint_that_sticks_while_an_unbounded_command_grows_is_not_decided_ear
     assert DOES_NOT not in whole[0]
 
 
-def test_home_is_the_reference():
+def test_distance_is_measured_from_the_reference():
     held = dataclasses.replace(base("duffing", smc.law("lqr"), 3.0), model="nominal", reference=smc.Constant(0.3))
     assert maps.of(held, [0.0, 0.6], [0.0, 0.1]).outcome.tolist() == [[CONVERGES] * 2] * 2
 

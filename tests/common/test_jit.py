@@ -15,7 +15,7 @@ def names(function: Callable[..., Any] | None) -> dict[str, Any]:
     return getattr(compiled, "py_func", compiled).__globals__
 
 
-def test_a_reason_that_quotes_a_user_s_text_has_no_codes_of_terminals():
+def test_reasons_have_no_terminal_codes_from_quoted_texts():
     error = ValueError("\x1b[1m\x1b[31mFailed in nopython mode\nit returns Literal[str](\x1b]0;owned\x07)\x1b[0m")
     assert reason(error) == r"it returns Literal[str](\x1b]0;owned\x07)"
 

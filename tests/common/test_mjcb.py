@@ -218,7 +218,7 @@ def test_a_forked_child_waits_for_no_thread_of_its_parent():
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 @pytest.mark.parametrize("module", [nominal_model, mjcf])
-def test_a_lock_that_another_thread_holds_is_free_in_a_forked_child(module):
+def test_locks_of_other_threads_are_free_in_a_forked_child(module):
     held = threading.Event()
 
     def hold():

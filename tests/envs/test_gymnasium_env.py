@@ -169,7 +169,7 @@ def test_a_copy_that_mujoco_gives_up_leaves_its_neighbours_drives_alone(monkeypa
     assert many.batch.asked == ([0, 1],) * 3 + ([0],) * 197  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def test_an_agent_that_did_not_begin_an_episode_has_no_memory_of_the_one_before():
+def test_an_agent_that_joins_an_episode_late_has_no_old_memory():
     one = PlantEnv("duffing", changes={"x0": 0.5, "duration": 0.1})
     act, episodes = smc.agent("adaptive", one), []
     for _ in range(2):

@@ -259,7 +259,7 @@ def ruled(**fields):
         (lambda: boards.board(ruled(x0=3.0)), "x0 of the run"),
         (lambda: boards.board(ruled(plant=smc.plant("acrobot", m2=0.3))), "m2 of the run is 0.3 and on the boards 0.6"),
         (lambda: boards.board(ruled(disturbance=smc.Sine(0.5, 1.0))), "disturbance of the run is"),
-        (lambda: boards.board(ruled(), "TVLQR"), "'TVLQR', as of a published row: give another"),
+        (lambda: boards.board(ruled(), "TVLQR"), "'TVLQR', which a published row has: give another"),
         (lambda: boards.criteria(smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))), "robot"),
         (lambda: boards.score({"energy": 1.0}), "swing_up_time of board v2 is missing"),
         (lambda: boards.score(boards.SIMULATION["acrobot"]["v2"][0], "v1"), "max_torque of board v1 is missing"),

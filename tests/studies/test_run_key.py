@@ -253,7 +253,7 @@ def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_rep
     fingerprint.package.cache_clear()
 
 
-def test_functions_in_place_of_a_plants_own_tell_runs_apart():
+def test_replaced_functions_of_a_plant_tell_runs_apart():
     def nominal(x, v, i, q):
         return 0.0, 1.0
 

@@ -126,7 +126,7 @@ def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[fl
     """
     bounds = {}
     if not law.uniform:
-        raise ScenarioError(f"tuning searches one number for each gain of all channels, not {law}: give one for each")
+        raise ScenarioError(f"tuning needs gains that all channels share, not {law}: give one number for each gain")
     for name in law.gains:
         if (its := unit(law, name)) is not None and not _gain(law, name).held:
             scale = its.of(plant_scales)

@@ -190,7 +190,7 @@ def _grid(
     duration: float,
     starts: "Starts | None",
 ) -> "tuple[list[Scenario], str]":
-    """Return the scenarios of `bench`, and where their gains are from in words. Texts are those of the options."""
+    """Return the scenarios of `bench` from the texts of its options, and in words where their gains are from."""
     from smc_mujoco.control.gain_sets import general_laws
     from smc_mujoco.mechanisms.plant import as_plant
     from smc_mujoco.simulation.conditions import applicable

@@ -31,7 +31,7 @@ ALTERED = BEYOND + 2  # code of glue.c: a law changed the arithmetic of its thre
 ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps), by which other simulations compute too"
 FAULTS = {  # code -> fault, formatted with the size of memory, and cure
     BEYOND: ("writes beyond the {} numbers of its memory", "say more in smc_law_memory, or give memory="),
-    BEYOND + 1: ("writes beyond the numbers of out", "write only u and s, which are out[0] and out[1] in one channel"),
+    BEYOND + 1: ("writes beyond the numbers of out", "write only u and s, which are out[0] and out[1] for one channel"),
     BEYOND + 3: ("asks for the Jacobian of a tip, and there is none", "give the plant a tip, and the law the model"),
     ALTERED: (ALTERS, "let it restore that, and leave out -Ofast and -ffast-math"),
 }
@@ -89,8 +89,8 @@ def call(
     """Call a law in a separate process, then with sanitizers. Return sentences on checks that were not possible.
 
     Args:
-      fields: names of the numbers in a measurement; of a law of many joints, of its arrays.
-      gains: values of the gains, of many joints one number or one for each joint.
+      fields: names of the numbers in a measurement, or of the arrays in one of many joints.
+      gains: values of the gains. With many joints, each is one number, or one for each joint.
       memory: number of state variables.
       modelled: whether the law needs the nominal model.
       joints: of a law of many joints; 0 for one channel.
@@ -227,7 +227,7 @@ def doubles(values) -> ctypes.Array:
 
 
 class Requests:
-    """C functions for what a law of many joints may ask, valid as long as this object lives.
+    """C functions that compute what a law of many joints asks for. They are valid as long as this object lives.
 
     Args:
       joints: their number.
@@ -235,7 +235,7 @@ class Requests:
       jacobian: returns the numbers of the tip's Jacobian by rows, or raises ValueError if there is none.
 
     Attributes:
-      address: of the addresses of both functions, of their parameters, and the force per unit of u.
+      address: of a table with the addresses of both functions and of their parameters, and the force per unit of u.
     """
 
     def __init__(self, joints: int, coriolis: Callable, jacobian: Callable):

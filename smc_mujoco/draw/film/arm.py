@@ -99,7 +99,7 @@ class Trail:
                 np.maximum.at(cover, (y[inside], x[inside]), ink[inside])
                 np.minimum.at(since, (y[inside], x[inside]), at[inside])
         y, x = np.unravel_index(np.argsort(since, axis=None)[: np.isfinite(since).sum()], since.shape)
-        self.since, self.cover = since[y, x], opacity * cover[y, x, None]  # of each pixel of the path, as it gets there
+        self.since, self.cover = since[y, x], opacity * cover[y, x, None]  # of its pixels, in time
         self.pixels = y + low[1], x + low[0]
 
     def draw(self, picture: np.ndarray, time: float) -> None:

@@ -2,8 +2,8 @@
 
 The measure is how far something moves in the time of a frame, as a share of its range over the whole run. Every machine
 should cross its range in 1/TRAVEL frames or more. So speeds are 1, 1/2, 1/4 or 1/8; 1/8 also around impacts and pushes
-on an arm; and FAST where nothing has moved for a while. A film that would be too long is slowed less, and around pushes
-only if it would be too long with all else in real time. The same traces give the same film.
+on an arm; and FAST where nothing has moved for a while. If a film would be too long, its slow motion is reduced: that
+around pushes only if the film is too long with everything else in real time. The same traces give the same film.
 """
 
 from collections.abc import Sequence
@@ -108,7 +108,7 @@ def motion(runs: Sequence[Trace], edges: np.ndarray) -> np.ndarray:
 
 
 def impacts(runs: Sequence[Trace]) -> list[float]:
-    """Return when contacts begin that were none for a while before, s."""
+    """Return when contacts begin after a while without contact, s."""
     starts = []
     for trace in runs:
         touch = states.held(np.asarray(states.in_contact(trace).any(axis=1)), trace.t, states.HOLD)

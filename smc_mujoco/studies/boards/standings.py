@@ -1,4 +1,4 @@
-"""The boards as tables: published rows with one's own among them, best score first."""
+"""The boards as tables: published rows with your own among them, best score first."""
 
 import dataclasses
 
@@ -72,7 +72,7 @@ def _ruled(scenario: Scenario) -> dict[str, object]:
 def _new_name(name: str, published: tuple[Row, ...] | tuple[RobustnessRow, ...]) -> str:
     """Return the name of a row if it can be printed and no published row has it."""
     if errors.name("name of the row", name) in [row.name for row in published]:
-        raise errors.ScenarioError(f"name of the row is {name!r}, as of a published row: give another")
+        raise errors.ScenarioError(f"name of the row is {name!r}, which a published row has: give another")
     return name
 
 

@@ -322,7 +322,7 @@ def test_what_cannot_be_loaded_is_one_sentence(file, text, words):
     assert "\n" not in str(error.value)
 
 
-def test_a_set_up_or_a_loading_that_never_ends_is_ended_and_its_process_gone(file, tmp_path):
+def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
     told = tmp_path / "pid"
     write = f'FILE *f = fopen("{told}", "w"); fprintf(f, "%d", (int)getpid()); fclose(f);'
     headers = "#include <stdio.h>\n#include <unistd.h>\n"

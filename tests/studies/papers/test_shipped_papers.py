@@ -38,7 +38,7 @@ def test_the_page_of_verdicts_has_every_paper_with_as_many_verdicts_as_claims():
 
 @pytest.fixture
 def made_once(monkeypatch):
-    """Keeps traces: a third of all steps are of runs that several claims of a paper look at."""
+    """Simulates each run once. Without it, a third of all steps would be repeated, for claims that share runs."""
     made, stream = {}, claim_runs.stream
 
     def kept(scenarios, threads):

@@ -13,7 +13,7 @@ const GRADES = [{ ratio: 2, shadows: true }, { ratio: 1, shadows: true }, { rati
 const SLOW = 24; // frames a second, below which the next faster grade is used: chosen
 const PATIENCE = 1.5; // s over which frames are counted: chosen
 const STIFFNESS = 12; // of the spring by which a pointer pulls, in u_max per extent of the plant squared: chosen
-// Of the arrow of u along a rail: length at the bound on u, and thickness, of the plant's extent. Chosen.
+// Arrow of u along a rail: length at the bound on u, and thickness, as shares of the plant's extent. Chosen.
 const [PUSH, THIN] = [0.2, 0.018];
 const REACH = 0.25; // of the plant's extent: a spring longer than that pulls no harder: chosen
 
@@ -366,7 +366,7 @@ export class Stage {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.slow, preserveDrawingBuffer: this.slow });
     canvas.addEventListener("webglcontextrestored", () => this.drawAll());
     this.setGrade(this.slow ? 2 : 0);
-    this.renderer.setClearAlpha(0); // of what is between two machines
+    this.renderer.setClearAlpha(0); // the page shows between two machines
     this.renderer.setScissorTest(true);
     this.camera = new THREE.PerspectiveCamera();
     this.machines = [];
@@ -410,7 +410,7 @@ export class Stage {
   show(simulations, colours) {
     for (const machine of this.machines) machine.dispose();
     this.renderer.setScissorTest(false);
-    this.renderer.clear(); // else the machines of before stay in the seam
+    this.renderer.clear(); // otherwise the previous machines stay visible between two parts
     this.renderer.setScissorTest(true);
     this.machines = simulations.map((simulation, i) => new Machine(simulation, colours[i]));
     this.furnish();
