@@ -174,10 +174,6 @@ class Setting:
         """Return the errors e and w of the task for x, v (..., n) at sample k, (..., n) each."""
         return self.task.errors(x - self.rest_x, v, self.reference(k) - self.rest_r, self.selected)
 
-    def reward(self, x: np.ndarray, v: np.ndarray, k: Any) -> Any:
-        """Return the reward for x, v (..., n) at sample k."""
-        return reward(*self.errors(x, v, k))
-
     def lost(self, x: np.ndarray, v: np.ndarray) -> Any:
         """Return whether x, v (..., n) are beyond the largest state of a run, or not numbers."""
         return ~(np.vecdot(x, x) + np.vecdot(v, v) < MAX_STATE**2)

@@ -137,9 +137,8 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
             rewards = np.where(terminated | anew, 0.0, reward(e, w))
         e[terminated] = np.nan
         observations, self.over = self.observe(terminated), terminated | truncated
-        final = {}
+        final, times = {}, self.times
         if mode is AutoresetMode.SAME_STEP and self.over.any():
-            times = self.samples * self.setting.scenario.control_period
             for i in np.flatnonzero(self.over):
                 info = {"time": times[i], "error": e[i].copy()}
                 final = self._add_info(final, {"final_obs": observations[i].copy(), "final_info": info}, int(i))
@@ -182,6 +181,11 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
             observations[lost] = bounded(observations[lost])
         return observations
 
+    @property
+    def times(self) -> np.ndarray:
+        """Time in each copy's episode, s, (num_envs,)."""
+        return self.samples * self.setting.scenario.control_period
+
     def errors(self) -> Pair:
         """Return the errors e and w of the task in all copies, (num_envs, n) each."""
         with np.errstate(over="ignore", invalid="ignore"):
@@ -195,7 +199,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
           e: errors of the task, (num_envs, n).
         """
         there = np.ones(self.num_envs, bool) if mask is None else mask
-        times = np.where(there, self.samples * self.setting.scenario.control_period, 0.0)
+        times = np.where(there, self.times, 0.0)
         return {"time": times, "_time": there, "error": np.where(there[:, None], e, 0.0), "_error": there.copy()}
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:

@@ -353,7 +353,7 @@ def broken(y, gain, m):
         (lambda: chattering(smc.Scenario(plant="duffing", law="classical"), plant="duffing"), "give one of them"),
         (lambda: chattering("clasical", plant="duffing"), "classical"),
         (lambda: chattering("classical"), "chattering lacks plant"),
-        (lambda: chattering("classical", plant="panda"), "about x = 0, and joint 'joint4' of panda is from -3.0718"),
+        (lambda: chattering("classical", plant="panda"), "about x = 0, and joint 'joint4' of panda moves from -3.0718"),
         (lambda: describing_function("classical", -1.0, 3.0), "amplitude is -1"),
         (lambda: describing_function("classical", 1.0, 3.0, 0), "samples is 0"),
         (lambda: describing_function("classical", 1.0, 3.0, True), "samples is True"),

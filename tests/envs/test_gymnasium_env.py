@@ -13,7 +13,7 @@ from helpers.episodes import EVERY, LAW, SHORT, columns, driven_by_gym, run_of, 
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.envs import registration
+from smc_mujoco.envs import registration, tasks
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 
 gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
@@ -358,11 +358,11 @@ def test_an_arm_tracks_a_reference_of_each_joint():
     np.testing.assert_allclose(ddr, rest - r)
     low, high = np.array([each[1:] for each in arm.ranges]).T
     assert np.all((low < rest - swing) & (rest + swing < high))
-    assert found.reward(r, dr, 300) == pytest.approx(1.0)
+    assert tasks.reward(*found.errors(r, dr, 300)) == pytest.approx(1.0)
     for i in range(7):
         off = np.eye(7)[i]
-        assert found.reward(r + off, dr, 300) < 0.9
-        assert found.reward(r, dr + 5.0 * off, 300) < 0.99
+        assert tasks.reward(*found.errors(r + off, dr, 300)) < 0.9
+        assert tasks.reward(*found.errors(r, dr + 5.0 * off, 300)) < 0.99
     several = [smc.Sine(0.1 * i, 2.0) for i in range(7)]
     own = PlantEnv(arm, "track", {"reference": several, "duration": 0.5}).setting.reference(100)
     np.testing.assert_allclose(own[:7], 0.1 * np.arange(7) * np.sin(0.2))

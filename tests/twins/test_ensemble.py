@@ -74,7 +74,7 @@ def test_the_command_compares_laws_on_every_set(tmp_path):
     for given in (["--plants", "duffing"], ["--conditions", "noise"], ["--gains", "study"]):
         refused = CliRunner().invoke(app, [*words, *given])
         assert refused.exit_code == 2
-        assert "--rig has a plant, parameter sets for conditions, and gains of its laws: leave out" in refused.output
+        assert "--rig brings its own plant, parameter sets and gains: leave out" in refused.output
 
 
 def test_the_command_identifies_from_files(tmp_path):

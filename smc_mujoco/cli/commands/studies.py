@@ -160,8 +160,8 @@ def bench(
     if rig is not None:
         if plants or conditions or condition or gains:
             raise ScenarioError(
-                "--rig has a plant, parameter sets for conditions, and gains of its laws: leave out --plants, "
-                "--conditions, --condition and --gains"
+                "--rig brings its own plant, parameter sets and gains: leave out --plants, --conditions, "
+                "--condition and --gains"
             )
         chosen = None if laws is None else [options.law(text) for text in options.names(laws)]
         scenarios = ensemble.runs(find_rig(rig), chosen, count, "default", length, begin)
