@@ -12,14 +12,13 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.audit.runs import Runs
 from smc_mujoco.studies.audit.verdict import Check, ratio
-from smc_mujoco.studies.papers.gaber.scenarios import LAWS, PLANTS
+from smc_mujoco.studies.papers.gaber.scenarios import LAWS
 
 OURS = LAWS[0]  # the paper's law
 RIVALS = LAWS[1:]  # classical, adaptive, and the paper's HOSMC
 HOSMC = LAWS[3]
 UNCLAMPED = "super_twisting_unclamped"  # as published; in the first gains its integral is clamped
 CONDITIONED = "conditioned_super_twisting"  # not the paper's: without the wind-up of the plain one
-NETWORKS = tuple(plant for plant in PLANTS if plant.endswith("network"))  # the paper does not say which way up
 LONG, PERIOD = 40.0, 5e-3  # s; s, of control and physics: runs near rest, where the smooth law asks no more
 
 
