@@ -2,7 +2,7 @@
 # Makes .venv, the project's own environment: the packages of requirements.lock, which the commands
 # need, and the project itself, editable; then those of one more lock, where an argument names it, as in
 # ./setup.sh requirements-test.lock. Run again, it adds what is missing and leaves the rest.
-# PYTHON names the interpreter (default: python3). What pip says goes to .venv/setup.log.
+# PYTHON names the interpreter (default: python3). What uv and pip say goes to .venv/setup.log.
 set -eu
 cd "$(dirname "$0")"
 python=${PYTHON:-python3}
@@ -34,7 +34,8 @@ create() {
         fail "$python could not make .venv: $(echo "$said" | tail -n 1)"
 }
 
-install() {
+install() { # with uv, five times as fast, where it is on the path and succeeds; else with pip
+    command -v uv >/dev/null && uv pip install --python .venv/bin/python --no-deps "$@" >>.venv/setup.log 2>&1 && return
     .venv/bin/python -I -m pip install --no-deps "$@" >>.venv/setup.log 2>&1 && return
     if grep -qE 'ConnectionError|ConnectTimeout|ReadTimeout|NameResolution|ProxyError' .venv/setup.log; then
         fail "no network: the packages could not be downloaded; pip's output is in .venv/setup.log"

@@ -371,6 +371,7 @@ def test_set_up_without_network_is_one_sentence_and_is_taken_up_again(checkout):
     made = f'"{sys.executable}" -m venv --without-pip --clear .venv && {link}'
     script = f'case "$*" in "-m venv --clear .venv") {made};; *) exec "{sys.executable}" "$@";; esac'
     offline = {"PIP_INDEX_URL": "http://127.0.0.1:9", "PIP_CONFIG_FILE": os.devnull, "PIP_RETRIES": "1"}
+    offline |= {"UV_OFFLINE": "1", "UV_CACHE_DIR": str(checkout / "cache")}
     for _ in range(2):
         done = run("./setup.sh", cwd=checkout, PYTHON=imposter(checkout, script), **offline)
         assert done.returncode == 1
