@@ -284,6 +284,16 @@ def test_a_user_s_other_callback_is_removed_in_a_run_and_restored(name):
     np.testing.assert_array_equal(beside.x, alone.x)
 
 
+def test_mujoco_s_timers_rest_while_a_callback_is_installed_and_go_on_afterwards():
+    model = smc.plant("duffing").load()
+    inside, after = mujoco.MjData(model), mujoco.MjData(model)
+    with mjcb.installed(None), mjcb.installed(None):
+        mujoco.mj_step(model, inside)
+    mujoco.mj_step(model, after)
+    assert inside.timer.number.sum() == after.timer.number.sum() > 0
+    assert inside.timer.duration.sum() == 0.0 < after.timer.duration.sum()
+
+
 @pytest.mark.parametrize("control", [None, foreign], ids=["none", "a Python function"])
 @pytest.mark.parametrize("at", [10, 15, 20])
 def test_runs_whose_callback_is_taken_away_fail_from_there_on(control, at, monkeypatch):

@@ -485,6 +485,7 @@ def test_a_failing_run_says_the_same_alone_in_company_and_in_python(function):
     beside = plainly([scenario(), *many, scenario()])
     said = [trace.failure for trace in beside[1:-1]]
     assert said == [plainly(one).failure for one in many] == [reference.run(one).failure for one in many]
+    said = [re.sub(r"expected a nonnegative input, got [-.\d]+", "math domain error", words) for words in said]  # 3.14
     assert all(words == SAYS[function].format(s=words.partition("s = ")[2].partition(" in ")[0]) for words in said)
     assert [trace.failure for trace in (beside[0], beside[-1])] == [None, None]
 

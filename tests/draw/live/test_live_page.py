@@ -356,6 +356,7 @@ def test_it_fits_a_phone(seen, page, scheme):
     wide = page.viewport_size
     page.set_viewport_size(PHONE)
     page.emulate_media(color_scheme=scheme)
+    seen.drawn()
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
     paper = page.evaluate("getComputedStyle(document.body).backgroundColor")
     light = sum(map(int, re.findall(r"\d+", paper)[:3])) > 3 * 128
