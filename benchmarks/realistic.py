@@ -15,7 +15,7 @@ import time
 import mujoco
 from rich.console import Console
 from rich.table import Table
-from speed import ROUNDS, STEPS, chunk, ratio, seconds, stepping
+from speed import BARE, ROUNDS, STEPS, chunk, ratio, seconds, stepping
 
 import smc_mujoco as smc
 from smc_mujoco.simulation.model import parts
@@ -59,13 +59,13 @@ def cases(plant: str) -> dict[str, smc.Scenario]:
 
 
 def measure(scenario: smc.Scenario) -> tuple[float, float]:
-    """Steps a second on two threads, and the seconds of the callback path over those of bare mj_step, on one."""
+    """Steps a second on two threads, and the seconds of the callback path over those of a bare mj_step, on one."""
     steps = STEPS // 4
-    together = stepping(chunk(scenario, RUNS, THREADS), steps, bare=False)
+    together = stepping(chunk(scenario, RUNS, THREADS), steps)
     together()
     rate = RUNS * steps / statistics.median(seconds(together, time.perf_counter) for _ in range(ROUNDS))
     alone = chunk(scenario, 4)
-    return rate, ratio(stepping(alone, steps, bare=False), stepping(alone, steps, bare=True))[2]
+    return rate, ratio(stepping(alone, steps), stepping(alone, steps, BARE))[2]
 
 
 if __name__ == "__main__":

@@ -4,9 +4,14 @@
 
 Times are of the processor, so that other work on the machine counts little; those of two threads are elapsed. A ratio
 is the median over rounds that alternate between the two sides. A peer that is not installed is left out by name.
+
+MuJoCo's timers rest during a run. So a run's step is compared with mj_step as everybody calls it, with timers, and with
+a bare step without them, which shows what the callback takes.
 """
 
+import contextlib
 import dataclasses
+import functools
 import importlib.util
 import statistics
 import sys
@@ -20,6 +25,7 @@ from rich.console import Console
 from rich.table import Table
 
 import smc_mujoco as smc
+from smc_mujoco.common import mjcb
 from smc_mujoco.simulation.batch import Chunk
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.prepare import prepare
@@ -27,6 +33,8 @@ from smc_mujoco.simulation.prepare import prepare
 QUICK = "--quick" in sys.argv
 ROUNDS = 3 if QUICK else 9
 STEPS = 2_000 if QUICK else 10_000
+BARE = functools.partial(mjcb.installed, None)  # neither the callback nor MuJoCo's timers
+TIMED = contextlib.nullcontext  # mj_step with its timers
 console = Console()
 
 
@@ -54,8 +62,10 @@ def chunk(scenario: smc.Scenario, runs: int, threads: int = 1) -> Chunk:
         return Chunk([prepare(dataclasses.replace(scenario, seed=seed)) for seed in range(runs)], threads)
 
 
-def stepping(batch: Chunk, steps: int, bare: bool) -> Callable[[], None]:
-    """Steps of a batch from its first state, with the callback or bare."""
+def stepping(
+    batch: Chunk, steps: int, within: Callable[[], contextlib.AbstractContextManager] = installed
+) -> Callable[[], None]:
+    """Steps of a batch from its first state, with the callback, BARE or TIMED."""
     start, records = batch.batch.state.copy(), batch.records.copy()
     numbers = [packed.numbers.copy() for packed in batch.packed]
 
@@ -63,17 +73,14 @@ def stepping(batch: Chunk, steps: int, bare: bool) -> Callable[[], None]:
         batch.batch.state[:], batch.records[:] = start, records
         for packed, first in zip(batch.packed, numbers, strict=True):
             packed.numbers[:] = first
-        if bare:
+        with within():
             batch.batch.step(nstep=steps)
-        else:
-            with installed():
-                batch.batch.step(nstep=steps)
 
     return action
 
 
 def callback_against_mj_step(table: Table) -> None:
-    """The same model, stepped with and without the callback, one thread."""
+    """The same model, stepped with and without the callback, and with MuJoCo's timers, one thread."""
     disturbed = {"noise": smc.Noise(position=0.01, velocity=0.05), "disturbance": smc.Sine(0.2, 5.0)}
     for name, fields, targets in (("alone", {}, (1.08, 1.08)), ("with noise and disturbance", disturbed, (1.20, 1.10))):
         for integrator, target in zip(("Euler", "RK4"), targets, strict=True):
@@ -81,15 +88,16 @@ def callback_against_mj_step(table: Table) -> None:
                 smc.paper.scenario("inverted_pendulum", "super_twisting"), integrator=integrator, **fields
             )
             batch = chunk(scenario, 16)
-            with_law, bare, r = ratio(stepping(batch, STEPS, bare=False), stepping(batch, STEPS, bare=True))
             per = 1e6 / (16 * STEPS)
-            row(table, f"callback / mj_step, {integrator}, {name}", with_law * per, bare * per, r, f"<= {target}")
+            for other, within, goal in (("mj_step", TIMED, f"<= {target}"), ("bare mj_step", BARE, "")):
+                with_law, without, r = ratio(stepping(batch, STEPS), stepping(batch, STEPS, within))
+                row(table, f"callback / {other}, {integrator}, {name}", with_law * per, without * per, r, goal)
 
 
 def threads(table: Table) -> None:
     """Simulated steps per second on two threads against one."""
     scenario = smc.paper.scenario("inverted_pendulum", "super_twisting")
-    one, two = (stepping(chunk(scenario, 64, n), STEPS // 4, bare=False) for n in (1, 2))
+    one, two = (stepping(chunk(scenario, 64, n), STEPS // 4) for n in (1, 2))
     a, b, r = ratio(one, two, time.perf_counter)
     per = 1e6 / (64 * (STEPS // 4))
     row(table, "1 thread / 2 threads", a * per, b * per, r, ">= 1.8")
@@ -101,7 +109,7 @@ def networks(table: Table) -> None:
     for n in (1000, 100):
         law = smc.law("observer_free", lam=2.922, k1=6.19)
         scenario = smc.Scenario(plant=smc.plant("pendulum_network", n=n), law=law, duration=1.0)
-        actions.append(stepping(chunk(scenario, 1000 // n), STEPS // 50, bare=False))
+        actions.append(stepping(chunk(scenario, 1000 // n), STEPS // 50))
     a, b, r = ratio(*actions)
     per = 1e6 / (1000 * (STEPS // 50))
     row(table, "network n = 1000 / n = 100, per pendulum", a * per, b * per, r, "<= 1.3")
@@ -110,7 +118,7 @@ def networks(table: Table) -> None:
 def peers(table: Table) -> None:
     """One simulation with a controller, as each package's users write it; microseconds per simulated step."""
     ours = chunk(smc.paper.scenario("inverted_pendulum", "super_twisting"), 1)
-    mine = stepping(ours, STEPS, bare=False)
+    mine = stepping(ours, STEPS)
     for name, module, make in (
         ("dm_control suite pendulum", "dm_control", dm_control_steps),
         ("gymnasium InvertedPendulum", "gymnasium", gymnasium_steps),

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import typer
+from helpers.episodes import dm_control_suite
 from helpers.pages import PAGES, ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
@@ -62,6 +63,8 @@ def test_there_is_something_to_test():
 def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, block, tmp_path, monkeypatch):
     if "smc.still" in block and gl.missing():
         pytest.skip(gl.missing())
+    if "dm_control_env" in block:
+        dm_control_suite()
     if "import gymnasium" in block:
         pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
     if "law_from_fmu" in block:

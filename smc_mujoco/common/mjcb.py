@@ -3,8 +3,8 @@
 A process has one set of callbacks, eight of them. A run installs the control callback and removes the others, so that a
 trace depends only on its scenario. Afterwards all are restored.
 
-MuJoCo reads the clock some 25 times in each evaluation of the forces, to fill `mjData.timer`. That is 16 to 40 % of the
-time of a step. So a run has a time callback that reads no clock, and its `mjData.timer` holds no durations.
+MuJoCo reads the clock some 25 times in each evaluation of the forces, to fill `mjData.timer`. That took 16 to 40 %
+of the time of a step. So a run has a time callback that reads no clock, and its `mjData.timer` holds no durations.
 
 MuJoCo cannot compile a model while a callback is a Python function, because it would call that function with a model
 that Python does not know. The reference loop installs such a function. The compiled callback is native code, with

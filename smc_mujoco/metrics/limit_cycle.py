@@ -83,8 +83,10 @@ def _order(rates: np.ndarray, spectrum: np.ndarray, first: int, peak: int, perio
     order, largest = 1, sizes[peak]
     for k in range(2, round(periods / PERIODS) + 1 if periods >= 3 * PERIODS else 4):
         at = round(periods / k)
-        own = at >= first and abs(_refined(rates, at) - periods / k) < SAME and spectrum[at] > LINE * spectrum[peak]
-        if sizes[at] > largest and (own or at < PERIODS):
+        if sizes[at] <= largest:
+            continue
+        strong = at >= first and spectrum[at] > LINE * spectrum[peak]
+        if at < PERIODS or (strong and abs(_refined(rates, at) - periods / k) < SAME):
             order, largest = k, sizes[at]
     return order
 
