@@ -66,7 +66,7 @@ bench: ## speed, beside bare MuJoCo and other packages
 lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages
 	@command -v $(UV) >/dev/null || { echo "make lock needs uv: see docs.astral.sh/uv" >&2; exit 1; }
 	$(LOCK) pyproject.toml --extra dm --extra film --extra report --extra rl --group use -o requirements.lock
-	@# what requirements.lock has already is left out of the others, but for what it has for Windows alone
+	@# the other locks leave out what requirements.lock has, except what it has only for Windows
 	beside="-c requirements.lock $$(sed -n "/== 'win32'/!s/^\([a-z0-9.-]*\)==.*/--no-emit-package \1/p" requirements.lock)"; \
 	$(LOCK) pyproject.toml --extra all --group test --group check $$beside -o requirements-test.lock && \
 	$(LOCK) pyproject.toml --extra live $$beside -c requirements-test.lock -o requirements-live.lock && \

@@ -59,7 +59,7 @@ def cases(plant: str) -> dict[str, smc.Scenario]:
 
 
 def measure(scenario: smc.Scenario) -> tuple[float, float]:
-    """Steps a second on two threads, and the seconds of the callback path over those of a bare mj_step, on one."""
+    """Steps per second on two threads, and on one thread the time of the callback path over that of a bare mj_step."""
     steps = STEPS // 4
     together = stepping(chunk(scenario, RUNS, THREADS), steps)
     together()

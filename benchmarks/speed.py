@@ -5,8 +5,8 @@
 Times are of the processor, so that other work on the machine counts little; those of two threads are elapsed. A ratio
 is the median over rounds that alternate between the two sides. A peer that is not installed is left out by name.
 
-MuJoCo's timers rest during a run. So a run's step is compared with mj_step as everybody calls it, with timers, and with
-a bare step without them, which shows what the callback takes.
+MuJoCo's timers are off during a run. So a step of a run is compared with two steps without a law: a plain mj_step, with
+timers, and a bare one without them. The bare one shows what the callback takes.
 """
 
 import contextlib

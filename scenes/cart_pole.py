@@ -3,7 +3,7 @@
 One force, two joints: the cart is driven, the pole only measured. The law (W. Wang et al. 2004) brings S = 0, a mixture
 of a surface for the cart and one for the pole; it knows the plant's equation, in which nothing rubs.
 
-Look for: the cart runs 0.9 m after the falling pole, then home. Friction at the hinge is not matched: where the pole
+Look for: the cart runs 0.9 m after the falling pole, then back. Friction at the hinge is not matched: where the pole
 sticks, a little off the vertical, the cart walks on until it comes loose, though S is 0. More than 0.016 N m is beyond
 the gain k, and S leaves 0 as well.
 """
@@ -23,7 +23,7 @@ def upright(trace):
 def answer(runs):
     return (
         f"pole and cart come to rest with {runs.those().named}; the pole comes to rest with "
-        f"{runs.those(upright).named}; the cart ends farthest from home with {runs.most('ultimate_bound')}"
+        f"{runs.those(upright).named}; the cart ends farthest from 0 with {runs.most('ultimate_bound')}"
     )
 
 

@@ -5,7 +5,7 @@ the surface s = b'P z of least quadratic cost. They differ in how they come to s
 layer, by super-twisting, or by u = -s, which is the linear quadratic regulator.
 
 Look for: all are up in 1.2 s. Where the arm rubs, the regulator and the layer rock it to and fro; the relay chatters
-anyway. Super-twisting stands still, once its integral holds the friction.
+anyway. Under super-twisting it comes to rest, once the integral balances the friction.
 """
 
 import smc_mujoco as smc

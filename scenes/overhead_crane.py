@@ -1,4 +1,4 @@
-"""What does it cost to keep a crane's load from swinging while its trolley goes home?
+"""What does it cost to keep a crane's load from swinging while its trolley goes to x = 0?
 
 The hierarchical law (W. Wang et al. 2004) on S = a (x' + c1 x) + q' + c2 q with three weights a of the trolley against
 the rope's angle q, from x = 1 m, at rest.

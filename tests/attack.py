@@ -46,7 +46,7 @@ from smc_mujoco.simulation.state import LOGGED
 START = 600.0  # s in which a process is ready, compiling included
 LIMIT = 60.0  # s a case may take; what computes on after a wrong-typed call is ended after LONG and counts as accepted
 LONG = 2.0  # s
-SLICE = 10_000  # cases a process at most; each process compiles the laws that it meets anew, for a minute
+SLICE = 10_000  # cases a process at most; each process compiles its laws again, for a minute
 MOST = 400  # physics steps times channels of a run that is played
 HERE = Path(__file__).parent
 SCRIPT = __file__  # what a child runs
@@ -297,7 +297,7 @@ def calls(random: Random) -> str:
         return "refused"
     except Long:
         return "computes"
-    except BaseException as error:  # SystemExit too, but for what is a script's end
+    except BaseException as error:  # SystemExit too, unless it ends a script
         if name == "play" and isinstance(error, SystemExit):
             return "refused"
         raise Found(f"{_where(error)} from {told}: {_first(error)}") from None

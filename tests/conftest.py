@@ -51,7 +51,7 @@ QUICK = {
     "testing/test_step_responses.py",
 }
 
-# Files that take longest: more than about 10 s. They come first, so that no core is left with one.
+# Files that take longest: more than about 10 s. They run first, so that at the end no core has to wait for one.
 LONG = {
     "analysis/test_chattering.py",
     "analysis/test_gains_for.py",
@@ -98,7 +98,7 @@ def pytest_collection() -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Exclude present objects from garbage collections, each of which would take half a second to look at them."""
+    """Exclude the present objects from garbage collection, which would take half a second each time to visit them."""
     gc.enable()
     gc.freeze()
 

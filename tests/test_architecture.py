@@ -48,7 +48,7 @@ def label(path: Path) -> str:
 
 
 def imported(path: Path) -> set[str]:
-    """Dotted names of our modules that a file imports, wherever in it, but for type checkers alone."""
+    """Dotted names of our modules that a file imports, anywhere in it, except those only for type checkers."""
     found, tree = set(), ast.parse(path.read_text())
     tree.body = [n for n in tree.body if not (isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING")]
     for node in ast.walk(tree):

@@ -72,7 +72,7 @@ SEVERAL += [range(3), range(10**9), [[]], [[1]], {"M": 1.3}, {"mass": math.nan},
 SEVERAL += [nested(50_000), [Shy()], {Shy: Shy()}, [1, "a"], [[1, 2], [3]], [1.0] * 1000, {"x": {}}, [True, False]]
 OTHERS = [None, ..., NotImplemented, int, float, str, object, object(), Shy(), Awkward(), Shy, print, len, math, smc]
 OTHERS += [lambda: 1, lambda *a, **k: None, lambda x: x, Path("a"), Path("a.npz"), ValueError("x"), type, slice(1)]
-MADE: list[Callable[[], Any]] = [  # made anew for each use
+MADE: list[Callable[[], Any]] = [  # made again for each use
     lambda: iter([]),
     lambda: iter([1.0, 2.0]),
     lambda: (x for x in ("a", "b")),
@@ -237,7 +237,7 @@ def actuator(random: Random) -> list:
 
 
 def fields(random: Random) -> dict[str, Any]:
-    """The arguments of a Scenario; each is sane but for one in forty."""
+    """The arguments of a Scenario; one in forty is not sane."""
     step, held = random.choice([1e-3, 5e-4, 2e-3, 1e-4, 1 / 3000, 0.01]), random.randint(1, 4)
     where = value(random) if random.random() < 1 / 40 else plant(random)
     n = where.n if isinstance(where, smc.Plant) else 1
@@ -290,7 +290,7 @@ def starts(random: Random, n: int) -> Any:
 
 
 def gridded(random: Random, fields: dict[str, Any]) -> list[smc.Scenario]:
-    """The fields as a condition of one's own, alone, with one of the suite's or as text, on a grid of two seeds."""
+    """The fields as a user's condition, by itself, with one of the suite's or as text, on a grid of two seeds."""
     left = {name: held for name, held in fields.items() if name not in ("plant", "law", "duration", "model", "surface")}
     seeds = [0, left.pop("seed", 7)]
     ours = random.choice(sorted(NAMED))

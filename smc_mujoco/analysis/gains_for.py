@@ -167,7 +167,7 @@ def _scaled(law: Component, size: float, speed: float) -> Component:
 
 
 def _strength(base: Scenario) -> float:
-    """Return how many times larger the forces among the gains can be: until the first is the actuator's limit."""
+    """Return the factor by which the forces among the gains can grow, until the first reaches the actuator's limit."""
     law, plant, u_max = base.law, base.plant, min(base.limits)
     rest, p, with_model = np.zeros(plant.n), plant.values({}), base.resolved.model == "nominal"
     accelerations = (u * abs(plant.nominal(rest, rest, i, p)[1]) for i, u in enumerate(base.limits))

@@ -186,7 +186,7 @@ def _doubled(largest: float) -> tuple[float, ...]:
 
 def _critical_delay(base: Scenario) -> float | None:
     estimated = base.resolved.velocity.name != "measured"
-    lam_k1 = None if base.actuator or estimated else linearisation.local(base.law)  # neither is in the theory
+    lam_k1 = None if base.actuator or estimated else linearisation.local(base.law)  # not in the theory
     return None if lam_k1 is None else theory.critical_delay(base.plant, *lam_k1, base.control_period)
 
 

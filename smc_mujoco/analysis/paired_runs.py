@@ -155,7 +155,7 @@ def _check_alike(table: Columns, columns: Mapping[str, np.ndarray]) -> None:
             what, one, two = difference
             raise ScenarioError(
                 f"runs of {cell[0]}, {cell[1]}, seed {cell[2]} are not alike: {what} is {shown(one)} under {known} and "
-                f"{shown(two)} under {law}: give runs that differ in the law alone"
+                f"{shown(two)} under {law}: give runs that differ only in the law"
             )
 
 

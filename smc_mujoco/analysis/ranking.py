@@ -136,8 +136,7 @@ def compare(
     """Compare every law with every other in every block.
 
     Args:
-      scores: law -> (blocks, n) or (n,), lower is better, inf for never. NaN, for all laws alike, where there is no
-        run.
+      scores: law -> (blocks, n) or (n,), lower is better, inf for never. NaN where no law has a run.
       floors: one for all blocks, or one for each, see `Comparison`.
       shares, level: see `Comparison`.
       outcomes: law -> a number per cell, equal if the law had the same result from two seeds. Default: all runs differ.
@@ -171,7 +170,7 @@ def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray
     cells = np.stack(each)
     missing = np.isnan(cells)
     if (missing != missing[0]).any() or missing[0].all(axis=0).any() or missing[0].all(axis=1).any():
-        raise ScenarioError(f"scores of {shown(laws)} lack different cells, or a seed: give nan to all laws alike")
+        raise ScenarioError(f"scores of {shown(laws)} lack different cells, or a seed: give nan to all laws")
     return laws, cells
 
 

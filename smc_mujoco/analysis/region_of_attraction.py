@@ -7,21 +7,23 @@
 
 All channels of a network start from the same state. x is not wrapped: a pendulum at rest a turn away has not converged.
 
-The rule. X and V are the largest |x| and |v| of the grid, and e = x - r is the error. A run is home while |e| <= 2 % of
-X and |v| <= 2 % of V on every channel, and near while its distance (e/X)^2 + (v/V)^2 is below (0.2 %)^2, a tenth of
-that. Every state is run for 15 % of the duration. Undecided states are run again, from the beginning, for 40 %, and the
-rest for the whole duration. (Runs are deterministic. All this costs at most 1.55 times a whole run.)
-- It converges, early: home throughout the last third of the run, with a distance that is smaller by a tenth in the
-  second half of this third than in the first; or near in the second half. Near the reference the size does not matter,
-  because a law that switches leaves a ripple. But a state that starts near must shrink: a run that leaves slowly is
-  near for long.
-- It does not converge, early: the run failed, or x, v and u stand still in that third, to 1e-6 of X, V and u_max (of
-  the largest |u|, if u has no bound), away from home.
-- At the end: it converges if it is home throughout the last 20 % of the run and is near, or its distance grows by less
-  than 5 %. It does not if it is never home in that part. Otherwise it is undecided. A run that leaves more slowly, 2.5
-  % a second in runs of 10 s, counts as one that stays.
+The rule. X and V are the largest |x| and |v| of the grid, and e = x - r is the error. A run is in the band while
+|e| <= 2 % of X and |v| <= 2 % of V on every channel. It is near while its squared distance (e/X)^2 + (v/V)^2 is below
+(0.2 %)^2, a tenth of the band. Every state is run for 15 % of the duration. Undecided states are run again, from the
+beginning, for 40 %, and the rest for the whole duration. (Runs are deterministic. All this costs at most 1.55 times a
+whole run.)
+- Early, a run converges if it is in the band throughout the last third of the run, and its largest squared distance in
+  the second half of this third is smaller by a tenth than in the first, or near. Near the reference the distance need
+  not decrease, because a law that switches leaves a ripple. If a run starts near, the distance must decrease, because a
+  run that leaves slowly is near for long.
+- Early, a run does not converge if it failed, or if it rests outside the band in that third: x, v and u change by less
+  than 1e-6 of X, V and u_max (of the largest |u|, if u has no bound).
+- At the end, a run converges if it is in the band throughout the last 20 % of the run, and in the second half of this
+  part it is near, or its largest squared distance is at most 5 % larger than in the first. It does not converge if it
+  is never in the band in that part. Otherwise it is undecided. A run that leaves more slowly, at 2.5 % a second in runs
+  of 10 s, counts as one that stays.
 
-Early verdicts are no proofs, because a run that is home and shrinking might leave later. Tests compare them with whole
+Early verdicts are no proofs, because a run that approaches in the band might leave later. Tests compare them with whole
 runs. `basin` integrates with implicitfast, four times as fast as RK4, with a difference of 1e-3 rad or m, less than a
 fiftieth of a cell.
 """
@@ -51,8 +53,9 @@ from smc_mujoco.simulation.trace import Trace
 HORIZONS = (0.15, 0.4, 1.0)  # of the duration: chosen
 LATE = 3  # an early verdict considers the last third of a run
 BATCH_BYTES = 48 * 2**20  # of traces in memory at once, about
-STILL = 1e-6  # of X, V and u_max
-LEAVING, SHRINKING, NEAR = 1.05, 0.9, (0.1 * BAND) ** 2  # of the distance (e/X)^2 + (v/V)^2: two factors, a size
+STILL = 1e-6  # of X, V and u_max: changes of a run that rests
+LEAVING, SHRINKING = 1.05, 0.9  # factors of the squared distance (e/X)^2 + (v/V)^2
+NEAR = (0.1 * BAND) ** 2  # squared distance
 TURN = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}  # X of a plant, chosen
 PACE = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
 MIN_SAMPLES = 10  # of the shortest runs: then each half of their last fifth has one
@@ -197,19 +200,19 @@ def judge(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None
     e = error(trace)
     distance = np.maximum(np.abs(e / far[0]), np.abs(trace.v / far[1])).max(axis=1)
     late = last(trace) if final else slice(-(distance.size // LATE), None)
-    home = distance[late] <= BAND
+    inside = distance[late] <= BAND
     square = ((e / far[0]) ** 2 + (trace.v / far[1]) ** 2).sum(axis=1)
     start, square = square[0], square[late]
     middle = square.size // 2
     sooner, later = square[:middle].max(), square[middle:].max()
     near = NEAR if final or start > NEAR else 0.0
-    stays = home.all() and later <= max((LEAVING if final else SHRINKING) * sooner, near)
+    stays = inside.all() and later <= max((LEAVING if final else SHRINKING) * sooner, near)
     if final or stays:
-        return CONVERGES if stays else UNDECIDED if home.any() else DOES_NOT
+        return CONVERGES if stays else UNDECIDED if inside.any() else DOES_NOT
     moved = np.stack([np.ptp(signal[late], axis=0).max() for signal in (trace.x, trace.v, trace.u)])
     u_max = float(np.max(trace.scenario.resolved.u_max))
     limits = STILL * np.array([*far, u_max if math.isfinite(u_max) else np.abs(trace.u).max()])
-    return DOES_NOT if (moved <= limits).all() and not home.any() else None
+    return DOES_NOT if (moved <= limits).all() and not inside.any() else None
 
 
 def load(path: str | os.PathLike) -> Basin:

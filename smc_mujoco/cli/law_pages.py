@@ -86,7 +86,7 @@ def print_pages(name: str | None, console: Console) -> None:
             table.add_row(template.name, *degrees, Text(formula), Text(brief(parts.source)))
         console.print(table, "")
     one, some = ("smc-mujoco laws NAME", "cyan"), ("smc-mujoco laws --needs continuous,two-gains", "cyan")
-    console.print(Text.assemble("One in full: ", one, ". Only some: ", some))
+    console.print(Text.assemble("One law in full: ", one, ". Only some laws: ", some))
 
 
 def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str | None, console: Console) -> None:

@@ -37,7 +37,7 @@ def _fail(sentence: str, code: int = 2) -> None:
 
 
 class Terminal(Console):
-    """The console of a command, which also measures its time. It does not read markup in texts.
+    """The console of a command, which also measures its time. It prints brackets as they are, not as markup.
 
     Args:
       prints: name of a result file to print on stdout instead of keeping it; all else then goes to stderr. "" for none.

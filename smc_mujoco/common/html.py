@@ -1,6 +1,6 @@
 """Short tables, curves, pictures and films as HTML, which notebooks show.
 
-They have no colours of their own: text and lines take the colour of the page, light or dark. All text is escaped,
+They set no colours: text and lines take the colour of the page, light or dark. All text is escaped,
 except `Html`.
 """
 

@@ -37,6 +37,12 @@ from smc_mujoco.common.rebuild import rebuild
 
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
 DIGEST = hashlib.sha256().digest_size
+# Beginnings of lines in numba's errors that say where an error was, not what it was.
+WHEREABOUTS = re.compile(
+    r"Failed in|No implementation|There are|- Of which|Overload|Intrinsic|With argument|Rejected|"
+    r"TypingError: Failed|raised from|During|File |>>>|\[1\]|def |\^|<source"
+)
+COLOURS = re.compile(r"\x1b\[[\d;]*m")  # numba writes them if NUMBA_COLOR_SCHEME is set
 
 # When numba loads a function from its cache, it imports the function's module. If that module cannot be imported, such
 # as a scene file, numba stores the name of a placeholder instead. Registering the placeholder lets numba import it.
@@ -292,18 +298,8 @@ class Uncompiled:
     why: str
 
 
-# Beginnings of lines in numba's errors that say where an error was, not what it was.
-WHEREABOUTS = re.compile(
-    r"Failed in|No implementation|There are|- Of which|Overload|Intrinsic|With argument|Rejected|"
-    r"TypingError: Failed|raised from|During|File |>>>|\[1\]|def |\^|<source"
-)
-
-
-COLOURS = re.compile(r"\x1b\[[\d;]*m")  # numba writes them if NUMBA_COLOR_SCHEME is set
-
-
 def reason(error: Exception) -> str:
-    """Return the line of a compiler's error that says what is wrong. It may quote a user's texts."""
+    """Return the line of a compiler's error that says what is wrong, printable even if it quotes a user's text."""
     lines = [line.strip() for line in COLOURS.sub("", str(error)).splitlines() if line.strip(" ^~.")]
     telling = [line for line in lines if not WHEREABOUTS.match(line)]
     return printable((telling or lines or [type(error).__name__])[0].removeprefix("TypingError: "))

@@ -1,10 +1,10 @@
 """Ownership of MuJoCo's callbacks, and the compiling of models while a callback is installed.
 
-A process has one set of callbacks, eight of them. A run installs the control callback and removes the others, so that a
-trace depends only on its scenario. Afterwards all are restored.
+A process has one set of eight callbacks. A run installs the control callback and a time callback, and removes the other
+six, so that a trace depends only on its scenario. Afterwards all are restored.
 
-MuJoCo reads the clock some 25 times in each evaluation of the forces, to fill `mjData.timer`. That took 16 to 40 %
-of the time of a step. So a run has a time callback that reads no clock, and its `mjData.timer` holds no durations.
+MuJoCo reads the clock about 25 times in each evaluation of the forces, to fill `mjData.timer`. That takes 16 to 40 % of
+a plain `mj_step`. The time callback of a run reads no clock, so the durations in `mjData.timer` are 0.
 
 MuJoCo cannot compile a model while a callback is a Python function, because it would call that function with a model
 that Python does not know. The reference loop installs such a function. The compiled callback is native code, with
@@ -41,9 +41,9 @@ if hasattr(os, "register_at_fork"):
 
 @contextlib.contextmanager
 def installed(control: Any) -> Iterator[None]:
-    """Install this control callback, or None, and no other, for the length of a with block; MuJoCo's timers rest.
+    """Install a control callback, or None, and `no_clock` during a with block, and remove all other callbacks.
 
-    Afterwards all callbacks are restored. Other threads wait, because their runs would continue without their laws.
+    Afterwards all are restored. Other threads wait, because their runs would continue without their laws.
     """
     with _lock:
         before = _callbacks()
@@ -56,7 +56,7 @@ def installed(control: Any) -> Iterator[None]:
 
 @functools.cache
 def no_clock() -> Any:
-    """Return a C function for MuJoCo's time callback that returns 0. With None MuJoCo would read the system's clock."""
+    """Return a time callback, a C function that returns 0. Without one, MuJoCo would read the system's clock."""
     from numba import types
 
     from smc_mujoco.common import jit

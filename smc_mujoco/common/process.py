@@ -9,7 +9,7 @@ from typing import Any
 
 
 def free_after_fork(lock: Any) -> None:
-    """Let a fork wait until no other thread holds a lock. In the child that thread is gone, and would never free it."""
+    """Let forks wait until no other thread holds a lock, which no thread of the child would ever release."""
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(before=lock.acquire, after_in_parent=lock.release, after_in_child=lock.release)
 
@@ -21,7 +21,7 @@ class TimedOut(Exception):
 def _kill(process: subprocess.Popen[str]) -> None:
     """Kill a process and every process that it started.
 
-    On POSIX the process must have been started in a session of its own.
+    On POSIX the process must have been started in a new session.
     """
     if hasattr(os, "killpg"):
         with contextlib.suppress(ProcessLookupError):

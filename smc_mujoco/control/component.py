@@ -99,7 +99,7 @@ class Component:
       function: None if a loaded trace names one that is not available.
       joint: whether it is a law of many joints.
       shared: gains of which a law of many joints has one number for all joints.
-      each: the laws of the driven channels, where they are not the same law; then this has no function of its own.
+      each: the laws of the driven channels, where they are not the same law; then `function` is None.
       template: the Template it was made from; None if that is not available.
     """
 
@@ -190,7 +190,7 @@ def _value(name: str, value: object, **limits: Any) -> Value:
             raise ScenarioError(f"{name} is {shown(value)}: give a number, or one for each driven channel")
         return tuple(number(f"{name}[{i}]", one, **limits) for i, one in enumerate(listed))
     if isinstance(value, Mapping | Set):
-        raise ScenarioError(f"{name} is {shown(value)}: give a number, or a list of one for each driven channel")
+        raise ScenarioError(f"{name} is {shown(value)}: give a number, or a list with one for each driven channel")
     return number(name, value, **limits)
 
 

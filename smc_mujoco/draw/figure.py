@@ -31,7 +31,7 @@ BESIDE = ("phase", "transient", "end")
 PANELS = (*OVER_TIME, "channels", *BESIDE)
 ROW = 1.5  # inches on a full page, height of a panel over time
 HEIGHTS = {"phase": 1.5, "transient": 1.0, "end": 1.0}  # relative heights of the panels in BESIDE
-Row = tuple[Axes, Panel, Sequence[str]]  # axes, what they show, and the colours of its traces
+Row = tuple[Axes, Panel, Sequence[str]]  # axes, the panel with the traces that they show, and the traces' colours
 LOW, FILLED = 0.32, 0.6  # relative height of a row, in a panel that has one for each trace; the part below its name
 
 
@@ -198,9 +198,9 @@ def _draw_over_time(
 
 
 def _rows(page, cell: SubplotSpec, panel: Panel, names, colours, share: Axes | None = None) -> tuple[Axes, list[Row]]:
-    """Return axes for a panel: the one that has its label, and all with the traces that each shows and their colours.
+    """Return the axes that have the label of a panel, and its rows.
 
-    A crowded panel has a row for each trace, under its name.
+    A crowded panel has a row for each trace, under the trace's name. Others have one row.
     """
     if not drawing.crowded(panel):
         ax = page.add_subplot(cell, sharex=share)
@@ -217,7 +217,7 @@ def _rows(page, cell: SubplotSpec, panel: Panel, names, colours, share: Axes | N
 
 
 def _level(frame: Axes, rows: Sequence[Row]) -> None:
-    """Give the rows of a panel the range of the runs that last, and ticks near its ends; a single row keeps its own."""
+    """Give all rows of a panel the range of the runs that last, and ticks near its ends. Keep a single row as it is."""
     if len(rows) == 1:
         return
     lasting = [ax for ax, part, _ in rows if part.traces[0].diverged_at is None]
@@ -228,7 +228,7 @@ def _level(frame: Axes, rows: Sequence[Row]) -> None:
         ax.set(ylim=(low, high), yticks=[places[0], places[-1]])
     for ax, *_ in rows[:-1]:
         ax.tick_params(labelbottom=False, length=0)
-    frame.tick_params(labelcolor="none", length=0)  # its label stands beside these, as if they were seen
+    frame.tick_params(labelcolor="none", length=0)  # invisible numbers, which keep its label beside those of the rows
 
 
 def _draw_small(page, cell: SubplotSpec, small, colours, changes) -> None:

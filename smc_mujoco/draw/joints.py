@@ -24,7 +24,8 @@ from smc_mujoco.simulation.trace import Trace
 WIDE, SLIM = (4, 3), (2, 3)  # panels in a row of a page, and of a narrow one: the number that leaves fewer cells empty
 ROW = 2.0  # inches on a full page
 TICKS = 62.0  # points on a full page, room for the numbers at the left of a panel
-AIR = 0.2  # of a panel's height, above its curves: for words on a run that leaves it
+TITLE, WORDS = 10.0, 8.5  # points on a full page, letters of a panel's title, and of words on a run that leaves it
+AIR = 0.2  # of a panel's height, above its curves: room for these words
 HALO = 0.8  # opacity of the paper behind these words
 
 
@@ -54,33 +55,33 @@ def joints(
     """
     traces = [finite(trace) for trace in style.same_plant(traces)]
     names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
-    several, marks = shown(traces), style.marks(traces, names)
+    drawn, marks = contents(traces), style.marks(traces, names)
     paths = [] if path is None else pages.files(path, format)
     width, height = pages.measure(size, fig)
-    columns = min(SLIM if width < pages.NARROW else WIDE, key=lambda n: -len(several) % n)
-    rows = -(-len(several) // columns)
+    columns = min(SLIM if width < pages.NARROW else WIDE, key=lambda n: -len(drawn) % n)
+    rows = -(-len(drawn) // columns)
     with style.page(width):
         room = 72 * width / columns - style.points(TICKS)
-        letters = min(style.points(10.0), *(room / style.width(panel.label, 1.0, bold=True) for panel in several))
+        letters = min(style.points(TITLE), *(room / style.width(panel.label, 1.0, bold=True) for panel in drawn))
         page = pages.blank(width, height or style.points(ROW * rows + 0.9), fig)
         grid = page.subplots(rows, columns, sharex=True, squeeze=False)
-        for ax, panel in zip(grid.flat, several, strict=False):
+        for ax, panel in zip(grid.flat, drawn, strict=False):
             draw(ax, panel, names, colours, letters)
             panels.mark(ax, marks, named=False)
         for k, ax in enumerate(grid.flat):
-            ax.set_visible(k < len(several))
-            if k + columns >= len(several):
+            ax.set_visible(k < len(drawn))
+            if k + columns >= len(drawn):
                 ax.set_xlabel("time (s)")
                 ax.tick_params(labelbottom=True)
         look = panels.dotted()
-        happened = [Line2D([], [], **look, label=f"{what} at {time:g} s") for time, what in marks.items()]
+        events = [Line2D([], [], **look, label=f"{what} at {time:g} s") for time, what in marks.items()]
         title = title or style.plant_name(traces[0].scenario.plant)
-        pages.set_head(page, width, title, [*pages.run_handles(traces, names, colours), *happened])
+        pages.set_head(page, width, title, [*pages.run_handles(traces, names, colours), *events])
         pages.write(page, paths)
     return page
 
 
-def shown(traces: Sequence[Trace]) -> list[Panel]:
+def contents(traces: Sequence[Trace]) -> list[Panel]:
     """Return the panels: the error of each joint, and what the tip does."""
     groups, found = list(style.split(traces)), []
     for group in groups:
@@ -96,7 +97,7 @@ def shown(traces: Sequence[Trace]) -> list[Panel]:
 def draw(ax: Axes, panel: Panel, names: Sequence[str], colours: Sequence[str], letters: float) -> None:
     """Draw a panel, with a title of `letters` points.
 
-    A run that is far off leaves the panel. Its name and largest value stand at the top.
+    A run that is far off leaves the panel. Its name and its largest value are printed at the top.
     """
     panels.over_time(ax, panel, colours)
     ax.set_xlim(0.0, end(panel.traces))
@@ -109,7 +110,7 @@ def draw(ax: Axes, panel: Panel, names: Sequence[str], colours: Sequence[str], l
         ax.set_ylim(low, high + AIR * (high - low))
         name, most = panels.outside(panel, names)
         room = 72 * ax.get_position().width * ax.figure.bbox.width / ax.figure.dpi
-        size = style.points(8.5)
+        size = style.points(WORDS)
         words = style.cropped(name, 0.95 * room - style.width(most, size), size) + most
         look = {"fontsize": size, "color": colours[away], "ha": "right", "va": "top", "parse_math": False}
         look["bbox"] = {"facecolor": style.PAPER, "alpha": HALO, "lw": 0, "pad": 0.5}

@@ -28,7 +28,7 @@ SIDES = (2.0, 100.0)  # inches, shortest and longest
 NARROW = 6.0  # inches: narrower pages have one column of panels
 LETTERS, TITLE = 11.0, 17.0  # points on a full page
 SAMPLE, GAPS = 1.6, 2.3  # of a legend's entry, in heights of its letters: its sample, and the space around its words
-SHARE = 0.55  # widest entry of a legend, of the page
+SHARE, WHOLE = 0.55, 0.95  # widest entry of a legend, of the page: in several columns, and in a single one
 Handle = Line2D | Patch
 Size = str | tuple[float, float] | None
 
@@ -107,14 +107,14 @@ def head(width: float, handles: Sequence[Handle]) -> float:
 
 
 def _wrapped(handles: Sequence[Handle], width: float) -> list[str]:
-    """Return the labels of a legend, each on up to two lines; as wide as the page if it has one column anyway."""
+    """Return the labels of a legend, each on up to two lines. In a single column they may be as wide as the page."""
     size, labels = style.points(LETTERS), [str(handle.get_label()) for handle in handles]
 
     def wrapped(share: float) -> list[str]:
         return [style.wrapped(label, share * 72 * width - (SAMPLE + GAPS) * size, size, lines=2) for label in labels]
 
     narrow = wrapped(SHARE)
-    return narrow if columns(narrow, width) > 1 else wrapped(0.95)
+    return narrow if columns(narrow, width) > 1 else wrapped(WHOLE)
 
 
 def _widest(words: str, size: float) -> float:
@@ -145,7 +145,7 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
 
 
 def run_handles(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) -> list[Handle]:
-    """Return the entries of a legend for runs: a line each, and how it failed if it did."""
+    """Return the entries of a legend for runs: a line and a label for each, and when it failed if it did."""
     handles: list[Handle] = []
     for trace, name, colour in zip(traces, names, colours, strict=True):
         how = style.ending(trace)

@@ -32,14 +32,14 @@ COLUMNS = 360  # of a panel
 LAST_SAMPLES = 60  # control samples in the close-up of u
 MIN_CLOSE_UP = 0.02  # height of the close-up, as a share of the largest |u|: hides round-off; chosen
 MAX_LIGHT = 9  # channels of a network that are drawn one by one
-LASTING = 0.98  # quantile of |reaction| that a panel shows in full; larger values are blows; chosen
+LASTING = 0.98  # quantile of |reaction| that a panel shows in full; larger values are impacts; chosen
 MAX_RESTS = 12  # marked in a phase portrait
 SPACING = 1 / 200  # of points in a phase portrait, as a share of its diagonal
 MAX_SMALL = 12  # channels that each have two small panels
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
 LEAVING = 0.6  # points, width of a curve that leaves its panel
 COINCIDENT = 0.02  # of a panel's height, about the width of a line: curves no farther apart are dashed in turn
-MOSTLY = 0.99  # of the samples of curves that coincide; chosen: controls that switch a sample apart do
+MOSTLY = 0.99  # of the samples of curves that coincide, so that controls that switch a sample apart do; chosen
 DASH = 5.0  # widths of a line
 WIDE, MAX_BANDS = 0.2, 2  # mean height of a wide band, of a panel's; more of them need a row each; chosen
 VISIBLE = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
@@ -55,7 +55,9 @@ OF_ARMS = {  # quantities of arms, one number a sample -> what an axis says
 }
 THOUSANDTHS = ("worst", "joint")  # of arms, in thousandths of the group's unit
 UNBANDED = ("x", "e", "spread", *OF_ARMS)  # drawn sample by sample, without a mean over time
-ALONE = 8.0  # times the errors of all other runs: a run so far off leaves the panel instead of flattening them; chosen
+FAR_OFF = 8.0  # times the values of every other run: such a run leaves the panel instead of flattening them; chosen
+UNDIVERGED = 0.8  # of a run whose plant diverged: the part that sets the range of a panel if no run lasts; chosen
+MARGIN = 0.08  # of a panel's height, above and below its curves
 
 REFERENCE, BACKLASH = "reference", "backlash"  # ids of a reference's lines, and of a gear's play
 PLAY = 0.16  # opacity of a gear's play around the reference
@@ -263,7 +265,7 @@ def over_time(
 
 
 def ends_in_failure(trace: Trace) -> bool:
-    """Return whether a trace ends where its run failed: one cut to a close-up may end before."""
+    """Return whether a trace ends where its run failed. A trace that is cut to a close-up may end before."""
     return trace.diverged_at is not None and trace.t[-1] + trace.scenario.control_period > trace.diverged_at - 1e-9
 
 
@@ -273,7 +275,7 @@ def cross() -> dict[str, Any]:
 
 
 def dotted() -> dict[str, Any]:
-    """Return the look of the line at which a plant changes or an arm is hit."""
+    """Return the look of the line that marks when a plant changes or an arm is hit."""
     return {"color": style.INK, "lw": style.points(0.9), "ls": (0, (2, 2))}
 
 
@@ -390,7 +392,7 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
 def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Sequence[Sequence[int]]) -> None:
     """Draw v over x of traces, and of a reference that moves.
 
-    A ring is the start of a trace, a diamond a sample in `held`, where friction holds it.
+    A ring marks the start of a trace, a diamond a sample in `held`, at which friction holds it.
     """
     drawn = list(zip(traces, colours, held, phase_dashes(traces), strict=True))
     for trace, colour, samples, dash in reversed(drawn):
@@ -479,7 +481,7 @@ def last_samples(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], peri
     for (t, u), colour, dash in reversed(list(zip(lines, colours, dashes(lines, ax.get_ylim()), strict=True))):
         ax.step(t, u, where="post", color=colour, lw=style.points(LINE), ls=dash)
     if all(trace.diverged_at is not None for trace in traces):
-        words = "the run failed" if len(traces) == 1 else "no run lasted"
+        words = "the run failed" if len(traces) == 1 else "all runs failed"
         ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center", color=style.MUTED)
         ax.tick_params(labelleft=False)
     ax.set_xlim(1e3 * (begin - stop), 0.0)
@@ -516,21 +518,21 @@ def lasting(traces: Sequence[Trace], name: str) -> dict[int, np.ndarray]:
     values = {k: QUANTITIES[name](trace) for k, trace in enumerate(traces)}
     found = {k: y for k, y in values.items() if traces[k].diverged_at is None}
     if not found:
-        found = {k: y[: max(1, int(0.8 * len(y)))] if traces[k].plant_diverged else y for k, y in values.items()}
+        found = {k: y[: max(1, int(UNDIVERGED * len(y)))] if traces[k].plant_diverged else y for k, y in values.items()}
     return {k: y for k, y in found.items() if np.isfinite(y).all()}
 
 
 def far_off(traces: Sequence[Trace], name: str) -> int | None:
-    """Return the index of the one run that is too far off for a panel of an arm to show in full; or None."""
+    """Return the index of the run that would flatten all others in a panel of an arm, or None."""
     sizes = {k: float(np.abs(y).max()) for k, y in lasting(traces, name).items()} if name in OF_ARMS else {}
     if len(sizes) < 2:
         return None
     *_, second, largest = sorted(sizes, key=lambda k: sizes[k])
-    return largest if sizes[largest] > ALONE * sizes[second] > 0.0 else None
+    return largest if sizes[largest] > FAR_OFF * sizes[second] > 0.0 else None
 
 
 def outside(panel: Panel, names: Sequence[str]) -> tuple[str, str]:
-    """Return which run leaves a panel of an arm and how far: "Time-delay sliding", ": up to 310"; else two ""."""
+    """Return the name of the run that leaves a panel, and how far: "Time-delay sliding", ": up to 310"; else "", ""."""
     away = far_off(panel.traces, panel.quantity)
     if away is None:
         return "", ""
@@ -553,5 +555,5 @@ def limits(traces: Sequence[Trace], name: str) -> tuple[float, float]:
         low, high = min(low, r.min(initial=low)), max(high, r.max(initial=high))
     if name == "e":
         low, high = min(low, 0.0), max(high, 0.0)
-    air = 0.08 * (high - low) or 1.0
+    air = MARGIN * (high - low) or 1.0
     return low - air, high + air

@@ -304,7 +304,7 @@ def _blow(push: Push) -> tuple[float, str]:
 
 
 def _by_time(events: Sequence[Sequence[tuple[float, str]]], names: Sequence[str]) -> dict[float, str]:
-    """Return what happens at each time, from the events of each run; with the runs' labels if only some have it."""
+    """Return time in s -> what happens, from the events of each run, with the runs' labels if only some have it."""
     found: dict[tuple[float, str], list[str]] = {}
     for name, happened in zip(names, events, strict=True):
         for event in dict.fromkeys(happened):
@@ -339,7 +339,7 @@ def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
 
 
 def wrapped(text: str, room: float, size: float, lines: int) -> str:
-    """Return the text on so many lines at most, broken between words; an ellipsis is at the end of one too long.
+    """Return the text on at most `lines` lines, broken between words, with an ellipsis at its end if it is too long.
 
     A number and a short word after it, such as its unit, stay together.
     """

@@ -59,17 +59,17 @@ class Agent:
     Attributes:
       episode: the environment's Episode, which counts the samples.
       loop: the reference loop of the scenario with the law in it. Only its controller is used.
-      begun: `episode.begun` when it acted last.
+      latest: number of the episode in which it acted last; 0 before its first action.
     """
 
     def __init__(self, episode: Episode, loop: reference.Loop):
-        self.episode, self.loop, self.begun = episode, loop, 0
+        self.episode, self.loop, self.latest = episode, loop, 0
 
     def __call__(self, observation: Any) -> np.ndarray:
         """Return the action for an observation: of dm_env a TimeStep or its mapping, of gymnasium an array."""
         loop, k, n = self.loop, self.episode.sample, self.loop.scenario.plant.n
-        if k == 0 or self.begun != self.episode.begun:
-            self.begun = self.episode.begun
+        if k == 0 or self.latest != self.episode.episodes:
+            self.latest = self.episode.episodes
             for component in filter(None, (loop.law, loop.surface, loop.estimator)):
                 component.memory[:] = 0.0
             loop.latest[:] = 0.0  # the last commands, part of the nominal model of coupled channels

@@ -184,7 +184,7 @@ class Episode:
 
     Attributes:
       setting: the plant with its task.
-      begun: number of episodes that have begun.
+      episodes: number of episodes that have begun.
       sample: control samples since the episode began.
       first: output of the first of two drives in series, (driven,).
       rubbing: a friction by a formula, or None.
@@ -194,7 +194,7 @@ class Episode:
 
     def __init__(self, setting: Setting):
         self.setting, self.sample, self.first, self.over = setting, 0, np.zeros(setting.shape), False
-        self.begun = 0
+        self.episodes = 0
         self.x = self.v = np.zeros(setting.scenario.plant.n)
         self.rubbing = setting.rubbing()
 
@@ -203,7 +203,7 @@ class Episode:
         x, v = self.setting.draw(random, options)
         mujoco.mj_resetData(self.setting.model, data)
         self.setting.place(data.qpos, data.qvel, x, v)
-        self.begun, self.sample, self.first[:] = self.begun + 1, 0, 0.0
+        self.episodes, self.sample, self.first[:] = self.episodes + 1, 0, 0.0
         if self.rubbing:
             self.rubbing.begin([0])
         self.look(data)
@@ -222,10 +222,10 @@ class Episode:
         self.over = bool(self.setting.lost(self.x, self.v)) or bool(self.rubbing and self.rubbing.failed[0])
 
     def assess(self) -> tuple[float, dict[str, Any]]:
-        """Return the reward of the state, in [0, 1], and an info.
+        """Return the reward of the state, in [0, 1], and the info of gymnasium.
 
-        The info has "time", s since the start, and "error", the task's e of each channel, (n,). After a divergence the
-        error is NaN and the reward 0.
+        The info has "time", s since the start, and "error", the e of the task in each channel, (n,). After a divergence
+        the error is NaN, and the reward is 0.
         """
         time = self.sample * self.setting.scenario.control_period
         if self.over:

@@ -120,21 +120,22 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         """
         if not self.randoms:
             raise ScenarioError("no episode has begun: call reset first")
-        anew, mode = self.over.copy(), self.metadata["autoreset_mode"]
-        if anew.any() and mode is AutoresetMode.DISABLED:
-            raise ScenarioError(f"the episode of copy {np.argmax(anew)} is over: reset it with the option reset_mask")
+        restarts, mode = self.over.copy(), self.metadata["autoreset_mode"]
+        if restarts.any() and mode is AutoresetMode.DISABLED:
+            over = np.argmax(restarts)
+            raise ScenarioError(f"the episode of copy {over} is over: reset it with the option reset_mask")
         commands = self.setting.command(actions, (self.num_envs,))
-        terminated = self.advance(None if not anew.any() else np.flatnonzero(~anew).astype(np.int32), commands)
+        terminated = self.advance(np.flatnonzero(~restarts).astype(np.int32) if restarts.any() else None, commands)
         self.samples += 1
-        if anew.any():
-            self.begin(anew)
-            terminated[anew] = False
+        if restarts.any():
+            self.begin(restarts)
+            terminated[restarts] = False
         x, v = self.state()
         terminated |= self.setting.lost(x, v)
         truncated = self.samples >= self.last
         e, w = self.errors()
         with np.errstate(over="ignore", invalid="ignore"):
-            rewards = np.where(terminated | anew, 0.0, reward(e, w))
+            rewards = np.where(terminated | restarts, 0.0, reward(e, w))
         e[terminated] = np.nan
         observations, self.over = self.observe(terminated), terminated | truncated
         final, times = {}, self.times
@@ -193,14 +194,15 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         return np.array(e), w
 
     def infos(self, e: np.ndarray, mask: np.ndarray | None = None) -> dict[str, Any]:
-        """Return the infos of `Episode.assess`, of all copies or where `mask`, (num_envs,) of bool, is true.
+        """Return the infos of `Episode.assess` for the copies in a mask, as gymnasium joins them.
 
         Args:
           e: errors of the task, (num_envs, n).
+          mask: (num_envs,) of bool; None for all copies.
         """
-        there = np.ones(self.num_envs, bool) if mask is None else mask
-        times = np.where(there, self.times, 0.0)
-        return {"time": times, "_time": there, "error": np.where(there[:, None], e, 0.0), "_error": there.copy()}
+        known = np.ones(self.num_envs, bool) if mask is None else mask
+        times = np.where(known, self.times, 0.0)
+        return {"time": times, "_time": known, "error": np.where(known[:, None], e, 0.0), "_error": known.copy()}
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """Return positions and velocities of all copies, (num_envs, n) each."""

@@ -3,7 +3,7 @@
 Levenberg's method with MuJoCo's Jacobians: dx = J' (J J' + mu)^-1 e, mu = |e|^2 / 100, at most 0.3 rad or m a step.
 It converges quadratically where J has full rank, and stays bounded where the arm is stretched. MuJoCo's Jacobians are
 exact and at hand; a package such as mink would add a solver of quadratic programs, which this problem does not need.
-Joints keep to their ranges. Joints without a channel stay where runs start.
+Joints stay within their ranges. Joints without a channel stay in the pose in which runs start.
 """
 
 import dataclasses

@@ -135,7 +135,7 @@ class Plant:
       contacts: kind of contact -> edit of the MjSpec that adds its obstacles and contact pairs.
       mechanisms: name -> Variant, which realises the equation, or a part of it, by other means.
       underactuated: whether it has channels without an actuator, which come after those with one.
-      goal: where its free joints shall come to rest, (free,), rad or m; empty: at 0.
+      goal: where its free joints should come to rest, (free,), rad or m; empty: at 0.
       placed: parameter -> its value in the geometry of the contacts, which another value would not fit.
       direct: whether disturbances act on its joints, not on the bodies that they carry.
       smooth: whether its model has no limits, contacts, dry friction and equality constraints.

@@ -9,7 +9,7 @@ windows of one period, of half the range of s less its mean over a period.
 
 There is no limit cycle where
 
-- s does not oscillate, but for rounding;
+- s does not oscillate, except by rounding;
 - the harmonics of the peak have less than a tenth of the spectrum, as in noise, or in the irregular steps of a coarse
   encoder, or no more than leaks from slow waves;
 - the peak may be a harmonic of a larger cycle with fewer than five periods;

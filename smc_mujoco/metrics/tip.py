@@ -77,7 +77,7 @@ def tip_path(plant: Plant, x: np.ndarray, factors: Mapping[str, float] | None = 
 def tip_paths(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
     """Return the actual and the wanted path of the tip, m, (K + 1, 3) each, read-only. Raises like `tip_path`.
 
-    The actual one is that of the true plant, the wanted one that of the nominal plant.
+    The actual path is that of the true plant, the wanted path that of the nominal plant.
     """
     scenario, jump = trace.scenario, _jump_sample(trace)
     parts = (trace.x[:jump], 0), (trace.x[jump:], scenario.jump_step)
@@ -153,7 +153,7 @@ def contacts(trace: Trace) -> Contacts:
 
 
 def _jump_sample(trace: Trace) -> int:
-    """Return the first sample of a trace at or after the jump of its scenario; the number of samples without one."""
+    """Return the first sample at or after the jump of a trace's scenario, or the number of samples without a jump."""
     scenario = trace.scenario
     return len(trace.t) if scenario.jump is None else -(-scenario.jump_step // scenario.steps)
 

@@ -55,7 +55,7 @@ class Chunk:
         for i, scenario in enumerate(scenarios):
             qpos[i], qvel[i] = assembly.start(self.model, scenario)
         self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
-        # Fields that the first scenario sets in the shared model, with their values for scenarios that do not set them.
+        # Fields that the first scenario sets in the shared model, with the values for scenarios that do not set them.
         set_fields = assembly.field_values(self.compiled, first, 0)
         self.untouched = {name: array(self.compiled, name) for name in set_fields}
         self.errors: dict[int, str] = {}
@@ -177,7 +177,7 @@ class Chunk:
 def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
     """Return why a simulation failed, from Python's exception, whose text compiled functions lack.
 
-    The function that failed is called once more, in Python, with the inputs in its record, so the text depends only on
+    The function that failed is called again, in Python, with the inputs in its record, so the text depends only on
     the run. Return None if it does not fail again, because it had already changed its memory.
     """
     n = s.plant.n
@@ -221,7 +221,7 @@ def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
 
 
 def call_law(s: Resolved, record: np.ndarray, packed: Packed, memory: np.ndarray) -> tuple[float, float]:
-    """Call the law that failed once more. Return the u and s that it returned before."""
+    """Call the law that failed again. Return the u and s that it returned before."""
     n, i = s.plant.n, int(state.view(packed.numbers, int(record["joints"]), (1,))[0])
     function = reference.PythonComponent(s.law, n)
     function.memory = memory

@@ -205,7 +205,7 @@ class Scenario:
         return tuple(getattr(self, one.name) for one in dataclasses.fields(self) if one.init)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}  # a copy resolves anew
+        return {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}  # a copy resolves again
 
     @functools.cached_property
     def resolved(self) -> "Resolved":
@@ -435,7 +435,7 @@ def check_signals(s: Resolved) -> None:
     for name, signal in [*(("disturbance", d) for d in s.disturbance), ("feedforward", s.feedforward)]:
         if isinstance(signal, PerChannel):
             raise ScenarioError(
-                f"{name} has a signal for each channel, and only a reference may: give one signal for all"
+                f"{name} has a signal for each channel, which only a reference may have: give one signal for all"
             )
     for push in [d for d in s.disturbance if isinstance(d, Push)]:
         find(f"body of {s.plant.name} in a Push", push.body, dict.fromkeys(bodies(s.plant)))

@@ -67,7 +67,7 @@ class Signal:
 
 @dataclasses.dataclass(frozen=True)
 class PerChannel(Signal):
-    """A reference of its own for each driven channel. A scenario makes it of several references."""
+    """A separate reference for each driven channel. A scenario makes it of several references."""
 
     signals: tuple[Signal, ...]
 
@@ -222,8 +222,9 @@ class Push(Signal):
     """A force in space on the centre of mass of one body, in the shape of a half sine: a blow on the arm.
 
     (x, y, z) sin(pi (t - time) / width) for time <= t <= time + width, else 0: of impulse 2 width / pi times the peak.
-    A trace's d does not show it where disturbances act on joints, as on the panda and on users' models. Elsewhere d has
-    what acts on the joint of the body: the force along a slide, or the torque of its horizontal part about a hinge.
+    On plants whose disturbances act on joints, as on the panda and on users' models, a trace's d does not contain the
+    push. On others, d has its effect on the body's joint: the force along a slide, or the torque of its horizontal part
+    about a hinge.
 
     Attributes:
       body: its name in the model.

@@ -42,7 +42,7 @@ STEPS, LOG_STEPS, RUNS = 500_000, 1_000_000, 1000
 LOOP_SLOWDOWN = 40  # of the reference loop against compiled laws, roughly
 UNDER_WAY = 1000  # most batches sent to workers and not finished; chosen
 ADDRESS = "dask://"
-LOGGERS = "distributed", "distributed.client", "tornado.application"  # those of dask that have a level of their own
+LOGGERS = "distributed", "distributed.client", "tornado.application"  # those of dask that set their own level
 WAIT = 10.0  # s, for a scheduler, and for its first worker; chosen
 
 Outcome = dict[str, Any]
@@ -245,7 +245,7 @@ def opened(executor: str | Executor) -> Iterator[Executor]:
 
 
 class _DaskExecutor(Executor):
-    """A dask client's workers. `Client.get_executor()` waits for ever if the scheduler dies."""
+    """A dask client's workers. `Client.get_executor()` waits forever if the scheduler dies."""
 
     def __init__(self, client: Any):
         self.client = client

@@ -111,7 +111,7 @@ def _codes(s: Scenario, plants: Hashes) -> list[str]:
 def _plant_codes(plant: Plant) -> list[str]:
     """Return hashes of a user's plant: of its functions, and of the model, which its build may read from a file.
 
-    For a plant of this package, hashes only of the functions that a user replaced.
+    For a plant of this package, return only hashes of the functions that a user replaced.
     """
     builds = *plant.contacts.items(), *plant.mechanisms.items()
     if plant.build.__module__.startswith(PACKAGE):
@@ -121,7 +121,7 @@ def _plant_codes(plant: Plant) -> list[str]:
 
 
 def _of_a_user(thing: Any) -> bool:
-    """Return whether a function, or one in nested tuples, is not of this package."""
+    """Return whether a function is not of this package, or any function in nested tuples is not."""
     if isinstance(thing, tuple):
         return any(map(_of_a_user, thing))
     return callable(thing) and not thing.__module__.startswith(PACKAGE)

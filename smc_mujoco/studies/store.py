@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 GROUP = 4096  # rows in memory at once while the table is written; chosen
-PARTS_HELD = 64  # parts in memory, likewise
+PARTS_HELD = 64  # parts in memory at once while the table is written; chosen
 ABANDONED = 3600.0  # s, age of temporary files that belong to a killed study; chosen
 PART = re.compile(r"[0-9a-f]{32}\.parquet")
 

@@ -132,7 +132,7 @@ def _cell(text: str) -> float:
 
 
 def of_trace(trace: Trace, columns: Columns) -> Record:
-    """Return a run as a record with a rig's columns: positions have noise and rounding, but no delay or losses."""
+    """Return a run as a record with a rig's columns. Positions have noise and rounding, but no delay and no losses."""
     s, sensor = trace.scenario, trace.scenario.sensor
     offset = columns.offset or (0.0,) * len(columns.x)
     record = {columns.time: trace.t, columns.u: trace.u[:, 0]}

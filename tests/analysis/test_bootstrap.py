@@ -1,4 +1,4 @@
-"""Intervals of medians: their two ends are treated alike, and another seed draws other resamples."""
+"""Intervals of medians: their two ends are treated in the same way, and another seed draws other resamples."""
 
 import numpy as np
 

@@ -12,7 +12,7 @@ from smc_mujoco.metrics.limit_cycle import of_trace
 LAG = {"actuator": smc.Lag(0.01)}
 
 
-def test_super_twisting_gets_the_largest_gains_that_keep_the_amplitude_in_the_proportion_of_its_theorem():
+def test_super_twisting_gets_the_largest_gains_in_the_proportion_of_its_theorem():
     design = smc.gains_for("super_twisting", "duffing", amplitude=1e-3, **LAG)
     assert 0.99e-3 < design.chattering.amplitude <= 1e-3
     run = smc.run(smc.Scenario(plant="duffing", law=design.law, x0=0.02, duration=6.0, **LAG))

@@ -225,7 +225,7 @@ def test_a_small_disturbance_needs_no_more_than_linear_theory(plant):
 
 
 @each_plant
-def test_what_is_borne_puts_the_plant_where_it_may_just_be(plant):
+def test_the_tolerated_force_moves_the_plant_to_the_limit(plant):
     law, most = own(plant), 0.02
     level = linear_theory.tolerated_force(plant, law, most)
     assert level is not None
@@ -234,7 +234,7 @@ def test_what_is_borne_puts_the_plant_where_it_may_just_be(plant):
 
 @settings(max_examples=15, deadline=None)
 @given(plant=st.sampled_from(PLANTS), k1=st.floats(1.0, 10.0), most=st.floats(1e-3, 0.5))
-def test_what_is_borne_is_the_largest_force_up_to_there(plant, k1, most):
+def test_the_tolerated_force_is_the_largest_up_to_the_limit(plant, k1, most):
     """Of the law's pull less the plant's own, on a grid that ends at `most`."""
     law = smc.law("observer_free", lam=5.0, k1=k1)
     force = linearisation.holding(plant, law)

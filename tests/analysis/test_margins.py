@@ -111,7 +111,7 @@ def test_an_island_between_two_levels_goes_unseen(monkeypatch):
     assert margin.open
 
 
-def test_what_never_fails_is_told_by_value_and_searched_alike(monkeypatch):
+def test_a_run_that_never_fails_has_the_searched_level_as_its_margin(monkeypatch):
     monkeypatch.setitem(margins.MARGIN_KINDS, "nothing", kind_of(lambda base, level: pushed(True)))
     (margin,) = margins.of([pushed(True)], ["nothing"])
     assert (margin.value, margin.searched, margin.resolution, margin.open) == (4.0, 4.0, 0.0, True)
@@ -181,7 +181,7 @@ def test_dry_friction_is_tolerated_beside_what_a_condition_has():
 
 
 def test_linear_theory_is_only_for_the_loop_that_it_describes():
-    """A plant that is pushed or changed, a law that sees a sensor or the model, and another reference."""
+    """None for a plant that is pushed or changed, a law that reads an encoder or the model, or another reference."""
     base = smc.grid("duffing", "observer_free", "nominal")[0]
     others = [{"model": "nominal"}, {"reference": smc.Constant(0.1)}, {"reference": smc.Sine(0.1, 1.0)}]
     cases = [(smc.grid("duffing", "observer_free", "noise")[0], True), (base, True)]

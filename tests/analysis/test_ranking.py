@@ -71,7 +71,7 @@ def ranks(scores, resamples: int = 1999, **options) -> list[Rank]:
 
 
 def within(count: int, runs: int, probability: float) -> bool:
-    """Whether a count is one that a binomial distribution has but for 1 in 10,000."""
+    """Whether a count is one that a binomial distribution has in all but 1 of 10,000 draws."""
     return bool(stats.binomtest(count, runs, probability).pvalue > 1e-4)
 
 
@@ -195,7 +195,7 @@ def test_differences_that_are_rounding_are_ties():
     assert worse(b, a).tolist() == [0.0, 0.0, 1.0, -1.0]
 
 
-def test_the_least_relevant_difference_is_of_the_larger_value_of_the_scale_or_what_the_sensor_tells():
+def test_the_least_relevant_difference_depends_on_value_scale_and_sensor():
     assert least_difference(2.0) == pytest.approx(0.06)
     assert least_difference(2.0, scale=20.0) == pytest.approx(0.1)
     assert least_difference(2.0, scale=20.0, resolution=0.2) == pytest.approx(0.2)
@@ -531,7 +531,7 @@ def test_a_real_table_has_what_a_leaderboard_needs():
 
 
 def checked(boards: list[Board]) -> int:
-    """How many winners boards name, each of them borne out by the numbers that the board shows."""
+    """How many winners boards name, each of them confirmed by the numbers that the board shows."""
     named = 0
     for board in boards:
         for block in board.blocks:

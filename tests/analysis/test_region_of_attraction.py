@@ -68,14 +68,14 @@ def test_a_law_below_the_smallest_lambda_converges_from_nowhere_else():
     assert (found.outcome == DOES_NOT).all()
 
 
-def test_what_creeps_away_from_an_unstable_rest_has_not_converged():
+def test_a_run_that_creeps_away_from_an_unstable_rest_has_not_converged():
     law = smc.law("observer_free", lam=0.23, k1=9.7)  # 0.253 would do
     found = maps.of(base("inverted_pendulum", law, 4.0), [-math.pi, 0.01], [-9.0, 0.0])
     assert found.outcome[1, 1] != CONVERGES
 
 
 @pytest.mark.parametrize(("lam", "k1"), [(0.3, 3.076), (0.95, 1.0)])  # growing by 0.12 and 0.04 per s
-def test_what_leaves_slowly_is_not_taken_for_home_early(lam, k1):
+def test_a_run_that_leaves_slowly_does_not_converge_early(lam, k1):
     plant = smc.plant("duffing")
     assert lam < linear_theory.smallest_lam(plant, k1)
     slow = base("duffing", smc.law("observer_free", lam=lam, k1=k1), 10.0)
@@ -84,7 +84,7 @@ def test_what_leaves_slowly_is_not_taken_for_home_early(lam, k1):
 
 
 @pytest.mark.parametrize("plant", ["duffing", "van_der_pol"])
-def test_what_leaves_slowly_from_near_the_reference_is_not_taken_for_home_early(plant):
+def test_a_run_that_leaves_slowly_from_near_the_reference_does_not_converge_early(plant):
     found = maps.of(base(plant, smc.law("none"), 10.0), [0.0005, 0.001, 2.0], [0.0, 6.0])
     assert (found.outcome != CONVERGES).all()
 
@@ -107,15 +107,15 @@ def test_distance_is_measured_from_the_reference():
     assert maps.of(held, [0.0, 0.6], [0.0, 0.1]).outcome.tolist() == [[CONVERGES] * 2] * 2
 
 
-def test_a_turn_away_is_not_home():
+def test_rest_a_turn_away_does_not_converge():
     found = maps.of(base("inverted_pendulum", smc.law("lqr"), 3.0), [0.0, 2 * math.pi], [0.0])
     assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]]
 
 
-def test_what_swings_in_and_out_of_home_at_the_end_is_undecided():
+def test_a_run_that_swings_through_the_band_at_the_end_is_undecided():
     swinging = base("van_der_pol", smc.law("none"), 10.0)
     found = maps.of(swinging, [2.0], [0.0])
-    assert found.outcome.tolist() == [[DOES_NOT]]  # the limit cycle's speed is never home
+    assert found.outcome.tolist() == [[DOES_NOT]]  # the limit cycle's speed is never in the band
     trace = smc.run(dataclasses.replace(swinging, x0=2.0))
     assert maps.judge(trace, np.array([50.0]), np.array([100.0]), final=True) == UNDECIDED
 
@@ -173,10 +173,10 @@ def test_beyond_the_angle_that_the_torque_can_hold_a_pendulum_at_rest_falls():
     assert found.outcome[0].tolist() == [CONVERGES, DOES_NOT, DOES_NOT]
 
 
-def test_what_has_fallen_over_the_saddle_of_full_torque_does_not_come_back_unless_it_swings_back(weak):
-    """With u = -U, E = J v^2 / 2 + m grav l cos x + U x is constant but for friction; other u take from it on the way.
+def test_a_pendulum_beyond_the_saddle_of_full_torque_comes_back_only_by_a_swing(weak):
+    """With u = -U, only friction changes E = J v^2 / 2 + m grav l cos x + U x; another u lowers it on the way.
 
-    So from beyond the saddle, with less than its E, there is no way back. With more a pendulum swings down and back.
+    So there is no way back from beyond the saddle with less than its E. With more, a pendulum swings down and back.
     """
     p, torque = PENDULUM.parameters, WEAK.gains["lam"]
     inertia, weight = p["m"] * p["l"] ** 2, p["m"] * p["grav"] * p["l"]

@@ -23,7 +23,7 @@ from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.metrics.catalogue import metrics, score
 
 LABEL = "a label that is forty characters in all."
-SCENE = f'''"""Does a scene of one's own run?"""
+SCENE = f'''"""Does a user's scene run?"""
 
 import smc_mujoco as smc
 

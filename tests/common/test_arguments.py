@@ -198,7 +198,7 @@ def test_a_list_without_end_is_refused_before_it_fills_the_memory(trace, call, w
     assert re.match(words, refused(call, trace, Endless()))
 
 
-def test_what_cannot_be_gone_through_is_no_list():
+def test_a_value_that_cannot_be_iterated_is_no_list():
     for x0 in (wild.Awkward(), np.array(0.5)):
         assert refused(smc.grid, "duffing", "none", seeds=x0).startswith("seeds is ")
     assert refused(smc.Scenario, plant="duffing", law="none", x0=wild.Awkward()).endswith(": give a list")

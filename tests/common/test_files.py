@@ -193,7 +193,7 @@ def test_a_damaged_part_of_a_kept_report_is_computed_again(damage, tmp_path):
 
 
 def test_a_file_is_replaced_as_a_whole(tmp_path):
-    """Who has the old file open goes on reading it: nothing is written into it."""
+    """A reader that has opened the old file still reads the old text: nothing is written into that file."""
     path = tmp_path / "a.json"
     path.write_text("old")
     with path.open() as reader:

@@ -1,4 +1,4 @@
-"""Helpers that laws call: this package's are compiled once for all laws, a user's anew with each law."""
+"""Helpers that laws call: this package's are compiled once for all laws, a user's again for each law."""
 
 from collections.abc import Callable
 from typing import Any

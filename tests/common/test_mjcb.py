@@ -1,4 +1,4 @@
-"""Models are compiled whatever control callback is installed, by whichever thread, and nobody waits for ever."""
+"""Models are compiled whatever control callback is installed, by whichever thread, and no thread waits forever."""
 
 import itertools
 import os
@@ -284,7 +284,7 @@ def test_a_user_s_other_callback_is_removed_in_a_run_and_restored(name):
     np.testing.assert_array_equal(beside.x, alone.x)
 
 
-def test_mujoco_s_timers_rest_while_a_callback_is_installed_and_go_on_afterwards():
+def test_timers_are_off_while_a_callback_is_installed_and_on_afterwards():
     model = smc.plant("duffing").load()
     inside, after = mujoco.MjData(model), mujoco.MjData(model)
     with mjcb.installed(None), mjcb.installed(None):

@@ -116,7 +116,7 @@ def test_a_package_is_imported_by_the_use_of_its_entries_alone(install):
 
 
 def test_a_command_that_needs_no_package_imports_none(tmp_path):
-    """In a process of its own, where nothing is imported yet."""
+    """In a separate process, where nothing is imported yet."""
     about = tmp_path / "unasked-1.0.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: unasked\nVersion: 1.0\n")

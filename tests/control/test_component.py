@@ -67,7 +67,9 @@ def test_word_that_cannot_be_drawn_is_refused(option):
 
 @pytest.mark.parametrize("value", [{"shoulder": 1.0}, {1.0, 2.0}])
 def test_gain_that_is_no_list_of_numbers_is_refused(value):
-    with pytest.raises(smc.ScenarioError, match=r"k is {.*: give a number, or a list of one for each driven channel$"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"k is {.*: give a number, or a list with one for each driven channel$"
+    ):
         smc.law("classical", k=value)
 
 

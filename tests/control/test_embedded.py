@@ -223,7 +223,7 @@ def test_a_form_moves_a_plant_as_the_paper_s_law_does(name, plant, runs):
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize("name", FORMS)
 def test_a_form_comes_to_rest_where_the_paper_s_law_does(name, plant, runs):
-    """Exactly, but for fixed point: within two steps of e, 4 / 2^15."""
+    """Exactly, except in fixed point: within two steps of e, 4 / 2^15."""
     step = 4.0 / 2**15 if name == "observer_free_q15" else 5e-7
     exact, form = (runs[plant][n].x[-2000:] for n in ("observer_free", name))
     assert np.abs(form - exact).max() <= 2.0 * step

@@ -170,7 +170,7 @@ def test_an_estimate_of_a_ramp_is_its_slope_and_no_acceleration(name, h):
 
 @pytest.mark.parametrize("name", SECOND)
 def test_an_estimate_of_second_order_is_exact_on_parabolas(name):
-    """The integral chain but for its lag: it gives the velocity of 3 / w before."""
+    """The integral chain, except for its lag: it gives the velocity of 3 / w before."""
     t = np.arange(3000) * H
     late = 0.0
     if name == "integral_chain":
@@ -370,7 +370,7 @@ def test_levant_s_order_on_a_sine_is_its_order(n, steps):
 
 @pytest.mark.parametrize(("n", "most"), [(1, (2.0,)), (2, (2.5, 2.5)), (3, (3.5, 4.5))])
 def test_levant_s_error_under_noise_is_of_the_best_order(n, most):
-    """|z_i - x^(i)| <= c_i eps^((n+1-i)/(n+1)) for L = 1, over three decades of eps; c_i measured, alike throughout."""
+    """|z_i - x^(i)| <= c_i eps^((n+1-i)/(n+1)) for L = 1, over three decades of eps; c_i measured, equal for all."""
     t, rng, constants = np.arange(20_000) * H, np.random.default_rng(1), []
     for eps in (1e-4, 1e-3, 1e-2, 1e-1):
         seen = np.sin(t) + eps * rng.uniform(-1, 1, t.size)

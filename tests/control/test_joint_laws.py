@@ -48,7 +48,7 @@ def test_computed_torque_sliding_reaches_its_layer_at_the_predicted_time():
 
 
 def test_computed_torque_sliding_leaves_width_times_d_over_k():
-    """At rest |s| = width M^-1 d / k and |e| = |s| / c, joint by joint, with gains of its own for each."""
+    """At rest |s| = width M^-1 d / k and |e| = |s| / c, joint by joint, with different gains for each."""
     k, c, width, d = np.array([8.0, 20.0, 15.0]), np.array([4.0, 6.0, 5.0]), 0.1, 0.3
     law = smc.law("computed_torque_sliding", k=k, c=c, width=width)
     trace = run(law, reference=smc.Constant(0.3), disturbance=smc.Constant(d), duration=4.0)

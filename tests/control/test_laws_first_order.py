@@ -322,7 +322,7 @@ def winding(y, gains, memory):
 
 
 def test_observer_free_integral_does_not_wind_up():
-    """A load beyond lam carries the plant away: z stands still. From afar z stays small, and so does the overshoot."""
+    """A load beyond lam carries the plant away: z is constant. From afar, z stays small, and so does the overshoot."""
     law = smc.law("observer_free_integral", lam=2.0, k1=1.0, ki=1.0)
     lost = plant_b(law, constant(3.0), x=(0.0, 0.0))
     assert lost.s[-1] > 10

@@ -30,13 +30,13 @@ STATES = np.random.default_rng(0).normal(scale=(1.0, 2.0), size=(400, 2))
 
 
 def measured(e=0.0, de=0.0, dt=H, **more):
-    """What a law of ours sees with the reference at 0."""
+    """What a law of this package measures with the reference at 0."""
     zero = {"r": 0.0, "dr": 0.0, "ddr": 0.0}
     return Measurement(**({"t": 0.0, "dt": dt, "x": e, "v": de, "e": e, "de": de, "f": 0.0, "g": 1.0} | zero | more))
 
 
 class Ours:
-    """A law, a surface or an estimator of ours with its memory, called like a function."""
+    """A law, a surface or an estimator of this package with its memory, called like a function."""
 
     def __init__(self, component, **more):
         self.function, self.gains, self.more = component.function, reference.gains_of(component), more
@@ -249,7 +249,7 @@ def test_wrong_relative_degree_their_2_sliding_laws_act_on_a_variable_of_degree_
 
 
 def test_the_integral_of_their_integral_surface_is_never_updated():
-    """s = s0(t) - s0(0) for ever: on s = 0, de + c e = c e(0), and the error stays where it began."""
+    """s is s0(t) - s0(0) at all times: on s = 0, de + c e = c e(0), and the error stays where it began."""
     theirs = surfaces.IntegralSlidingSurface(c=2.0)
     values = [theirs.compute(1.0, 0.0, t=k * H) for k in range(1000)]
     assert values == [0.0] * 1000
@@ -261,7 +261,7 @@ def test_the_integral_of_their_integral_surface_is_never_updated():
     assert abs(smc.run(smc.Scenario(plant=free, **common)).x[-1, 0]) < 0.05
 
 
-def test_flipped_sign_their_integral_terminal_law_pushes_away_with_a_reaching_law_of_theirs():
+def test_flipped_sign_their_integral_terminal_law_diverges_with_a_reaching_law():
     """Reaching laws give -k sgn(s); it adds that where s' = ... - u asks for the opposite."""
     own = ride(controllers.ITSMC(), T=3.0)
     given = ride(controllers.ITSMC(reaching=reaching.ExponentialRate(k=5.0, q=3.0)), T=3.0)
@@ -298,7 +298,7 @@ def test_a_negative_period_is_taken_and_runs_the_memory_backwards():
 
 
 def test_their_adaptive_law_ignores_how_fast_the_reference_moves():
-    """On the reference, with its speed, e = de = 0: nothing is to be done, and u = -c x' all the same."""
+    """On the reference, with its speed, e = de = 0: u should be 0, and is -c x'."""
     u, info = controllers.AdaptiveSMC(c=10.0).compute(0.0, np.array([0.3, 2.0]), np.array([0.3, 2.0]))
     assert (info["e"], info["edot"]) == (0.0, 0.0)
     assert u == -20.0
@@ -394,7 +394,7 @@ def test_their_reaching_time_is_the_first_touch_and_the_end_for_never():
 
 
 def test_their_simulator_returns_a_diverged_run_in_silence():
-    """The same instability of ours is named, with its time."""
+    """The same instability of this package's law is named, with its time."""
     lost = ride(controllers.PID(Kp=-500.0, Kd=-500.0), T=2.0)
     assert not np.all(np.isfinite(lost["x"])) or np.abs(lost["x"]).max() > 1e100
     law = smc.law("computed_torque", kp=1e-3, kd=1e-3)

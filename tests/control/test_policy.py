@@ -65,7 +65,7 @@ def test_a_joint_that_nothing_couples_where_it_is_stays_in_the_observation():
     assert [o.tolist() for o in seen] == [[0.1, 0.2], [0.1, 1.5, 0.2, 0.0], [0.1, 1.6, 0.2, 0.0]]
 
 
-def test_the_warning_tells_who_asked_for_a_policy_what_it_costs_and_nothing_of_compilers():
+def test_the_warning_of_a_policy_names_its_cost_and_no_compiler():
     with pytest.warns(smc.PlainLoopWarning) as caught:
         briefly(smc.policy(proportional))
     sentence = str(caught[0].message)
@@ -261,7 +261,7 @@ class Alone:
 
 
 @pytest.mark.parametrize("kind", [Predicts, Alone])
-def test_what_predicts_is_asked_for_its_deterministic_action(kind):
+def test_an_object_that_predicts_gives_its_deterministic_action(kind):
     law = smc.policy(kind())
     assert law.name == kind.__name__
     assert briefly(law).u[0, 0] == -1.5

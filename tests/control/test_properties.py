@@ -114,7 +114,7 @@ def arrival(name):
 
 
 @pytest.mark.parametrize("name", [name for name, law in catalogue().items() if law.finite_time])
-def test_what_arrives_in_finite_time_is_ever_faster(name):
+def test_laws_with_finite_time_approach_ever_faster(name):
     assert arrival(name) < 0.6
 
 
@@ -122,7 +122,7 @@ def test_what_arrives_in_finite_time_is_ever_faster(name):
     "name",
     ["observer_free", "observer_free_third", "boundary_layer", "pid", "lqr", "computed_torque", "barrier_adaptive"],
 )
-def test_what_falls_exponentially_does_not(name):
+def test_laws_that_decay_exponentially_do_not_approach_ever_faster(name):
     assert arrival(name) > 0.7
 
 

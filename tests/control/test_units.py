@@ -14,7 +14,7 @@ from smc_mujoco.control import estimator, surface
 from smc_mujoco.control.estimator import Reading
 
 SYSTEMS = [{"F": 4.0, "X": X, "T": T} for X, T in ((4.0, 1.0), (1.0, 4.0), (16.0, 0.25), (0.25, 0.25))]
-ALIKE = {"predefined_time": [{"F": 1.0, "X": 1.0, "T": T} for T in (4.0, 0.25)]}  # exp(|e|^p) has a unit of its own
+ALIKE = {"predefined_time": [{"F": 1.0, "X": 1.0, "T": T} for T in (4.0, 0.25)]}  # exp(|e|^p) has a special unit
 WAY = np.random.default_rng(0).normal(size=(20, 4))
 
 
@@ -43,7 +43,7 @@ def test_surface_does_the_same_in_every_system_of_units(name):
     for system in ALIKE.get(name, SYSTEMS):
         X, T = system["X"], system["T"]
         s, eq = called(converted(surface.surface(name), system), seen(X, T)).T
-        ratio = s[-1] / plain[-1, 0]  # s has a unit of its own
+        ratio = s[-1] / plain[-1, 0]  # s has its own unit
         np.testing.assert_allclose(s, plain[:, 0] * ratio, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(eq, plain[:, 1] * X / T**2, rtol=1e-9, atol=1e-12)
 

@@ -59,7 +59,7 @@ def arm(tmp_path_factory) -> list[smc.Trace]:
 
 
 def texts(page) -> list[matplotlib.text.Text]:
-    """The words on a page that are seen, but for the numbers of a hidden axis."""
+    """The visible words on a page, without the numbers of a hidden axis."""
     page.draw_without_rendering()
     every = page.findobj(matplotlib.text.Text)
     found = [text for text in every if text.get_visible() and text.get_text().strip() and text.get_color() != "none"]
@@ -114,7 +114,7 @@ def test_words_of_signals_are_apart(one):
 
 
 def curves(ax) -> list:
-    """The lines of traces, but for single channels of several."""
+    """The lines of traces, without those of single channels of several."""
     return [line for line in ax.lines if len(line.get_xdata()) > 20 and line.get_gid() is None and not line.get_alpha()]
 
 
@@ -156,7 +156,7 @@ def test_a_run_that_fails_does_not_set_the_range_of_the_rows_of_others(one):
     assert [len(rows(ax)) for ax in (over_time, end)] == [4, 4]
     assert {row.get_ylim() for row in rows(over_time)} == {panels.limits(three, "u")}
     (cross,) = [line for row in rows(over_time) for line in row.lines if line.get_marker() == "X"]
-    assert cross.get_ydata()[0] in panels.limits(three, "u")  # at the edge: elsewhere it would be out of the panel
+    assert cross.get_ydata()[0] in panels.limits(three, "u")  # at the edge of the range: it lies far outside
     assert max(row.get_ylim()[1] for row in rows(end)) < 0.0
     assert [text.get_text() for row in rows(end) for text in row.texts] == ["the run failed"]
 

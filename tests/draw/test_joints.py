@@ -47,7 +47,7 @@ def test_a_run_far_off_leaves_its_panel_by_name(trace):
     assert page.legends[0].get_texts()[1].get_text() == "lost (failed at 0.2 s)"
     ax = shown(page)[0]
     assert "X" in [line.get_marker() for line in ax.lines]
-    assert not ax.texts  # a failed run does not set the range, in films neither
+    assert not ax.texts  # a failed run does not set the range, here or in films
     assert panels.outside(panels.Panel("tip", next(iter(style.split([trace]))), [trace, lost]), ["a", "b"]) == ("", "")
 
 

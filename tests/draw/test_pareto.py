@@ -59,7 +59,7 @@ def test_writes_svg_and_png_that_name_the_laws_what_they_cost_and_the_axes(pair,
     assert [p.read_bytes() for p in again] == [svg.read_bytes(), png.read_bytes()]
 
 
-def test_nothing_that_was_tried_lies_below_the_staircase_and_the_chosen_gains_are_on_it(pair, page, tmp_path):
+def test_no_tried_gains_lie_below_the_staircase_and_the_chosen_ones_are_on_it(pair, page, tmp_path):
     pareto(pair, tmp_path / "fronts")
     (ax,) = page[0].axes
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")

@@ -1,4 +1,4 @@
-"""Ticks of horizontal axes: labels do not touch, and axes that have ticks of their own keep them."""
+"""Ticks of horizontal axes: labels do not touch, and axes that have their own ticks keep them."""
 
 import itertools
 

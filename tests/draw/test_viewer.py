@@ -106,7 +106,7 @@ def test_untouched_it_is_the_run_that_run_makes(scenario, run, shown):
     assert view.law == scenario.law
 
 
-def test_what_is_shown_is_where_the_run_is(shown, monkeypatch):
+def test_the_viewer_shows_the_present_state_of_the_run(shown, monkeypatch):
     monkeypatch.setattr(live, "MAX_FRAME", 60.0)  # a slow machine shortens no frame
     view, viewer = shown(HARD)
     for _ in range(12):
@@ -250,7 +250,7 @@ def test_the_mouse_pushes_while_it_pulls(shown):
 
     view, viewer = shown(moves=push)
     pushed, untouched = finish(view, viewer), smc.run(DUFFING)
-    impulse = 20.0 * 3 * FRAME  # N s on 1 kg: by so much does v change, but for what the law and the spring do
+    impulse = 20.0 * 3 * FRAME  # N s on 1 kg: v changes by this, and by what the law and the spring do
     assert np.max(np.abs(pushed.v - untouched.v)) == pytest.approx(impulse, rel=0.4)
     assert not view.loop.data.xfrc_applied.any()
 

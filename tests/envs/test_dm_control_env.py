@@ -100,8 +100,8 @@ def test_a_plant_of_one_s_own_starts_as_its_runs_do(tmp_path):
     assert environment.physics.data.qpos[1] == 3.0  # a joint without a channel, where the keyframe has it
 
 
-def test_what_makes_an_environment_waits_for_other_threads_runs_in_the_plain_loop():
-    """Which would go on without their laws: MuJoCo's callback, which it takes away for a moment, is everybody's."""
+def test_making_an_environment_waits_for_runs_in_the_plain_loop():
+    """Otherwise they would continue without their laws, because all threads share MuJoCo's callback."""
     made = threading.Event()
 
     def other():
@@ -198,7 +198,7 @@ def test_a_plant_that_diverges_within_a_step_ends_its_episode_and_the_next_one_b
     assert environment.step([0.0]).first()
 
 
-def test_who_writes_into_an_observation_changes_nothing():
+def test_writing_into_an_observation_changes_nothing():
     environment = suite.load("duffing", "track", random=0)
     for _ in range(2):
         environment.reset()

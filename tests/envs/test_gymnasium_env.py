@@ -140,7 +140,7 @@ def test_a_friction_that_raises_ends_its_episode_and_the_next_one_begins():
         assert ends[0][1] is False
     found = [many.step([[1.0], [0.0]])[2].tolist() for _ in range(40)]
     assert found[0] == [False, False]
-    assert found[found.index([True, False]) + 1] == [False, False]  # the first copy begins anew
+    assert found[found.index([True, False]) + 1] == [False, False]  # the first copy begins a new episode
     with pytest.raises(smc.ScenarioError, match="friction Untyped needs functions that compile, but Untyped does not"):
         PlantEnv("duffing", changes={"friction": Untyped()})
 
@@ -301,7 +301,7 @@ def test_a_copy_that_is_over_starts_anew_and_the_others_go_on():
     assert (rewards_ > 0.0).all()
     o, rewards_, terminated, truncated, _ = many.step(np.ones((3, 1)))
     assert many.samples.tolist() == [0, 16, 0]
-    assert rewards_[0] == rewards_[2] == 0.0 < rewards_[1]  # the step that starts anew gives none
+    assert rewards_[0] == rewards_[2] == 0.0 < rewards_[1]  # a step that begins an episode gives none
     assert (o[[0, 2], 1] == 0.0).all()  # nor does it move
     assert not (terminated | truncated).any()
 
@@ -418,7 +418,7 @@ def test_it_is_seen():
     single = gymnasium.make("smc_mujoco:Duffing-v0", render_mode="rgb_array")
     single.reset(seed=0)
     assert single.render().std() > 5.0
-    assert copy.deepcopy(single.unwrapped).render().std() > 5.0  # with a renderer of its own
+    assert copy.deepcopy(single.unwrapped).render().std() > 5.0  # with its own renderer
     single.close()
 
 

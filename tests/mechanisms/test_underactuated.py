@@ -255,7 +255,7 @@ def test_both_joints_come_to_rest_within_6_newton(name):
 
 
 def test_the_load_is_kept_from_swinging_on_the_way_and_at_the_end():
-    """Beside a law that only brings the trolley home, with the same c1."""
+    """In comparison with a law that only brings the trolley to 0, with the same c1."""
     ours = smc.run(scenario("overhead_crane"))
     trolley = smc.run(scenario("overhead_crane", smc.law("classical", c=LAW.c1, k=1.0), model="none"))
     swing = [np.abs(trace.x[trace.t > 5.0, 1]).max() for trace in (ours, trolley)]
@@ -295,7 +295,7 @@ def test_masses_off_by_a_fifth_are_borne(name, factors):
 
 
 @PLANTS
-def test_a_matched_force_is_borne_up_to_k_and_beyond_it_s_is_left_with_the_rest_over_rate(name):
+def test_a_matched_force_is_tolerated_up_to_k_and_beyond_it_s_is_the_rest_over_rate(name):
     p = smc.plant(name)
     values = SimpleNamespace(**p.parameters)
     (_, g), (_, gq) = (p.nominal(np.zeros(2), np.zeros(2), i, values) for i in (0, 1))
@@ -315,7 +315,7 @@ ROUTH = [  # a L, c1, c2
 
 @PLANTS
 @pytest.mark.parametrize(("aL", "c1", "c2"), ROUTH)
-def test_what_is_left_on_the_surface_is_stable_just_where_its_roots_say(name, aL, c1, c2):
+def test_the_motion_on_the_surface_is_stable_exactly_where_its_roots_say(name, aL, c1, c2):
     """S -> 0 does not suffice: with gains beyond the condition S stays at 0 while both joints run away."""
     L = LENGTH[name]
     a = aL / abs(L)

@@ -405,7 +405,7 @@ def test_a_stuck_joint_may_creep_and_bristles_may_bend():
     assert m.stick_time(run(t, v=np.where(t < 2, 1.0, 1.01e-3), reaction=1.0)) == 0.0
 
 
-def test_what_nothing_holds_does_not_stick():
+def test_a_joint_at_rest_without_friction_does_not_stick():
     t = clock(10, 1e-2)
     assert m.stick_time(run(t, v=np.exp(-5 * t))) == 0.0
     assert m.stick_time(run(t)) == 0.0
@@ -536,7 +536,7 @@ def test_driven_channels_and_free_joints_are_scored_as_if_each_were_alone():
     assert (found["driven"]["overshoot"], found["free"]["overshoot"]) == (0.0, pytest.approx(50.0))
 
 
-def test_times_and_percentages_of_the_motion_are_the_worst_of_cart_and_pole_and_what_has_a_unit_is_the_carts():
+def test_scores_are_the_worst_of_cart_and_pole_and_those_with_a_unit_the_carts():
     trace = cart_and_pole()
     found, ours = m.scores(trace), m.score(trace)
     of_both = {"settling_time", "rise_time", "overshoot", "stick_time", "reversal_rate"}

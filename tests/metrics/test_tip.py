@@ -49,7 +49,7 @@ def test_tip_scores_are_of_the_distance_in_space(trace):
 
 
 def test_the_actual_tip_is_that_of_the_true_plant(trace):
-    """An arm whose last link's length is a parameter: a mismatch moves the tip, and not the wanted one."""
+    """An arm whose last link's length is a parameter: a jump of it moves the actual tip, not the wanted one."""
 
     def fields(model, p):
         yield from trace.scenario.plant.fields(model, p)
@@ -102,7 +102,7 @@ def test_contact_forces_are_those_under_the_runs_disturbance_and_motor():
 
 
 def test_contact_forces_know_a_push(pressed):
-    """The wall's soft normal carries at most a hundredth of it at once, and the rest by depth."""
+    """The wall is soft: at an unchanged depth, its force grows by at most a hundredth of the push."""
     push = smc.Push("link7", x=30.0, time=0.5, width=0.1)
     more = tip.contacts(changed(pressed, disturbance=push)).force - tip.contacts(pressed).force
     assert np.abs(np.delete(more, np.s_[500:601])).max() < 1e-9
@@ -128,7 +128,7 @@ def test_contact_forces_know_a_jump_between_two_samples(pressed):
 
 
 def test_contact_forces_end_with_a_failure(pressed, tmp_path, monkeypatch):
-    """And MuJoCo, which gets no NaN, logs no warning of one."""
+    """MuJoCo gets no NaN, so it writes no warning to its log."""
     monkeypatch.chdir(tmp_path)
     x, applied = pressed.x.copy(), pressed.applied.copy()
     x[800:] = applied[800:] = np.nan
@@ -157,7 +157,7 @@ LIFTED = """
 
 
 def test_joints_without_a_channel_are_where_they_start():
-    """A lift that holds the arm 0.7 m higher than the model's qpos0, also for inverse kinematics."""
+    """A lift holds the arm 0.7 m higher than the model's qpos0, also for inverse kinematics."""
     plant = smc.plant_from(LIFTED, channels=["turn"], keyframe="up", name="lifted", tip="tip")
     np.testing.assert_allclose(tip.tip_path(plant, np.zeros((1, 1))), [[0.5, 0.0, 1.0]])
     (turn,) = smc.cartesian_path(plant, (0, 1), [(0.4, 0.0, 1.3)] * 2, site="tip", x0=[-0.5])

@@ -8,7 +8,7 @@ delay"). A differentiator of order n errs in the i-th derivative by O(eps^((n+1-
 
 The bounds are for the worst noise. White noise sampled at one fixed period is not the worst for every eps, since more
 samples of it average out where the loop is slower. Here the period is in proportion to eps^(1/r), so that the noise is
-alike for every eps, at the loop's own pace.
+the same for every eps, relative to the speed of the loop.
 """
 
 import functools

@@ -4,7 +4,7 @@ The files are those of siconos-tutorials (Apache-2.0), `examples/control/SMC/SMC
 as arrays in ../shared/published. Without them the figures below remain, a few rows of each file.
 
 Both examples run on a free mass here. In the first, x1' = b, x2' = -b + 2 u with b = sin 50 t, the two states do not
-meet: each is the velocity of a mass of its own. Siconos holds b over a step at its value at the step's end, which is
+meet: each is the velocity of a separate mass. Siconos holds b over a step at its value at the step's end, which is
 MuJoCo's Euler step with b advanced by one step.
 """
 

@@ -59,7 +59,7 @@ def test_conditioned_super_twisting_follows_slopes_up_to_k2_and_no_steeper_ones(
 
 
 @pytest.mark.parametrize(("force", "kept"), [(0.95 * BOUND, True), (1.05 * BOUND, False)])
-def test_conditioned_super_twisting_bears_disturbances_up_to_its_bound_and_no_larger_ones(force, kept):
+def test_conditioned_super_twisting_tolerates_disturbances_up_to_its_bound(force, kept):
     (trace,) = run([conditioned(1.05)], u_max=BOUND, disturbance=smc.Constant(force), v0=0.1, duration=40.0)
     assert (residual(trace) < 1e-5) == kept
 

@@ -1,4 +1,4 @@
-"""A law, gains, bound and reference of its own for each channel: both loops, files, keys, and bad input."""
+"""A separate law, gains, bound and reference for each channel: both loops, files, keys, and bad input."""
 
 import dataclasses
 import pickle

@@ -172,7 +172,7 @@ def test_every_parameter_of_a_plant_may_differ_and_jump_within_one_batch(plant):
 
 
 def test_a_jump_at_the_last_step_is_in_the_last_sample():
-    """The gust's lever is longer there."""
+    """The jump makes the lever of the gust longer."""
     gust, jump = smc.Gust(2.0, 0.0, 0.02), smc.Jump(0.00999, {"l": 1.5})
     longer = smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01, disturbance=gust, jump=jump)
     assert longer.jump_step == longer.samples * longer.steps
@@ -435,7 +435,7 @@ def test_a_plant_that_lets_mujoco_reset_itself_still_says_that_it_diverged():
 
 
 class Policy:
-    """A law that no compiler takes, for the reference loop; it may think with a simulation of its own."""
+    """A law that no compiler takes, for the reference loop; it may run its own simulation."""
 
     def __init__(self, think=lambda: None):
         self.think = think
@@ -462,7 +462,7 @@ def test_a_law_that_does_not_compile_takes_the_plain_loop_and_says_so():
 
 
 def test_a_python_law_may_simulate_a_model_of_its_own():
-    """A predictive law steps MuJoCo inside the callback. In a process of its own, since the worst case is an abort."""
+    """A predictive law steps MuJoCo inside the callback. In a separate process, since the worst case is an abort."""
     here = Path(__file__).parent
     env = os.environ | {"PYTHONPATH": f"{here.parent}{os.pathsep}{here}"}
     code = "import test_lockstep as t; t.predict()"

@@ -166,7 +166,7 @@ def process(plant="duffing", **fields):
     return smc.run(smc.Scenario(**(common | fields)))
 
 
-def test_process_noise_of_a_run_knows_neither_physics_step_nor_control_period_nor_integrator():
+def test_process_noise_does_not_depend_on_steps_or_integrator():
     d = process().d
     assert d.std() > 0.1 * SIGMA
     for fields in ({"physics_step": 2.5e-4}, {"integrator": "Euler"}, {"law": "classical"}, {"noise": smc.Noise(1, 1)}):

@@ -235,7 +235,7 @@ def test_scenarios_that_differ_in_numbers_are_one_batch(name, part):
 
 @pytest.mark.parametrize(("name", "kind"), CONTACT_NUMBERS)
 def test_contacts_that_differ_in_numbers_are_one_batch(name, kind):
-    """Also where the first sets a number that a later one leaves to the plant."""
+    """Also if the first scenario sets a number that a later one leaves to the plant."""
     plain_contact = smc.Contact(kind)
     edited = small(name).spec()
     small(name).contacts[kind](edited)
@@ -792,7 +792,7 @@ EVERYTHING = {
 }
 
 
-def test_what_is_left_out_fits_what_is_there():
+def test_defaults_follow_the_fields_that_are_given():
     ideal, realistic = scenario(), scenario(friction=smc.Coulomb(0.1))
     assert (ideal.resolved.integrator, ideal.resolved.physics_step) == ("RK4", 1e-3)
     assert (realistic.resolved.integrator, realistic.resolved.physics_step) == ("implicitfast", REALISTIC_STEP)

@@ -39,7 +39,7 @@ def test_a_ramp_is_zero_then_a_line():
 
 
 def test_a_ramp_starts_on_the_sample_that_its_time_names():
-    """k h misses the decimal time by an ulp; the slope is there all the same."""
+    """k h misses the decimal time by an ulp; the slope must be there nevertheless."""
     for k in range(1, 200):
         assert at(Ramp(1.0, k / 1000), k * 1e-3)[1] == 1.0
 

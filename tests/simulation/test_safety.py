@@ -245,7 +245,7 @@ def test_a_law_that_may_return_none_is_not_compiled_and_is_named_when_it_does(fu
 
 STUDIED = list(smc.paper.GAINS["duffing"])  # the other laws' signs are tested with their theorems
 TURNING = {"k", "k1", "k2", "gamma", "c", "leak", "deadzone", "k0", "lam", "phi", "w_max"}
-# observer_free holds a plant with a spring of its own for some negative k1 (lam k1 > -K), so it may have one
+# observer_free holds a plant that has a spring for some negative k1 (lam k1 > -K), so it may have one
 SIGNED = [
     (name, gain)
     for name in STUDIED
@@ -373,7 +373,7 @@ print("done")
 """
 
 
-def test_a_run_is_the_first_thing_in_a_process_with_a_callback_of_its_own_and_puts_it_back(tmp_path):
+def test_a_first_run_restores_the_callback_that_the_process_had(tmp_path):
     environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent)}
     done = subprocess.run(
         [sys.executable, "-c", FIRST], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
@@ -394,7 +394,7 @@ LARGE = [
 
 
 @pytest.mark.parametrize("large", LARGE, ids=["law", "noise", "delay", "estimator", "log"])
-def test_what_a_simulation_is_reckoned_to_take_is_what_it_takes(large):
+def test_the_estimated_memory_of_a_simulation_is_what_it_takes(large):
     model, prepared = large.plant.load(nuserdata=2), prepare(large)
     log = np.empty((large.samples + 1, large.plant.n), state.LOG)
     _, packed = pack(prepared, channels(model), log, model)
@@ -595,7 +595,7 @@ def test_the_arrays_of_a_failing_run_do_not_depend_on_its_company():
 
 
 def child_runs() -> int:
-    """0 where a forked child finishes a run of its own, its exit status where not."""
+    """0 if a forked child finishes its own run, its exit status if not."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # forking with threads about is what is tested
         child = os.fork()
@@ -694,7 +694,7 @@ def test_names_that_make_the_same_file_are_refused(conditions):
         smc.Scene(title="T", conditions=runs)
 
 
-# (l) signals of one's own
+# (l) users' signals
 
 
 @dataclasses.dataclass(frozen=True)
@@ -807,7 +807,7 @@ def test_a_scenario_hashes_and_comes_back_equal_and_unchangeable(copied):
             held(again)["k"] = 1.0
 
 
-def test_scenarios_that_are_equal_hash_alike_in_whatever_order_their_factors_were_written():
+def test_equal_scenarios_hash_alike_in_any_order_of_their_factors():
     a, b = scenario(mismatch={"M": 1.1, "alpha": 0.9}), scenario(mismatch={"alpha": 0.9, "M": 1.1})
     assert a == b
     assert hash(a) == hash(b)

@@ -262,7 +262,7 @@ def test_every_channel_has_band_limited_noise_of_its_own():
     trace = smc.run(scenario(plant=smc.plant("pendulum_network", n=3), disturbance=[NOISE, NOISE], duration=1.0))
     assert np.linalg.matrix_rank(trace.d) == 3
     alone = smc.run(dataclasses.replace(trace.scenario, disturbance=NOISE))
-    assert np.abs(trace.d - 2.0 * alone.d).max() > 0.1  # and every noise of a run has numbers of its own
+    assert np.abs(trace.d - 2.0 * alone.d).max() > 0.1  # and every noise of a run has its own numbers
 
 
 @pytest.mark.parametrize(

@@ -170,7 +170,7 @@ def test_when_an_executor_stops_one_sentence_says_so_and_what_is_finished_stays(
     assert len(list((tmp_path / "parts").glob("*.parquet"))) == 3
 
 
-def test_what_ended_well_is_kept_before_an_error_is_told(monkeypatch):
+def test_finished_parts_are_kept_before_an_error_is_raised(monkeypatch):
     batches, kept = [[prepare(scenario)] for scenario in mixed()[:6]], []
     ends = [died(), *(Future() for _ in batches[1:])]
     for future in ends[1:]:
@@ -279,7 +279,7 @@ def dask(tmp_path_factory) -> Iterator[tuple[str, list[subprocess.Popen]]]:
 @pytest.fixture
 def half_done(dask, tmp_path) -> Iterator[subprocess.Popen[str]]:
     """A study whose first three parts are written, and that waits for the file "go"."""
-    # a scheduler that has died is waited for as long as one that is not there yet
+    # the client waits as long for a scheduler that has died as for one that has not started yet
     client = start("-c", CLIENT, str(tmp_path), dask[0], "5", log=tmp_path / "client.log")
     parts = tmp_path / "remote" / "parts"
     try:

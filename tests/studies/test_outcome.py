@@ -105,7 +105,7 @@ def test_a_run_that_failed_has_no_value_and_nothing_holds_for_it():
         ({"a": NEVER, "b": NEVER, "c": NEVER}, "none of the 3 settles"),
     ],
 )
-def test_who_says_for_whom_something_holds_and_for_whom_not(settled, text):
+def test_who_names_the_runs_for_which_something_holds(settled, text):
     assert single(**settled).who("settles", "settle") == text
     assert summary(single(**settled)).startswith(text)
 
@@ -153,7 +153,7 @@ def test_who_says_in_which_conditions():
     assert none.who("settles", "settle") == "none of the 2 settles in any condition"
 
 
-def test_up_to_ends_before_the_first_condition_that_is_too_much_and_says_what_holds_again():
+def test_up_to_ends_before_the_first_failure_and_names_what_holds_again():
     runs = several(
         weak={"a": 0.2, "b": 0.2, "c": NEVER, "d": 0.2},
         middle={"a": 0.2, "b": NEVER, "c": NEVER, "d": NEVER},

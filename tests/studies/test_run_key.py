@@ -218,7 +218,7 @@ def package(factor: float) -> ModuleType:
     ],
     ids=["method", "partial", "global partial", "vectorized", "object", "package", "class", "kept results"],
 )
-def test_what_a_law_reaches_in_any_way_tells_it_from_others(made):
+def test_everything_that_a_law_reaches_is_in_its_fingerprint(made):
     assert fingerprint.of(made(1.0)) == fingerprint.of(made(1.0)) != fingerprint.of(made(2.0))
 
 
@@ -246,14 +246,14 @@ def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_rep
     (package / "simulation" / "callback.py").write_text("# another loop")
     assert now() != same
     fingerprint.package.cache_clear()
-    before = fingerprint.package()  # on which a report's verdicts depend
+    before = fingerprint.package()  # the key of a report's verdicts
     (package / "studies" / "papers" / "gaber" / "paper.toml").write_text("# other thresholds")
     fingerprint.package.cache_clear()
     assert fingerprint.package() != before
     fingerprint.package.cache_clear()
 
 
-def test_replaced_functions_of_a_plant_tell_runs_apart():
+def test_replaced_functions_of_a_plant_change_the_key():
     def nominal(x, v, i, q):
         return 0.0, 1.0
 

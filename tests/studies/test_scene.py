@@ -238,7 +238,7 @@ GAINS = {
 
 
 def stated(plant: str, condition: str) -> dict:
-    """The fields of a scenario of the study, but for its plant and law."""
+    """The fields of a scenario of the study, without its plant and law."""
     if condition in JUMPS:
         return COMMON | {"disturbance": SINE, "jump": smc.Jump(time=5.0, factors=JUMPS[condition][plant])}
     return COMMON | CONDITIONS[condition]

@@ -68,7 +68,7 @@ def test_seed_0_is_the_papers_own_scenario():
     assert made == paper.scenario("pendulum_network", "classical", "noise")
 
 
-def test_a_seed_starts_every_law_in_every_condition_alike_and_within_a_fifth_of_the_papers_start():
+def test_a_seed_has_one_start_for_all_laws_and_conditions_near_the_papers():
     made = grid(["pendulum_network"], ["classical", "adaptive"], ["nominal", "coulomb"], [3, 4], "study")
     starts = {s.seed: {t.resolved.x0 for t in made if t.seed == s.seed} for s in made}
     assert all(len(found) == 1 for found in starts.values())
@@ -94,7 +94,7 @@ def test_laws_may_come_with_gains_of_their_own():
     assert [s.law for s in grid(["duffing"], [raises], ["nominal"], 1)] == [raises()]
 
 
-def test_whatever_can_be_gone_through_once_makes_the_grid():
+def test_the_grid_takes_iterators():
     names = [["duffing", "van_der_pol"], ["classical", "adaptive"], ["nominal", "noise"]]
     once = grid(*map(iter, names), np.int64(2), "study")  # pyright: ignore[reportArgumentType]
     assert once == grid(*names, np.arange(2), "study")
@@ -188,8 +188,8 @@ def test_a_larger_grid_takes_over_what_is_there(tmp_path, monkeypatch):
     )
     study(small(seeds=3), tmp_path)
     assert sorted(s.seed for s in ran) == [2] * 4
-    study(small(seeds=3), tmp_path / "anew")
-    assert bytes_of(tmp_path) == bytes_of(tmp_path / "anew")
+    study(small(seeds=3), tmp_path / "fresh")
+    assert bytes_of(tmp_path) == bytes_of(tmp_path / "fresh")
 
 
 def test_without_resume_everything_is_run_anew_and_foreign_files_stay(tmp_path, monkeypatch):
@@ -262,7 +262,7 @@ def test_runs_of_other_versions_are_run_again(tmp_path, monkeypatch):
     assert set(table.column("versions")) == {'{"mujoco": "99"}'}
 
 
-def test_what_a_kill_left_half_written_is_cleared_away_in_time(tmp_path):
+def test_half_written_files_of_a_killed_study_are_deleted_in_time(tmp_path):
     parts = tmp_path / "parts"
     parts.mkdir()
     old, new = parts / ".a.parquet", parts / ".b.parquet"
@@ -299,7 +299,7 @@ def test_the_worst_trace_of_each_plant_and_condition_is_saved(tmp_path):
     assert smc.score(traces[0])["ultimate_bound"] == noisy.column("ultimate_bound").max()
 
 
-def test_what_failed_is_worst_then_what_never_settles_then_the_largest_bound_or_without_one_the_largest_overshoot():
+def test_the_worst_run_failed_or_never_settled_or_has_the_largest_bound():
     columns = {
         "plant": np.array(["pole"] * 3 + ["arm"] * 3 + ["cart"] * 2),
         "condition": np.array(["nominal"] * 8),

@@ -63,7 +63,7 @@ def undrawn(monkeypatch):
 
 @pytest.fixture
 def session(pytester, undrawn):
-    """Run a test file, given as text, in a folder of its own; what pytest printed. outcomes: how many tests of each."""
+    """Run a test file, given as text, in a new folder; what pytest printed. outcomes: how many tests of each."""
 
     def run(text: str, *options: str, **outcomes: int) -> str:
         pytester.makepyfile(test_my_laws=HEAD + text)
@@ -295,7 +295,7 @@ def test_metrics_are_plain_floats(step_response):
 def test_a_failing_test_attaches_its_figure_and_with_smc_video_its_film(pytester, monkeypatch):
     pytester.makepyfile(test_my_laws=HEAD + BAD.replace("phi=2.0", "phi=2.0, duration=0.1"))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), *sys.path]))
-    # in a process of its own: a renderer that this one forgets would be opened twice
+    # in a separate process: a renderer that this one forgets would be opened twice
     said = pytester.runpytest_subprocess(*PLUGIN, "--smc-video").stdout.str()
     (figure,) = re.findall(r"^figure: (.*)$", said, re.MULTILINE)
     assert Path(figure).read_bytes().startswith(b"\x89PNG")

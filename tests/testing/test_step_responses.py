@@ -1,4 +1,4 @@
-"""Step responses of the laws of the study, tested with the pytest plugin as a user tests a law of their own."""
+"""Step responses of the laws of the study, tested with the pytest plugin as users test their laws."""
 
 import numpy as np
 import pytest

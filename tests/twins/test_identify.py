@@ -136,7 +136,7 @@ def test_noise_is_read_off_a_moving_record():
     assert records.noise(record, records.Columns()) == pytest.approx(2e-4, rel=0.05)
 
 
-def test_what_cannot_be_told_apart_is_said(swung):
+def test_parameters_that_cannot_be_told_apart_are_named(swung):
     with pytest.raises(smc.ScenarioError) as error:
         smc.identify(PENDULUM, swung, ("inertia", "torque_limit"), starts=1)
     assert str(error.value) == "nothing in the records depends on torque_limit: leave it out, or give other records"

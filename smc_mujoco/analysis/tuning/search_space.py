@@ -24,7 +24,7 @@ exponent is a gain, the unit of the factor before the power depends on it, and i
 
 With these units a law behaves the same in every system of units (tests/analysis/tuning/test_search_space.py). Some laws
 contain a number with a unit, such as the width 1 of tanh(s): their gains have the units that leave this number
-unchanged. A law without the model that takes g as 1 treats forces and accelerations alike.
+unchanged. A law without the model takes g as 1, so it treats forces and accelerations in the same way.
 """
 
 import dataclasses

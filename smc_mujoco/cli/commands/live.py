@@ -61,7 +61,7 @@ def live(
 
 
 def _serve(folder: Path, port: int, terminal: Terminal) -> None:
-    """Serve a folder on this machine alone, until Ctrl-C."""
+    """Serve a folder, only to this machine, until Ctrl-C."""
     import contextlib
     import functools
     from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer

@@ -41,7 +41,7 @@ static unsigned smc_mujoco_arithmetic(void) { return 0u; }
 static void smc_mujoco_restore(unsigned smc_was) { (void)smc_was; }
 #endif
 
-/* Calls the law with numbers of its own type, between guards that show whether it writes beyond them. */
+/* Calls the law with numbers of its type, between guards that show whether it writes beyond them. */
 static long long smc_mujoco_convert(const smc_seen *smc_y, const double *smc_gains, double *smc_memory, double *smc_out)
 {
     int (*const smc_called)(const smc_seen *, const smc_real *, smc_real *, smc_real *) = SMC_SYMBOL;

@@ -1,6 +1,6 @@
 /* What glue.c needs for a law of many joints: its measurement, from the numbers of joint_law.py in double precision:
- * SMC_HEADER ones (t, dt, model, the address of what `coriolis` and `jacobian` call, the number of joints), SMC_VECTORS
- * vectors, M, h, g.
+ * a header of SMC_HEADER numbers (t, dt, model, the address of what `coriolis` and `jacobian` call, the number of
+ * joints), then SMC_VECTORS vectors, M, h, g.
  */
 enum { SMC_EACH = SMC_JOINTS, SMC_NUMBERS = (SMC_VECTORS + 2 + SMC_JOINTS) * SMC_JOINTS }; /* of vectors, M, h and g */
 typedef smc_joint_measurement smc_seen;

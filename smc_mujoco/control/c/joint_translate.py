@@ -276,7 +276,7 @@ class ArrayFunction(Function):
         return super().destination(target, kind)
 
     def changeable(self, target: ast.expr) -> Value:
-        """Return elements that the function may change: of its memory, or of an array of its own."""
+        """Return elements that the function may change: of its memory, or of an array that it makes."""
         name = root(target)
         kind = self.kinds.get(name, "")
         if kind != "memory" and (not shape(kind) or name in self.parameters):

@@ -93,7 +93,7 @@ def call(
       gains: values of the gains. With many joints, each is one number, or one for each joint.
       memory: number of state variables.
       modelled: whether the law needs the nominal model.
-      joints: of a law of many joints; 0 for one channel.
+      joints: number of joints of a law of many joints; 0 for one channel.
 
     Raises:
       ScenarioError: as in `load`.
@@ -235,7 +235,8 @@ class Requests:
       jacobian: returns the numbers of the tip's Jacobian by rows, or raises ValueError if there is none.
 
     Attributes:
-      address: of a table with the addresses of both functions and of their parameters, and the force per unit of u.
+      address: of a table with the addresses of both functions and of their parameters, and with the force per unit of
+        u.
     """
 
     def __init__(self, joints: int, coriolis: Callable, jacobian: Callable):

@@ -144,7 +144,7 @@ class Program:
         return unique
 
     def claim(self, node: ast.AST, slot: int) -> None:
-        """Take a slot of the memory. Refuse one that the component does not have."""
+        """Note that a slot of the memory is used. Refuse one that the component does not have."""
         size = self.component.memory
         if slot >= size:
             code = shown(ast.unparse(node))[1:-1]
@@ -534,7 +534,7 @@ class Function:
         return Value(f"{home.text}[{index.text}]", "real")
 
     def from_start(self, place: ast.expr, index: Value, length: int | str) -> Value:
-        """Return an index that counts from the end if it is negative, as in Python, as one from the start."""
+        """Return an index from the start for an index of Python, which counts from the end if it is negative."""
         if self.natural(place):
             return index
         return Value(f"{self.program.helper('wrapped', 'int')}({index.text}, {length})", "int")

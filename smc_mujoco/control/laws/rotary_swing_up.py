@@ -2,7 +2,7 @@
 
 E = q'^2 / (2 w0^2) + cos q - 1 is the pendulum's energy relative to rest upright, in m grav l. During the swing-up the
 arm gets the acceleration a = sat(pump E) sgn(q' cos q) - 20 x - 3 v, by the nominal model or, without it, by u = J a.
-E' = -m L l cos(q) q' a / (m grav l) then has the sign of -E, but for the last two terms, which keep the arm near 0
+E' = -m L l cos(q) q' a / (m grav l) then has the sign of -E, except for the last two terms, which keep the arm near 0
 (chosen); a jumps with the sign of q' cos q. The catch begins where |q| < 0.35 and |s| < catch, and ends at |q| > 0.8
 (chosen).
 

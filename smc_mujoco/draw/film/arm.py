@@ -45,26 +45,28 @@ def has_bars(trace: Trace) -> bool:
 
 def key(traces: Sequence[Trace]) -> list[str]:
     """Return what the film of arms shows, in words."""
-    words = ["line: path of the tip, dark where it is wanted"]
+    words = ["line: path of the tip; dark: the wanted path"]
     if all(map(has_bars, traces)):
-        words.append(f"bars: torque of joints 1 to {traces[0].scenario.plant.n}, of its limits")
+        words.append(f"bars: torque of joints 1 to {traces[0].scenario.plant.n}, share of their limits")
     if any(tip.knows_contacts(trace.scenario) for trace in traces):
         words.append("violet arrow: force on what the tip touches")
     if style.pushes(traces):
         words.append("violet arrow: the blow")
     if any(tip.tip_error(trace).max() > LOST for trace in traces):
-        words.append("translucent: where it is wanted")
+        words.append("translucent: the wanted pose")
     return words
 
 
 class Trail:
-    """A path in the picture, uncovered as time runs.
+    """A path in the picture, of which `draw` draws the part until a time.
 
     Args:
       points: of the path, (m, 2) px.
-      times: at which the path gets there, (m,) s.
-      seen: which of them are drawn, (m,).
-      size: of the picture, px.
+      times: at which the path reaches its points, (m,) s.
+      seen: which points are drawn, (m,) of bool.
+      colour: as "#RRGGBB".
+      width: of the line, px.
+      size: width and height of the picture, px.
       opacity: 0 to 1.
     """
 
@@ -99,7 +101,7 @@ class Trail:
                 np.maximum.at(cover, (y[inside], x[inside]), ink[inside])
                 np.minimum.at(since, (y[inside], x[inside]), at[inside])
         y, x = np.unravel_index(np.argsort(since, axis=None)[: np.isfinite(since).sum()], since.shape)
-        self.since, self.cover = since[y, x], opacity * cover[y, x, None]  # of its pixels, in time
+        self.since, self.cover = since[y, x], opacity * cover[y, x, None]  # of each pixel, in the order of time
         self.pixels = y + low[1], x + low[0]
 
     def draw(self, picture: np.ndarray, time: float) -> None:

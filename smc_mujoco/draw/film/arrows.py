@@ -22,7 +22,7 @@ from smc_mujoco.simulation.trace import Trace
 
 HINGE, SLIDE = 0.425, 0.08  # length of the longest arrow: of the pendulum's, of the rail's
 OF_RADIUS, OF_LENGTH = 0.16, 0.024  # thickness at a hinge: the sum of these shares of the bob's radius and the length
-LONG = 0.5  # m, of a pendulum's length that counts for the thickness at most
+LONG = 0.5  # m: longer pendulums have arrows as thick as one of this length
 OFF_ARC, OFF_RAIL = 1.6, 2.2  # thicknesses between a body and its nearest arrow
 THICKNESS, SHORT = 0.035, 0.008  # m, at a slide, and at most that part of its rail
 OWN_LENGTH, OWN_THICKNESS = 0.25, 0.012  # at an own model's slides, of its extent

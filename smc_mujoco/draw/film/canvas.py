@@ -30,7 +30,7 @@ Area = tuple[int, int, int, int]  # px from the top left: left, top, right, bott
 
 
 class Canvas:
-    """A picture of `size` px of a model, from its camera `film`, which stands still.
+    """A picture of `size` px of a model, from its camera `film`, which does not move.
 
     Args:
       arms: whether it is of arms: rings around their links cast no shadows, and show all around.

@@ -1,4 +1,4 @@
-"""Encoding of a film in a thread of its own, so that pictures are drawn meanwhile."""
+"""Encoding of a film in a separate thread, so that pictures are drawn meanwhile."""
 
 import contextlib
 import queue

@@ -61,8 +61,8 @@ def film(
       speed: of playback, such as 1 for real time or 0.25; default: what suits the motion, see pace.py.
       camera: name of a camera of the model, or (azimuth, elevation) in degrees as of MuJoCo's free camera, or
         (azimuth, elevation, distance), m for a lens of 45 degrees. A name and two angles give the direction of the
-        view, and the camera stands as near as all machines can be seen. Default: the plant's own `look`; of an own
-        model the first camera that stands still.
+        view, and the camera stands as near as all machines can be seen. Default: the plant's own `look`; for your own
+        model the first camera that does not move.
 
     Raises:
       ScenarioError: nothing to show, a size that is odd or too small or large, or no OpenGL to render with.

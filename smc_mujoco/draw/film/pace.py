@@ -1,9 +1,9 @@
 """Playback speed of a film, from its traces: slow motion where things move fast, and faster where they rest.
 
 The measure is how far something moves in the time of a frame, as a share of its range over the whole run. Every machine
-should cross its range in 1/TRAVEL frames or more. So speeds are 1, 1/2, 1/4 or 1/8; 1/8 also around impacts and pushes
-on an arm; and FAST where nothing has moved for a while. If a film would be too long, its slow motion is reduced: that
-around pushes only if the film is too long with everything else in real time. The same traces give the same film.
+should cross its range in 1/TRAVEL frames or more, so the speed is 1, 1/2, 1/4 or 1/8. Around impacts, and around pushes
+on an arm, it is 1/8. Where nothing has moved for a while, it is FAST. If a film would be too long, slow motion is
+reduced step by step, and around pushes last. The same traces give the same film.
 """
 
 from collections.abc import Sequence

@@ -70,7 +70,7 @@ class OwnModel:
         """
         spec = self.source.read()
         while named := [*spec.tuples, *spec.sensors]:  # tuples may name sensors and motors that are deleted
-            spec.delete(named[0])  # MuJoCo 4 also deletes the tuples that name it, so list them anew
+            spec.delete(named[0])  # MuJoCo 4 also deletes the tuples that name it, so list them again
         put(spec, self.motors)
         for joint in joints_of(self.channels):
             for letter, kind in (("x", mujoco.mjtSensor.mjSENS_JOINTPOS), ("v", mujoco.mjtSensor.mjSENS_JOINTVEL)):

@@ -77,8 +77,8 @@ class Sliding(Friction):
         Args:
           v: speed of the joint, rad/s (m/s).
           motor: force of its drive in the physics step before, N m (N).
-          load: sum of the other forces on it, N m (N): gravity, gyration, springs and disturbances as a trace's d has
-            them, and contacts and limits in the step before. The joint's damping is not in it.
+          load: sum of the other forces on it, N m (N): gravity, gyration, springs, the disturbances in a trace's d, and
+            the contacts and limits of the step before. It does not include the joint's damping.
           p: the numbers of its channel, by name.
         """
         raise NotImplementedError

@@ -1,8 +1,7 @@
 """Acrobot: a double pendulum that is driven at the elbow, with a free shoulder.
 
-The equation, the parameters and their source are in double_pendulum.py, with u = (0, u). A disturbance d is a
-torque from outside on the lower link, so both rows have it: (d, d). It is not matched, because u turns the links
-against each other.
+The equation, the parameters and their source are in double_pendulum.py, with u = (0, u). A disturbance d is an external
+torque on the lower link, so both rows have it: (d, d). It is not matched, because u turns the links against each other.
 Driven channels come first: channel 0 is the elbow's angle q2; channel 1, which is only measured, the shoulder's angle
 q1, from hanging. (0, pi) is upright. Dry friction is left out of the nominal f and g.
 """

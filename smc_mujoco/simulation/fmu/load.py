@@ -348,7 +348,7 @@ def _meanings(
     if joints := [n for n in ins if n.endswith("[2]") and n not in taken]:
         raise ScenarioError(
             f"{file} has inputs of many joints, such as {joints[0]!r}: give an FMU of one channel, or the law in C; "
-            f"an input that one channel does not need is held by constants={{{joints[0]!r}: 0.0}}"
+            f"if one channel does not need the input, hold it by constants={{{joints[0]!r}: 0.0}}"
         )
     for theirs in ins:
         if theirs not in {*inputs.values(), *constants}:

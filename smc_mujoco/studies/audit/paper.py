@@ -75,7 +75,7 @@ class Entry(Statement):
 
     Attributes:
       evidence: function from runs under one set of gains to numbers, or to checks and the numbers beside them.
-      thresholds: what the numbers must be; empty if the function returns checks with limits of its own.
+      thresholds: what the numbers must be; empty if the function returns checks with limits.
       quick: what a quick audit measures instead, if that is less.
       late: whether it looks at the runs of all other claims, and so comes after them.
       varies: why its numbers differ from audit to audit, as a timing; they are not sealed.

@@ -15,7 +15,7 @@ end of the last step:
     v2:  score = 1 - (1/5) sum tanh(pi c / n),    of five criteria, n as in V2
 
 A failed run scores 0. Source: src/python/double_pendulum/analysis/leaderboard.py and leaderboard/*/simulation_v* of
-github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), written anew here.
+github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), rewritten here.
 """
 
 import math

@@ -17,7 +17,7 @@ and its estimator run as in every scenario, compiled, by their addresses. In the
 joint without a motor has no effect (its input matrix is 0 there), so only the driven joint's are drawn. The published
 test has other random numbers at every run. Here they depend on `SEED` alone.
 Source: leaderboard/*/robustness_v2 and src/python/double_pendulum of
-github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), written anew here.
+github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), rewritten here.
 """
 
 import dataclasses

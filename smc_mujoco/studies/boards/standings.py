@@ -31,7 +31,7 @@ TESTS = {
 
 
 def board(trace: Trace, name: str = NAME) -> tuple[Row, ...]:
-    """Return the rows of the version-2 simulation board of a trace's plant, with its own row of this name.
+    """Return the rows of the version-2 simulation board of a trace's plant, with the trace's row under this name.
 
     Raises:
       ScenarioError: another plant than pendubot and acrobot, a run by other rules than the boards', or a name that
@@ -52,7 +52,7 @@ def board(trace: Trace, name: str = NAME) -> tuple[Row, ...]:
 
 
 def robustness_board(robot: str, found: Robustness, name: str = NAME) -> tuple[RobustnessRow, ...]:
-    """Return the rows of the robustness board of a robot, with a result of this name among them.
+    """Return the rows of the robustness board of a robot, with the row of a result under this name.
 
     Raises:
       ScenarioError: another robot, or a name that cannot be printed or is that of a published row.
@@ -63,7 +63,7 @@ def robustness_board(robot: str, found: Robustness, name: str = NAME) -> tuple[R
 
 
 def _ruled(scenario: Scenario) -> dict[str, object]:
-    """Return what the rules fix of a run, by name: the plant's parameters, and the fields that are not in DESIGN."""
+    """Return name -> value of all that the rules fix: the plant's parameters, and the fields that are not in DESIGN."""
     resolved = scenario.resolved
     fields = [field.name for field in dataclasses.fields(Scenario) if field.name not in (*DESIGN, "u_max")]
     return {**scenario.plant.parameters, **{name: getattr(resolved, name) for name in ("limits", *fields)}}

@@ -262,8 +262,8 @@ def _settled(findings: "Findings") -> str:
     least, most = min(share, key=share.__getitem__), max(share, key=share.__getitem__)
     text = "Every run settles" if share[least] == 1 else f"{100 * share[least]:.0f}\u00a0% of every law’s runs settle"
     if f"{share[least]:.2f}" != f"{share[most]:.2f}":
-        text = f"Of {words.law(least)}’s runs {100 * share[least]:.0f} % settle, the fewest; a run "
-        text += "that does not settle may still be calm"
+        text = f"{words.law(least)} settles least often, in {100 * share[least]:.0f} % of its runs; a run that does "
+        text += "not settle may still be calm"
     return f"{text}. {findings.about.failed or 'None'} of {findings.about.runs} runs failed."
 
 

@@ -71,7 +71,7 @@ def metric(name: str) -> str:
 
 
 def asks(metric: str) -> str:
-    """Return what somebody asks for who wants little of a metric, such as "fast"."""
+    """Return what a user asks for who wants a small value of a metric, such as "fast"."""
     return CATALOGUE[metric].need.replace("-", " ")
 
 
@@ -94,7 +94,7 @@ def typeset(unit: str) -> str:
 
 
 def pretty(text: str) -> str:
-    """Return a sentence of the audit, written in ASCII, with mathematical signs and proper names; no backquotes."""
+    """Return a sentence of the audit, written in ASCII, with mathematical signs, proper names and no backquotes."""
     text = text.replace("`", "")
     signs = [rf"(?<![^\W\d_]){s}(?![^\W\d_])" if s.isalpha() else re.escape(s) for s in SIGNS]  # no eps within steps
     text = re.sub("|".join(signs), lambda m: SIGNS[m[0]], text)

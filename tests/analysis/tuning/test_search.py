@@ -84,7 +84,7 @@ def test_it_stops_exactly_at_the_budget_and_no_set_of_gains_is_paid_for_twice(fo
     assert len(set(sets)) == 64
 
 
-def test_what_the_best_gains_cost_can_be_had_again(found):
+def test_the_cost_of_the_best_gains_can_be_repeated(found):
     traces = smc.run(found.definition.scenarios(found.plant, found.law, found.seed))
     again = sum(itae(t) / abs(t.x[0, 0]) + 1e-3 * tv(t) / (6.0 * 1.0) for t in traces)
     assert again == pytest.approx(found.objective, rel=1e-12)
@@ -151,7 +151,7 @@ def test_a_gain_is_divided_by_one_that_the_law_has():
         smc.law_function(gains={"k": Gain(1.0, over="B"), "b": 1.0})(lambda y, gains, memory: (0.0, 0.0))
 
 
-def test_what_is_held_keeps_the_value_it_came_with():
+def test_a_held_gain_keeps_its_value():
     tuned = tune("duffing", smc.law("adaptive", k0=1.25), budget=5, objective=LEAN)
     assert tuned.law.gains["k0"] == 1.25
     assert set(tuned.bounds) == {"gamma", "c"}

@@ -50,7 +50,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def compiled(folder):
-    """Law -> what its C in double precision is as a law of one's own, compiled without a warning."""
+    """Law -> its C in double precision, compiled without a warning and loaded as a user's law."""
 
     def make(name: str):
         path = folder / f"{name}.c"
@@ -177,7 +177,7 @@ def test_fixed_point_s_core_is_whole_numbers_and_right_for_every_word(folder):
     assert [core(int(n), 24576) for n in s] == (-np.sign(s) * ((24576 * T + 2**14) >> 15)).tolist()
 
 
-# laws of one's own
+# users' laws
 
 
 WIDTH, QUARTERS, NOUGHT = 0.5, (1, 2, 3), -0.0

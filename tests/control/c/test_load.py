@@ -1,4 +1,4 @@
-"""Laws of one's own in C: the same traces as the library's, and for every mistake one sentence, not a dead process."""
+"""Users' laws in C: the same traces as the library's, and for every mistake one sentence, not a dead process."""
 
 import copy
 import os
@@ -328,7 +328,7 @@ def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
     headers = "#include <stdio.h>\n#include <unistd.h>\n"
     waits = law("out[0] = 0.0;", f"{headers}int smc_setup(void) {{ {write} for (;;) pause(); }}")
     starts = law("", f"{headers}__attribute__((constructor)) static void start(void) {{ for (;;) pause(); }}")
-    with ThreadPoolExecutor(2) as pool:  # both wait
+    with ThreadPoolExecutor(2) as pool:  # each waits for its time limit
         files = file(waits, "waits.c"), file(starts, "starts.c")
         tries = [pool.submit(smc.law_from_c, path, timeout=3.0) for path in files]
         for tried, words in zip(tries, ("smc_setup did not end within 3 s", "loading did not end"), strict=True):
@@ -517,7 +517,7 @@ def test_isolated_a_law_may_give_up_far_away(file):
 
 def test_what_a_set_up_prints_is_not_kept(file):
     """60 MB of it, and then it waits."""
-    line = '"a line of a law, which is as long as lines of laws are wont to be"'
+    line = '"a line of a law, which is as long as the lines of laws usually are"'
     text = "#include <stdio.h>\n#include <unistd.h>\n"
     text += f"int smc_setup(void) {{ for (int i = 0; i < 1000000; i++) puts({line}); for (;;) pause(); return 0; }}"
     tracemalloc.start()
@@ -533,7 +533,7 @@ def test_what_a_command_leaves_behind_is_ended_too(tmp_path):
     told = tmp_path / "pid"
     with pytest.raises(build.TimedOut):
         build.timed(["sh", "-c", f"sleep 60 & echo $! > '{told}'"], 0.3)
-    for _ in range(200):  # until whoever inherits orphans has taken note
+    for _ in range(200):  # until the process that inherits orphans has noticed
         state = Path(f"/proc/{told.read_text().strip()}/stat")
         if not state.exists() or state.read_text().rpartition(")")[2].split()[0] == "Z":
             return

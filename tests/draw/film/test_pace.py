@@ -40,7 +40,7 @@ def test_a_number_is_the_speed_of_the_whole_film(base):
 
 
 def test_a_jump_of_position_is_slow_and_a_rest_fast(base):
-    """1 m in 0.1 s is a third of the range a frame; 2 s of rest are shown four times as fast, but for its ends."""
+    """1 m in 0.1 s is a third of the range a frame; 2 s of rest are shown four times as fast, except at its ends."""
     trace = moving(base, lambda t: np.clip((t - 2.0) / 0.1, 0.0, 1.0))
     assert at(trace, (0.5, 1.8, 2.05, 2.3, 3.0)) == [4.0, 1.0, 0.125, 1.0, 4.0]
 
@@ -86,7 +86,7 @@ def test_impacts_are_slowest(monkeypatch):
     assert at(trace, (first,)) == [0.25]
 
 
-def test_what_leaves_the_world_does_not_make_the_others_rest(base):
+def test_a_diverged_run_does_not_make_the_others_rest(base):
     good = moving(base, lambda t: np.clip(t / 0.3, 0.0, 1.0))
     arrays = {name: getattr(base, name).copy() for name in ARRAYS if name != "t"}
     arrays["x"][:, 0] = np.exp(40.0 * base.t)

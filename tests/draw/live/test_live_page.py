@@ -66,8 +66,8 @@ def browser():
         opened.close()
 
 
-# Five frames a second: without a GPU, drawing takes most of these tests' time.
 LONGEST_FRAME = 100  # samples that the page simulates in a frame of 0.1 s or more
+# Five frames a second: without a GPU, drawing takes most of these tests' time.
 FEW_FRAMES = "window.requestAnimationFrame = (f) => setTimeout(() => f(performance.now()), 200)"
 
 
@@ -318,7 +318,7 @@ def test_a_picture_of_what_moves_is_the_whole_picture(seen, plant):
     assert np.abs(drawn - again).max() == 0.0
     x, y = map(round, seen.page.evaluate("(({ x, y }) => [x, y])(live.stage.parts()[1])"))
     seam = again[20:-20, x - 1] if x else again[y - 1, 20:-20]  # the corners are round
-    assert np.ptp(seam, axis=0).max() == 0.0  # nothing of the plant before
+    assert np.ptp(seam, axis=0).max() == 0.0  # nothing is left of the previous plant
 
 
 def test_two_laws_have_the_colours_of_the_figures(seen, page):

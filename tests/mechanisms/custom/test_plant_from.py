@@ -246,7 +246,7 @@ def test_threads_change_nothing(arm):
         np.testing.assert_array_equal(one.x, alone.x)
 
 
-def test_what_the_nominal_models_of_runs_worked_on_serves_the_next_ones(arm):
+def test_data_of_a_nominal_model_are_reused_by_later_runs(arm):
     plant = arm()
     base = smc.Scenario(plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1))
     many = [dataclasses.replace(base, x0=(0.1 * i, 0.2), v0=0.5) for i in range(7)]
@@ -257,7 +257,7 @@ def test_what_the_nominal_models_of_runs_worked_on_serves_the_next_ones(arm):
     assert len(prepared(plant.nominal, frozen(plant.parameters))[3]) == len(many)
 
 
-def test_what_the_nominal_model_of_a_run_gone_astray_worked_on_does_as_well(arm):
+def test_data_of_a_nominal_model_are_reused_after_a_failed_run(arm):
     plant = arm(bodies=BALL)
     good = smc.Scenario(plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1))
     bad = dataclasses.replace(good, law=smc.law("computed_torque", kp=1e9, kd=1e9), u_max=math.inf)
@@ -394,7 +394,7 @@ def test_an_environment_clips_actions_at_the_motors_limits_and_starts_in_the_key
     np.testing.assert_array_equal(qpos, [0.1, -0.5])
 
 
-def test_what_is_no_channel_stays_as_the_model_has_it(arm):
+def test_joints_without_a_channel_keep_the_actuators_of_the_model(arm):
     servo = '<actuator><motor name="b" joint="elbow"/><position joint="shoulder" kp="500" dampratio="1"/></actuator>'
     plant = arm(["elbow"], servo, keyframe=None)
     assert plant.n == 1
@@ -681,7 +681,7 @@ def test_what_cannot_hang_is_not_asked_to_swing_up(tmp_path, joint):
         assert found.scenario.resolved.u_max == 20.0
 
 
-def test_a_swing_up_has_half_the_torque_of_its_heaviest_pendulum_and_no_slide_of_its_own(tmp_path):
+def test_a_swing_up_has_half_the_torque_of_its_heaviest_pendulum_and_no_slide(tmp_path):
     (tmp_path / "pole.xml").write_text(POLE.format(range=""))
     for order in (("slide", "pole"), ("pole", "slide")):
         assert tasks.tasks(smc.plant_from(tmp_path / "pole.xml", order)) == ["regulate", "track"]
@@ -855,7 +855,7 @@ def test_a_law_gets_no_model_that_there_is_not(arm):
 
 
 @pytest.mark.parametrize("partner", [None, "hinge", "hinge2"])
-def test_what_no_channels_or_partners_can_mend_is_not_advised(partner):
+def test_channels_and_partners_are_not_advised_where_they_do_not_help(partner):
     """Two poles on one cart, of which one could be a partner."""
     plant = smc.plant_from(gym("inverted_double_pendulum"), {"slider": smc.Channel(partner=partner)})
     assert "there are 2, of driven ones 1, which take one partner each or none: give a law without" in plant.unmodelled

@@ -19,7 +19,7 @@ G = 9.81  # m/s^2
 OFFERED = [(name, kind) for name, p in sorted(catalogue().items()) for kind in p.contacts if name != "panda"]
 EVERY = pytest.mark.parametrize(("name", "kind"), OFFERED, ids=["-".join(pair) for pair in OFFERED])
 BUILDS = [(*pair, build) for pair in OFFERED for build in ("equation", *catalogue()[pair[0]].mechanisms)]
-STUDIES = [pair for pair in OFFERED if pair[1] != "bobs"]  # bobs in a row need places of their own
+STUDIES = [pair for pair in OFFERED if pair[1] != "bobs"]  # bobs in a row need their own places
 CARTS = pytest.mark.parametrize("name", ["duffing", "van_der_pol"])
 # Where a mechanism that nothing else moves meets its obstacle, and the way it goes there.
 MEETS = {
@@ -181,7 +181,7 @@ def test_two_metres_a_second_go_a_centimetre_deep_at_most(name, kind):
 
 
 @HITS
-def test_what_leans_on_an_obstacle_stands_still_and_hardly_sinks_in(name, kind):
+def test_a_body_that_leans_on_an_obstacle_rests_and_hardly_sinks_in(name, kind):
     place, way = MEETS[name, kind]
     model, data = built(idle(name), Contact(kind))
     data.qpos[0], data.ctrl[0] = place - way * 0.001, way * 3.0

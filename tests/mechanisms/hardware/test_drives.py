@@ -348,7 +348,7 @@ def saturated(y, gains, memory):
 
 @pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
 @pytest.mark.parametrize("law", [smc.law("classical", k=100.0), saturated()], ids=["compiled", "plain"])
-def test_what_a_motor_is_asked_for_is_within_the_bound_to_the_last_bit(law):
+def test_the_command_of_a_motor_is_within_the_bound_to_the_last_bit(law):
     """With this gear a command of 6 N becomes volts and comes back an ulp larger."""
     motor = smc.DCMotor(gear=0.32761186154670086)
     trace = smc.run(smc.Scenario(plant="duffing", law=law, duration=0.005, x0=0.8, actuator=motor))

@@ -169,7 +169,7 @@ def test_a_lost_reading_leaves_the_one_before_in_place():
     np.testing.assert_array_equal(v[~lost], trace.v[~lost])
 
 
-def test_what_gets_lost_is_held_with_its_noise_and_rounding():
+def test_a_lost_reading_holds_the_last_one_with_its_noise_and_rounding():
     _, x, _ = read(smc.Encoder(50, dropout=0.5, bias=0.1), noise=smc.Noise(position=0.1), seed=3)
     _, all_of_them, _ = read(smc.Encoder(50, bias=0.1), noise=smc.Noise(position=0.1), seed=3)
     arrived = x == all_of_them
@@ -294,7 +294,7 @@ def test_readings_are_held_between_periods_with_their_noise_and_losses():
 
 
 def test_noise_of_readings_that_are_no_multiple_of_the_control_period_is_drawn_once_a_reading():
-    """Readings every 2.5 ms at samples every 1 ms: the number that held at the sample tells when it is drawn anew."""
+    """Readings every 2.5 ms, samples every 1 ms: the number that held at a sample shows when a new one is drawn."""
     sensor = smc.Encoder(math.inf, period=2.5e-3)
     changes = {"physics_step": 2.5e-4, "integrator": "implicitfast", "velocity": "measured", "duration": 0.5}
     _, x, _ = read(sensor, noise=smc.Noise(position=0.5), **changes)

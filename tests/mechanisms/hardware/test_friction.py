@@ -37,7 +37,7 @@ def build(p, *parts, h=2.5e-4, integrator=IMPLICIT):
 
 
 def bare(name, *parts, h=2.5e-4, integrator=IMPLICIT):
-    """The plant's inertia with nothing on it but the parts: no weight, spring or damping of its own."""
+    """The plant's inertia with nothing on it but the parts: without the plant's weight, spring and damping."""
     model = build(plant(name), *parts, h=h, integrator=integrator)
     model.dof_damping[:] -= build(plant(name)).dof_damping
     for field in ("opt.gravity", "jnt_stiffness", "jnt_stiffnesspoly"):

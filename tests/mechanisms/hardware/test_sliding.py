@@ -184,7 +184,7 @@ def test_friction_only_takes_energy():
 
 @dataclasses.dataclass(frozen=True)
 class Curious(Sliding):
-    """A friction of one's own, which reads all that it may."""
+    """A user's friction, which reads all that it may."""
 
     a: float | tuple[float, ...] = 0.3
     b: float | tuple[float, ...] = 0.05

@@ -207,7 +207,7 @@ def test_theory_of_delays_knows_no_drive():
         ((smc.Backlash(0.1), smc.Lag(0.2), smc.Backlash(0.1)), "actuator has a Backlash twice, "),
     ],
 )
-def test_what_cannot_stand_in_series_is_one_sentence(actuator, says):
+def test_parts_that_cannot_be_in_series_are_one_sentence(actuator, says):
     with pytest.raises(ScenarioError) as error:
         scenario(*actuator)
     assert str(error.value).startswith(says)

@@ -67,7 +67,7 @@ def test_what_cannot_be_compared_never_holds(relation, value, limit):
     assert not check("x", value, relation, limit).holds
 
 
-def test_what_never_comes_is_later_than_what_comes():
+def test_never_is_later_than_any_time():
     assert check("x", math.inf, ">", 3.0).holds
     assert check("x", 3.0, "<", math.inf).holds
     assert not check("x", math.inf, "<=", 3.0).holds
@@ -185,12 +185,12 @@ def test_a_claim_says_what_it_depends_on(only):
 @pytest.mark.parametrize(
     "decisive", [check("worst", 9.0, "<", 2.0), check("never", math.inf, "<", 2.0), check("none", math.nan, "<", 2.0)]
 )
-def test_what_decides_is_what_is_missed_by_most(only, decisive):
+def test_the_check_that_fails_by_most_decides(only, decisive):
     only(entry(found=[YES, NO, check("worse", 30.0, "<", 20.0), decisive]))
     assert claims(gains="study")[0].decisive("study").what == decisive.what  # pyright: ignore[reportOptionalMemberAccess]
 
 
-def test_what_decides_where_all_holds_is_the_nearest_to_its_limit(only):
+def test_if_all_checks_hold_the_nearest_to_its_limit_decides(only):
     near = check("near", 1.9, "<", 2.0)
     only(entry(found=[YES, near]))
     assert claims(gains="study")[0].decisive("study") == near

@@ -393,7 +393,7 @@ def test_the_answer_tells_who_settles_least_and_how_many_runs_failed(findings):
         findings, places=tuple(share), about=dataclasses.replace(findings.about, runs=40, failed=3)
     )
     told = sentences(few, [])
-    assert "Of Classical’s runs 50 % settle, the fewest" in told
+    assert "Classical settles least often, in 50 % of its runs" in told
     assert "3 of 40 runs failed" in told
 
 
@@ -558,7 +558,7 @@ def test_what_is_there_is_not_computed_again(made, folder, monkeypatch):
     assert line.sub("", again) == line.sub("", before)
 
 
-def test_a_stage_that_was_killed_leaves_nothing_behind_and_one_with_other_arguments_is_made_anew(tmp_path):
+def test_a_killed_stage_leaves_nothing_and_other_arguments_repeat_a_stage(tmp_path):
     def killed():
         raise KeyboardInterrupt
 
