@@ -35,8 +35,9 @@ create() {
 }
 
 install() { # with uv, five times as fast, where it is on the path and succeeds; else with pip
-    command -v uv >/dev/null && uv pip install --python .venv/bin/python --no-deps "$@" >>.venv/setup.log 2>&1 && return
-    .venv/bin/python -I -m pip install --no-deps "$@" >>.venv/setup.log 2>&1 && return
+    command -v uv >/dev/null &&
+        uv pip install --python .venv/bin/python --no-deps ${again:+--reinstall} "$@" >>.venv/setup.log 2>&1 && return
+    .venv/bin/python -I -m pip install --no-deps ${again:+--ignore-installed} "$@" >>.venv/setup.log 2>&1 && return
     if grep -qE 'ConnectionError|ConnectTimeout|ReadTimeout|NameResolution|ProxyError' .venv/setup.log; then
         fail "no network: the packages could not be downloaded; pip's output is in .venv/setup.log"
     fi
@@ -56,6 +57,9 @@ if ! wanted | cmp -s - .venv/installed; then
 fi
 if [ -n "$extra" ] && ! cmp -s "$extra" ".venv/$extra"; then
     [ "$extra" != requirements-test.lock ] || echo "smc-mujoco: adding $extra, once (0.6 GB)"
+    [ ! -e .venv/adding ] || again=yes # uv was stopped: it takes a package that it had half copied for complete
+    touch .venv/adding
     install --only-binary :all: --require-hashes -r "$extra"
     cp "$extra" .venv/
+    rm -f .venv/adding
 fi

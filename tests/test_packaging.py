@@ -363,6 +363,24 @@ def test_set_up_without_a_fit_python_is_one_sentence(checkout, script, sentence)
     assert not (checkout / ".venv").exists()
 
 
+def test_packages_of_a_set_up_that_was_stopped_are_installed_again(checkout):
+    base, uv = checkout / ".venv" / "bin", checkout / "uv"
+    base.mkdir(parents=True)
+    (base / "python").symlink_to(sys.executable)
+    files = [(checkout / name).read_text() for name in ("pyproject.toml", "requirements.lock")]
+    (base.parent / "installed").write_text(f"{checkout}\n{''.join(files)}")
+    (checkout / "more.lock").touch()
+    uv.write_text('#!/bin/sh\necho "$*" >>asked\n[ -e go ] || kill -9 $PPID\n')
+    uv.chmod(0o755)
+    for k in range(3):
+        done = run("./setup.sh", "more.lock", cwd=checkout, PATH=f"{checkout}:{os.environ['PATH']}")
+        assert (done.returncode == 0) == (k > 0), done.stderr
+        (checkout / "go").touch()
+    first, second = (checkout / "asked").read_text().splitlines()  # the third time nothing is missing
+    assert ["--reinstall" in words for words in (first, second)] == [False, True]
+    assert not (base.parent / "adding").exists()
+
+
 def test_set_up_without_network_is_one_sentence_and_is_taken_up_again(checkout):
     """The environments get pip by a link: unpacking it takes most of the time."""
     import pip

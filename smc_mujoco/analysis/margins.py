@@ -161,7 +161,7 @@ class Kind:
         """Return the largest level by linear theory; None if there is none for the law, the plant or the condition."""
         if base.disturbance or base.friction or base.mismatch or base.jump or base.sensor:  # not in the theory
             return None
-        if base.resolved.model == "nominal" or base.resolved.reference != REST:
+        if base.feedforward or base.resolved.model == "nominal" or base.resolved.reference != REST:
             return None
         try:
             return self.theory(base)

@@ -28,11 +28,12 @@ _free = threading.RLock()  # held briefly, so that no Python callback is install
 
 
 def _after_fork() -> None:
-    """Free the locks and remove the callback: a child process has none of its parent's threads."""
+    """Free the locks and remove our callbacks: a child process has none of its parent's threads."""
     global _lock, _free
     _lock, _free = threading.RLock(), threading.RLock()
     mujoco.set_mjcb_control(None)
-    mujoco.set_mjcb_time(None)
+    if no_clock.cache_info().currsize and mujoco.get_mjcb_time() is no_clock():  # else it is None or a user's
+        mujoco.set_mjcb_time(None)
 
 
 if hasattr(os, "register_at_fork"):

@@ -200,7 +200,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
           e: errors of the task, (num_envs, n).
           mask: (num_envs,) of bool; None for all copies.
         """
-        known = np.ones(self.num_envs, bool) if mask is None else mask
+        known = np.ones(self.num_envs, bool) if mask is None else mask.copy()  # it is a user's
         times = np.where(known, self.times, 0.0)
         return {"time": times, "_time": known, "error": np.where(known[:, None], e, 0.0), "_error": known.copy()}
 

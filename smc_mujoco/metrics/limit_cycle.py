@@ -9,6 +9,7 @@ windows of one period, of half the range of s less its mean over a period.
 
 There is no limit cycle where
 
+- s is not finite, or not below 1e100;
 - s does not oscillate, except by rounding;
 - the harmonics of the peak have less than a tenth of the spectrum, as in noise, or in the irregular steps of a coarse
   encoder, or no more than leaks from slow waves;
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
 
 PERIODS = 5  # fewest in the samples
+LARGEST = 1e100  # of |s|: the powers of a spectrum of larger numbers may be infinite
 LEAK = 2.5e-9  # of the spectrum's largest power: what the window leaks from slow waves
 ROUNDING = 1e-10  # of the largest |s|
 SHARE = 0.1  # of the spectrum's power, which the cycle's harmonics have at least
@@ -48,7 +50,7 @@ def limit_cycle(t: np.ndarray, s: np.ndarray) -> tuple[float, float]:
       s: (K,) sliding variable.
     """
     rates = np.diff(s)
-    if len(rates) < 4 * PERIODS or not np.isfinite(s).all():
+    if len(rates) < 4 * PERIODS or not np.abs(s).max() < LARGEST:
         return NONE
     h = float(t[-1] - t[0]) / (len(t) - 1)
     spectrum = np.abs(np.fft.rfft((rates - rates.mean()) * _window(len(rates)))) ** 2

@@ -184,6 +184,7 @@ def test_linear_theory_is_only_for_the_loop_that_it_describes():
     """None for a plant that is pushed or changed, a law that reads an encoder or the model, or another reference."""
     base = smc.grid("duffing", "observer_free", "nominal")[0]
     others = [{"model": "nominal"}, {"reference": smc.Constant(0.1)}, {"reference": smc.Sine(0.1, 1.0)}]
+    others += [{"feedforward": smc.Constant(2.0)}]
     cases = [(smc.grid("duffing", "observer_free", "noise")[0], True), (base, True)]
     cases += [(smc.grid("duffing", "observer_free", one)[0], False) for one in ("constant", "heavy", "encoder")]
     for case, told in [*cases, *((dataclasses.replace(base, **fields), False) for fields in others)]:

@@ -206,10 +206,11 @@ def test_a_forked_child_waits_for_no_thread_of_its_parent():
         child = os.fork()
     if child == 0:
         signal.alarm(30)  # ends it where it hangs
+        own = mujoco.get_mjcb_control(), mujoco.get_mjcb_time()
         mjcb.compiled(mujoco.MjSpec())
         with mjcb.installed(lambda model, data: None):
             mjcb.compiled(mujoco.MjSpec())
-        os._exit(7 if mujoco.get_mjcb_control() is None else 8)
+        os._exit(7 if own == (mujoco.get_mjcb_control(), mujoco.get_mjcb_time()) == (None, None) else 8)
     leave.set()
     slow.let.set()
     assert all(end.wait(60) for end in ends)
@@ -234,6 +235,20 @@ def test_locks_of_other_threads_are_free_in_a_forked_child(module):
     if child == 0:
         os._exit(7 if module._lock.acquire(timeout=5.0) else 8)
     assert end.wait(60)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+def test_a_user_s_clock_is_kept_in_a_forked_child():
+    mujoco.set_mjcb_time(foreign)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # of a fork beside threads
+            child = os.fork()
+        if child == 0:
+            os._exit(7 if mujoco.get_mjcb_time() is foreign else 8)
+    finally:
+        mujoco.set_mjcb_time(None)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
 
 

@@ -87,8 +87,9 @@ def test_slow_waves_and_drifts_do_not_count():
         1.0 + 1e-12 * wave(30.0),
         np.where(T < 1.0, wave(30.0), math.nan),
         wave(30.0)[:10],
+        1e160 * wave(30.0),
     ],
-    ids=["zero", "decay", "dying", "growing", "slow", "slow triangle", "noise", "rounding", "broken", "short"],
+    ids=["zero", "decay", "dying", "growing", "slow", "slow triangle", "noise", "rounding", "broken", "short", "huge"],
 )
 def test_what_does_not_oscillate_steadily_has_no_limit_cycle(s):
     amplitude, frequency = limit_cycle(T[: len(s)], s)

@@ -158,6 +158,7 @@ REFUSED = {
         lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0), (0, 0)], site="tip"),
         "give a position (x, y, z)",
     ),
+    "sets": (lambda: smc.cartesian_path(ARM(), (0, 1), [{0.1}, {0.2}], site="tip"), "give a position (x, y, z)"),
     "beyond reach": (
         lambda: smc.cartesian_path("double_pendulum", (0, 1), [(0.0, 0.0, 0.46), (0.0, 0.0, 9.0)], body="lower"),
         "m away; give points within reach",
