@@ -179,9 +179,9 @@ def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], own: Sequence
 
 
 def _opening(own: Sequence[str], offered: Sequence[str]) -> list[str]:
-    """Return the names of at most two laws with which the page opens: the user's, then START, else the first ones."""
-    found = dict.fromkeys([*own, *(name for name in START if name in offered)])
-    return list(found or dict.fromkeys(name for name in offered if name != "none"))[:2]
+    """Return the names of at most two laws with which the page opens: the user's, then START, then the first ones."""
+    found = [*own, *(name for name in START if name in offered), *(name for name in offered if name != "none")]
+    return list(dict.fromkeys(found))[:2]
 
 
 def _mjcf(plant: Plant) -> Path:

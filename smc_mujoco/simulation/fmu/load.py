@@ -264,9 +264,20 @@ def check(path: str | os.PathLike, timeout: float, **settings: Any) -> Iterator[
     yield "outputs  " + ", ".join(f"{theirs} is {ours}" for ours, theirs in zip(OUTPUTS, law.outputs, strict=False))
     if law.constants:
         yield "held     " + ", ".join(f"{theirs} = {value:g}" for theirs, value in law.constants)
-    yield f"step     {'every control period' if law.period is None else f'{law.period:g} s'}"
+    yield f"step     {_pace(law)}"
     yield "gains    " + (", ".join(f"{name} = {gain.default:g}" for name, gain in template.gains.items()) or "none")
     yield f"{Path(path).name} passes"
+
+
+def _pace(law: FmuLaw) -> str:
+    """Return words for how often a run steps an FMU, and for its own period if it has one that it keeps inside."""
+    import fmpy
+
+    if law.period is not None:
+        return f"{law.period:g} s"
+    about = fmpy.read_model_description(str(extracted(law)), validate=False)
+    inside = getattr(about.coSimulation, "fixedInternalStepSize", None)
+    return f"every control period{f'; inside, it runs every {float(inside):g} s' if inside else ''}"
 
 
 def _file(path: str | os.PathLike) -> Path:
@@ -350,17 +361,18 @@ def _meanings(
             f"{file} has inputs of many joints, such as {joints[0]!r}: give an FMU of one channel, or the law in C; "
             f"if one channel does not need the input, hold it by constants={{{joints[0]!r}: 0.0}}"
         )
-    for theirs in ins:
-        if theirs not in {*inputs.values(), *constants}:
-            raise ScenarioError(
-                f"input {theirs!r} of {file} means nothing that a law measures: say what it is, as in "
-                f"variables={{'x': {theirs!r}}}, or hold it, constants={{{theirs!r}: 0.0}}"
-            )
+    if strange := [n for n in ins if n not in {*inputs.values(), *constants}]:
+        raise _without_meaning(file, strange, known)
     outputs = {ours: theirs for ours, theirs in chosen.items() if ours in OUTPUTS}
     outputs |= _by_name([n for n in outs if n not in taken], [n for n in OUTPUTS if n not in chosen])
+    if not outs:
+        raise ScenarioError(f"{file} has no output: export it with the command as an output")
     if "u" not in outputs and len(outs) != 1:
-        listed = ", ".join(outs) or "none"
-        raise ScenarioError(f"{file} has no output that is named as a command ({listed}): give variables={{'u': ...}}")
+        free = next((n for n in outs if n not in outputs.values()), outs[0])
+        raise ScenarioError(
+            f"{file} has no output that is named as a command ({', '.join(outs)}): "
+            f"say which it is, as in variables={{'u': {free!r}}} (--variables u={free})"
+        )
     outputs.setdefault("u", outs[0])
     real = dict.fromkeys((*inputs.values(), *outputs.values()), REAL)
     for theirs, types in {**dict.fromkeys(constants, HELD), **real}.items():
@@ -369,6 +381,19 @@ def _meanings(
             need = need if types is REAL else "number: export it without this input"
             raise ScenarioError(f"{theirs!r} of {file} is not one {need}")
     return inputs, {ours: outputs[ours] for ours in OUTPUTS if ours in outputs}
+
+
+def _without_meaning(file: str, strange: Sequence[str], known: Mapping[str, Any]) -> ScenarioError:
+    """Return the error for inputs of an FMU that are nothing a law measures. Only real ones can be given a meaning."""
+    some, names = len(strange) > 1, ", ".join(map(repr, strange))
+    what = f"inputs {names} of {file} mean" if some else f"input {names} of {file} means"
+    real = [name for name in strange if known[name].type in REAL][:1]
+    meaning = [
+        f"say what {'they are' if some else 'it is'}, variables={{'x': {n!r}}} (--variables x={n}), or" for n in real
+    ]
+    held = strange[-1]
+    hold = f"hold {'them' if some else 'it'}, constants={{{held!r}: 0.0}} (--constants {held}=0)"
+    return ScenarioError(" ".join([f"{what} nothing that a law measures:", *meaning, hold]))
 
 
 def _by_name(theirs: Iterable[str], ours: Iterable[str]) -> dict[str, str]:

@@ -74,10 +74,14 @@ def test_skins_follow_the_bodies_as_in_mujoco(vendor, tmp_path):
 
 
 def test_every_plant_of_the_page_has_laws_and_an_opening(vendor, tmp_path):
-    found = facts(smc.live(build.known.plants(), out=tmp_path / "page"))
+    @smc.law_function(gains={"k": 1.0})
+    def mine(y, gains, memory):
+        return -gains.k * y.e, y.e
+
+    found = facts(smc.live(build.known.plants(), laws=[mine], out=tmp_path / "page"))
     assert {"inverted_pendulum", "cart_pole", "furuta"} <= set(found["plants"])
     for plant in found["plants"].values():
-        assert plant["start"]
+        assert (plant["start"][0], len(set(plant["start"]))) == ("mine", 2)  # beside a law that suits the plant
         assert set(plant["start"]) <= set(plant["laws"]) <= set(found["laws"])
         for condition in plant["conditions"]:
             assert condition["least"] <= condition["value"] <= condition["most"]

@@ -239,9 +239,13 @@ def test_surface_estimator_and_encoder_are_choices_that_the_link_holds(seen, pag
 
 
 def test_a_link_with_nonsense_opens_the_page(seen):
-    seen.open("plant=nothing&a=classical&a.k=much&delay=1e9&b=<script>")
+    seen.open("plant=toString&a=classical&a.c=much&a.k=Infinity&delay=1e9&b=<script>")
     assert seen.page.input_value("#plant") == PLANTS[0]
     assert seen.chosen("input_delay") == 0.05  # the slider's end
+    assert seen.law_gain("k") == seen.page.evaluate("live.facts.plants.inverted_pendulum.ranges.classical.k[1]")
+    assert seen.page.inner_text("#status") == (
+        "This page does not have the plant “toString” and the law “<script>”, which the link names."
+    )
     assert seen.said == []
 
 

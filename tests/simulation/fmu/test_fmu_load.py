@@ -70,6 +70,7 @@ def test_gains_are_the_fmu_s_parameters(folder):
     path = smc.export_fmu(smc.law("observer_free", lam=4.0, k1=2.0), folder / "gains.fmu", u_max=5.0)
     template = smc.law_from_fmu(path, isolate=False)
     assert template.defaults == {"u_max": 5.0, "law_lam": 4.0, "law_k1": 2.0}
+    assert load._pace(template.function) == "every control period; inside, it runs every 0.001 s"
     with pytest.raises(smc.ScenarioError, match="law_lam"):
         template(law_lam=-1.0)
     with pytest.raises(smc.ScenarioError, match="unknown gain of gains 'lam'"):
@@ -177,8 +178,16 @@ def test_an_fmu_faster_than_the_law_steps_several_times_a_sample(foreign):
 def test_inputs_that_are_not_real_may_be_held(folder):
     """FMI 3.0: a Boolean and an Int32. It holds u for 5 samples."""
     path = helper.fmi3(folder)
-    with pytest.raises(smc.ScenarioError, match=r"^input 'enable' of servo\.fmu means nothing .* constants="):
-        smc.law_from_fmu(path)
+    for held, said in (
+        ({}, "inputs 'enable', 'mode' of servo.fmu mean"),
+        ({"enable": 1}, "input 'mode' of servo.fmu means"),
+    ):
+        with pytest.raises(smc.ScenarioError) as error:
+            smc.law_from_fmu(path, constants=held)
+        assert str(error.value) == (
+            f"{said} nothing that a law measures: hold {'it' if held else 'them'}, "
+            "constants={'mode': 0.0} (--constants mode=0)"
+        )
     laws = [smc.law_from_fmu(path, constants={"enable": on, "mode": 2}) for on in (1, 0)]
     trace, off = smc.run([scenario(law(), noise=None, u_max=100.0, reference=None) for law in laws])
     seen = slice(None, None, 5)
@@ -219,7 +228,11 @@ def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({}, r"input 'mode' of controller\.fmu means nothing that a law measures: say what it is, as in "),
+        (
+            {},
+            "input 'mode' of controller.fmu means nothing that a law measures: say what it is, variables={'x': 'mode'} "
+            "(--variables x=mode), or hold it, constants={'mode': 0.0} (--constants mode=0)",
+        ),
         ({"constants": {"mod": 1.0}}, "unknown input of controller.fmu 'mod': did you mean 'mode'?"),
         ({"variables": {"x": "theta"}}, "unknown input of controller.fmu 'theta': did you mean 'Plant.Theta'?"),
         ({"variables": {"u": "omega"}}, "unknown output of controller.fmu 'omega': choose from torque"),
@@ -260,7 +273,10 @@ def changed(foreign: Path, folder: Path, *pairs: tuple[str, str]) -> Path:
         (('modelIdentifier="controller"', 'modelIdentifier="other"'), "changed.fmu has a binary for "),
         (("<fmiModelDescription", "<fmi"), "changed.fmu is not an FMU ("),
         (('name="torque" valueReference="4" causality="output"', 'name="torque" valueReference="4"'),
-         "changed.fmu has no output that is named as a command (none): give variables={'u': ...}"),
+         "changed.fmu has no output: export it with the command as an output"),
+        (('name="torque"', 'name="s" valueReference="9" causality="output"><Real/></ScalarVariable>'
+          '<ScalarVariable name="kraft"'), "changed.fmu has no output that is named as a command (s, kraft): "
+         "say which it is, as in variables={'u': 'kraft'} (--variables u=kraft)"),
         (('name="mode" valueReference="3" causality="input"><Real start="0"/>',
           'name="mode" valueReference="3" causality="input"><String start=""/>'),
          "'mode' of changed.fmu is not one number: export it without this input"),

@@ -9,6 +9,7 @@ import { History, overTime, phasePlane } from "./plots.js";
 const SECONDS = 10; // that the plots show: chosen
 const MAX_FRAME = 0.1; // s: after a frame that took longer, only this much time is simulated
 const TICKS = 1000; // along a slider
+const MAX_NAME = 40; // characters of a name from a link that the page repeats
 const WORDS = { NaN, Infinity, "-Infinity": -Infinity }; // words in facts.json for numbers that JSON lacks
 const SIDES = ["a", "b"];
 const PARTS = { surface: "surfaces", velocity: "estimators" }; // of a controller beside its law -> where their facts are
@@ -39,31 +40,48 @@ function opening(plant) {
   return { plant, ...numbers, counts: 0, a: controller(start[0]), b: controller(start[1] ?? "") };
 }
 
-// Return the choice that the page's address holds. What it lacks, or has wrong, is that of `opening`.
-function fromAddress() {
+// Return the choice that the page's address holds. What it lacks, or has wrong, is that of `opening`. What it names and
+// the page does not have is added to `missing`.
+function fromAddress(missing) {
   const given = new URLSearchParams(location.hash.slice(1));
-  const plant = given.get("plant") in facts.plants ? given.get("plant") : Object.keys(facts.plants)[0];
+  const lacks = (kind, key) => missing.push(`the ${kind} “${given.get(key).slice(0, MAX_NAME)}”`);
+  const known = Object.hasOwn(facts.plants, given.get("plant"));
+  if (given.has("plant") && !known) lacks("plant", "plant");
+  const plant = known ? given.get("plant") : Object.keys(facts.plants)[0];
   const made = opening(plant);
-  for (const { name, least, most } of facts.plants[plant].conditions) {
+  const { conditions, laws, ranges, surface_ranges, estimator_ranges } = facts.plants[plant];
+  for (const { name, least, most } of conditions) {
     const value = parseFloat(given.get(name));
     if (Number.isFinite(value)) made[name] = Math.min(Math.max(value, least), most);
   }
   const counts = Math.round(parseFloat(given.get("counts")));
   if (counts >= 2 && counts <= 2 ** 32) made.counts = counts;
-  const gains = (key, order) => Object.fromEntries(
-    order.map((name) => [name, parseFloat(given.get(`${key}.${name}`))]).filter(([, value]) => !Number.isNaN(value)));
+  // the gains of a component, within their sliders
+  const gains = (key, { order }, sliders) => Object.fromEntries(order.map((name) => {
+    const [least, most] = sliders[name] ?? [-Number.MAX_VALUE, Number.MAX_VALUE];
+    return [name, Math.min(Math.max(parseFloat(given.get(`${key}.${name}`)), least), most)];
+  }).filter(([, value]) => !Number.isNaN(value)));
   for (const side of SIDES) {
     if (!given.has(side)) continue;
     const law = given.get(side);
-    if (!facts.plants[plant].laws.includes(law) && !(side === "b" && law === "")) continue;
+    const none = side === "b" && law === "";
+    if (!laws.includes(law) && !none) {
+      lacks("law", side);
+      continue;
+    }
     made[side] = controller(law);
-    if (law === "") continue;
-    made[side].gains = gains(side, facts.laws[law].order);
+    if (none) continue;
+    made[side].gains = gains(side, facts.laws[law], ranges[law]);
     for (const [part, kind] of Object.entries(PARTS)) {
       const key = `${side}-${part}`;
       const name = given.get(key);
-      if (!Object.hasOwn(facts[kind], name) || (part === "surface" && !facts.laws[law].takes_surface)) continue;
-      made[side][part] = { name, gains: gains(key, facts[kind][name].order) };
+      if (name === null || (part === "surface" && !facts.laws[law].takes_surface)) continue;
+      if (!Object.hasOwn(facts[kind], name)) {
+        lacks(part === "surface" ? "surface" : "velocity estimator", key);
+        continue;
+      }
+      const sliders = (part === "surface" ? surface_ranges : estimator_ranges)[name];
+      made[side][part] = { name, gains: gains(key, facts[kind][name], sliders) };
     }
     if (given.has(`${side}.model`)) made[side].model = given.get(`${side}.model`) === "nominal" ? "nominal" : "none";
   }
@@ -100,6 +118,15 @@ function scenarioOf(side) {
     input_delay: delay / 1000, control_period: period / 1000, u_max: bound, disturbance: { amplitude, omega },
     noise: { position: noise * facts.noise.position, velocity: noise * facts.noise.velocity },
   };
+}
+
+// Show what the page's address holds, and say what the page does not have of it.
+function follow() {
+  const missing = [];
+  chosen = fromAddress(missing);
+  forms();
+  restart();
+  if (missing.length) say(`This page does not have ${missing.join(" and ")}, which the link names.`);
 }
 
 // ---- simulations
@@ -530,11 +557,7 @@ function listen() {
   });
   window.addEventListener("blur", () => (pressed = 0));
   window.addEventListener("resize", writeNames);
-  window.addEventListener("hashchange", () => {
-    chosen = fromAddress();
-    forms();
-    restart();
-  });
+  window.addEventListener("hashchange", follow);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     restart();
   });
@@ -549,9 +572,7 @@ async function begin() {
   for (const [name, { label }] of Object.entries(facts.plants)) $("plant").append(element("option", { value: name }, label));
   $("mujoco").textContent = mujoco.mj_versionString();
   $("version").textContent = facts.version;
-  chosen = fromAddress();
-  forms();
-  restart();
+  follow();
   listen();
   $("loading").hidden = true;
   // for tests, and for use in the browser's console
