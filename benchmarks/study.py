@@ -1,11 +1,12 @@
-"""What a study costs beside the simulation alone: 4,400 runs of 10 s at 1 ms, against bare mj_step.
+"""What a study costs beside the simulation alone: 4,400 runs of 10 s at 1 ms, against plain mj_step.
 
     python benchmarks/study.py [--quick]
 
 5 plants x 4 laws x 11 conditions x 20 seeds; --quick takes 2 of the seeds. The study is all that `smc.study` does:
-looking up what is there, running with laws, noise and delays, scoring, writing parts and table. Bare is the same models
-stepped as often on as many threads, without a controller. Both take turns, a slice of the grid at a time, so that what
-else the machine does falls on both. Compiling the laws, once a process, is left out. The targets are 1.3 and 1.5 GB.
+looking up what is there, running with laws, noise and delays, scoring, writing parts and table. Plain is mj_step of the
+same plants, as often and on as many threads, without a controller. Both take turns, a slice of the grid at a time, so
+that what else the machine does falls on both. Compiling the laws, once a process, is left out. The targets are 1.3 and
+1.5 GB.
 """
 
 import resource
@@ -18,10 +19,9 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.progress import track
+from speed import plain
 
 import smc_mujoco as smc
-from smc_mujoco.simulation.batch import Chunk
-from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.studies import executors
@@ -34,7 +34,7 @@ CONDITIONS = ["nominal", "noise", "sine", "constant", "step", "pulse", "process_
 CONDITIONS += ["jump_mild", "differenced_5ms_noise"]
 SEEDS = range(2) if QUICK else range(20)
 SLICE = 2 if QUICK else 5  # seeds
-MOST, MEMORY = 1.3, 1.5e9  # times bare mj_step; bytes
+MOST, MEMORY = 1.3, 1.5e9  # times plain mj_step; bytes
 console = Console()
 
 
@@ -44,15 +44,14 @@ def slices() -> list[list[smc.Scenario]]:
     return [grid([plant], paper.LAWS, CONDITIONS, seeds, "study") for seeds in parts for plant in paper.PLANTS]
 
 
-def bare(scenarios: Sequence[smc.Scenario], threads: int) -> float:
-    """Seconds of stepping the models of these scenarios, in the same batches, without the callback."""
+def plain_seconds(scenarios: Sequence[smc.Scenario], threads: int) -> float:
+    """Seconds of stepping the plants of these scenarios, in the same batches, without the callback."""
     spent = 0.0
-    for batch in executors.batches(scenarios, threads):
-        with installed():
-            chunk = Chunk(batch, threads)
+    for prepared in executors.batches(scenarios, threads):
+        scenario = prepared[0].scenario
+        batch = plain(scenario, len(prepared), min(threads, len(prepared)))
         start = time.perf_counter()
-        scenario = batch[0].scenario
-        chunk.batch.step(nstep=scenario.samples * scenario.steps)
+        batch.step(nstep=scenario.samples * scenario.steps)
         spent += time.perf_counter() - start
     return spent
 
@@ -65,9 +64,9 @@ def main() -> None:
     grids = slices()
     try:
         for number, scenarios in enumerate(track(grids, "slices", console=console, transient=True)):
-            for side in ("study", "bare") if number % 2 else ("bare", "study"):
-                if side == "bare":
-                    simulated += bare(scenarios, threads)
+            for side in ("study", "plain") if number % 2 else ("plain", "study"):
+                if side == "plain":
+                    simulated += plain_seconds(scenarios, threads)
                 else:
                     start = time.perf_counter()
                     study(scenarios, out, threads=threads)
@@ -78,7 +77,7 @@ def main() -> None:
     finally:
         shutil.rmtree(out)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-    told = f"{len(table)} runs of 10 s, {threads} threads: study {studied:.1f} s, bare mj_step {simulated:.1f} s"
+    told = f"{len(table)} runs of 10 s, {threads} threads: study {studied:.1f} s, plain mj_step {simulated:.1f} s"
     console.print(told, highlight=False)
     for what, value, most, unit in (
         ("ratio", studied / simulated, MOST, ""),

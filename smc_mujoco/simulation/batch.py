@@ -36,7 +36,7 @@ class Chunk:
         self.given = [one.scenario for one in prepared]
         self.scenarios = scenarios = [one.resolved for one in self.given]
         first, count = scenarios[0], len(scenarios)
-        self.compiled = assembly.model(scenarios, nuserdata=callback.USERDATA)
+        self.compiled = assembly.model(scenarios, nuserdata=callback.USERDATA, scenery=False)
         self.model = assembly.with_values(self.compiled, first)
         self.channels = channels(self.model)
         self.logs = [np.full((first.samples + 1, first.plant.n), np.nan, state.LOG) for _ in scenarios]

@@ -1,0 +1,57 @@
+"""Models of runs: what only a picture needs is deleted, everything else stays."""
+
+import mujoco
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.simulation.model import model, without_scenery
+
+REFERRED = """
+<mujoco>
+  <default><geom size="0.1" contype="0" conaffinity="0"/></default>
+  <worldbody>
+    <light/>
+    <camera/>
+    <geom name="floor" type="plane" size="1 1 1" contype="1"/>
+    <geom name="wall"/>
+    <geom name="pulley" type="sphere"/>
+    <geom name="seen"/>
+    <geom name="drawn"/>
+    <body>
+      <geom name="frame"/>
+      <site name="from" pos="-1 0 0"/>
+      <body pos="1 0 0"><joint type="slide"/><geom name="bob" mass="1"/><site name="to"/></body>
+    </body>
+  </worldbody>
+  <contact><pair geom1="wall" geom2="bob"/></contact>
+  <tendon><spatial><site site="from"/><geom geom="pulley"/><site site="to"/></spatial></tendon>
+  <sensor><framepos objtype="geom" objname="seen"/></sensor>
+</mujoco>
+"""
+
+
+def test_geoms_that_move_or_touch_or_are_referred_to_are_no_scenery():
+    spec = mujoco.MjSpec.from_string(REFERRED)
+    without_scenery(spec)
+    assert [geom.name for geom in spec.geoms] == ["floor", "wall", "pulley", "seen", "bob"]
+    assert (len(spec.lights), len(spec.cameras)) == (0, 0)
+    spec.compile()
+
+
+@pytest.mark.parametrize("contact", ["none", "stops"])
+def test_a_run_has_a_model_without_scenery(contact):
+    scenario = smc.Scenario(plant="cart_pole", law="classical", contact=contact).resolved
+    whole, bare = model([scenario]), model([scenario], scenery=False)
+    assert bare.ngeom < 0.6 * whole.ngeom
+    assert (bare.nlight, bare.ncam) == (0, 0)
+    assert (bare.nbody, bare.npair, bare.nsensor) == (whole.nbody, whole.npair, whole.nsensor)
+
+
+def test_the_scenery_of_a_users_model_stays():
+    plant = smc.plant_from(
+        "<mujoco><worldbody><light/><geom name='base' size='0.1' contype='0' conaffinity='0'/>"
+        "<body><joint name='turn'/><geom size='0.1' pos='0 0 1'/></body></worldbody></mujoco>",
+        channels={"turn": smc.Channel(motor=True)},
+    )
+    made = model([smc.Scenario(plant=plant, law="classical").resolved], scenery=False)
+    assert (made.ngeom, made.nlight) == (2, 1)
