@@ -5,8 +5,9 @@
 Times are of the processor, so that other work on the machine counts little; those of two threads are elapsed. A ratio
 is the median over rounds that alternate between the two sides. A peer that is not installed is left out by name.
 
-MuJoCo's timers are off during a run, and its model has no scenery. So a step of a run is compared with two steps without
-a law: a plain mj_step, with timers and scenery, and a bare one without them. The bare one shows what the callback takes.
+MuJoCo's timers are off during a run, and its model has no scenery. So a step of a run is compared with two steps
+without a law: a plain mj_step, with timers and scenery, and a bare one without them, which shows what the callback
+takes.
 """
 
 import contextlib
