@@ -48,6 +48,7 @@ from smc_mujoco.simulation.conditions import Condition, find_condition
 from smc_mujoco.simulation.grid import DURATION, case
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Constant
 from smc_mujoco.simulation.trace import Trace
 
 HORIZONS = (0.15, 0.4, 1.0)  # of the duration: chosen
@@ -123,7 +124,7 @@ def basin(
       condition: condition of the runs, such as "coulomb".
 
     Raises:
-      ScenarioError: an unknown plant, law, set or condition, or an empty grid.
+      ScenarioError: an unknown plant, law, set or condition, a condition whose reference moves, or an empty grid.
     """
     base = case(plant, law, condition, duration, gains, changes={"integrator": "implicitfast"})
     if own := sorted({"x0", "v0"} & find_condition(condition).on(base.plant, duration).keys()):
@@ -150,10 +151,13 @@ def of(
       early: whether to decide states early; False runs all of them to the end. The other arguments are as in `basin`.
 
     Raises:
-      ScenarioError: channels with different units, an empty grid, or a duration too short for the rule.
+      ScenarioError: channels with different units, a reference that moves, an empty grid, or a duration too short for
+        the rule.
     """
     if base.plant.mixed:
         raise ScenarioError(f"{base.plant.name} has channels in m and rad, which cannot start alike: map another plant")
+    if moving := [one for one in base.references if not isinstance(one, Constant)]:
+        raise ScenarioError(f"a map tells what comes to rest, and {shown(moving[0])} moves: give a constant reference")
     horizons = HORIZONS if early else HORIZONS[-1:]
     least = math.ceil(MIN_SAMPLES / horizons[0])
     if base.samples < least:

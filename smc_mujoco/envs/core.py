@@ -231,7 +231,7 @@ class Episode:
         if self.over:
             return 0.0, {"time": time, "error": np.full(len(self.x), np.nan)}
         e, w = self.setting.errors(self.x, self.v, self.sample)
-        return float(reward(e, w)), {"time": time, "error": np.array(e)}
+        return float(reward(e, w)), {"time": time, "error": e}
 
 
 def bounded(observation: np.ndarray) -> np.ndarray:

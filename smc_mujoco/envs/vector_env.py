@@ -142,7 +142,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         final, times = {}, self.times
         if mode is AutoresetMode.SAME_STEP and self.over.any():
             for i in np.flatnonzero(self.over):
-                info = {"time": times[i], "error": e[i].copy()}
+                info = {"time": times[i], "error": e[i]}
                 final = self._add_info(final, {"final_obs": observations[i].copy(), "final_info": info}, int(i))
             self.begin(self.over.copy())
             observations, e = self.observe(), self.errors()[0]
@@ -191,8 +191,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
     def errors(self) -> Pair:
         """Return the errors e and w of the task in all copies, (num_envs, n) each."""
         with np.errstate(over="ignore", invalid="ignore"):
-            e, w = self.setting.errors(*self.state(), self.samples)
-        return np.array(e), w
+            return self.setting.errors(*self.state(), self.samples)
 
     def infos(self, e: np.ndarray, mask: np.ndarray | None = None) -> dict[str, Any]:
         """Return the infos of `Episode.assess` for the copies in a mask, as gymnasium joins them.
