@@ -20,7 +20,7 @@ from smc_mujoco.common.version import __version__ as __version__
 from smc_mujoco.envs import registration
 
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-_HOMES = {name: home for home, name in re.findall(r"^from (\S+) import (\w+) as \2$", _STUB, re.MULTILINE)}
+_ORIGINS = {name: module for module, name in re.findall(r"^from (\S+) import (\w+) as \2$", _STUB, re.MULTILINE)}
 _MODULES = {  # public modules; three of them need an extra
     "arms": "smc_mujoco.studies.arms",
     "boards": "smc_mujoco.studies.boards",
@@ -29,7 +29,7 @@ _MODULES = {  # public modules; three of them need an extra
     "suite": "smc_mujoco.envs.dm_control_env",
     "vector": "smc_mujoco.envs.vector_env",
 }
-__all__ = [*_HOMES, "arms", "boards", "paper"]  # noqa: PLE0604  # pyright: ignore[reportUnsupportedDunderAll]
+__all__ = [*_ORIGINS, "arms", "boards", "paper"]  # noqa: PLE0604  # pyright: ignore[reportUnsupportedDunderAll]
 
 __path__.append(str(Path(__file__).parent / "moved"))  # old names of modules, for one release
 
@@ -39,7 +39,7 @@ def __getattr__(name: str) -> object:
         if registration.register_if_imported():
             globals()["__spec__"] = _SPEC
         return _SPEC
-    if name not in _HOMES and name not in _MODULES:
+    if name not in _ORIGINS and name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = globals()[name] = _load(name)  # also where the import of an old module has taken the name, see `moved`
     return value
@@ -51,12 +51,12 @@ def _load(name: str) -> object:
     with held_back():
         if name in _MODULES:
             return importlib.import_module(_MODULES[name])
-        value = getattr(importlib.import_module(_HOMES[name]), name)
+        value = getattr(importlib.import_module(_ORIGINS[name]), name)
         return importlib.import_module("smc_mujoco.common.arguments").explained(value)
 
 
 def __dir__() -> list[str]:
-    return sorted({*_HOMES, *_MODULES, "__doc__", "__version__"})
+    return sorted({*_ORIGINS, *_MODULES, "__doc__", "__version__"})
 
 
 # gymnasium.make imports this package and then looks an id up. If the package was imported before gymnasium, nothing of

@@ -28,7 +28,7 @@ MOVED = "moved"  # old names of modules, for one release
 HEAVY = {"numpy", "mujoco", "numba", "scipy", "matplotlib", "mediapy", "dm_control", "PIL", "rich", "typer"}
 
 STUB = ast.parse((PACKAGE / "__init__.pyi").read_text())
-PUBLIC = {*smc._HOMES, *smc._MODULES}
+PUBLIC = {*smc._ORIGINS, *smc._MODULES}
 
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
 TEXTS = [

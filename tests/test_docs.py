@@ -33,14 +33,14 @@ def test_the_contents_name_every_page_once():
 
 def test_the_reference_names_every_public_name_where_it_is_defined():
     named = re.findall(r"^::: smc_mujoco\.(\S+)$", (DOCS / "api.md").read_text(), re.MULTILINE)
-    homes = {f"{home}.{name}" for name, home in smc._HOMES.items()} | {
+    public = {f"{module}.{name}" for name, module in smc._ORIGINS.items()} | {
         smc._MODULES[one] for one in ("arms", "boards", "paper")
     }
-    homes = {home.removeprefix("smc_mujoco.") for home in homes}
-    assert homes <= set(named)
+    public = {path.removeprefix("smc_mujoco.") for path in public}
+    assert public <= set(named)
     assert len(named) == len(set(named))
     of_modules = ("pytest_plugin.", "testing.", "studies.arms.", "studies.boards.")
-    assert {name for name in set(named) - homes if not name.startswith(of_modules)} == set()
+    assert {name for name in set(named) - public if not name.startswith(of_modules)} == set()
 
 
 def test_the_mathematics_define_every_metric_in_the_order_of_tables():

@@ -19,7 +19,7 @@ PLACES = {  # old name -> the module that its file names
     for path in FOLDER.rglob("*.py")
     if path.parent != FOLDER or path.name != "__init__.py"
 }
-FUNCTIONS = sorted({*PLACES} & {name for name in smc._HOMES if callable(getattr(smc, name))})
+FUNCTIONS = sorted({*PLACES} & {name for name in smc._ORIGINS if callable(getattr(smc, name))})
 NAMES = {  # old place -> names in it that the documentation of 0.1 showed
     "actuators": "DCMotor Lag RateLimit",
     "agents": "agent",

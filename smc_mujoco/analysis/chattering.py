@@ -63,7 +63,7 @@ class Chattering:
         amplitude includes the change of s by one count of an encoder. If the balance has no solution but the law
         switches, the ranges are those of a locked cycle, which is possible.
       coupling: largest amplitude of another driven channel under this channel's command, over amplitude_x; 0 for a
-        single channel. The prediction is for one channel alone. If coupling is not small, the channels oscillate
+        single channel. The prediction is for a single channel. If coupling is not small, the channels oscillate
         together.
       gain, response: N and L at the cycle, complex.
       assumptions: what was left out or is doubtful, in sentences.

@@ -61,9 +61,7 @@ def _linear(plant: Plant, factors: Frozen[float]) -> Linear:
     rest = np.zeros(n)
     g = np.array([plant.nominal(rest, rest, i, p)[1] for i in range(n)])
     if plant.underactuated or plant.mixed or g.min() <= 0.0 or np.ptp(g) > SAME * g.max():
-        raise ScenarioError(
-            f"{plant.name} has no theory here: give a plant with an actuator on each of its like joints"
-        )
+        raise ScenarioError(f"{plant.name} has no theory here: give a plant with equal joints and an actuator on each")
 
     def slopes(at: Callable[[np.ndarray, int], float]) -> np.ndarray:
         """Return -d f_i / d z_j / g, (n, n), by central differences."""
@@ -74,7 +72,7 @@ def _linear(plant: Plant, factors: Frozen[float]) -> Linear:
     damping = slopes(lambda v, i: plant.nominal(rest, v, i, p)[0])
     d, small = damping[0, 0], SAME * (1.0 + np.abs(stiffness).max())
     if np.abs(damping - d * np.eye(n)).max() > small or np.abs(stiffness - stiffness.T).max() > small:
-        raise ScenarioError(f"{plant.name} has no theory here: give a plant whose joints are coupled by springs alone")
+        raise ScenarioError(f"{plant.name} has no theory here: give a plant whose joints are coupled only by springs")
     return Linear(inertia=float(1.0 / g[0]), damping=float(d), stiffness=(stiffness + stiffness.T) / 2.0)
 
 
@@ -110,7 +108,7 @@ def holding(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.nda
     p, still = SimpleNamespace(**plant.parameters), np.zeros(plant.n)
     ratios = [plant.nominal(np.full(plant.n, 1.0), still, i, p) for i in range(plant.n)]
     if np.ptp([f / g for f, g in ratios]) > SAME * (1.0 + abs(ratios[0][0] / ratios[0][1])):
-        raise ScenarioError(f"{plant.name} has no theory at rest: give a plant whose joints are alike")
+        raise ScenarioError(f"{plant.name} has no theory at rest: give a plant with equal joints")
 
     def force(x: np.ndarray) -> np.ndarray:
         own = [plant.nominal(np.full(plant.n, each), still, 0, p) for each in x]

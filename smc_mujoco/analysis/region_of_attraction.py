@@ -155,9 +155,11 @@ def of(
         the rule.
     """
     if base.plant.mixed:
-        raise ScenarioError(f"{base.plant.name} has channels in m and rad, which cannot start alike: map another plant")
+        raise ScenarioError(
+            f"{base.plant.name} has channels in m and rad, which cannot start from the same state: map another plant"
+        )
     if moving := [one for one in base.references if not isinstance(one, Constant)]:
-        raise ScenarioError(f"a map tells what comes to rest, and {shown(moving[0])} moves: give a constant reference")
+        raise ScenarioError(f"a map shows what comes to rest, and {shown(moving[0])} moves: give a constant reference")
     horizons = HORIZONS if early else HORIZONS[-1:]
     least = math.ceil(MIN_SAMPLES / horizons[0])
     if base.samples < least:

@@ -39,6 +39,17 @@ if TYPE_CHECKING:
     from smc_mujoco.studies.audit.verdict import Claim
     from smc_mujoco.twins.identify import Identified
 
+MAX_TIP_COLUMNS = 5  # with more, the name of the joint that does most work does not fit into 80 characters
+TIP = {  # columns of a table of an arm's tip and worst joint: heading -> score, unit, factor on its SI value
+    "largest\nerror": ("max_error", "mm", 1e3),
+    "error at\nthe end": ("last_error", "mm", 1e3),
+    "mean\nforce": ("mean_force", "N", 1.0),
+    "off the\nwanted": ("force_error", "%", 1.0),
+    "force\nvaries by": ("force_ripple", "N", 1.0),
+    "touching": ("touching", "%", 1.0),
+    "deepest": ("depth", "mm", 1e3),
+}
+
 # Columns of a table of scores: heading -> metric.
 SHOWN = {
     "settles": "settling_time",
@@ -113,18 +124,6 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
             table.add_row(_label(label, trace), *cells)
         tables.append(table)
     return tables
-
-
-MAX_TIP_COLUMNS = 5  # with more, the name of the joint that does most work does not fit into 80 characters
-TIP = {  # columns of a table of an arm's tip and worst joint: heading -> score, unit, factor on its SI value
-    "largest\nerror": ("max_error", "mm", 1e3),
-    "error at\nthe end": ("last_error", "mm", 1e3),
-    "mean\nforce": ("mean_force", "N", 1.0),
-    "off the\nwanted": ("force_error", "%", 1.0),
-    "force\nvaries by": ("force_ripple", "N", 1.0),
-    "touching": ("touching", "%", 1.0),
-    "deepest": ("depth", "mm", 1e3),
-}
 
 
 def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:

@@ -65,12 +65,12 @@ def _explain_methods(kind: type) -> None:
             setattr(kind, name, method if held is function else type(held)(method))
 
 
-def _explained(function: Callable, home: type | None = None) -> Callable:
-    """Return a function, or a method of the class `home`, with its exceptions explained."""
+def _explained(function: Callable, owner: type | None = None) -> Callable:
+    """Return a function, or a method of the class `owner`, with its exceptions explained."""
 
     @functools.wraps(function)
     def call(*args: Any, **named: Any) -> Any:
-        with _explaining(function, home, args, named):
+        with _explaining(function, owner, args, named):
             result = function(*args, **named)
         for one in result[:1] if isinstance(result, list) else (result,):
             _explain_methods(type(one))
@@ -78,7 +78,7 @@ def _explained(function: Callable, home: type | None = None) -> Callable:
 
     @functools.wraps(function)
     def iterate(*args: Any, **named: Any) -> Any:
-        with _explaining(function, home, args, named):
+        with _explaining(function, owner, args, named):
             return (yield from function(*args, **named))
 
     wrapper = iterate if inspect.isgeneratorfunction(function) else call
@@ -87,25 +87,25 @@ def _explained(function: Callable, home: type | None = None) -> Callable:
 
 
 @contextlib.contextmanager
-def _explaining(function: Callable, home: type | None, args: tuple, named: dict[str, Any]) -> Iterator[None]:
+def _explaining(function: Callable, owner: type | None, args: tuple, named: dict[str, Any]) -> Iterator[None]:
     """Turn an exception of a call into the error that names the argument at fault, if there is one."""
     try:
         yield
     except ScenarioError:
         raise
     except Exception:
-        if (wrong := _misfit(function, home, args, named)) is None:
+        if (wrong := _misfit(function, owner, args, named)) is None:
             raise
         raise wrong from None
 
 
-def _misfit(function: Callable, home: type | None, args: tuple, named: dict[str, Any]) -> ScenarioError | None:
+def _misfit(function: Callable, owner: type | None, args: tuple, named: dict[str, Any]) -> ScenarioError | None:
     """Return the error that names the first argument that is unknown, missing, or does not fit; None if all fit."""
     signature = inspect.signature(function)
     try:
         given = signature.bind(*args, **named).arguments
     except TypeError:
-        return _unbound(function, home, signature, args, named)
+        return _unbound(function, owner, signature, args, named)
     hints = typing.get_type_hints(function, localns=_Names(function.__globals__))
     kinds = {name: kind_of(hint) for name, hint in hints.items()}
     defaults = {name: p.default for name, p in signature.parameters.items() if name in kinds}
@@ -121,12 +121,12 @@ def _misfit(function: Callable, home: type | None, args: tuple, named: dict[str,
 
 
 def _unbound(
-    function: Callable, home: type | None, signature: inspect.Signature, args: tuple, named: dict[str, Any]
+    function: Callable, owner: type | None, signature: inspect.Signature, args: tuple, named: dict[str, Any]
 ) -> ScenarioError:
     """Return the error for arguments that a signature does not take."""
     parameters, name, what = list(signature.parameters.values()), function.__name__, "argument"
-    if home is not None:
-        name, what = (home.__name__, "field") if name == "__init__" else (f"{home.__name__}.{name}", what)
+    if owner is not None:
+        name, what = (owner.__name__, "field") if name == "__init__" else (f"{owner.__name__}.{name}", what)
         parameters, args = parameters[1:], args[1:]
     by_name = [p.name for p in parameters if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)]
     by_place = [p.name for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]

@@ -204,7 +204,7 @@ def imported(kind: type[T], fits: Callable[[T], bool]) -> Callable[[EntryPoint],
 
 
 def source(point: EntryPoint) -> ModuleSpec:
-    """Return the spec of the module that an entry point names. It imports the packages around the module alone.
+    """Return the spec of the module that an entry point names. It imports only the packages around the module.
 
     Raises:
       ScenarioError: there is no such module, or the entry point names something in it.

@@ -3,7 +3,7 @@
     trace = smc.run(smc.Scenario(plant="duffing", law=smc.policy(network)))
 
 A policy observes the same positions and velocities as in an environment. On a plant of several channels it is called
-once per channel, with that channel's observation. It must be a function of the observation alone, because all channels
+once per channel, with that channel's observation. It must be a function only of the observation, because all channels
 and runs share it. A policy is Python, so its runs take the reference loop.
 """
 
@@ -230,7 +230,7 @@ def _forward(torch: ModuleType, module: Any, observation: np.ndarray) -> np.ndar
     with torch.no_grad():
         action = module(torch.as_tensor(observation[None], dtype=dtype))
     if isinstance(action, tuple | list | dict):
-        raise TypeError(f"it gave a {type(action).__name__}, not an action: wrap it in one that gives the action alone")
+        raise TypeError(f"it gave a {type(action).__name__}, not an action: wrap it in one that gives only the action")
     return action.double().numpy()
 
 

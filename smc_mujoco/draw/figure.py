@@ -1,4 +1,4 @@
-"""Figures: x, u and s of several runs over time with their phase portrait; u alone under several conditions."""
+"""Figures: x, u and s of several runs over time with their phase portrait; only u under several conditions."""
 
 import os
 from collections.abc import Sequence

@@ -177,7 +177,7 @@ class Pushed(Loop):
         self.push = np.zeros_like(self.data.xfrc_applied)
 
     def disturb(self, data: mujoco.MjData, t: float) -> np.ndarray:
-        """Return the disturbances alone, and apply them and the push to the bodies."""
+        """Apply the disturbances and the push to the bodies. Return the disturbances without the push."""
         data.xfrc_applied[:] = 0.0
         d = super().disturb(data, t)
         data.xfrc_applied += self.push

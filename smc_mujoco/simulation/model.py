@@ -156,9 +156,9 @@ def check_start(made: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario) -
     inside, beyond = _overlap(made, data, there), None
     moves_around = scenario.plant.tip  # an arm: the straight line in its joints may cross what the arm goes around
     if not inside and scenario.resolved.x0 != scenario.plant.x0 and not moves_around:
-        home = start(made, dataclasses.replace(scenario, x0=scenario.plant.x0))[0]
-        home = made.qpos0 if _overlap(made, data, home) else home
-        path = (_overlap(made, data, (1 - part) * home + part * there) for part in np.linspace(0, 1, PATH_POINTS))
+        free = start(made, dataclasses.replace(scenario, x0=scenario.plant.x0))[0]
+        free = made.qpos0 if _overlap(made, data, free) else free
+        path = (_overlap(made, data, (1 - part) * free + part * there) for part in np.linspace(0, 1, PATH_POINTS))
         beyond = next(filter(None, path), None)
     if hit := inside or beyond:
         raise ScenarioError(

@@ -45,7 +45,7 @@ from smc_mujoco.simulation.signals import Signal
 
 @functools.cache
 def _component(function: Callable, kind: str, gains: tuple[str, ...], memory: int) -> Function:
-    """Compile (y, gains, memory) -> two numbers; an estimator may return the velocity alone."""
+    """Compile (y, gains, memory) -> two numbers; an estimator may return only the velocity."""
     body, inputs, values = jit(function), loader(Reading if kind == "estimator" else Measurement), loader(named(gains))
     estimates = kind == "estimator"
 

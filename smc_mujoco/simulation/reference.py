@@ -261,7 +261,7 @@ class Loop:
             if signal.random:
                 d = [evaluate(signal, t, own, self.scenario.seed, i, stream)[0] for i, own in enumerate(memory)]
             else:
-                d = evaluate(signal, t)[0]  # alike in all channels
+                d = evaluate(signal, t)[0]  # the same in all channels
             matched = at["sign"] * d * self.driven  # only where there is an actuator
             joints += matched
             xfrc[at["push" if signal.cartesian else "xfrc"]] += d if signal.cartesian else matched

@@ -109,7 +109,7 @@ class Scenario:
 
     A field is None where nothing was given and its default depends on other fields: model, physics_step, u_max, x0, v0,
     reference, velocity and integrator. `resolved` is the same scenario with these defaults. dataclasses.replace keeps
-    None, so that a default follows the fields that it depends on. The law alone is never None: one that is left out is
+    None, so that a default follows the fields that it depends on. Only the law is never None: one that is left out is
     taken from the plant's channels at once. Scenarios whose resolved fields are equal are equal, and give the same
     trace to the last bit.
 

@@ -143,9 +143,9 @@ def _restore_law(data: dict) -> Component:
 
 
 def _find(data: dict, kind: str, known: Catalogue[Template]) -> Component:
-    home, template = _present_place(data["module"]), known.get(data["name"])
+    module, template = _present_place(data["module"]), known.get(data["name"])
     named = known.own.values() if template is None else [template]  # one of the library may have been renamed
-    there = (one for one in named if one.function.__module__ == home and {*data["gains"]} <= {*one.gains})
+    there = (one for one in named if one.function.__module__ == module and {*data["gains"]} <= {*one.gains})
     if template := next(there, None):
         bound = template.bind(data["gains"])
         return bound if bound.name == data["name"] else bound.named(data["name"])

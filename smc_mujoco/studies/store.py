@@ -99,7 +99,7 @@ class Store:
             found = []
             for path, indices in places.items():
                 if (part := read(path)) is None:
-                    raise ScenarioError(f"part {path} was removed or broken while the study ran: start it once more")
+                    raise ScenarioError(f"part {path} was removed or broken while the study ran: start it again")
                 found.append(part.take([self.where[names[i]][1] for i in indices]))
             order = np.argsort(np.concatenate(list(places.values())))
             return pa.concat_tables(found).take(order).combine_chunks()
@@ -110,7 +110,7 @@ class Store:
     def _read(self, path: Path) -> "pa.Table | None":
         """Return a part, or None for a file that is damaged or not a part."""
         try:
-            with reading(path, "part", "start the study once more") as file:
+            with reading(path, "part", "start the study again") as file:
                 part = table.read(file, sealed=True)
         except ScenarioError:
             return None

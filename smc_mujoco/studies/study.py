@@ -31,6 +31,10 @@ from smc_mujoco.studies.table import Table
 
 key, condition = run_key.key, run_key.condition
 
+# One condition of each kind: of the paper's, and one each for friction, drive, gear, sensor and obstacles.
+IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
+REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Extent:
@@ -43,16 +47,14 @@ class Extent:
     duration: float = paper.DURATION
 
 
-# One condition of each kind: of the paper's, and one each for friction, drive, gear, sensor and obstacles.
-IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
-REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
 FULL = Extent(conditions=IDEAL + REAL, seeds=20)
+# It has the fewest seeds with which a winner can be named, see `ranking`, and takes half a minute on 2 cores.
 QUICK = Extent(
     plants=("inverted_pendulum", "van_der_pol", "duffing"),
     conditions=("nominal", "noise", "coulomb"),
     seeds=16,
     duration=3.0,
-)  # the fewest seeds with which a winner is named, see `ranking`; half a minute on 2 cores
+)
 
 
 def study(

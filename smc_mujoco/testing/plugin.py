@@ -20,6 +20,8 @@ import pytest
 if TYPE_CHECKING:
     from smc_mujoco.testing.response import StepResponse
 
+GOLDEN = "smc_golden"  # property of a test's report: the golden file that it wrote
+
 
 class Ledger(NamedTuple):
     """Responses of the running test, and pytest's temporary folder. Fixtures write them, hooks read them."""
@@ -29,7 +31,6 @@ class Ledger(NamedTuple):
 
 
 LEDGER = pytest.StashKey[Ledger]()
-GOLDEN = "smc_golden"  # property of a test's report: the golden file that it wrote
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -142,10 +142,10 @@ def test_what_an_annotation_asks_for(hint, right, wrong, words):
 # what they are to a reader
 
 
-@pytest.mark.parametrize("name", sorted(smc._HOMES))
+@pytest.mark.parametrize("name", sorted(smc._ORIGINS))
 def test_a_public_name_keeps_its_signature_and_words(name):
     value = getattr(smc, name)
-    plain = getattr(importlib.import_module(smc._HOMES[name]), name)
+    plain = getattr(importlib.import_module(smc._ORIGINS[name]), name)
     assert value.__doc__ == plain.__doc__
     assert value.__name__ == plain.__name__
     if inspect.isfunction(value):

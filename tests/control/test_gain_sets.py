@@ -1,4 +1,4 @@
-"""The sets of gains: what ships was tuned alike, is what its files say, and comes out again."""
+"""The sets of gains: shipped gains were tuned in the same way, equal their files, and are found again."""
 
 import dataclasses
 import itertools

@@ -72,10 +72,10 @@ def test_a_seed_has_one_start_for_all_laws_and_conditions_near_the_papers():
     made = grid(["pendulum_network"], ["classical", "adaptive"], ["nominal", "coulomb"], [3, 4], "study")
     starts = {s.seed: {t.resolved.x0 for t in made if t.seed == s.seed} for s in made}
     assert all(len(found) == 1 for found in starts.values())
-    home = np.array(made[0].plant.x0)
+    nominal = np.array(made[0].plant.x0)
     for seed, (x0,) in starts.items():
-        z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(home.size)]
-        assert np.allclose(x0, home * (1.0 + 0.2 * np.array(z)))
+        z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(nominal.size)]
+        assert np.allclose(x0, nominal * (1.0 + 0.2 * np.array(z)))
     assert starts[3] != starts[4]
 
 

@@ -195,18 +195,24 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
                     field.replace("definition", "objective"),
                     f"{one.law.name} has {its}, {first.law.name} {other}",
                 )
-                raise ScenarioError(f"laws tuned with unequal {name} cannot be compared, {pair}: tune them alike")
+                raise ScenarioError(
+                    f"laws tuned with unequal {name} cannot be compared, {pair}: tune them in the same way"
+                )
         if len(one.history) != one.budget:
             counts = f"{one.law.name} evaluated {len(one.history)} of {one.budget}"
             raise ScenarioError(f"laws that did not spend their budget cannot be compared, {counts}: tune it again")
         for gain, ends in _bounds(one).items():
             if not np.allclose(one.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
                 pair = f"{one.law.name}'s {gain} was searched in {one.bounds.get(gain)}, not in {ends}"
-                raise ScenarioError(f"laws tuned within unequal bounds cannot be compared, {pair}: tune them alike")
+                raise ScenarioError(
+                    f"laws tuned within unequal bounds cannot be compared, {pair}: tune them in the same way"
+                )
         for gain, most in one._largest.items():
             if one.gains[gain] > most * (1.0 + ROUNDING):
                 pair = f"{one.law.name}'s {gain} is {one.gains[gain]:g}, and its actuator gives {most:g}"
-                raise ScenarioError(f"laws tuned beyond their actuator cannot be compared, {pair}: tune them alike")
+                raise ScenarioError(
+                    f"laws tuned beyond their actuator cannot be compared, {pair}: tune them in the same way"
+                )
     return sorted(tuned, key=lambda one: one.objective)
 
 

@@ -67,7 +67,9 @@ def _gain(law: Component, name: str) -> Gain:
     old = SCALES.get(law.name, {})
     if name in old and gain.unit is None and not gain.held:
         cure = f'write gains={{"{name}": Gain({gain.default:g}, ...)}} in its decorator'
-        warnings.warn(f"SCALES[{law.name!r}] goes with the next release: {cure}", DeprecationWarning, users_frame())
+        warnings.warn(
+            f"SCALES[{law.name!r}] will be removed in the next release: {cure}", DeprecationWarning, users_frame()
+        )
         entry = old[name]
         return Gain(gain.default, entry(law.gains) if callable(entry) else entry, held=entry is None)
     return dataclasses.replace(gain, unit=gain.unit_at(law.gains))

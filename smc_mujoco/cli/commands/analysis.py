@@ -19,7 +19,7 @@ def tune(
     plant: options.PlantName,
     law: options.LawName,
     objective: Annotated[
-        str, typer.Option(help="balanced: error, and variation of u; tracking: error alone.")
+        str, typer.Option(help="balanced: error, and variation of u; tracking: only error.")
     ] = "balanced",
     budget: Annotated[int, typer.Option(min=1, help="How many sets of gains to try.")] = 96,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search and of the noise.")] = 0,
@@ -243,7 +243,7 @@ def chatter(
     the predicted amplitude or frequency may be off. There are two reasons: s has harmonics, and the cycle may be locked
     to the control samples, which shifts the instant at which the law switches. The column "third" is the share of the
     third harmonic. If the plant has several driven channels, the column "coupling" is how far this channel's command
-    moves another channel, relative to its own motion. The prediction is for one channel alone, so it fails if that is
+    moves another channel, relative to its own motion. The prediction is for a single channel, so it fails if that is
     not small, because the channels then oscillate together.
 
     With --amplitude or --frequency, the gains of each law are scaled in proportion until the prediction is what you ask

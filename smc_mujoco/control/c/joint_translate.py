@@ -32,6 +32,7 @@ from smc_mujoco.control.c.translate import (
     Function,
     Program,
     Value,
+    call_to,
     known,
     literal,
     names_in,
@@ -174,15 +175,15 @@ class ArrayFunction(Function):
         kinds, beginning = self.program.function(self.callee(call), values, call.args)
         if len(kinds) != len(targets):
             raise refuse(call, f"{len(targets)} names for {len(kinds)} results")
-        homes, stores = [], []
+        pointers, stores = [], []
         for target, kind in zip(targets, kinds, strict=True):
             if shape(kind):
                 found = self.temporary(kind)
-                homes.append(found.home)
+                pointers.append(found.pointer)
                 stores.append((target, found))
             else:
-                homes.append(f"&{self.destination(target, kind)}")
-        yield call_to(beginning, ", ".join(homes))
+                pointers.append(f"&{self.destination(target, kind)}")
+        yield call_to(beginning, ", ".join(pointers))
         for target, found in stores:
             yield from self.store(target, found)
 
@@ -245,7 +246,7 @@ class ArrayFunction(Function):
         """Yield the loops that copy an array, or one number, to a place."""
         dimensions = shape(place.kind)
         if call := self.last_call(place, value):
-            yield f"{call}, {place.home});"
+            yield f"{call}, {place.pointer});"
             return
         indices = [self.index(i) for i in range(len(dimensions))]
         loops = [f"for (int32_t {i} = 0; {i} < {n}; {i}++)" for i, n in zip(indices, dimensions, strict=True)]
@@ -256,14 +257,14 @@ class ArrayFunction(Function):
 
     def last_call(self, place: Value, value: Value) -> str:
         """Take back the call that has just computed a value, if it can write to a place itself; else an empty text."""
-        end = f", {value.home});"
-        if not (place.home and self.before and value.home in self.temporaries and self.before[-1].endswith(end)):
+        end = f", {value.pointer});"
+        if not (place.pointer and self.before and value.pointer in self.temporaries and self.before[-1].endswith(end)):
             return ""
         call = self.before[-1].removesuffix(end)
-        if re.search(rf"\b{place.home.partition(' ')[0]}\b", call.partition("(")[2]):  # it reads from there
+        if re.search(rf"\b{place.pointer.partition(' ')[0]}\b", call.partition("(")[2]):  # it reads from there
             return ""
         self.before.pop()
-        del self.temporaries[value.home]
+        del self.temporaries[value.pointer]
         return call
 
     def destination(self, target: ast.expr, kind: str) -> str:
@@ -375,7 +376,7 @@ class ArrayFunction(Function):
 
     def stored(self, value: Value, node: ast.AST) -> Value:
         """Return an array whose numbers lie in a row: itself, or a copy."""
-        if value.home:
+        if value.pointer:
             return value
         kept = self.temporary(value.kind)
         lines = list(self.fill(kept, value))
@@ -391,7 +392,7 @@ class ArrayFunction(Function):
         if not shape(value.kind):
             return value
         kept = self.stored(value, node)
-        return kept._replace(text=kept.home)
+        return kept._replace(text=kept.pointer)
 
     def truth(self, node: ast.expr) -> str:
         """Translate an expression as a condition."""
@@ -410,45 +411,45 @@ class ArrayFunction(Function):
     def _attribute(self, node: ast.Attribute) -> Value:
         if (constant := self.resolve(node)) is not None:
             return self.constants_of(node, constant) if isinstance(constant, np.ndarray) else super()._attribute(node)
-        home, name = self.outside(self.value, node.value), node.attr
-        if home.kind == "y":
+        owner, name = self.outside(self.value, node.value), node.attr
+        if owner.kind == "y":
             known(name, "measurement", FIELDS)
             return (
-                array_at(f"{home.text}->{name}", f"real{FIELDS[name]}")
+                array_at(f"{owner.text}->{name}", f"real{FIELDS[name]}")
                 if FIELDS[name]
-                else Value(f"{home.text}->{name}", "real")
+                else Value(f"{owner.text}->{name}", "real")
             )
-        if home.kind == "gains":
+        if owner.kind == "gains":
             known(name, "gain", self.program.gains)
             place = f"GAIN_{plain(name)} * {JOINTS}"
             if name in self.program.component.shared:
-                return Value(f"{home.text}[{place}]", "real")
-            return array_at(home.text, f"real[{JOINTS}]", f"{place} + ")
+                return Value(f"{owner.text}[{place}]", "real")
+            return array_at(owner.text, f"real[{JOINTS}]", f"{place} + ")
         raise refuse(node, "an attribute")
 
     def constants_of(self, node: ast.expr, values: np.ndarray) -> Value:
         """Return an array of constants."""
         made = self.program.array(ast.unparse(node).replace(".", "_"), values)
         found = array_at(made.text, f"{made.kind}[{len(values)}]")
-        return found if made.kind == "real" else found._replace(home="")  # of 16 bits, so that functions get a copy
+        return found if made.kind == "real" else found._replace(pointer="")  # of 16 bits, so that functions get a copy
 
     def _subscript(self, node: ast.Subscript) -> Value:
         array = self.resolve(node.value)
         if isinstance(array, tuple | list):
             return self.outside(super()._subscript, node)
-        home = self.outside(self.value, node.value)
-        if home.kind == "memory":
-            home = Value(f"{home.text}[{ROW} * {SLOTS} + {COLUMN}]", f"real[{JOINTS}][{SLOTS}]")
-        dimensions = shape(home.kind)
+        owner = self.outside(self.value, node.value)
+        if owner.kind == "memory":
+            owner = Value(f"{owner.text}[{ROW} * {SLOTS} + {COLUMN}]", f"real[{JOINTS}][{SLOTS}]")
+        dimensions = shape(owner.kind)
         places = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         if not dimensions or len(places) > len(dimensions):
             raise refuse(node, "an element")
-        return self.elements(node, home, [*places, *[ast.Slice()] * (len(dimensions) - len(places))])
+        return self.elements(node, owner, [*places, *[ast.Slice()] * (len(dimensions) - len(places))])
 
-    def elements(self, node: ast.Subscript, home: Value, places: Sequence[ast.expr]) -> Value:
+    def elements(self, node: ast.Subscript, owner: Value, places: Sequence[ast.expr]) -> Value:
         """Return some elements of an array, by an index or a colon for each dimension."""
-        text, left, pointer = home.text, list[str](), home.home
-        for token, place, dimension in zip((ROW, COLUMN), places, shape(home.kind), strict=False):
+        text, left, pointer = owner.text, list[str](), owner.pointer
+        for token, place, dimension in zip((ROW, COLUMN), places, shape(owner.kind), strict=False):
             if isinstance(place, ast.Slice):
                 if place.lower or place.upper or place.step or dimension == SLOTS:
                     raise refuse(node, "a part of an array")
@@ -460,8 +461,8 @@ class ArrayFunction(Function):
             index = self.from_start(place, index, dimension)
             text = text.replace(token, index.within(PRODUCT))
             row = pointer and token == ROW and len(places) == 2
-            pointer = f"{pointer} + {index.within(PRODUCT)} * {shape(home.kind)[1]}" if row else ""
-        return Value(text, base(home.kind) + "".join(f"[{n}]" for n in left), home.level, pointer)
+            pointer = f"{pointer} + {index.within(PRODUCT)} * {shape(owner.kind)[1]}" if row else ""
+        return Value(text, base(owner.kind) + "".join(f"[{n}]" for n in left), owner.level, pointer)
 
     def check_index(self, node: ast.Subscript, place: ast.expr, index: Value, dimension: str) -> None:
         """Refuse an index that is no integer, or out of range as far as it is known."""
@@ -473,7 +474,7 @@ class ArrayFunction(Function):
                 raise refuse(node, f"memory at {'a negative' if constant else 'an'} index that is not constant")
             self.program.claim(node, int(constant))
         elif constant is not None and not 0 <= constant < self.program.size(dimension):
-            raise refuse(node, f"an index out of 0 to {self.program.size(dimension) - 1}")
+            raise refuse(node, f"an index outside 0 to {self.program.size(dimension) - 1}")
 
     def _unaryop(self, node: ast.UnaryOp) -> Value:
         return self.elementwise(super()._unaryop, node)
@@ -496,7 +497,7 @@ class ArrayFunction(Function):
         if node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
             raise refuse(node, "a call with names or stars")
         if isinstance(node.func, ast.Attribute) and node.func.attr == "copy" and not node.args:
-            return self.outside(self.value, node.func.value)._replace(home="")
+            return self.outside(self.value, node.func.value)._replace(pointer="")
         function = self.callee(node)
         if function in ELEMENTWISE or function in HELPED or function is np.where:
             return self.elementwise(lambda one: self.of_elements(function, one), node)
@@ -522,7 +523,7 @@ class ArrayFunction(Function):
         if not shape(kinds[0]):
             return Value(f"{beginning})", kinds[0])
         found = self.temporary(kinds[0])
-        self.move(call_to(beginning, found.home), node)
+        self.move(call_to(beginning, found.pointer), node)
         return found
 
     def of_elements(self, function: Any, node: ast.Call) -> Value:
@@ -544,7 +545,7 @@ class ArrayFunction(Function):
         y, *rest = [self.argument(a) for a in node.args]
         found = self.temporary("real" + "".join(f"[{n}]" for n in dimensions))
         arguments = [f"{y.text}->plant", *(one.text for one in rest)]
-        self.move(f"{y.text}->{name}({', '.join(arguments)}, {found.home});", node)
+        self.move(f"{y.text}->{name}({', '.join(arguments)}, {found.pointer});", node)
         return found
 
     def listed(self, function: Any, node: ast.Call) -> Value:
@@ -557,7 +558,7 @@ class ArrayFunction(Function):
         kind = functools.reduce(wider, (item.kind for item in items))
         found = self.temporary(f"{kind}[{len(items)}]")
         for i, item in enumerate(items):
-            self.move(f"{found.home}[{i}] = {item.text};", node)
+            self.move(f"{found.pointer}[{i}] = {item.text};", node)
         return found
 
     def sized(self, function: Any, node: ast.Call) -> Value:
@@ -652,8 +653,8 @@ def shared_arguments(function: Any) -> set[int]:
                 parts = value.elts
             case ast.Call(func=ast.Name(id=name), args=arguments):
                 parts = [arguments[i] for i in shared_arguments(written.__globals__.get(name))]
-            case ast.Call(func=ast.Attribute(value=ast.Name(id=home), attr=name), args=arguments):
-                parts = [arguments[i] for i in shared_arguments(getattr(written.__globals__.get(home), name, None))]
+            case ast.Call(func=ast.Attribute(value=ast.Name(id=module), attr=name), args=arguments):
+                parts = [arguments[i] for i in shared_arguments(getattr(written.__globals__.get(module), name, None))]
         return set().union(*map(shared, parts))
 
     inside, before = list(ast.walk(tree)), {}
@@ -693,13 +694,8 @@ def declared(kind: str, name: str) -> str:
     return f"{TYPES[base(kind)]} {name}[{' * '.join(shape(kind))}];"
 
 
-def call_to(beginning: str, homes: str) -> str:
-    """Return the call of a function that writes its results to pointers."""
-    return f"{beginning}{', ' * (not beginning.endswith('('))}{homes});"
-
-
-def array_at(home: str, kind: str, offset: str = "") -> Value:
+def array_at(pointer: str, kind: str, offset: str = "") -> Value:
     """Return the array at a pointer, from an offset on."""
     place = ROW if len(shape(kind)) == 1 else f"{ROW} * {shape(kind)[-1]} + {COLUMN}"
-    pointer = f"{home} + {offset.removesuffix(' + ')}" if offset else home
-    return Value(f"{home}[{offset}{place}]", kind, ATOM, pointer)
+    moved = f"{pointer} + {offset.removesuffix(' + ')}" if offset else pointer
+    return Value(f"{pointer}[{offset}{place}]", kind, ATOM, moved)

@@ -90,7 +90,7 @@ class Value(NamedTuple):
     text: str
     kind: str
     level: int = ATOM
-    home: str = ""  # of an array: a pointer to its numbers, if they lie in a row
+    pointer: str = ""  # of an array: to its numbers in C, if they lie in a row
 
     def within(self, level: int) -> str:
         """Return the text as an operand of an operator of precedence `level`."""
@@ -368,8 +368,8 @@ class Function:
         kinds, beginning = self.program.function(self.callee(call), values, call.args)
         if len(kinds) != len(targets):
             raise refuse(call, f"{len(targets)} names for {len(kinds)} results")
-        homes = [f"&{self.destination(target, kind)}" for target, kind in zip(targets, kinds, strict=True)]
-        yield f"{beginning}{', ' * (not beginning.endswith('('))}{', '.join(homes)});"
+        pointers = [f"&{self.destination(target, kind)}" for target, kind in zip(targets, kinds, strict=True)]
+        yield call_to(beginning, ", ".join(pointers))
 
     def destination(self, target: ast.expr, kind: str) -> str:
         """Return a target in C, to which a value of a kind is assigned."""
@@ -477,8 +477,8 @@ class Function:
         """Return the value of a global name, dotted or not; None for a variable."""
         if isinstance(node, ast.Name):
             return None if node.id in self.names else self.globals.get(node.id, getattr(builtins, node.id, None))
-        if isinstance(node, ast.Attribute) and isinstance(home := self.resolve(node.value), ModuleType):
-            return getattr(home, node.attr, None)
+        if isinstance(node, ast.Attribute) and isinstance(module := self.resolve(node.value), ModuleType):
+            return getattr(module, node.attr, None)
         return None
 
     def callee(self, node: ast.Call) -> Any:
@@ -501,15 +501,15 @@ class Function:
     def _attribute(self, node: ast.Attribute) -> Value:
         if (constant := self.resolve(node)) is not None:
             return literal(constant, self.program.single, node)
-        home, name = self.value(node.value), node.attr
-        if home.kind == "y":
+        owner, name = self.value(node.value), node.attr
+        if owner.kind == "y":
             name = OLD_FIELDS.get(name, name)
             kind = self.program.component.kind
             known(name, "reading" if kind == "estimator" else "measurement", READS[kind])
-            return Value(f"{home.text}->{name}", "real")
-        if home.kind == "gains":
+            return Value(f"{owner.text}->{name}", "real")
+        if owner.kind == "gains":
             known(name, "gain", self.program.gains)
-            return Value(f"{home.text}[GAIN_{plain(name)}]", "real")
+            return Value(f"{owner.text}[GAIN_{plain(name)}]", "real")
         raise refuse(node, "an attribute")
 
     def _subscript(self, node: ast.Subscript) -> Value:
@@ -519,10 +519,10 @@ class Function:
         if isinstance(array, tuple | list | np.ndarray):
             constants = self.program.array(ast.unparse(node.value).replace(".", "_"), array)
             if (place := self.constant(node.slice)) is not None and not -len(array) <= place < len(array):
-                raise refuse(node, f"an index out of {-len(array)} to {len(array) - 1}")
+                raise refuse(node, f"an index outside {-len(array)} to {len(array) - 1}")
             return Value(f"{constants.text}[{self.from_start(node.slice, index, len(array)).text}]", constants.kind)
-        home = self.value(node.value)
-        if home.kind != "memory":
+        owner = self.value(node.value)
+        if owner.kind != "memory":
             raise refuse(node, "an element")
         place, component = self.constant(node.slice), self.program.component
         if place is None and component.kind == "estimator":  # a ring of readings, as long as its memory
@@ -531,7 +531,7 @@ class Function:
             why = "at an index that is not constant" if place is None else "at a negative index"
             raise refuse(node, f"memory {why}")
         self.program.claim(node, int(place))
-        return Value(f"{home.text}[{index.text}]", "real")
+        return Value(f"{owner.text}[{index.text}]", "real")
 
     def from_start(self, place: ast.expr, index: Value, length: int | str) -> Value:
         """Return an index from the start for an index of Python, which counts from the end if it is negative."""
@@ -751,6 +751,11 @@ def wider(one: str, other: str) -> str:
     else:
         kind = max(first, second, key=KINDS.index)
     return kind + one[len(first) :]
+
+
+def call_to(beginning: str, pointers: str) -> str:
+    """Return the call of a function that writes its results to pointers."""
+    return f"{beginning}{', ' * (not beginning.endswith('('))}{pointers});"
 
 
 def literal(value: Any, single: bool, node: ast.AST) -> Value:

@@ -14,6 +14,7 @@ BEYOND = 1e-3  # rad or m, chosen: how far beyond its range a joint may start, b
 SIMPLE = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
 
 Range = tuple[str, float, float]  # joint, least and largest position, rad or m
+SUGGESTED = ("law", "u_max", "reference")  # fields of a Channel that are defaults of scenarios
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -47,7 +48,6 @@ class Channel:
         return dataclasses.replace(self, **dict.fromkeys(SUGGESTED))
 
 
-SUGGESTED = ("law", "u_max", "reference")  # fields of a Channel that are defaults of scenarios
 Pairs = tuple[tuple[str, Channel], ...]  # a joint and its Channel, each
 
 

@@ -24,6 +24,24 @@ ROLES = {
     "SMC_CONSTANT": ("local", "constant", "exact"),
     "SMC_STATE": ("local", "discrete", "exact"),
 }
+PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head><meta charset="utf-8"><title>{name}</title></head>
+<body style="font-family: sans-serif; max-width: 50em; margin: 2em auto; line-height: 1.4">
+<h1>{name}</h1>
+<p>{summary}.</p>
+<p>The law runs at t = start + k dt, dt = {period:g} s, on the inputs as they are set at that time, and u is held in
+between. With Event Mode, u follows the inputs without delay. Without it, the u that is read after a step is computed
+from the inputs that were set before the step, so an importer that applies it after the step has a delay of one step.
+Gains can be changed while it runs. The sources need a C99 compiler and nothing else.</p>
+<table style="border-collapse: collapse; text-align: left">
+<tr><th>variable</th><th>role</th><th>unit</th><th>start</th><th>meaning</th></tr>
+{rows}
+</table>
+<p>Written by smc_mujoco {version}.</p>
+</body>
+</html>
+"""
 
 
 def unit_name(unit: Unit, joint: str) -> str:
@@ -152,26 +170,6 @@ def summary(controller: Controller) -> str:
     parts += [f"surface {controller.surface}"] if controller.surface else []
     parts += [f"velocity estimator {controller.estimator}"] if controller.estimator else []
     return f"Sliding-mode controller: {', '.join(parts)}; every {controller.period:g} s"
-
-
-PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head><meta charset="utf-8"><title>{name}</title></head>
-<body style="font-family: sans-serif; max-width: 50em; margin: 2em auto; line-height: 1.4">
-<h1>{name}</h1>
-<p>{summary}.</p>
-<p>The law runs at t = start + k dt, dt = {period:g} s, on the inputs as they are set at that time, and u is held in
-between. With Event Mode, u follows the inputs without delay. Without it, the u that is read after a step is computed
-from the inputs that were set before the step, so an importer that applies it after the step has a delay of one step.
-Gains can be changed while it runs. The sources need a C99 compiler and nothing else.</p>
-<table style="border-collapse: collapse; text-align: left">
-<tr><th>variable</th><th>role</th><th>unit</th><th>start</th><th>meaning</th></tr>
-{rows}
-</table>
-<p>Written by smc_mujoco {version}.</p>
-</body>
-</html>
-"""
 
 
 def page(listed: Iterable[Variable], controller: Controller, joint: str) -> str:

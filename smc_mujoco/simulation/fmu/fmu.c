@@ -104,7 +104,7 @@ const char *fmi3GetVersion(void) { return fmi3Version; }
 
 fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String categories[])
 {
-    (void)on, (void)n, (void)categories; /* there are messages of errors alone */
+    (void)on, (void)n, (void)categories; /* there are only messages of errors */
     return c ? fmi3OK : fmi3Error;
 }
 

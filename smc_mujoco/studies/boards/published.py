@@ -21,7 +21,7 @@ class Row(NamedTuple):
     torque_smoothness: float
     velocity_cost: float
     score: float
-    max_torque: float | None = None  # this one and the next belong to version 1 alone
+    max_torque: float | None = None  # only version 1 has this one and the next
     integrated_torque: float | None = None
 
 

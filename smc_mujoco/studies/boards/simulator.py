@@ -9,13 +9,13 @@
     perturbations    50 profiles of 3 pulses, standard width 0.05 to 0.1 s, amplitude 0.5 to 5 N m, beside the motor
 
 A case is survived if after 10 s the state is within (0.35, 0.35, 1, 1) of upright and at rest; a level with several
-runs if more than half of these do. The percentage of each test counts alike.
+runs if more than half of these do. Each test's percentage has the same weight.
 
 The published simulator is repeated here, because some of these machines cannot be built: friction that pushes, a
 response beyond 1. It is RK4 at 2 ms of the double pendulum's equation, with the dry friction cf arctan(100 q'). The law
 and its estimator run as in every scenario, compiled, by their addresses. In the published simulator a pulse on the
 joint without a motor has no effect (its input matrix is 0 there), so only the driven joint's are drawn. The published
-test has other random numbers at every run. Here they depend on `SEED` alone.
+test has other random numbers at every run. Here they depend only on `SEED`.
 Source: leaderboard/*/robustness_v2 and src/python/double_pendulum of
 github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), rewritten here.
 """
@@ -189,7 +189,7 @@ class Machine:
         self.driven = shoulder_first(scenario.plant.name).index(0)
         if scenario.surface is not None or resolved.reference != REST or scenario.feedforward is not None:
             raise ScenarioError(
-                f"the robustness test of {scenario.plant.name} is one of the law and its estimator alone: leave out "
+                f"the robustness test of {scenario.plant.name} is only of the law and its estimator: leave out "
                 "surface, reference and feedforward"
             )
         law, velocity = scenario.law.of_channel(0), resolved.velocity

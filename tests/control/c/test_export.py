@@ -262,7 +262,7 @@ REFUSED = {
     "memory[int(y.t)] = 1.0; u = 0.0": "memory at an index that is not constant",
     "memory[-1] = 1.0; u = 0.0": "memory at a negative index",
     "memory[8] = 1.0; u = 0.0": r"it uses memory\[8\], and its memory has 8 numbers: give memory=9",
-    "u = TABLE[2]": "an index out of -2 to 1",
+    "u = TABLE[2]": "an index outside -2 to 1",
     "for u in (y.e, y.de): pass": "a loop over anything but a range",
     "n = 3; u = 0.0\n    for i in range(n): n += 1": "a loop that changes its own variable or range",
     "u = 0.0\n    for i in range(3): i += 1": "a loop that changes its own variable or range",
