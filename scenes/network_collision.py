@@ -1,9 +1,9 @@
 """Five pendulums hang so close that their bobs collide: which law settles without a clash?
 
 They hang in one row like a Newton's cradle, 3 cm apart, and start swung out to both sides. To stop at rest is not
-enough: whoever arrives with speed passes it on to its neighbours.
+enough: a bob that arrives with speed passes it on to its neighbours.
 
-Look for: the hardest blow (peak reaction), and whether it costs settling time.
+Look for: the hardest collision (peak reaction), and whether it costs settling time.
 """
 
 import smc_mujoco as smc

@@ -99,7 +99,7 @@ def hybrid(friction: bool = False) -> Law:
 
 @functools.cache
 def sway() -> tuple[Waypoints, ...]:
-    """Return references that swing every joint to and fro with minimum jerk. They begin and end in the ready pose."""
+    """Return references that swing every joint back and forth with minimum jerk, from and to the ready pose."""
     times = [BEAT * k for k in range(6)]
     return tuple(Waypoints(times, [x, x + a, x - a, x + a, x - a, x]) for x, a in zip(arm().rest, SWAY, strict=True))
 

@@ -55,7 +55,7 @@ def ratios(runs, scenarios, names):
 
 
 def compared(runs):
-    """Error e and command u of the last quarter of 12 s at 10 ms, implicit over explicit, gains and model alike."""
+    """Error e and command u of the last quarter of 12 s at 10 ms, implicit over explicit, equal gains and model."""
     return ratios(runs, runs.grid().values(), runs.plants)
 
 

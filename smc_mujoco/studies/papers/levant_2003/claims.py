@@ -24,8 +24,8 @@ def precision(runs):
 def noise(runs):
     """Exponents of the largest errors of the last 3000 samples as functions of the noise's standard deviation eps.
 
-    The control period is in proportion to eps^(1/3), eps = (period / 30 ms)^3, so that the noise is alike for every eps
-    at the loop's own pace; at one fixed period white noise averages out where the loop is slow.
+    The control period is in proportion to eps^(1/3), eps = (period / 30 ms)^3, so that the noise is the same for every
+    eps, relative to the speed of the loop. At one fixed period, white noise averages out where the loop is slow.
     """
     (plant,), (law,), (condition,), values = runs.plants, runs.laws, runs.conditions, runs.values
     eps = [(h / values["pace"]) ** 3 for h in values["periods"]]
