@@ -44,14 +44,13 @@ def fetched() -> Path:
     """Return a folder with FILES and their licences. Fetch them if they are not in the cache.
 
     Raises:
-      ScenarioError: there is no npm, or it cannot fetch the packages.
+      ScenarioError: there is no npm, it cannot fetch the packages, or the cache cannot be written.
     """
     target = cached()
     if target.is_dir():
         return target
     command = npm()
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=target.parent) as name:
+    with _scratch(target.parent) as name:
         scratch, made = Path(name), Path(name) / "vendor"
         for file in PINNED.iterdir():
             shutil.copy(file, scratch)
@@ -66,6 +65,22 @@ def fetched() -> Path:
             if not target.is_dir():
                 raise
     return target
+
+
+def _scratch(cache: Path) -> tempfile.TemporaryDirectory[str]:
+    """Return a new folder in the cache, which its context deletes.
+
+    Raises:
+      ScenarioError: the cache cannot be written.
+    """
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+        return tempfile.TemporaryDirectory(dir=cache)
+    except OSError as error:
+        raise ScenarioError(
+            f"the live page's packages cannot be kept in {cache} ({error.strerror}): "
+            "set XDG_CACHE_HOME to a folder that you can write"
+        ) from error
 
 
 def npm() -> list[str]:

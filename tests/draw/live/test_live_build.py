@@ -181,6 +181,9 @@ def test_an_npm_that_fails_is_quoted_and_leaves_no_cache(tmp_path, monkeypatch):
         npm.fetched()
     assert not npm.cached().exists()
     assert list((tmp_path / "cache" / "smc_mujoco").iterdir()) == []
+    monkeypatch.setenv("XDG_CACHE_HOME", str(stand_in))
+    with pytest.raises(smc.ScenarioError, match=r"cannot be kept in .* \(Not a directory\): set XDG_CACHE_HOME to"):
+        npm.fetched()
 
 
 def test_the_command_is_light_to_import():
