@@ -110,7 +110,7 @@ _cached = functools.cache(now)
 
 def _ours(thing: Any) -> bool:
     """Return whether a thing is a function or class of this package."""
-    return isinstance(thing, FunctionType | type) and thing.__module__.startswith(f"{PACKAGE.name}.")
+    return isinstance(thing, FunctionType | type) and (thing.__module__ or "").startswith(f"{PACKAGE.name}.")
 
 
 class _CodePickler(pickle._Pickler):

@@ -124,7 +124,7 @@ def _of_a_user(thing: Any) -> bool:
     """Return whether a function is not of this package, or any function in nested tuples is not."""
     if isinstance(thing, tuple):
         return any(map(_of_a_user, thing))
-    return callable(thing) and not thing.__module__.startswith(PACKAGE)
+    return callable(thing) and not (thing.__module__ or "").startswith(PACKAGE)  # generated code has no module
 
 
 def _compared(data: dict[str, Any]) -> str:

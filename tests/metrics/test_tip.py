@@ -93,7 +93,8 @@ def test_contact_forces_are_those_that_the_joints_feel(pressed):
 
 def test_contact_forces_are_those_under_the_runs_disturbance_and_motor():
     """A cart leans on a stop, whose reaction a trace has."""
-    pushed = {"feedforward": smc.Constant(4.0), "disturbance": smc.Constant(8.0)}
+    push = smc.Push("cart", x=4.0, time=1.0, width=2.0)  # largest at 2 s; it is in d
+    pushed = {"feedforward": smc.Constant(4.0), "disturbance": (smc.Constant(4.0), push)}
     motor = smc.DCMotor(inductance=0.0)
     cart = smc.Scenario(plant="duffing", law="none", contact="stops", x0=0.5, duration=2.0, actuator=motor, **pushed)
     trace = smc.run(cart)

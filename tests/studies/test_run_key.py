@@ -260,10 +260,12 @@ def test_replaced_functions_of_a_plant_change_the_key():
     def nothing(*given):
         yield from ()
 
+    exec("def generated(x, v, i, q): return 0.0, 2.0", made := {})  # without a module, as SymPy's lambdify
     own = smc.Scenario(plant="duffing", law="classical", duration=0.1)
     contacts, mechanisms = own.plant.contacts, own.plant.mechanisms
     changes = (
         {"nominal": nominal},
+        {"nominal": made["generated"]},
         {"fields": nothing},
         {"contacts": {**contacts, "other": nothing}},
         {"mechanisms": {**mechanisms, "other": Variant(nothing, nothing)}},
@@ -271,7 +273,7 @@ def test_replaced_functions_of_a_plant_change_the_key():
     )
     plants = [dataclasses.replace(own.plant, **change) for change in changes]
     *others, same = [key(dataclasses.replace(own, plant=plant)) for plant in plants]
-    assert len({key(own), *others}) == 5
+    assert len({key(own), *others}) == 6
     assert same == key(own)
 
 

@@ -194,7 +194,7 @@ def turns(z, K, state):
         count += 1
         if count == 2:
             continue
-        double += QUARTERS[count - 3] / 4  # from the end, the first time
+        double += QUARTERS[count - 3] * QUARTERS[-1] / 12  # from the end, the first time
     if abs(a) > WIDTH and not b < 0.0:
         late = a
     elif -1.0 < b <= 0.0 or a == 0:
