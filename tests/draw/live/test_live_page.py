@@ -304,6 +304,18 @@ def test_an_arrow_points_where_u_pushes(seen):
     assert along < -0.05  # m: the arrow's shaft along x
 
 
+# The edges, from -1 to 1 across a wide and a high picture, of the first machine with the arrows of the largest u.
+ARROWS = """[-1, 1].flatMap((u) => [{ width: 3, height: 1 }, { width: 1, height: 3 }].flatMap((part) => {
+    const { stage, stage: { machines: [machine] } } = live;
+    const kept = machine.u;
+    machine.u = u;
+    machine.pointForce();
+    stage.open(part);
+    machine.u = kept;
+    return Object.values(machine.movingBounds(stage.camera));
+}))"""
+
+
 @pytest.mark.parametrize("plant", PLANTS)
 def test_a_picture_of_what_moves_is_the_whole_picture(seen, plant):
     """Without a GPU only the part of the picture in which something moves is drawn."""
@@ -318,7 +330,9 @@ def test_a_picture_of_what_moves_is_the_whole_picture(seen, plant):
     seen.page.evaluate("live.stage.drawAll()")
     seen.drawn()
     again = picture(seen.page)
+    edges = seen.page.evaluate(ARROWS)
     seen.page.locator("#play").click()
+    assert np.abs(edges).max() < 1.0  # the arrows of the largest u are in the picture
     assert np.abs(drawn - again).max() == 0.0
     x, y = map(round, seen.page.evaluate("(({ x, y }) => [x, y])(live.stage.parts()[1])"))
     seam = again[20:-20, x - 1] if x else again[y - 1, 20:-20]  # the corners are round

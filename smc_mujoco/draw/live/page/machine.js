@@ -334,10 +334,11 @@ class Machine {
     return seen;
   }
 
-  // Return the bounds of x/z and y/z, in the camera's frame, of the machine in POSES over its range.
+  // Return the bounds of x/z and y/z, in the camera's frame, of the machine in POSES over its range, with the arrows of the
+  // largest u.
   bounds(camera) {
     const { simulation: { mujoco, model, data, plant, s } } = this;
-    const kept = data.qpos.slice();
+    const [kept, u] = [data.qpos.slice(), this.u];
     const toCamera = camera.matrixWorld.clone().invert();
     const toTangents = (point) => point.multiplyScalar(-1 / point.z);
     const seen = noBounds();
@@ -351,8 +352,15 @@ class Machine {
       for (const mesh of k === 0 ? this.meshes : this.moving) {
         spread(seen, mesh.geometry.attributes.position.array, toCamera.clone().multiply(mesh.matrix), toTangents);
       }
+      for (this.u of [-1, 1]) {
+        this.pointForce();
+        for (const part of this.force.visible ? this.force.children : []) {
+          spread(seen, part.geometry.attributes.position.array, toCamera.clone().multiply(part.matrixWorld), toTangents);
+        }
+      }
     }
     data.qpos.set(kept);
+    this.u = u;
     mujoco.mj_kinematics(model, data);
     this.place();
     return seen;
