@@ -249,6 +249,8 @@ def test_curves_that_coincide_are_all_seen(one):
         assert adaptive.get_linestyle() == "-"
         assert [line.get_linestyle() for line in (pid, classical)] == ["--", "--"]
         assert pid._unscaled_dash_pattern[0] != classical._unscaled_dash_pattern[0]
+    zero = 0.0 * one.t
+    assert panels.dashes([(one.t, zero), (one.t, np.where(one.t < 0.1 * one.t[-1], 1.0, 0.0))], (0.0, 1.0)) == ["-"] * 2
 
 
 def test_each_joint_of_an_arm_has_its_reference_and_its_error(arm):

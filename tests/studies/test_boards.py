@@ -181,6 +181,9 @@ def test_the_entry_swings_up_and_balances(robot, traces):
     assert np.abs(traces[robot].x[-1, order] - [math.pi, 0.0]).max() < 1e-3
     assert boards.score(found) > max(row.score for row in boards.SIMULATION[robot]["v2"])
     assert boards.board(traces[robot])[0].name == boards.NAME
+    own = {"reference": smc.Constant(0.1), "feedforward": smc.Constant(0.1), "velocity": "levant", "seed": 3}
+    designed = dataclasses.replace(traces[robot], scenario=dataclasses.replace(traces[robot].scenario, **own))
+    assert boards.board(designed) == boards.board(traces[robot])
 
 
 @ROBOTS
@@ -245,6 +248,9 @@ def test_an_entry_is_exported_to_c():
 # errors and the command
 
 
+ALL = boards.Robustness(dict.fromkeys(boards.RobustnessRow._fields[1:-1], (("a", 1.0, True),)))
+
+
 def ruled(**fields):
     """A run of acrobot by the rules of the boards, as far as its scenario says, with some fields changed."""
     short = smc.run(boards.entry("acrobot", duration=0.01))
@@ -260,6 +266,7 @@ def ruled(**fields):
         (lambda: boards.board(ruled(plant=smc.plant("acrobot", m2=0.3))), "m2 of the run is 0.3 and on the boards 0.6"),
         (lambda: boards.board(ruled(disturbance=smc.Sine(0.5, 1.0))), "disturbance of the run is"),
         (lambda: boards.board(ruled(), "TVLQR"), "'TVLQR', which a published row has: give another"),
+        (lambda: boards.robustness_board("acrobot", ALL, boards.ROBUSTNESS["acrobot"][0].name), "a published row has"),
         (lambda: boards.criteria(smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))), "robot"),
         (lambda: boards.score({"energy": 1.0}), "swing_up_time of board v2 is missing"),
         (lambda: boards.score(boards.SIMULATION["acrobot"]["v2"][0], "v1"), "max_torque of board v1 is missing"),

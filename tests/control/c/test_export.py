@@ -205,6 +205,16 @@ def turns(z, K, state):
         state[2] += i * late
     for i in range(4):
         state[3] = state[3] - 0.5 if i & 1 == 1 else state[3]
+    for i in range(2, -4, -1):  # from the end below 0, as in those that follow
+        double += QUARTERS[i] * i
+    for i in range(-2, 2):
+        double += QUARTERS[i] * i
+    for i in range(-3, 0, 1):
+        double += QUARTERS[i] * i
+    for i in range(4):
+        double += QUARTERS[i - 3] * QUARTERS[i + -3]
+    i = 1 - count
+    double += QUARTERS[i]
     s, _ = sliding(z, K.k)
     state[0], state[1] = state[1], state[0] + s
     high, low = (0.75, 0.25) if state[0] > state[1] else (a, b)
