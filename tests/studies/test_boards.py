@@ -298,9 +298,14 @@ def test_the_command_shows_ours_among_the_published(capsys, tmp_path):
     assert (tmp_path / "a.svg").exists()
 
 
-@pytest.mark.parametrize("arguments", [["acrobat"], ["acrobot", "--film", "a.avi"]])
+UNWRITABLE = ["acrobot", "--no-robustness", "--figure", f"{__file__}/a"]  # in no folder
+
+
+@pytest.mark.parametrize("arguments", [["acrobat"], ["acrobot", "--film", "a.avi"], UNWRITABLE])
 def test_the_command_refuses_in_one_sentence(arguments, capsys):
     with pytest.raises(SystemExit) as ended:
         cli.main(["board", *arguments])
     assert ended.value.code == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1
