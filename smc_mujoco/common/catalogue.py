@@ -91,7 +91,7 @@ class Added(Generic[T_co]):
             return ScenarioError(f"{self}: {error}")
         except (Exception, SystemExit) as error:  # whatever another package raises
             why = one_line(f"{type(error).__name__}: {error}")
-            failed = ScenarioError(f"{self} cannot be loaded ({why}): update or uninstall that package")
+            failed = ScenarioError(f"{self} cannot be loaded ({why}): fix, update or uninstall that package")
             failed.__cause__ = error
             return failed
 
@@ -212,7 +212,7 @@ def source(point: EntryPoint) -> ModuleSpec:
     if point.attr:
         raise ScenarioError(f"it is {point.attr!r} in a module: give {KINDS[point.group][1]}")
     if (found := importlib.util.find_spec(point.module)) is None:
-        raise ScenarioError(f"there is no module {point.module}: update or uninstall that package")
+        raise ScenarioError(f"there is no module {point.module}: fix, update or uninstall that package")
     if (own := point.module.rpartition(".")[2]) != point.name:
         raise ScenarioError(f"its own name is {own!r}: give the entry point the same name")
     return found

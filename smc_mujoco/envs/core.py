@@ -176,7 +176,7 @@ class Setting:
 
     def lost(self, x: np.ndarray, v: np.ndarray) -> Any:
         """Return whether x, v (..., n) are beyond the largest state of a run, or not numbers."""
-        return ~(np.vecdot(x, x) + np.vecdot(v, v) < MAX_STATE**2)
+        return ~(np.maximum(np.abs(x), np.abs(v)).max(axis=-1) < MAX_STATE)
 
 
 class Episode:

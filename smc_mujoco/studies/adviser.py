@@ -279,7 +279,7 @@ def _tuned(
     searched = template and (dict(template.gains), dict(template.conditions))  # which gains, and where
     depends = [run_key.key(first), goal.describe(), fingerprint.of((coerce.law(law).function, searched))]
 
-    def tuned_anew() -> result.Tuned:
+    def tuned_now() -> result.Tuned:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)  # the source says so
             return search.tune(plant, law, budget, objective=goal, threads=threads)
@@ -287,7 +287,7 @@ def _tuned(
     tuned = cached(
         folder / f"{plant.name}-{law.name}-{budget}.json",
         depends,
-        tuned_anew,
+        tuned_now,
         lambda made, path: made.save(path),
         result.load,
     )

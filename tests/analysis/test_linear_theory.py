@@ -81,7 +81,7 @@ def test_factors_give_the_true_plant():
 
 @pytest.mark.parametrize("name", ["cart_pole", "overhead_crane"])
 def test_a_joint_without_an_actuator_is_refused(name):
-    with pytest.raises(smc.ScenarioError, match=f"{name} has no theory here: give a plant with an actuator"):
+    with pytest.raises(smc.ScenarioError, match=f"{name} has no theory here: give a plant with equal joints"):
         linear_theory.smallest_lam(smc.plant(name), 1.0)
 
 

@@ -76,7 +76,7 @@ def test_writes_svg_and_png_with_names_and_units(pair, tmp_path):
     assert [p.name for p in svg.parent.iterdir()] in (["a.svg", "a.png"], ["a.png", "a.svg"])  # nothing else
 
 
-def test_a_figure_that_was_written_is_laid_out_anew_when_it_is_shown(pair, tmp_path):
+def test_a_figure_that_was_written_is_laid_out_again_when_it_is_shown(pair, tmp_path):
     page = draw_figure.figure(pair, tmp_path / "a", format="svg")
     assert page.get_layout_engine() is not None
 

@@ -123,7 +123,7 @@ def test_the_viewer_shows_the_present_state_of_the_run(shown, monkeypatch):
     np.testing.assert_array_equal(view.model.body_mass, live.Live(HARD).model.body_mass)
 
 
-def test_a_run_that_is_over_begins_anew_with_its_gains(shown):
+def test_a_run_that_is_over_restarts_with_its_gains(shown):
     view, viewer = shown()
     slide(view, "lam", 12.0)
     first = finish(view, viewer)
@@ -255,7 +255,7 @@ def test_the_mouse_pushes_while_it_pulls(shown):
     assert not view.loop.data.xfrc_applied.any()
 
 
-def test_a_reset_of_the_viewer_begins_anew(shown):
+def test_a_reset_of_the_viewer_restarts_the_run(shown):
     view, viewer = shown(moves=lambda view, frame: mujoco.mj_resetData(view.model, view.data) if frame == 9 else None)
     slide(view, "lam", 12.0)
     for _ in range(10):
@@ -266,7 +266,7 @@ def test_a_reset_of_the_viewer_begins_anew(shown):
     assert view.law.gains == {"lam": 12.0, "k1": 3.0}  # though a reset puts its slider to 0
 
 
-def test_a_law_that_fails_is_told_and_paused_and_space_begins_anew(shown, said):
+def test_a_law_that_fails_is_told_and_paused_and_space_restarts_the_run(shown, said):
     @smc.law_function(gains={"k": 3.0})
     def breaks(y, gains, memory):
         return (1.0 / 0.0 if y.t > 0.05 else 0.0), y.e

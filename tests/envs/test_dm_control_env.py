@@ -182,9 +182,9 @@ def test_a_swing_up_cannot_push_the_pendulum_up_and_energy_can():
     assert np.cos(driven_by_dm(environment, act)[-1, 0]) > 0.999
 
 
-def test_an_episode_ends_where_the_finite_world_does():
-    environment = suite.load("inverted_pendulum", changes={"x0": 9e5, "v0": 9e5})
-    environment.reset()
+def test_an_episode_ends_where_a_run_diverges():
+    environment = suite.load("inverted_pendulum", changes={"x0": 999_900.0, "v0": 9e5})
+    assert environment.reset().step_type == StepType.FIRST
     timestep = environment.step(np.zeros(1))
     assert (timestep.step_type, timestep.reward, timestep.discount) == (StepType.LAST, 0.0, 0.0)
 

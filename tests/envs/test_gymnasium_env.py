@@ -290,7 +290,7 @@ def test_the_spec_tells_how_long_an_episode_is(named):
     assert PlantEnv("duffing").spec is None
 
 
-def test_a_copy_that_is_over_starts_anew_and_the_others_go_on():
+def test_a_copy_that_is_over_begins_a_new_episode_and_the_others_go_on():
     many = BatchEnv("duffing", 3, changes={"duration": 0.02})
     many.reset(seed=0)
     for _ in range(5):
@@ -308,10 +308,11 @@ def test_a_copy_that_is_over_starts_anew_and_the_others_go_on():
     assert not (terminated | truncated).any()
 
 
-def test_an_episode_ends_where_the_finite_world_does_with_numbers_of_its_space():
+def test_an_episode_ends_where_a_run_diverges_with_an_observation_in_its_space():
     changes = {"x0": 9.9e5, "v0": 9e5, "control_period": 0.1}
     single, many = PlantEnv("inverted_pendulum", changes=changes), BatchEnv("inverted_pendulum", 2, changes=changes)
     single.reset(seed=0)
+    assert not single.setting.lost(single.x, single.v)  # each number is below the limit of a run
     observation, reward, terminated, _, info = single.step([0.0])
     assert (terminated, reward) == (True, 0.0)
     assert np.isnan(info["error"]).all()

@@ -61,7 +61,7 @@ def test_a_law_is_compiled_once_for_all_processes():
     assert [hits(smc.law("classical").function, gains=("k", "c")) for _ in range(2)] == [0, 1]
 
 
-def test_another_kind_other_gains_or_another_memory_are_compiled_anew():
+def test_another_kind_other_gains_or_another_memory_are_compiled_again():
     assert [hits(mine()), hits(mine())] == [0, 1]
     assert hits(mine(), gains=("k", "c")) == 0
     assert hits(mine(), memory=2) == 0

@@ -858,7 +858,7 @@ def test_a_realistic_trace_comes_back_from_its_file(name, tmp_path):
     assert_same(smc.run(again.scenario), trace)
 
 
-def test_a_loaded_scenario_still_finds_its_defaults_anew(tmp_path):
+def test_a_loaded_scenario_finds_its_defaults_again(tmp_path):
     loaded = smc.load(smc.run(scenario(friction=LUGRE)).save(tmp_path / "a.npz")).scenario
     assert dataclasses.replace(loaded, friction=()) == scenario()
 

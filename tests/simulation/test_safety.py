@@ -922,7 +922,7 @@ def flipped(data: bytes) -> bytes:
     return data[:middle] + bytes([data[middle] ^ 16]) + data[middle + 1 :]
 
 
-def test_a_damaged_cache_is_written_anew(added, tmp_path):
+def test_a_damaged_cache_is_written_again(added, tmp_path):
     assert [hits(added), hits(added)] == [0, 1]
     damages = [lambda data: b"", lambda data: data[: len(data) // 2], flipped, lambda data: b"garbage" * 99]
     for name, damage in zip(("*.nbi", "*.nbc", "*.nb?", "*.nbc"), damages, strict=True):

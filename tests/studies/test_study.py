@@ -192,7 +192,7 @@ def test_a_larger_grid_takes_over_what_is_there(tmp_path, monkeypatch):
     assert bytes_of(tmp_path) == bytes_of(tmp_path / "fresh")
 
 
-def test_without_resume_everything_is_run_anew_and_foreign_files_stay(tmp_path, monkeypatch):
+def test_without_resume_everything_is_run_again_and_foreign_files_stay(tmp_path, monkeypatch):
     study(small(), tmp_path)
     (tmp_path / "parts" / "mine.parquet").write_text("not a part")
     ran = []

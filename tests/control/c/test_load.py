@@ -161,7 +161,7 @@ def test_state_in_single_precision_is_kept(file):
 # libraries, other files, other processes
 
 
-def test_a_shared_library_is_taken_as_it_is_and_anew_where_it_was_built_again(file, tmp_path):
+def test_a_shared_library_is_taken_as_it_is_and_again_after_a_new_build(file, tmp_path):
     target = tmp_path / "my_law.so"
     traces = []
     for gain in (1.0, 2.0):

@@ -225,7 +225,7 @@ def test_a_check_takes_its_limit_from_the_file_and_may_be_relative_to_a_run(fold
         claims(paper=folder(data, code.replace("'size',", "'sise',")))
 
 
-def test_an_edited_folder_is_read_anew(folder):
+def test_an_edited_folder_is_read_again(folder):
     assert claims(paper=folder())[0].verdict == SUPPORTED
     (one,) = claims(paper=folder(code=SMALL.replace("1.0", "7.0, 'also': {'a': 3}")))
     assert (one.verdict, one.beside) == (REFUTED, {"default": {"a: also": 3.0}})
