@@ -67,7 +67,7 @@ def chunk(scenario: smc.Scenario, runs: int, threads: int = 1) -> Chunk:
 def stepping(
     batch: Chunk, steps: int, within: Callable[[], contextlib.AbstractContextManager] = installed
 ) -> Callable[[], None]:
-    """Steps of a batch from its first state, with the callback or BARE."""
+    """Steps of a batch from its present state, with the callback or BARE."""
     start, records = batch.batch.state.copy(), batch.records.copy()
     numbers = [packed.numbers.copy() for packed in batch.packed]
 
@@ -81,7 +81,7 @@ def stepping(
     return action
 
 
-def plain(scenario: smc.Scenario, runs: int, threads: int = 1) -> Batch:
+def plain_batch(scenario: smc.Scenario, runs: int, threads: int = 1) -> Batch:
     """A batch of a plant's whole model, with scenery. It is stepped outside of `installed`, with MuJoCo's timers."""
     first = scenario.resolved
     model = assembly.with_values(assembly.model([first]), first)
@@ -92,7 +92,7 @@ def plain(scenario: smc.Scenario, runs: int, threads: int = 1) -> Batch:
 
 def plain_steps(scenario: smc.Scenario, runs: int, steps: int) -> Callable[[], None]:
     """Plain mj_step of equal runs from their first state."""
-    batch = plain(scenario, runs)
+    batch = plain_batch(scenario, runs)
     start = batch.state.copy()
 
     def action() -> None:
@@ -111,13 +111,12 @@ def callback_against_mj_step(table: Table) -> None:
                 smc.paper.scenario("inverted_pendulum", "super_twisting"), integrator=integrator, **fields
             )
             batch = chunk(scenario, 16)
+            with_law, bare = stepping(batch, STEPS), stepping(batch, STEPS, BARE)  # both before the first step
+            plain = plain_steps(scenario, 16, STEPS)
             per = 1e6 / (16 * STEPS)
-            for other, steps, goal in (
-                ("mj_step", plain_steps(scenario, 16, STEPS), f"<= {target}"),
-                ("bare mj_step", stepping(batch, STEPS, BARE), ""),
-            ):
-                with_law, without, r = ratio(stepping(batch, STEPS), steps)
-                row(table, f"callback / {other}, {integrator}, {name}", with_law * per, without * per, r, goal)
+            for other, steps, goal in (("mj_step", plain, f"<= {target}"), ("bare mj_step", bare, "")):
+                a, b, r = ratio(with_law, steps)
+                row(table, f"callback / {other}, {integrator}, {name}", a * per, b * per, r, goal)
 
 
 def threads(table: Table) -> None:

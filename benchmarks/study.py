@@ -19,7 +19,7 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.progress import track
-from speed import plain
+from speed import plain_batch
 
 import smc_mujoco as smc
 from smc_mujoco.simulation.grid import grid
@@ -44,12 +44,12 @@ def slices() -> list[list[smc.Scenario]]:
     return [grid([plant], paper.LAWS, CONDITIONS, seeds, "study") for seeds in parts for plant in paper.PLANTS]
 
 
-def plain_seconds(scenarios: Sequence[smc.Scenario], threads: int) -> float:
+def plain(scenarios: Sequence[smc.Scenario], threads: int) -> float:
     """Seconds of stepping the plants of these scenarios, in the same batches, without the callback."""
     spent = 0.0
     for prepared in executors.batches(scenarios, threads):
         scenario = prepared[0].scenario
-        batch = plain(scenario, len(prepared), min(threads, len(prepared)))
+        batch = plain_batch(scenario, len(prepared), min(threads, len(prepared)))
         start = time.perf_counter()
         batch.step(nstep=scenario.samples * scenario.steps)
         spent += time.perf_counter() - start
@@ -66,7 +66,7 @@ def main() -> None:
         for number, scenarios in enumerate(track(grids, "slices", console=console, transient=True)):
             for side in ("study", "plain") if number % 2 else ("plain", "study"):
                 if side == "plain":
-                    simulated += plain_seconds(scenarios, threads)
+                    simulated += plain(scenarios, threads)
                 else:
                     start = time.perf_counter()
                     study(scenarios, out, threads=threads)
