@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import smc_mujoco as smc
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.control.gain_sets import general
-from smc_mujoco.studies.papers.gaber.scenarios import PLANTS
+from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS
 
 BUDGET = 96
 

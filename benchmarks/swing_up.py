@@ -1,4 +1,4 @@
-"""The trajectories of the boards' entries, found again: smc_mujoco/studies/boards/trajectories.
+"""The trajectories of the boards' entries, found again: smc_mujoco/evidence/boards/trajectories.
 
     python benchmarks/swing_up.py acrobot              # optimise, then write the file; a minute
     python benchmarks/swing_up.py acrobot --starts 12  # also tell what other starts of the search lead to
@@ -25,9 +25,9 @@ from scipy.optimize import minimize
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.mechanisms.plants.double_pendulum import LIMIT, MODEL_1_1
-from smc_mujoco.studies.boards import entries
-from smc_mujoco.studies.boards.scoring import V2
-from smc_mujoco.studies.boards.simulator import Case, Machine, _slope, upright
+from smc_mujoco.evidence.boards import entries
+from smc_mujoco.evidence.boards.scoring import V2
+from smc_mujoco.evidence.boards.simulator import Case, Machine, _slope, upright
 
 BEST = {"acrobot": 8, "pendubot": 4}  # start of the search, of twelve, that led to the best score
 DRIVEN = {"acrobot": 1, "pendubot": 0}

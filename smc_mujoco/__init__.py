@@ -23,9 +23,9 @@ _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _ORIGINS = {name: module for module, name in re.findall(r"^from (\S+) import (\w+) as \2$", _STUB, re.MULTILINE)}
 _MODULES = {  # public modules; three of them need an extra
     "arms": "smc_mujoco.studies.arms",
-    "boards": "smc_mujoco.studies.boards",
+    "boards": "smc_mujoco.evidence.boards",
     "gym": "smc_mujoco.envs.gymnasium_env",
-    "paper": "smc_mujoco.studies.papers.gaber.scenarios",
+    "paper": "smc_mujoco.evidence.papers.gaber.scenarios",
     "suite": "smc_mujoco.envs.dm_control_env",
     "vector": "smc_mujoco.envs.vector_env",
 }

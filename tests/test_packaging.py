@@ -249,7 +249,7 @@ def refused(tmp_path_factory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("refused")
     asked = f"""
 import smc_mujoco as smc
-from smc_mujoco.studies.report import films
+from smc_mujoco.evidence.report import films
 t = smc.run(smc.Scenario(plant='duffing', law='none', duration=0.01))
 for code in {list(MISSING)}:
     try:

@@ -17,7 +17,7 @@ import notation
 from smc_mujoco.cli.law_pages import DEGREES
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import gain_sets
-from smc_mujoco.control.c.export import law_to_c
+from smc_mujoco.exchange.c.export import law_to_c
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.docstring import SOURCE, entry
 from smc_mujoco.control.estimator import catalogue as estimators

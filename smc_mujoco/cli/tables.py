@@ -26,9 +26,9 @@ from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.metrics.tip import tip_scores, worst_joint
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.audit import verdict as verdicts
+from smc_mujoco.evidence.audit import verdict as verdicts
 from smc_mujoco.studies.board_tables import size, spread
-from smc_mujoco.studies.boards.published import RobustnessRow, Row
+from smc_mujoco.evidence.boards.published import RobustnessRow, Row
 from smc_mujoco.studies.leaderboard import Block, Board
 
 if TYPE_CHECKING:
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.gains_for import Design
     from smc_mujoco.analysis.margins import Margin
     from smc_mujoco.studies.advice import Advice
-    from smc_mujoco.studies.audit.verdict import Claim
-    from smc_mujoco.twins.identify import Identified
+    from smc_mujoco.evidence.audit.verdict import Claim
+    from smc_mujoco.evidence.rigs.identify import Identified
 
 MAX_TIP_COLUMNS = 5  # with more, the name of the joint that does most work does not fit into 80 characters
 TIP = {  # columns of a table of an arm's tip and worst joint: heading -> score, unit, factor on its SI value

@@ -15,7 +15,7 @@ from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import known_laws
-from smc_mujoco.control.rig_controllers import CONTROLLERS
+from smc_mujoco.evidence.rigs.controllers import CONTROLLERS
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.custom.plant_from import OwnModel, restored
 from smc_mujoco.mechanisms.hardware import backlash, drives, friction, servos  # noqa: F401  # whose parts a file may name
@@ -30,7 +30,7 @@ from smc_mujoco.simulation.signals import PerChannel, Recorded, Signal
 PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
 DEPENDENT = ("model", "physics_step", "integrator", "velocity", "u_max", "x0", "v0", "reference")  # None where left out
 PARTS = ("friction", "contact", "actuator", "sensor")
-OTHER_LAWS = ("smc_mujoco.studies.boards.entries",)  # modules with laws that are not in the catalogue
+OTHER_LAWS = ("smc_mujoco.evidence.boards.entries",)  # modules with laws that are not in the catalogue
 T = TypeVar("T")
 
 # Former name of a module, as files of recorded runs have it -> its present name.
@@ -47,7 +47,7 @@ FORMER_PLACES = {
     "smc_mujoco.signals": "smc_mujoco.simulation.signals",
     "smc_mujoco.references": "smc_mujoco.simulation.signals",
     "smc_mujoco.simulation.references": "smc_mujoco.simulation.signals",
-    "smc_mujoco.studies.paper": "smc_mujoco.studies.papers.gaber",
+    "smc_mujoco.studies.paper": "smc_mujoco.evidence.papers.gaber",
     "smc_mujoco.series": "smc_mujoco.simulation.time_series",
 }
 

@@ -14,7 +14,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.conditions import NAMED
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.papers.gaber import scenarios
+from smc_mujoco.evidence.papers.gaber import scenarios
 
 PACKAGE = "smc_mujoco."
 # Fields of a description that do not belong to the condition, but to the plant, the law or the run.

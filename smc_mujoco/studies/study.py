@@ -25,7 +25,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import executors, run_key, saved_traces
 from smc_mujoco.studies.executors import Batch, Outcome
-from smc_mujoco.studies.papers.gaber import scenarios as paper
+from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.studies.store import Store
 from smc_mujoco.studies.table import Table
 

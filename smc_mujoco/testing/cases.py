@@ -6,7 +6,7 @@ from typing import Any
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation.conditions import find_condition
-from smc_mujoco.studies.papers.gaber import scenarios
+from smc_mujoco.evidence.papers.gaber import scenarios
 
 EXAMPLE = '@pytest.mark.smc(plants=["duffing"], conditions=["nominal", "noise"])'
 

@@ -16,7 +16,7 @@ from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, Step
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.papers.gaber import scenarios
+from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.testing.limits import bound, judge, quantity, without_frames
 
 IN_REPR = ("settling_time", "overshoot", "tv_rate")  # metrics in the repr of a response

@@ -15,7 +15,7 @@ from smc_mujoco.cli import tables
 from smc_mujoco.cli.commands.analysis import QUICK
 from smc_mujoco.cli.commands.analysis import margins as command
 from smc_mujoco.control import gain_sets as gains
-from smc_mujoco.studies.papers.gaber import scenarios
+from smc_mujoco.evidence.papers.gaber import scenarios
 
 margins = importlib.import_module("smc_mujoco.analysis.margins")  # smc.margins is the function
 

@@ -17,7 +17,7 @@ from smc_mujoco.common.errors import find
 from smc_mujoco.control import estimator, gain_sets, joint_law, law, surface
 from smc_mujoco.mechanisms import plant
 from smc_mujoco.studies import run_key, scene
-from smc_mujoco.studies.audit import paper
+from smc_mujoco.evidence.audit import paper
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "my_smc_package"
@@ -382,7 +382,7 @@ def test_a_paper_with_something_wrong_is_left_out_of_the_list(install, tmp_path)
     home.mkdir(parents=True)
     (folder / "their_papers" / "__init__.py").touch()
     for file in ("paper.toml", "claims.py"):
-        (home / file).write_text((ROOT / "smc_mujoco/studies/audit/template" / file).read_text())
+        (home / file).write_text((ROOT / "smc_mujoco/evidence/audit/template" / file).read_text())
     (home / "__init__.py").touch()
     first = said(paper.papers)
     assert [sentence.partition(": its")[0] for sentence in first] == ["package 'papers'"]

@@ -11,7 +11,7 @@ import smc_mujoco as smc
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.estimator import Reading, catalogue
 from smc_mujoco.simulation import reference
-from smc_mujoco.studies.papers.gaber import scenarios
+from smc_mujoco.evidence.papers.gaber import scenarios
 
 H = 1e-3  # s
 FROM_POSITION = [name for name in smc.estimators() if name != "measured"]

@@ -47,7 +47,7 @@ from smc_mujoco.analysis import linearisation, margins
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control import gain_sets
 from smc_mujoco.draw import style
-from smc_mujoco.studies.report import words
+from smc_mujoco.evidence.report import words
 
 found = {}
 for name in ("brand_new", "plain_one"):

@@ -7,7 +7,7 @@ import pytest
 from helpers.plants_ab import called, constant, measured, plant_a, plant_b, sine
 
 import smc_mujoco as smc
-from smc_mujoco.studies.papers.gaber import scenarios as paper
+from smc_mujoco.evidence.papers.gaber import scenarios as paper
 
 H = 1e-3  # s
 LAWS = ("extended_state", "disturbance_observer")

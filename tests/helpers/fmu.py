@@ -9,7 +9,7 @@ from typing import Any
 import fmpy
 from fmpy.simulation import instantiate_fmu
 
-from smc_mujoco.control.c import build
+from smc_mujoco.exchange.c import build
 
 HERE = Path(__file__).parent
 

@@ -15,7 +15,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.common.files import plain
 from smc_mujoco.control import gain_sets
-from smc_mujoco.draw.live import npm
+from smc_mujoco.exchange.live import npm
 
 WORDS = "const WORDS = { NaN, Infinity, '-Infinity': -Infinity };\n"
 READ = WORDS + "const read = (text) => JSON.parse(text, (_, v) => (Object.hasOwn(WORDS, v) ? WORDS[v] : v));\n"

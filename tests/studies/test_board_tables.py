@@ -18,7 +18,7 @@ from smc_mujoco.studies import board_tables
 from smc_mujoco.studies.advice import _interval
 from smc_mujoco.studies.board_tables import TEX, spread
 from smc_mujoco.studies.leaderboard import Boards, leaderboard
-from smc_mujoco.studies.report import words
+from smc_mujoco.evidence.report import words
 
 EVIL = r"50 % & <b>x_1^{2}</b> \ λ = 2 #~$"
 LAWS = (EVIL, "second", "third")

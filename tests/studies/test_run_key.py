@@ -20,7 +20,7 @@ from smc_mujoco.mechanisms.plant import Variant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.studies.papers.gaber import scenarios
+from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.studies.study import condition, key
 
 ROOT = Path(__file__).parents[2]

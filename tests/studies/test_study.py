@@ -17,7 +17,7 @@ from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.model import check_starts
 from smc_mujoco.studies import executors, run_key, saved_traces, store
-from smc_mujoco.studies.papers.gaber import scenarios as paper
+from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.studies.study import condition, study
 from smc_mujoco.studies.table import Table
 

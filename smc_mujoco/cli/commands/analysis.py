@@ -125,7 +125,7 @@ def margins(
         from smc_mujoco.common.files import ended, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
-        from smc_mujoco.studies.papers.gaber import scenarios
+        from smc_mujoco.evidence.papers.gaber import scenarios
 
     json, terminal = options.json_file(json)
     if out:

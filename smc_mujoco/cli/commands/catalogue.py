@@ -24,7 +24,7 @@ def list_() -> None:
         from smc_mujoco.common.catalogue import Catalogue
         from smc_mujoco.mechanisms.plant import catalogue as plants
         from smc_mujoco.studies import scene
-        from smc_mujoco.studies.papers.gaber import scenarios
+        from smc_mujoco.evidence.papers.gaber import scenarios
 
     def first_line(doc: str | None) -> str:
         return (doc or "").strip().partition("\n")[0].rstrip(":")  # a colon where a formula follows

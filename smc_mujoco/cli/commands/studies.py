@@ -151,8 +151,8 @@ def bench(
         from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.studies.leaderboard import leaderboard
         from smc_mujoco.studies.study import FULL, QUICK, study
-        from smc_mujoco.twins import ensemble
-        from smc_mujoco.twins.rig import rig as find_rig
+        from smc_mujoco.evidence.rigs import ensemble
+        from smc_mujoco.evidence.rigs.rig import rig as find_rig
 
     terminal, size = Terminal(), QUICK if quick else FULL
     count, length = seeds or size.seeds, size.duration if duration is None else duration
@@ -228,7 +228,7 @@ def board(
         from smc_mujoco.common.files import writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.simulation.run import run
-        from smc_mujoco.studies import boards
+        from smc_mujoco.evidence import boards
 
     terminal = Terminal()
     scenario = boards.entry(robot)
@@ -312,8 +312,8 @@ def claims(
         from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import ended, replacing, writable
         from smc_mujoco.common.progress import bar
-        from smc_mujoco.studies.audit.audit import DEFAULT, audit, document, evaluations
-        from smc_mujoco.studies.audit.paper import paper as find_paper
+        from smc_mujoco.evidence.audit.audit import DEFAULT, audit, document, evaluations
+        from smc_mujoco.evidence.audit.paper import paper as find_paper
         from smc_mujoco.studies.table import Table
         from smc_mujoco.testing import mutants as testing
 
@@ -380,7 +380,7 @@ def papers(
     """
     with held_back():
         from smc_mujoco.cli import tables
-        from smc_mujoco.studies.audit import evidence, paper
+        from smc_mujoco.evidence.audit import evidence, paper
 
     terminal = Terminal()
     if new:
@@ -432,8 +432,8 @@ def report(
     """
     with held_back():
         from smc_mujoco.common.errors import ScenarioError
-        from smc_mujoco.studies.report import paper as of_paper
-        from smc_mujoco.studies.report import report as make
+        from smc_mujoco.evidence.report import paper as of_paper
+        from smc_mujoco.evidence.report import report as make
 
     if paper and (seeds or records or laws):
         raise ScenarioError("--seeds, --laws and --records belong to the study: leave them out with --paper")

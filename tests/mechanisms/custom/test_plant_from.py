@@ -26,7 +26,7 @@ from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import reference as plain
 from smc_mujoco.simulation import scenario as scenario_module
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies.papers.gaber import scenarios
+from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.studies.scene import slug
 
 TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)

@@ -1,0 +1,241 @@
+"""The audit of a paper: its claims, each a function of runs, and the verdicts on them.
+
+    found = audit("gaber", only=["3"])             # one claim, under every set of gains of the paper
+    found.claims[0].verdict
+    found.save("evidence.json")                    # claim -> runs -> numbers -> threshold -> verdict
+
+Thresholds are fixed in the paper's file before any run, and are not moved. How verdicts follow from checks: `verdict`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from smc_mujoco.common.errors import ScenarioError, find, shown, taken, unknown
+from smc_mujoco.common.files import to_json
+from smc_mujoco.common.version import __version__
+from smc_mujoco.evidence.audit.paper import Entry, Paper, failed
+from smc_mujoco.evidence.audit.paper import paper as find_paper
+from smc_mujoco.evidence.audit.verdict import Beside, Check, Claim, Claims, Evidence, judged
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
+    from smc_mujoco.evidence.audit.runs import Result, Runs, Substitute, Used
+    from smc_mujoco.studies.table import Table
+
+DEFAULT = "gaber"  # the paper that the suite was built for
+CURE = "return measure -> number, or measure -> {case: number}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Audit:
+    """An audit of a paper.
+
+    Attributes:
+      paper: the paper as it was read.
+      claims: with their verdicts, in the order of the paper's file.
+      quick: whether less was looked at, as each claim says.
+      used: claim -> set of gains -> key -> run that the claim rests on.
+      sealable: whether all of it was run here, with the laws as they are.
+    """
+
+    paper: Paper
+    claims: Claims
+    quick: bool
+    used: Mapping[str, Mapping[str, Mapping[str, Used]]]
+    sealable: bool
+
+    def save(self, path: str | Path) -> Path:
+        """Write the evidence to a .json file: claim -> runs -> numbers -> threshold -> verdict, sealed by a hash.
+
+        A second audit in a clean process writes the same file, to the last bit, with the same versions of the packages
+        and on a machine whose arithmetic is the same. The file holds no times, no paths and nothing of the machine.
+        Numbers that differ from audit to audit, such as timings, are left out, and the file says so.
+
+        Raises:
+          ScenarioError: the name does not end in .json, or runs were taken from a table.
+        """
+        from smc_mujoco.evidence.audit import evidence
+
+        return evidence.save(self, path)
+
+    def badge(self, path: str | Path) -> Path:
+        """Write a badge, an .svg file with the number of claims by verdict."""
+        from smc_mujoco.evidence.audit import badge
+
+        return badge.save(self.paper.name, self.claims, path)
+
+    def figure(self, path: str | Path | None = None, **options: Any) -> Figure | SubFigure:
+        """Draw every check as a multiple of its threshold, a row for each claim; options as of `smc.figure`."""
+        from smc_mujoco.evidence.audit.figure import figure
+
+        return figure(self.claims, f"Claims of {self.paper.authors}: {self.paper.title}", path, **options)
+
+    def _repr_html_(self) -> str:
+        return self.claims._repr_html_()
+
+
+def audit(
+    paper: str | Path | Paper = DEFAULT,
+    only: Iterable[str | int] | None = None,
+    gains: str | Sequence[str] | None = None,
+    quick: bool = False,
+    threads: int | None = None,
+    *,
+    table: Table | None = None,
+    substitute: Substitute | None = None,
+    report: Callable[[int], None] = lambda done: None,
+) -> Audit:
+    """Audit a paper: measure each claim against its threshold, and keep what every verdict rests on.
+
+        smc.audit("./my_paper").save("evidence.json")
+
+    Args:
+      paper: the name of one that ships, see `smc-mujoco papers`, or a folder.
+      only: ids of the claims wanted; None for all.
+      gains: sets of gains, of the paper's; None for all of them, or its quick sets if it is to be quick.
+      quick: less, as each claim says: coarser grids, shorter runs.
+      threads: simulations at once; None for one per available core.
+      table: of a study, whose runs are then not made again.
+      substitute: law's name -> function that makes its mutant, to see whether the audit can fail.
+      report: called with 1 as each claim is done under a set of gains, `evaluations` times in all.
+
+    Raises:
+      ScenarioError: an unknown paper, id or set of gains, or something is wrong with a file of the paper.
+    """
+    from smc_mujoco.evidence.audit.runs import Runs, of_table
+
+    found = as_paper(paper)
+    # a table has runs of the laws as they are, not of their mutants
+    rows: dict[str, Result] = {} if table is None or substitute else of_table(table)
+    shared: dict[str, Result] = {}
+    entries = wanted(found, only)
+    evidence: dict[str, dict[str, Evidence]] = {entry.id: {} for entry in entries}
+    used: dict[str, dict[str, dict[str, Used]]] = {entry.id: {} for entry in entries}
+    for name in sets(found, gains, quick):
+        runs = Runs(found, name, quick, substitute, threads, rows, shared)
+        for entry in sorted(entries, key=lambda entry: entry.late):
+            own = runs.of(entry)
+            evidence[entry.id][name] = measure(entry, own)
+            used[entry.id][name] = own.used
+            report(1)
+    if quick:
+        instead = {entry.id: f"; here, quickly, {entry.quick}" if entry.quick else "" for entry in entries}
+        entries = [dataclasses.replace(entry, measured=entry.measured + instead[entry.id]) for entry in entries]
+    verdicts = Claims(judged(entry, evidence[entry.id]) for entry in entries)
+    return Audit(found, verdicts, quick, used, table is None and not substitute)
+
+
+def claims(
+    table: Table | None = None,
+    only: Iterable[str | int] | None = None,
+    gains: str | Sequence[str] | None = None,
+    quick: bool = False,
+    substitute: Substitute | None = None,
+    threads: int | None = None,
+    report: Callable[[int], None] = lambda done: None,
+    paper: str | Path | Paper = DEFAULT,
+) -> Claims:
+    """Return the verdicts on a paper's claims, with the numbers behind them; arguments and errors as of `audit`."""
+    options: dict[str, Any] = {"table": table, "substitute": substitute, "report": report}
+    return audit(paper, only, gains, quick, threads, **options).claims
+
+
+def as_paper(paper: str | Path | Paper) -> Paper:
+    """Return a paper, from itself, its name or its folder."""
+    return paper if isinstance(paper, Paper) else find_paper(paper)
+
+
+def wanted(paper: Paper, only: Iterable[str | int] | None) -> list[Entry]:
+    """Return the claims of some ids, or all for None, in the order of the file; refuse an unknown id."""
+    known = paper.claims
+    if only is None:
+        return list(known.values())
+    ids = {str(id) for id in taken("only", only)}
+    for id in sorted(ids - set(known)):
+        raise unknown("claim", id, known)
+    return [entry for entry in known.values() if entry.id in ids]
+
+
+def sets(paper: Paper, gains: str | Sequence[str] | None, quick: bool) -> list[str]:
+    """Return the sets of gains that `claims` takes for these arguments; refuse an unknown one."""
+    if gains is None:
+        return list(paper.quick_sets if quick else paper.sets)
+    names = [gains] if isinstance(gains, str) else taken("gains", gains)
+    for name in names:
+        find("set of gains", name, paper.sets)
+    if not names:
+        raise ScenarioError(f"no set of gains is given: choose from {', '.join(paper.sets)}")
+    return names
+
+
+def evaluations(
+    only: Iterable[str | int] | None = None,
+    gains: str | Sequence[str] | None = None,
+    quick: bool = False,
+    paper: str | Path | Paper = DEFAULT,
+) -> int:
+    """Return how often `claims` reports, for a progress bar."""
+    found = as_paper(paper)
+    return len(wanted(found, only)) * len(sets(found, gains, quick))
+
+
+def document(claims: Sequence[Claim]) -> str:
+    """Return claims as one JSON document: {"smc_mujoco": version, "claims": [...]}."""
+    return to_json({"smc_mujoco": __version__, "claims": [dataclasses.asdict(claim) for claim in claims]}, indent=1)
+
+
+def measure(entry: Entry, runs: Runs) -> Evidence:
+    """Return the checks of a claim under one set of gains, and the numbers beside them.
+
+    Raises:
+      ScenarioError: the claim's function raises something, or returns what its thresholds are not about.
+    """
+    try:
+        found = entry.evidence(runs)
+    except (Exception, SystemExit) as error:  # whatever a user's function raises
+        raise failed(runs.paper, entry, error) from error
+    try:
+        return list(_evidence(entry, found, runs.asked))
+    except ScenarioError as error:
+        raise failed(runs.paper, entry, error) from None
+
+
+def _evidence(entry: Entry, found: Any, met: Collection[str]) -> Iterator[Check | Beside]:
+    """Yield the checks of what a claim's function returned; `met` are measures whose thresholds it has asked for."""
+    if not isinstance(found, Mapping):
+        checks = isinstance(found, Sequence) and all(isinstance(one, Check | Beside) for one in found)
+        if not checks:
+            raise ScenarioError(f"it returns {shown(found)}: {CURE}")
+        for threshold in entry.thresholds:
+            if threshold.measure not in met:
+                cure = "return numbers, or checks from runs.check"
+                raise ScenarioError(f"it returns checks, and none for {threshold.measure!r} of holds_if: {cure}")
+        yield from found
+        return
+    if not entry.thresholds:
+        raise ScenarioError('it returns numbers, and holds_if is a text: write a table, as { "exponent" = ">= 1.9" }')
+    values = {measure: dict(_cases(measure, one)) for measure, one in found.items()}
+    for threshold in entry.thresholds:
+        if not values.get(threshold.measure):
+            cure = f"its measures are {', '.join(map(str, values)) or 'none'}"
+            raise ScenarioError(f"it returns no {threshold.measure!r}, of which holds_if is: {cure}")
+        yield from threshold.evidence(values[threshold.measure])
+    asked = {threshold.measure for threshold in entry.thresholds}
+    for measure, cases in values.items():
+        for case, value in cases.items() if measure not in asked else ():
+            yield Beside(f"{case}: {measure}" if case else measure, value)
+
+
+def _cases(measure: object, found: Any) -> Iterator[tuple[str, float]]:
+    """Yield case -> number of a measure; the case is "" for a measure with one number."""
+    for case, value in found.items() if isinstance(found, Mapping) else (("", found),):
+        try:
+            yield str(case), float(value)
+        except (TypeError, ValueError):
+            where = f"{measure!r}, {case!r}" if case else repr(measure)
+            raise ScenarioError(f"it returns {shown(value)} for {where}: {CURE}") from None

@@ -1,0 +1,59 @@
+"""A badge of an audit: an SVG file with the number of claims by verdict, as READMEs show."""
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+from smc_mujoco.common.files import ended, replacing
+from smc_mujoco.evidence.audit.verdict import NOT_TESTABLE, PARTLY, REFUTED, SUPPORTED, VERDICTS, Claim
+
+COLOURS = {SUPPORTED: "#2b7a3d", PARTLY: "#8a6100", REFUTED: "#b3322b", NOT_TESTABLE: "#6a6a6a"}  # white on each: 5:1
+SHORT = {PARTLY: "partly"}
+LABEL = "#444"
+HEIGHT, SIZE, MARGIN = 20, 11, 6  # px
+FONT = "Verdana,Geneva,DejaVu Sans,sans-serif"
+
+
+def save(name: str, claims: Sequence[Claim], path: str | Path) -> Path:
+    """Write the badge of a paper to an .svg file, and return its path."""
+    path = ended(path, ".svg")
+    with replacing(path) as file:
+        file.write_text(svg(name, claims), encoding="utf-8")
+    return path
+
+
+def svg(name: str, claims: Sequence[Claim]) -> str:
+    """Return the badge: the paper's name, and a field for each verdict that some claim has."""
+    counts = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
+    fields = [(f"claims of {name}", LABEL)]
+    fields += [(f"{count} {SHORT.get(one, one)}", COLOURS[one]) for one, count in counts.items() if count]
+    about = f"{fields[0][0]}: {', '.join(text for text, _ in fields[1:])}"
+    boxes, texts, x = [], [], 0.0
+    for text, colour in fields:
+        length = width(text)
+        wide = round(length + 2 * MARGIN)
+        boxes.append(f'<rect x="{x:g}" width="{wide}" height="{HEIGHT}" fill="{colour}"/>')
+        shown, middle = escape(text), x + wide / 2
+        place = f'textLength="{length:.0f}" lengthAdjust="spacingAndGlyphs"'
+        texts.append(
+            f'<text x="{middle:g}" y="15" fill="#010101" fill-opacity=".3" aria-hidden="true" {place}>{shown}</text>'
+        )
+        texts.append(f'<text x="{middle:g}" y="14" {place}>{shown}</text>')
+        x += wide
+    size, about = f'width="{x:g}" height="{HEIGHT}"', escape(about)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" {size} role="img" aria-label="{about}"><title>{about}</title>'
+        '<linearGradient id="s" x2="0" y2="100%"><stop offset="0" stop-color="#bbb" stop-opacity=".1"/>'
+        '<stop offset="1" stop-opacity=".1"/></linearGradient>'
+        f'<clipPath id="r"><rect {size} rx="3" fill="#fff"/></clipPath>'
+        f'<g clip-path="url(#r)">{"".join(boxes)}<rect {size} fill="url(#s)"/></g>'
+        f'<g fill="#fff" text-anchor="middle" font-family="{FONT}" font-size="{SIZE}">{"".join(texts)}</g></svg>\n'
+    )
+
+
+def width(text: str) -> float:
+    """Return the width of a text, px, in the font of badges; DejaVu Sans stands for Verdana, which is as wide."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import TextPath
+
+    return float(TextPath((0, 0), text, size=SIZE, prop=FontProperties(family="DejaVu Sans")).get_extents().x1)

@@ -1,0 +1,142 @@
+"""The evidence of an audit as a JSON file that anybody can make again, to the last bit.
+
+    audit("gaber").save("evidence.json")
+    check("evidence.json")                    # its seal: the file is as it was written
+
+It leads from each claim to its runs, their numbers, the threshold and the verdict. A run is named by a hash of its
+scenario, and has a hash of what the claim took from it, its scores or its trace. The paper's own files count by their
+hashes. The seal is a hash of all the rest. There are no times, no paths and nothing of the machine in it.
+"""
+
+import hashlib
+import sys
+from collections import Counter
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from smc_mujoco.common import fingerprint
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import ended, read_json, reading, to_json, write_json
+from smc_mujoco.common.version import __version__
+from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.evidence.audit.paper import Paper, shipped
+from smc_mujoco.evidence.audit.runs import Used
+from smc_mujoco.studies.run_key import condition, portable_key
+
+if TYPE_CHECKING:
+    from smc_mujoco.evidence.audit.audit import Audit
+
+FORMAT = "smc-mujoco evidence 1"
+ENDINGS = (".py", ".toml", ".xml")  # of a paper's files that count
+
+
+def save(audit: "Audit", path: str | Path) -> Path:
+    """Write the evidence of an audit to a .json file, and return its path."""
+    path = ended(path, ".json")
+    return write_json(path, document(audit))
+
+
+def document(audit: "Audit") -> dict[str, Any]:
+    """Return the evidence of an audit as plain data, with its seal.
+
+    Raises:
+      ScenarioError: runs were taken from a table, or laws replaced.
+    """
+    if not audit.sealable:
+        raise ScenarioError("evidence is of runs that the audit made itself: leave out the table and the substitutes")
+    names: dict[str, str] = {}  # key of a run -> its name in the file
+    runs: dict[str, Any] = {}
+    for used in (runs for sets in audit.used.values() for runs in sets.values()):
+        for key, one in used.items():
+            name = names[key] = names.get(key) or portable_key(one.scenario)
+            if name not in runs:
+                runs[name] = _run(one.scenario)
+            runs[name] |= _results(one)
+    sealed = [claim.verdict for claim in audit.claims if not audit.paper.claims[claim.id].varies]
+    data = {
+        "format": FORMAT,
+        "paper": {
+            "name": audit.paper.name,
+            **{field: getattr(audit.paper, field) for field in ("title", "authors", "source", "read", "note")},
+            "files": files(audit.paper),
+        },
+        "software": {
+            "smc_mujoco": __version__,
+            **{name: version(name) for name in ("mujoco", "numba", "numpy")},
+            "python": f"{sys.version_info.major}.{sys.version_info.minor}",
+            "code": fingerprint.package("testing", "draw", *(f"studies/papers/{name}" for name in shipped())),
+        },
+        "quick": audit.quick,
+        "left_out": [id for id in audit.paper.claims if id not in audit.used],
+        "counts": dict(sorted(Counter(sealed).items())),
+        "claims": [_claim(audit, claim, names) for claim in audit.claims],
+        "runs": dict(sorted(runs.items())),
+    }
+    return data | {"seal": seal(data)}
+
+
+def seal(data: Mapping[str, Any]) -> str:
+    """Return the hash of all but the seal, 64 hex digits."""
+    rest = {name: value for name, value in data.items() if name != "seal"}
+    return hashlib.sha256(to_json(rest, sort_keys=True).encode()).hexdigest()
+
+
+def check(path: str | Path) -> dict[str, Any]:
+    """Return the evidence in a file whose seal is whole.
+
+    Raises:
+      ScenarioError: there is no such file, it is no evidence, or it was changed after it was written.
+    """
+    with reading(path, "file of evidence", "give one that `smc-mujoco claims --evidence FILE.json` wrote") as file:
+        data = read_json(file)
+        if data["format"] != FORMAT:
+            raise ScenarioError(f"its format is {data['format']!r}, and this version reads {FORMAT!r}")
+        if data["seal"] != seal(data):
+            raise ScenarioError("its seal is broken: it was changed after it was written")
+    return data
+
+
+def files(paper: Paper) -> dict[str, str]:
+    """Return file -> hash, of the files of a paper that count; the ends of lines do not."""
+    found = sorted(path for path in paper.folder.rglob("*") if path.suffix in ENDINGS and path.is_file())
+    return {path.relative_to(paper.folder).as_posix(): _hash(path) for path in found}
+
+
+def _hash(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes().replace(b"\r\n", b"\n")).hexdigest()
+
+
+def _claim(audit: "Audit", claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
+    """Return what is sealed of a claim."""
+    entry = audit.paper.claims[claim.id]
+    told = {name: getattr(claim, name) for name in ("id", "text", "where", "measured", "holds_if", "quantifier")}
+    if entry.immune:
+        told["immune"] = entry.immune
+    if entry.varies:
+        return told | {"not_sealed": f"its numbers differ from audit to audit: {entry.varies}"}
+    runs = {name: sorted({names[key] for key in used}) for name, used in audit.used[claim.id].items()}
+    judged = {name: getattr(claim, name) for name in ("numbers", "beside", "verdicts", "verdict", "flips", "note")}
+    return told | {"runs": runs} | judged
+
+
+def _run(scenario: Scenario) -> dict[str, Any]:
+    """Return what a reader wants to know of a run; its name is a hash of all that is."""
+    plant, suite = scenario.plant, plants().get(scenario.plant.name)
+    own = {name: value for name, value in plant.parameters.items() if not suite or suite.parameters.get(name) != value}
+    return {
+        "plant": plant.name,
+        "parameters": own | ({"n": plant.n} if not suite or plant.n != suite.n else {}),  # other than the suite's
+        "law": scenario.law.name,
+        "gains": dict(scenario.law.gains),
+        "condition": condition(scenario),
+        "duration": scenario.duration,
+        "seed": scenario.seed,
+    }
+
+
+def _results(used: Used) -> dict[str, str]:
+    """Return the hashes of what was taken from a run."""
+    return {name: value for name, value in (("scores", used.scores), ("trace", used.trace)) if value}

@@ -1,0 +1,105 @@
+"""The figure of an audit: how far every check is from its threshold, a row for each claim.
+
+    audit("levant_1993").figure("checks.pdf")
+
+A check is a dot at its value over its limit, or at its limit over its value if more is asked for: left of 1 it holds,
+and its dot is filled. Where the ratio tells nothing, as with a limit of 0, the dot is at the edge.
+"""
+
+import math
+import os
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import style
+from smc_mujoco.draw.page import Size
+from smc_mujoco.evidence.audit.badge import COLOURS
+from smc_mujoco.evidence.audit.verdict import MARKS, Check, Claim
+
+ROW = 26.0  # points on a full page, height of a claim's row
+DECADES = 3.0  # on each side of 1
+SPREAD = 0.5  # of a row, over which the sets of gains are spread
+TEXT = 0.36  # of the page's width, for the claims
+
+
+def figure(
+    claims: Sequence[Claim],
+    title: str,
+    path: str | os.PathLike | None = None,
+    size: Size = None,
+    format: str | None = None,
+    fig: Figure | SubFigure | None = None,
+) -> Figure | SubFigure:
+    """Draw the checks of claims as multiples of their thresholds.
+
+    Args:
+      claims: with their verdicts.
+      title: of the figure.
+      path, size, format, fig: as in `smc.figure`.
+
+    Raises:
+      ScenarioError: no claims, or as `smc.figure`.
+    """
+    if not claims:
+        raise ScenarioError("no claims to draw: give at least one")
+    paths = [] if path is None else pages.files(path, format)
+    width, height = pages.measure(size, fig)
+    kinds = [kind for kind in COLOURS if any(claim.verdict == kind for claim in claims)]
+    with style.page(width):
+        handles = [Line2D([], [], color=COLOURS[kind], marker="o", ls="", label=kind) for kind in kinds]
+        whole = pages.head(width, handles) + style.points(ROW * (len(claims) + 2.5)) / 72
+        page = pages.blank(width, height or whole, fig)
+        ax = page.subplots()
+        for row, claim in enumerate(claims):
+            if row % 2:
+                ax.axhspan(row - 0.5, row + 0.5, color=style.RULE, alpha=0.25, lw=0)
+            draw(ax, row, claim)
+        ax.axvline(0.0, color=style.INK, lw=style.points(1.2))
+        ax.set(xlim=(-1.08 * DECADES, 1.08 * DECADES), ylim=(len(claims) - 0.5, -0.5))
+        sets = list(claims[0].verdicts)
+        order = f"; from above, gains {', '.join(sets)}" if len(sets) > 1 else ""
+        words = f"measured / asked: left of 1 it holds, and is filled{order}"
+        letters, room = style.points(9.5), TEXT * 72 * width
+        ax.set_xlabel(style.wrapped(words, 2 * room, letters, lines=2), fontsize=letters)
+        narrow = width < pages.NARROW
+        ends = {-DECADES: f"≤ {10**-DECADES:g}", DECADES: f"≥ {10**DECADES:g}"}
+        ticks = [float(k) for k in range(-round(DECADES), round(DECADES) + 1) if not narrow or k % 2 == 0]
+        ax.set_xticks(ticks, [ends.get(k, f"{10.0**k:g}") for k in ticks])
+        names = [style.cropped(f"{MARKS[one.verdict]} {one.id}  {one.text}", room, letters) for one in claims]
+        ax.set_yticks(range(len(claims)), names, fontsize=letters)
+        for label, claim in zip(ax.get_yticklabels(), claims, strict=True):
+            label.set_color(COLOURS[claim.verdict])
+            label.set_parse_math(False)
+        ax.tick_params(axis="y", length=0)
+        ax.grid(axis="y", visible=False)
+        pages.set_head(page, width, title, handles)
+        pages.write(page, paths)
+    return page
+
+
+def draw(ax: Axes, row: int, claim: Claim) -> None:
+    """Draw the checks of a claim: a line of dots for each set of gains."""
+    colour, sets = COLOURS[claim.verdict], list(claim.verdicts)
+    dot = {"marker": "o", "ls": "", "ms": style.points(5.5), "mec": colour, "mew": style.points(1.1), "clip_on": False}
+    for k, name in enumerate(sets):
+        y = row + SPREAD * ((k + 0.5) / len(sets) - 0.5)
+        for one in claim.checks(name):
+            ax.plot(place(one), y, mfc=colour if one.holds else "none", **dot)
+
+
+def place(check: Check) -> float:
+    """Return the place of a check: log10 of the multiple of what is asked, at most DECADES from 0."""
+    over, under = (check.value, check.limit) if check.relation in ("<", "<=") else (check.limit, check.value)
+    edge = -DECADES if check.holds else DECADES
+    if math.isnan(over) or math.isnan(under) or under <= 0.0 or over < 0.0 or math.isinf(under):
+        return edge
+    if over == 0.0 or math.isinf(over):
+        return edge
+    found = math.log10(over / under)
+    found = min(found, 0.0) if check.holds else max(found, 0.0)
+    return min(max(found, -DECADES), DECADES)

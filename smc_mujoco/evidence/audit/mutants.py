@@ -1,0 +1,121 @@
+"""Whether an audit can fail: the claims of a paper, measured on broken laws, the mutants.
+
+    assert survivors("./my_paper") == {}      # in a test: each claim that holds is lost by some mutant of its first law
+
+A mutant is the law that a claim is about with the wrong sign, without gain, without memory, or as a relay. A paper does
+not write about such a law, so a claim that holds under every mutant measures something else. If no mutant can lose a
+claim, the claim's field `immune` says why.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control.component import Component
+from smc_mujoco.control.variants import forgetful, relay, reversed_gain, zero_gain
+from smc_mujoco.evidence.audit.audit import as_paper, measure, sets, wanted
+from smc_mujoco.evidence.audit.paper import Entry, Paper
+from smc_mujoco.evidence.audit.runs import Result, Runs
+from smc_mujoco.evidence.audit.verdict import Evidence, sentences
+
+MUTANTS: dict[str, Callable[[Component], Component]] = {
+    "wrong sign": reversed_gain,
+    "zero gain": zero_gain,
+    "no memory": forgetful,
+    "relay": relay,
+}
+KEPT, BLIND = "kept by every mutant", "refuted, and no mutant changes its numbers"
+
+
+def mutants(law: Component) -> dict[str, Component]:
+    """Return the mutants of a law: with the wrong sign, without gain, without memory, and as a relay."""
+    return {name: mutant(law) for name, mutant in MUTANTS.items()}
+
+
+def survivors(
+    paper: str | Path | Paper,
+    only: Iterable[str | int] | None = None,
+    gains: str | Sequence[str] | None = None,
+    quick: bool = True,
+    threads: int | None = None,
+    report: Callable[[int], None] = lambda done: None,
+) -> dict[str, str]:
+    """Return claim -> KEPT or BLIND, for the claims that no mutant of their first law loses. There should be none.
+
+    A mutant loses a claim if fewer of the claim's sentences hold than under the law itself, or if the claim's function
+    cannot measure the mutant. A refuted claim has nothing to lose: there the numbers must change. Claims with `immune`
+    are skipped.
+
+    Args:
+      paper, only, gains, quick, threads: as of `smc.audit`.
+      report: called with the number of evaluations done since its last call; the sum is `evaluations`. An evaluation is
+        one claim, set of gains and mutant. Those of a claim that is lost already count as done.
+    """
+    found = as_paper(paper)
+    asked = {entry.id: entry for entry in wanted(found, only) if not entry.immune}
+    left = dict(asked)
+    names = sets(found, gains, quick)
+
+    def measured(entries: Iterable[Entry], law: str, mutant: str) -> Iterator[tuple[str, str, Evidence | None]]:
+        """Yield claim, set of gains, and evidence; None as evidence if the claim's function cannot measure a mutant."""
+        shared: dict[str, Result] = {}
+        replaced = {law: MUTANTS[mutant]} if mutant else None
+        for name in names:
+            runs = Runs(found, name, quick, replaced, threads, None, shared)
+            for entry in sorted(entries, key=lambda entry: entry.late):
+                try:
+                    yield entry.id, name, measure(entry, runs.of(entry))
+                except ScenarioError:
+                    if not mutant:
+                        raise
+                    yield entry.id, name, None
+                report(1)
+
+    intact = {(id, name): evidence for id, name, evidence in measured(left.values(), "", "")}
+    holding = {id: any(any(sentences(intact[id, name] or [], left[id].quantifier)) for name in names) for id in left}
+    for mutant in MUTANTS:
+        report((len(asked) - len(left)) * len(names))
+        for law in sorted({first_law(entry) for entry in left.values()}):
+            about = [entry for entry in left.values() if first_law(entry) == law]
+            for id, name, evidence in measured(about, law, mutant):
+                if id in left and lost(left[id], intact[id, name] or [], evidence, holding[id]):
+                    del left[id]
+    return {id: KEPT if holding[id] else BLIND for id in left}
+
+
+def evaluations(
+    paper: str | Path | Paper,
+    only: Iterable[str | int] | None = None,
+    gains: str | Sequence[str] | None = None,
+    quick: bool = True,
+) -> int:
+    """Return the number of evaluations that `survivors` reports, for a progress bar."""
+    found = as_paper(paper)
+    asked = [entry for entry in wanted(found, only) if not entry.immune]
+    return len(asked) * len(sets(found, gains, quick)) * (1 + len(MUTANTS))
+
+
+def first_law(entry: Entry) -> str:
+    """Return the law that mutants of a claim replace.
+
+    Raises:
+      ScenarioError: the claim names no law.
+    """
+    if not entry.laws:
+        raise ScenarioError(f"claim {entry.id} names no law: write laws, first the one that it is about, or immune")
+    return entry.laws[0]
+
+
+def lost(entry: Entry, intact: Evidence, mutant: Evidence | None, holding: bool) -> bool:
+    """Return whether a mutant loses a claim.
+
+    Args:
+      intact: evidence under the law itself.
+      mutant: evidence under the mutant; None if it cannot be measured.
+      holding: whether some sentence of the claim holds under the law itself. If none does, the numbers are compared.
+    """
+    if mutant is None:
+        return True
+    if holding:
+        return sum(sentences(mutant, entry.quantifier)) < sum(sentences(intact, entry.quantifier))
+    return [repr(one.value) for one in mutant] != [repr(one.value) for one in intact]  # repr: NaN equals NaN

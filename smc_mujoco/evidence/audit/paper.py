@@ -1,0 +1,516 @@
+"""A paper as data: a folder with paper.toml, its claims and thresholds, and claims.py, a function for each claim.
+
+    paper("levant_1993")            # one that ships
+    paper("./my_paper")             # your own folder
+
+docs/audit_a_paper.md shows how to write one, and lists the fields. A folder that is broken is refused with one
+sentence, which says what is wrong with which file.
+"""
+
+import dataclasses
+import functools
+import importlib
+import inspect
+import re
+import sys
+import tomllib
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+from smc_mujoco.common.catalogue import KINDS, Catalogue, added, source, warn
+from smc_mujoco.common.errors import ScenarioError, find, name, shown, unknown
+from smc_mujoco.common.files import reading, replacing
+from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.registry import modules
+from smc_mujoco.control import gain_sets
+from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.law import catalogue as laws_known
+from smc_mujoco.mechanisms.custom.plant_from import plant_from
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import catalogue as plants_known
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.conditions import NAMED as CONDITIONS
+from smc_mujoco.simulation.conditions import Condition, condition, find_condition, read_fields
+from smc_mujoco.simulation.grid import DURATION
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.evidence.audit.threshold import Threshold
+from smc_mujoco.evidence.audit.verdict import EXISTENTIAL, NAMED, UNIVERSAL, Statement
+
+FILE, CODE = "paper.toml", "claims.py"
+SHIPPED = "smc_mujoco.evidence.papers"
+QUANTIFIERS = {"universal": UNIVERSAL, "existential": EXISTENTIAL, "named": NAMED}
+NOTHING: Mapping[str, Any] = frozen({})
+TEXTS = ("title", "authors", "source", "read", "note", "runs")  # of a paper
+SETS = (*gain_sets.SETS, "default")  # of the suite
+OF_CLAIM = {  # field of a claim -> its type and what to write; the first five are needed
+    "id": (str, "a text"),
+    "text": (str, "a text"),
+    "where": (str, "a text"),
+    "function": (str, "the name of a function"),
+    "holds_if": (dict | str, 'a table, as { "settling time, s" = "< 2" }'),
+    "words": (str, "a text: holds_if in words"),
+    "measured": (str, "a text"),
+    "note": (str, "a text"),
+    "quantifier": (str, "universal, existential or named"),
+    "quick": (str, "a text"),
+    "late": (bool, "true or false"),
+    "varies": (str, "a text: why its numbers differ from audit to audit"),
+    "immune": (str, "a text: why no mutant of the law loses the claim"),
+    "plants": (list, "a list of names"),
+    "laws": (list, "a list of names"),
+    "conditions": (list, "a list of names"),
+    "runs": (str, 'fields of a scenario, as "duration=5.0"'),
+    "values": (dict, "a table of numbers"),
+}
+NEEDED = tuple(OF_CLAIM)[:5]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Entry(Statement):
+    """A claim of a paper. Besides the attributes of a `Statement` it has:
+
+    Attributes:
+      evidence: function from runs under one set of gains to numbers, or to checks and the numbers beside them.
+      thresholds: what the numbers must be; empty if the function returns checks with limits.
+      quick: what a quick audit measures instead, if that is less.
+      late: whether it looks at the runs of all other claims, and so comes after them.
+      varies: why its numbers differ from audit to audit, as a timing; they are not sealed.
+      immune: why no mutant of the law loses the claim, if none can.
+      plants, laws, conditions: names of what it is about; the first law is the one that mutants replace.
+      fields: of the scenarios of its runs.
+      values: its numbers, such as the levels of a sweep.
+    """
+
+    evidence: Callable[[Any], Any]
+    thresholds: tuple[Threshold, ...] = ()
+    quick: str = ""
+    late: bool = False
+    varies: str = ""
+    immune: str = ""
+    plants: tuple[str, ...] = ()
+    laws: tuple[str, ...] = ()
+    conditions: tuple[str, ...] = ()
+    fields: Mapping[str, Any] = NOTHING
+    values: Mapping[str, Any] = NOTHING
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Paper:
+    """A paper, its claims, and what their runs are made of.
+
+    Attributes:
+      name: of its folder.
+      title, authors, source: as one cites it.
+      read: what could be read of it, and what was not.
+      note: what a reader of the audit should know.
+      sets: set of gains -> plant ("" for all) -> law -> gain -> value; None for a set of the suite.
+      quick_sets: the sets of a quick audit.
+      plants, conditions, laws: its own, by name.
+      fields: of the scenarios of all its runs.
+      claims: in the order of the file.
+    """
+
+    name: str
+    folder: Path
+    title: str
+    authors: str
+    source: str
+    read: str = ""
+    note: str = ""
+    sets: Mapping[str, Mapping[str, Mapping[str, Mapping[str, float]]] | None]
+    quick_sets: tuple[str, ...]
+    plants: Mapping[str, Plant]
+    conditions: Mapping[str, Condition]
+    laws: Mapping[str, Template | Component]
+    fields: Mapping[str, Any]
+    claims: Mapping[str, Entry]
+
+    def plant(self, plant: str) -> Plant:
+        """Return a plant by the paper's name or the suite's."""
+        if plant in self.plants:
+            return self.plants[plant]
+        find("plant", plant, plants_known() | self.plants)
+        return find_plant(plant)
+
+    def condition(self, text: str | Condition) -> Condition:
+        """Return a condition by the paper's name, the suite's, or from its text."""
+        if isinstance(text, str) and not set(":+") & set(text):
+            return find("condition", text, {**CONDITIONS, **self.conditions})
+        return find_condition(text)
+
+    def law(self, plant: str, law: str, gains: str) -> Component:
+        """Return a law with the gains that a set has for a plant, or else with its own.
+
+        Raises:
+          ScenarioError: an unknown law, set or gain.
+        """
+        of_set = find("set of gains", gains, self.sets)
+        if of_set is None:
+            if law in self.laws or law not in (*gain_sets.LAWS, *gain_sets.SAME):
+                gains = "default"
+            return self._bound(law, {}) if law in self.laws else gain_sets.law(self.plant(plant), law, gains)
+        return self._bound(law, {**of_set.get("", {}).get(law, {}), **of_set.get(plant, {}).get(law, {})})
+
+    def _bound(self, law: str, gains: Mapping[str, float]) -> Component:
+        """Return a law with these gains, and its own for the rest."""
+        base = find("law", law, laws_known() | self.laws)
+        if isinstance(base, Component):
+            base = base if base.template is None else base.template
+        if isinstance(base, Template):
+            return base.bind(dict(gains))
+        return dataclasses.replace(base, gains={**base.gains, **gains})
+
+
+def shipped() -> dict[str, Path]:
+    """Return name -> folder of every paper that ships, in alphabetical order."""
+    home = Path(str(importlib.import_module(SHIPPED).__file__)).parent
+    return {path.parent.name: path.parent for path in sorted(home.glob(f"*/{FILE}"))}
+
+
+class Home(NamedTuple):
+    """Where a paper is: its folder, and the name of the package that this folder is."""
+
+    folder: Path
+    package: str
+
+
+@functools.cache
+def catalogue() -> Catalogue[Home]:
+    """Return where every paper is that ships, or comes with another package, by name."""
+    own = {name: Home(folder, f"{SHIPPED}.{name}") for name, folder in shipped().items()}
+    return Catalogue(own, added("smc_mujoco.papers", _of_package))
+
+
+def _of_package(point: EntryPoint) -> Home:
+    """Return where the paper is that an entry point of another package names."""
+    found = source(point)
+    if not found.submodule_search_locations:
+        raise ScenarioError(f"{found.origin} is no folder: give {KINDS[point.group][1]}")
+    return Home(Path(next(iter(found.submodule_search_locations))), point.module)
+
+
+def paper(which: str | Path) -> Paper:
+    """Return a paper by its name in `smc-mujoco papers`, or from its folder.
+
+    Raises:
+      ScenarioError: there is none, or something is wrong with one of its files, in one sentence.
+    """
+    known = catalogue()
+    if isinstance(which, str) and which in known:
+        return _known(known[which])
+    folder = Path(which)
+    if not folder.is_dir():
+        if isinstance(which, str) and not set("/\\.") & set(which):
+            raise unknown("paper", which, known)
+        raise ScenarioError(f"no folder {str(which)!r} with a {FILE}: give one, or a name of {', '.join(known)}")
+    return _read(folder, _package(folder))
+
+
+@functools.cache
+def _known(home: Home) -> Paper:
+    return _read(home.folder, home.package)
+
+
+def papers() -> dict[str, Paper]:
+    """Return every paper that ships, or comes with another package, by its name, in alphabetical order.
+
+    Warns:
+      PackageWarning: another package's paper has something wrong with it, and is left out.
+    """
+    found: dict[str, Paper] = {}
+    for key, home in catalogue().items():
+        try:
+            found[key] = _known(home)
+        except ScenarioError as error:
+            if not (package := catalogue().package(key)):
+                raise
+            warn(f"package {package!r}: its paper {key!r}: {error}")
+    return found
+
+
+def new(folder: Path) -> list[Path]:
+    """Copy the template, a paper that runs, to a folder, and return the files.
+
+    Raises:
+      ScenarioError: the folder has files already, or cannot be written.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ScenarioError(f"{folder} is there already: give the name of a new folder")
+    written = [folder / FILE, folder / CODE]
+    for file in written:
+        with replacing(file) as part:
+            part.write_text((Path(__file__).parent / "template" / file.name).read_text(encoding="utf-8"), "utf-8")
+    return written
+
+
+def _package(folder: Path) -> str:
+    """Make a package of a user's folder, so that its modules can be imported, and return its name."""
+    package = ModuleType("paper_" + re.sub(r"\W", "_", folder.resolve().name))
+    package.__path__ = [str(folder.resolve())]
+    for known in [one for one in sys.modules if one.partition(".")[0] == package.__name__]:
+        del sys.modules[known]
+    sys.modules[package.__name__] = package
+    importlib.invalidate_caches()
+    return package.__name__
+
+
+def _read(folder: Path, package: str) -> Paper:
+    """Return the paper in a folder, whose code is imported under a package's name."""
+    cure = "make one with `smc-mujoco papers --new FOLDER`"
+    with reading(folder / FILE, "paper", cure) as file:
+        text = file.read_text(encoding="utf-8")
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{folder / FILE} is no TOML: {error}") from None
+    code = _modules(folder, package)
+    try:
+        return _checked(folder, data, code)
+    except ScenarioError as error:
+        raise ScenarioError(f"{folder / FILE}: {error}") from None
+
+
+def _modules(folder: Path, package: str) -> list[ModuleType]:
+    """Return the modules with a paper's functions: claims.py, or every module of a folder claims/."""
+    if not (folder / CODE).is_file() and not (folder / "claims").is_dir():
+        raise ScenarioError(f"no {CODE} in {folder}: write one, with a function for each claim of {FILE}")
+    before, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # a user's folder stays as it is
+    try:
+        home = importlib.import_module(f"{package}.claims")
+        return [home, *(modules(home.__name__) if hasattr(home, "__path__") else ())]
+    except ScenarioError as error:
+        raise ScenarioError(f"{folder / CODE}: {error}") from None
+    except SyntaxError as error:
+        raise ScenarioError(f"{error.filename}, line {error.lineno}: {error.msg}") from None
+    except (Exception, SystemExit) as error:  # whatever the user's module raises
+        raise ScenarioError(f"{_place(error, folder)}: {_said(error)}") from None
+    finally:
+        sys.dont_write_bytecode = before
+
+
+def _said(error: BaseException) -> str:
+    """Return the class and the message of an exception, on one line."""
+    return ", ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
+
+
+def _place(error: BaseException, folder: Path) -> str:
+    """Return the file and line of a paper's folder at which an exception was raised."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).is_relative_to(folder.resolve())]
+    return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else str(folder / CODE)
+
+
+def failed(paper: Paper, entry: Entry, error: BaseException) -> ScenarioError:
+    """Return the error for a claim whose function raised an exception."""
+    called = f"function {inspect.unwrap(entry.evidence).__name__} of claim {entry.id}"
+    if isinstance(error, ScenarioError):
+        return ScenarioError(f"{paper.name}: {called}: {error}")
+    return ScenarioError(f"{_place(error, paper.folder)}: {called} raised {_said(error)}")
+
+
+def _checked(folder: Path, data: Mapping[str, Any], code: Sequence[ModuleType]) -> Paper:
+    """Return the paper in a file's data."""
+    for field in data:
+        if field not in (known := (*TEXTS, "sets", "quick_sets", "plants", "conditions", "gains", "claim")):
+            raise unknown("field", field, known)
+    texts = {field: _text(_typed(field, data.get(field, ""), str, "a text")) for field in TEXTS}
+    for field in TEXTS[:3]:
+        if not texts[field].strip():
+            raise ScenarioError(f"no {field}: write one, as {field} = {_example(field)}")
+    parts: dict[str, Any] = {
+        "fields": _fields("runs", texts.pop("runs")),
+        "plants": {key: _plant(key, one, folder) for key, one in _table(data, "plants")},
+        "conditions": {key: _condition(key, one) for key, one in _table(data, "conditions")},
+        "laws": dict(_laws(code)),
+    }
+    sets = _sets(data)
+    quick = _names("quick_sets", data.get("quick_sets", list(sets)[:1]))
+    for one in quick:
+        find("set of gains in quick_sets", one, sets)
+    paper = Paper(
+        name=folder.resolve().name, folder=folder, sets=sets, quick_sets=quick, claims={}, **texts, **parts
+    )  # fmt: skip
+    functions: dict[str, Callable] = {}
+    for module in code:
+        own = {key: value for key, value in vars(module).items() if inspect.isfunction(value)}
+        functions |= own | {f"{module.__name__.rpartition('.')[2]}.{key}": value for key, value in own.items()}
+    claims = _typed("claim", data.get("claim", []), list, "tables, each under a line [[claim]]")
+    if not claims:
+        raise ScenarioError("no claims: write each under a line [[claim]]")
+    entries: dict[str, Entry] = {}
+    for number, one in enumerate(claims, 1):
+        called = f"claim {one.get('id', f'number {number}') if isinstance(one, dict) else number}"
+        try:
+            entry = _entry(_typed(called, one, dict, "a table"), functions, paper)
+        except ScenarioError as error:
+            raise ScenarioError(f"{called}: {error}") from None
+        if entry.id in entries:
+            raise ScenarioError(f"{called} is there twice: give one another id")
+        entries[entry.id] = entry
+    return dataclasses.replace(paper, claims=entries)
+
+
+def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Paper) -> Entry:
+    """Return a claim from its table."""
+    for field in data:
+        find("field", field, OF_CLAIM)
+    for field in NEEDED:
+        if field not in data:
+            what = "threshold" if field == "holds_if" else field
+            raise ScenarioError(f"it has no {what}: write {field}, {OF_CLAIM[field][1]}")
+    values = {field: _text(_typed(field, one, *OF_CLAIM[field])) for field, one in data.items()}
+    names: dict[str, Any] = {field: _names(field, values.pop(field, [])) for field in ("plants", "laws", "conditions")}
+    function = find(f"function of {CODE}", values.pop("function"), functions)
+    asked = values.pop("holds_if")
+    if not asked:
+        raise ScenarioError(f"it has no threshold: write holds_if, {OF_CLAIM['holds_if'][1]}")
+    thresholds = () if isinstance(asked, str) else tuple(_thresholds(asked))
+    texts: dict[str, Any] = {"measured": _text((inspect.getdoc(function) or "").partition("\n\n")[0]).rstrip(".")}
+    fields = _fields("runs", values.pop("runs", ""))
+    quantifier = find("quantifier", values.pop("quantifier", "named"), QUANTIFIERS)
+    words = values.pop("words", asked if isinstance(asked, str) else ", ".join(map(str, thresholds)))
+    entry = Entry(
+        **texts | values | names,
+        holds_if=words,
+        quantifier=quantifier,
+        evidence=function,
+        thresholds=thresholds,
+        fields=fields,
+    )
+    _check_names(entry, paper)
+    return entry
+
+
+def _check_names(entry: Entry, paper: Paper) -> None:
+    """Raise ScenarioError for a plant, law or condition that is not known, or gains that a law does not have."""
+    for one in entry.plants:
+        paper.plant(one)
+    for one in entry.conditions:
+        paper.condition(one)
+    for law in entry.laws:
+        find("law", law, laws_known() | paper.laws)
+        for gains, of_set in paper.sets.items():
+            for plant in entry.plants if of_set is not None else ():
+                paper.law(plant, law, gains)
+
+
+def _thresholds(asked: Mapping[str, Any]) -> Iterator[Threshold]:
+    """Yield the thresholds in a table: measure -> text, or {asked, sentence}."""
+    for measure, one in asked.items():
+        if isinstance(one, dict):
+            for field in one:
+                find(f"field of the threshold of {measure!r}", field, dict.fromkeys(("asked", "sentence")))
+            yield Threshold.read(measure, one.get("asked"), str(one.get("sentence", "")))
+        else:
+            yield Threshold.read(measure, one)
+
+
+def _sets(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return set of gains -> plant -> law -> gains; None for a set of the suite."""
+    own = dict(_table(data, "gains"))
+    for key in own:
+        if key in SETS:
+            raise ScenarioError(f"gains.{key} is a set of the suite: give yours another name, such as gains.paper")
+    listed = _names("sets", data.get("sets", list(own) or ["default"]))
+    found: dict[str, Any] = {}
+    for key in listed or ["default"]:
+        if key not in own:
+            find("set of gains in sets", key, dict.fromkeys((*own, *SETS)))
+            found[key] = None
+            continue
+        of_set: dict[str, dict[str, Any]] = {}
+        for law_or_plant, values in _typed(f"gains.{key}", own[key], dict, "a table").items():
+            one = _typed(f"gains.{key}.{law_or_plant}", values, dict, "a table of gains")
+            if one and all(isinstance(value, dict) for value in one.values()):
+                of_set[law_or_plant] = one
+            else:
+                of_set.setdefault("", {})[law_or_plant] = one
+        for law in {law for laws in of_set.values() for law in laws}:
+            name(f"a law in gains.{key}", law)
+        found[key] = of_set
+    return found
+
+
+def _plant(key: str, data: object, folder: Path) -> Plant:
+    """Return a plant from its table: {plant, parameters...}, or {plant = "FILE.xml:joint+joint"}."""
+    values = dict(_typed(f"plants.{key}", data, dict, 'a table, as { plant = "duffing", delta = 0.0 }'))
+    base = values.pop("plant", None)
+    if not isinstance(base, str):
+        raise ScenarioError(f'plants.{key} names no plant: write it as {{ plant = "duffing", delta = 0.0 }}')
+    file, _, joints = base.rpartition(":") if ".xml:" in base else (base, "", "")
+    try:
+        if file.endswith(".xml"):
+            return plant_from(folder / file, [joint for joint in joints.split("+") if joint], **values)
+        return find_plant(base, **values)
+    except ScenarioError as error:
+        raise ScenarioError(f"plants.{key}: {error}") from None
+
+
+def _condition(key: str, text: object) -> Condition:
+    """Return a condition from its text, fields as in "actuator=Lag(0.01)"."""
+    words = _typed(f"conditions.{key}", text, str, 'fields of a scenario, as "actuator=Lag(0.01)"')
+    fields = _fields(f"conditions.{key}", words)
+    return condition(key, **fields)
+
+
+def _fields(what: str, text: str) -> dict[str, Any]:
+    """Return fields of a scenario from a text, such as "duration=5.0, control_period=1e-4"."""
+    try:
+        fields = read_fields(text)
+    except SyntaxError:
+        raise ScenarioError(f'{what} is {shown(text)}: write fields of a scenario, as "duration=5.0"') from None
+    except ScenarioError as error:
+        raise ScenarioError(f"{what}: {error}") from None
+    known = [field.name for field in dataclasses.fields(Scenario) if field.init and field.name not in ("plant", "law")]
+    for field in fields:
+        if field not in known:
+            raise unknown(f"field of a scenario in {what}", field, known)
+    return fields
+
+
+def _laws(code: Sequence[ModuleType]) -> Iterator[tuple[str, Template | Component]]:
+    """Yield name, law of every law in a paper's modules; refuse one with the name of another law of the library."""
+    for value in [value for module in code for value in vars(module).values()]:
+        if isinstance(value, Template | Component) and value.kind == "law":
+            known = laws_known().get(value.name)
+            if known and known.function is not value.function:
+                raise ScenarioError(f"law {value.name!r} of {CODE} has the name of a law of the library: rename it")
+            yield value.name, value
+
+
+def _table(data: Mapping[str, Any], field: str) -> Iterator[tuple[str, Any]]:
+    """Yield the items of a table of the file, which may be missing."""
+    yield from _typed(field, data.get(field, {}), dict, f"a table, under a line [{field}]").items()
+
+
+def _names(field: str, value: object) -> tuple[str, ...]:
+    """Return a list of names."""
+    items = _typed(field, value, list, 'a list of names, as ["duffing"]')
+    for one in items:
+        name(f"an item of {field}", one)
+    return tuple(items)
+
+
+def _typed(field: str, value: Any, kind: Any, cure: str) -> Any:
+    """Return a value of this type, or raise ScenarioError naming the field."""
+    if not isinstance(value, kind):
+        raise ScenarioError(f"{field} is {shown(value)}: write {cure}")
+    return value
+
+
+def _text(value: Any) -> Any:
+    """Return a text with single spaces, and any other value as it is."""
+    return " ".join(value.split()) if isinstance(value, str) else value
+
+
+def _example(field: str) -> str:
+    examples = {"title": "Sliding order and sliding accuracy in sliding mode control", "authors": "A. Levant"}
+    return f'"{examples.get(field, "International Journal of Control 58(6), 1993, pp. 1247-1263")}"'
+
+
+def duration_of(paper: Paper, entry: Entry | None, changes: Mapping[str, Any]) -> float:
+    """Return the duration of a run, s: as changed, or the claim's, the paper's, or else 10 s."""
+    return {"duration": DURATION, **paper.fields, **(entry.fields if entry else {}), **changes}["duration"]

@@ -1,0 +1,284 @@
+"""RealAIGym's robustness test: six ways in which the machine differs from the model, at many levels.
+
+    model            one parameter at 21 values: Ir 0 to 1e-4 kg m^2; m1 r1, I1, m2 r2, m2, I2 at 75 to 125 %; b of each
+                     joint -0.1 to 0.1 N m s/rad; cf of each -0.2 to 0.2 N m
+    velocity noise   standard deviation 0 to 0.5 rad/s of both velocities, 10 runs a level
+    torque noise     standard deviation 0 to 1.1 N m, 10 runs a level
+    torque response  tau_k = tau_(k-1) + r (u_k - tau_(k-1)), r = 0.1 to 2
+    delay            positions and velocities 0 to 40 ms late
+    perturbations    50 profiles of 3 pulses, standard width 0.05 to 0.1 s, amplitude 0.5 to 5 N m, beside the motor
+
+A case is survived if after 10 s the state is within (0.35, 0.35, 1, 1) of upright and at rest; a level with several
+runs if more than half of these do. Each test's percentage has the same weight.
+
+The published simulator is repeated here, because some of these machines cannot be built: friction that pushes, a
+response beyond 1. It is RK4 at 2 ms of the double pendulum's equation, with the dry friction cf arctan(100 q'). The law
+and its estimator run as in every scenario, compiled, by their addresses. In the published simulator a pulse on the
+joint without a motor has no effect (its input matrix is 0 there), so only the driven joint's are drawn. The published
+test has other random numbers at every run. Here they depend only on `SEED`.
+Source: leaderboard/*/robustness_v2 and src/python/double_pendulum of
+github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), rewritten here.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.jit import NotCompilable, call
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1, accelerations
+from smc_mujoco.simulation import native
+from smc_mujoco.simulation.coerce import REST
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.evidence.boards.scoring import shoulder_first
+
+SEED = 20240  # of all random numbers; chosen before any run
+STEP, STEPS = 2e-3, 5000  # s; number of
+WITHIN = (0.35, 0.35, 1.0, 1.0)  # rad, rad, rad/s, rad/s, of upright and at rest
+LEVELS, REPEATS, PROFILES, PULSES = 21, 10, 50, 3
+GAP, WIDTH, AMPLITUDE = 1.0, (0.05, 0.1), (0.5, 5.0)  # s between pulses, s, N m
+SCALED = {"m1r1": "r1", "I1": "I1", "m2r2": "r2", "m2": "m2", "I2": "I2"}  # what is scaled -> the parameter
+FIELDS = len(Measurement._fields)
+T, DT, LIMIT, USES, X, V, E, DE, Q, DQ, F, G, FQ, GQ = (  # places in a measurement
+    Measurement._fields.index(name)
+    for name in ("t", "dt", "limit", "model", "x", "v", "e", "de", "q", "dq", "f", "g", "fq", "gq")
+)
+TESTS = ("model", "velocity_noise", "torque_noise", "torque_response", "delay", "perturbations")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Case:
+    """A machine that differs from the model.
+
+    Attributes:
+      test: one of TESTS.
+      name: the parameter that differs in the test "model", else the test.
+      value: its level.
+      parameters: parameter of the double pendulum -> its true value, where it differs.
+      velocity_noise, torque_noise: standard deviations, rad/s and N m.
+      response: r of the motor.
+      delay: of the measurement, in control periods.
+      pulses: centre, s, standard width, s, and amplitude, N m, of each pulse on the driven joint.
+      seed: of the noise.
+    """
+
+    test: str = ""
+    name: str = ""
+    value: float = 0.0
+    parameters: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    velocity_noise: float = 0.0
+    torque_noise: float = 0.0
+    response: float = 1.0
+    delay: int = 0
+    pulses: tuple[tuple[float, float, float], ...] = ()
+    seed: int = 0
+
+
+@dataclasses.dataclass(frozen=True)
+class Robustness:
+    """The result of the test.
+
+    Attributes:
+      survived: the levels of each test: (name, value) -> whether the law survived it.
+    """
+
+    survived: Mapping[str, tuple[tuple[str, float, bool], ...]]
+
+    @property
+    def percent(self) -> dict[str, float]:
+        """Percent of the levels of each test that the law survived."""
+        return {test: 100.0 * float(np.mean([ok for *_, ok in levels])) for test, levels in self.survived.items()}
+
+    @property
+    def score(self) -> float:
+        """The overall robustness score, in 0 .. 1: the mean over the tests."""
+        return sum(self.percent.values()) / (100.0 * len(self.survived))
+
+    @property
+    def parameters(self) -> dict[str, int]:
+        """Parameter -> how many of its 21 values the law survived."""
+        names = dict.fromkeys(name for name, *_ in self.survived["model"])
+        return {name: sum(ok for other, _, ok in self.survived["model"] if other == name) for name in names}
+
+
+def cases() -> list[Case]:
+    """Return every run of the test, in order. Runs of one level stand together."""
+    ramp, made = np.linspace(0.75, 1.25, LEVELS), list[Case]()
+
+    def model(name: str, value: float, **parameters: float) -> None:
+        made.append(Case(test="model", name=name, value=value, parameters=parameters))
+
+    for value in np.linspace(0.0, 1e-4, LEVELS):
+        model("Ir", float(value), Ir=float(value))
+    for name, key in SCALED.items():
+        for factor in map(float, ramp):
+            changed = {key: factor * MODEL_1_1[key]}
+            model(name, factor, **changed)
+    for name, most in (("b1", 0.1), ("b2", 0.1), ("cf1", 0.2), ("cf2", 0.2)):
+        for value in map(float, np.linspace(-most, most, LEVELS)):
+            model(name, value, **{name: value})
+    for test, most in (("velocity_noise", 0.5), ("torque_noise", 1.1)):
+        for level, value in enumerate(map(float, np.linspace(0.0, most, LEVELS))):
+            for repeat in range(REPEATS):
+                noise: dict[str, Any] = {test: value}
+                made.append(Case(test=test, name=test, value=value, seed=level * REPEATS + repeat, **noise))
+    for value in map(float, np.linspace(0.1, 2.0, LEVELS)):
+        made.append(Case(test="torque_response", name="torque_response", value=value, response=value))
+    for late in range(LEVELS):
+        made.append(Case(test="delay", name="delay", value=late * STEP, delay=late))
+    rng = np.random.default_rng(SEED)
+    for profile in range(PROFILES):
+        pulses = _pulses(rng)
+        made.append(Case(test="perturbations", name="perturbations", value=float(profile), pulses=pulses))
+    return made
+
+
+def _pulses(rng: np.random.Generator) -> tuple[tuple[float, float, float], ...]:
+    """Return the pulses of the driven joint: half of those of a profile, which lie at least GAP apart."""
+    count = 2 * PULSES
+    centres = np.cumsum(GAP + rng.uniform(0.0, (STEP * STEPS - (count + 1) * GAP) / count, count))
+    widths, reach = rng.uniform(*WIDTH, PULSES), AMPLITUDE[1] - AMPLITUDE[0]
+    amplitudes = rng.uniform(-reach, reach, PULSES)
+    amplitudes += np.copysign(AMPLITUDE[0], amplitudes)
+    rows = zip(rng.permutation(centres)[:PULSES], widths, amplitudes, strict=True)
+    return tuple((float(centre), float(width), float(amplitude)) for centre, width, amplitude in rows)
+
+
+def robustness(scenario: Scenario, report: Callable[[float, float], None] | None = None) -> Robustness:
+    """Return what a law survives of the robustness test.
+
+    Args:
+      scenario: plant pendubot or acrobot; its law and velocity estimator are tested. The law may know the plant's
+        nominal parameters if the scenario says so.
+      report: called with the runs that are done and all runs.
+
+    Raises:
+      ScenarioError: another plant, a surface, a reference that moves, or a law that does not compile.
+    """
+    machine, todo = Machine(scenario), cases()
+    ends = list[bool]()
+    for done, case in enumerate(todo):
+        ends.append(upright(machine.simulate(case)[0][-1]))
+        if report is not None:
+            report(done + 1, len(todo))
+    survived: dict[str, list[tuple[str, float, bool]]] = {test: [] for test in TESTS}
+    levels: dict[tuple[str, str, float], list[bool]] = {}
+    for case, end in zip(todo, ends, strict=True):
+        levels.setdefault((case.test, case.name, case.value), []).append(end)
+    for (test, name, value), results in levels.items():
+        survived[test].append((name, value, sum(results) > len(results) / 2))
+    return Robustness({test: tuple(rows) for test, rows in survived.items()})
+
+
+def upright(state: np.ndarray) -> bool:
+    """Return whether a state (q1, q2, q1', q2') is within WITHIN of upright and at rest."""
+    angles = [math.remainder(state[0] - math.pi, 2.0 * math.pi), math.remainder(state[1], 2.0 * math.pi)]
+    return all(abs(value) < most for value, most in zip((*angles, *state[2:]), WITHIN, strict=True))
+
+
+class Machine:
+    """The published simulator with a law, its estimator and what it knows of the plant."""
+
+    def __init__(self, scenario: Scenario):
+        resolved = scenario.resolved
+        self.driven = shoulder_first(scenario.plant.name).index(0)
+        if scenario.surface is not None or resolved.reference != REST or scenario.feedforward is not None:
+            raise ScenarioError(
+                f"the robustness test of {scenario.plant.name} is only of the law and its estimator: leave out "
+                "surface, reference and feedforward"
+            )
+        law, velocity = scenario.law.of_channel(0), resolved.velocity
+        try:
+            self.law, self.estimator = native.component(law), native.component(velocity)
+        except NotCompilable as error:
+            raise ScenarioError(f"the robustness test runs compiled laws only, and {error}") from None
+        self.gains, self.filter = np.array([*law.gains.values(), 0.0]), np.array([*velocity.gains.values(), 0.0])
+        self.sizes = law.memory, velocity.memory
+        self.known = np.array([scenario.plant.parameters[name] for name in MODEL_1_1])
+        self.limit, self.uses_model = scenario.limits[0], float(resolved.model == "nominal")
+
+    def simulate(self, case: Case) -> tuple[np.ndarray, np.ndarray]:
+        """Return the states (q1, q2, q1', q2'), (5001, 4), and the motor's torque, N m, (5000,), of a case."""
+        true = dict(zip(MODEL_1_1, self.known, strict=True)) | dict(case.parameters)
+        t, rng = STEP * np.arange(STEPS), np.random.default_rng([SEED, case.seed])
+        noise = rng.normal(size=(STEPS, 3)) * [case.velocity_noise, case.velocity_noise, case.torque_noise]
+        pulse = np.zeros(STEPS)
+        for centre, width, amplitude in case.pulses:
+            pulse += amplitude * np.exp(-0.5 * ((t - centre) / width) ** 2)
+        states, torque = np.zeros((STEPS + 1, 4)), np.zeros(STEPS)
+        memories = np.zeros(self.sizes[0]), np.zeros((2, self.sizes[1]))
+        functions = np.array([self.law.address, self.estimator.address])
+        raised = _simulate(
+            functions, self.gains, self.filter, *memories, self.known, np.array(list(true.values())), self.driven,
+            self.limit, self.uses_model, noise, pulse, case.response, case.delay, states, torque,
+        )  # fmt: skip
+        if raised:
+            raise ScenarioError(f"law {self.law!r} raised an exception in the robustness test; run it in a scenario")
+        return states, torque
+
+
+@njit(error_model="numpy")
+def _slope(x, u1, u2, p):
+    """Return the derivative of the state (4 numbers) under torques on both joints."""
+    m1, m2, l1, r1, r2, I1, I2, Ir, gear, b1, b2, cf1, cf2, grav = p
+    a1, a2, W11, W12, W22 = accelerations(x[0], x[1], x[2], x[3], m1, m2, l1, r1, r2, I1, I2, Ir, gear, b1, b2, grav)
+    u1 -= cf1 * math.atan(100.0 * x[2])
+    u2 -= cf2 * math.atan(100.0 * x[3])
+    return x[2], x[3], a1 + W11 * u1 + W12 * u2, a2 + W12 * u1 + W22 * u2
+
+
+@njit(error_model="numpy")
+def _moved(x, k, h):
+    """Return the state after a time h at the slope k."""
+    return x[0] + h * k[0], x[1] + h * k[1], x[2] + h * k[2], x[3] + h * k[3]
+
+
+@njit(error_model="numpy")
+def _simulate(
+    functions, gains, tuning, memory, memories, known, true, driven, limit, uses_model, noise, pulse, response, delay,
+    states, torque,
+):  # fmt: skip
+    """Run a case; states and torque are written. Return whether the law or its estimator raised an exception."""
+    at = (true[0], true[1], true[2], true[3], true[4], true[5], true[6], true[7], true[8], true[9], true[10],
+          true[11], true[12], true[13])  # fmt: skip
+    y, reading, estimate, control = np.zeros(FIELDS), np.zeros(3), np.zeros(2), np.zeros(2)
+    x, last, free = (0.0, 0.0, 0.0, 0.0), 0.0, 1 - driven
+    position, velocity = np.zeros(2), np.zeros(2)
+    for k in range(len(torque)):
+        seen = states[max(0, k - delay)]
+        for joint in range(2):
+            reading[0], reading[1], reading[2] = STEP, seen[joint], seen[2 + joint] + noise[k, joint]
+            if call(functions[1], reading.ctypes.data, tuning.ctypes.data, memories[joint].ctypes.data,
+                    estimate.ctypes.data) != 0:  # fmt: skip
+                return True
+            position[joint], velocity[joint] = seen[joint], estimate[0]
+        f1, f2, W11, W12, W22 = accelerations(
+            position[0], position[1], velocity[0], velocity[1], known[0], known[1], known[2], known[3], known[4],
+            known[5], known[6], known[7], known[8], known[9], known[10], known[13],
+        )  # fmt: skip
+        f, fq, g = (f1, f2, W11) if driven == 0 else (f2, f1, W22)
+        y[T], y[DT], y[LIMIT], y[USES] = k * STEP, STEP, limit, uses_model
+        y[X], y[V], y[E], y[DE] = position[driven], velocity[driven], position[driven], velocity[driven]
+        y[Q], y[DQ], y[F], y[G], y[FQ], y[GQ] = position[free], velocity[free], f, g, fq, W12
+        if call(functions[0], y.ctypes.data, gains.ctypes.data, memory.ctypes.data, control.ctypes.data) != 0:
+            return True
+        last += response * (min(max(control[0], -limit), limit) - last)
+        last = min(max(last + noise[k, 2], -limit), limit)
+        u = last + pulse[k]
+        u1, u2 = (u, 0.0) if driven == 0 else (0.0, u)
+        k1 = _slope(x, u1, u2, at)
+        k2 = _slope(_moved(x, k1, STEP / 2), u1, u2, at)
+        k3 = _slope(_moved(x, k2, STEP / 2), u1, u2, at)
+        k4 = _slope(_moved(x, k3, STEP), u1, u2, at)
+        x = _moved(_moved(_moved(_moved(x, k1, STEP / 6), k2, STEP / 3), k3, STEP / 3), k4, STEP / 6)
+        torque[k] = last
+        states[k + 1, 0], states[k + 1, 1], states[k + 1, 2], states[k + 1, 3] = x
+        if not abs(x[2]) + abs(x[3]) < 1e6:
+            states[k + 1 :] = math.inf
+            return False
+    return False

@@ -1,0 +1,135 @@
+"""smc-mujoco identify, replay: a rig's quantities from its records, and records beside their twins."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.common.interrupts import held_back
+
+
+@errors_as_sentences()
+def identify(
+    rig: Annotated[
+        str, typer.Argument(metavar="RIG", help="A rig, such as qube_servo, or a plant, which `list` shows.")
+    ],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE...", help="Records: CSV or npz files of columns, or saved traces.")
+    ],
+    columns: options.Columns = None,
+    quantities: Annotated[
+        str | None, typer.Option(help="Quantities to find, as a,b; default those that the rig's records determine.")
+    ] = None,
+    starts: Annotated[int, typer.Option(min=1, help="How many sets of values the search may start from.")] = 4,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of these starts.")] = 0,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw the first record and its residuals, as FIGURE.svg and .png.")
+    ] = None,
+    json: options.Json = None,
+) -> None:
+    """Find the quantities of a machine from records of it.
+
+    The rig's references, controller, encoder and delay are replayed, and the quantities are chosen that give the least
+    sum of squared residuals. The command prints them with their standard errors, says what the records cannot tell, and
+    gives the fit of each record before and after: 100 (1 - |y - yhat| / |y - mean y|) percent. A record has a column
+    for each signal, sampled at the rate of the rig's controller, angles in rad and time in s. The first line of a CSV
+    file has the names of the columns.
+
+    Example: smc-mujoco identify emps run1.csv run2.csv --columns x=position,r=reference,u=voltage
+    """
+    with held_back():
+        from smc_mujoco.cli import tables
+        from smc_mujoco.common.files import ended, writable
+        from smc_mujoco.mechanisms.plant import as_plant
+        from smc_mujoco.mechanisms.plant import catalogue as plants
+        from smc_mujoco.evidence.rigs.identify import identify as find
+        from smc_mujoco.evidence.rigs.records import load
+        from smc_mujoco.evidence.rigs.rig import rigs
+
+    json, terminal = options.json_file(json)
+    for file in (figure, json):
+        if file:
+            writable(file)
+    named = options.columns(columns)
+    found = find(
+        as_plant(options.plant(rig)) if rig not in rigs() and (rig in plants() or ".xml:" in rig) else rig,
+        [load(file, named) for file in files],
+        options.names(quantities) or None,
+        starts=starts,
+        seed=seed,
+        progress=True,
+    )
+    for table in tables.identified(found, [str(file) for file in files]):
+        terminal.print(table)
+    for note in found.notes:
+        terminal.note(note, wrap=True)
+    terminal.note(f"{found.evaluations} sets of values, seed {seed}, {terminal.seconds:.0f} s")
+    if json:
+        terminal.wrote(found.save(ended(json, ".json")))
+    if figure:
+        terminal.wrote(*found.figure(figure))
+
+
+@errors_as_sentences()
+def replay(
+    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig, such as qube_servo or simple_pendulum_ak80.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A record: CSV or npz file of columns.")],
+    columns: options.Columns = None,
+    quantities: Annotated[
+        str | None, typer.Option(help="Published sets of quantities whose twins are shown too, as a,b; default none.")
+    ] = None,
+    start: Annotated[
+        float | None, typer.Option(min=0.0, help="Where the film starts, s of the record; default the rig's own start.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Duration of the film, s; default to the end of the record.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw the columns and their residuals, as FIGURE.svg and .png.")
+    ] = None,
+    film: Annotated[Path | None, typer.Option(help="Also film machine and twins side by side, to a .mp4 file.")] = None,
+) -> None:
+    """Repeat a record of a real machine by its twin, and show both side by side.
+
+    The twin starts from the measured state. If the machine's controller is known, the loop is closed and only the
+    references are those of the record; else the twin repeats the recorded command. The table has the fit of the whole
+    record, 100 (1 - |y - yhat| / |y - mean y|) percent, and that of a machine that does nothing.
+
+    Example: smc-mujoco replay qube_servo run.csv --quantities driver --duration 6 --film run.mp4
+    """
+    with held_back():
+        from smc_mujoco.cli import tables
+        from smc_mujoco.cli.scene import filmed
+        from smc_mujoco.common.errors import ScenarioError
+        from smc_mujoco.common.files import writable
+        from smc_mujoco.simulation.run import run
+        from smc_mujoco.simulation.trace import Trace
+        from smc_mujoco.evidence.rigs.records import load
+        from smc_mujoco.evidence.rigs.rig import rig as find_rig
+
+    terminal, twin = Terminal(), find_rig(rig)
+    if film and film.suffix != ".mp4":
+        raise ScenarioError(f"cannot film to {film.name!r}: end the name in .mp4")
+    for path in (figure, film):
+        if path:
+            writable(path)
+    record = load(file, options.columns(columns))
+    if isinstance(record, Trace):
+        raise ScenarioError(f"{file} is a trace: give a record, with columns {', '.join(twin.needed)}")
+    twins = {"twin": twin} | {name: twin.set(name) for name in options.names(quantities)}
+    fits = {"twin": twin.fit(record)} | {name: each.fits([record])[0] for name, each in twins.items() if name != "twin"}
+    terminal.print(tables.fits(twin.label, fits | {"do nothing": twin.idle(record)}))
+    title = f"{twin.name}: {file.stem}"
+    if figure:
+        from smc_mujoco.evidence.rigs.figure import residual_figure
+
+        shown = {name: each.predictions([record])[0] for name, each in twins.items()}
+        predicted = {name: each[0] for name, each in shown.items()}
+        _, measured, t = shown["twin"]
+        terminal.wrote(*residual_figure(title, t, measured, predicted, fits, twin.units, figure))
+    if film:
+        repeated = run([each.replay(record, start, duration, rounded=False) for each in twins.values()])
+        traces = [twin.measured(record, start, duration), *repeated]
+        terminal.wrote(*filmed(traces, film, ["measured", *twins], title, terminal))

@@ -1,0 +1,57 @@
+"""How the claims of Levant 1993 are measured."""
+
+import numpy as np
+
+from smc_mujoco.evidence.papers.measures import LATE, exponent, late, late_step, settled
+
+
+def sweep(runs):
+    """Return plant -> traces, each start at each control period, in the order of the periods."""
+    (law,), (condition,), periods = runs.laws, runs.conditions, runs.values["periods"]
+    starts = runs.values.get("starts", [0.5])
+    plants, starts = (runs.plants[:1], starts[:1]) if runs.quick else (runs.plants, starts)
+    scenarios = [
+        runs.scenario(
+            plant, law, condition, x0=x0, control_period=period, duration=runs.values["settled"] + LATE * period
+        )
+        for plant in plants
+        for period in periods
+        for x0 in starts
+    ]
+    traces = np.array(runs.traces(scenarios), dtype=object).reshape(len(plants), -1)
+    return dict(zip(plants, traces, strict=True))
+
+
+def accuracy_of_s(runs):
+    """Exponent of the largest |s| of the last 3000 samples as a function of the control period, 0.5 to 4 ms."""
+    periods = runs.values["periods"]
+    exponents = {plant: exponent(periods, [late(one.s) for one in traces]) for plant, traces in sweep(runs).items()}
+    return {"exponent of the largest |s| in the period": exponents}
+
+
+def continuity(runs):
+    """Exponent of the largest step of u from sample to sample, of the last 3000, as a function of the period."""
+    periods = runs.values["periods"]
+    steps = {plant: exponent(periods, [late_step(one.u) for one in traces]) for plant, traces in sweep(runs).items()}
+    return {"exponent of the largest step of u in the period": steps}
+
+
+def switching(runs):
+    """Largest step of u of the last 3000 samples, as a share of 2k, at control periods of 1 and 4 ms."""
+    (law,), steps = runs.laws, {}
+    for plant, traces in sweep(runs).items():
+        k = runs.law(plant, law).gains["k"]
+        for period, trace in zip(runs.values["periods"], traces, strict=True):
+            steps[f"{plant}, {period:g} s"] = late_step(trace.u) / (2.0 * k)
+    return {"largest step of u / 2k": steps}
+
+
+def finite_time(runs):
+    """Time from which |x| stays within 1e-5 of its start, over that for 1e-2, sampled at 50 us."""
+    grid = runs.grid()
+    wide, narrow = runs.values["bands"]
+    ratios = {}
+    for (plant, *_), scenario, trace in zip(grid, grid.values(), runs.traces(grid.values()), strict=True):
+        start = max(map(abs, scenario.resolved.x0))
+        ratios[plant] = settled(trace, trace.x, narrow * start) / settled(trace, trace.x, wide * start)
+    return {"time to 1e-5 |x0| / time to 1e-2 |x0|": ratios}

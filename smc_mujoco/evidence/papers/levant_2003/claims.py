@@ -1,0 +1,84 @@
+"""How the claims of Levant 2003 are measured."""
+
+import numpy as np
+
+import smc_mujoco as smc
+from smc_mujoco.evidence.papers.measures import LATE, exponent, late, settled
+
+END = 0.1  # share of a run that counts as its end
+
+
+def precision(runs):
+    """Exponent of the largest |e| of the last 3000 samples as a function of the control period, 0.25 to 2 ms."""
+    (plant,), (law,), (condition,), values = runs.plants, runs.laws, runs.conditions, runs.values
+    traces = runs.traces(
+        runs.scenario(
+            plant, law, condition, x0=x0, control_period=h, physics_step=h, duration=values["settled"] + LATE * h
+        )
+        for h in values["periods"]
+        for x0 in values["starts"][: 1 if runs.quick else None]
+    )
+    return {"exponent of the largest |e| in the period": exponent(values["periods"], [late(one.x) for one in traces])}
+
+
+def noise(runs):
+    """Exponents of the largest errors of the last 3000 samples as functions of the noise's standard deviation eps.
+
+    The control period is in proportion to eps^(1/3), eps = (period / 30 ms)^3, so that the noise is the same for every
+    eps, relative to the speed of the loop. At one fixed period, white noise averages out where the loop is slow.
+    """
+    (plant,), (law,), (condition,), values = runs.plants, runs.laws, runs.conditions, runs.values
+    eps = [(h / values["pace"]) ** 3 for h in values["periods"]]
+    traces = runs.traces(
+        runs.scenario(
+            plant,
+            law,
+            condition,
+            x0=0.02,
+            control_period=h,
+            physics_step=h,
+            duration=values["settled"] + LATE * h,
+            noise=smc.Noise(position=size),
+            seed=seed,
+        )
+        for h, size in zip(values["periods"], eps, strict=True)
+        for seed in values["seeds"][: 1 if runs.quick else None]
+    )
+    return {
+        "exponent of |e| in the noise": exponent(eps, [late(one.x) for one in traces]),
+        "exponent of |e'| in the noise": exponent(eps, [late(one.v) for one in traces]),
+        "exponent of |e''| in the noise": exponent(eps, [late(one.force + one.d) for one in traces]),
+    }
+
+
+def finite_time(runs):
+    """Time from which |x| stays within 1e-6 of its start, over that for 1e-3, sampled at 0.25 ms."""
+    (scenario,) = runs.grid(physics_step=2.5e-4).values()
+    (trace,) = runs.traces([scenario])
+    start = max(map(abs, scenario.resolved.x0))
+    wide, narrow = (settled(trace, trace.x, band * start) for band in runs.values["bands"])
+    return {"time to 1e-6 |x0| / time to 1e-3 |x0|": narrow / wide}
+
+
+def end(trace):
+    """Return the largest |x| at the end of a run; inf if it failed."""
+    value = float(np.abs(trace.x[-int(END * len(trace.x)) :]).max())
+    return value if np.isfinite(value) else float("inf")
+
+
+def output_feedback(runs):
+    """Largest |x| of the last tenth of 12 s, over |x0|, on three plants that the law does not know."""
+    grid = runs.grid()
+    shares = {
+        plant: end(trace) / max(map(abs, scenario.resolved.x0))
+        for (plant, *_), scenario, trace in zip(grid, grid.values(), runs.traces(grid.values()), strict=True)
+    }
+    return {"largest |x| of the last tenth / |x0|": shares}
+
+
+def chattering(runs):
+    """Largest |x| of the last tenth under the nested law over that under the classical law, behind the same lag."""
+    grid = runs.grid()
+    ends = {cell[:2]: end(trace) for cell, trace in zip(grid, runs.traces(grid.values()), strict=True)}
+    nested, classical = runs.laws
+    return {"largest |x|, nested / classical": {one: ends[one, nested] / ends[one, classical] for one in runs.plants}}

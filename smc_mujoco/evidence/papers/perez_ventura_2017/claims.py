@@ -1,0 +1,133 @@
+"""How the claims of Perez-Ventura & Fridman 2017 are measured."""
+
+import math
+
+import numpy as np
+
+import smc_mujoco as smc
+from smc_mujoco.evidence.papers.measures import cycle, exponent
+
+HALF = 2.0 * math.gamma(1.25) / (math.sqrt(math.pi) * math.gamma(1.75))  # c: first harmonic of [sin]^(1/2)
+MARGIN = 1.1  # M over the bound of the disturbance
+FINE = 50  # samples in the ATC
+QUICK = 1  # the shortest ATCs that a quick audit leaves out
+
+
+def behind(runs, law, lag, **changes):
+    """Return the scenario of a law behind two lags, long enough for its cycle."""
+    (plant,) = runs.plants
+    fields = {"duration": 2.0 + 60.0 * lag, "control_period": lag / FINE}
+    return runs.scenario(plant, law.name, law=law, actuator=(smc.Lag(lag), smc.Lag(lag)), **(fields | changes))
+
+
+def super_twisting(runs, slope):
+    """Return super-twisting with Levant's gains for |d'| <= slope."""
+    return runs.law(runs.plants[0], "super_twisting", k1=1.5 * math.sqrt(slope), k2=1.1 * slope)
+
+
+def relay(runs, bound):
+    """Return the classical law for |d| <= bound."""
+    return runs.law(runs.plants[0], "classical", k=MARGIN * bound)
+
+
+def predicted(k1, k2, lag):
+    """Return amplitude and frequency, Hz, of super-twisting by harmonic balance."""
+    a, b = HALF * k1, 16.0 * k2 / math.pi
+    return lag**2 * (a * a + b) ** 2 / (4.0 * a * a), a / (lag * math.sqrt(a * a + b)) / math.tau
+
+
+def compared(runs, law, expected):
+    """Return measured amplitude and frequency over those expected of a lag, and the exponent of the amplitude."""
+    lags = runs.values["lags"][QUICK if runs.quick else 0 :]
+    found = [cycle(trace) for trace in runs.traces(behind(runs, law, lag) for lag in lags)]
+    amplitudes, frequencies = ({}, {})
+    for lag, (amplitude, frequency) in zip(lags, found, strict=True):
+        a, f = expected(lag)
+        amplitudes[f"{1e3 * lag:g} ms"], frequencies[f"{1e3 * lag:g} ms"] = amplitude / a, frequency / f
+    return {
+        "amplitude / predicted": amplitudes,
+        "frequency / predicted": frequencies,
+        "exponent of the amplitude in the ATC": exponent(lags, [amplitude for amplitude, _ in found]),
+    }
+
+
+def relay_cycle(runs):
+    """Amplitude and frequency of s at ATCs of 1 to 10 ms, over 2 M mu / pi and 1 / (2 pi mu)."""
+    law = runs.law(runs.plants[0], "classical")
+    return compared(runs, law, lambda lag: (2.0 * law.gains["k"] * lag / math.pi, 1.0 / (math.tau * lag)))
+
+
+def twisting_cycle(runs):
+    """Amplitude and frequency of s at ATCs of 1 to 10 ms, over the prediction."""
+    law = runs.law(runs.plants[0], "super_twisting")
+    return compared(runs, law, lambda lag: predicted(law.gains["k1"], law.gains["k2"], lag))
+
+
+def size_and_power(trace):
+    """Return half the range of s, and the mean square of s', in the last half of a run; inf if it failed."""
+    s = trace.s[len(trace.t) // 2 :, 0]
+    if not np.isfinite(s).all():
+        return math.inf, math.inf
+    return float(np.ptp(s)) / 2.0, float(np.mean((np.diff(s) / trace.scenario.control_period) ** 2))
+
+
+def some_disturbance(runs):
+    """Half the range of s, and the mean square of s', under d = D sin(omega t) with omega = 1 / (2 ATC).
+
+    STA has the gains for L = D omega, as its theory asks for; bounds D of 0.5 and 2, ATCs of 1 and 10 ms.
+    """
+    cases = [
+        (bound, lag) for bound in runs.values["bounds"] for lag in runs.values["lags"][QUICK if runs.quick else 0 :]
+    ]
+    scenarios = []
+    for bound, lag in cases:
+        omega = runs.values["pace"] / lag
+        d = smc.Sine(bound, omega)
+        for law in (relay(runs, bound), super_twisting(runs, bound * omega)):
+            scenarios.append(behind(runs, law, lag, disturbance=d))
+    found = [size_and_power(trace) for trace in runs.traces(scenarios)]
+    names = [f"|d| <= {bound:g} N, {1e3 * lag:g} ms" for bound, lag in cases]
+    ratios = np.divide(found[::2], found[1::2])
+    return {
+        "amplitude, FOSMC / STA": dict(zip(names, ratios[:, 0], strict=True)),
+        "power, FOSMC / STA": dict(zip(names, ratios[:, 1], strict=True)),
+    }
+
+
+def small_lags(runs):
+    """Half the range of s, and the mean square of s', under d = sin t, L = 1, at ATCs of 1 to 10 ms."""
+    bound, lags = runs.values["bound"], runs.values["lags"][QUICK if runs.quick else 0 :]
+    d = smc.Sine(bound, 1.0)
+    laws = (super_twisting(runs, bound), relay(runs, bound))
+    scenarios = [behind(runs, law, lag, disturbance=d, duration=8.0) for lag in lags for law in laws]
+    ratios = np.reshape([size_and_power(trace) for trace in runs.traces(scenarios)], (len(lags), 2, 2))
+    names = [f"{1e3 * lag:g} ms" for lag in lags]
+    return {
+        "amplitude, STA / FOSMC": dict(zip(names, ratios[:, 0, 0] / ratios[:, 1, 0], strict=True)),
+        "power, STA / FOSMC": dict(zip(names, ratios[:, 0, 1] / ratios[:, 1, 1], strict=True)),
+    }
+
+
+def crossover(runs):
+    """Amplitudes of s at the ATC where the two predictions are equal, at half and at twice of it, without d."""
+    bound, slope = runs.values["bound"], runs.values["slope"]
+    twisting, sign = super_twisting(runs, slope), relay(runs, bound)
+    equal = (2.0 * MARGIN * bound / math.pi) / predicted(1.5 * math.sqrt(slope), 1.1 * slope, 1.0)[0]
+    lags = [equal, equal / 2.0, equal * 2.0]
+    scenarios = [behind(runs, law, lag, duration=2.0 + 150.0 * lag) for lag in lags for law in (twisting, sign)]
+    found = [cycle(trace)[0] for trace in runs.traces(scenarios)]
+    names = ("at the crossover", "at half of it", "at twice of it")
+    ratios = np.divide(found[::2], found[1::2])
+    return {f"amplitude, STA / FOSMC, {name}": ratio for name, ratio in zip(names, ratios, strict=True)} | {
+        "ATC at the crossover, s": equal
+    }
+
+
+def redesigned(runs):
+    """Amplitude of s at k1 = sqrt(16 k2 / pi) / c, and at half and twice of that, at an ATC of 5 ms."""
+    k2 = runs.values["k2"]
+    best = math.sqrt(16.0 * k2 / math.pi) / HALF
+    laws = [runs.law(runs.plants[0], "super_twisting", k1=factor * best, k2=k2) for factor in (1.0, 0.5, 2.0)]
+    scenarios = [behind(runs, law, runs.values["lag"]) for law in laws]
+    least, half, twice = (cycle(trace)[0] for trace in runs.traces(scenarios))
+    return {"amplitude with half of k1 / least": half / least, "amplitude with twice k1 / least": twice / least}

@@ -1,0 +1,61 @@
+"""How the claims of Seeber & Reichhartinger 2020 are measured."""
+
+import math
+
+import numpy as np
+
+from smc_mujoco.evidence.papers.measures import settled
+
+BAND = 1e-3  # m/s
+
+
+def winds_up(runs):
+    """How far s goes beyond 0 from s0 = 5, 10 and 20 m/s with |u| <= 2 N, over min(U^2 / (2 k2), (U / k1)^2).
+
+    Without a disturbance. That bound holds where the integrator stays within -U .. U. Undefined where s does not reach
+    0 at all.
+    """
+    (plant,), (law,), starts = runs.plants, runs.laws, runs.values["starts"]
+    starts = starts[1:2] if runs.quick else starts
+    scenarios = [runs.scenario(plant, law, v0=start) for start in starts]
+    gains, bound = scenarios[0].law.gains, scenarios[0].u_max
+    most = min(bound**2 / (2.0 * gains["k2"]), (bound / gains["k1"]) ** 2)
+    beyond = {
+        f"from {start:g} m/s": -float(trace.v.min()) / most if trace.v.min() <= 0.0 else math.nan
+        for start, trace in zip(starts, runs.traces(scenarios), strict=True)
+    }
+    return {"overshoot of s / bound of a law that does not wind up": beyond}
+
+
+def reaches(runs):
+    """Largest |s| of the last quarter of 40 s under d = 1.5 sin 0.6 t, |u| <= 2 N, from three starts."""
+    (law,), (condition,), starts = runs.laws, runs.conditions, runs.values["starts"]
+    cells = [(plant, start) for plant in runs.plants for start in starts][: 1 if runs.quick else None]
+    traces = runs.traces(runs.scenario(plant, law, condition, v0=start) for plant, start in cells)
+    ends = {
+        f"{plant}, from {start:g} m/s": float(np.abs(trace.v[-(len(trace.t) // 4) :]).max())
+        for (plant, start), trace in zip(cells, traces, strict=True)
+    }
+    return {"largest |s| of the last quarter, m/s": ends}
+
+
+def time(runs):
+    """Time from which |s| stays within 1 mm/s, from 10 and 50 m/s with |u| <= 2 N and without d, over |s0| / U."""
+    (plant,), starts = runs.plants, runs.values["starts"][: 1 if runs.quick else None]
+    scenarios = [runs.scenario(plant, law, v0=start) for law in runs.laws for start in starts]
+    times = np.reshape([settled(trace, trace.v, BAND) for trace in runs.traces(scenarios)], (2, len(starts)))
+    names = [f"from {start:g} m/s" for start in starts]
+    least = np.array(starts) / scenarios[0].u_max
+    return {
+        "time to |s| <= 1 mm/s / |s0| / U, conditioned": dict(zip(names, times[0] / least, strict=True)),
+        "time, plain / conditioned": dict(zip(names, times[1] / times[0], strict=True)),
+    }
+
+
+def same(runs):
+    """Largest difference of s between the two laws with the same gains, under d, with |u| <= 50 N."""
+    (condition,) = runs.conditions
+    scenarios = [runs.scenario(plant, law, condition) for plant in runs.plants for law in runs.laws]
+    traces = runs.traces(scenarios)
+    pairs = zip(runs.plants, traces[::2], traces[1::2], strict=True)
+    return {"largest difference of s, m/s": {plant: float(np.abs(a.v - b.v).max()) for plant, a, b in pairs}}

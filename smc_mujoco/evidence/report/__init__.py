@@ -1,0 +1,64 @@
+"""A study as one HTML file: which controller, where, how sure, and which of the paper's claims hold.
+
+    from smc_mujoco.evidence.report import report
+    report("report", quick=True)                   # report/report.html, which needs no other file and no network
+
+The folder also keeps the data: study/results.parquet, claims, margins and region maps as JSON, films as WebM. Started
+again it computes only what is missing.
+"""
+
+import dataclasses
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from smc_mujoco.evidence.report.plan import Plan
+
+
+def report(
+    out: str | os.PathLike = "report",
+    quick: bool = False,
+    seeds: int | None = None,
+    threads: int | None = None,
+    progress: bool = False,
+    plan: "Plan | None" = None,
+    records: str | os.PathLike | None = None,
+    laws: Sequence[str] = (),
+) -> Path:
+    """Compute a study and write its report, out/report.html.
+
+    Args:
+      out: the folder; what it holds already is not computed again.
+      quick: a look in two minutes: less of everything, one set of gains for the claims.
+      seeds: of every cell of the grid; fewer than 16 name no winner.
+      threads: simulations at once; None for one per available core.
+      progress: whether to show a bar a stage.
+      plan: how much of everything, instead of `quick`.
+      records: a folder with records of rigs, CSV or npz files, which their twins repeat; see docs/rigs.md.
+      laws: names of further laws, beside those of the plan; each needs tuned gains on every plant of the plan.
+
+    Raises:
+      ScenarioError: a number of seeds or threads that cannot be, a folder that cannot be written, records of no rig, or
+        a further law that is unknown or has no tuned gains.
+      MissingPackageError: jinja2 or plotly is not installed.
+    """
+    from smc_mujoco.common import extras
+    from smc_mujoco.common.errors import whole
+    from smc_mujoco.common.files import replacing
+    from smc_mujoco.evidence.report import page, stages
+    from smc_mujoco.evidence.report.plan import FULL, QUICK, Bars
+
+    if why := extras.missing("report", "a report", "jinja2", "plotly"):
+        raise extras.MissingPackageError(why)
+    plan = plan or (QUICK if quick else FULL)
+    if seeds is not None:
+        plan = dataclasses.replace(plan, seeds=whole("seeds", seeds, 1, 10_000))
+    if laws:
+        plan = dataclasses.replace(plan, laws=tuple(dict.fromkeys((*plan.laws, *laws))))
+    folder = Path(out)
+    html = page.page(stages.find(plan, folder, threads, Bars(progress), None if records is None else Path(records)))
+    with replacing(folder / "report.html") as part:
+        part.write_text(html, encoding="utf-8")
+    return folder / "report.html"

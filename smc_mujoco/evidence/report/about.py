@@ -1,0 +1,125 @@
+"""How a report was computed, in words: the grid, the conditions, the gains with their provenance, the versions."""
+
+import contextlib
+import dataclasses
+import functools
+import itertools
+import json
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import Any, NamedTuple
+
+from smc_mujoco.analysis.tuning import result
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control import gain_sets as sets
+from smc_mujoco.control.component import Component
+from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.evidence.report import words
+from smc_mujoco.evidence.report.plan import FULL, Plan
+from smc_mujoco.studies.table import Table
+
+SHOWN = ("plotly", "pyarrow", "scipy")  # packages whose versions are shown beside those that each run records
+
+
+class Gains(NamedTuple):
+    """A law's gains on a plant in a set, and where they are from."""
+
+    set: str
+    plant: str
+    law: str
+    gains: str
+    source: str
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class About:
+    """How the report was computed; templates/method.jinja has the sentences.
+
+    Attributes:
+      plan: how much of everything.
+      runs, failed: number of runs of the grid, and of those that failed.
+      seeds: number of seeds of a cell of the grid, the largest where cells differ.
+      versions: package -> version.
+      spent: stage -> s of this call; less where results were there already.
+      no_film: why there are no films, or None.
+    """
+
+    plan: Plan
+    runs: int
+    failed: int
+    seeds: int
+    versions: Mapping[str, str]
+    spent: Mapping[str, float]
+    no_film: str | None = None
+
+    @property
+    def left_out(self) -> list[str]:
+        """The conditions of the full report that this one lacks."""
+        return [name for name in FULL.conditions if name not in self.plan.conditions]
+
+    @functools.cached_property
+    def conditions(self) -> dict[str, str]:
+        """Condition -> the Scenario fields that it sets, in words."""
+        found = {}
+        for name in self.plan.conditions:
+            each = {words.plant(p): _fields(scenarios.fields(name, p, self.plan.duration)) for p in self.plan.plants}
+            same = len(set(each.values())) == 1
+            found[name] = next(iter(each.values())) if same else "; ".join(f"{p}: {text}" for p, text in each.items())
+        return found
+
+    @functools.cached_property
+    def gains(self) -> list[Gains]:
+        """The gains of every set, with where they are from."""
+        return [
+            Gains(name, plant, law, ", ".join(f"{k} {v:g}" for k, v in its.gains.items()), _source(plant, law, name))
+            for name in sets.SETS
+            for plant, laws in laws_of(self.plan, name).items()
+            for law, its in laws.items()
+        ]
+
+
+def about(plan: Plan, table: Table, spent: Mapping[str, float], no_film: str | None) -> About:
+    """Return how the report was computed."""
+    return About(
+        plan=plan,
+        runs=len(table),
+        failed=sum(failure is not None for failure in table.column("failure")),
+        seeds=len(set(table.column("seed").tolist())),
+        versions=json.loads(table.column("versions")[0]) | {name: version(name) for name in SHOWN},
+        spent=dict(spent),
+        no_film=no_film,
+    )
+
+
+def _fields(fields: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name.replace('_', ' ')} {_short(value)}" for name, value in fields.items()) or "nothing"
+
+
+def _short(value: Any) -> str:
+    """Return a field's value as it would be written, without what it leaves at its default."""
+    if not dataclasses.is_dataclass(value) or isinstance(value, type):
+        return " ".join(str(value).split())
+    shown = [
+        f"{field.name}={_short(getattr(value, field.name))}"
+        for field in dataclasses.fields(value)
+        if field.init and getattr(value, field.name) != field.default
+    ]
+    return f"{type(value).__name__}({', '.join(shown)})"
+
+
+def laws_of(plan: Plan, gains: str) -> dict[str, dict[str, Component]]:
+    """Return plant -> law's name -> law, for the laws that a set has gains for on that plant."""
+    found: dict[str, dict[str, Component]] = {}
+    for plant, law in itertools.product(plan.plants, plan.laws):
+        with contextlib.suppress(ScenarioError):
+            found.setdefault(plant, {})[law] = sets.law(plant, law, gains)
+    return found
+
+
+def _source(plant: str, law: str, name: str) -> str:
+    if name not in sets.OBJECTIVES:
+        return "chosen by hand before any comparison"
+    its = result.shipped(plant, sets.FORMS.get(law, law), sets.OBJECTIVES[name])
+    bounds = f"; at a bound: {', '.join(its.at_bound)}" if its.at_bound else ""
+    widened = f"; widened: {', '.join(its.widened)}" if its.widened else ""
+    return f"objective {its.objective:.4g} s², {its.budget} sets of gains tried, seed {its.seed}{bounds}{widened}"

@@ -1,0 +1,290 @@
+"""The report's answer in sentences: which law leads where, where no winner is known, where the paper's law loses.
+
+Everything here is counted from `Findings.scores`.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from smc_mujoco.analysis.differences import ROUNDING
+from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.common.text import joined
+from smc_mujoco.studies.adviser import MIN_SETTLED
+from smc_mujoco.evidence.audit.verdict import VERDICTS
+from smc_mujoco.evidence.report import words
+from smc_mujoco.evidence.report.scores import Place, Score
+
+if TYPE_CHECKING:
+    from smc_mujoco.evidence.report.stages import Findings
+
+NAMED = 3  # laws in a sentence
+
+Cells = dict[tuple[str, str, str], list[Score]]  # (plant, condition, metric) -> a score for each law
+
+
+class Standing(NamedTuple):
+    """How often a law leads among `of` cells: `best` counts ties with the best, `alone` counts wins.
+
+    `lost`: in how many another law is better.
+    """
+
+    law: str
+    best: int
+    alone: int
+    lost: int
+    of: int
+
+
+class Pick(NamedTuple):
+    """The law to take for a metric on a plant, or on all plants, over the conditions.
+
+    `median`: of the conditions' medians, NaN over all plants. `wins`, `losses`: in how many of the `of` cells it wins,
+    and in how many another law is better. `level`: the other laws that are beaten in no more cells.
+    """
+
+    law: str
+    median: float
+    wins: int
+    losses: int
+    of: int
+    level: tuple[str, ...]
+
+    @property
+    def sure(self) -> str:
+        """How sure the choice is, in words."""
+        if self.wins == self.of:
+            return f"wins in all {self.of}"
+        unbeaten = f"unbeaten in {self.of - self.losses or 'none'} of {self.of}"
+        return f"{unbeaten}, wins in {self.wins}" if self.wins else unbeaten
+
+
+class Loss(NamedTuple):
+    """A cell in which another law is better than the paper's.
+
+    `own`, `rival`: medians of the paper's law and of the best law. `times`: own over rival; where the rival's is less
+    than the least difference that counts, own over that difference, a lower bound (`rounded`). `settles`: whether the
+    best law settles there: a law that hardly acts may be calm, and never arrive.
+    """
+
+    metric: str
+    plant: str
+    condition: str
+    own: float
+    rival: float
+    law: str
+    times: float
+    rounded: bool
+    settles: bool
+
+
+def cells(scores: Sequence[Score]) -> Cells:
+    """Return the scores of each comparison."""
+    found: Cells = {}
+    for score in scores:
+        found.setdefault((score.plant, score.condition, score.metric), []).append(score)
+    return found
+
+
+def leaders(found: Cells, plant: str, condition: str, metric: str) -> list[str]:
+    """Return the laws that are best, or level with the best; none where no law has a finite median."""
+    best = [s for s in found.get((plant, condition, metric), ()) if s.best]
+    return [s.law for s in best] if any(math.isfinite(s.median) for s in best) else []
+
+
+def winner(found: Cells, plant: str, condition: str, metric: str) -> str | None:
+    """Return the law that wins, as on a board: it alone leads, among several."""
+    leading = leaders(found, plant, condition, metric)
+    return leading[0] if len(leading) == 1 < len(found[plant, condition, metric]) else None
+
+
+def standings(findings: "Findings", metric: str) -> list[Standing]:
+    """Return how often each law leads, and how often another law is better, most wins first."""
+    found = {key: scores for key, scores in cells(findings.scores).items() if key[2] == metric}
+    best = Counter(law for key in found for law in leaders(found, *key))
+    alone = Counter(winner(found, *key) for key in found)
+    lost = Counter(s.law for scores in found.values() for s in scores if not s.best)
+    rows = [Standing(law, best[law], alone[law], lost[law], len(found)) for law in findings.laws]
+    return sorted(rows, key=lambda row: (-row.alone, row.lost, -row.best))
+
+
+def everywhere(findings: "Findings", metric: str) -> dict[str, list[str]]:
+    """Return law -> the conditions in which it wins on every plant, of those with two plants or more."""
+    found = cells(findings.scores)
+    conditions: dict[str, list[str]] = {}
+    for condition in findings.conditions:
+        winners = [winner(found, *key) for key in found if key[1:] == (condition, metric)]
+        if len(winners) > 1 and winners[0] and len(set(winners)) == 1:
+            conditions.setdefault(winners[0], []).append(words.condition(condition))
+    return conditions
+
+
+def undecided(found: Cells, metrics: Sequence[str]) -> tuple[int, int]:
+    """Return how many comparisons have no winner, and how many comparisons there are."""
+    winners = [winner(found, *key) for key in found if key[2] in metrics]
+    return winners.count(None), len(winners)
+
+
+def losses(found: Cells, metrics: Sequence[str], law: str = words.PAPER) -> list[Loss]:
+    """Return the cells in which another law is better than this one, worst first."""
+    lost: list[Loss] = []
+    for (plant, condition, metric), scores in found.items():
+        own = next((s for s in scores if s.law == law), None)
+        if metric not in metrics or own is None or own.best:
+            continue
+        best = min((s for s in scores if s.best), key=lambda s: s.median, default=None)
+        if best is not None and math.isfinite(best.median):
+            settling = {s.law: s.median for s in found.get((plant, condition, "settling_time"), ())}
+            least = max(best.floor, ROUNDING)
+            loss = Loss(
+                metric=metric,
+                plant=plant,
+                condition=condition,
+                own=own.median,
+                rival=best.median,
+                law=best.law,
+                times=own.median / max(best.median, least),
+                rounded=best.median < least,
+                settles=settling.get(best.law) != math.inf,
+            )
+            lost.append(loss)
+    return sorted(lost, key=lambda loss: -loss.times)
+
+
+def counts(findings: "Findings") -> dict[str, int]:
+    """Return verdict -> how many claims have it, where some do."""
+    found = Counter(claim.verdict for claim in findings.claims)
+    return {verdict: found[verdict] for verdict in VERDICTS if found[verdict]}
+
+
+def overall(findings: "Findings", metric: str) -> list[Place]:
+    """Return the laws' places over all runs, best first."""
+    return sorted((p for p in findings.places if p.metric == metric and not p.plant), key=lambda p: p.mean)
+
+
+def pick(findings: "Findings", metric: str, plant: str = "") -> Pick | None:
+    """Return the law that is beaten in the fewest conditions, by mean rank where several are; "" for all plants.
+
+    Laws that settle in less than half as many runs as the law that settles in the most are left out: to do nothing
+    would be calm. None for a metric without numbers.
+    """
+    here = [place for place in findings.places if place.plant == plant]
+    settled = {place.law: place.median for place in here if place.metric == SETTLES}
+    enough = MIN_SETTLED * max(settled.values(), default=0.0)
+    rows = [place for place in here if place.metric == metric and settled.get(place.law, 1.0) >= enough]
+    if not rows:
+        return None
+    best = min(rows, key=lambda row: (row.losses, row.mean))
+    level = tuple(row.law for row in sorted(rows, key=lambda row: row.mean) if row.losses == best.losses)
+    others = tuple(law for law in level if law != best.law)
+    return Pick(best.law, best.median, best.wins, best.losses, best.of, others)
+
+
+# sentences
+
+
+def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
+    """Return the paper's verdict in one line: how its law does, and how many of its claims hold."""
+    own = [row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER]
+    parts = []
+    if own:
+        of, lost, alone = (sum(getattr(row, name) for row in own) for name in ("of", "lost", "alone"))
+        parts.append(f"its observer-free law is beaten in {lost} of {of} comparisons and wins in {alone or 'none'}")
+    if findings.claims:
+        found = [f"{n} {'are' if n != 1 else 'is'} {verdict}" for verdict, n in counts(findings).items()]
+        parts.append(f"of its {len(findings.claims)} checked claims, {joined(found)}")
+    return f"The paper: {'; '.join(parts)}." if parts else ""
+
+
+def first(findings: "Findings", metrics: Sequence[str]) -> str:
+    """Return whether there is one best law."""
+    standing = [standings(findings, metric) for metric in metrics]
+    winners = [{row.law for row in rows if row.alone == row.of} for rows in standing]
+    unbeaten = [{row.law for row in rows if not row.lost} for rows in standing]
+    if winner := set.intersection(*winners) if winners else set():
+        return f"{words.law(winner.pop())} wins in every respect compared here, on every plant in every condition."
+    if common := set.intersection(*unbeaten) if unbeaten else set():
+        names = joined([words.law(law) for law in sorted(common)])
+        return f"No law can be called the best; none is better than {names} anywhere, in any respect compared here."
+    return "No law is the best in every respect, nor in every condition: it depends on what is asked, and where."
+
+
+def leads(findings: "Findings", metric: str) -> str:
+    """Return who leads on a metric: in every cell, else on every plant, else in how many cells."""
+    standing, what = standings(findings, metric), words.metric(metric)
+    top = standing[0]
+    if top.alone == top.of:
+        return f"{words.law(top.law)} wins on {what} in every one of {top.of} cells."
+    if not top.alone:
+        level = [words.law(row.law) for row in standing if not row.lost]
+        unbeaten = f"; none is better than {joined(level)} in any" if 0 < len(level) <= NAMED else ""
+        return f"no winner on {what} in any of {top.of} cells{unbeaten}."
+    plants = [
+        f"{words.law(law)} wins on every plant under {joined(names)}"
+        for law, names in everywhere(findings, metric).items()
+    ]
+    wins = [
+        f"{words.law(row.law)} wins in {row.alone} and loses in {row.lost or 'none'}"
+        for row in standing[:NAMED]
+        if row.alone
+    ]
+    nobody = top.of - sum(row.alone for row in standing)
+    return (
+        f"no law wins on {what} in all {top.of} cells. {'; '.join(plants) + '. ' if plants else ''}{'; '.join(wins)}; "
+        f"in {nobody or 'none'} no law wins."
+    )
+
+
+def rest(findings: "Findings", metrics: Sequence[str]) -> list[str]:
+    """Return the other sentences: how sure it is, who settles, how the paper's law and its claims do."""
+    return list(
+        filter(None, [_sure(findings, metrics), _settled(findings), _paper(findings, metrics), _claims(findings)])
+    )
+
+
+def _sure(findings: "Findings", metrics: Sequence[str]) -> str:
+    open, of = undecided(cells(findings.scores), metrics)
+    repeated = len({(s.plant, s.condition) for s in findings.scores if s.runs < s.seeds})
+    return (
+        f"In {open} of {of} comparisons no single winner can be declared; each has {findings.about.seeds} seeds, and "
+        "the tests are corrected for all comparisons of a metric on a plant."
+        + f" In {repeated} of the cells seeds change nothing, or not each: equal runs count once."
+        * bool(repeated)
+    )
+
+
+def _settled(findings: "Findings") -> str:
+    """Return what share of runs settles, and how many failed; a run that does not settle may still be calm."""
+    share = {place.law: place.median for place in overall(findings, "settles")}
+    if not share:
+        return ""
+    least, most = min(share, key=share.__getitem__), max(share, key=share.__getitem__)
+    text = "Every run settles" if share[least] == 1 else f"{100 * share[least]:.0f}\u00a0% of every law’s runs settle"
+    if f"{share[least]:.2f}" != f"{share[most]:.2f}":
+        text = f"{words.law(least)} settles least often, in {100 * share[least]:.0f} % of its runs; a run that does "
+        text += "not settle may still be calm"
+    return f"{text}. {findings.about.failed or 'None'} of {findings.about.runs} runs failed."
+
+
+def _paper(findings: "Findings", metrics: Sequence[str]) -> str:
+    own = {metric: row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER}
+    if not own:
+        return ""
+    lost = losses(cells(findings.scores), metrics)
+    beaten = f"; it is beaten in {len(lost)} comparisons, listed below, in half of them by a factor of " if lost else ""
+    beaten += f"{words.number(lost[(len(lost) - 1) // 2].times)} or more" if lost else ""
+    return (
+        "The paper’s observer-free law leads, or is level with what leads, in "
+        f"{joined([f'{row.best} on {words.metric(metric)}' for metric, row in own.items()])}, "
+        f"of {own[metrics[0]].of} cells each{beaten}."
+    )
+
+
+def _claims(findings: "Findings") -> str:
+    if not findings.claims:
+        return ""
+    parts = [f"{n} {'are' if n != 1 else 'is'} {verdict}" for verdict, n in counts(findings).items()]
+    flips = sum(claim.flips for claim in findings.claims)
+    depend = f"; {flips} of these verdicts depend on the gains" if flips else ""
+    return f"Of {len(findings.claims)} claims of the paper that were checked, {joined(parts)}{depend}."

@@ -1,0 +1,218 @@
+"""Charts of numbers: medians with intervals, fronts of error against effort, margins, curves over time.
+
+A value that is not on an axis (inf, or less than a logarithm shows) is a triangle at the end of the axis.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from smc_mujoco.evidence.report import words
+from smc_mujoco.evidence.report.films import Curve, Scene
+from smc_mujoco.evidence.report.panels import Figure, figure, law_axis, panels, plant_titles, rounded, scale
+from smc_mujoco.evidence.report.scores import Score
+from smc_mujoco.evidence.report.words import style
+
+if TYPE_CHECKING:
+    from smc_mujoco.analysis.margins import Margin
+    from smc_mujoco.evidence.report.rigs import Repeated
+    from smc_mujoco.evidence.report.stages import Front
+
+KEYS = 5  # laws in a line of a legend
+# Of logarithmic axes; plotly writes powers a quarter larger than the size says.
+POWERS: dict[str, Any] = {"type": "log", "exponentformat": "power", "tickfont": {"size": 9}}
+
+
+def _named(law: str) -> str:
+    return words.escape(words.law(law))
+
+
+def forest(scores: Sequence[Score], metrics: Sequence[str], plants: Sequence[str], laws: Sequence[str]) -> Figure:
+    """Draw medians with intervals in one condition: a row per metric, a column per plant, a line per law."""
+    grid = panels(len(metrics), len(plants), (0.028, 0.08))
+    known = {(s.metric, s.plant, s.law): s for s in scores}
+    data: list[dict] = []
+    titles = [title | {"yshift": 17} for title in plant_titles(grid[: len(plants)], plants)]
+    layout: dict[str, Any] = {"annotations": titles}
+    for k, panel in enumerate(grid):
+        metric, plant = metrics[k // len(plants)], plants[k % len(plants)]
+        cells = [known[metric, plant, law] for law in laws if (metric, plant, law) in known]
+        logarithmic, low, high = ends = scale([v for cell in cells for v in (cell.low, cell.median, cell.high)])
+        data += [_whisker(cell, ends) | panel.trace for cell in cells]
+        unit = f"{words.metric(metric)}, {words.unit(metric, plant)}"
+        titles.append(panel.heading(unit, font={"size": 11}))
+        x: dict[str, Any] = {"type": "linear", "range": [low, high], "nticks": 4}
+        if logarithmic:
+            ticks = max(1, math.ceil(math.log10(high / low) / 4))  # decades between ticks that leave at most four
+            x |= POWERS | {"range": [math.log10(low), math.log10(high)], "dtick": ticks}
+        layout |= panel.axes(x, law_axis(laws, k % len(plants) == 0))
+    return figure(data, layout, 84 + (32 + 16 * len(laws)) * len(metrics), (172, 14, 58, 34))
+
+
+def _whisker(score: Score, ends: tuple[bool, float, float]) -> dict[str, Any]:
+    """Return a law's point with its interval, on an axis with these ends."""
+    logarithmic, low, high = ends
+    off = (high / low) ** 0.035 if logarithmic else 1.0  # off the ends, clear of the labels
+    inner = (low * off, high / off) if logarithmic else (low, high * 0.97)
+    at, left, right = (min(max(v, inner[0]), inner[1]) for v in (score.median, score.low, score.high))
+    symbol = "triangle-right" if score.median > inner[1] else "triangle-left" if score.median < inner[0] else "circle"
+    symbol += "" if score.best else "-open"
+    colour, name = words.colour(score.law), _named(score.law)
+    text = f"<b>{name}</b><br>{words.number(score.median)} {words.unit(score.metric, score.plant)}"
+    spread = words.interval(score.median, score.low, score.high)
+    bar = {"type": "data", "symmetric": False, "array": [right - at], "arrayminus": [at - left]}
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "cliponaxis": False,
+        "x": [at],
+        "y": [name],
+        "error_x": bar | {"color": colour, "thickness": 2, "width": 0},
+        "marker": {"size": 9, "color": colour, "symbol": symbol, "line": {"width": 2, "color": colour}},
+        "hovertemplate": text + (f"<br>95 %: {spread}" if spread else "") + "<extra></extra>",
+    }
+
+
+def fronts(found: "Sequence[Front]") -> Figure:
+    """Draw tracking against variation: a panel per plant, a staircase per law; a dot at the study's gains."""
+    plants = list(dict.fromkeys(front.plant for front in found))
+    laws = list(dict.fromkeys(front.law for front in found))
+    grid = panels(1, len(plants), (0.035, 0))
+    data: list[dict] = []
+    layout: dict[str, Any] = {"annotations": plant_titles(grid, plants)}
+    for panel, plant in zip(grid, plants, strict=True):
+        own = [front for front in found if front.plant == plant]
+        data += [trace | panel.trace for front in own for trace in _front(front)]
+        across = _span([v for f in own for v in (*f.variation, f.chosen[1])], 1e-3)
+        up = _span([v for f in own for v in (*f.tracking, f.chosen[0])], None)
+        x = POWERS | {"title": {"text": "variation, 1/s"}, "range": across, "tickangle": 0}
+        y = POWERS | {"dtick": 1, "range": up}
+        y |= {"title": {"text": "tracking, s²"}} if panel is grid[0] else {}
+        layout |= panel.axes(x | {"dtick": max(1, math.ceil((across[1] - across[0]) / 4))}, y)
+    for law in laws:  # an entry of the legend, which switches all curves of the law
+        colour = words.colour(law)
+        key = {"type": "scatter", "mode": "lines+markers", "x": [None], "y": [None], "name": _named(law)}
+        key |= {"legendgroup": law, "line": {"color": colour, "width": 2}, "marker": {"size": 8, "color": colour}}
+        data.append(key)
+    legend = 21 * math.ceil(len(laws) / KEYS)  # px that it takes above the panels
+    layout["legend"] = {"y": 1 + 52 / 264}
+    return figure(data, layout, 380 + legend, (60, 12, 62 + legend, 54), showlegend=True)
+
+
+def _span(values: Sequence[float], least: float | None) -> list[float]:
+    """Return the ends of a logarithmic axis, in decades.
+
+    It shows all values down to `least` of the largest, or up to 1000 times the smallest where that is None.
+    """
+    above = [v for v in values if v > 0] or [1.0]
+    low, high = (min(above), min(max(above), 1e3 * min(above))) if least is None else (0.0, max(above))
+    low = max(low, min(above), (least or 0.0) * high)
+    return [math.log10(low) - 0.15, math.log10(high) + 0.15]
+
+
+def _front(front: "Front") -> list[dict[str, Any]]:
+    colour = words.colour(front.law)
+    common = {"type": "scatter", "legendgroup": front.law, "showlegend": False}
+    hover = f"<b>{_named(front.law)}</b><br>variation %{{x:.3g}} 1/s<br>tracking %{{y:.3g}} s²<extra></extra>"
+    across, up = zip(*sorted(zip(front.variation, front.tracking, strict=True)), strict=True)  # for steps to the right
+    line = {"mode": "lines+markers", "line": {"color": colour, "width": 1.5, "shape": "hv"}}
+    line["marker"] = {"size": 4, "color": colour}
+    dot = {"mode": "markers", "marker": {"size": 12, "color": colour, "line": {"width": 2, "color": "#FFFFFF"}}}
+    return [
+        common | line | {"x": rounded(across), "y": rounded(up), "hovertemplate": hover},
+        common | dot | {"x": [front.chosen[1]], "y": [front.chosen[0]], "hovertemplate": "The study's gains: " + hover},
+    ]
+
+
+def margins(found: "Sequence[Margin]", kind: str) -> Figure:
+    """Draw the largest level of one kind that each law tolerates: a panel per plant; a bar marks linear theory.
+
+    A triangle means that the search ended there without a failure.
+    """
+    plants = list(dict.fromkeys(margin.plant for margin in found))
+    laws = list(dict.fromkeys(margin.law for margin in found))
+    grid = panels(1, len(plants), (0.025, 0))
+    data: list[dict] = []
+    layout: dict[str, Any] = {"annotations": plant_titles(grid, plants)}
+    for panel, plant in zip(grid, plants, strict=True):
+        here = [margin for margin in found if (margin.plant, margin.kind) == (plant, kind)]
+        _, _, most = scale([v for m in here for v in (m.value, m.theory or 0.0)], False)
+        data += [trace | panel.trace for margin in here for trace in _margin(margin, most)]
+        x = {"range": [-0.03 * most, most], "nticks": 4, "rangemode": "tozero"}
+        layout |= panel.axes(x, law_axis(laws, panel is grid[0]))
+    return figure(data, layout, 98 + 19 * len(laws), (172, 14, 42, 28))
+
+
+def _margin(margin: "Margin", most: float) -> list[dict[str, Any]]:
+    colour, name = words.colour(margin.law), _named(margin.law)
+    common = {"type": "scatter", "mode": "markers", "y": [name], "cliponaxis": False}
+    if math.isnan(margin.value):
+        cross = {"size": 8, "symbol": "x-thin", "line": {"width": 2, "color": colour}}
+        hover = f"<b>{name}</b><br>not within bounds without any, either<extra></extra>"
+        return [common | {"x": [0.0], "marker": cross, "hovertemplate": hover}]
+    beyond, at = margin.value >= margin.searched, min(margin.value, most)
+    marker = {"size": 10, "color": colour, "symbol": "triangle-right" if beyond else "circle"}
+    hover = f"<b>{name}</b><br>{'at least ' if beyond else ''}{words.number(margin.value)} {margin.unit}"
+    hover += f" (to {words.number(margin.resolution)})<extra></extra>"
+    stem = {"array": [0], "arrayminus": [at], "symmetric": False, "type": "data"}
+    stem |= {"color": colour, "thickness": 1.5, "width": 0}
+    traces = [common | {"x": [at], "marker": marker, "error_x": stem, "hovertemplate": hover}]
+    if margin.theory is not None and math.isfinite(margin.theory):
+        bar = {"size": 15, "symbol": "line-ns", "line": {"width": 2.5, "color": style.INK}}
+        hover = f"linear theory<br>{words.number(margin.theory)} {margin.unit}<extra></extra>"
+        traces.append(common | {"x": [margin.theory], "marker": bar, "hovertemplate": hover})
+    return traces
+
+
+def curves(scene: Scene) -> Figure:
+    """Draw x and u of every law over time. Where u chatters, a band is its range and the line its running mean."""
+    left, right = panels(1, 2, (0.075, 0))
+    extremes = [np.concatenate([c.u, c.low, c.high]) for c in scene.curves]
+    bound = 1.08 * (max((float(np.abs(each).max()) for each in extremes if each.size), default=0.0) or scene.u_max)
+    time, zero = {"title": {"text": "t, s"}}, {"zeroline": True, "zerolinecolor": style.RULE}
+    angle, force = ("angle", "N·m") if scene.unit == "rad" else ("position", "N")
+    layout: dict[str, Any] = left.axes(time, zero)
+    layout |= right.axes(time | {"matches": "x"}, zero | {"range": [-bound, bound]})
+    layout["annotations"] = [left.title(f"{angle} x, {scene.unit}"), right.title(f"control u, {force}")]
+    layout["legend"] = {"y": 1.12}
+    data = []
+    for curve in scene.curves:
+        x, *u = _curve(curve)
+        data += [x, *(trace | right.trace | {"showlegend": False} for trace in u)]
+    return figure(data, layout, 305, (48, 12, 62, 46), showlegend=True)
+
+
+def _curve(curve: Curve) -> list[dict[str, Any]]:
+    """Return the line of x, the band of u if it chatters, and the line of u."""
+    colour, name = words.colour(curve.law), _named(curve.law)
+    line = {"type": "scatter", "mode": "lines", "legendgroup": curve.law, "line": {"color": colour, "width": 1.8}}
+    hover = {"hovertemplate": f"<b>{name}</b> %{{y:.4g}} at %{{x:.3f}} s<extra></extra>"}
+    traces = [line | hover | {"x": rounded(curve.t), "y": rounded(curve.x), "name": name}]
+    if len(curve.tb):
+        around = np.concatenate([curve.tb, curve.tb[::-1]]), np.concatenate([curve.high, curve.low[::-1]])
+        fill = "rgba({}, {}, {}, 0.18)".format(*style.rgb(colour))
+        band = {"fill": "toself", "fillcolor": fill, "line": {"width": 0}, "hoverinfo": "skip"}
+        traces.append(line | band | {"x": rounded(around[0], 4), "y": rounded(around[1], 3)})
+    return [*traces, line | hover | {"x": rounded(curve.tu), "y": rounded(curve.u)}]
+
+
+def record(shown: "Repeated") -> Figure:
+    """Draw the columns of a record over time, measured and as its twin repeats them: a panel for each, one below."""
+    grid = panels(len(shown.measured), 1, (0.0, 0.13))
+    data: list[dict] = []
+    layout: dict[str, Any] = {"annotations": [], "legend": {"y": 1.0 + 30 / (120 * len(grid))}}
+    for panel, name in zip(grid, shown.measured, strict=True):
+        layout["annotations"].append(panel.title(name))
+        below = {"title": {"text": "t, s"}} if panel is grid[-1] else {"showticklabels": False}
+        layout |= panel.axes(below | ({} if panel is grid[0] else {"matches": "x"}), {})
+        for label, values, line in (
+            ("measured", shown.measured[name], {"color": style.MUTED, "width": 2.4}),
+            ("twin", shown.twin[name], {"color": words.colour(words.PAPER), "width": 1.2}),
+        ):
+            trace = {"type": "scatter", "mode": "lines", "x": rounded(shown.t), "y": rounded(values), "line": line}
+            hover = f"<b>{label}</b> %{{y:.4g}} at %{{x:.3f}} s<extra></extra>"
+            trace |= {"name": label, "legendgroup": label, "showlegend": panel is grid[0], "hovertemplate": hover}
+            data.append(trace | panel.trace)
+    return figure(data, layout, 120 + 120 * len(grid), (56, 12, 62, 46), showlegend=True)

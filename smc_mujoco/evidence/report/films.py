@@ -1,0 +1,142 @@
+"""Curves and films of a report's scenes: runs side by side, in few points and few bytes.
+
+Films are WebM (VP9), which every browser plays and no patent covers. They are small, as they are part of the page.
+"""
+
+import dataclasses
+import io
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from smc_mujoco.common import extras, gl
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import replacing
+from smc_mujoco.draw import decimate
+from smc_mujoco.draw.film import film as video
+from smc_mujoco.draw.film.encoder import sigint_blocked
+from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.evidence.report.plan import Report
+
+SIZE, FPS = (960, 540), 20  # px; 1/s
+# Chosen: letters stay clean at 100 to 200 kB for 5 s.
+VP9 = ["-crf", "34", "-b:v", "0", "-deadline", "good", "-cpu-used", "4", "-row-mt", "1", "-g", "60"]
+BANDS = 250  # windows of a band across the run
+POSTER = 0.5  # s
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Curve:
+    """One channel of a trace in few points: x(t), the line of u, and the band between the extremes of u.
+
+    t, x: (k,). tu, u: the line, a mean where u chatters. tb, low, high: the band's windows.
+    """
+
+    law: str
+    t: np.ndarray
+    x: np.ndarray
+    tu: np.ndarray
+    u: np.ndarray
+    tb: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Scene:
+    """Runs of one plant in one condition, side by side: curves of the channel that starts farthest out.
+
+    Attributes:
+      unit: of x.
+      seconds: duration of the film.
+      film: WebM, or None.
+      poster: a picture of the film as JPEG, or None.
+    """
+
+    plant: str
+    condition: str
+    unit: str
+    u_max: float
+    curves: tuple[Curve, ...]
+    film: bytes | None = None
+    poster: bytes | None = None
+    seconds: float = 0.0
+
+
+def curve(trace: Trace) -> Curve:
+    """Return the channel of a trace that starts farthest out, in few points with every extreme kept."""
+    whole = decimate.finite(trace)
+    i = int(np.argmax(np.abs(trace.scenario.resolved.x0)))
+    t, x, u = whole.t, whole.x[:, i], whole.u[:, i]
+    width = decimate.window(trace)
+    tu, line = decimate.line(t, u, width)
+    band = decimate.columns(t, u[:, None], BANDS) if decimate.stretches(u, width) else None
+    tb, low, high = (band.t, band.low[:, 0], band.high[:, 0]) if band else (np.empty(0),) * 3
+    shown = _extremes(x)
+    return Curve(
+        law=trace.scenario.law.name, t=t[shown], x=x[shown], tu=tu, u=line, tb=tb[: len(low)], low=low, high=high
+    )
+
+
+def _extremes(y: np.ndarray) -> np.ndarray:
+    """Return the indices of the extremes of y (K + 1,) in each of some stretches, with its first and last."""
+    parts = np.array_split(np.arange(len(y)), min(decimate.POINTS, len(y)))
+    ends = [(part[np.argmin(y[part])], part[np.argmax(y[part])]) for part in parts]
+    return np.unique([0, *np.ravel(ends), len(y) - 1])
+
+
+def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whole: None) -> tuple[bytes, bytes]:
+    """Return a film of the traces as WebM, and a picture of it as JPEG.
+
+    Args:
+      report: called with the number of frames written, and of all.
+
+    Raises:
+      ScenarioError: nothing renders here, or ffmpeg cannot write.
+    """
+    with extras.extra("report", "a film"):
+        import imageio_ffmpeg
+    from PIL import Image
+
+    if why := gl.missing():
+        raise ScenarioError(why)
+    shown, poster = video.clock(traces, FPS), io.BytesIO()
+    count = len(shown.times)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "film.webm")
+        writer = imageio_ffmpeg.write_frames(
+            path, SIZE, fps=FPS, codec="libvpx-vp9", output_params=VP9, macro_block_size=2, ffmpeg_log_level="error"
+        )
+        try:
+            with sigint_blocked():
+                writer.send(None)
+            for k, picture in enumerate(video.frames(traces, shown, None, title, SIZE)):
+                if k == min(int(np.searchsorted(shown.times, POSTER)), count - 1):
+                    Image.fromarray(picture).save(poster, "JPEG", quality=80, optimize=True)
+                writer.send(np.ascontiguousarray(picture))
+                report(k + 1, count)
+        except OSError as error:
+            raise ScenarioError(f"cannot write a film: {' '.join(str(error).split())}; make room") from error
+        finally:
+            writer.close()
+        return path.read_bytes(), poster.getvalue()
+
+
+def missing() -> str | None:
+    """Return None when a film can be made, else one sentence that says why not and what to do."""
+    return gl.missing() or extras.missing("report", "no film: it", "imageio_ffmpeg")
+
+
+def save(made: tuple[bytes, bytes], path: Path) -> None:
+    """Write a film and, before it, its picture beside it."""
+    film, poster = made
+    for data, file in ((poster, path.with_suffix(".jpg")), (film, path)):
+        with replacing(file) as part:
+            part.write_bytes(data)
+
+
+def load(path: Path) -> tuple[bytes, bytes]:
+    """Return the film and the picture that `save` wrote."""
+    return path.read_bytes(), path.with_suffix(".jpg").read_bytes()

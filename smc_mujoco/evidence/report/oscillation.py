@@ -1,0 +1,95 @@
+"""Chattering in a report: predicted by harmonic balance behind a lagging actuator, and measured in runs."""
+
+import dataclasses
+import math
+import statistics
+
+from smc_mujoco.analysis.chattering import chattering
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import read_json, write_json
+from smc_mujoco.mechanisms.hardware.drives import Lag
+from smc_mujoco.metrics.limit_cycle import NONE, of_trace
+from smc_mujoco.simulation.grid import case
+from smc_mujoco.simulation.run import run
+from smc_mujoco.studies.cache import cached
+from smc_mujoco.evidence.report.plan import GAINS, Report, Work
+
+LAG = 0.01  # s, of the actuator
+DURATION = 8.0  # s, of the runs
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Oscillation:
+    """The limit cycle of s of one law on one plant; NaN where there is none.
+
+    Attributes:
+      amplitude, frequency: predicted, in the unit of s and in Hz.
+      measured_amplitude, measured_frequency: of a run.
+      third_harmonic, uncertainty: how good the prediction is, see `Chattering`.
+    """
+
+    plant: str
+    law: str
+    amplitude: float
+    frequency: float
+    measured_amplitude: float
+    measured_frequency: float
+    third_harmonic: float
+    uncertainty: float
+
+    @property
+    def error(self) -> float:
+        """The error of the predicted amplitude in percent of the measured one; NaN where one of them is missing."""
+        return 100.0 * (self.amplitude / self.measured_amplitude - 1.0)
+
+
+def oscillations(work: Work) -> tuple[Oscillation, ...]:
+    """Return the limit cycles of all laws on all plants behind a lagging actuator, plant by plant."""
+    plan = work.plan
+
+    def compute(plant: str, report: Report) -> list[Oscillation]:
+        return cached(
+            work.folder / f"chattering-{plant}.json",
+            [plan.laws, LAG, DURATION, GAINS],
+            lambda: _on(plant, plan.laws, work.threads, report),
+            lambda found, path: write_json(path, [dataclasses.asdict(one) for one in found]),
+            lambda path: [Oscillation(**entry) for entry in read_json(path)],
+        )
+
+    return tuple(one for found in work.each("chattering", "plants", plan.plants, compute) for one in found)
+
+
+def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) -> list[Oscillation]:
+    """Return the limit cycles on a plant. Laws whose chattering cannot be predicted are left out."""
+    found, cases = [], [case(plant, law, "nominal", DURATION, GAINS, changes={"actuator": Lag(LAG)}) for law in laws]
+    for done, (one, trace) in enumerate(zip(cases, run(cases, threads), strict=True)):
+        report(done, len(cases))
+        try:
+            cycle = chattering(one)
+        except ScenarioError:
+            continue
+        amplitude, frequency = NONE if trace.diverged_at is not None else of_trace(trace)
+        found.append(
+            Oscillation(
+                plant=plant,
+                law=one.law.name,
+                amplitude=cycle.amplitude,
+                frequency=cycle.frequency,
+                measured_amplitude=amplitude,
+                measured_frequency=frequency,
+                third_harmonic=cycle.third_harmonic,
+                uncertainty=cycle.uncertainty,
+            )
+        )
+    return found
+
+
+def sentence(found: tuple[Oscillation, ...]) -> str:
+    """Return in a sentence how many limit cycles were predicted, how many were found, and how large the error is."""
+    both = [one for one in found if not math.isnan(one.error)]
+    calm = sum(math.isnan(one.amplitude) and math.isnan(one.measured_amplitude) for one in found)
+    text = f"Of {len(found)} pairs of plant and law {len(both)} are predicted to oscillate and do; {calm} do neither"
+    if not both:
+        return f"{text}."
+    error = statistics.median(abs(one.error) for one in both)
+    return f"{text}. The median error of the predicted amplitude is {error:.2g} %."

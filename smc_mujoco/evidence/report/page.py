@@ -1,0 +1,151 @@
+"""The HTML page of a report, which needs no network and no other file.
+
+    page(findings)                 # the HTML, a str
+
+Each section is a template of its name. Text is escaped by jinja2. Charts are JSON in the page, drawn by plotly.js,
+which is embedded once; films and pictures are data URIs. A content security policy in the file forbids everything that
+is not in it.
+"""
+
+import base64
+import inspect
+import math
+import re
+from collections.abc import Hashable, Iterable, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from smc_mujoco.analysis.differences import OF_SCALE, OF_VALUE
+from smc_mujoco.analysis.ranking import SEEDS
+from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.control.law import laws
+from smc_mujoco.draw import style
+from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.evidence.audit.verdict import Claim
+from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.evidence.report import answer, charts, maps, oscillation, rigs, words
+from smc_mujoco.evidence.report.plan import GAINS
+from smc_mujoco.evidence.report.stages import Findings
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+TEMPLATES = Path(__file__).parent / "templates"
+SECTIONS = {
+    "overview": "The answer",
+    "claims": "The paper’s claims",
+    "tradeoffs": "Error against effort",
+    "margins": "Margins",
+    "chattering": "How much will it chatter",
+    "regions": "Regions of attraction",
+    "rigs": "On the rig",
+    "films": "Films and traces",
+    "method": "How it was computed",
+}
+
+Row = TypeVar("Row", bound=Hashable)
+Column = TypeVar("Column", bound=Hashable)
+Cell = TypeVar("Cell")
+
+
+def environment() -> "Environment":
+    """Return what renders the templates, with their filters and the functions that they share."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from jinja2.utils import htmlsafe_json_dumps
+
+    made = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters |= {"json": htmlsafe_json_dumps, "margin_kind": words.kind, "law_name": words.law}
+    made.globals |= {"words": words, "checks": checks, "white": style.WHITE}
+    return made
+
+
+def page(findings: Findings) -> str:
+    """Return the report as HTML."""
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
+
+    made = environment()
+    made.globals |= {
+        "f": findings,
+        "about": findings.about,
+        "gains_set": GAINS,
+        "infinity": math.inf,
+        "answer": answer,
+        "charts": charts,
+        "maps": maps,
+        "rigs": rigs,
+        "oscillation": oscillation,
+        "link": link,
+        "uri": uri,
+        "plants": plants(),
+    }
+    return made.get_template("page.jinja").render(
+        css=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
+        js=Markup((TEMPLATES / "page.js").read_text(encoding="utf-8")),
+        plotly=Markup(get_plotlyjs().replace("</script", "<\\/script")),
+        sections=SECTIONS,
+        # tables: what identifies a row -> column -> cell
+        board=pivot(((s.plant, s.condition, s.law), s.metric, s) for s in findings.scores),
+        places=pivot(((p.plant, p.law), p.metric, p) for p in findings.places),
+        set_margins=set_margins(findings),
+        gains=pivot(((row.plant, row.law), row.set, row) for row in findings.about.gains),
+        # how it was computed
+        laws=laws(),
+        objective=Objective(),
+        u_max=scenarios.U_MAX,
+        control_period=scenarios.CONTROL_PERIOD,
+        least={"value": 100 * OF_VALUE, "scale": 100 * OF_SCALE, "seeds": SEEDS},
+        metrics={metric.name: paragraphs(inspect.getdoc(metric.formula) or "") for metric in metrics()},
+    )
+
+
+def pivot(cells: Iterable[tuple[Row, Column, Cell]]) -> dict[Row, dict[Column, Cell]]:
+    """Return row -> column -> cell, in the order of the cells."""
+    table: dict[Row, dict[Column, Cell]] = {}
+    for row, column, cell in cells:
+        table.setdefault(row, {})[column] = cell
+    return table
+
+
+def set_margins(findings: Findings) -> dict[tuple[str, str, str], dict[str, Any]]:
+    """Return (kind, plant, law) -> set of gains -> Margin; a law that a set has no gains for lacks that set."""
+    return pivot(((m.kind, m.plant, m.law), name, m) for name, found in findings.by_set.items() for m in found)
+
+
+def checks(sets: Sequence[str], claim: Claim) -> list[SimpleNamespace]:
+    """Return a row for each check of a claim, those that fail first.
+
+    Each has what is measured, set of gains -> Check, and its limit in words, "" where the sets have several limits.
+    """
+    rows = []
+    its_checks = pivot((c.what, name, c) for name in sets if name in claim.numbers for c in claim.checks(name))
+    for what, its in its_checks.items():
+        limits = {f"{words.pretty(check.relation)} {words.number(check.limit)}" for check in its.values()}
+        rows.append(SimpleNamespace(what=what, checks=its, must=limits.pop() if len(limits) == 1 else ""))
+    return sorted(rows, key=lambda row: all(check.holds for check in row.checks.values()))
+
+
+def link(what: str) -> str:
+    """Return the anchor of the metric that a check names, else that of "verdict"."""
+    names = {called: m.name for m in metrics() for called in (m.name, words.metric(m.name))}
+    known = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
+    found = re.search(rf"(?<!\w)({known})(?!\w)", what)
+    return f"metric-{names[found[1]]}" if found else "verdict"
+
+
+def uri(kind: str, data: bytes) -> str:
+    """Return bytes as a data URI."""
+    return f"data:{kind};base64,{base64.b64encode(data).decode()}"
+
+
+def paragraphs(text: str) -> list[str]:
+    """Return a docstring's paragraphs, with signs as people write them."""
+    return [words.pretty(" ".join(part.split())) for part in text.strip().split("\n\n")]

@@ -1,0 +1,105 @@
+"""The audit of one paper as one HTML file, with its evidence, badge and figure beside it.
+
+report("levant_1993", "levant")                # levant/report.html, which needs no other file and no network
+"""
+
+from collections import Counter
+from pathlib import Path
+
+from smc_mujoco.common import extras
+from smc_mujoco.common.files import replacing, write_json
+from smc_mujoco.common.progress import bar
+from smc_mujoco.common.text import number
+from smc_mujoco.common.version import __version__
+from smc_mujoco.evidence.audit import badge, evidence
+from smc_mujoco.evidence.audit.audit import Audit, audit, evaluations
+from smc_mujoco.evidence.audit.paper import paper as find_paper
+from smc_mujoco.evidence.audit.verdict import VERDICTS
+from smc_mujoco.evidence.report import words
+from smc_mujoco.evidence.report.page import TEMPLATES, environment, uri
+
+SECTIONS = {
+    "claims": "The claims",
+    "checks": "How far from the thresholds",
+    "gains": "Gains",
+    "method": "How it was computed",
+}
+
+
+def report(
+    paper: str | Path,
+    out: str | Path = "report",
+    quick: bool = False,
+    threads: int | None = None,
+    progress: bool = False,
+) -> Path:
+    """Audit a paper and write its report, out/report.html, with evidence.json, badge.svg and checks.svg beside it.
+
+    Args:
+      paper: the name of one that ships, or a folder.
+      out: the folder.
+      quick: less, as each claim says.
+      threads: simulations at once; None for one per available core.
+      progress: whether to show a bar.
+
+    Raises:
+      ScenarioError: as `smc.audit`, or a folder that cannot be written.
+      MissingPackageError: jinja2 is not installed.
+    """
+    if why := extras.missing("report", "a report", "jinja2"):
+        raise extras.MissingPackageError(why)
+    about, folder = find_paper(paper), Path(out)
+    with bar("claims", evaluations(None, None, quick, about), shown=progress, counted=True) as drawn:
+        done = audit(about, quick=quick, threads=threads, report=drawn.advance)
+    found = evidence.document(done)
+    write_json(folder / "evidence.json", found)
+    done.badge(folder / "badge.svg")
+    done.figure(folder / "checks.svg")
+    html = page(done, found["seal"], len(found["runs"]), (folder / "checks.svg").read_bytes())
+    with replacing(folder / "report.html") as part:
+        part.write_text(html, encoding="utf-8")
+    return folder / "report.html"
+
+
+def page(done: Audit, seal: str, runs: int, figure: bytes) -> str:
+    """Return an audit as HTML."""
+    from markupsafe import Markup
+
+    found = Counter(claim.verdict for claim in done.claims)
+    sets = list(done.claims[0].verdicts)
+    return (
+        environment()
+        .get_template("paper.jinja")
+        .render(
+            css=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
+            js=Markup((TEMPLATES / "page.js").read_text(encoding="utf-8")),
+            paper=done.paper,
+            claims=done.claims,
+            counts={verdict: found[verdict] for verdict in VERDICTS if found[verdict]},
+            sets=sets,
+            gains_set=sets[-1],
+            gains={name: gains(done, name) for name in sets},
+            quick=done.quick,
+            sections=SECTIONS,
+            link=lambda what: "verdict",
+            badge=uri("image/svg+xml", badge.svg(done.paper.name, done.claims).encode()),
+            figure=uri("image/svg+xml", figure),
+            runs=runs,
+            seal=seal,
+            varying=[id for id, entry in done.paper.claims.items() if entry.varies and id in done.used],
+            version=__version__,
+        )
+    )
+
+
+def gains(done: Audit, name: str) -> dict[tuple[str, str], list[str]]:
+    """Return (law, its gains in words) -> the plants on which runs under a set of gains had them."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for sets in done.used.values():
+        for one in sets.get(name, {}).values():
+            law, plant = one.scenario.law, words.plant(one.scenario.plant.name)
+            values = ", ".join(f"{gain} = {number(value)}" for gain, value in law.gains.items())
+            on = found.setdefault((law.name, values), [])
+            if plant not in on:
+                on.append(plant)
+    return dict(sorted(found.items()))

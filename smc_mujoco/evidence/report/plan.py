@@ -1,0 +1,112 @@
+"""How much a report computes, and its progress."""
+
+import contextlib
+import dataclasses
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+from smc_mujoco.analysis.ranking import SEEDS
+from smc_mujoco.common import progress
+from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.studies.study import FULL as GRID
+from smc_mujoco.studies.study import QUICK as QUICK_GRID
+from smc_mujoco.studies.study import Extent
+
+GAINS = "tuned"  # the set of gains of everything but the claims, which are judged under every set
+
+T = TypeVar("T")
+Item = TypeVar("Item")
+Report = Callable[[float, float], None]  # called with the work done and the whole
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Plan(Extent):
+    """How much of everything: the extent of the grid, and the rest.
+
+    Attributes:
+      quick: whether margins and claims are quick.
+      kinds: of margins, searched for all plants and laws.
+      compared: those kinds that are searched under every set of gains.
+      basins: plants with maps of their regions of attraction: on 2 cores a map of 1000 states takes 12 s.
+      basin_laws: laws of these maps.
+      points: of a map, across and up.
+      region: the longest run of a map, s.
+      claims: ids of claims to judge; None for all.
+      scenes: (plant, condition) of the traces and films.
+      filmed: how many of the scenes are filmed.
+      scene_laws: laws side by side in a scene.
+      scene: duration of traces and films, s.
+      rigs: machines whose laws are compared on all their sets of quantities.
+    """
+
+    quick: bool
+    conditions: tuple[str, ...] = GRID.conditions
+    seeds: int = SEEDS  # the fewest that name a winner
+    kinds: tuple[str, ...] = ("delay", "disturbance", "friction", "mass", "noise")
+    compared: tuple[str, ...] = ("disturbance",)
+    basins: tuple[str, ...] = ("inverted_pendulum", "van_der_pol", "duffing")
+    basin_laws: tuple[str, ...] = scenarios.LAWS
+    points: tuple[int, int] = (32, 32)
+    region: float = scenarios.DURATION
+    claims: tuple[str, ...] | None = None
+    scenes: tuple[tuple[str, str], ...] = tuple((plant, "nominal") for plant in scenarios.PLANTS)
+    filmed: int = len(scenarios.PLANTS)
+    scene_laws: tuple[str, ...] = scenarios.LAWS
+    scene: float = 5.0
+    rigs: tuple[str, ...] = ("qube_servo", "simple_pendulum_ak80")
+
+
+FULL = Plan(quick=False)
+QUICK = Plan(
+    **vars(QUICK_GRID),
+    quick=True,
+    kinds=("delay", "disturbance"),
+    compared=(),
+    basins=("inverted_pendulum",),
+    points=(16, 16),
+    scenes=tuple((plant, "nominal") for plant in QUICK_GRID.plants),
+    filmed=1,
+    rigs=("qube_servo",),
+)
+
+
+class Bars:
+    """Progress on the terminal: a bar for each stage, then a line with its time; or nothing.
+
+    `spent`: stage -> s.
+    """
+
+    def __init__(self, shown: bool):
+        self.shown = shown
+        self.spent: dict[str, float] = {}
+
+    @contextlib.contextmanager
+    def stage(self, name: str, what: str = "", whole: float | None = None, bar: bool = True) -> Iterator[progress.Bar]:
+        """Time a stage, and show its bar; without one if `bar` is False, for work that shows its own."""
+        start = time.monotonic()
+        with progress.bar(f"{name}  {what}", whole, shown=bar and self.shown) as drawn:
+            yield drawn
+        self.spent[name] = time.monotonic() - start
+        if self.shown:
+            print(f"{name:11} {what:16} {self.spent[name]:6.0f} s", flush=True)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Work:
+    """What every stage needs: the plan, the folder for results, threads, and the bars."""
+
+    plan: Plan
+    folder: Path
+    threads: int | None
+    bars: Bars
+
+    def each(self, stage: str, unit: str, items: Sequence[Item], compute: Callable[[Item, Report], T]) -> list[T]:
+        """Return compute(item, report) for each item of a stage; `report` takes the progress within that item."""
+        found = []
+        with self.bars.stage(stage, f"{len(items)} {unit}") as bar:
+            for k, item in enumerate(items):
+                found.append(compute(item, lambda done, total, k=k: bar.reached(k + done / (total or 1), len(items))))
+                bar.reached(k + 1, len(items))
+        return found

@@ -1,0 +1,150 @@
+"""Rigs in a report: who wins on a real machine's parameter sets, and how well its twin repeats records of it."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, printable
+from smc_mujoco.common.text import joined
+from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.leaderboard import Board, leaderboard
+from smc_mujoco.evidence.report import words
+from smc_mujoco.evidence.report.plan import Report, Work
+from smc_mujoco.studies.study import study
+from smc_mujoco.evidence.rigs import ensemble, records
+from smc_mujoco.evidence.rigs.rig import Rig, rig, rigs
+
+POINTS = 1200  # of a curve; chosen
+FALLS = -1000.0  # percent, of a fit below which the twin is nowhere near the record; chosen
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Machine:
+    """Laws compared on every parameter set of a rig: a board for each metric, whose conditions are the sets."""
+
+    rig: Rig
+    boards: tuple[Board, ...]
+
+    @property
+    def laws(self) -> dict[str, str]:
+        """Name of each law -> its label, in the order of the rig."""
+        return {law.name: words.style.law_name(law) for law in self.rig.laws}
+
+    @property
+    def colours(self) -> dict[str, str]:
+        """Name of each law -> its colour, all different."""
+        return dict(zip(self.laws, words.style.law_colours(self.rig.laws), strict=True))
+
+    def unit(self, metric: str) -> str:
+        """Return the unit of a metric on this machine."""
+        scenario = self.rig.scenario("none")
+        return CATALOGUE[metric].unit_for(scenario.plant.unit, scenario.efforts[0])
+
+    def sentence(self, board: Board) -> str:
+        """Return who wins in a metric, and whether on every parameter set."""
+        count, won, what = len(board.blocks), ensemble.wins(board), words.metric(board.metric)
+        what = what[:1].upper() + what[1:]
+        if board.winner:
+            return f"{what}: {self.laws[board.winner]} wins on all {count} sets of quantities: the ranking survives."
+        if not won:
+            return f"{what}: no law wins on any of the {count} sets of quantities."
+        others = joined([f"{self.laws[law]} on {number}" for law, number in won.items()])
+        return f"{what}: no law wins on all sets of quantities; {others} of {count}."
+
+    def medians(self, metric: str, law: str) -> list[float]:
+        """Return a law's medians on the sets."""
+        board = next(board for board in self.boards if board.metric == metric)
+        return [block.medians[law] for block in board.blocks if law in block.medians]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Repeated:
+    """A record that the twin repeated.
+
+    Attributes:
+      rig, name: of the machine, and of the record's file.
+      fits: the twin’s quantities, published ones, or "do nothing" -> column -> percent.
+      t: s, (K,); measured, twin: column -> values, (K,), in few points.
+      why: why it could not be repeated, "" where it was.
+    """
+
+    rig: Rig
+    name: str
+    fits: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
+    t: np.ndarray = dataclasses.field(default_factory=lambda: np.empty(0))
+    measured: Mapping[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    twin: Mapping[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    why: str = ""
+
+
+def machines(work: Work) -> tuple[Machine, ...]:
+    """Return the comparison of each rig's laws on its parameter sets."""
+    plan, found = work.plan, []
+    for name in plan.rigs:
+        twin = rig(name)
+        runs = ensemble.runs(twin, seeds=plan.seeds, duration=plan.duration)
+        with work.bars.stage("rigs", f"{len(runs)} runs", bar=False):
+            table = study(runs, work.folder / "rigs" / name, threads=work.threads, progress=work.bars.shown)
+        found.append(Machine(rig=twin, boards=tuple(leaderboard(table, words.HEADLINE))))
+    return tuple(found)
+
+
+def repeated(work: Work, folder: Path | None) -> tuple[Repeated, ...]:
+    """Return the records of a folder, each repeated by the twin of the machine whose columns it has."""
+    files = [] if folder is None else read(folder)
+
+    def compute(file: tuple[Path, Rig, Mapping[str, np.ndarray]], report: Report) -> Repeated:
+        path, twin, record = file
+        try:
+            fits = {"the twin’s": twin.fit(record)}
+            fits |= {name: twin.set(name).fits([record])[0] for name in twin.published}
+            ((predicted, measured, t),) = twin.predictions([record])
+        except ScenarioError as error:
+            return Repeated(rig=twin, name=path.name, why=str(error))
+        fits["do nothing"] = twin.idle(record)
+        step = -(-len(t) // POINTS)
+        thin = [{name: values[::step] for name, values in columns.items()} for columns in (measured, predicted)]
+        return Repeated(rig=twin, name=path.name, fits=fits, t=t[::step], measured=thin[0], twin=thin[1])
+
+    return tuple(work.each("records", "records", files, compute)) if files else ()
+
+
+def read(folder: Path) -> list[tuple[Path, Rig, Mapping[str, np.ndarray]]]:
+    """Return the records in a folder with their rigs: CSV and npz files that have all columns of a rig.
+
+    Raises:
+      ScenarioError: not a folder, or none of its files has the columns of a rig.
+    """
+    if not folder.is_dir():
+        raise ScenarioError(f"no folder at {printable(str(folder))}: give one with records, CSV or npz files")
+    known = [twin for twin in map(rig, rigs()) if twin.free]
+    found = []
+    for path in sorted(file for file in folder.iterdir() if file.suffix in (".csv", ".npz")):
+        record = records.load(path)
+        if isinstance(record, Trace):
+            continue
+        mine = next((twin for twin in known if set(twin.needed) <= set(record)), None)
+        if mine is not None:
+            found.append((path, mine, record))
+    if not found:
+        has = "; ".join(f"{twin.name} {', '.join(twin.needed)}" for twin in known)
+        raise ScenarioError(
+            f"no record in {printable(str(folder))} has the columns of a rig: give those of one of {has}"
+        )
+    return found
+
+
+def fit(values: Mapping[str, float], unit: str = "%") -> str:
+    """Return a fit in words, "theta 94.1, u 86.7 %"; "falls" for a twin that leaves its machine's range."""
+    if unit == "%" and min(values.values()) < FALLS:
+        return "falls"
+    digits = 1 if unit == "%" else 3
+    return ", ".join(f"{name} {value:z.{digits}f}" for name, value in values.items()) + f" {words.typeset(unit)}"
+
+
+def reached() -> list[Rig]:
+    """Return the rigs whose fit of public records is kept with them."""
+    return [twin for twin in map(rig, rigs()) if twin.reached]

@@ -1,0 +1,148 @@
+"""A study's table as a report shows it: each law's score in every cell, and the laws' places over many cells.
+
+A cell is a plant in a condition. Every `metric` is the name of one in `metrics`, or "settles".
+"""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from smc_mujoco.analysis import paired_runs
+from smc_mujoco.analysis.bootstrap import median_of
+from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.studies.leaderboard import Board, leaderboard
+from smc_mujoco.evidence.report import words
+
+if TYPE_CHECKING:
+    from smc_mujoco.studies.table import Table
+
+
+class Score(NamedTuple):
+    """A law's median in a cell over the seeds, with its 95 % interval; inf is never.
+
+    `best`: no other law is better there, see `ranking`; several laws may be. `seeds`: of the runs, `runs`: how many of
+    them are distinct, `failed`: how many have no score. `floor`: the least difference that counts between small values.
+    """
+
+    plant: str
+    condition: str
+    law: str
+    metric: str
+    median: float
+    low: float
+    high: float
+    best: bool
+    seeds: int
+    failed: int
+    runs: int
+    floor: float = 0.0
+
+
+class Place(NamedTuple):
+    """A law's place in a metric over all cells of a plant, or of all plants, where `plant` is "".
+
+    `mean`: its mean rank over the cells, 1 is the best. `low`, `high`: the 95 % interval of its place, NaN of all
+    plants. `best`: no law is better in any cell. `median`: of the cells' medians, NaN where units differ; of "settles"
+    the share of runs that settle. `wins`, `losses`: in how many of the `of` cells it wins, and in how many another law
+    is better. `why`: why there is no winner, "" if there can be one.
+    """
+
+    plant: str
+    metric: str
+    law: str
+    mean: float
+    low: float
+    high: float
+    best: bool
+    median: float
+    wins: int
+    losses: int
+    of: int
+    why: str
+
+
+def scores(table: "Table") -> tuple[Score, ...]:
+    """Return a score for every law, cell and column of the leaderboard, in the table's order."""
+    columns = [table.column(name).tolist() for name in ("plant", "condition", "law", "failure")]
+    failed = Counter(tuple(cell) for *cell, failure in zip(*columns, strict=True) if failure is not None)
+    order = list(dict.fromkeys(columns[2]))
+    boards = leaderboard(table, words.COLUMNS, by=("plant",))
+    blocks = {(block.plant, block.condition, board.metric): block for board in boards for block in board.blocks}
+    by_row = {metric: paired_runs.values(table, metric) for metric in words.COLUMNS}
+    found = []
+    for group in paired_runs.groups(table, by=("plant", "condition")):
+        ((plant, condition),) = group.blocks
+        (ran,) = paired_runs.scenarios(table, group)
+        for metric in words.COLUMNS:
+            _, by_law, _ = group.scores(by_row[metric])
+            for law in sorted(by_law, key=order.index):
+                block, interval = blocks[plant, condition, metric], median_of(by_law[law])
+                score = Score(
+                    plant=plant,
+                    condition=condition,
+                    law=law,
+                    metric=metric,
+                    median=interval.median,
+                    low=interval.low,
+                    high=interval.high,
+                    best=law in block.best,
+                    seeds=block.seeds,
+                    failed=failed[plant, condition, law],
+                    runs=block.runs,
+                    floor=paired_runs.floor(ran, CATALOGUE[metric].unit),
+                )
+                found.append(score)
+    return tuple(found)
+
+
+def places(table: "Table") -> tuple[Place, ...]:
+    """Return every law's place in each metric that the overview ranks, by plant and over all plants."""
+    boards = leaderboard(table, words.RANKED, by=("plant",))
+    found = [place for board in boards for place in _places(board)]
+    by_law: dict[tuple[str, str], list[Place]] = {}
+    for place in found:
+        by_law.setdefault((place.metric, place.law), []).append(place)
+    most = {metric: max(len(own) for (name, _), own in by_law.items() if name == metric) for metric, _ in by_law}
+    return (*found, *(_overall(own) for (metric, _), own in by_law.items() if len(own) == most[metric]))
+
+
+def _places(board: Board) -> list[Place]:
+    return [
+        Place(
+            plant=board.group["plant"],
+            metric=board.metric,
+            law=entry.law,
+            mean=entry.rank.mean,
+            low=entry.rank.low,
+            high=entry.rank.high,
+            best=entry.rank.best,
+            median=entry.interval.median,
+            wins=len(board.wins(entry.law)),
+            losses=len(board.losses(entry.law)),
+            of=len(board.blocks),
+            why=board.why,
+        )
+        for entry in board.entries
+    ]
+
+
+def _overall(by_plant: Sequence[Place]) -> Place:
+    """Return a law's place over all plants, from its places on each; every cell weighs the same."""
+    first, cells = by_plant[0], [place.of for place in by_plant]
+    mean, median = np.average([(place.mean, place.median) for place in by_plant], axis=0, weights=cells).tolist()
+    return first._replace(
+        plant="",
+        mean=mean,
+        low=math.nan,
+        high=math.nan,
+        best=all(place.best for place in by_plant),
+        median=median if first.metric == SETTLES else math.nan,
+        wins=sum(place.wins for place in by_plant),
+        losses=sum(place.losses for place in by_plant),
+        of=sum(cells),
+        why=first.why if len({place.why for place in by_plant}) == 1 else "",
+    )

@@ -1,0 +1,278 @@
+"""The stages of a report: records, grid, claims, margins, maps, rigs, chattering, scenes, statistics.
+
+    findings = find(QUICK, Path("report"), threads=2, bars=Bars(True))
+
+Killed and called again, the grid continues where it stopped. The other stages continue with the first plant, map, film
+or list of claims that is missing.
+"""
+
+import contextlib
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from smc_mujoco.analysis import margins as margin_search
+from smc_mujoco.analysis import region_of_attraction as regions
+from smc_mujoco.analysis.margins import Margin
+from smc_mujoco.analysis.region_of_attraction import Basin
+from smc_mujoco.analysis.tuning import result
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import read_json, write_json
+from smc_mujoco.control import gain_sets as sets
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.grid import grid as make_grid
+from smc_mujoco.simulation.run import run
+from smc_mujoco.evidence.audit import audit
+from smc_mujoco.evidence.audit.verdict import Claim
+from smc_mujoco.studies.cache import cached
+from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.evidence.papers.gaber.claims import lyapunov
+from smc_mujoco.evidence.report import about, films, oscillation, rigs, scores, words
+from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
+from smc_mujoco.evidence.report.scores import Place, Score
+from smc_mujoco.studies.study import study
+from smc_mujoco.studies.table import Table
+
+FIELD_POINTS = 121  # of a map of V', along each axis
+ON_SURFACE = 1e-6  # |s| up to this is s = 0, as in the claim on V'
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Front:
+    """Gains of a law that none beats in both tracking (s^2) and variation (1/s), and those of the study (`chosen`)."""
+
+    plant: str
+    law: str
+    tracking: tuple[float, ...]
+    variation: tuple[float, ...]
+    chosen: tuple[float, float]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Field:
+    """V' = s s' on the state plane under the paper's law; x (nx,), v (nv,), vdot (nv, nx), s (nv, nx)."""
+
+    plant: str
+    x: np.ndarray
+    v: np.ndarray
+    vdot: np.ndarray
+    s: np.ndarray
+
+    @property
+    def rises(self) -> np.ndarray:
+        """Where V' is positive off s = 0, bool."""
+        return (self.vdot > 0) & (np.abs(self.s) > ON_SURFACE)
+
+    @property
+    def share(self) -> float:
+        """The share of the plane in which V rises."""
+        return float(self.rises.mean())
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Findings:
+    """Everything that a report shows. `by_set`: set of gains -> the margins that are searched under every set."""
+
+    scores: tuple[Score, ...]
+    places: tuple[Place, ...]
+    claims: tuple[Claim, ...]
+    fields: tuple[Field, ...]
+    fronts: tuple[Front, ...]
+    margins: tuple[Margin, ...]
+    by_set: Mapping[str, tuple[Margin, ...]]
+    oscillations: tuple[oscillation.Oscillation, ...]
+    basins: tuple[Basin, ...]
+    machines: tuple[rigs.Machine, ...]
+    repeated: tuple[rigs.Repeated, ...]
+    scenes: tuple[films.Scene, ...]
+    about: about.About
+
+    @property
+    def plants(self) -> list[str]:
+        """The plants in the order of the grid."""
+        return list(dict.fromkeys(score.plant for score in self.scores))
+
+    @property
+    def laws(self) -> list[str]:
+        """The laws in the order of the grid."""
+        return list(dict.fromkeys(score.law for score in self.scores))
+
+    @property
+    def conditions(self) -> list[str]:
+        """The conditions in the order of the grid."""
+        return list(dict.fromkeys(score.condition for score in self.scores))
+
+
+def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Path | None = None) -> Findings:
+    """Return everything that a report shows, computed or read from the folder; `records`: folder of rigs' records."""
+    work = Work(plan=plan, folder=folder, threads=threads, bars=bars)
+    repeated = rigs.repeated(work, records)  # first, as bad files are refused
+    table = grid(work)
+    claims = judged_claims(work, table)
+    margins = all_margins(work)
+    by_set, basins, scenes = margins_by_set(work, margins), all_basins(work), all_scenes(work)
+    machines = rigs.machines(work)
+    oscillations = oscillation.oscillations(work)
+    no_film = films.missing() if plan.filmed else None
+    with bars.stage("statistics"):
+        return Findings(
+            scores=scores.scores(table),
+            places=scores.places(table),
+            claims=claims,
+            fields=fields(plan),
+            fronts=fronts(plan),
+            margins=margins,
+            by_set=by_set,
+            oscillations=oscillations,
+            basins=basins,
+            machines=machines,
+            repeated=repeated,
+            scenes=scenes,
+            about=about.about(plan, table, bars.spent, no_film and no_film.removeprefix("no film: ")),
+        )
+
+
+def grid(work: Work) -> Table:
+    """Return the table of the grid's runs."""
+    plan = work.plan
+    runs = make_grid(plan.plants, plan.laws, plan.conditions, plan.seeds, GAINS, plan.duration)
+    with work.bars.stage("grid", f"{len(runs)} runs", bar=False):
+        return study(runs, work.folder / "study", threads=work.threads, progress=work.bars.shown)
+
+
+def judged_claims(work: Work, table: Table) -> tuple[Claim, ...]:
+    """Return the claims with their verdicts; the table's runs are not made again."""
+    plan = work.plan
+    total = audit.evaluations(plan.claims, None, plan.quick)
+    with work.bars.stage("claims", f"{total} judgements", total) as bar:
+        return cached(
+            work.folder / "claims.json",
+            [plan.claims, plan.quick, plan.plants, plan.laws, plan.conditions, plan.seeds, plan.duration],
+            lambda: tuple(audit.claims(table, plan.claims, None, plan.quick, None, work.threads, bar.advance)),
+            lambda claims, path: write_json(path, [dataclasses.asdict(claim) for claim in claims]),
+            lambda path: tuple(Claim(**entry) for entry in read_json(path)),
+        )
+
+
+def all_margins(work: Work) -> tuple[Margin, ...]:
+    """Return every law's margins, plant by plant."""
+    plan = work.plan
+    laws = dict.fromkeys(plan.plants if plan.kinds else (), plan.laws)
+    return _margins(work, "margins", GAINS, laws, plan.kinds)
+
+
+def margins_by_set(work: Work, found: Sequence[Margin]) -> dict[str, tuple[Margin, ...]]:
+    """Return set of gains -> margins of the kinds that are compared, of the laws that the set has gains for."""
+    plan = work.plan
+    if not plan.compared:
+        return {}
+    by_set = {GAINS: tuple(margin for margin in found if margin.kind in plan.compared)}
+    for name in (name for name in sets.SETS if name != GAINS):
+        laws = {plant: tuple(laws) for plant, laws in about.laws_of(plan, name).items()}
+        by_set[name] = _margins(work, f"margins-{name}", name, laws, plan.compared)
+    return by_set
+
+
+def _margins(
+    work: Work, stage: str, gains: str, laws: Mapping[str, tuple[str, ...]], kinds: tuple[str, ...]
+) -> tuple[Margin, ...]:
+    """Return margins of kinds under a set of gains; `laws`: plant -> laws."""
+
+    def compute(plant: str, report: Report) -> list[Margin]:
+        names, quick = laws[plant], work.plan.quick
+        return cached(
+            work.folder / f"{stage}-{plant}.json",
+            [names, kinds, quick, gains],
+            lambda: margin_search.margins(
+                [plant], names, kinds, gains=gains, quick=quick, threads=work.threads, report=report
+            ),
+            margin_search.save,
+            margin_search.load,
+        )
+
+    return tuple(margin for found in work.each(stage, "plants", list(laws), compute) for margin in found)
+
+
+def all_basins(work: Work) -> tuple[Basin, ...]:
+    """Return the maps of regions of attraction, one for each plant and law."""
+    plan = work.plan
+
+    def compute(pair: tuple[str, str], report: Report) -> Basin:
+        plant, law = pair
+        return cached(
+            work.folder / f"region-{plant}-{law}.json",
+            [plan.points, plan.region, GAINS],
+            lambda: regions.basin(
+                plant, law, plan.points, gains=GAINS, duration=plan.region, threads=work.threads, report=report
+            ),
+            Basin.save,
+            regions.load,
+        )
+
+    pairs = [(plant, law) for plant in plan.basins for law in plan.basin_laws]
+    return tuple(work.each("regions", "maps", pairs, compute))
+
+
+def all_scenes(work: Work) -> tuple[films.Scene, ...]:
+    """Return runs side by side: their curves, and films where something renders."""
+    plan = work.plan
+
+    def compute(scene: tuple[str, str], report: Report) -> films.Scene:
+        plant, condition = scene
+        runs = scenarios.comparison(plant, condition, plan.scene_laws, duration=plan.scene, gains=GAINS)
+        traces = run(list(runs.values()), work.threads)
+        film = poster = None
+        if scene in plan.scenes[: plan.filmed] and films.missing() is None:
+            film, poster = cached(
+                work.folder / f"film-{plant}-{condition}.webm",
+                [plan.scene_laws, plan.scene, GAINS, films.SIZE, films.FPS, films.VP9],
+                lambda: films.film(traces, f"{words.plant(plant)}, {words.condition(condition)}", report),
+                films.save,
+                films.load,
+            )
+        first = traces[0].scenario
+        return films.Scene(
+            plant=plant,
+            condition=condition,
+            unit=first.plant.unit,
+            u_max=float(np.max(first.resolved.u_max)),
+            curves=tuple(films.curve(trace) for trace in traces),
+            film=film,
+            poster=poster,
+            seconds=plan.scene,
+        )
+
+    return tuple(work.each("scenes", "scenes", plan.scenes, compute))
+
+
+def fields(plan: Plan) -> tuple[Field, ...]:
+    """Return V' of the paper's law on the state plane of every plant."""
+    found = []
+    for name in plan.plants if words.PAPER in plan.laws else ():
+        plant, law = find_plant(name), sets.law(name, words.PAPER, GAINS)
+        lam, k1 = law.gains["lam"], law.gains["k1"]
+        x, v = lyapunov.plane(plant, k1, FIELD_POINTS)
+        rate, s = lyapunov.vdot(plant, lam, k1, x, v), lyapunov.surface(plant, lam, k1, x, v)
+        found.append(Field(plant=name, x=x[0], v=v[:, 0], vdot=rate, s=s))
+    return tuple(found)
+
+
+def fronts(plan: Plan) -> tuple[Front, ...]:
+    """Return error against effort, of the tunings that come with the package."""
+    found = []
+    for plant in plan.plants:
+        for law in plan.laws:
+            with contextlib.suppress(ScenarioError):
+                tuned = result.shipped(plant, law)
+                best = min(tuned.finals, key=lambda e: e.objective)  # its gains are the study's, and on the front
+                front = Front(
+                    plant=plant,
+                    law=law,
+                    tracking=tuple(e.tracking for e in tuned.front),
+                    variation=tuple(e.variation for e in tuned.front),
+                    chosen=(best.tracking, best.variation),
+                )
+                found.append(front)
+    return tuple(found)

@@ -1,0 +1,82 @@
+"""Rankings of laws over a rig's parameter sets: does a winner win whichever of them is true?
+
+table = smc.study(ensemble.runs(smc.rig("qube_servo")), "qube")
+print(ensemble.verdict(smc.leaderboard(table)))
+"""
+
+import dataclasses
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control.law import Law
+from smc_mujoco.simulation.grid import grid
+from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.evidence.rigs.rig import Rig, Values
+
+BY_STARTS = ("x0", "v0")  # fields of a rig's machine that the starts of the grid replace
+
+
+def runs(
+    rig: Rig,
+    laws: Sequence[str | Law] | None = None,
+    seeds: int = 20,
+    gains: str = "default",
+    duration: float = 10.0,
+    starts: Starts | None = None,
+) -> list[Scenario]:
+    """Return scenarios of every law on every parameter set from every seed. The set is the condition.
+
+    Args:
+      rig: a rig with an ensemble.
+      laws: laws or their names; None: the rig's own.
+      seeds, gains, duration: as in `smc.grid`.
+      starts: as in `smc.grid`; None: within 20 % of the rig's x0.
+
+    Raises:
+      ScenarioError: a rig without an ensemble or, if none are given, without laws; arguments that `smc.grid` refuses.
+    """
+    if not rig.ensemble:
+        raise ScenarioError(
+            f"{rig.name} has only one parameter set: choose a rig with an ensemble, such as qube_servo, or identify it "
+            "from records and draw other sets with Identified.drawn"
+        )
+    if not (chosen := list(rig.laws if laws is None else laws)):
+        raise ScenarioError(f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)")
+    found, around = [], starts or Starts(x0=rig.x0)
+    for name, member in rig.members().items():
+        fields: dict[str, Any] = member.machine(Values(**member.values))
+        own = {key: value for key, value in fields.items() if key not in BY_STARTS}
+        plant = own.pop("plant")
+        base = grid([plant], chosen, ["nominal"], seeds, gains, duration, around)
+        free: dict[str, Any] = {"u_max": None, "physics_step": None} | own
+        found += [dataclasses.replace(scenario, **free).named(name) for scenario in base]
+    return found
+
+
+def wins(board: Any) -> dict[str, int]:
+    """Return law -> number of parameter sets on which it wins.
+
+    Args:
+      board: a `leaderboard.Board` whose conditions are the sets.
+    """
+    return dict(Counter(block.winner for block in board.blocks if block.winner).most_common())
+
+
+def verdict(boards: Sequence[Any]) -> str:
+    """Return a line for each metric: whether one law wins on every parameter set.
+
+    Args:
+      boards: of `smc.leaderboard`, whose conditions are the sets.
+    """
+    lines = []
+    for board in boards:
+        count, found = len(board.blocks), wins(board)
+        if board.winner:
+            lines.append(f"{board.metric}: {board.winner} wins on all {count} parameter sets")
+            continue
+        others = ", ".join(f"{law} on {number}" for law, number in found.items()) or "none on any"
+        lines.append(f"{board.metric}: no law wins on all {count} parameter sets ({others})")
+    return "\n".join(lines)

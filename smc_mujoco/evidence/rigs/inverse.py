@@ -1,0 +1,95 @@
+"""Inverse dynamics: the torques that a measured motion takes, and the measured torques, both below 5 Hz.
+
+Velocities and accelerations are those of cubics through the positions. The noise of an acceleration, times the inertia,
+may exceed the torque itself. Least squares would then find too small an inertia, which reduces that noise. So computed
+and measured torques go through the same low-pass filter, forward and backward.
+Source: M. Gautier, "Dynamic identification of robots with power model", IEEE ICRA 1997 (the parallel filter).
+"""
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.evidence.rigs.records import Columns, Record, step_of
+
+WINDOW, ORDER = 0.04, 3  # s, and degree, of the cubic about each sample; chosen
+PERIOD = 0.01  # s, between the samples that are compared; chosen: the cubics leave nothing above 30 Hz
+# Hz, and number of poles, of the low-pass filter. Chosen: three times the fastest public exciting motions, 1.6 Hz.
+CUTOFF, POLES = 5.0, 4
+END = 0.1  # s, left out at both ends, where the filter knows only one side; chosen
+MIN_DURATION, MAX_STEP = 1.0, 0.05  # s: of a record, and between its samples; chosen
+
+
+class Filter:
+    """The filter of a record's columns at its own rate."""
+
+    def __init__(self, data: Record, columns: Columns):
+        """Make the filter of a record.
+
+        Raises:
+          ScenarioError: the record is too short, or is sampled too slowly.
+        """
+        from scipy.signal import butter
+
+        t = data[columns.time]
+        self.data, self.step = data, step_of(data, columns)
+        if t[-1] - t[0] < MIN_DURATION or self.step > MAX_STEP:
+            raise ScenarioError(
+                f"the record lasts {t[-1] - t[0]:.3g} s, with a sample every {self.step:.3g} s: for its torques give "
+                f"at least {MIN_DURATION:g} s, with a sample every {MAX_STEP:g} s or more often"
+            )
+        self.stride = max(1, round(PERIOD / self.step))
+        self.poles = butter(POLES, CUTOFF, fs=1.0 / (self.stride * self.step), output="sos")
+
+    def cubic(self, name: str, derivative: int = 0) -> np.ndarray:
+        """Return a column or its derivative, (N,), at the samples that are compared, from cubics about each of them."""
+        from scipy.signal import savgol_filter
+
+        samples = 2 * max(2, round(WINDOW / self.step / 2)) + 1
+        smooth = savgol_filter(self.data[name], samples, ORDER, deriv=derivative, delta=self.step)
+        return np.asarray(smooth)[:: self.stride]
+
+    def low(self, values: np.ndarray) -> np.ndarray:
+        """Return the part of values (N,) below CUTOFF, without the ends."""
+        from scipy.signal import sosfiltfilt
+
+        return self.inner(sosfiltfilt(self.poles, values))
+
+    def inner(self, values: np.ndarray) -> np.ndarray:
+        """Return values (N,) without the ends."""
+        cut = round(END / (self.stride * self.step))
+        return values[cut : len(values) - cut]
+
+
+def times(data: Record, columns: Columns) -> np.ndarray:
+    """Return the times at which torques are compared, s."""
+    own = Filter(data, columns)
+    return own.inner(data[columns.time][:: own.stride])
+
+
+def measured(data: Record, columns: Columns) -> Record:
+    """Return the recorded torque of each joint, below CUTOFF, N m."""
+    own = Filter(data, columns)
+    return {name: own.low(own.cubic(name)) for name in columns.torque}
+
+
+def torques(plant: Plant, data: Record, columns: Columns) -> Record:
+    """Return the torque of each joint that the measured motion takes, below CUTOFF, N m, by MuJoCo's inverse dynamics.
+
+    Args:
+      plant: with the joints of the record.
+      data: the record.
+      columns: names of its columns.
+    """
+    own, model = Filter(data, columns), plant.load()
+    state, joints, dofs = mujoco.MjData(model), joint_ids(model), dof_ids(model)
+    x, v, a = (np.column_stack([own.cubic(name, order) for name in columns.x]) for order in range(3))
+    found = np.empty_like(x)
+    at = model.jnt_qposadr[joints]
+    for k in range(len(x)):
+        state.qpos[at], state.qvel[dofs], state.qacc[dofs] = x[k], v[k], a[k]
+        mujoco.mj_inverse(model, state)
+        found[k] = state.qfrc_inverse[dofs]
+    return {name: own.low(found[:, i]) for i, name in enumerate(columns.torque)}

@@ -1,0 +1,484 @@
+"""A rig: a real machine as data, which makes scenarios of that machine and repeats its records in simulation.
+
+    rig = smc.rig("qube_servo")
+    rig.scenario(law="none", duration=5.0)         # a Scenario of that machine
+    rig.fit(record)                                # {"theta": 95.1, ...}, percent
+
+A rig's file states its quantities, each with unit and source, and a function that makes the fields of a Scenario from
+them. Identification changes the quantities. Everything else is done with scenarios, runs and traces.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.common.catalogue import Catalogue
+from smc_mujoco.common.errors import ScenarioError, find, number
+from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.registry import catalogue_of
+from smc_mujoco.control.law import Law
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.time_series import TimeSeries
+from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.evidence.rigs import inverse, records
+from smc_mujoco.evidence.rigs.records import Columns, Record
+
+Values = SimpleNamespace  # quantities by name
+Source = Mapping[str, Any] | Trace  # a record as columns by name, or as a simulated run
+FAR_BETTER = 50.0  # percent: if radians improve a fit by this, and beyond this, its angles are in degrees; chosen
+UNSCORED = -1e3  # percent: fit of a replay that fails or leaves the machine's range
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """A number of a rig.
+
+    Attributes:
+      value: in SI units.
+      unit: such as "kg m^2" or "V s/rad"; "" for none.
+      source: where the number comes from: a publication and its licence, or the records it was identified from.
+      least, most: range that identification keeps to.
+    """
+
+    value: float
+    unit: str
+    source: str
+    least: float = -np.inf
+    most: float = np.inf
+
+
+@dataclasses.dataclass(frozen=True)
+class Reached:
+    """How well a set of quantities fits records that the package does not contain. Tests check it if they have them.
+
+    Attributes:
+      quantities: "identified", the name of a published set, or "do nothing", see `Rig.idle`.
+      records: which records, and what the values are, such as their medians.
+      values: column or joint -> value, in `unit`.
+      unit: "%" of `Rig.fit`, or that of a residual rms.
+    """
+
+    quantities: str
+    records: str
+    values: Mapping[str, float]
+    unit: str = "%"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Rig:
+    """A real machine.
+
+    Attributes:
+      name: as in `smc.rigs()`.
+      label: what it is, in a line.
+      quantities: name -> Quantity.
+      machine: function of the quantities, by name, that returns fields of a Scenario: plant, actuator, sensor, control
+        period and so on.
+      controller: the rig's own law, if it is known. Closed-loop records are replayed with it.
+      columns: names of its records' columns.
+      commands: function of a record and the index of the start, that returns what the rig adds to its controller's u
+        from there on, (K,). None: only the column of the feedforward, if there is one.
+      start, score_from: s after a record's first sample, at which a replay starts, and from which its fit counts.
+      dynamics: function of the quantities, by name, that returns a plant with the joints of the record, for records
+        whose torques are predicted from the measured motion. None: records are replayed.
+      free: names of the quantities that its records determine, which `smc.identify` finds by default.
+      window: s, of the pieces in which identification first repeats a record; each starts from its measured state.
+      published: name of a parameter set -> its values of quantities by name, and its source under "source".
+      ensemble: other sets of quantities that fit about as well, each by name.
+      laws: laws with gains for this machine, which a ranking compares by default.
+      x0: middle of the initial states of a ranking, rad or m, (n,); None: the plant's own.
+      reached: how well it fits records that the package does not contain.
+      about: licence and history of the data, and what the twin predicts well or badly.
+    """
+
+    name: str
+    label: str
+    quantities: Mapping[str, Quantity]
+    machine: Callable[[Values], dict[str, Any]]
+    controller: Law | None = None
+    columns: Columns = dataclasses.field(default_factory=Columns)
+    commands: Callable[[Record, int], np.ndarray] | None = None
+    start: float = 0.0
+    score_from: float = 0.0
+    dynamics: Callable[[Values], Plant] | None = None
+    free: tuple[str, ...] = ()
+    window: float = 1.0
+    published: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
+    ensemble: tuple[Mapping[str, float], ...] = ()
+    laws: tuple[Law, ...] = ()
+    x0: tuple[float, ...] | None = None
+    reached: tuple["Reached", ...] = ()
+    about: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("quantities", "published"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def __repr__(self) -> str:
+        return f"rig({self.name!r})"
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Quantity -> its value."""
+        return {name: quantity.value for name, quantity in self.quantities.items()}
+
+    def with_values(self, values: Mapping[str, float], source: str = "given") -> "Rig":
+        """Return the rig with other values of some quantities.
+
+        Args:
+          values: quantity -> value, SI units.
+          source: where the values come from.
+
+        Raises:
+          ScenarioError: an unknown quantity, or a value out of its range.
+        """
+        changed = dict(self.quantities)
+        for name, value in values.items():
+            known = find(f"quantity of {self.name}", name, changed)
+            new = number(f"{self.name}'s {name}", value, least=known.least, most=known.most)
+            if new != known.value:
+                changed[name] = dataclasses.replace(known, value=new, source=source)
+        return dataclasses.replace(self, quantities=changed)
+
+    def set(self, name: str) -> "Rig":
+        """Return the rig with a published set of parameters."""
+        chosen = dict(find(f"parameter set of {self.name}", name, self.published))
+        return self.with_values(chosen, chosen.pop("source"))
+
+    def members(self) -> dict[str, "Rig"]:
+        """Return name -> the rig with one of its parameter sets: "set 1" for its own, then those of the ensemble."""
+        sets = {f"set {i + 2}": self.with_values(each, "ensemble") for i, each in enumerate(self.ensemble)}
+        return {"set 1": self} | sets
+
+    def scenario(self, law: Law | str | None = None, **fields: Any) -> Scenario:
+        """Return a Scenario of the machine.
+
+        Args:
+          law: the law; None: the rig's own controller.
+          fields: fields of a Scenario that replace the rig's.
+
+        Raises:
+          ScenarioError: no law, where the rig's own controller is not known.
+        """
+        if law is None and self.controller is None:
+            raise ScenarioError(f"the controller of {self.name} is not known: give a law")
+        own: dict[str, Any] = {"law": law or self.controller}
+        return Scenario(**self.machine(Values(**self.values)) | own | fields)
+
+    def replay(
+        self,
+        record: Mapping[str, Any],
+        start: float | None = None,
+        duration: float | None = None,
+        rounded: bool = True,
+        closed: bool = True,
+        state: np.ndarray | None = None,
+    ) -> Scenario:
+        """Return the scenario that repeats a record from its measured state on.
+
+        With the rig's own controller the loop is closed: only references and feedforward come from the record, and u is
+        the controller's. Without one, the recorded command is the feedforward of the law "none".
+
+        Args:
+          record: column -> values, (K,); see `columns`.
+          start: s after the first sample; None: the rig's `start`.
+          duration: s; None: to the end of the record.
+          rounded: whether the encoder rounds to counts. The sample in which a count changes cannot be predicted, so
+            `fit` leaves rounding out by default.
+          closed: whether to close the loop if the controller is known; else the recorded command is replayed.
+          state: positions and velocities at the start, as in the columns of `checked`, (2n,); None: those measured.
+
+        Raises:
+          ScenarioError: a start before the record, fewer than 50 samples to repeat, or what `fit` raises of a record.
+        """
+        if self.dynamics is not None:
+            raise ScenarioError(f"records of {self.name} are not replayed, as their torques are predicted: use fit")
+        data = self.checked(record)
+        period = self.step(data)
+        first = round((self.start if start is None else number("start", start, least=0.0)) / period)
+        last = len(data[self.columns.time]) - 1
+        if duration is not None:
+            shortest = round(records.MIN_SAMPLES * period, 9)
+            last = min(last, first + round(number("duration", duration, least=shortest) / period))
+        if last - first < records.MIN_SAMPLES:
+            raise ScenarioError(
+                f"the record of {self.name} lasts {len(data[self.columns.time]) * period:.3g} s, too short to repeat "
+                f"it from {first * period:g} s on: give at least {(first + records.MIN_SAMPLES + 1) * period:.3g} s"
+            )
+        fields = self.machine(Values(**self.values))
+        sensor = fields.get("sensor")
+        if sensor is not None and not rounded:
+            fields["sensor"] = sensor = dataclasses.replace(sensor, counts=np.inf)
+        x, v = records.state(data, self.columns, period, first) if state is None else np.split(state, 2)
+        times = period * np.arange(last + 1 - first)
+
+        def signal(values: np.ndarray) -> TimeSeries:
+            return TimeSeries(times.tolist(), values[: len(times)].tolist())
+
+        own = self.controller if closed else None
+        known: dict[str, Any] = {"law": own or "none", "duration": float(times[-1])}
+        bias = sensor.bias if sensor and not self.columns.state else 0.0
+        known |= {"x0": tuple(x - bias), "v0": tuple(v)}
+        if own is None:
+            known |= {"feedforward": signal(data[self.columns.u][first:]), "control_period": period}
+            if self.controller is None:
+                fields.pop("physics_step", None)
+        else:
+            known["reference"] = signal(data[self.columns.reference][first:])
+            added = data.get(self.columns.feedforward, np.zeros(last + 1))[first:]
+            known["feedforward"] = signal(added if self.commands is None else self.commands(data, first))
+        return Scenario.recorded(**fields | known)
+
+    def measured(self, record: Mapping[str, Any], start: float | None = None, duration: float | None = None) -> Trace:
+        """Return a record as a trace of the machine, for figures and films beside those of twins.
+
+        x and u are measured, v follows from cubics through the positions, and what was not measured is 0.
+
+        Args:
+          record, start, duration: as in `replay`, whose scenario the trace has.
+        """
+        scenario = self.replay(record, start, duration, rounded=False)
+        data, period, n = self.checked(record), scenario.control_period, scenario.plant.n
+        first, count = round((self.start if start is None else start) / period), scenario.samples
+        part = slice(first, first + count + 1)
+        bias = scenario.sensor.bias if scenario.sensor else 0.0
+        x, v, u, r = np.zeros((4, count + 1, n))
+        for i, name in enumerate(self.columns.x):
+            x[:, i] = data[name][part] - bias
+            v[:, i] = records.rate(data[name], period)[part]
+        u[:, 0] = data[self.columns.u][part]
+        if self.columns.reference in data:
+            r[:, 0] = data[self.columns.reference][part]
+        t, zero = period * np.arange(count + 1), np.zeros((count + 1, n))
+        return Trace(
+            t=t, x=x, v=v, u=u, applied=u.copy(), s=zero, d=zero.copy(), r=r, force=zero.copy(), reaction=zero.copy(),
+            scenario=scenario,
+        )  # fmt: skip
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """The columns that a record must have."""
+        return self.columns.needed(self.controller is not None)
+
+    def checked(self, record: Mapping[str, Any]) -> Record:
+        """Return the columns of a record that a replay reads, (K,) each. Raises as `fit`."""
+        return records.checked(record, self.columns, self.period, self.name)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each column that `fit` compares."""
+        if self.dynamics is not None:
+            return dict.fromkeys(self.columns.torque, "N m")
+        scenario = self.scenario("none")
+        joints = dict(zip(self.columns.x, scenario.plant.units, strict=False))
+        return joints | {self.columns.u: scenario.efforts[0]}
+
+    @functools.cached_property
+    def period(self) -> float | None:
+        """The control period of closed-loop records, s; None for records of an open loop, whose rate is their own."""
+        return None if self.controller is None else self.scenario().control_period
+
+    def step(self, data: Record) -> float:
+        """Return the time between samples of a record, as `checked` returns it, s: in a closed loop the period."""
+        return self.period or records.step_of(data, self.columns)
+
+    def reading(self, many: Sequence[Source]) -> tuple["Rig", list[Mapping[str, Any]]]:
+        """Return the rig that repeats some records, and the records as columns.
+
+        For traces, that rig has their law and starts at their start.
+
+        Raises:
+          ScenarioError: traces of several laws or of another plant, or traces and columns.
+        """
+        traces = [one for one in many if isinstance(one, Trace)]
+        if not traces:
+            return self, [one for one in many if not isinstance(one, Trace)]
+        if len(traces) < len(many) or len({trace.scenario.law for trace in traces}) > 1:
+            raise ScenarioError("records are traces of one law, or columns: give one kind at a time")
+        plant = self.machine(Values(**self.values))["plant"].name
+        if other := next((trace.scenario.plant.name for trace in traces if trace.scenario.plant.name != plant), None):
+            raise ScenarioError(
+                f"the trace is one of {other} and the plant of {self.name} is {plant}: give one of its own"
+            )
+        law = traces[0].scenario.law
+        state = tuple(f"{kind} of {name}" for kind in ("position", "velocity") for name in self.columns.x)
+        rig = dataclasses.replace(
+            self, controller=None if law.name == "none" else law, commands=None, dynamics=None, start=0.0,
+            score_from=0.0, columns=dataclasses.replace(self.columns, state=state, torque=()),
+        )  # fmt: skip
+        return rig, [records.of_trace(trace, rig.columns) for trace in traces]
+
+    def fit(self, record: Source, rounded: bool = False) -> dict[str, float]:
+        """Return how well the twin repeats a record: 100 (1 - |y - yhat| / |y - mean y|), percent.
+
+        The norms are over all samples from `score_from` on. 100 is perfect, 0 is as good as the mean.
+
+        Args:
+          record: column -> values, (K,), such as a loaded npz file, see `columns`; or a trace, of which all samples
+            count.
+          rounded: whether the prediction is rounded to counts of the encoder.
+
+        Returns:
+          Name -> percentage, for each joint's column and, in a closed loop, "u". If torques are predicted, for each
+          torque.
+
+        Raises:
+          ScenarioError: a missing column, NaN, time that is not increasing at the rig's rate, a record too short, or
+            angles in degrees.
+        """
+        rig, data = self.reading([record])
+        found = rig.fits(data, rounded)[0]
+        rig.refuse_degrees(data[0], found)
+        return found
+
+    def refuse_degrees(self, record: Mapping[str, Any], fit: Mapping[str, float]) -> None:
+        """Raise ScenarioError if a record has degrees in place of radians.
+
+        It has if it fits far better after all its angles, those of a joint, or the references are converted to radians.
+
+        Args:
+          record: column -> values.
+          fit: of the record as it is. A record that fits well is not simulated again.
+        """
+        if min(fit.values()) >= 100.0 - FAR_BETTER or "rad" not in self.scenario("none").plant.units:
+            return
+        references = (self.columns.reference, *self.columns.others)
+        each = [
+            tuple(name for name in (x, *references[i : i + 1]) if name in record) for i, x in enumerate(self.columns.x)
+        ]
+        references = tuple(name for name in (self.columns.reference, *self.columns.others) if name in record)
+        sets = (self.columns.angles, *((name,) for name in (*self.columns.x, *references)), *each, references)
+        suspects = [names for names in dict.fromkeys(sets) if names]
+        others = self.fits([records.in_radians(record, self.columns, names) for names in suspects])
+        best = max(range(len(suspects)), key=lambda i: min(others[i].values()))
+        if min(others[best].values()) > max(FAR_BETTER, min(fit.values()) + FAR_BETTER):
+            which = "angles" if best == 0 else f"values of {' and '.join(suspects[best])}"
+            raise ScenarioError(
+                f"the {which} of the record of {self.name} look like degrees, as it fits by "
+                f"{records.percent(others[best])} with them in radians and by {records.percent(fit)} as they are: "
+                "give radians"
+            )
+
+    def fits(
+        self, many: list[Mapping[str, Any]], rounded: bool = False, states: Sequence[np.ndarray | None] | None = None
+    ) -> list[dict[str, float]]:
+        """Return `fit` of several records, simulated in one batch, without the check for degrees.
+
+        Args:
+          states: positions and velocities at the start of each, as in `replay`; None: those measured.
+        """
+        found = [percentages(*each[:2]) for each in self.predictions(many, rounded, states)]
+        return [{"u" if name == self.columns.u else name: value for name, value in fit.items()} for fit in found]
+
+    def predictions(
+        self, many: list[Mapping[str, Any]], rounded: bool = False, states: Sequence[np.ndarray | None] | None = None
+    ) -> list[tuple[Record, Record, np.ndarray]]:
+        """Return the predicted columns, the measured columns and their times of each record, from `score_from` on.
+
+        Arguments are those of `fits`.
+        """
+        data, time = [self.checked(record) for record in many], self.columns.time
+        if self.dynamics is not None:
+            return [
+                (self.torques(one), self.measured_torques(one), inverse.times(each, self.columns))
+                for one, each in zip(many, data, strict=True)
+            ]
+        pairs = zip(many, states or [None] * len(many), strict=True)
+        traces = run([self.replay(one, rounded=rounded, state=state) for one, state in pairs])
+        found = []
+        for each, trace in zip(data, traces, strict=True):
+            period = trace.scenario.control_period
+            first, after = round(self.score_from / period), round((self.score_from - self.start) / period)
+            if len(trace.t) < after + records.MIN_SAMPLES:
+                seconds = (first + records.MIN_SAMPLES) * period
+                raise ScenarioError(
+                    f"the record of {self.name} lasts {len(each[time]) * period:.3g} s, too short to score it from "
+                    f"{self.score_from:g} s on: give at least {seconds:.3g} s"
+                )
+            predicted = {name: values[after:] for name, values in self.predicted(trace).items()}
+            parts = {name: each[name][first : first + len(values)] for name, values in predicted.items()}
+            found.append((predicted, parts, each[time][first : first + len(trace.t) - after]))
+        return found
+
+    def idle(self, record: Mapping[str, Any]) -> dict[str, float]:
+        """Return the fit of a machine that does nothing, as a baseline for twins. Names and unit are those of `fit`.
+
+        In a closed loop its joints are where their references are, and u is the feedforward. In an open loop it stays
+        where the record is at `score_from`. If torques are predicted, they are 0.
+        """
+        data, columns = self.checked(record), self.columns
+        if self.dynamics is not None:
+            measured = self.measured_torques(record)
+            return percentages({name: np.zeros_like(values) for name, values in measured.items()}, measured)
+        first = round(self.score_from / self.step(data))
+        measured = {name: data[name][first:] for name in columns.x}
+        if self.period is None:
+            return percentages({name: np.full_like(values, values[0]) for name, values in measured.items()}, measured)
+        references = (columns.reference, *columns.others)
+        zero = np.zeros(len(data[columns.time]))
+        predicted = {
+            name: data.get(references[i] if i < len(references) else "", zero)[first:]
+            for i, name in enumerate(columns.x)
+        }
+        predicted["u"], measured["u"] = data.get(columns.feedforward, zero)[first:], data[columns.u][first:]
+        return percentages(predicted, measured)
+
+    def predicted(self, trace: Trace) -> Record:
+        """Return the columns of a record that a replay gives, (K,) each, without the columns' offset."""
+        sensor = trace.scenario.sensor
+        found = {}
+        for i, name in enumerate(self.columns.x):
+            found[name] = trace.x[:, i] + (sensor.bias if sensor else 0.0)
+            if quantum := sensor.quantum(trace.scenario.plant.units[i] == "rad") if sensor else 0.0:
+                found[name] = quantum * np.floor(found[name] / quantum + 0.5)
+        return found | ({} if trace.scenario.law.name == "none" else {self.columns.u: trace.u[:, 0]})
+
+    def torques(self, record: Mapping[str, Any]) -> Record:
+        """Return the torque of each joint that a record's measured motion takes, below 5 Hz, N m."""
+        return inverse.torques(self._dynamics(), self.checked(record), self.columns)
+
+    def measured_torques(self, record: Mapping[str, Any]) -> Record:
+        """Return the recorded torque of each joint at the same times, through the same filter, N m."""
+        return inverse.measured(self.checked(record), self.columns)
+
+    def _dynamics(self) -> Plant:
+        if self.dynamics is None:
+            raise ScenarioError(f"records of {self.name} are replayed, and their torques are not predicted: use fit")
+        return self.dynamics(Values(**self.values))
+
+
+def percentages(predicted: Record, measured: Record) -> dict[str, float]:
+    """Return the fit of each column, percent: 100 (1 - |y - yhat| / |y - mean y|)."""
+    found = {}
+    for name, values in predicted.items():
+        y = measured[name]
+        with np.errstate(all="ignore"):
+            share = float(np.linalg.norm(y - values) / np.linalg.norm(y - y.mean()))
+        found[name] = 100.0 * (1.0 - share) if np.isfinite(share) else UNSCORED
+    return found
+
+
+@functools.cache
+def catalogue() -> Catalogue[Rig]:
+    """Return every rig of smc_mujoco.evidence.rigs.machines and of other packages, by name."""
+    return catalogue_of("smc_mujoco.evidence.rigs.machines", Rig, "smc_mujoco.rigs")
+
+
+def rig(name: str, **values: float) -> Rig:
+    """Return the rig `name`, with some of its quantities changed.
+
+    Raises:
+      ScenarioError: an unknown rig or quantity, or a value out of its range.
+    """
+    return find("rig", name, catalogue()).with_values(values)
+
+
+def rigs() -> list[str]:
+    """List the names that `rig` knows."""
+    return list(catalogue())

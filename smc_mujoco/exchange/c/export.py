@@ -1,0 +1,224 @@
+"""Export laws to C99: one file without dependencies, with the signature of `smc_law.h` or `smc_joint_law.h`.
+
+The C is translated from the law's Python, operation by operation. In double precision it equals the compiled law bit
+for bit if both use the same C library. A division by zero raises nothing in C: it gives inf or NaN, which ends a run
+too.
+"""
+
+import functools
+import inspect
+import platform
+import re
+import textwrap
+
+from smc_mujoco.common.errors import ScenarioError, shown, unknown, whole
+from smc_mujoco.common.jit import AtAddress
+from smc_mujoco.common.process import TimedOut, timed
+from smc_mujoco.common.version import __version__
+from smc_mujoco.exchange.c import build, joint_translate
+from smc_mujoco.exchange.c.joint_translate import JOINTS, SLOTS
+from smc_mujoco.exchange.c.translate import MATH, Untranslatable, plain, rows, translate
+from smc_mujoco.control.component import Component, Template, Value, written
+from smc_mujoco.control.law import catalogue, known_laws
+from smc_mujoco.control.law import law as find_law
+
+BYTES = {"double": 8, "float": 4, "q15": 8}  # of a number of memory, by type of numbers
+Q15 = "observer_free_q15"
+MAX_JOINTS = 100
+SIZE_FLAGS = ("-std=c99", "-Os", "-ffp-contract=off")  # with which the size of the code is measured
+
+
+def law_to_c(law: Component | Template | str, numbers: str = "double", joints: int | None = None) -> str:
+    """Return a law as one C99 file, with its gains as defaults. `smc.law_from_c` can load it.
+
+    Args:
+      law: a Law, its Template, or its name.
+      numbers: "double", "float", or, only for the paper's law observer_free, "q15": words of 16 bits.
+      joints: for how many joints a law of many joints is written. Default: as many as it has values of a gain.
+
+    Raises:
+      ScenarioError: no such law or type of numbers, no number of joints, or the law uses Python without translation,
+        which is quoted.
+    """
+    if numbers not in BYTES:
+        raise unknown("type of numbers", numbers, BYTES)
+    law = writable(law)
+    joints = number_of_joints(law, joints)
+    if numbers == "q15":
+        law = _in_q15(law)
+        slots, code = 0, _fixed_point(law)
+    else:
+        slots, code = translated(law, numbers == "float", joints)
+    return with_head(law, numbers, slots, code, joints, measured=True)
+
+
+def with_head(law: Component, numbers: str, slots: int, code: str, joints: int, *, measured: bool) -> str:
+    """Return the file of a law that is translated.
+
+    Args:
+      measured: whether its head has the size of the compiled code, which depends on the compiler.
+    """
+    real = ["#define SMC_REAL float"] if numbers == "float" else []
+    body = "\n".join([*includes(code), "", *real, _facts(law, slots, joints), code, ""])
+    return f"{_head(law, numbers, slots, joints, code, _measured(body) if measured else '')}\n{body}"
+
+
+def writable(law: Component | Template | str) -> Component:
+    """Return a law that can be written in C.
+
+    Raises:
+      ScenarioError: it is no law, is in C already, or is of one channel and has gains by channel.
+    """
+    law = find_law(law) if isinstance(law, str) else law() if isinstance(law, Template) else law
+    if not isinstance(law, Component) or law.kind != "law" or law.function is None:
+        raise ScenarioError(f"cannot write {shown(law)} in C: give smc.law(...), your own law, or a name")
+    if isinstance(law.function, AtAddress):
+        raise ScenarioError(f"law {law.name!r} is in C already: take {law.function.__module__}")
+    if not law.joint and law.of_channel(0) is not law:
+        raise ScenarioError(f"law {law} has gains by channel: give one channel's, such as law.of_channel(0)")
+    return law
+
+
+def number_of_joints(law: Component, joints: int | None) -> int:
+    """Return for how many joints the C of a law is: `joints`, or the number of values of a gain; 0 for one channel.
+
+    Raises:
+      ScenarioError: it is not known, or another than the number of values of a gain.
+    """
+    several = {name: len(value) for name, value in law.gains.items() if isinstance(value, tuple)}
+    if not law.joint:
+        if joints is not None:
+            raise ScenarioError(f"law {law.name!r} is of one channel: leave joints={shown(joints)} out")
+        return 0
+    if joints is None and not several:
+        raise ScenarioError(f"law {law.name!r} is of many joints: give their number, such as joints=7")
+    count = whole("joints", next(iter(several.values())) if joints is None else joints, 2, MAX_JOINTS)
+    for name, values in several.items():
+        if values != count:
+            raise ScenarioError(
+                f"gain {name} of {law.name} has {values} values, {written(law.gains[name])}, for {count} joints: give "
+                f"one number, or {count}"
+            )
+    return count
+
+
+def translated(component: Component, single: bool = False, joints: int = 0) -> tuple[int, str]:
+    """Return the memory slots and the C of a component, of a law of many joints for a number of these.
+
+    Raises:
+      ScenarioError: it uses Python without translation, which is quoted.
+    """
+    try:
+        return joint_translate.translate(component, single, joints) if joints else translate(component, single)
+    except Untranslatable as error:
+        raise ScenarioError(f"{component.kind} {component.name!r} cannot be written in C: {error}") from None
+
+
+def includes(code: str) -> list[str]:
+    """Return the lines that include the headers of C that some code needs."""
+    headers = {"math.h": rf"\b(?:{'|'.join(MATH)})f?\(|\bNAN\b|\bINFINITY\b", "stdint.h": r"\bint(?:16|32)_t\b"}
+    return [f"#include <{name}>" for name, needs in headers.items() if re.search(needs, code)]
+
+
+def gain_names(component: Component) -> list[str]:
+    """Return the line that names the elements of gains[], or nothing for a component without gains."""
+    names = ", ".join(f"GAIN_{plain(name)}" for name in component.gains)
+    return [f"enum {{ {names} }};"] if names else []
+
+
+def _in_q15(law: Component) -> Component:
+    """Return the fixed-point law with the gains of a law, which must be the paper's or fixed-point itself."""
+    if law.name == "observer_free" and law.function is catalogue()["observer_free"].function:
+        law = catalogue()[Q15].bind(law.gains, warn=True)
+    if law.function is not catalogue()[Q15].function:
+        raise ScenarioError(
+            f"law {law.name!r} has no Q15 form: give observer_free or {Q15}, or write double or float numbers"
+        )
+    return law
+
+
+def _fixed_point(law: Component) -> str:
+    """Return the C of the fixed-point law, with its table and the words of its gains."""
+    from smc_mujoco.control.laws import observer_free_q15 as q15
+
+    gains, word = law.gains, q15.word.py_func
+    words = {
+        "ON_E": word(gains["k1"] * gains["e_range"] / 8.0, 16.0),
+        "ON_DE": word(gains["de_range"] / 8.0, 16.0),
+        "LAM": word(gains["lam"], gains["u_range"]),
+        "TABLE": rows([str(n) for n in q15.TABLE]),
+    }
+    text = (build.HERE / "q15.c").read_text(encoding="utf-8").rstrip()
+    return re.sub(r"@(\w+)@", lambda found: str(words[found[1]]), text)
+
+
+def _facts(law: Component, slots: int, joints: int) -> str:
+    """Return the header, the names of the gains, and the constants that describe the law."""
+    defaults = ",".join(f"{plain(name)}={_default(value)}" for name, value in law.gains.items())
+    lines = [
+        *([f"#define {JOINTS} {joints}", f"#define {SLOTS} {slots}"] if joints else []),
+        (build.JOINT_HEADER if joints else build.HEADER).read_text(encoding="utf-8"),
+        *gain_names(law),
+        f'const char smc_law_gains[] = "{defaults}";',
+        *([f'const char smc_law_shared[] = "{",".join(map(plain, law.shared))}";'] if joints else []),
+        f"const int smc_law_memory = {slots};",
+        "const int smc_law_real = sizeof(smc_real);",
+        *([] if joints else [f"const int smc_law_degree = {law.relative_degree};"]),
+        f"const int smc_law_modelled = {int(law.requires_model)};",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _default(value: Value) -> str:
+    """Return the default of a gain, or those of all joints."""
+    return " ".join(map(repr, value)) if isinstance(value, tuple) else repr(value)
+
+
+def _head(law: Component, numbers: str, slots: int, joints: int, code: str, size: str) -> str:
+    """Return the comment at the top: formula, source, gains, sizes."""
+    template = known_laws().get(law.name)
+    ours = template is not None and template.function is law.function
+    doc = template.doc if template is not None and ours else inspect.cleandoc(law.function.__doc__ or "")
+    gains = ", ".join(f"{name} = {written(value)}" for name, value in law.gains.items()) or "none"
+    many, each = (f" of {joints} joints", "joint") if joints else ("", "channel")
+    facts = {
+        "gains": f"{gains}; gains[] in this order" + f", {joints} numbers each" * bool(joints),
+        "numbers": {"q15": "words of 16 bits, sums of 32, and double where they meet the plant"}.get(numbers, numbers),
+        "state": f"{slots * BYTES[numbers]} bytes a {each}, memory[{slots * max(joints, 1)}]; no static data but "
+        "constants, no malloc",
+        **({"reads": ", ".join(dict.fromkeys(re.findall(r"->(?!plant)(\w+)", code)))} if joints else {}),
+        **({"code": size} if size else {}),
+        "licence": "use without restriction, without warranty",
+        "build": "cc -std=c99 -O2 -ffp-contract=off, and -lm",
+    }
+    title = f"{law.name}: a control law{many} in C99, written out by smc_mujoco {__version__}."
+    lines = [title, "", *doc.splitlines(), ""]
+    for name, fact in facts.items():
+        lines += textwrap.wrap(f"{name:8} {fact}", 112, subsequent_indent=" " * 9, break_on_hyphens=False)
+    text = "\n".join(f" * {line}".rstrip() for line in lines)[2:]
+    return f"/*{text.replace('*/', '* /').replace('/*', '/ *')}\n */"
+
+
+@functools.cache
+def _tools(command: tuple[str, ...]) -> tuple[str, str]:
+    """Return a compiler's version, and the program that prints the sizes of an object file."""
+    version = timed([*command, "-dumpversion"], 60.0).stdout.strip()
+    return version, timed([*command, "-print-prog-name=size"], 60.0).stdout.strip() or "size"
+
+
+def _measured(code: str) -> str:
+    """Return the bytes of code and of constants in words, or why they are not measured."""
+    source, target, command = build.fresh(".c"), build.fresh(".o"), build.compiler()
+    source.write_text(code, encoding="utf-8")
+    try:
+        done = timed([*command, *SIZE_FLAGS, "-c", str(source), "-o", str(target)], 60.0)
+        version, tool = _tools(tuple(command))
+        table = timed([tool, "-A", str(target)], 60.0).stdout
+    except (OSError, TimedOut):
+        return "not measured: there is no compiler here"
+    sections = [(name, int(n)) for name, n in re.findall(r"^\.(text|rodata)\S*\s+(\d+)", table, re.MULTILINE)]
+    if done.returncode or not sections:
+        return "not measured: the compiler here does not say"
+    text, constants = (sum(n for name, n in sections if name == kind) for kind in ("text", "rodata"))
+    return f"{text} bytes, and {constants} of constants ({command[0]} {version} -Os, {platform.machine()})"

@@ -1,0 +1,332 @@
+"""Laws written in C: `law_from_c` compiles and loads them, and they run in the callback like the library's own.
+
+`smc_law.h` and, for laws of many joints, `smc_joint_law.h`, beside this file, describe the C function. A file is
+compiled together with `glue.c`, which calls the law the way the callback does, so a law of another type is a compiler
+error. A shared library is called directly. Loading, smc_setup and, on request, the law itself are tried in a separate
+process first, because they can hang or crash.
+"""
+
+# pyright: reportCallIssue=false
+# (an intrinsic is called without its typing context)
+import ctypes
+import dataclasses
+import functools
+import hashlib
+import math
+import re
+import shutil
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import carray
+
+from smc_mujoco.common import errors
+from smc_mujoco.common.errors import ScenarioError, number, shown, whole
+from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
+from smc_mujoco.exchange.c import build, sandbox
+from smc_mujoco.control.component import Template, Value, as_gains, template, written
+from smc_mujoco.control.joint_law import ARRAYS
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.control.units import Gain
+
+LIBRARIES = (".so", ".dylib")
+MAX_TIMEOUT = 86_400.0  # s
+DEFAULT_MEMORY = 8
+
+
+class CLaw(AtAddress):
+    """A law in C: called by its address in the callback, and through ctypes in the reference loop.
+
+    Two laws are equal if their machine code is, and so file, headers, flags and compiler.
+
+    Attributes:
+      joints: for how many joints it is; 0 for a law of one channel.
+      sizes: number of gains and of memory slots.
+    """
+
+    def __init__(self, path: Path, symbol: str, file: Path, doc: str | None):
+        self.path, self.symbol = path, symbol
+        self.code = file.read_bytes()
+        self.digest = hashlib.sha256(symbol.encode() + b"\0" + self.code).hexdigest()
+        self._function, self.library = sandbox.entry(str(file), symbol)
+        self.address: int = ctypes.cast(self._function, ctypes.c_void_p).value or 0
+        glued = hasattr(self.library, "smc_mujoco_entry")
+        self.joints = ctypes.c_int.in_dll(self.library, "smc_mujoco_joints").value if glued else 0
+        if not glued:
+            self._trampoline = _trampoline(self.address)
+            self.address = self._trampoline.address
+        self.sizes = 0, 1
+        self.__name__ = re.sub(r"\W", "_", path.stem)
+        self.__module__, self.__doc__ = path.name, doc
+
+    def __call__(self, y: Any, gains: Sequence[Any], memory: np.ndarray) -> tuple[Any, Any]:
+        """Return u and s, two vectors of a law of many joints.
+
+        Args:
+          y: a Measurement, or a JointMeasurement.
+
+        Raises:
+          ArithmeticError: the C function returned anything but 0.
+        """
+        if not self.joints:
+            u, s = self._out(y, gains, memory, 2)
+            return u, s
+        requests = sandbox.Requests(
+            self.joints, lambda w: y.dynamics.coriolis(np.array(w)).tolist(), lambda: y.dynamics.jacobian().ravel()
+        )
+        numbers = sandbox.stored(y[:3], requests, [np.ravel(getattr(y, name)).tolist() for name in ARRAYS])
+        each = [n for g in gains for n in np.broadcast_to(g, self.joints).tolist()]
+        out = self._out(numbers, each, memory, 2 * len(y.x))
+        return np.array(out[: self.joints]), np.array(out[self.joints :])
+
+    def _out(self, y: Sequence[float], gains: Sequence[float], memory: np.ndarray, count: int) -> list[float]:
+        """Call the C function, and return the numbers of its out[]."""
+        out = sandbox.doubles([math.nan] * count)
+        code = self._function(sandbox.doubles(y), sandbox.doubles(gains), memory.ctypes.data_as(sandbox.DOUBLES), out)
+        if code != 0:
+            what, _ = sandbox.FAULTS.get(code, (f"returned {code}", ""))
+            raise ArithmeticError(f"{self.symbol} {what.format(self.sizes[1])}")
+        return out[:]
+
+    def set_up(self, gains: int, memory: int, name: str | None) -> None:
+        """Call smc_setup, and set the name and the number of gains and of memory slots."""
+        if code := sandbox.set_up(self.library):
+            raise ScenarioError(f"{self.path.name}: smc_setup returned {code}: fix it")
+        self.sizes, self.__name__ = (gains, memory), name or self.__name__
+        sandbox.set_sizes(self.library, gains, memory)
+
+    def __repr__(self) -> str:
+        return f"<C function {self.symbol} of {self.path.name}>"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, CLaw) and self._identity() == other._identity()
+
+    def __hash__(self) -> int:
+        return hash(self._identity())
+
+    def _identity(self) -> tuple:
+        """Return the key of equality: a copy, pickled or loaded again, is the same law."""
+        return self.digest, self.sizes, self.__name__
+
+    def __reduce__(self):
+        """Pickle the machine code: another process runs this law even if its file has changed."""
+        return _unpickled, (self.path.name, self.symbol, self.code, self.sizes, self.__name__, self.__doc__)
+
+
+@functools.cache
+def _unpickled(file: str, symbol: str, code: bytes, sizes: tuple[int, int], name: str, doc: str | None) -> CLaw:
+    """Return a law from another process, loaded once in this one."""
+    copy = build.fresh(".so")
+    copy.write_bytes(code)
+    try:
+        law = CLaw(Path(file), symbol, copy, doc)
+    except OSError as error:
+        why = str(error).replace(str(copy), file)
+        raise ScenarioError(
+            f"{file} cannot be loaded ({why}): run it on machines like the one it was built on"
+        ) from None
+    law.set_up(*sizes, name)
+    return law
+
+
+def _trampoline(address: int) -> Function:
+    """Return a function of the callback's type that calls a C function which returns an int."""
+
+    def native(y: Any, g: Any, m: Any, out: Any):
+        output = carray(pointer(out), (2,))
+        output[0], output[1] = math.nan, math.nan  # a result that the law does not set ends its run
+        return call_int(address, y, g, m, out)
+
+    return Function(native)
+
+
+def law_from_c(
+    source: str | Path,
+    *,
+    gains: Mapping[str, float | Gain] | None = None,
+    memory: int | None = None,
+    name: str | None = None,
+    symbol: str = "smc_law",
+    flags: Sequence[str] = (),
+    isolate: bool = False,
+    timeout: float = 10.0,
+    positive: Iterable[str] = (),
+    nonnegative: Iterable[str] = (),
+    degree: int | None = None,
+    plants: Iterable[str] = (),
+    modelled: bool | None = None,
+) -> Template:
+    """Load your own law in C. It runs in MuJoCo's control callback at the speed of the built-in laws.
+
+    Args:
+      source: a .c file, compiled by $CC or cc in a temporary folder; or a .so with the function in double precision.
+        `smc_law.h`, which the file may include, describes the function. A file that includes `smc_joint_law.h` is a law
+        of SMC_JOINTS joints.
+      gains: name -> default or Gain, in the order of the function's gains[]. If the file has smc_law_gains, they
+        change its defaults.
+      memory: number of state variables per channel. Default: smc_law_memory of the file, or 8.
+      name: of the law. Default: the file's name.
+      symbol: the function's name.
+      flags: additional compiler flags or files: "-Ifirmware/include", "-DUNIT_TEST", "filter.c".
+      isolate: whether to try the law first in a separate process, on short runs of a double integrator. The error is
+        one sentence that says where the law crashes, hangs, returns NaN, reads gains without a name, writes beyond its
+        memory or keeps state elsewhere.
+      timeout: s, for each of compilation, set-up and trial.
+      positive, nonnegative, plants: as in `smc.law_function`.
+      degree, modelled: relative_degree and requires_model of `smc.law_function`. Default: smc_law_degree and
+        smc_law_modelled of the file.
+
+    Returns:
+      A Template. Called with gains it returns the Law of a Scenario: `law_from_c("my_law.c")(lam=5.0)`. It does not
+      follow later edits of the file: call `law_from_c` again. A pickle contains the machine code.
+
+    Raises:
+      ScenarioError: no such file or function, a compiler error, a function of another type, a set-up that fails,
+        crashes or does not end, and with isolate a law that does.
+
+    Nothing checks C while it runs. A law that accesses other memory crashes the process or changes the numbers of
+    other runs; one that does not return hangs it. Try a new law with isolate=True, or with
+    `smc-mujoco check-c my_law.c`.
+    """
+    if name is not None:
+        errors.name("name", name)
+    library = _library(source, symbol, flags, timeout)
+    about = _about(library, gains, memory, degree, modelled)
+    if isolate:
+        _try(library, about)
+    law = CLaw(library.path, symbol, library.file, _first_comment(library.path))
+    law.set_up(len(about.gains), about.memory, name)
+    words = {"requires_model": about.modelled, "joint": bool(about.joints)}
+    return template("law", about.gains, about.memory, positive, nonnegative, about.degree, None, plants, **words)(law)
+
+
+def _try(library: sandbox.Library, about: "About") -> list[str]:
+    """Call a law in a separate process, as `sandbox.call` does."""
+    fields = ARRAYS if about.joints else Measurement._fields
+    gains = [gain.default for gain in about.gains.values()]
+    return sandbox.call(library, fields, gains, about.memory, about.modelled, about.joints)
+
+
+def check(
+    source: Path,
+    gains: Mapping[str, float] | None,
+    memory: int | None,
+    symbol: str,
+    flags: Sequence[str],
+    timeout: float,
+) -> Iterator[str]:
+    """Try a law without loading it, and yield lines: warnings, limits of the trial, gains and memory.
+
+    Arguments and errors are those of `law_from_c`.
+    """
+    library = _library(source, symbol, (*build.WARNINGS, *flags) if source.suffix == ".c" else flags, timeout)
+    about = _about(library, gains, memory, None, None)
+    yield from library.warnings
+    yield from _try(library, about)
+    gains_text = ", ".join(f"{name} = {written(gain.default)}" for name, gain in about.gains.items()) or "none"
+    joints = f"{about.joints} joints; " * bool(about.joints)
+    yield f"{source.name}: {symbol} passes; {joints}gains {gains_text}; memory {about.memory}"
+
+
+def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: float) -> sandbox.Library:
+    """Return the library of a law, compiled from a .c file or copied. Arguments and errors as in `law_from_c`."""
+    if not isinstance(source, str | Path):
+        raise ScenarioError(f"cannot take a law from {shown(source)}: give the path of a .c file, or of a .so")
+    if sys.platform == "win32":
+        raise ScenarioError(
+            f"cannot take a law from {shown(str(source))} on Windows: run smc_mujoco on Linux, or in WSL"
+        )
+    path = Path(source)
+    timeout = number("timeout", timeout, above=0.0, most=MAX_TIMEOUT)
+    if not isinstance(symbol, str) or not re.fullmatch(r"[A-Za-z_]\w*", symbol, re.ASCII):
+        raise ScenarioError(f"symbol is {shown(symbol)}: give the name of a C function")
+    if isinstance(flags, str) or not isinstance(flags, Sequence) or not all(isinstance(flag, str) for flag in flags):
+        raise ScenarioError(f"flags is {shown(flags)}: give several, such as ['-DUNIT_TEST']")
+    if path.suffix not in (".c", *LIBRARIES):
+        raise ScenarioError(f"cannot take a law from {shown(str(path))}: give a .c file, or a shared library, .so")
+    if not path.is_file():
+        raise ScenarioError(f"there is no file {path}: give the path of a .c file or of a .so")
+    if path.suffix == ".c":
+        file, warnings = build.library(path, symbol, flags, timeout)
+        return sandbox.Library(file, path, symbol, flags, timeout, warnings)
+    try:
+        copy = shutil.copy(path, build.fresh(path.suffix))  # so that a rebuilt library is loaded again
+    except OSError as error:
+        raise ScenarioError(f"{path} cannot be read ({error.strerror}): give one that can") from None
+    return sandbox.Library(Path(copy), path, symbol, flags, timeout)
+
+
+class About(NamedTuple):
+    """Properties of a law in C; `joints` is 0 for a law of one channel."""
+
+    gains: dict[str, Gain]
+    memory: int
+    degree: int
+    modelled: bool
+    joints: int
+
+
+def _about(
+    library: sandbox.Library,
+    gains: Mapping[str, float | Gain] | None,
+    memory: int | None,
+    degree: int | None,
+    modelled: bool | None,
+) -> About:
+    """Return the properties of a library's law: the arguments, or else what the file states."""
+    facts, file = sandbox.load(library), library.path.name
+    joints = facts.get("smc_mujoco_joints", 0)
+    if "smc_law_shared" in facts and not facts["glue"]:
+        raise ScenarioError(f"{file} is a library with a law of many joints: give its .c file")
+    if facts.get("smc_law_real", 8) != 8 and not facts["glue"]:
+        raise ScenarioError(f"{file} is a library of single precision: give its .c file, or build it of doubles")
+    text = facts.get("smc_law_gains")
+    own = {} if text is None else parsed_gains(text, f"{file}'s smc_law_gains")
+    named = as_gains(gains, own)
+    for name in () if text is None else named:
+        errors.find(f"gain of {file}", name, own)
+    for name, gain in named.items():
+        if isinstance(gain.default, tuple) and len(gain.default) != joints:
+            each = f", or {joints}" * bool(joints)
+            raise ScenarioError(f"gain {name} of {file} is {written(gain.default)}: give it one number{each}")
+    for name in filter(None, facts.get("smc_law_shared", "").split(",")):
+        gain = errors.find(f"shared gain of {file}", name, named)
+        if isinstance(gain.default, tuple):
+            raise ScenarioError(f"shared gain {name} of {file} is {written(gain.default)}: give it one number")
+        named[name] = dataclasses.replace(gain, shared=True)
+    return About(
+        named,
+        whole("memory", max(facts.get("smc_law_memory", DEFAULT_MEMORY), 1) if memory is None else memory, 1, 10_000),
+        whole("degree", (facts.get("smc_law_degree") or 1) if degree is None else degree, 1, 3),
+        bool(facts.get("smc_law_modelled")) if modelled is None else modelled,
+        joints,
+    )
+
+
+def parsed_gains(text: str, what: str) -> dict[str, Any]:
+    """Return the gains in a text such as "lam=6,k1=3 5", with two joints' k1. `what` names the text in errors."""
+    parsed: dict[str, Value] = {}
+    for part in filter(None, (p.strip() for p in text.split(","))):
+        name, equals, value = (word.strip() for word in part.partition("="))
+        if name in parsed:
+            raise ScenarioError(f"{what} is {shown(text)}: give {name} once")
+        try:
+            values = tuple(map(float, value.split()))
+        except ValueError:
+            values = ()
+        parsed[name] = values[0] if len(values) == 1 else values
+        if not (equals and name.isidentifier() and values):
+            raise ScenarioError(f"{what} is {shown(text)}: give names and numbers, such as lam=6,k1=3")
+        if any(map(math.isnan, values)):
+            raise ScenarioError(f"{what} is {shown(text)}, and {name} is nan: give it a number")
+    return parsed
+
+
+def _first_comment(path: Path) -> str | None:
+    """Return the comment at the top of a C file."""
+    text = path.read_text(encoding="utf-8", errors="replace") if path.suffix == ".c" else ""
+    found = re.match(r"\s*/\*+(.*?)\*/", text, re.DOTALL)
+    return re.sub(r"^ ?\* ?", "", found[1], flags=re.MULTILINE).strip() if found else None

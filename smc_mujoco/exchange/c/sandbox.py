@@ -1,0 +1,481 @@
+"""Try a law's library in a separate process, which may crash, and report the result in one sentence.
+
+The process runs this file as a script: it loads the library, sets it up, calls the law on request, and unloads it. It
+writes its progress to a file. The last line names the step in which the process died, or the result. The script must
+start quickly, so the functions that start it, and only they, import smc_mujoco.
+"""
+
+import contextlib
+import ctypes
+import itertools
+import json
+import math
+import os
+import random
+import re
+import signal
+import struct
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+STEPS, LONG_STEPS = 500, 10_000  # samples of 1 ms per run, and in the longest run
+LATER_STEPS, GROWTH = 200, 1.06  # samples after those, and the ratio of successive times: up to 15 hours
+MAX_POSITION = 3.0  # a stop for the double integrator, because a law need not stabilise it
+GUARD, GUARDS = -7.25, 512  # a value that no law writes by chance, and its number on either side of an array
+COUPLING = 0.1  # elements of M off its diagonal
+MORE_GAINS = 16  # additional gains, which detect a law that reads them
+BEYOND = 2**40  # code of glue.c: a law of floats wrote beyond its memory; one more: beyond out
+ALTERED = BEYOND + 2  # code of glue.c: a law changed the arithmetic of its thread
+ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps), by which other simulations compute too"
+FAULTS = {  # code -> fault, formatted with the size of memory, and cure
+    BEYOND: ("writes beyond the {} numbers of its memory", "say more in smc_law_memory, or give memory="),
+    BEYOND + 1: ("writes beyond the numbers of out", "write only u and s, which are out[0] and out[1] for one channel"),
+    BEYOND + 3: ("asks for the Jacobian of a tip, and there is none", "give the plant a tip, and the law the model"),
+    ALTERED: (ALTERS, "let it restore that, and leave out -Ofast and -ffast-math"),
+}
+SHARED = "which all channels and simulations share, on several threads"
+NUMBERS = ("smc_law_memory", "smc_law_real", "smc_law_degree", "smc_law_modelled", "smc_mujoco_joints")
+TEXTS = ("smc_law_gains", "smc_law_shared")
+DOUBLES = ctypes.POINTER(ctypes.c_double)
+ON_REQUEST = ctypes.CFUNCTYPE(ctypes.c_int64, *[DOUBLES] * 4)  # C(x, v) w, or the Jacobian of the tip
+
+# Signal -> its usual cause in a law. The causes of other signals are reads, writes and divisions.
+SIGNALS = {int(signal.SIGABRT): "aborts", int(signal.SIGFPE): "divides, or traps floating-point exceptions"}
+# Output of the sanitizers: undefined behaviour; a bad access, and the stack frames it happened in.
+UNDEFINED = re.compile(r"^(?P<file>.+?):(?P<line>\d+):\d+: runtime error: (?P<what>.*)$", re.MULTILINE)
+ACCESS = re.compile(r"AddressSanitizer: (?P<what>[\w-]+).*(?:\n(?P<size>(?:READ|WRITE) of size \d+))?")
+FRAME = re.compile(r"^ +#\d+ .* in \S+ (?P<file>.+?):(?P<line>\d+)(?::\d+)?$", re.MULTILINE)
+
+
+class Library(NamedTuple):
+    """A law's library, not loaded into this process.
+
+    Attributes:
+      file: the library, compiled or copied.
+      path: the user's file.
+      symbol: name of the law's function.
+      flags: additional compiler flags.
+      timeout: of a trial, s.
+      warnings: of the compiler.
+    """
+
+    file: Path
+    path: Path
+    symbol: str
+    flags: Sequence[str]
+    timeout: float
+    warnings: Sequence[str] = ()
+
+
+def load(library: Library) -> dict[str, Any]:
+    """Load, set up and unload a library in a separate process, and return the constants that describe its law.
+
+    Raises:
+      ScenarioError: the process crashed, did not end in time, or found a fault.
+    """
+    return _run(library, None)
+
+
+def call(
+    library: Library,
+    fields: Sequence[str],
+    gains: Sequence[float | tuple[float, ...]],
+    memory: int,
+    modelled: bool,
+    joints: int = 0,
+) -> list[str]:
+    """Call a law in a separate process, then with sanitizers. Return sentences on checks that were not possible.
+
+    Args:
+      fields: names of the numbers in a measurement, or of the arrays in one of many joints.
+      gains: values of the gains. With many joints, each is one number, or one for each joint.
+      memory: number of state variables.
+      modelled: whether the law needs the nominal model.
+      joints: number of joints of a law of many joints; 0 for one channel.
+
+    Raises:
+      ScenarioError: as in `load`.
+    """
+    from smc_mujoco.exchange.c import build
+    from smc_mujoco.control.component import at
+
+    calls, unseen, name, each = build.fresh(".calls"), [], library.path.name, max(1, joints)
+    anchor, data = build.static_data(library.file, library.symbol)
+    if not data:
+        unseen.append(f"{name}: static data that it changes is not seen, as nm shows no names of it")
+    numbers = [at(gain, i) for gain in gains for i in range(each)]
+    order = {"fields": fields, "gains": numbers, "memory": memory, "modelled": modelled, "joints": joints, "each": each}
+    _run(library, order | {"calls": str(calls), "anchor": anchor, "data": data})
+    if why := _sanitize(library, calls, len(gains), memory):
+        unseen.append(f"{name} is tried without address and undefined-behaviour sanitizers: {why}")
+    calls.unlink()
+    return unseen
+
+
+def _run(library: Library, trial: dict | None) -> dict[str, Any]:
+    """Run this file as a script, and return the constants that it prints at its end."""
+    from smc_mujoco.common.errors import ScenarioError
+    from smc_mujoco.common.process import TimedOut, timed
+    from smc_mujoco.exchange.c import build
+
+    progress, order = build.fresh(".txt"), build.fresh(".json")
+    words = {"library": str(library.file), "symbol": library.symbol, "progress": str(progress), "trial": trial}
+    order.write_text(json.dumps(words), encoding="utf-8")
+    command = [sys.executable, "-I", "-S", __file__, str(order)]
+    try:
+        code = timed(command, library.timeout, output=False).returncode
+    except TimedOut:
+        code = None
+    lines = (progress.read_text(encoding="utf-8") if progress.exists() else "").splitlines() or ["loading"]
+    if lines[-1] == "unloading" and code == 0:
+        return json.loads(lines[-2])
+    file, last = library.path.name, lines[-1].replace(str(library.file), library.path.name)
+    kind, _, why = last.partition(" ")
+    if kind == Fault.__name__:
+        raise ScenarioError(f"{file}: {why}")
+    if library.symbol in why and ("undefined symbol" in why or "not found" in why):
+        raise ScenarioError(build.undefined(library.path, library.symbol))
+    if why:
+        why = " ".join(why.split())
+        raise ScenarioError(f"{file} cannot be loaded ({why}): build it for this machine, with all it needs")
+    raise ScenarioError(f"{file}: {last} {ended(code, library.timeout)}")
+
+
+def ended(code: int | None, timeout: float) -> str:
+    """Return in words how a process ended: by an exit code, a signal or the timeout."""
+    if code is None:
+        return f"did not end within {timeout:g} s: fix what it waits for, or give timeout="
+    if code >= 0:
+        return f"ended the process with exit code {code}: let it return"
+    names = {known.value: known.name for known in signal.Signals}  # without most real-time signals
+    name, does = names.get(-code, f"signal {-code}"), SIGNALS.get(-code, "reads, writes or divides")
+    return f"died of {name} ({signal.strsignal(-code)}): fix where it {does}"
+
+
+def _sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
+    """Repeat the calls of a trial with sanitizers. Return why this is not possible, or an empty text."""
+    from smc_mujoco.common.errors import ScenarioError
+    from smc_mujoco.common.process import TimedOut, timed
+    from smc_mujoco.exchange.c import build
+
+    compiler = build.compiler()
+    if library.path.suffix != ".c":
+        return "give its .c file"
+    if (program := build.replayer(tuple(compiler))) is None:
+        return f"{compiler[0]} has none that work here"
+    try:
+        file, _ = build.library(library.path, library.symbol, (*library.flags, *build.SANITIZERS), library.timeout)
+    except ScenarioError:
+        return f"{compiler[0]} has none with these flags"
+    try:
+        done = timed([str(n) for n in (program, file, calls, gains, memory)], library.timeout)
+    except TimedOut:
+        late = f"{library.symbol} did not end within {library.timeout:g} s with sanitizers"
+        raise ScenarioError(f"{library.path.name}: {late}: give timeout=") from None
+    if done.returncode == 0:
+        return ""
+    what, places = "it does not end as without sanitizers", []
+    if found := UNDEFINED.search(done.stderr):
+        what, places = found["what"], [found]
+    elif found := ACCESS.search(done.stderr):
+        what = ", ".join(filter(None, found.group("what", "size")))
+        places = [frame for frame in FRAME.finditer(done.stderr) if Path(frame["file"]).exists()]
+    name = Path(places[0]["file"]).name if places else library.path.name
+    where = f"line {places[0]['line']}" if places else library.symbol
+    raise ScenarioError(f"{name} makes an error in {where}: {what}; fix it")
+
+
+# libraries through ctypes, in the script and in the process that runs the law
+
+
+def entry(path: str, symbol: str):
+    """Return the law's ctypes function, and its library."""
+    library = ctypes.CDLL(path, mode=getattr(os, "RTLD_NOW", 0) | getattr(os, "RTLD_LOCAL", 0))
+    glued = hasattr(library, "smc_mujoco_entry")
+    function = getattr(library, "smc_mujoco_entry" if glued else symbol)
+    function.restype, function.argtypes = ctypes.c_int64 if glued else ctypes.c_int, [DOUBLES] * 4
+    return function, library
+
+
+def facts(library) -> dict[str, str | int]:
+    """Return the constants of smc_law.h that a library defines, and whether it contains the glue."""
+    constants: dict[str, str | int] = {"glue": hasattr(library, "smc_mujoco_entry")}
+    for name in TEXTS:
+        if hasattr(library, name):
+            text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(library, name)))
+            constants[name] = text.decode(errors="replace")
+    return constants | {name: ctypes.c_int.in_dll(library, name).value for name in NUMBERS if hasattr(library, name)}
+
+
+def set_up(library) -> int:
+    """Return the result of smc_setup; 0 if the library has none."""
+    return int(library.smc_setup()) if hasattr(library, "smc_setup") else 0
+
+
+def set_sizes(library, gains: int, memory: int) -> None:
+    """Set the number of gains and of memory slots in the glue, if the library contains it."""
+    if hasattr(library, "smc_mujoco_entry"):
+        ctypes.c_int.in_dll(library, "smc_mujoco_gains").value = gains
+        ctypes.c_int.in_dll(library, "smc_mujoco_memory").value = memory
+
+
+def doubles(values) -> ctypes.Array:
+    """Return an array of C doubles."""
+    return (ctypes.c_double * len(values))(*values)
+
+
+class Requests:
+    """C functions that compute what a law of many joints asks for. They are valid as long as this object lives.
+
+    Args:
+      joints: their number.
+      coriolis: a list w -> the numbers of C(x, v) w.
+      jacobian: returns the numbers of the tip's Jacobian by rows, or raises ValueError if there is none.
+
+    Attributes:
+      address: of a table with the addresses of both functions and of their parameters, and with the force per unit of
+        u.
+    """
+
+    def __init__(self, joints: int, coriolis: Callable, jacobian: Callable):
+        def answer(out, function, *arguments) -> int:
+            try:
+                for i, number in enumerate(function(*arguments)):
+                    out[i] = number
+            except ValueError:
+                return 1
+            return 0
+
+        def product(w, own, memory, out) -> int:
+            return answer(out, coriolis, w[:joints])
+
+        def tip(nothing, own, memory, out) -> int:
+            return answer(out, jacobian)
+
+        self.joints, self.functions = joints, (ON_REQUEST(product), ON_REQUEST(tip))
+        addresses = [float(ctypes.cast(function, ctypes.c_void_p).value or 0) for function in self.functions]
+        self.table = doubles([*addresses, 0.0, 1.0])
+        self.address = ctypes.addressof(self.table)
+
+
+def stored(head, requests: Requests, arrays) -> list[float]:
+    """Return the numbers of a joint measurement, as `joint_law.measurement_at` reads them.
+
+    Args:
+      head: t, dt and model.
+      arrays: the numbers of each of its arrays, in their order.
+    """
+    return [*head, float(requests.address), requests.joints, *itertools.chain.from_iterable(arrays)]
+
+
+# the script
+
+
+class Fault(Exception):
+    """A fault of a law, in words."""
+
+
+def arithmetic() -> bytes:
+    """Return results that depend on rounding and flush-to-zero. An enabled trap ends the process."""
+    one, half, big, inf, zero, ulp, normal, tiny = 1.0, 0.5, 1e308, math.inf, 0.0, 2.0**-52, 2.0**-1022, 2.0**-1074
+    with contextlib.suppress(ValueError):
+        math.pow(zero, -one)  # divides by zero
+    return struct.pack("6d", big * big, inf - inf, one + 0.3 * ulp, one + 0.7 * ulp, normal * half, tiny + tiny)
+
+
+STANDARD = arithmetic()
+
+
+class Fenced:
+    """An array between guards, which a law must not write."""
+
+    def __init__(self, values, guard: float = GUARD):
+        edge = [guard] * GUARDS
+        self.whole = doubles([*edge, *values, *edge])
+        self.own = (ctypes.c_double * len(values)).from_buffer(self.whole, 8 * GUARDS)
+        self.before = self.guards()
+
+    def guards(self) -> bytes:
+        """Return the bytes of the guards."""
+        whole = bytes(self.whole)
+        return whole[: 8 * GUARDS] + whole[-8 * GUARDS :]
+
+    def crossed(self) -> bool:
+        """Return whether a guard has changed."""
+        return self.guards() != self.before
+
+
+class Trial:
+    """Runs of a law on a double integrator x'' = u for each channel, and calls far outside of them.
+
+    Args:
+      law, library: as returned by `entry`.
+      order: fields, memory, modelled and joints as in `call`; "each", the number of channels; "gains", each gain's
+        number for each channel; "data" and "anchor", the static data and the law's address in the file.
+      calls: an open file for the gains and the measurement of each call, which `replay.c` reads.
+    """
+
+    def __init__(self, law, library, order, calls):
+        self.law, self.library, self.calls = law, library, calls
+        self.fields, self.size, self.modelled = order["fields"], order["memory"], order["modelled"]
+        self.joints, self.each = order["joints"], order["each"]
+        self.requests = Requests(self.joints, lambda w: [0.1 * one for one in w], self.jacobian)
+        base = ctypes.cast(law, ctypes.c_void_p).value - order["anchor"]
+        self.data = [(name, base + place, size) for name, place, size in order["data"]]
+        self.data_before = self.static_data()
+        self.y, self.out = Fenced(self.measurement([{}] * self.each)), Fenced([0.0] * (2 * self.each))
+        self.gains = Fenced(order["gains"], math.nan)  # u is NaN if the law reads more gains than it has
+        self.gains_before = bytes(self.gains.whole)
+        calls.write(bytes(self.gains.own))
+        self.random = random.Random(0)
+
+    def all(self) -> None:
+        """Make every kind of run, and calls at very large errors, at which a law may return an error."""
+        steps = LONG_STEPS
+        for model in (1.0,) if self.modelled else (0.0, 1.0):
+            for surfaced in (0.0,) if self.joints else (0.0, 1.0):
+                self.run(model, surfaced, 1.0 - 2.0 * surfaced, steps)
+                steps = STEPS
+        for e in (-1e6, -1e3, 0.0, 1e3, 1e6):
+            for de in (-1e6, 0.0, 1e6):
+                far = {"dt": 1e-3, "x": e, "v": de, "e": e, "de": de, "g": 1.0, "limit": 6.0, "model": 1.0}
+                self.call(self.measurement([far] * self.each), self.state())
+        self.check_static_data()
+
+    def run(self, model: float, surfaced: float, x0: float, steps: int) -> None:
+        """Make a run with measurement noise and a sine as reference. After `steps` the time grows geometrically."""
+        xs, vs, dt, memory = [x0 - 0.1 * i for i in range(self.each)], [0.0] * self.each, 1e-3, self.state()
+        for k in range(steps + LATER_STEPS):
+            t, seen = dt * (k if k < steps else steps * GROWTH ** (k - steps)), []
+            r, dr, ddr = 0.1 * math.sin(t), 0.1 * math.cos(t), -0.1 * math.sin(t)
+            for x, v in zip(xs, vs, strict=True):
+                e, de = x + self.random.gauss(0.0, 1e-3) - r, v + self.random.gauss(0.0, 1e-2) - dr
+                one = {"t": t, "dt": dt, "x": e + r, "v": de + dr, "e": e, "de": de, "r": r, "dr": dr, "ddr": ddr}
+                one |= {"g": 1.0, "a": ddr, "limit": 6.0, "model": model, "q": 0.1 * e, "gq": 1.0}
+                if surfaced:
+                    one |= {"has_surface": 1.0, "s": de + 2.0 * e, "v_eq": -2.0 * de}
+                seen.append(one)
+            y, before = self.measurement(seen), bytes(memory.own)
+            code, us, ss = self.call(y, memory)
+            for i, (one, u, s) in enumerate(zip(seen, us, ss, strict=True)):
+                if code != 0 or not (math.isfinite(u) and math.isfinite(s)):
+                    self.check_gains(y, before)
+                    what, joint = code or f"u = {u}, s = {s}", f" of joint {i}" * bool(self.joints and not code)
+                    where = f"t = {t:g}, e = {one['e']:g}, de = {one['de']:g}"
+                    raise Fault(f"returned {what}{joint} at {where}: fix it, or the gains")
+            if k % 50 == 0:
+                self.check_static_data()
+                if repr(self.law_at(y, self.state(before))) != repr((code, us, ss)):
+                    raise Fault(f"gave two answers to one measurement, as from state {SHARED}: keep it in memory")
+            for i, u in enumerate(us):
+                vs[i] += dt * min(max(u, -6.0), 6.0)
+                xs[i] += dt * vs[i]
+                if abs(xs[i]) > MAX_POSITION:
+                    xs[i], vs[i] = math.copysign(MAX_POSITION, xs[i]), 0.0
+
+    def measurement(self, seen: list[dict[str, float]]) -> list[float]:
+        """Return the numbers of a measurement in their order, from those of each channel. Those left out are 0."""
+        if not self.joints:
+            return [seen[0].get(name, 0.0) for name in self.fields]
+        M = [1.0 if i == j else COUPLING for i in range(self.joints) for j in range(self.joints)]
+        known = {"M": M, "h": [0.0] * self.joints, "g": [0.0] * self.joints}
+        arrays = [known.get(name) or [one.get(name, 0.0) for one in seen] for name in self.fields]
+        return stored([seen[0].get(name, 0.0) for name in ("t", "dt", "model")], self.requests, arrays)
+
+    def jacobian(self) -> list[float]:
+        """Return the Jacobian of a tip that the first three joints move."""
+        return [float(row == i) for row in range(3) for i in range(self.joints)]
+
+    def state(self, saved: bytes = b"") -> Fenced:
+        """Return a memory of zeros, or with saved content."""
+        count = self.size * self.each
+        return Fenced(struct.unpack(f"{count}d", saved) if saved else [0.0] * count)
+
+    def call(self, y: list[float], memory: Fenced) -> tuple[int, list[float], list[float]]:
+        """Call the law, and record the call for the sanitizers."""
+        self.calls.write(struct.pack(f"{len(y)}d", *y))
+        return self.law_at(y, memory)
+
+    def law_at(self, y: list[float], memory: Fenced) -> tuple[int, list[float], list[float]]:
+        """Return the law's code, u and s. Raise Fault if it writes anything but memory and out."""
+        self.y.own[:], self.out.own[:] = y, [math.nan] * len(self.out.own)
+        y_before = bytes(self.y.whole)
+        code = self.law(self.y.own, self.gains.own, memory.own, self.out.own)
+        if memory.crossed():
+            code = BEYOND
+        elif self.out.crossed():
+            code = BEYOND + 1
+        elif arithmetic() != STANDARD:
+            code = ALTERED
+        if code in FAULTS:
+            what, cure = FAULTS[code]
+            raise Fault(f"{what.format(self.size)}: {cure}")
+        if bytes(self.gains.whole) != self.gains_before or bytes(self.y.whole) != y_before:
+            raise Fault("changes its gains or its measurement: keep what changes in memory")
+        return code, self.out.own[: self.each], self.out.own[self.each :]
+
+    def static_data(self) -> dict[str, bytes]:
+        """Return the current content of the static data."""
+        return {name: ctypes.string_at(place, size) for name, place, size in self.data}
+
+    def check_static_data(self) -> None:
+        """Raise Fault if the law has changed static data, which all simulations share."""
+        changed = [name for name, now in self.static_data().items() if now != self.data_before[name]]
+        if changed:
+            cure = "keep state in memory, and fill tables in smc_setup"
+            raise Fault(f"changes static data ({changed[0]}), {SHARED}: {cure}")
+
+    def check_gains(self, y: list[float], before: bytes) -> None:
+        """Raise Fault if u becomes finite when additional gains are finite."""
+        count, out = len(self.gains.own) // self.each, Fenced([math.nan] * (2 * self.each))
+        more = Fenced([*self.gains.own, *[1.0] * (MORE_GAINS * self.each)])
+        set_sizes(self.library, count + MORE_GAINS, self.size)
+        code = self.law(Fenced(y).own, more.own, self.state(before).own, out.own)
+        set_sizes(self.library, count, self.size)
+        if code == 0 and all(map(math.isfinite, out.own)):
+            raise Fault(
+                f"reads more gains than the {count} that have names: name them in smc_law_gains, or give gains="
+            )
+
+
+def attempt(order, progress) -> None:
+    """Load, set up and on request call a law. Write the progress, and at the end the library's constants."""
+
+    def done(step: str) -> None:
+        if arithmetic() != STANDARD:
+            raise Fault(f"{step} {ALTERS}: {FAULTS[ALTERED][1]}")
+
+    symbol = order["symbol"]
+    print("loading", file=progress)
+    law, library = entry(order["library"], symbol)
+    done("loading it")
+    print("smc_setup", file=progress)
+    if code := set_up(library):
+        raise Fault(f"smc_setup returned {code}: fix it")
+    done("smc_setup")
+    if trial := order["trial"]:
+        print(symbol, file=progress)
+        set_sizes(library, len(trial["gains"]) // trial["each"], trial["memory"])
+        with Path(trial["calls"]).open("wb") as calls:
+            try:
+                Trial(law, library, trial, calls).all()
+            except Fault as fault:
+                raise Fault(f"{symbol} {fault}") from None
+    print(json.dumps(facts(library)), file=progress)
+    print("unloading", file=progress)
+
+
+def main(file: str) -> None:
+    """Carry out the order in a JSON file."""
+    order = json.loads(Path(file).read_text(encoding="utf-8"))
+    with Path(order["progress"]).open("w", buffering=1, encoding="utf-8") as progress:
+        try:
+            attempt(order, progress)
+        except (Fault, OSError, AttributeError) as error:
+            print(f"{type(error).__name__} {error}", file=progress)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,191 @@
+"""modelDescription.xml, buildDescription.xml and the page of documentation of an FMU."""
+
+import html
+import itertools
+import math
+import xml.etree.ElementTree as xml
+from collections.abc import Iterable, Sequence
+
+from smc_mujoco.common.version import __version__
+from smc_mujoco.control.units import Unit
+from smc_mujoco.exchange.fmu.controller import OUTPUTS, UNBOUNDED, Controller, Variable
+
+# Kind of joint -> units of force and position: name, exponents of the base units.
+JOINTS = {
+    "hinge": (("N.m", {"kg": 1, "m": 2, "s": -2}), ("rad", {"rad": 1})),
+    "slide": (("N", {"kg": 1, "m": 1, "s": -2}), ("m", {"m": 1})),
+}
+# Kind of variable -> causality, variability, initial.
+ROLES = {
+    "SMC_CLOCK": ("independent", "continuous", None),
+    "SMC_INPUT": ("input", "discrete", None),
+    "SMC_COMPUTED": ("local", "discrete", "calculated"),
+    "SMC_PARAMETER": ("parameter", "tunable", "exact"),
+    "SMC_CONSTANT": ("local", "constant", "exact"),
+    "SMC_STATE": ("local", "discrete", "exact"),
+}
+PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head><meta charset="utf-8"><title>{name}</title></head>
+<body style="font-family: sans-serif; max-width: 50em; margin: 2em auto; line-height: 1.4">
+<h1>{name}</h1>
+<p>{summary}.</p>
+<p>The law runs at t = start + k dt, dt = {period:g} s, on the inputs as they are set at that time, and u is held in
+between. With Event Mode, u follows the inputs without delay. Without it, the u that is read after a step is computed
+from the inputs that were set before the step, so an importer that applies it after the step has a delay of one step.
+Gains can be changed while it runs. The sources need a C99 compiler and nothing else.</p>
+<table style="border-collapse: collapse; text-align: left">
+<tr><th>variable</th><th>role</th><th>unit</th><th>start</th><th>meaning</th></tr>
+{rows}
+</table>
+<p>Written by smc_mujoco {version}.</p>
+</body>
+</html>
+"""
+
+
+def unit_name(unit: Unit, joint: str) -> str:
+    """Return the name of a unit in FMI, such as N.m.s/rad."""
+    (force, _), (position, _) = JOINTS[joint]
+    powers = {force: unit.force, position: unit.position, "s": unit.time}
+    above = [_power(name, n) for name, n in powers.items() if n > 0.0]
+    below = [_power(f"({name})" if "." in name else name, -n) for name, n in powers.items() if n < 0.0]
+    return "/".join([".".join(above) or "1", *below])
+
+
+def _power(name: str, n: float) -> str:
+    """Return a unit to a power."""
+    return name if n == 1.0 else f"({name})^{n:g}" if "." in name else f"{name}^{n:g}"
+
+
+def base_units(unit: Unit, joint: str) -> dict[str, int] | None:
+    """Return SI base unit -> its exponent in a unit; None if an exponent is not whole."""
+    (_, force), (_, position) = JOINTS[joint]
+    found: dict[str, float] = {}
+    for parts, n in ((force, unit.force), (position, unit.position), ({"s": 1}, unit.time)):
+        for name, each in parts.items():
+            found[name] = found.get(name, 0.0) + n * each
+    if any(n != int(n) for n in found.values()):
+        return None
+    return {name: int(n) for name, n in found.items() if n}
+
+
+def model_description(
+    listed: Sequence[Variable], controller: Controller, identifier: str, token: str, joint: str
+) -> str:
+    """Return modelDescription.xml of an FMU for Co-Simulation.
+
+    Args:
+      listed: variables in the order of their value references.
+      identifier: name of the model in C.
+      token: the instantiation token.
+      joint: "hinge" or "slide", which decides the units.
+    """
+    root = xml.Element(
+        "fmiModelDescription",
+        fmiVersion="3.0",
+        modelName=controller.law.name,
+        instantiationToken=token,
+        description=summary(controller),
+        generationTool=f"smc_mujoco {__version__}",
+        license="use without restriction, without warranty; the headers of FMI under the 2-clause BSD licence",
+        variableNamingConvention="structured",
+    )
+    xml.SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=identifier,
+        canGetAndSetFMUState="true",
+        canSerializeFMUState="true",
+        canHandleVariableCommunicationStepSize="true",
+        hasEventMode="true",
+        fixedInternalStepSize=repr(controller.period),
+    )
+    units = xml.SubElement(root, "UnitDefinitions")
+    for unit in _units(listed):
+        definition = xml.SubElement(units, "Unit", name=unit_name(unit, joint))
+        if (base := base_units(unit, joint)) is not None:
+            xml.SubElement(definition, "BaseUnit", {name: str(n) for name, n in base.items()})
+    categories = xml.SubElement(root, "LogCategories")
+    xml.SubElement(categories, "Category", name="error", description="why a call failed")
+    xml.SubElement(root, "DefaultExperiment", startTime="0.0", stopTime="10.0", stepSize=repr(controller.period))
+    variables, structure = xml.SubElement(root, "ModelVariables"), xml.SubElement(root, "ModelStructure")
+    for reference, one in enumerate(listed):
+        variables.append(_variable(reference, one, joint))
+    outputs = [str(reference) for reference, one in enumerate(listed) if is_output(one)]
+    for element in ("Output", "InitialUnknown"):
+        for reference in outputs:
+            xml.SubElement(structure, element, valueReference=reference)
+    return written(root)
+
+
+def is_output(one: Variable) -> bool:
+    """Return whether a variable is u or s, or an element of these."""
+    return one.name.partition("[")[0] in OUTPUTS
+
+
+def _units(listed: Iterable[Variable]) -> list[Unit]:
+    """Return the units of the variables, each once."""
+    return list(dict.fromkeys(one.unit for one in listed if one.unit is not None and any(one.unit)))
+
+
+def _variable(reference: int, one: Variable, joint: str) -> xml.Element:
+    """Return the element of a variable."""
+    causality, variability, initial = ROLES[one.kind]
+    about = {"name": one.name, "valueReference": str(reference), "description": one.description}
+    about |= {"causality": "output" if is_output(one) else causality, "variability": variability}
+    if initial is not None:
+        about["initial"] = initial
+    if one.unit is not None and any(one.unit):
+        about["unit"] = unit_name(one.unit, joint)
+    if math.isfinite(one.least):
+        about["min"] = repr(one.least)
+    if one.kind not in ("SMC_CLOCK", "SMC_COMPUTED"):
+        about["start"] = repr(one.start)
+    return xml.Element("Float64", about)
+
+
+def build_description(files: Iterable[str], identifier: str) -> str:
+    """Return buildDescription.xml, by which an importer compiles the sources."""
+    root = xml.Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = xml.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
+    sources = xml.SubElement(
+        configuration, "SourceFileSet", language="C99", compiler="gcc", compilerOptions="-ffp-contract=off"
+    )
+    for name in files:
+        xml.SubElement(sources, "SourceFile", name=name)
+    xml.SubElement(configuration, "Library", name="m", external="true", description="the C library's mathematics")
+    return written(root)
+
+
+def written(root: xml.Element) -> str:
+    """Return an XML element as the text of a file."""
+    xml.indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{xml.tostring(root, encoding="unicode")}\n'
+
+
+def summary(controller: Controller) -> str:
+    """Return the controller in one line."""
+    parts = [f"law {controller.law}"]
+    parts += [f"surface {controller.surface}"] if controller.surface else []
+    parts += [f"velocity estimator {controller.estimator}"] if controller.estimator else []
+    return f"Sliding-mode controller: {', '.join(parts)}; every {controller.period:g} s"
+
+
+def page(listed: Iterable[Variable], controller: Controller, joint: str) -> str:
+    """Return documentation/index.html. The elements of a vector or a matrix share a row."""
+    rows = []
+    for name, elements in itertools.groupby(listed, lambda variable: variable.name.partition("[")[0]):
+        one, *others = elements
+        if one.kind == "SMC_STATE":
+            continue
+        role = "output" if is_output(one) else ROLES[one.kind][0]
+        unit = unit_name(one.unit, joint) if one.unit is not None and any(one.unit) else ""
+        starts = ["unbounded" if each.start == UNBOUNDED else f"{each.start:g}" for each in (one, *others)]
+        start = "identity" if name == "M" else ", ".join(starts[: 1 if len(set(starts)) == 1 else None])
+        start = "" if one.kind in ("SMC_CLOCK", "SMC_COMPUTED") else start
+        cells = (f"{one.name} to {others[-1].name}" if others else one.name, role, unit, start, one.description)
+        rows.append("<tr>" + "".join(f"<td style='padding-right: 1em'>{html.escape(c)}</td>" for c in cells) + "</tr>")
+    about = html.escape(summary(controller))
+    title = html.escape(controller.law.name)
+    return PAGE.format(name=title, summary=about, period=controller.period, rows="\n".join(rows), version=__version__)

@@ -1,0 +1,236 @@
+"""Writing a law as an FMU: FMI 3.0 for Co-Simulation, as source code and as a binary, without Python.
+
+An FMU is a zip archive of modelDescription.xml, the sources and a shared library. It contains the law with its gains as
+parameters, and on request a surface and a velocity estimator. In double precision it gives the bits of `smc.run`.
+"""
+
+import hashlib
+import math
+import os
+import platform
+import re
+import sys
+import tempfile
+import uuid
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, find, number, shown
+from smc_mujoco.common.files import ended, replacing
+from smc_mujoco.common.process import TimedOut, timed
+from smc_mujoco.exchange.c import build
+from smc_mujoco.exchange.c.export import number_of_joints, writable
+from smc_mujoco.control.component import Template
+from smc_mujoco.control.estimator import Estimator
+from smc_mujoco.control.law import Law
+from smc_mujoco.control.surface import Surface
+from smc_mujoco.simulation import coerce
+from smc_mujoco.exchange.fmu import controller as one_joint
+from smc_mujoco.exchange.fmu import description, joint_controller
+from smc_mujoco.exchange.fmu.controller import Controller
+from smc_mujoco.simulation.scenario import Scenario, check_surface
+
+HERE, MIXED = Path(__file__).parent, "mixed"  # kind of joints of which some turn and some slide: without units
+HEADERS = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")  # of the standard
+# Only the symbols of FMI, and no paths of the build, so that the same law gives the same bytes.
+HIDDEN = ("-std=c99", "-fvisibility=hidden", "-s")
+SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
+MACHINES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64", "i686": "x86"}
+
+
+def export_fmu(
+    law: Law | Template | str | Scenario,
+    path: str | os.PathLike | None = None,
+    *,
+    surface: Surface | Template | str | None = None,
+    velocity: Estimator | Template | str | None = None,
+    control_period: float | None = None,
+    u_max: float | Sequence[float] | None = None,
+    model: str | None = None,
+    joint: str | None = None,
+    joints: int | None = None,
+    binary: bool = True,
+) -> Path:
+    """Write a law as an FMU for Simulink, Modelica and other tools: FMI 3.0, Co-Simulation. Return its path.
+
+    Args:
+      law: a Law, its Template, its name, or a Scenario, which then gives surface, velocity, control_period, u_max,
+        model, the number of joints and their units.
+      path: of the .fmu file. Default: the law's name, in the current folder.
+      surface: a Surface or its name. None: the law's own, de + c e.
+      velocity: an Estimator or its name. None: the FMU has the velocity as an input, v.
+      control_period: s; the law runs this often. Default: 1 ms.
+      u_max: bound on |u|, N or N m; the parameter u_max of the FMU. For many joints also one for each. Default: none.
+      model: "nominal" gives the FMU the inputs f and g of x'' = f + g u, or those of M, h, g, C and J that a law of
+        many joints reads. Default: "nominal" for a law that requires it, else "none".
+      joint: "hinge" for the units rad and N m, the default, or "slide" for m and N.
+      joints: number of joints of a law of many joints. Default: as many as it has values of a gain.
+      binary: whether the FMU also contains a binary for this machine, compiled by $CC or cc.
+
+    Inputs are x, v unless an estimator replaces it, the reference r and dr, and what else the law reads, such as ddr.
+    Outputs are u and s. All gains are tunable parameters. Many joints have x[1], x[2], M[1,1] and so on.
+
+    Raises:
+      ScenarioError: a law in C, Python without translation into C, a surface that does not fit, no
+        compiler.
+    """
+    if isinstance(law, Scenario):
+        given = {"surface": surface, "velocity": velocity, "control_period": control_period}
+        given |= {"u_max": u_max, "model": model, "joint": joint, "joints": joints}
+        law, about, joint = _of_scenario(law, given)
+    else:
+        about = {
+            "surface": surface,
+            "velocity": velocity,
+            "control_period": 1e-3 if control_period is None else control_period,
+            "u_max": math.inf if u_max is None else u_max,
+            "model": model,
+            "joints": joints,
+        }
+        joint = "hinge" if joint is None else joint
+        find("joint", joint, description.JOINTS)
+    controller = _controller(law, **about)
+    identifier = _identifier(controller.law.name)
+    target = ended(path if path is not None else f"{identifier}.fmu", ".fmu")
+    files = _files(controller, identifier, joint)
+    if binary:
+        files |= _binary(files, identifier)
+    with replacing(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)  # without the time
+    return target
+
+
+def _of_scenario(scenario: Scenario, given: Mapping[str, Any]) -> tuple[Law, dict[str, Any], str]:
+    """Return a scenario's law, its other arguments of `export_fmu`, and its kind of joint."""
+    if chosen := [name for name, value in given.items() if value is not None]:
+        raise ScenarioError(f"a scenario has its own {chosen[0]}: leave {chosen[0]} out, or give its law instead")
+    s, limits = scenario.resolved, set(scenario.limits)
+    several = len(limits) > 1 and not s.law.joint
+    if several or s.feedforward is not None:
+        what = "a bound for each channel" if several else "a feedforward"
+        raise ScenarioError(f"the scenario has {what}, which an FMU cannot have: give its law, with u_max=")
+    about = {
+        "surface": s.surface,
+        "velocity": s.velocity,
+        "control_period": s.control_period,
+        "u_max": list(scenario.limits) if s.law.joint else limits.pop(),
+        "model": s.model,
+        "joints": s.plant.n if s.law.joint else None,
+    }
+    return s.law, about, MIXED if s.law.joint and s.plant.mixed else "slide" if s.plant.unit == "m" else "hinge"
+
+
+def _controller(
+    law: Law | Template | str,
+    surface: Surface | Template | str | None,
+    velocity: Estimator | Template | str | None,
+    control_period: float,
+    u_max: float | Sequence[float],
+    model: str | None,
+    joints: int | None,
+) -> Controller:
+    """Return the controller, checked. Arguments and errors as in `export_fmu`."""
+    surface, estimator = coerce.surface(surface), coerce.velocity(velocity)
+    chosen = writable(law)
+    count = number_of_joints(chosen, joints)
+    if surface is not None and count:
+        raise ScenarioError(f"law {chosen.name!r} is of many joints and has its own surface: leave the surface out")
+    if surface is not None:
+        check_surface(surface, chosen)
+    if model not in (None, *coerce.MODELS):
+        raise ScenarioError(f"model is {shown(model)}: give 'none' or 'nominal'")
+    if chosen.requires_model and model == "none":
+        raise ScenarioError(f"law {chosen.name!r} needs the nominal model: leave model out, or give 'nominal'")
+    return Controller(
+        law=chosen,
+        surface=surface,
+        estimator=None if estimator is None or estimator.name == "measured" else estimator,
+        period=number("control_period", control_period, above=0.0),
+        u_max=_bounds(u_max, count),
+        modelled=chosen.requires_model or model == "nominal",
+        joints=count,
+    )
+
+
+def _bounds(u_max: float | Sequence[float], joints: int) -> tuple[float, ...]:
+    """Return the bound on |u| of each joint, from one for all or one for each."""
+    each = list(u_max) if joints and isinstance(u_max, Sequence | np.ndarray) else [u_max] * max(1, joints)
+    if len(each) != max(1, joints):
+        raise ScenarioError(f"u_max has {len(each)} values for {joints} joints: give one, or {joints}")
+    names = [f"u_max[{i}]" for i in range(joints)] if joints and each[0] is not u_max else ["u_max"] * len(each)
+    return tuple(number(name, one, above=0.0, infinite=True) for name, one in zip(names, each, strict=True))
+
+
+def _identifier(name: str) -> str:
+    """Return a law's name as an identifier of C."""
+    plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_")
+    return plain if plain[:1].isalpha() else f"law_{plain}".rstrip("_")
+
+
+def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str]:
+    """Return path in the archive -> text, for all files but the binary."""
+    code, inside = controller.code(), joint_controller if controller.joints else one_joint
+    listed = inside.variables(controller, code)
+    if joint == MIXED:
+        joint = "hinge"  # of which no unit is left but powers of the second
+        listed = [
+            one if one.unit and not (one.unit.force or one.unit.position) else one._replace(unit=None) for one in listed
+        ]
+    body = inside.body(listed, controller, code)
+    files = {"controller.c": one_joint.source(listed, inside.helpers(controller, code), body)}
+    files["law.c"] = one_joint.law_file(controller, *code["law"])
+    for kind, (slots, text) in code.items():
+        if kind != "law":
+            files[f"{kind}.c"] = one_joint.component_file(controller.parts[kind], slots, text)
+    files = {"fmu.c": (HERE / "fmu.c").read_text(encoding="utf-8"), **files}
+    content = "\0".join([*files.values(), one_joint.header(listed, controller, identifier, ""), joint])
+    token = f"{{{uuid.UUID(bytes=hashlib.sha256(content.encode()).digest()[:16])}}}"
+    compiled = list(files)
+    files["controller.h"] = one_joint.header(listed, controller, identifier, token)
+    files["smc_fmu.h"] = (HERE / "smc_fmu.h").read_text(encoding="utf-8")
+    own = build.JOINT_HEADER if controller.joints else build.HEADER
+    files[own.name] = own.read_text(encoding="utf-8")
+    files |= {name: (HERE / "headers" / name).read_text(encoding="utf-8") for name in HEADERS}
+    return {
+        "modelDescription.xml": description.model_description(listed, controller, identifier, token, joint),
+        "documentation/index.html": description.page(listed, controller, joint),
+        "sources/buildDescription.xml": description.build_description(compiled, identifier),
+        **{f"sources/{name}": text for name, text in files.items()},
+    }
+
+
+def platform_tuple() -> tuple[str, str]:
+    """Return FMI's name of this machine, such as x86_64-linux, and the suffix of its libraries."""
+    system, suffix = SYSTEMS.get(sys.platform, (sys.platform, ".so"))
+    machine = platform.machine().lower()
+    return f"{MACHINES.get(machine, machine)}-{system}", suffix
+
+
+def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
+    """Return path in the archive -> shared library for this machine, compiled from the sources in `files`.
+
+    Raises:
+      ScenarioError: there is no compiler, or it fails.
+    """
+    (machine, suffix), command = platform_tuple(), build.compiler()
+    with tempfile.TemporaryDirectory(prefix="smc_mujoco-") as folder:
+        sources, target = {Path(n).name: t for n, t in files.items() if n.startswith("sources/")}, Path(folder, "out")
+        for name, text in sources.items():
+            Path(folder, name).write_text(text, encoding="utf-8")
+        compiled = [str(Path(folder, name)) for name in sources if name.endswith(".c")]
+        try:
+            done = timed([*command, *build.FLAGS, *HIDDEN, *compiled, "-o", str(target), "-lm"], 120.0)
+        except (OSError, TimedOut):
+            raise ScenarioError(
+                f"the FMU cannot be compiled, as there is no C compiler {command[0]!r}: install one, set CC, or leave "
+                "the binary out (binary=False, --no-binary)"
+            ) from None
+        if done.returncode or not target.exists():
+            lines = [line for line in done.stderr.splitlines() if "error" in line] or ["it says nothing"]
+            raise ScenarioError(f"the FMU does not compile, {command[0]} says: {lines[0]}; set another compiler in CC")
+        return {f"binaries/{machine}/{identifier}{suffix}": target.read_bytes()}

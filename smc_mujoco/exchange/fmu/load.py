@@ -1,0 +1,461 @@
+"""Controllers in FMUs as laws: `law_from_fmu` reads FMI 2.0 and 3.0 for Co-Simulation, through FMPy.
+
+An FMU from Simulink, Modelica or `export_fmu` keeps its own state. So each channel of each run has its own instance,
+which is made at the first sample and freed with the run. The instance is called from Python, in the reference loop. The
+FMU is first tried in a separate process, which may crash or hang.
+"""
+
+import dataclasses
+import functools
+import gc
+import hashlib
+import itertools
+import json
+import math
+import os
+import re
+import sys
+import weakref
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from smc_mujoco.common import errors
+from smc_mujoco.common.errors import ScenarioError, number, one_line, shown, unknown
+from smc_mujoco.common.extras import extra
+from smc_mujoco.common.jit import Uncompiled
+from smc_mujoco.common.process import TimedOut, timed
+from smc_mujoco.exchange.c import build, sandbox
+from smc_mujoco.control.component import Template
+from smc_mujoco.control.law import Measurement, law_function
+from smc_mujoco.control.units import Gain
+from smc_mujoco.exchange.fmu import slave
+from smc_mujoco.exchange.fmu.controller import OUTPUTS, UNBOUNDED
+from smc_mujoco.exchange.fmu.slave import HELD, REAL, Fault, Slave
+
+# Our name -> names of an FMU's variables with that meaning; case is ignored.
+NAMES = {
+    "x": ("x", "position", "pos", "q", "phi", "theta", "angle", "y", "measurement", "feedback"),
+    "v": ("v", "velocity", "vel", "speed", "omega", "dx", "xdot", "x_dot", "dq", "qdot", "w"),
+    "r": ("r", "ref", "reference", "setpoint", "x_ref", "xref", "xd", "x_d", "desired", "u_s"),
+    "dr": ("dr", "rdot", "ref_dot", "dref", "v_ref", "vd", "v_d"),
+    "ddr": ("ddr", "rddot", "ref_ddot", "ddref", "a_ref"),
+    "e": ("e", "error", "err"),
+    "de": ("de", "edot", "error_dot", "derror"),
+    "u": ("u", "control", "command", "torque", "tau", "force", "u_c", "manipulated"),
+    "s": ("s", "sigma", "sliding", "sliding_variable"),
+}
+INPUTS = tuple(n for n in Measurement._fields if n not in ("has_surface", "s", "v_eq"))
+CLOSE = 1e-6  # relative difference below which two periods are equal
+MAX_TIMEOUT = 86_400.0  # s: a day
+CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
+
+_running: dict[int, "Running"] = {}  # number of an instance, which its law's memory holds -> the instance
+_numbers = itertools.count(1)
+_begun: dict[int, int] = {}  # address of a law's memory -> number of the last instance that it held
+
+
+class Running(NamedTuple):
+    """The instance of an FMU for one channel of a run."""
+
+    law: "FmuLaw"
+    slave: Slave
+    start: float  # s: time of the first sample
+    last: list[float]  # u and s of the last step
+
+
+@dataclasses.dataclass(frozen=True)
+class FmuLaw(Uncompiled):
+    """The function of a law in an FMU. Two are equal if the content of the file and the settings are.
+
+    Attributes:
+      path: of the .fmu file.
+      digest: of its bytes.
+      name: of the law.
+      inputs: pairs of our name and the FMU's name for each input.
+      outputs: the FMU's name of u, and of s if it has s.
+      constants: pairs of the FMU's name and the value for each input that does not change.
+      parameters: the FMU's names of its gains.
+      period: of its steps, s; None for the control period.
+      once: whether a process can have only one instance.
+    """
+
+    path: str = dataclasses.field(compare=False)
+    digest: str
+    name: str
+    inputs: tuple[tuple[str, str], ...]
+    outputs: tuple[str, ...]
+    constants: tuple[tuple[str, float], ...]
+    parameters: tuple[str, ...]
+    period: float | None
+    once: bool = False
+
+    why = "is an FMU, called from Python: several times slower than a law that compiles, and on one core"
+
+    @property
+    def __name__(self) -> str:
+        """The law's name."""
+        return self.name
+
+    def __call__(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> tuple[float, float]:
+        """Return u and s. The memory holds the number of the instance, 0 before the first sample."""
+        if memory[0] == 0.0:
+            memory[0] = self._begin(y, gains, memory)
+        running = _running[int(memory[0])]
+        every, length = steps(self.period, y.dt)
+        k = round((y.t - running.start) / y.dt)
+        if k % every == 0:
+            values = [getattr(y, ours) for ours, _ in self.inputs]
+            for i in range(round(every * y.dt / length)):
+                running.last[: len(self.outputs)] = running.slave.step(values, y.t + i * length, length)
+        return running.last[0], running.last[1]
+
+    def _begin(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> int:
+        """Start an instance, which ends when the memory of the run is freed. Return its number."""
+        place = next(_numbers)
+        values = (max(-UNBOUNDED, min(float(gain), UNBOUNDED)) for gain in gains)
+        fixed = dict(self.constants) | dict(zip(self.parameters, values, strict=False))
+        names = [theirs for _, theirs in self.inputs]
+        address = memory.__array_interface__["data"][0]
+        _end(_begun.get(address, 0))  # the instance of a run whose memory was set to 0, to begin again
+        if self.once:
+            self._make_room()
+        made = Slave(str(extracted(self)), names, self.outputs, fixed, y.t)
+        _running[place], _begun[address] = Running(self, made, y.t, [0.0, 0.0]), place
+        owner: Any = memory if memory.base is None else memory.base
+        weakref.finalize(owner, _end, place)
+        return place
+
+    def _make_room(self) -> None:
+        """Raise ScenarioError if the FMU already has an instance. For FMUs that can have only one in a process."""
+        gc.collect()  # ends the instances of runs that are over
+        if any(other.law == self for other in _running.values()):
+            raise ScenarioError(
+                f"FMU {Path(self.path).name!r} can have only one instance in a process, by its description: "
+                "give a plant of one channel"
+            )
+
+
+def steps(period: float | None, dt: float) -> tuple[int, float]:
+    """Return after how many control periods the FMU steps, and how long each of its steps is, s.
+
+    Args:
+      period: of the FMU's steps, s; None for the control period.
+      dt: control period, s.
+
+    Raises:
+      ScenarioError: neither period is a multiple of the other.
+    """
+    if period is None:
+        return 1, dt
+    slower, faster = period / dt, dt / period
+    if abs(slower - round(slower)) < CLOSE * slower and round(slower) >= 1:
+        return round(slower), round(slower) * dt
+    if abs(faster - round(faster)) < CLOSE * faster:
+        return 1, dt / round(faster)
+    raise ScenarioError(
+        f"the FMU steps every {period:g} s and the law runs every {dt:g} s: give control_period={period:g}"
+    )
+
+
+def _end(place: int) -> None:
+    """End an instance, if it has not ended yet. Exceptions of its library are ignored."""
+    try:
+        _running.pop(place).slave.close()
+    except Exception:
+        return
+
+
+def extracted(law: FmuLaw) -> Path:
+    """Return the folder with an FMU's extracted files. It is the same in each call.
+
+    Raises:
+      ScenarioError: the file has changed since `law_from_fmu`, or is gone.
+    """
+    return _extracted(law.path, law.digest)
+
+
+@functools.lru_cache(maxsize=64)
+def _extracted(path: str, digest: str) -> Path:
+    try:
+        found = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError:
+        found = ""
+    if found != digest:
+        raise ScenarioError(f"FMU {Path(path).name!r} is gone or has changed: call smc.law_from_fmu again")
+    folder = build.fresh("-fmu")
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(folder)
+    return folder
+
+
+def law_from_fmu(
+    path: str | os.PathLike,
+    *,
+    variables: Mapping[str, str] | None = None,
+    constants: Mapping[str, float] | None = None,
+    period: float | None = None,
+    name: str | None = None,
+    isolate: bool = True,
+    timeout: float = 30.0,
+) -> Template:
+    """Load a controller in an FMU as a law, such as one that Simulink or a Modelica tool exported.
+
+    Args:
+      path: of an .fmu file: FMI 2.0 or 3.0, Co-Simulation, with a binary for this machine.
+      variables: our name -> the FMU's name, as {"x": "theta", "u": "torque"}. Ours are those of a law's measurement (x,
+        v, e, de, r, dr, ddr, f, g, ...), u and s. Default: recognised by their names, such as position, speed,
+        reference and torque; case is ignored.
+      constants: name -> value of the FMU's inputs that have none of these meanings.
+      period: s; the FMU steps this often, and u is held in between. Default: its own period if it has a fixed one, else
+        the control period.
+      name: of the law. Default: the file's name.
+      isolate: whether to try the FMU first in a separate process, for 500 steps on a double integrator.
+      timeout: s, for the trial.
+
+    Returns:
+      A Template. Its gains are the FMU's real parameters, with _ in place of dots and brackets:
+      law_from_fmu("c.fmu")(law_lam=5.0). Gains that are not given keep the FMU's own values.
+
+    Raises:
+      MissingPackageError: FMPy is not installed: pip install 'smc-mujoco[fmu]'.
+      ScenarioError: the file is not an FMU, or is of another version, without Co-Simulation or for other machines; a
+        variable is unknown; an input has no meaning; or the trial fails, crashes or does not end.
+
+    u is what the FMU returns after a step from the sample's time, on the measurement of that sample. In a run the FMU
+    is part of your process: if it crashes, Python ends.
+    """
+    with extra("fmu", "smc.law_from_fmu"):
+        import fmpy  # noqa: F401
+    file = _file(path)
+    timeout = number("timeout", timeout, above=0.0, most=MAX_TIMEOUT)
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    about = _description(file, digest)
+    known = {variable.name: variable for variable in about.modelVariables}
+    inputs, outputs = _meanings(file.name, known, variables or {}, constants or {})
+    gains = _gains(known.values())
+    law = FmuLaw(
+        path=str(file.resolve()),
+        digest=digest,
+        name=errors.name("name", name if name is not None else re.sub(r"\W", "_", file.stem)),
+        inputs=tuple(inputs.items()),
+        outputs=tuple(outputs.values()),
+        constants=tuple((key, number(f"constants[{key!r}]", value)) for key, value in (constants or {}).items()),
+        parameters=tuple(theirs for theirs, _ in gains.values()),
+        once=bool(about.coSimulation.canBeInstantiatedOnlyOncePerProcess),
+        period=_period(about) if period is None else number("period", period, above=0.0),
+    )
+    if isolate:
+        _try(law, timeout)
+    return law_function(gains={ours: gain for ours, (_, gain) in gains.items()}, memory=1)(law)
+
+
+def check(path: str | os.PathLike, timeout: float, **settings: Any) -> Iterator[str]:
+    """Try an FMU as a law, and yield lines: what its variables mean, its step, its gains.
+
+    Arguments and errors are those of `law_from_fmu`.
+    """
+    template = law_from_fmu(path, timeout=timeout, **settings)
+    law: FmuLaw = template.function  # pyright: ignore[reportAssignmentType]
+    yield "inputs   " + ", ".join(f"{theirs} is {ours}" for ours, theirs in law.inputs)
+    yield "outputs  " + ", ".join(f"{theirs} is {ours}" for ours, theirs in zip(OUTPUTS, law.outputs, strict=False))
+    if law.constants:
+        yield "held     " + ", ".join(f"{theirs} = {value:g}" for theirs, value in law.constants)
+    yield f"step     {_pace(law)}"
+    yield "gains    " + (", ".join(f"{name} = {gain.default:g}" for name, gain in template.gains.items()) or "none")
+    yield f"{Path(path).name} passes"
+
+
+def _pace(law: FmuLaw) -> str:
+    """Return words for how often a run steps an FMU, and for its own period if it has one that it keeps inside."""
+    import fmpy
+
+    if law.period is not None:
+        return f"{law.period:g} s"
+    about = fmpy.read_model_description(str(extracted(law)), validate=False)
+    inside = getattr(about.coSimulation, "fixedInternalStepSize", None)
+    return f"every control period{f'; inside, it runs every {float(inside):g} s' if inside else ''}"
+
+
+def _file(path: str | os.PathLike) -> Path:
+    """Return the path of an existing file."""
+    if not isinstance(path, str | os.PathLike):
+        raise ScenarioError(f"cannot take a law from {shown(path)}: give the path of an .fmu file")
+    if not Path(path).is_file():
+        raise ScenarioError(f"there is no file {str(path)!r}: give the path of an .fmu file")
+    return Path(path)
+
+
+def _description(file: Path, digest: str) -> Any:
+    """Return FMPy's description of an FMU.
+
+    Raises:
+      ScenarioError: it is not an FMU, or cannot run here.
+    """
+    import fmpy
+
+    if not zipfile.is_zipfile(file):
+        raise ScenarioError(f"{file.name} is not an FMU, as it is no zip archive: {CURE}")
+    try:
+        with zipfile.ZipFile(file) as archive:
+            if (wanted := "modelDescription.xml") not in archive.namelist():
+                raise ScenarioError(f"{file.name} is not an FMU, as there is no {wanted} in it: {CURE}")
+        folder = _extracted(str(file.resolve()), digest)
+        about = fmpy.read_model_description(str(folder), validate=False)
+    except ScenarioError:
+        raise
+    except Exception as error:  # a damaged archive or XML raises any exception there is
+        raise ScenarioError(
+            f"{file.name} is not an FMU ({type(error).__name__}: {one_line(str(error), 120)}): {CURE}"
+        ) from error
+    if str(about.fmiVersion)[:2] not in ("2.", "3."):
+        raise ScenarioError(f"{file.name} is of FMI {about.fmiVersion}: {CURE}")
+    if about.coSimulation is None:
+        kind = "Model Exchange" if about.modelExchange is not None else "Scheduled Execution"
+        raise ScenarioError(f"{file.name} is for {kind} only: export it for Co-Simulation")
+    here = fmpy.platform if str(about.fmiVersion).startswith("2") else fmpy.platform_tuple
+    if not list((folder / "binaries" / here).glob(f"{about.coSimulation.modelIdentifier}.*")):
+        places = sorted(each.name for each in (folder / "binaries").glob("*")) if (folder / "binaries").exists() else []
+        cure = (
+            "compile its sources with FMPy, fmpy compile" if (folder / "sources").is_dir() else "export it for this one"
+        )
+        raise ScenarioError(
+            f"{file.name} has a binary for {', '.join(places) or 'no machine'}, and this one is {here}: {cure}"
+        )
+    return about
+
+
+def _meanings(
+    file: str, known: Mapping[str, Any], chosen: Mapping[str, str], constants: Mapping[str, float]
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Return our name -> the FMU's, for its inputs and for its outputs.
+
+    Args:
+      file: the file's name, for errors.
+      known: name -> variable of the FMU.
+      chosen: our name -> the FMU's, from the user.
+      constants: inputs of the FMU that do not change.
+
+    Raises:
+      ScenarioError: an unknown name, an input without a meaning, no u, or a variable that is no real number.
+    """
+    for what, value in (("variables", chosen), ("constants", constants)):
+        if not isinstance(value, Mapping):
+            raise ScenarioError(f"{what} is {shown(value)}: give a dict, such as variables={{'x': 'theta'}}")
+    ins, outs = ([n for n, v in known.items() if v.causality == side] for side in ("input", "output"))
+    for ours, theirs in chosen.items():
+        if ours not in (*INPUTS, *OUTPUTS):
+            raise unknown("meaning of a variable", ours, (*INPUTS, *OUTPUTS))
+        side, theirs_known = ("output", outs) if ours in OUTPUTS else ("input", ins)
+        errors.find(f"{side} of {file}", theirs, dict.fromkeys(theirs_known, ""))
+    for theirs in constants:
+        errors.find(f"input of {file}", theirs, dict.fromkeys(ins, ""))
+    taken = {*chosen.values(), *constants}
+    inputs = {ours: theirs for ours, theirs in chosen.items() if ours in INPUTS}
+    inputs |= _by_name([n for n in ins if n not in taken], [n for n in INPUTS if n not in chosen])
+    if joints := [n for n in ins if n.endswith("[2]") and n not in taken]:
+        raise ScenarioError(
+            f"{file} has inputs of many joints, such as {joints[0]!r}: give an FMU of one channel, or the law in C; "
+            f"if one channel does not need the input, hold it by constants={{{joints[0]!r}: 0.0}}"
+        )
+    if strange := [n for n in ins if n not in {*inputs.values(), *constants}]:
+        raise _without_meaning(file, strange, known)
+    outputs = {ours: theirs for ours, theirs in chosen.items() if ours in OUTPUTS}
+    outputs |= _by_name([n for n in outs if n not in taken], [n for n in OUTPUTS if n not in chosen])
+    if not outs:
+        raise ScenarioError(f"{file} has no output: export it with the command as an output")
+    if "u" not in outputs and len(outs) != 1:
+        free = next((n for n in outs if n not in outputs.values()), outs[0])
+        raise ScenarioError(
+            f"{file} has no output that is named as a command ({', '.join(outs)}): "
+            f"say which it is, as in variables={{'u': {free!r}}} (--variables u={free})"
+        )
+    outputs.setdefault("u", outs[0])
+    real = dict.fromkeys((*inputs.values(), *outputs.values()), REAL)
+    for theirs, types in {**dict.fromkeys(constants, HELD), **real}.items():
+        if known[theirs].type not in types or known[theirs].dimensions:
+            need = "real number: a law measures and returns real numbers"
+            need = need if types is REAL else "number: export it without this input"
+            raise ScenarioError(f"{theirs!r} of {file} is not one {need}")
+    return inputs, {ours: outputs[ours] for ours in OUTPUTS if ours in outputs}
+
+
+def _without_meaning(file: str, strange: Sequence[str], known: Mapping[str, Any]) -> ScenarioError:
+    """Return the error for inputs of an FMU that are nothing a law measures. Only real ones can be given a meaning."""
+    some, names = len(strange) > 1, ", ".join(map(repr, strange))
+    what = f"inputs {names} of {file} mean" if some else f"input {names} of {file} means"
+    real = [name for name in strange if known[name].type in REAL][:1]
+    meaning = [
+        f"say what {'they are' if some else 'it is'}, variables={{'x': {n!r}}} (--variables x={n}), or" for n in real
+    ]
+    held = strange[-1]
+    hold = f"hold {'them' if some else 'it'}, constants={{{held!r}: 0.0}} (--constants {held}=0)"
+    return ScenarioError(" ".join([f"{what} nothing that a law measures:", *meaning, hold]))
+
+
+def _by_name(theirs: Iterable[str], ours: Iterable[str]) -> dict[str, str]:
+    """Return our name -> the FMU's, for its variables whose name, after the last dot, is ours or one of NAMES."""
+    words = {name.rsplit(".", 1)[-1].casefold(): name for name in theirs}
+    found = {}
+    for name in ours:
+        word = next((word for word in (name, *NAMES.get(name, ())) if word in words), None)
+        if word is not None:
+            found[name] = words.pop(word)
+    return found
+
+
+def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
+    """Return name of a gain -> the FMU's name and the Gain, for its real parameters."""
+    gains: dict[str, tuple[str, Gain]] = {}
+    for variable in variables:
+        if variable.causality != "parameter" or variable.type not in REAL or variable.dimensions:
+            continue
+        try:
+            start = float(variable.start)
+        except (TypeError, ValueError):
+            continue
+        ours = re.sub(r"\W+", "_", variable.name).strip("_")
+        if not ours.isidentifier() or ours.startswith("_") or ours in gains or math.isnan(start):
+            continue
+        start = math.copysign(math.inf, start) if abs(start) >= UNBOUNDED else start
+        least = math.nan if variable.min is None else float(variable.min)
+        gains[ours] = variable.name, Gain(start, nonnegative=least == 0.0)
+    return gains
+
+
+def _period(about: Any) -> float | None:
+    """Return the step that an FMU prescribes, s; None if it takes any."""
+    inside = about.coSimulation
+    if inside.canHandleVariableCommunicationStepSize:
+        return None
+    fixed = getattr(inside, "fixedInternalStepSize", None)
+    default = about.defaultExperiment.stepSize if about.defaultExperiment else None
+    for step in (fixed, default):
+        if step is not None and float(step) > 0.0:
+            return float(step)
+    return None
+
+
+def _try(law: FmuLaw, timeout: float) -> None:
+    """Try an FMU in a separate process.
+
+    Raises:
+      ScenarioError: it failed, crashed or did not end.
+    """
+    progress, order, file = build.fresh(".txt"), build.fresh(".json"), Path(law.path).name
+    words = {"folder": str(extracted(law)), "inputs": dict(law.inputs), "outputs": law.outputs, "step": law.period}
+    order.write_text(json.dumps(words | {"fixed": dict(law.constants), "progress": str(progress)}), encoding="utf-8")
+    try:
+        code = timed([sys.executable, "-P", slave.__file__, str(order)], timeout, output=False).returncode
+    except TimedOut:
+        code = None
+    lines = (progress.read_text(encoding="utf-8") if progress.exists() else "").splitlines() or ["loading"]
+    last, _, why = lines[-1].partition(" ")
+    if last == "passed" and code == 0:
+        return
+    if last == Fault.__name__:
+        raise ScenarioError(f"{file}: {why}: fix the FMU, or its inputs and parameters")
+    raise ScenarioError(f"{file}: {lines[-1]} {sandbox.ended(code, timeout)}")

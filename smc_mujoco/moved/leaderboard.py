@@ -1,3 +1,0 @@
-from smc_mujoco.moved import forward
-
-forward(__name__, "smc_mujoco.studies.leaderboard")

@@ -1,0 +1,515 @@
+"""The audit: how checks make verdicts, that it can fail, and that what it computes is what happens."""
+
+import dataclasses
+import json
+import math
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.linear_theory import lam_range
+from smc_mujoco.cli import tables
+from smc_mujoco.cli.commands.studies import claims as command
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control.variants import reversed_gain, squeezed, with_gains, zero_gain
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.simulation.grid import grid
+from smc_mujoco.evidence.audit import audit
+from smc_mujoco.evidence.audit import runs as claim_runs
+from smc_mujoco.evidence.audit.audit import claims, evaluations
+from smc_mujoco.evidence.audit.paper import Entry, paper
+from smc_mujoco.evidence.audit.runs import Runs
+from smc_mujoco.evidence.audit.verdict import (
+    EXISTENTIAL,
+    NAMED,
+    NOT_TESTABLE,
+    PARTLY,
+    REFUTED,
+    SUPPORTED,
+    UNIVERSAL,
+    Beside,
+    check,
+    combined,
+    judged,
+    ratio,
+    verdict,
+)
+from smc_mujoco.evidence.papers.gaber.claims import common, lyapunov, searches
+from smc_mujoco.evidence.papers.gaber.claims.common import OURS
+from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS
+from smc_mujoco.studies.run_key import key
+
+GABER = paper("gaber")
+LIST = """1 3 4 5 7 10 11 12 13 14 15 18 19 20 21 24 25 27 28 29 31 32 33 34 35 36 37 38 39 40
+          45 46 48 49 50 51 52 55 56 57 59 61 T"""
+UNIVERSALS = {"11", "18", "19", "20", "24", "50", "59"}
+CHEAP = ("3", "5", "18", "25")
+
+# checks
+
+
+def test_a_check_holds_just_where_its_relation_does():
+    for relation, below, at, above in (("<", 1, 0, 0), ("<=", 1, 1, 0), (">", 0, 0, 1), (">=", 0, 1, 1)):
+        assert [check("x", value, relation, 2.0).holds for value in (1.0, 2.0, 3.0)] == [below, at, above]
+
+
+@pytest.mark.parametrize("relation", ["<", "<=", ">", ">="])
+@pytest.mark.parametrize(
+    ("value", "limit"), [(math.nan, 1.0), (1.0, math.nan), (math.nan, math.nan), (math.inf, math.inf)]
+)
+def test_what_cannot_be_compared_never_holds(relation, value, limit):
+    assert not check("x", value, relation, limit).holds
+
+
+def test_never_is_later_than_any_time():
+    assert check("x", math.inf, ">", 3.0).holds
+    assert check("x", 3.0, "<", math.inf).holds
+    assert not check("x", math.inf, "<=", 3.0).holds
+
+
+def test_a_relation_that_is_none_is_refused():
+    with pytest.raises(ScenarioError, match="relation '=='"):
+        check("x", 1.0, "==", 1.0)
+
+
+def test_ratios_of_nothing_are_no_numbers_that_hold():
+    assert math.isnan(ratio(0.0, 0.0))
+    assert math.isnan(ratio(math.inf, math.inf))
+    assert (ratio(1.0, 0.0), ratio(1.0, 4.0)) == (math.inf, 0.25)
+
+
+def test_slack_is_the_room_to_the_limit():
+    assert check("x", 1.0, "<", 4.0).slack == check("x", 7.0, ">", 4.0).slack == 0.75
+    assert check("x", 2.0, "<=", 0.0).slack == -2.0
+    assert check("x", math.nan, "<", 1.0).slack == check("x", math.inf, "<", 1.0).slack == -math.inf
+
+
+# verdicts
+
+YES, NO, ASIDE = check("yes", 1.0, "<", 2.0), check("no", 3.0, "<", 2.0), Beside("theory", 7.0)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        ([YES], SUPPORTED),
+        ([YES, check("also", 1.0, ">", 0.0)], SUPPORTED),
+        ([NO], REFUTED),
+        ([YES, NO], REFUTED),
+        ([], NOT_TESTABLE),
+        ([ASIDE], NOT_TESTABLE),
+        ([NO, ASIDE], REFUTED),
+        ([check("x", math.nan, "<", 1.0)], REFUTED),
+    ],
+)
+def test_the_verdict_is_of_the_checks_alone(found, expected):
+    assert verdict(found) == expected
+
+
+ABOUT = [one._replace(sentence="a") for one in (YES, NO)]
+OTHER = YES._replace(what="other", sentence="b")
+
+
+@pytest.mark.parametrize(
+    ("found", "quantifier", "expected"),
+    [
+        ([YES, NO], UNIVERSAL, REFUTED),
+        ([YES, NO], EXISTENTIAL, SUPPORTED),
+        ([NO], EXISTENTIAL, REFUTED),
+        ([*ABOUT, OTHER], NAMED, PARTLY),
+        ([*ABOUT, OTHER], EXISTENTIAL, SUPPORTED),
+        ([ABOUT[1], OTHER], UNIVERSAL, PARTLY),
+    ],
+)
+def test_a_sentence_holds_with_all_its_checks_and_an_existential_one_with_one(found, quantifier, expected):
+    assert verdict(found, quantifier) == expected
+
+
+def test_one_counter_example_refutes_what_is_said_of_all_gains():
+    found = {"study": SUPPORTED, "tuned": REFUTED}
+    assert combined(found, UNIVERSAL)[:2] == (REFUTED, True)
+    assert combined(found, EXISTENTIAL)[:2] == (SUPPORTED, True)
+    assert combined(found, NAMED)[:2] == (PARTLY, True)
+    assert combined({"study": PARTLY, "tuned": SUPPORTED}, UNIVERSAL)[0] == PARTLY
+
+
+def test_universal_claims_are_those_of_the_list():
+    assert {id for id, one in GABER.claims.items() if one.quantifier == UNIVERSAL} == UNIVERSALS
+
+
+def test_sets_that_agree_give_their_verdict_and_others_flip():
+    assert combined({"study": REFUTED, "tuned": REFUTED}) == (REFUTED, False, "")
+    overall, flips, sentence = combined({"study": SUPPORTED, "tuned": REFUTED})
+    assert (overall, flips) == (PARTLY, True)
+    assert "supported with study gains, refuted with tuned gains" in sentence
+
+
+def test_two_numbers_of_one_name_are_refused():
+    with pytest.raises(ScenarioError, match="'yes' twice"):
+        judged(entry(), {"study": [YES, YES]})
+
+
+def entry(id="900", found=(YES,), note=""):
+    told = {"text": "text", "where": "here", "measured": "this", "holds_if": "< 2", "note": note}
+    return Entry(id=id, evidence=lambda runs: found[runs.gains] if isinstance(found, dict) else found, **told)
+
+
+@pytest.fixture
+def only(monkeypatch):
+    """A paper with the claims given alone."""
+
+    def put(*entries):
+        short = dataclasses.replace(GABER, claims={one.id: one for one in entries})
+        monkeypatch.setattr(audit, "find_paper", lambda which: short)
+
+    return put
+
+
+def test_a_claim_says_what_it_depends_on(only):
+    only(entry(found={"study": [YES, ASIDE], "tuned": [NO]}, note="Mind the gap."))
+    (one,) = claims(gains=["study", "tuned"])
+    assert (one.verdict, one.flips, one.verdicts) == (PARTLY, True, {"study": SUPPORTED, "tuned": REFUTED})
+    assert one.numbers["study"] == {"yes": {"value": 1.0, "relation": "<", "limit": 2.0, "holds": True, "sentence": ""}}
+    assert one.beside == {"study": {"theory": 7.0}, "tuned": {}}
+    assert one.note.startswith("Mind the gap. The verdict depends on the gains")
+    assert one.checks("tuned") == [NO]
+    assert one.decisive("tuned") == NO
+
+
+@pytest.mark.parametrize(
+    "decisive", [check("worst", 9.0, "<", 2.0), check("never", math.inf, "<", 2.0), check("none", math.nan, "<", 2.0)]
+)
+def test_the_check_that_fails_by_most_decides(only, decisive):
+    only(entry(found=[YES, NO, check("worse", 30.0, "<", 20.0), decisive]))
+    assert claims(gains="study")[0].decisive("study").what == decisive.what  # pyright: ignore[reportOptionalMemberAccess]
+
+
+def test_if_all_checks_hold_the_nearest_to_its_limit_decides(only):
+    near = check("near", 1.9, "<", 2.0)
+    only(entry(found=[YES, near]))
+    assert claims(gains="study")[0].decisive("study") == near
+
+
+def test_claims_are_json_without_loss(only):
+    only(entry(found=[check("a", math.inf, "<", 1.0), check("b", math.nan, "<", -math.inf), ASIDE]))
+    text = audit.document(claims(gains="study"))
+    told = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))["claims"][0]
+    assert float(told["numbers"]["study"]["a"]["value"]) == math.inf
+    assert math.isnan(float(told["numbers"]["study"]["b"]["value"]))
+    assert told["beside"] == {"study": {"theory": 7.0}}
+    assert told["flips"] is False
+
+
+# the list
+
+
+def test_every_claim_of_the_list_is_there_once_and_in_order():
+    assert list(GABER.claims) == LIST.split()
+
+
+def test_every_claim_says_what_where_and_how():
+    for one in GABER.claims.values():
+        assert all((one.text, one.where, one.measured, one.holds_if, one.evidence.__doc__)), one.id
+
+
+def test_unknown_claims_and_sets_are_refused():
+    with pytest.raises(ScenarioError, match="unknown claim '2'"):
+        claims(only=["2"])
+    with pytest.raises(ScenarioError, match="unknown set of gains 'tund': did you mean 'tuned'"):
+        claims(only=["3"], gains=["tund"])
+    with pytest.raises(ScenarioError, match="no set of gains"):
+        claims(only=["3"], gains=[])
+
+
+def test_late_claims_come_last_and_every_one_is_reported(only):
+    order, told = [], []
+    late = dataclasses.replace(entry("1"), late=True, evidence=lambda runs: order.append("1") or [YES])
+    only(late, dataclasses.replace(entry("2"), evidence=lambda runs: order.append("2") or [YES]))
+    assert [one.id for one in claims(gains=["study", "tuned"], report=told.append)] == ["1", "2"]
+    assert order == ["2", "1", "2", "1"]
+    assert sum(told) == evaluations(gains=["study", "tuned"]) == 4
+
+
+# runs
+
+
+@pytest.fixture
+def runs():
+    return Runs(GABER, "study", quick=True)
+
+
+def short(runs, name="duffing", **changes):
+    return runs.scenario(name, OURS, duration=0.05, **changes)
+
+
+def test_a_run_is_made_once(runs, monkeypatch):
+    made = []
+    stream = claim_runs.stream
+    monkeypatch.setattr(claim_runs, "stream", lambda some, threads: made.extend(some) or stream(some, threads))
+    first = runs.scores([short(runs), short(runs), short(runs, seed=1)])
+    assert first[0] == first[1]
+    assert runs.scores([short(runs, seed=1), short(runs)]) == [first[2], first[0]]
+    assert len(made) == 2
+
+
+def test_a_run_that_fails_is_infinitely_bad_in_everything(runs):
+    @smc.law_function
+    def lost(y, gains, memory):
+        return math.nan, 0.0
+
+    (scores,) = runs.scores([short(runs, law=lost())])
+    assert set(scores) >= {m.name for m in metrics() if not m.network}
+    assert set(scores.values()) == {math.inf}
+
+
+def test_the_rows_of_a_table_stand_for_their_runs(runs):
+    scenario = short(runs)
+    row = {m.name: None if m.network else 1.5 for m in metrics()}
+    row |= {"hash": key(scenario), "law": OURS, "gains": '{"lam": 6.0}', "failure": None}
+    table = Runs(GABER, "study", table=claim_runs.of_table(SimpleNamespace(rows=lambda: [row])))
+    assert table.scores([scenario])[0]["itae"] == 1.5
+    assert [one.gains for one in table.results()] == [{"lam": 6.0}]
+
+
+@pytest.mark.parametrize("condition", ["nominal", "noise", "jump_hard", "encoder"])
+def test_a_run_of_the_study_has_the_key_that_the_study_gives_it(runs, condition):
+    (scenario,) = grid(["duffing"], [OURS], [condition], 1, "study")
+    assert key(runs.scenario("duffing", OURS, condition)) == key(scenario)
+
+
+def test_a_change_of_plant_keeps_the_gains_of_its_name(runs):
+    scenario = short(runs, "pendulum_network", plant=find_plant("pendulum_network", n=2))
+    assert scenario.plant.n == 2
+    assert scenario.law == runs.law("pendulum_network", OURS)
+
+
+def test_a_mutant_stands_for_its_law_alone():
+    runs = Runs(GABER, "study", substitute={OURS: zero_gain})
+    assert runs.law("duffing", OURS).name == "observer_free_zero"
+    assert runs.law("duffing", "classical") == Runs(GABER, "study").law("duffing", "classical")
+
+
+# laws made of laws
+
+
+def test_an_input_gain_multiplies_the_command_at_each_sample(runs):
+    law = runs.law("duffing", OURS)
+    made = (law, reversed_gain(law), zero_gain(law), squeezed(law))
+    traces = runs.traces([short(runs, law=one) for one in made])
+    for trace, gain in zip(
+        traces, (lambda x: 1.0, lambda x: -1.0, lambda x: 0.0, lambda x: 1 / (1 + x**2)), strict=True
+    ):
+        assert np.array_equal(trace.s, traces[0].s) is (trace is traces[0])
+        expected = -law.gains["lam"] * np.tanh(trace.v + law.gains["k1"] * trace.x) * gain(trace.x)
+        np.testing.assert_allclose(trace.u, expected, rtol=1e-12)
+
+
+def test_an_input_gain_multiplies_what_the_actuator_gives_and_not_what_the_law_asks_for(runs):
+    strong = with_gains(runs.law("duffing", OURS), lam=26.0)  # of which 6 N come
+    (trace,) = runs.traces([short(runs, law=squeezed(strong))])
+    asked = -26.0 * np.tanh(trace.v + strong.gains["k1"] * trace.x)
+    np.testing.assert_allclose(trace.u, np.clip(asked, -6.0, 6.0) / (1.0 + trace.x**2), rtol=1e-12)
+
+
+# Lyapunov
+
+
+def along(name, period):
+    """Finite differences of V along a run, and V' of the map at the same samples."""
+    plant, lam, k1 = find_plant(name), 2.5, 4.0
+    x0 = [0.6] * plant.n  # a network synchronised
+    scenario = smc.Scenario(
+        plant=plant, law=smc.law(OURS, lam=lam, k1=k1), x0=x0, v0=-1.0, duration=0.5, control_period=period
+    )
+    trace = smc.run(scenario)
+    x, v = trace.x[:, 0], trace.v[:, 0]
+    height = lyapunov.value(plant, lam, k1, x, v)
+    measured = (height[2:] - height[:-2]) / (2 * period)
+    mapped = lyapunov.vdot(plant, lam, k1, x, v)[1:-1]
+    return np.abs(measured - mapped).max() / np.abs(mapped).max()
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_the_map_is_the_slope_of_v_along_trajectories(name):
+    coarse, fine = along(name, 1e-3), along(name, 2.5e-4)
+    assert fine < 0.01
+    assert 3.0 < coarse / fine < 5.0  # what is left is the command's being held, first order in the control period
+
+
+@pytest.mark.parametrize("name", PLANTS)
+@pytest.mark.parametrize("lam", [0.1, 3.0, 1e3])
+def test_v_rises_on_one_side_of_alpha_0_whatever_lambda_is(name, lam):
+    plant, k1 = find_plant(name), 4.0
+    x, near = 0.7, 1e-6 / lam
+    sides = lyapunov.vdot(plant, lam, k1, np.full(2, x), -k1 * x + np.array([near, -near]))
+    assert sides.max() > 0.0 > sides.min()
+
+
+def test_a_plant_on_which_the_claim_is_true_shows_no_rise():
+    """f = -k1 v - alpha makes alpha' = -alpha - lam tanh(alpha): V falls wherever s is not 0."""
+    k1 = 4.0
+    plant = dataclasses.replace(
+        find_plant("duffing"), nominal=lambda x, v, i, p: (-k1 * v[i] - (v[i] + k1 * x[i]), 1.0)
+    )
+    x, v = lyapunov.plane(plant, k1, points=21)
+    away = np.abs(lyapunov.surface(plant, 2.0, k1, x, v)) > 1e-6
+    assert (lyapunov.vdot(plant, 2.0, k1, x, v)[away] < 0.0).all()
+
+
+# searches
+
+
+def about(plants, **options):
+    """Runs of claim 24, of these plants."""
+    return Runs(GABER, "study", **options).of(dataclasses.replace(GABER.claims["24"], plants=plants))
+
+
+def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory():
+    runs = about(("inverted_pendulum", "van_der_pol", "duffing"))
+    for name, found in searches.smallest_stable(runs).items():
+        theory, _ = lam_range(find_plant(name), runs.law(name, OURS).gains["k1"], common.PERIOD)
+        assert theory <= found <= 1.02 * theory, name
+
+
+def test_a_law_without_effect_stabilises_what_hangs_alone():
+    found = searches.smallest_stable(about(("duffing", "pendulum_network"), quick=True, substitute={OURS: zero_gain}))
+    assert found == {"duffing": math.inf, "pendulum_network": searches.MIN_LAMBDA}
+
+
+# the audit
+
+
+@pytest.fixture(scope="module")
+def verdicts():
+    return {one.id: one for one in claims(only=CHEAP, gains="study", quick=True)}
+
+
+def test_the_same_audit_twice_gives_the_same(verdicts):
+    again = claims(only=["3", "18"], gains="study", quick=True, threads=1)
+    assert again == [verdicts[one] for one in ("3", "18")]
+
+
+def test_the_true_law_passes_what_its_mutants_fail(verdicts):
+    assert {id: one.verdict for id, one in verdicts.items()} == {
+        "3": SUPPORTED,
+        "5": SUPPORTED,
+        "18": REFUTED,
+        "25": SUPPORTED,
+    }
+
+
+@pytest.mark.parametrize("mutant", [reversed_gain, zero_gain])
+def test_a_broken_law_fails(mutant, verdicts):
+    broken = claims(only=["5", "25"], gains="study", quick=True, substitute={OURS: mutant})
+    flipped = {one.id for one in broken if one.verdict != verdicts[one.id].verdict}
+    assert {"5", "25"} <= flipped
+
+
+def test_more_chattering_than_the_classical_law_flips_the_claim_of_less():
+    (one,) = claims(only=["3"], gains="study", substitute={OURS: lambda law: smc.law("classical", k=5.0, c=4.0)})
+    assert one.verdict == REFUTED
+
+
+def test_the_wrong_sign_converges_just_where_the_plant_has_it_too():
+    assert claims(only=["21"], gains="study")[0].verdict == REFUTED
+    assert claims(only=["21"], gains="study", substitute={OURS: reversed_gain})[0].verdict == SUPPORTED
+
+
+def test_a_command_beyond_lambda_is_seen():
+    def louder(law):
+        return with_gains(law, lam=law.gains["lam"] * 0.5)
+
+    class Louder(Runs):  # whose scores are those of twice the command
+        def scores(self, scenarios):
+            return [found | {"max_u": 2.0 * found["max_u"]} for found in super().scores(scenarios)]
+
+    runs = Louder(GABER, "study", quick=True, substitute={OURS: louder})
+    assert verdict(GABER.claims["4"].evidence(runs.of(GABER.claims["4"]))) != SUPPORTED
+
+
+# the command
+
+
+@pytest.fixture
+def terminal(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
+    app = typer.Typer()
+    app.command()(command)
+    return lambda *arguments: CliRunner().invoke(app, list(arguments))
+
+
+def test_the_command_prints_one_json_document(terminal, tmp_path):
+    done = terminal("18", "3", "--gains", "study", "--quick", "--json", "--out", str(tmp_path / "claims.json"))
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    assert [one["id"] for one in told["claims"]] == ["3", "18"]
+    assert json.loads((tmp_path / "claims.json").read_text()) == told
+
+
+def test_a_claim_is_shown_in_full(terminal):
+    done = terminal("18", "--gains", "study", "--quick")
+    assert done.exit_code == 0, done.output
+    assert "quick: coarser grids" in done.stdout
+    for part in ("Vdot <= -eps s^2", "holds if", "refuted", "van_der_pol: share of the plane", "largest Vdot, at x"):
+        assert part in done.stdout
+
+
+def test_an_overview_has_a_line_a_claim(only, capsys):
+    from rich.console import Console
+
+    only(entry("3", found={"study": [YES], "tuned": [NO]}), entry("18", found=[], note="Nothing to see."))
+    tables.print_claims(claims(gains=["study", "tuned"]), Console(width=120), full=False)
+    text = capsys.readouterr().out
+    for part in ("partly supported, flips", "● ", "no = 3 (asked: < 2)", "Nothing to see.", "1 not testable"):
+        assert part in text
+
+
+def test_a_time_that_never_comes_is_told_apart_from_what_has_no_bound():
+    late = str(check("settling time, s", math.inf, "<", 10.0))
+    far = str(check("deviation", math.inf, "<", 0.01))
+    assert (late, far) == ("settling time, s = never (asked: < 10)", "deviation = inf (asked: < 0.01)")
+
+
+def test_a_folder_is_no_file_to_write(terminal, tmp_path):
+    done = terminal("3", "--out", str(tmp_path))
+    assert done.exit_code == 2
+    assert "it is a folder" in done.stderr
+
+
+def test_a_claim_that_is_none_ends_in_a_sentence(terminal):
+    done = terminal("999")
+    assert done.exit_code == 2
+    assert "unknown claim '999'" in done.stderr
+
+
+@pytest.mark.parametrize(("quick", "told"), [(True, "; here, quickly, 51 x 51 points"), (False, "one pendulum")])
+def test_a_quick_audit_tells_what_it_measures_instead(quick, told):
+    (claim,) = claims(only=["18"], gains="study", quick=quick)
+    assert claim.measured.endswith(told)
+
+
+def test_a_notebook_shows_claims_in_a_line_each_and_one_in_full(only):
+    only(
+        entry("3", found={"study": [YES], "tuned": [NO, YES]}, note="<Mind> the gap."),
+        entry("18", found=[], note="Nothing to see."),
+        entry("19", found=[NO]),
+    )
+    several = claims(gains=["study", "tuned"])
+    shown = several._repr_html_()
+    assert isinstance(several, list)
+    assert re.findall(r"<b>(.*?)</b>", shown) == ["◐ partly supported, flips", "– not testable", "○ refuted"]
+    assert "no = 3 (asked: &lt; 2)" in shown
+    assert "Nothing to see." in shown
+    assert "1 partly supported, " in shown
+    full = several[0]._repr_html_()
+    rows = re.findall(r"<td[^>]*>(study|tuned)</td><td[^>]*>(.)</td><td[^>]*>(yes|no)</td><td[^>]*>(\S+)</td>", full)
+    assert rows == [("study", "✓", "yes", "1"), ("tuned", "✗", "no", "3"), ("tuned", "✓", "yes", "1")]
+    assert "flips with the gains" in full
+    assert "&lt;Mind&gt; the gap." in full
+    assert "flips" not in several[2]._repr_html_()

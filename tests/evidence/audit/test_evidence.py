@@ -1,0 +1,209 @@
+"""The evidence of an audit: written twice it is the same, it leads from claims to runs, and its seal shows changes."""
+
+import dataclasses
+import json
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import smc_mujoco as smc
+from smc_mujoco.cli.commands import studies
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import from_json
+from smc_mujoco.simulation import serialise
+from smc_mujoco.evidence.audit import badge, evidence
+from smc_mujoco.evidence.audit.audit import audit
+from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED
+from smc_mujoco.studies.run_key import portable_key
+
+DATA = """
+title = "Small"
+authors = "A. Nobody"
+source = "nowhere, 2026"
+runs = "duration=0.2"
+sets = ["slow", "tuned"]
+[conditions]
+pushed = "disturbance=Sine(amplitude=0.5, omega=2.0)"
+[gains.slow]
+classical = { k = 3.0, c = 2.0 }
+[[claim]]
+id = "1"
+text = "the law is calm"
+where = "p. 1"
+function = "calm"
+plants = ["duffing"]
+laws = ["classical"]
+conditions = ["pushed", "noise"]
+holds_if = { "TV rate" = "< 1e9", "largest |x|" = "< 1e-9" }
+[[claim]]
+id = "2"
+text = "it is fast"
+where = "p. 2"
+function = "fast"
+varies = "a timing"
+holds_if = { "time" = "< 1" }
+"""
+CODE = """
+import time
+import numpy as np
+def calm(runs):
+    grid = runs.grid()
+    rates = {name: one["tv_rate"] for (_, _, name), one in zip(grid, runs.scores(grid.values()))}
+    return {"TV rate": rates, "largest |x|": float(np.abs(runs.traces(grid.values())[0].x).max())}
+def fast(runs):
+    return {"time": time.perf_counter() % 1.0}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    home = tmp_path_factory.mktemp("papers") / "small"
+    home.mkdir()
+    (home / "paper.toml").write_text(DATA)
+    (home / "claims.py").write_text(CODE)
+    return home
+
+
+@pytest.fixture(scope="module")
+def done(folder):
+    return audit(folder)
+
+
+@pytest.fixture(scope="module")
+def told(done):
+    return evidence.document(done)
+
+
+def test_a_clean_process_writes_the_same_file_of_another_folder(done, folder, tmp_path):
+    here = done.save(tmp_path / "here.json")
+    copy = tmp_path / "elsewhere" / "small"
+    copy.mkdir(parents=True)
+    for file in folder.glob("*.*"):
+        (copy / file.name).write_bytes(file.read_bytes().replace(b"\n", b"\r\n"))
+    code = "import sys, smc_mujoco as smc; smc.audit(sys.argv[1], threads=1).save(sys.argv[2])"
+    there = tmp_path / "there.json"
+    subprocess.run([sys.executable, "-c", code, str(copy), str(there)], check=True, cwd=Path(__file__).parents[3])
+    assert here.read_bytes() == there.read_bytes()
+
+
+def test_a_claim_leads_to_its_runs_numbers_threshold_and_verdict(told):
+    first, second = told["claims"]
+    assert (first["verdict"], first["verdicts"]) == (REFUTED, {"slow": REFUTED, "tuned": REFUTED})
+    assert set(first["numbers"]["slow"]) == {"pushed: TV rate", "noise: TV rate", "largest |x|"}
+    assert [len(names) for names in first["runs"].values()] == [2, 2]
+    runs = [told["runs"][name] for name in first["runs"]["slow"]]
+    assert {run["condition"] for run in runs} == {"pushed", "noise"}
+    assert [run["gains"] for run in runs] == [{"k": 3.0, "c": 2.0}] * 2
+    assert all(len(run["scores"]) == len(run["trace"]) == 16 for run in runs)
+    assert len({run["trace"] for run in told["runs"].values()}) == len(told["runs"]) == 4
+    assert "not_sealed" in second
+    assert "a timing" in second["not_sealed"]
+    assert {"numbers", "verdict"}.isdisjoint(second)
+    assert told["counts"] == {REFUTED: 1}
+    assert set(told["paper"]["files"]) == {"paper.toml", "claims.py"}
+
+
+def test_nothing_of_the_machine_is_in_it(told, folder):
+    text = json.dumps(told)
+    assert str(folder.parent) not in text
+    assert "arithmetic" not in text
+    assert "/" not in "".join(told["paper"]["files"])
+
+
+def test_a_run_has_one_name_with_all_versions_and_under_all_names_of_its_condition(monkeypatch):
+    scenario = smc.Scenario(plant="duffing", law="classical", duration=0.1)
+    name = portable_key(scenario)
+    monkeypatch.setattr(serialise, "_versions", lambda: {"mujoco": "another", "arithmetic": "another"})
+    assert portable_key(scenario) == portable_key(scenario.named("calm")) == name
+    assert portable_key(dataclasses.replace(scenario, seed=1)) != name
+
+
+def test_a_claim_has_its_own_runs_alone(done):
+    assert [len(done.used[id]["slow"]) for id in ("1", "2")] == [2, 0]
+
+
+def test_a_quick_audit_has_the_quick_sets(folder):
+    assert list(audit(folder, only=["2"], quick=True).claims[0].verdicts) == ["slow"]
+
+
+def test_other_gains_are_other_runs(told):
+    first, _ = told["claims"]
+    assert set(first["runs"]["slow"]).isdisjoint(first["runs"]["tuned"])
+
+
+def test_a_change_breaks_the_seal(done, tmp_path):
+    path = done.save(tmp_path / "evidence.json")
+    assert evidence.check(path)["counts"] == {REFUTED: 1}
+    path.write_text(path.read_text().replace('"verdict": "refuted"', '"verdict": "supported"'))
+    with pytest.raises(ScenarioError, match="its seal is broken"):
+        evidence.check(path)
+    data = from_json(path.read_text())
+    path.write_text(json.dumps(data | {"format": "another"}))
+    with pytest.raises(ScenarioError, match="its format is 'another'"):
+        evidence.check(path)
+    with pytest.raises(ScenarioError, match="no file of evidence"):
+        evidence.check(tmp_path / "none.json")
+
+
+def test_evidence_of_mutants_or_under_another_ending_is_refused(folder, done, tmp_path):
+    with pytest.raises(ScenarioError, match="leave out the table and the substitutes"):
+        audit(folder, only=["2"], substitute={"classical": lambda law: law}).save(tmp_path / "a.json")
+    with pytest.raises(ScenarioError, match=r"end the name in \.json"):
+        done.save(tmp_path / "evidence.txt")
+    assert evidence.document(audit(folder, only=["2"]))["left_out"] == ["1"]
+
+
+# badges
+
+
+def claim(verdict):
+    return type("One", (), {"verdict": verdict})()
+
+
+def test_a_badge_has_a_field_for_each_verdict_that_occurs(tmp_path):
+    text = badge.svg("a <b>", [claim(SUPPORTED)] * 12 + [claim(REFUTED), claim(PARTLY)])
+    root = ElementTree.fromstring(text)
+    assert root.attrib["aria-label"] == "claims of a <b>: 12 supported, 1 partly, 1 refuted"
+    shown = [one.text for one in root.iter() if one.tag.endswith("}text") and "aria-hidden" not in one.attrib]
+    assert shown == ["claims of a <b>", "12 supported", "1 partly", "1 refuted"]
+    boxes = [one for one in root.iter() if one.tag.endswith("}rect") and one.attrib.get("x")]
+    ends = [float(one.attrib["x"]) + float(one.attrib["width"]) for one in boxes]
+    assert ends == [*(float(one.attrib["x"]) for one in boxes[1:]), float(root.attrib["width"])]
+    for box, word in zip(boxes, shown, strict=True):
+        assert float(box.attrib["width"]) > badge.width(word) + badge.MARGIN
+    with pytest.raises(ScenarioError, match=r"end the name in \.svg"):
+        badge.save("a", [], tmp_path / "badge.png")
+
+
+# the command
+
+
+def test_the_command_writes_evidence_and_badge_and_checks_the_seal(folder, tmp_path):
+    app = typer.Typer()
+    app.command("claims")(studies.claims)
+    app.command("papers")(studies.papers)
+    files = tmp_path / "evidence.json", tmp_path / "badge.svg"
+    words = ["claims", "--paper", str(folder), "--evidence", str(files[0]), "--badge", str(files[1])]
+    written = CliRunner().invoke(app, words)
+    assert written.exit_code == 0, written.output
+    assert "the law is calm" in written.stdout
+    assert all(file.is_file() for file in files)
+    asked = CliRunner().invoke(app, ["claims", "1", "--paper", str(folder), "--mutants"])
+    assert (asked.exit_code, "Every claim is lost by a mutant" in asked.stdout) == (0, True), asked.output
+    without = CliRunner().invoke(app, ["claims", "2", "--paper", str(folder), "--mutants"])
+    assert (without.exit_code, "claim 2 names no law" in without.stderr) == (2, True)
+    checked = CliRunner().invoke(app, ["papers", "--check", str(files[0])])
+    assert "the seal is whole: A. Nobody, Small: 1 refuted" in " ".join(checked.stdout.split())
+    listed = CliRunner().invoke(app, ["papers"])
+    assert "gaber" in listed.stdout
+    begun = CliRunner().invoke(app, ["papers", "--new", str(tmp_path / "mine")])
+    assert begun.exit_code == 0
+    assert (tmp_path / "mine" / "claims.py").is_file()
+    broken = CliRunner().invoke(app, ["claims", "--paper", str(tmp_path)])
+    assert broken.exit_code == 2
+    assert "no paper at" in broken.stderr

@@ -1,0 +1,99 @@
+"""Mutants of laws: what they are, and that a claim which no mutant loses is found."""
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control.law import law_function
+from smc_mujoco.evidence.audit.paper import new
+from smc_mujoco.evidence.audit.mutants import BLIND, KEPT, evaluations, mutants, survivors
+
+DATA = """
+title = "t"
+authors = "a"
+source = "s"
+runs = "duration=0.5"
+[[claim]]
+id = "1"
+text = "it settles"
+where = "p. 1"
+function = "{}"
+plants = ["duffing"]
+laws = [{}]
+holds_if = {{ size = "{}" }}
+{}
+"""
+CODE = """
+import numpy as np
+def moved(runs):
+    (one,) = runs.traces(runs.grid().values())
+    return {"size": {"a": float(abs(one.x[-1, 0])), "b": float("nan")}}
+def end(runs):
+    (one,) = runs.traces(runs.grid().values())
+    return {"size": float(abs(one.x[-1, 0]))}
+def constant(runs):
+    return {"size": 1.0}
+def picky(runs):
+    (one,) = runs.traces(runs.grid().values())
+    if not np.abs(one.u).any():
+        raise ValueError("no command")
+    return {"size": 1.0}
+"""
+
+
+@pytest.fixture
+def paper(tmp_path):
+    def write(function: str, asked: str, more: str = "", laws: str = '"classical"'):
+        (tmp_path / "paper.toml").write_text(DATA.format(function, laws, asked, more))
+        (tmp_path / "claims.py").write_text(CODE)
+        return tmp_path
+
+    return write
+
+
+@law_function(gains={"k": 3.0})
+def winding(y, gains, memory):
+    """Integrate the error."""
+    memory[0] += gains.k * y.e * y.dt
+    return -memory[0], y.e
+
+
+def test_mutants_reverse_the_command_drop_it_forget_or_switch():
+    scenario = smc.Scenario(plant="duffing", law=winding(), duration=0.05)
+    true, *broken = smc.run(
+        [scenario, *(smc.Scenario(plant="duffing", law=law, duration=0.05) for law in mutants(winding()).values())]
+    )
+    wrong, without, forgetful, relay = broken
+    assert list(mutants(winding())) == ["wrong sign", "zero gain", "no memory", "relay"]
+    assert true.u[0, 0] == -wrong.u[0, 0] < 0.0
+    assert not without.u.any()
+    assert set(np.unique(relay.u)) == {-6.0}
+    x = forgetful.x[:, 0]
+    np.testing.assert_allclose(forgetful.u[:, 0], -3.0 * x * 1e-3, rtol=1e-12)
+    assert np.abs(true.u[-1, 0]) > 10 * np.abs(forgetful.u[-1, 0])
+
+
+@pytest.mark.parametrize(
+    ("function", "asked", "kept"),
+    [("end", "< 1.49", None), ("constant", "< 2", KEPT), ("constant", "> 2", BLIND), ("end", "> 2", None),
+     ("moved", "> 2", None), ("picky", "< 2", None)],
+)  # fmt: skip
+def test_a_claim_that_no_mutant_loses_is_found(paper, function, asked, kept):
+    done = []
+    assert survivors(paper(function, asked), report=done.append) == ({"1": kept} if kept else {})
+    assert sum(done) == evaluations(paper(function, asked)) == 5
+
+
+def test_a_claim_that_says_why_is_not_asked(paper):
+    assert survivors(paper("constant", "< 2", 'immune = "a number of the paper alone"')) == {}
+
+
+def test_a_claim_without_a_law_cannot_be_asked(paper):
+    with pytest.raises(ScenarioError, match="claim 1 names no law"):
+        survivors(paper("constant", "< 2", laws=""))
+
+
+def test_every_claim_of_the_template_can_be_lost(tmp_path):
+    new(tmp_path / "mine")
+    assert survivors(tmp_path / "mine") == {}

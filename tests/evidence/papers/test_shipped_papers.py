@@ -1,0 +1,130 @@
+"""The papers that ship beside Gaber's: what each says of itself, and that a broken law loses each of its claims."""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.evidence.audit import runs as claim_runs
+from smc_mujoco.evidence.audit.audit import audit
+from smc_mujoco.evidence.audit.paper import paper, shipped
+from smc_mujoco.evidence.papers.aldana_lopez_2019.claims import BAND, classical_bound, least_bound
+from smc_mujoco.evidence.papers.measures import LATE, exponent, late, late_step, settled
+from smc_mujoco.evidence.papers.perez_ventura_2017.claims import predicted
+from smc_mujoco.studies.run_key import key
+from smc_mujoco.evidence.audit.mutants import survivors
+
+ROOT = Path(__file__).parents[3]
+PAPERS = [name for name in shipped() if name != "gaber"]
+
+
+def test_at_least_five_papers_ship_with_4_to_12_claims_each():
+    assert len(PAPERS) >= 5
+    for name in PAPERS:
+        found = paper(name)
+        assert 4 <= len(found.claims) <= 12, name
+        assert "abstract" in found.read or "title" in found.read, name
+        assert all(claim.where and claim.thresholds for claim in found.claims.values()), name
+
+
+def test_the_page_of_verdicts_has_every_paper_with_as_many_verdicts_as_claims():
+    rows = re.findall(r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|([^|]*)\|", (ROOT / "docs" / "papers.md").read_text(), re.M)
+    counted = {name: sum(int(count) for count in counts if count.strip()) for name, *counts in rows}
+    assert counted == {name: len(paper(name).claims) for name in PAPERS}
+
+
+@pytest.fixture
+def made_once(monkeypatch):
+    """Simulates each run once. Without it, a third of all steps would be repeated, for claims that share runs."""
+    made, stream = {}, claim_runs.stream
+
+    def kept(scenarios, threads):
+        keys = [key(scenario.named(None)) for scenario in scenarios]
+        new = {name: scenario for name, scenario in zip(keys, scenarios, strict=True) if name not in made}
+        made.update((list(new)[i], trace) for i, trace in stream(list(new.values()), threads))
+        return ((i, made[name]) for i, name in enumerate(keys))
+
+    monkeypatch.setattr(claim_runs, "stream", kept)
+
+
+@pytest.mark.usefixtures("made_once")
+@pytest.mark.parametrize("name", PAPERS)
+def test_a_broken_law_loses_each_claim(name):
+    assert survivors(name) == {}
+
+
+# measures
+
+
+def test_an_exponent_is_that_of_a_power_and_nan_of_runs_that_failed():
+    levels = [1.0, 2.0, 4.0]
+    assert exponent(levels, [3.0 * level**1.5 for level in levels for _ in range(2)]) == pytest.approx(1.5)
+    for broken in (math.nan, math.inf, 0.0):
+        assert math.isnan(exponent(levels, [1.0, broken, 3.0]))
+
+
+def run_of(signal):
+    """A trace that has times alone, and a signal, (samples, 1)."""
+    trace = object.__new__(Trace)
+    object.__setattr__(trace, "t", 0.1 * np.arange(len(signal)))
+    return trace, np.reshape(signal, (-1, 1))
+
+
+@pytest.mark.parametrize(
+    ("signal", "time"),
+    [
+        ([3.0, 1.0, 0.5, -0.5], 0.1),
+        ([3.0, 1.0, 2.0, 0.5], 0.3),
+        ([0.5, 0.5, 0.5, 0.5], 0.0),
+        ([3.0, 1.0, 0.5, 2.0], math.inf),
+        ([3.0, 1.0, math.nan, math.nan], math.inf),
+    ],
+)
+def test_a_signal_is_settled_from_where_it_stays_within_a_band(signal, time):
+    assert settled(*run_of(signal), 1.0) == pytest.approx(time)
+
+
+def test_late_values_are_those_of_the_last_samples():
+    signal = np.concatenate([np.full(10, 9.0), np.arange(LATE + 2) % 3]).reshape(-1, 1)
+    assert (late(signal), late_step(signal)) == (2.0, 2.0)
+    assert math.isnan(late(np.full((5, 1), math.nan)))
+
+
+# formulas
+
+
+def test_the_least_bound_of_fixed_time_is_the_integral():
+    from scipy.integrate import quad
+
+    from smc_mujoco.control.law import law
+
+    for k1, k2, a, b in ((2.0, 2.0, 0.5, 1.5), (1.0, 2.0, 0.5, 2.0), (3.0, 1.0, 0.3, 1.5)):
+        made = law("fixed_time", k1=k1, k2=k2, a=a, b=b)
+        integral, _ = quad(  # over s = e^z
+            lambda z, k1=k1, k2=k2, a=a, b=b: 1.0 / (k1 * math.exp((a - 1.0) * z) + k2 * math.exp((b - 1.0) * z)),
+            -80.0,
+            80.0,
+            limit=400,
+        )
+        assert least_bound(made) == pytest.approx(integral, rel=1e-6)
+        assert classical_bound(made) > integral
+
+
+def test_fixed_time_is_sampled_finely_enough_for_the_band_that_was_fixed_before_the_first_run():
+    (claim,) = audit("aldana_lopez_2019", ["3"], gains=["skew"], quick=True).claims
+    assert (BAND, claim.verdict) == (1e-6, "supported")
+
+
+def test_the_predicted_cycle_of_super_twisting_balances_its_harmonics():
+    """N(A, omega) = -1 / W(j omega) for N = c k1 / sqrt(A) + 4 k2 / (pi A j omega), W = 1 / (s (mu s + 1)^2)."""
+    from scipy.integrate import quad
+
+    k1, k2, lag = 1.5, 1.1, 5e-3
+    amplitude, frequency = predicted(k1, k2, lag)
+    omega = math.tau * frequency
+    half, _ = quad(lambda angle: math.sin(angle) ** 1.5, 0.0, math.pi)
+    gain = 2.0 / math.pi * half * k1 / math.sqrt(amplitude) + 4.0 * k2 / (math.pi * amplitude * 1j * omega)
+    assert gain * (1.0 / (1j * omega * (1.0 + 1j * omega * lag) ** 2)) == pytest.approx(-1.0, rel=1e-6)

@@ -1,0 +1,778 @@
+"""The report: one file from real runs that needs no other, counted from the data, and alive in a real browser.
+
+The browser is Chromium (Debian, Ubuntu: apt-get install chromium); without it these tests are skipped, but not in CI.
+"""
+
+import base64
+import dataclasses
+import html.parser
+import importlib
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from smc_mujoco.analysis.tuning.result import Evaluation
+from smc_mujoco.common import gl
+from smc_mujoco.control import gain_sets as gains
+from smc_mujoco.simulation.run import run
+from smc_mujoco.studies.cache import cached
+from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.evidence.report import answer, charts, films, maps, page, panels, report, stages, words
+from smc_mujoco.evidence.report import scores as scores_of
+from smc_mujoco.evidence.report.plan import QUICK, Bars
+from smc_mujoco.evidence.report.scores import Place, Score
+
+TINY = dataclasses.replace(
+    QUICK,
+    plants=("duffing",),
+    laws=("observer_free", "classical", "super_twisting"),
+    conditions=("nominal", "noise"),
+    seeds=2,
+    duration=0.3,
+    kinds=("delay",),
+    compared=("delay",),
+    basins=("duffing",),
+    basin_laws=("observer_free", "classical"),
+    points=(3, 2),
+    region=5.0,
+    claims=("3", "18"),
+    scenes=(("duffing", "nominal"),),
+    scene_laws=("observer_free", "classical"),
+    scene=0.6,
+    rigs=("qube_servo",),
+)
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("report")
+
+
+@pytest.fixture(scope="module")
+def made(folder):
+    """A report of tiny but real runs."""
+    return report(folder, plan=TINY)
+
+
+@pytest.fixture(scope="module")
+def text(made):
+    return made.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def findings(made, folder):
+    """What that report tells, read back from its folder."""
+    return stages.find(TINY, folder, None, Bars(False))
+
+
+class Reader(html.parser.HTMLParser):
+    """Ids and references of a page, and the cells of its tables."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.ids, self.targets, self.rows, self.table, self.cell = [], [], {}, "", None
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        its = dict(attrs)
+        self.ids += [its["id"]] if "id" in its else []
+        names = ("src", "href", "srcset", "poster", "action", "data", "xlink:href")
+        self.targets += [its[name] for name in names if its.get(name)]
+        if tag == "table":
+            self.table = its.get("id", "")
+        elif tag == "tr":
+            self.rows.setdefault(self.table, []).append((its, []))
+        elif tag == "td" and self.table:
+            self.cell = [its, ""]
+            self.rows[self.table][-1][1].append(self.cell)
+
+    def handle_endtag(self, tag):
+        if tag == "td":
+            self.cell = None
+
+    def handle_data(self, data):
+        if self.cell is not None:
+            self.cell[1] += data
+
+
+@pytest.fixture(scope="module")
+def reader(text):
+    return Reader(text)
+
+
+# one file
+
+
+def test_the_report_is_one_file_under_20_megabytes(made):
+    assert made.name == "report.html"
+    assert made.stat().st_size < 20e6
+
+
+def test_it_refers_to_nothing_outside_itself(text, reader):
+    outside = [target for target in reader.targets if not target.startswith(("#", "data:"))]
+    assert outside == []
+    styles = "".join(re.findall(r"<style>.*?</style>", text, re.S))
+    assert "url(" not in styles
+    assert "@import" not in styles
+
+
+def test_a_policy_in_the_file_forbids_what_is_not_in_it(text):
+    assert "default-src 'none'" in text.split("<title>")[0]
+
+
+def test_every_link_within_the_page_has_its_target_and_every_id_is_there_once(reader):
+    assert sorted(reader.ids) == sorted(set(reader.ids))
+    assert {target[1:] for target in reader.targets if target.startswith("#")} <= set(reader.ids)
+
+
+def test_every_column_of_numbers_and_every_number_links_to_a_definition(text):
+    for table in re.findall(r'<table class="sortable.*?</table>', text, re.S):
+        heads = re.findall(r'<th [^>]*class="number".*?</th>', table, re.S)
+        cells = re.findall(r'<td class="number[^>]*>(.*?)</td>', table, re.S)
+        assert all('href="#' in head for head in heads)
+        assert all('href="#' in cell or cell == "–" for cell in cells)
+
+
+def test_tables_have_captions_pictures_texts_and_the_page_a_language(text):
+    assert '<html lang="en"' in text
+    assert len(re.findall(r"<table[ >]", text)) == text.count("<caption>")
+    assert all('alt="' in image for image in re.findall(r"<img [^>]*>", text))
+    assert all('aria-label="' in plot for plot in re.findall(r'<div class="plot"[^>]*>', text))
+
+
+# what it says is what was found
+
+
+def test_the_leaderboard_has_the_numbers_of_the_scores(reader, findings):
+    known = {(s.plant, s.condition, s.law): {} for s in findings.scores}
+    for s in findings.scores:
+        known[s.plant, s.condition, s.law][s.metric] = s
+    rows = [row for row in reader.rows["leaderboard"] if row[1]]
+    assert len(rows) == len(known) == 6
+    for its, cells in rows:
+        scores = known[its["data-plant"], its["data-condition"], its["data-law"]]
+        for metric, (attributes, shown) in zip(words.COLUMNS, cells[3:], strict=True):
+            assert float(attributes["data-v"]) == scores[metric].median
+            assert shown.startswith(words.number(scores[metric].median))
+
+
+def test_scores_are_the_medians_of_the_tables_runs(folder, findings):
+    from smc_mujoco.studies.table import Table
+
+    table = Table.read(folder / "study").select(law="classical", condition="noise")
+    score = next(s for s in findings.scores if (s.law, s.condition, s.metric) == ("classical", "noise", "itae"))
+    assert score.median == pytest.approx(np.median(table.column("itae")), rel=1e-12)
+    assert score.seeds == 2
+
+
+def test_margins_and_fronts_are_told_as_found(reader, findings):
+    rows = [row[1] for row in reader.rows["margins-table"] if row[1]]
+    assert [float(cells[3][0]["data-v"]) for cells in rows] == [m.value for m in findings.margins]
+    rows = [row[1] for row in reader.rows["fronts"] if row[1]]
+    assert [float(cells[2][0]["data-v"]) for cells in rows] == [f.chosen[0] for f in findings.fronts]
+
+
+def test_margins_are_told_under_every_set_of_gains_side_by_side(text, reader, findings):
+    assert list(findings.by_set) == ["tuned", "study", "tracking"]
+    assert findings.by_set["tuned"] == findings.margins
+    rows = [row[1] for row in reader.rows["sets-table"] if row[1]]
+    for margins, column in zip(findings.by_set.values(), (3, 4, 5), strict=True):
+        assert [m.value for m in margins] == [float(cells[column][0]["data-v"]) for cells in rows]
+
+
+def test_the_gains_of_every_set_stand_beside_each_other(reader, findings):
+    rows = {its["data-law"]: cells for its, cells in reader.rows["gains-table"] if cells}
+    assert list(rows) == list(TINY.laws)
+    sets = list(dict.fromkeys(row.set for row in findings.about.gains))
+    for row in findings.about.gains:
+        assert row.gains in rows[row.law][2 + sets.index(row.set)][1]
+
+
+def test_a_law_that_a_set_has_no_gains_for_stands_there_without(findings):
+    few = {"tuned": findings.by_set["tuned"], "study": findings.by_set["study"][:1]}
+    rows = page.set_margins(dataclasses.replace(findings, by_set=few))
+    assert [list(by_set) for by_set in rows.values()] == [["tuned", "study"], ["tuned"], ["tuned"]]
+    text = page.page(dataclasses.replace(findings, by_set=few))
+    assert "The same under every set of gains" in text
+
+
+THIRTEEN = (
+    *("observer_free", "classical", "boundary_layer", "adaptive", "super_twisting", "conditioned_super_twisting"),
+    *("implicit_super_twisting", "twisting", "nonsingular_terminal", "fixed_time", "integral", "disturbance_observer"),
+    "pid",
+)
+
+
+def test_thirteen_laws_have_colours_and_short_names_of_their_own(monkeypatch):
+    monkeypatch.setattr(gains, "LAWS", THIRTEEN)
+    assert len({words.colour(law) for law in THIRTEEN}) == 13
+    assert len({words.short(law) for law in THIRTEEN}) == 13
+    assert max(len(words.short(law)) for law in THIRTEEN) <= 3
+    assert words.colour("classical") == words.style.law_colour("classical")
+    assert words.law("pid") == "PID"
+
+
+def forest_of(findings):
+    return charts.forest(findings.scores, words.HEADLINE, findings.plants, findings.laws)
+
+
+def test_a_page_of_thirteen_laws_has_a_line_for_each(findings):
+    cell = [s for s in findings.scores if s.law == "classical"]
+    many = tuple(s._replace(law=law) for law in THIRTEEN for s in cell)
+    place = tuple(p._replace(law=law) for law in THIRTEEN for p in findings.places if p.law == "classical")
+    shown = dataclasses.replace(findings, scores=many, places=place)
+    forest, here = forest_of(shown), forest_of(findings)
+    per_law = (forest["layout"]["height"] - here["layout"]["height"]) / (13 - 3) / len(words.HEADLINE)
+    assert per_law >= 15  # px: a line of text
+    text = page.page(shown)
+    assert all(words.law(law) in text for law in THIRTEEN)
+
+
+def test_a_map_is_drawn_as_it_was_found(findings):
+    figure = panels_of(maps.basins(findings.basins, maps.horizons(findings.basins)))
+    z = figure["data"][0]["z"]
+    drawn = np.frombuffer(base64.b64decode(z["bdata"]), np.int8).reshape(tuple(map(int, z["shape"].split(","))))
+    home = findings.basins[0].outcome == 1
+    assert ((drawn < 3) == home).all()  # the blues
+    assert home.any()
+
+
+def panels_of(figure):
+    """A figure, read by plotly itself, which refuses what it does not know."""
+    import plotly.graph_objects as go
+
+    go.Figure(figure)
+    return figure
+
+
+def test_plotly_knows_every_word_of_every_chart(findings):
+    panels_of(forest_of(findings))
+    panels_of(maps.fields(findings.fields))
+    panels_of(charts.fronts(findings.fronts))
+    for kind in TINY.kinds:
+        panels_of(charts.margins(findings.margins, kind))
+    for scene in findings.scenes:
+        panels_of(charts.curves(scene))
+
+
+def test_what_comes_from_outside_is_escaped(findings):
+    evil = "<script>alert(1)</script>"
+    scores = tuple(s._replace(law=evil) if s.law == "classical" else s for s in findings.scores)
+    places = tuple(p._replace(law=evil) if p.law == "classical" else p for p in findings.places)
+    shown = page.page(dataclasses.replace(findings, scores=scores, places=places))
+    assert evil not in shown
+    assert "&lt;script&gt;alert(1)" in shown
+
+
+def test_a_law_and_a_verdict_that_nobody_foresaw_are_shown(findings):
+    claim = dataclasses.replace(
+        findings.claims[0], verdict="not testable", numbers={}, beside={}, verdicts={}, note="x"
+    )
+    scores = tuple(s._replace(law="mine") for s in findings.scores if s.law == "classical")
+    places = tuple(p._replace(law="mine") for p in findings.places if p.law == "classical")
+    few = dataclasses.replace(
+        findings, claims=(claim,), scores=scores, places=places, margins=(), basins=(), fronts=(), scenes=(), fields=()
+    )
+    assert "mine" in page.page(few)
+
+
+# the answer
+
+
+def scores(condition="nominal", plant="duffing", runs=16, **medians):
+    """One cell's scores of settling time; the laws within 0.1 of the best are level with it."""
+    best = min(medians.values())
+    return [
+        Score(plant, condition, law, "settling_time", m, m, m, m <= best + 0.1, 16, 0, runs)
+        for law, m in medians.items()
+    ]
+
+
+def told(findings, *cells):
+    """The answer, of these cells alone."""
+    few = dataclasses.replace(findings, scores=tuple(score for cell in cells for score in cell), places=())
+    return sentences(few, ["settling_time"])
+
+
+def sentences(findings, metrics):
+    leads = [answer.leads(findings, metric) for metric in metrics]
+    return " ".join([answer.first(findings, metrics), *leads, *answer.rest(findings, metrics)])
+
+
+def test_laws_that_are_level_share_the_lead_and_no_winner_is_named(findings):
+    found = answer.cells(scores(observer_free=1.0, classical=1.05, adaptive=2.0))
+    assert answer.leaders(found, "duffing", "nominal", "settling_time") == ["observer_free", "classical"]
+    assert answer.undecided(found, ["settling_time"]) == (1, 1)
+    text = told(findings, scores(observer_free=1.0, classical=1.05))
+    assert "no winner on settling time in any of 1 cells; none is better than Observer-free and Classical" in text
+    assert "wins" not in text
+
+
+def test_a_winner_is_named_where_one_law_alone_is_best_in_every_cell(findings):
+    text = told(findings, scores(observer_free=2.0, classical=1.0), scores("noise", observer_free=4.0, classical=3.0))
+    assert "Classical wins on settling time in every one of 2 cells" in text
+
+
+def test_over_several_cells_the_answer_says_who_wins_where_and_loses_where(findings):
+    cells = [scores(plant=plant, observer_free=2.0, classical=1.0) for plant in ("duffing", "van_der_pol")]
+    cells += [
+        scores("noise", plant=plant, observer_free=1.0, classical=3.0) for plant in ("duffing", "van_der_pol", "x")
+    ]
+    text = told(findings, *cells)
+    assert "no law wins on settling time in all 5 cells" in text
+    assert "Observer-free wins on every plant under noise" in text
+    assert "Observer-free wins in 3 and loses in 2" in text
+    assert "Classical wins in 2 and loses in 3; in none no law wins" in text
+    assert "nor in every condition" in text
+
+
+def test_a_law_that_is_level_with_one_that_seldom_settles_keeps_it_from_winning(findings):
+    cell = [s._replace(best=True) for s in scores(observer_free=1.0, classical=math.inf)]
+    assert answer.leaders(answer.cells(cell), "duffing", "nominal", "settling_time") == ["observer_free", "classical"]
+    assert "wins" not in told(findings, cell)
+
+
+def test_a_law_alone_does_not_win(findings):
+    assert "wins" not in told(findings, scores(classical=1.0))
+
+
+def test_the_answer_says_where_seeds_change_nothing(findings):
+    cells = scores(runs=1, observer_free=2.0, classical=1.0), scores("noise", observer_free=2.0, classical=1.0)
+    assert "In 1 of the cells seeds change nothing" in told(findings, *cells)
+    assert "seeds change nothing" not in told(findings, cells[1])
+
+
+def test_places_over_all_plants_count_the_cells_that_a_law_wins(folder):
+    from smc_mujoco.studies.table import Table
+
+    rows = scores_of.places(Table.read(folder / "study"))
+    own = [p for p in rows if (p.plant, p.metric) == ("duffing", "itae")]
+    overall = [p for p in rows if (p.plant, p.metric) == ("", "itae")]
+    assert {p.law: (p.mean, p.wins, p.losses, p.of, p.best) for p in own} == {
+        p.law: (p.mean, p.wins, p.losses, p.of, p.best) for p in overall
+    }
+    assert {p.why for p in overall} == {"2 seeds, too few"}
+    assert {p.of for p in overall} == {2}
+
+
+def test_where_the_papers_law_loses_is_listed_worst_first():
+    lost = answer.losses(answer.cells(scores(observer_free=3.0, classical=1.0, adaptive=2.0)), ["settling_time"])
+    assert [(loss.law, loss.times) for loss in lost] == [("classical", 3.0)]
+    assert answer.losses(answer.cells(scores(observer_free=1.0, classical=3.0)), ["settling_time"]) == []
+    calm = scores(observer_free=1.0, classical=math.inf)
+    calm += [s._replace(metric="tv_rate") for s in scores(observer_free=2.0, classical=1.0)]
+    (one,) = answer.losses(answer.cells(calm), ["tv_rate"])
+    assert (one.law, one.settles) == ("classical", False)
+    exact = answer.losses(answer.cells(scores(observer_free=3.0, classical=1e-20)), ["settling_time"])
+    assert exact[0].times == pytest.approx(3e9)  # over what rounding leaves of zero, not over 1e-20
+    assert exact[0].rounded
+    small = [s._replace(floor=0.5) for s in scores(observer_free=3.0, classical=0.1)]
+    (one,) = answer.losses(answer.cells(small), ["settling_time"])
+    assert (one.times, one.rounded) == (6.0, True)  # over the least difference that counts
+    never = answer.losses(answer.cells(scores(observer_free=math.inf, classical=1.0)), ["settling_time"])
+    assert never[0].times == math.inf
+
+
+def test_the_answer_tells_who_settles_least_and_how_many_runs_failed(findings):
+    share = [
+        Place("", "settles", law, 1.0, 1.0, 1.0, True, of, 0, 0, 1, "")
+        for law, of in (("classical", 0.5), ("adaptive", 1))
+    ]
+    few = dataclasses.replace(
+        findings, places=tuple(share), about=dataclasses.replace(findings.about, runs=40, failed=3)
+    )
+    told = sentences(few, [])
+    assert "Classical settles least often, in 50 % of its runs" in told
+    assert "3 of 40 runs failed" in told
+
+
+def place(law, losses=0, wins=0, mean=1.0, metric="itae", median=1.0, plant="duffing"):
+    return Place(plant, metric, law, mean, 1.0, 2.0, not losses, median, wins, losses, 4, "")
+
+
+def picked(findings, *places):
+    one = answer.pick(dataclasses.replace(findings, places=places), "itae", "duffing")
+    assert one
+    return one
+
+
+def test_the_law_to_take_is_beaten_in_the_fewest_conditions_then_has_the_best_mean_rank(findings):
+    one = picked(findings, place("a", 2, 2, 1.0), place("b", 1, 0, 3.0), place("c", 1, 0, 2.0), place("d", plant="x"))
+    assert (one.law, one.level) == ("c", ("b",))
+    assert one.sure == "unbeaten in 3 of 4"
+    assert picked(findings, place("a", 4, median=2.0), place("b", 1, 1)).sure == "unbeaten in 3 of 4, wins in 1"
+    assert picked(findings, place("a", 0, 4)).sure == "wins in all 4"
+    assert picked(findings, place("a", 4)).sure == "unbeaten in none of 4"
+    assert answer.pick(dataclasses.replace(findings, places=()), "itae", "duffing") is None
+
+
+def test_a_law_that_seldom_settles_is_not_one_to_take(findings):
+    def settling(law, share):
+        return place(law, metric="settles", median=share)
+
+    calm, other = place("idle"), place("pid", 3)
+    assert picked(findings, calm, other, settling("idle", 0.39), settling("pid", 0.8)).law == "pid"
+    assert picked(findings, calm, other, settling("idle", 0.41), settling("pid", 0.8)).law == "idle"
+
+
+def test_the_first_screen_says_for_each_plant_and_need_what_to_use(text, findings):
+    table = text.split('id="picks"')[1].split("</table>")[0]
+    (row,) = re.findall(r'<tr><th scope="row">Duffing</th>(.*?)</tr>', table, re.S)
+    cells = re.findall(r"<td>(.*?)</td>", row, re.S)
+    assert len(cells) == len(words.HEADLINE)
+    for metric, cell in zip(words.HEADLINE, cells, strict=True):
+        one = answer.pick(findings, metric, "duffing")
+        assert one
+        assert words.law(one.law) in cell
+        assert one.sure in cell.replace("\N{NO-BREAK SPACE}", " ")
+        assert words.number(one.median) in cell
+    assert text.index('id="picks"') < text.index("Who wins where")
+
+
+def test_the_papers_verdict_is_one_line_that_counts(findings):
+    cells = [
+        *scores(observer_free=2.0, classical=1.0),
+        *scores("noise", observer_free=1.0, classical=3.0),
+        *scores("sine", observer_free=1.0, classical=1.0),
+    ]
+    claims = [dataclasses.replace(findings.claims[0], verdict=v) for v in ("supported", "refuted", "refuted")]
+    few = dataclasses.replace(findings, scores=tuple(cells), claims=tuple(claims))
+    assert answer.verdict(few, ["settling_time"]) == (
+        "The paper: its observer-free law is beaten in 1 of 3 comparisons and wins in 1; of its 3 checked claims, "
+        "1 is supported and 2 are refuted."
+    )
+    none = dataclasses.replace(few, scores=(), claims=())
+    assert answer.verdict(none, ["settling_time"]) == ""
+
+
+def test_the_report_tells_what_was_not_done(text, findings):
+    assert "Nothing was tried on hardware" in text
+    assert "encoder" in findings.about.left_out  # a condition of the full grid that this one lacks
+    assert re.search(r"Left out by this plan: [^<]*\bencoder\b", text)
+
+
+def test_a_claims_row_says_where_it_stands_and_what_decides_it(text, findings):
+    for claim in findings.claims:
+        row = text.split(f'id="claim-{claim.id}"')[1].split("</summary>")[0]
+        one = claim.decisive("tuned")
+        assert words.pretty(claim.where) in row
+        assert html.escape(words.number(one.value)) in row
+        assert (", not " in row) is not one.holds
+
+
+@pytest.mark.parametrize(
+    ("what", "target"),
+    [
+        ("duffing: settling time, s", "metric-settling_time"),
+        ("duffing tv_rate / classical", "metric-tv_rate"),
+        ("inverted_pendulum: TV rate, over that of classical", "metric-tv_rate"),
+        ("largest step with noise, over lambda", "verdict"),  # there is a metric called ise
+    ],
+)
+def test_a_check_leads_to_the_metric_that_it_names(what, target):
+    assert page.link(what) == target
+
+
+def test_signs_are_put_for_words_and_not_within_them():
+    assert words.pretty("steps of eps s^2 <= lambda") == "steps of ε s² ≤ λ"
+
+
+def test_a_cell_in_which_nothing_settles_has_no_leader():
+    found = answer.cells(scores(observer_free=math.inf, classical=math.inf))
+    assert answer.leaders(found, "duffing", "nominal", "settling_time") == []
+
+
+# curves
+
+
+def test_curves_keep_every_extreme_of_a_chattering_control():
+    trace = run(scenarios.scenario("duffing", "classical", duration=2.0))
+    curve = films.curve(trace)
+    u, x = trace.u[:, 0], trace.x[:, 0]
+    assert (curve.x.min(), curve.x.max()) == (x.min(), x.max())
+    assert (curve.low.min(), curve.high.max()) == (u.min(), u.max())
+    assert len(curve.x) + len(curve.u) + 2 * len(curve.low) < len(x) + len(u)
+
+
+def test_a_calm_control_has_no_band():
+    assert films.curve(run(scenarios.scenario("duffing", "observer_free", duration=1.0))).low.size == 0
+
+
+def test_fronts_and_gains_taken_are_of_the_accurate_runs(monkeypatch):
+    cheap, taken, best = (Evaluation(gains=(k,), objective=k, tracking=k, variation=1 / k) for k in (0.5, 1.0, 0.8))
+    taken = taken._replace(objective=0.7)
+    tuned = SimpleNamespace(history=(cheap, taken, best), finals=(best, taken), front=[best, taken])
+    monkeypatch.setattr(stages.result, "shipped", lambda plant, law: tuned)
+    (front,) = stages.fronts(dataclasses.replace(TINY, laws=("classical",)))
+    assert front.chosen == (taken.tracking, taken.variation)
+    assert front.tracking[0] <= front.chosen[0]
+
+
+def test_fronts_are_staircases_from_the_left(findings):
+    lines = [line for line in charts.fronts(findings.fronts)["data"] if line.get("line", {}).get("shape")]
+    assert len(lines) == len(TINY.laws)
+    for line in lines:
+        assert line["line"]["shape"] == "hv"
+        assert line["x"] == sorted(line["x"])
+        assert line["y"] == sorted(line["y"], reverse=True)
+
+
+def test_numbers_off_an_axis_stand_at_its_end():
+    figure = charts.forest(scores(observer_free=math.inf, classical=1.0), ["settling_time"], ["duffing"], ["classical"])
+    assert len(figure["data"]) == 1
+    figure = charts.forest(
+        scores(observer_free=math.inf, classical=1.0), ["settling_time"], ["duffing"], ["observer_free", "classical"]
+    )
+    assert figure["data"][0]["marker"]["symbol"] == "triangle-right-open"
+    assert "never" in figure["data"][0]["hovertemplate"]
+    assert panels.rounded([math.inf, 1.0]) == [None, 1.0]
+
+
+# started again
+
+
+def test_what_is_there_is_not_computed_again(made, folder, monkeypatch):
+    for name in (
+        "analysis.region_of_attraction.basin",
+        "analysis.margins.margins",
+        "studies.audit.audit.claims",
+        "studies.report.films.film",
+        "studies.executors.outcome",
+    ):
+        module, _, function = f"smc_mujoco.{name}".rpartition(".")
+        monkeypatch.setattr(importlib.import_module(module), function, None)  # not to be called
+    before = made.read_text(encoding="utf-8")
+    again = report(folder, plan=TINY).read_text(encoding="utf-8")
+    line = re.compile(r"<tr><th scope=\"row\">time</th>.*")
+    assert line.sub("", again) == line.sub("", before)
+
+
+def test_a_killed_stage_leaves_nothing_and_other_arguments_repeat_a_stage(tmp_path):
+    def killed():
+        raise KeyboardInterrupt
+
+    def keep(depends, make):
+        write = lambda found, path: path.write_text(json.dumps(found))  # noqa: E731
+        return cached(tmp_path / "a.json", depends, make, write, lambda path: json.loads(path.read_text()))
+
+    with pytest.raises(KeyboardInterrupt):
+        keep([1], killed)
+    assert list(tmp_path.iterdir()) == []
+    assert keep([1], lambda: "one") == keep([1], killed) == "one"
+    assert keep([2], lambda: "two") == "two"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_without_a_renderer_the_report_says_so_in_one_sentence(folder, findings, monkeypatch):
+    monkeypatch.setattr(gl, "missing", lambda: "no film: nothing renders here: install a renderer")
+    without = stages.find(dataclasses.replace(TINY, filmed=1), folder, None, Bars(False))
+    assert without.scenes[0].film is None
+    shown = page.page(without)
+    assert "There are no films here: nothing renders here: install a renderer" in shown
+    assert "<video" not in shown
+
+
+def test_the_command_is_light_to_import():
+    code = "import smc_mujoco.cli.commands.studies, sys; print(*sys.modules)"
+    environment = os.environ | {"PYTHONPATH": str(Path(scenarios.__file__).parents[3])}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert {"mujoco", "numba", "jinja2", "plotly", "pyarrow", "scipy"} & set(done.stdout.split()) == set()
+
+
+# in a browser
+
+
+@pytest.fixture(scope="module")
+def browser():
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if path is None:
+        hint = "no Chromium to open the report in: apt-get install chromium"
+        pytest.fail(hint) if os.environ.get("CI") else pytest.skip(hint)
+    sync = pytest.importorskip("playwright.sync_api")
+    with sync.sync_playwright() as play:
+        opened = play.chromium.launch(executable_path=path, args=SWITCHES)
+        yield opened
+        opened.close()
+
+
+class Seen:
+    """A page in the browser, with all that it said and asked for."""
+
+    def __init__(self, browser, url, width=1400, scheme="light"):
+        self.said, self.asked = [], []
+        self.page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        self.page.on("console", lambda m: self.said.append(m.text) if m.type in ("error", "warning") else None)
+        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.goto(url)
+        self.page.wait_for_selector("html[data-ready]", timeout=60_000)
+
+
+@pytest.fixture(scope="module")
+def seen(browser, made):
+    return Seen(browser, made.as_uri())
+
+
+def test_the_page_has_no_error_and_asks_for_nothing(seen, made):
+    assert seen.said == []
+    assert [url for url in seen.asked if not url.startswith(("data:", "blob:")) and url != made.as_uri()] == []
+
+
+def test_no_button_of_a_chart_sends_it_anywhere(seen):
+    titles = seen.page.eval_on_selector_all(".modebar-btn", "all => all.map(one => one.dataset.title)")
+    assert titles
+    assert {title for title in titles if not title.startswith(("Download", "Zoom", "Pan", "Reset"))} == set()
+
+
+def test_every_chart_is_drawn(seen, findings):
+    counts = seen.page.eval_on_selector_all(
+        ".plot", "plots => plots.map(p => p.querySelectorAll('.trace, .hm, .contour').length)"
+    )
+    assert len(counts) == 1 + 1 + 1 + len(TINY.kinds) + len(TINY.basins) + len(TINY.scenes)
+    assert min(counts) > 0
+
+
+@pytest.mark.skipif(gl.missing() is not None, reason="nothing renders here")
+def test_a_film_plays(seen):
+    film = seen.page.locator("video").first
+    played = film.evaluate(
+        """async film => {
+          await film.play();
+          for (let k = 0; k < 100 && film.currentTime === 0; k++) await new Promise(done => setTimeout(done, 50));
+          const found = [film.currentTime, film.videoWidth, film.videoHeight];
+          film.pause();
+          return found;
+        }"""
+    )
+    assert played[0] > 0
+    assert played[1:] == list(films.SIZE)
+
+
+def column(page, table, k):
+    """The shown values of a table's column k, from the top."""
+    return page.eval_on_selector_all(
+        f"#{table} tbody tr:not([hidden])", f"rows => rows.map(row => row.cells[{k}].dataset.v)"
+    )
+
+
+def test_clicking_a_header_sorts_and_clicking_again_sorts_the_other_way(seen):
+    page = seen.page
+    page.select_option('select[data-table="leaderboard"][data-column="condition"]', "")
+    head = page.locator("#leaderboard th").nth(3 + words.COLUMNS.index("itae"))
+    head.locator("button").click()
+    up = [float(v) for v in column(page, "leaderboard", 3 + words.COLUMNS.index("itae"))]
+    assert up == sorted(up)
+    assert len(set(up)) > 1
+    assert head.get_attribute("aria-sort") == "ascending"
+    head.locator("button").click()
+    assert [float(v) for v in column(page, "leaderboard", 3 + words.COLUMNS.index("itae"))] == up[::-1]
+    page.locator("#leaderboard th button").nth(2).click()
+    laws = column(page, "leaderboard", 2)
+    assert laws == sorted(laws)
+
+
+def test_filtering_hides_the_other_rows(seen):
+    page = seen.page
+    page.select_option('select[data-table="leaderboard"][data-column="condition"]', "noise")
+    page.select_option('select[data-table="leaderboard"][data-column="law"]', "classical")
+    assert column(page, "leaderboard", 1) == ["noise"]
+    assert page.inner_text('[data-count="leaderboard"]') == "1 of 6 rows"
+    page.select_option('select[data-table="leaderboard"][data-column="law"]', "")
+    assert len(column(page, "leaderboard", 1)) == 3
+
+
+def test_claims_are_filtered_by_verdict_and_open_to_their_numbers(seen, findings):
+    page = seen.page
+    for button in page.locator(".verdicts").all():
+        button.click()
+        wanted = button.get_attribute("data-verdict")
+        shown = page.eval_on_selector_all(".claim:not([hidden])", "all => all.map(one => one.dataset.verdict)")
+        if wanted not in ("", "flips"):
+            assert shown
+            assert set(shown) == {wanted}
+    page.locator(".verdicts").first.click()
+    first = page.locator(".claim").first
+    assert not first.locator("dl").is_visible()
+    first.locator("summary").click()
+    assert words.pretty(findings.claims[0].holds_if) in first.inner_text()
+
+
+def test_a_number_leads_to_its_definition(seen):
+    seen.page.locator("#leaderboard tbody tr:not([hidden]) td.number a").first.click()
+    assert seen.page.evaluate("location.hash") == "#metric-settling_time"
+    assert seen.page.evaluate("document.querySelector(':target').tagName") == "DT"
+
+
+def test_a_phone_shows_it_without_scrolling_sideways_and_what_scrolls_takes_the_keyboard(browser, made):
+    phone = Seen(browser, made.as_uri(), 420).page
+    assert phone.evaluate("document.documentElement.scrollWidth") == 420
+    assert (
+        phone.eval_on_selector_all(
+            ".chart, .wide", "all => all.filter(a => a.scrollWidth > a.clientWidth + 1 && a.tabIndex < 0).length"
+        )
+        == 0
+    )
+    box = phone.locator(".wide:has(#picks)")
+    assert box.evaluate("a => a.scrollWidth > a.clientWidth + 50")
+    shades = box.evaluate("a => getComputedStyle(a)")["backgroundAttachment"]
+    assert shades == "local, local, local, scroll, scroll, scroll"  # shadows at edges, which ends of the table cover
+    name = phone.locator("#picks tbody th").first
+    left = name.evaluate("a => a.getBoundingClientRect().left")
+    box.evaluate("a => a.scrollTo(200, 0)")
+    assert name.evaluate("a => a.getBoundingClientRect().left") == left
+    phone.close()
+
+
+def contrast(a, b):
+    """The contrast of two colours, 1 to 21 (WCAG 2.2)."""
+    parts = [np.array(words.style.rgb(colour)) / 255 for colour in (a, b)]
+    linear = [np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4) @ (0.2126, 0.7152, 0.0722) for c in parts]
+    return (max(linear) + 0.05) / (min(linear) + 0.05)
+
+
+def colours(page, selector, what):
+    """The colours of what a selector finds, "#rrggbb"."""
+    found = page.eval_on_selector_all(selector, f"all => [...new Set(all.map(e => getComputedStyle(e).{what}))]")
+    return {"#{:02x}{:02x}{:02x}".format(*map(int, re.findall(r"\d+", one)[:3])) for one in found if "rgb" in one}
+
+
+def test_in_the_dark_letters_and_laws_are_legible_in_charts_too(browser, made):
+    night = Seen(browser, made.as_uri(), scheme="dark")
+    (back,) = colours(night.page, "body", "backgroundColor")
+    letters = colours(night.page, ".plot text", "fill")
+    assert min(contrast(colour, back) for colour in letters) > 4.5
+    marks = colours(night.page, ".plot .point", "stroke") - {back}  # a ring of the page's colour is about some dots
+    assert min(contrast(colour, back) for colour in marks) > 2.5
+    assert len(marks) >= len(TINY.laws)
+    night.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    printed = colours(night.page, ".plot text", "fill")
+    assert printed != letters
+    assert min(contrast(colour, "#ffffff") for colour in printed) > 2  # laws name their maps in their colours
+    night.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    assert colours(night.page, ".plot text", "fill") == letters
+    night.page.emulate_media(color_scheme="light")
+    assert colours(night.page, "body", "backgroundColor") == {"#ffffff"}
+    assert colours(night.page, ".plot text", "fill") == printed
+    assert night.said == []
+    night.page.close()
+
+
+def test_it_prints_with_everything_open(seen, tmp_path):
+    seen.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    assert seen.page.locator(".claim:not([open])").count() == 0
+    assert seen.page.eval_on_selector(".plot .main-svg", "svg => svg.clientWidth") == 1016
+    seen.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    printed = seen.page.pdf(path=str(tmp_path / "report.pdf"), prefer_css_page_size=True)
+    assert printed.startswith(b"%PDF")
+    assert seen.said == []

@@ -1,0 +1,121 @@
+"""The report's section on real machines: rankings over sets of quantities, and records beside their twins."""
+
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.evidence.report import charts, page, rigs, stages
+from smc_mujoco.evidence.report.plan import Bars, Work
+from smc_mujoco.evidence.rigs import records
+from tests.studies.report.test_report import TINY
+
+DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
+AXIS = smc.rig("emps")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A record of the simulated axis, one that it cannot have written, and a file of other columns."""
+    path = tmp_path_factory.mktemp("records")
+    trace = smc.run(AXIS.scenario(duration=0.4, reference=smc.Sine(0.05, 8.0), x0=0.0))
+    record = records.of_trace(trace, AXIS.columns)
+    np.savez(path / "run.npz", **record)
+    np.savez(path / "slow.npz", **{name: values[::2] for name, values in record.items()})
+    (path / "other.csv").write_text("a,b\n1,2\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory):
+    return Work(plan=TINY, folder=tmp_path_factory.mktemp("report"), threads=None, bars=Bars(False))
+
+
+@pytest.fixture(scope="module")
+def shown(folder, work):
+    return rigs.repeated(work, folder)
+
+
+def test_records_find_the_twin_of_their_columns(shown):
+    assert [(each.name, each.rig.name) for each in shown] == [("run.npz", "emps"), ("slow.npz", "emps")]
+    own, nothing = shown[0].fits["the twin’s"], shown[0].fits["do nothing"]
+    assert min(own.values()) > 90.0  # the velocity at the start is read off the positions
+    assert nothing["u"] == pytest.approx(0.0, abs=1.0)
+    assert own["x"] > nothing["x"]
+    assert shown[0].why == ""
+    assert "sampled every 0.002 s" in shown[1].why
+
+
+def test_a_chart_has_what_was_measured_beside_the_twin(shown):
+    figure = charts.record(shown[0])
+    assert [trace["name"] for trace in figure["data"]] == ["measured", "twin"] * 2
+    measured = figure["data"][0]
+    assert len(measured["x"]) == len(measured["y"]) <= rigs.POINTS
+    assert measured["x"][-1] == pytest.approx(0.4, abs=1e-3)
+
+
+def test_a_folder_without_records_of_a_rig_is_refused_before_any_run(work, tmp_path):
+    (tmp_path / "a.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(smc.ScenarioError, match="has the columns of a rig: give those of one of emps t, x, u, r;"):
+        stages.find(TINY, work.folder / "none", None, Bars(False), tmp_path)
+    assert not (work.folder / "none").exists()
+    with pytest.raises(smc.ScenarioError, match="no folder at"):
+        rigs.read(tmp_path / "b")
+
+
+def test_every_law_of_the_machine_runs_on_every_set(work):
+    (machine,) = rigs.machines(work)
+    qube = smc.rig("qube_servo")
+    assert list(machine.laws) == [law.name for law in qube.laws]
+    assert machine.laws["state_feedback"] == "Rig's state feedback"
+    assert len(set(machine.colours.values())) == len(qube.laws)
+    for board in machine.boards:
+        assert [block.condition for block in board.blocks] == list(qube.members())
+        assert len(machine.medians(board.metric, "relay")) == len(qube.members())
+    assert machine.unit("tv_rate") == "V/s"
+    assert machine.unit("itae") == "rad s^2"
+
+
+def board(*winners):
+    blocks = [SimpleNamespace(winner=winner) for winner in winners]
+    sole = winners[0] if len(set(winners)) == 1 else None
+    return SimpleNamespace(metric="itae", blocks=blocks, winner=sole)
+
+
+@pytest.mark.parametrize(
+    ("winners", "sentence"),
+    [
+        (("relay", "relay"), "ITAE: relay wins on all 2 sets of quantities: the ranking survives."),
+        ((None, None), "ITAE: no law wins on any of the 2 sets of quantities."),
+        (("relay", None, "relay", "state_feedback"),
+         "ITAE: no law wins on all sets of quantities; relay on 2 and Rig's state feedback on 1 of 4."),
+    ],
+)  # fmt: skip
+def test_a_sentence_says_whether_a_ranking_survives(winners, sentence):
+    assert rigs.Machine(rig=smc.rig("qube_servo"), boards=()).sentence(board(*winners)) == sentence
+
+
+def test_a_twin_that_leaves_the_machines_range_falls():
+    assert rigs.fit({"theta": 94.06, "u": -0.01}) == "theta 94.1, u 0.0 %"
+    assert rigs.fit({"theta": 50.0, "u": -1e4}) == "falls"
+    assert rigs.fit({"elbow": 0.0731}, "N m") == "elbow 0.073 N·m"
+
+
+@pytest.mark.skipif(not DATA.exists(), reason="the public records are not at hand")
+@pytest.mark.parametrize("kept", smc.rig("qube_servo").reached, ids=lambda kept: kept.quantities)
+def test_what_the_page_says_of_unused_records_is_what_they_give(kept):
+    twin = smc.rig("qube_servo")
+    unused = [dict(np.load(DATA / f"qube-{name}.npz")) for name in re.findall(r"\d+", kept.records)]
+    if kept.quantities == "do nothing":
+        fits = [twin.idle(record) for record in unused]
+    else:
+        fits = (twin if kept.quantities == "identified" else twin.set(kept.quantities)).fits(unused)
+    for name, value in kept.values.items():
+        assert np.median([fit[name] for fit in fits]) == pytest.approx(value, rel=5e-3, abs=0.06)
+
+
+def test_the_section_is_in_the_page():
+    assert page.SECTIONS["rigs"] == "On the rig"

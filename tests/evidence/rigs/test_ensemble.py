@@ -1,0 +1,92 @@
+"""Rankings over a rig's parameter sets, and the commands that make them and identify rigs."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+import smc_mujoco as smc
+from smc_mujoco.cli.main import app
+from smc_mujoco.studies.board_tables import heading
+from smc_mujoco.evidence.rigs import ensemble
+
+PENDULUM = smc.rig("simple_pendulum_ak80")
+LAWS = (smc.law("pid", kp=30.0, kd=6.0), smc.law("super_twisting"))
+
+
+@pytest.fixture(scope="module")
+def boards(tmp_path_factory):
+    runs = ensemble.runs(PENDULUM, LAWS, seeds=16, duration=1.5, starts=smc.starts(0.3))
+    return smc.leaderboard(smc.study(runs, tmp_path_factory.mktemp("study"), progress=False))
+
+
+def test_every_set_is_a_condition_with_its_own_numbers():
+    runs = ensemble.runs(PENDULUM, LAWS, seeds=2, duration=1.0, starts=smc.starts(0.3))
+    assert len(runs) == 2 * 2 * (1 + len(PENDULUM.ensemble))
+    levels = {run.condition: run.friction[0].level for run in runs}
+    assert levels == {"set 1": 0.21, "set 2": 0.18, "set 3": 0.24, "set 4": 0.18, "set 5": 0.24}
+    assert {run.resolved.u_max for run in runs} == {12.0}
+    assert len({run.resolved.x0 for run in runs}) == 2
+
+
+def test_the_verdict_says_where_one_law_wins(boards):
+    lines = {line.partition(":")[0]: line for line in ensemble.verdict(boards).splitlines()}
+    assert lines["tv_rate"] == "tv_rate: pid wins on all 5 parameter sets"
+    assert set(lines) == {board.metric for board in boards}
+    for board in boards:
+        start = f"{board.metric}: {board.winner or 'no law'} wins on all 5"
+        assert lines[board.metric].startswith(start)
+
+
+def test_a_rig_of_one_set_is_refused():
+    sentence = "emps has only one parameter set: choose a rig with"
+    with pytest.raises(smc.ScenarioError, match=sentence):
+        ensemble.runs(smc.rig("emps"), LAWS)
+
+
+def test_a_rig_has_laws_and_a_start_of_its_own():
+    qube = smc.rig("qube_servo")
+    runs = ensemble.runs(qube, seeds=1, duration=0.1)
+    assert {run.law.name for run in runs} == {law.name for law in qube.laws}
+    assert {run.resolved.x0 for run in runs} == {(0.0, 0.1)}
+    with pytest.raises(smc.ScenarioError, match="no laws have gains for realaigym_acrobot: give some"):
+        ensemble.runs(smc.rig("realaigym_acrobot"))
+
+
+def test_a_board_of_a_voltage_is_in_volts(tmp_path):
+    fields = {"actuator": smc.DCMotor(command="voltage"), "duration": 0.2}
+    runs = [
+        smc.Scenario(plant="duffing", law=law, x0=x0, seed=seed, **fields)
+        for law in LAWS
+        for seed, x0 in enumerate((0.2, 0.3))
+    ]
+    (board,) = smc.leaderboard(smc.study(runs, tmp_path, progress=False), metrics=("tv_rate",))
+    assert board.unit == "V/s"
+    assert heading(board) == "TV rate (V/s)"
+
+
+def test_the_command_compares_laws_on_every_set(tmp_path):
+    words = ["bench", "--rig", PENDULUM.name, "--laws", "pid(kp=30, kd=6),super_twisting", "--seeds", "1"]
+    done = CliRunner().invoke(app, [*words, "--duration", "0.1", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert "tv_rate: no law wins on all 5 parameter sets (none on any)" in done.output
+    assert "10 runs, 0 of them failed, gains 'default'," in done.output
+    own = ["--condition", "noise=0.1"]
+    for given in (["--plants", "duffing"], ["--conditions", "noise"], own, ["--gains", "study"]):
+        refused = CliRunner().invoke(app, [*words, *given])
+        assert refused.exit_code == 2
+        assert "--rig brings its own plant, parameter sets and gains: leave out" in refused.output
+
+
+def test_the_command_identifies_from_files(tmp_path):
+    rig = smc.rig("emps")
+    smc.run(rig.scenario(duration=0.6, reference=smc.Sine(0.05, 8.0), x0=0.0)).save(tmp_path / "run.npz")
+    words = ["identify", "emps", str(tmp_path / "run.npz"), "--quantities", "mass", "--starts", "1"]
+    done = CliRunner().invoke(app, [*words, "--json", str(tmp_path / "found.json")])
+    assert done.exit_code == 0, done.output
+    assert "mass" in done.output
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert found["quantities"]["mass"]["value"] == pytest.approx(95.1089, rel=0.02)
+    wrong = CliRunner().invoke(app, [*words, "--columns", "x"])
+    assert wrong.exit_code == 2
+    assert "columns 'x' cannot be read: write it as theta=arm_angle,t=time" in wrong.output

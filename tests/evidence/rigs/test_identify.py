@@ -1,0 +1,282 @@
+"""Identification returns what made the records, and says what records cannot tell."""
+
+import csv
+import dataclasses
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import smc_mujoco as smc
+from smc_mujoco.cli.main import app
+from smc_mujoco.simulation import philox
+from smc_mujoco.evidence.rigs import records
+from smc_mujoco.evidence.rigs.identify import Search
+
+AXIS = smc.rig("emps")
+PENDULUM = smc.rig("simple_pendulum_ak80")
+WRONG = {"mass": 80.0, "viscous": 150.0, "coulomb": 30.0, "offset": 0.0}
+
+
+def carriage(x, v, force, time):
+    """The axis under a constant force, s later, in closed form between its stops: an independent oracle."""
+    m, b, dry, constant = (AXIS.values[name] for name in AXIS.free)
+    while time > 1e-15:
+        net = force - constant
+        if v == 0.0 and abs(net) <= dry:
+            break
+        sign = math.copysign(1.0, v or net)
+        final, lag = (net - dry * sign) / b, m / b
+        stop = lag * math.log((v - final) / -final) if v and final * sign < 0.0 else math.inf
+        spent = min(time, stop)
+        left = math.exp(-spent / lag)
+        x, v = x + final * spent + (v - final) * lag * (1.0 - left), final + (v - final) * left
+        v, time = (0.0 if spent == stop else v), time - spent
+    return x, v
+
+
+def axis_record(seconds, begin=0.0, speed=4.0):
+    """Columns of the real axis on a sine from rest, as its encoder, cascade and amplifier would write them."""
+    quantum, gains = AXIS.values["count"], AXIS.scenario().law.gains
+    t = 1e-3 * np.arange(round(seconds / 1e-3) + 1)
+    r = 0.05 * np.sin(speed * t)
+    y, u = np.zeros((2, len(t)))
+    x, v = 0.0, 0.0
+    for k in range(len(t)):
+        y[k] = quantum * math.floor(x / quantum + 0.5)
+        rate = (y[k] - y[k - 1]) / 1e-3 if k else 0.0
+        u[k] = min(10.0, max(-10.0, gains["kv"] * (gains["kp"] * (r[k] - y[k]) - rate)))
+        x, v = carriage(x, v, AXIS.values["force_per_volt"] * u[k], 1e-3)
+    first = round(begin / 1e-3)
+    return {"t": t[first:] - begin, "x": y[first:], "u": u[first:], "r": r[first:]}
+
+
+@pytest.mark.parametrize("begin", [0.0, 0.25], ids=["with a jump from rest", "in motion"])
+def test_columns_of_the_axis_give_all_four_however_they_begin(begin):
+    """By another simulator without steps; a cubic through the first samples would err by 8 % in the offset."""
+    near = AXIS.with_values({name: 1.05 * AXIS.values[name] for name in AXIS.free})
+    result = smc.identify(near, axis_record(1.1, begin), starts=1, most=5)
+    for name, value in result.values.items():
+        assert value == pytest.approx(AXIS.values[name], rel=0.02)
+    assert min(result.fits[0].values()) > 99.0
+
+
+@pytest.fixture(scope="module")
+def moved():
+    """1 s of the axis on a sine, read by its encoder."""
+    return smc.run(AXIS.scenario(duration=1.0, reference=smc.Sine(0.05, 4.0), x0=0.0))
+
+
+@pytest.fixture(scope="module")
+def found(moved):
+    return smc.identify(AXIS.with_values(WRONG), moved, starts=1)
+
+
+@pytest.fixture(scope="module")
+def swung():
+    """2.5 s of the pendulum under a torque, with noise."""
+    return smc.run(
+        PENDULUM.scenario(
+            "none", feedforward=smc.Sine(2.0, 4.5), duration=2.5, x0=-math.pi, noise=smc.Noise(1e-3), seed=3
+        )
+    )
+
+
+def test_the_published_axis_is_found_within_two_percent(found):
+    assert set(found.values) == set(AXIS.free)
+    for name, value in found.values.items():
+        assert value == pytest.approx(AXIS.values[name], rel=0.02)
+    assert min(found.fits[0].values()) > 99.0
+    assert found.fits_before[0]["u"] < 60.0
+    assert found.rig.quantities["mass"].source == "identified from records"
+
+
+def test_equal_seeds_give_equal_results_and_starts_agree(moved, found):
+    free = ("mass", "offset")
+    one, again = (smc.identify(found.rig.with_values({"mass": 80.0}), moved, free, starts=3, seed=5) for _ in range(2))
+    assert one.values == again.values
+    assert one.errors == again.errors
+    for name, value in one.values.items():
+        assert value == pytest.approx(found.values[name], rel=0.02)
+
+
+def test_a_motion_gives_its_quantities_within_three_standard_errors(swung):
+    free = ("inertia", "mass_moment", "coulomb")
+    result = smc.identify(PENDULUM.with_values({"inertia": 0.15, "coulomb": 0.15}), swung, free, starts=1)
+    for name in free:
+        assert abs(result.values[name] - PENDULUM.values[name]) < 3.0 * result.errors[name]
+        assert result.errors[name] < 0.05 * PENDULUM.values[name]
+
+
+def test_a_closed_loop_s_transient_gives_a_quantity_within_three_errors():
+    """A reference that jumps in speed decides the mass within 0.1 s. A jackknife alone errs by more than 3 deviations.
+
+    The noise of the second sample, which the controller takes for a velocity, decides most of the error. Where it is
+    itself beyond 3 deviations, as the 4.2 of seed 4, the error may be as far off.
+    """
+    runs = [
+        AXIS.scenario(reference=smc.Sine(0.05, 3.0), x0=0.0, duration=1.0, seed=seed, noise=smc.Noise(2e-7))
+        for seed in (4, 8, 10)
+    ]
+    for trace in smc.run(runs):
+        second = philox.normals(trace.scenario.seed, 0, philox.MEASUREMENT, 1)[0]
+        result = smc.identify(AXIS, trace, ("mass", "viscous"), starts=1, most=4)
+        for name, value in result.values.items():
+            assert abs(value - AXIS.values[name]) < max(3.0, abs(second)) * result.errors[name]
+            assert result.errors[name] < 0.01 * AXIS.values[name]
+
+
+def test_noise_is_read_off_a_moving_record():
+    t, rng = 1e-3 * np.arange(4000), np.random.default_rng(5)
+    record = {"x": 0.3 * np.sin(20.0 * t) + rng.normal(0.0, 2e-4, len(t))}
+    record["x"][2000:] += 0.1  # a jump
+    assert records.noise(record, records.Columns()) == pytest.approx(2e-4, rel=0.05)
+
+
+def test_parameters_that_cannot_be_told_apart_are_named(swung):
+    with pytest.raises(smc.ScenarioError) as error:
+        smc.identify(PENDULUM, swung, ("inertia", "torque_limit"), starts=1)
+    assert str(error.value) == "nothing in the records depends on torque_limit: leave it out, or give other records"
+    with pytest.raises(smc.ScenarioError) as error:
+        smc.identify(AXIS, smc.run(AXIS.scenario(duration=0.06, x0=0.0)), starts=1)
+    assert "cannot tell" in str(error.value) or "nothing in the records depends on" in str(error.value)
+    with pytest.raises(smc.ScenarioError) as error:
+        smc.identify(AXIS, axis_record(0.12), starts=1, most=4)
+    assert re.search(r"emps cannot tell \w+ \(.* ± .*\) and \w+ \(.* ± .*\) apart: leave one out", str(error.value))
+
+
+def test_a_plants_own_parameters_are_found_from_a_run():
+    plant = smc.plant("duffing")
+    run = smc.run(smc.Scenario(plant=plant, law="none", feedforward=smc.Sine(3.0, 2.0), x0=0.3, duration=4.0))
+    wrong = smc.plant("duffing", M=1.2, delta=0.1)
+    result = smc.identify(wrong, run, ("M", "delta"), starts=1)
+    assert result.values == pytest.approx({name: plant.parameters[name] for name in ("M", "delta")}, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda run: smc.identify("emps", []), "there are no records: give at least one"),
+        (lambda run: smc.identify("emps", "run.csv"), "record is 'run.csv': give a mapping of columns, such as"),
+        (lambda run: smc.identify("emps", run, ["weight"]), "unknown quantity of emps 'weight': "),
+        (lambda run: smc.identify("emps", run, ["mass", "mass"]), "quantities have mass 2 times: name it once"),
+        (lambda run: smc.identify("emps", run, []), "emps has no quantities to find: name some, of mass"),
+        (lambda run: smc.identify("ip02", {"t": [0]}), "ip02 has no quantities to find: name some, of resistance"),
+        (lambda run: smc.identify(3, run), "cannot identify 3: give a rig, the name of one, or a smc.Plant"),
+        (lambda run: smc.identify("emps", run, starts=0), "starts is 0: give a whole number from 1 to 1000"),
+        (lambda run: smc.identify("emps", [run, {"t": [0]}]), "records are traces of one law, or columns"),
+    ],
+)
+def test_bad_questions_get_one_sentence(make, sentence, moved):
+    with pytest.raises(smc.ScenarioError) as error:
+        make(moved)
+    assert sentence in str(error.value)
+
+
+def test_a_search_stays_within_its_ranges_to_the_last_bit():
+    """1e-4 / 0.042 * 0.042 is less than 1e-4."""
+    rig = smc.rig("qube_servo", back_emf=0.042)
+    search = Search(rig, ["back_emf"], [], [], lambda count: None)
+    assert (search.low * search.scales)[0] < 1e-4
+    assert search.rig(search.low).values["back_emf"] == 1e-4
+
+
+def test_a_search_without_free_states_looks_for_no_other_start(monkeypatch):
+    """They would be the same start, simulated twice."""
+    search = Search(smc.rig("qube_servo"), ["back_emf"], [], [], lambda count: None)
+    search.free = np.zeros(0, int)
+    monkeypatch.setattr(Search, "refine", lambda self, stage, z, most: z + 1.0)
+    monkeypatch.setattr(Search, "better", lambda self, stage, *points: pytest.fail("it simulates"))
+    assert search.refine_from_rest(np.zeros(1), 3) == [1.0]
+
+
+def test_a_poor_fit_is_said(found):
+    assert found.notes == []
+    poor = dataclasses.replace(found, fits=({"x": 99.0, "u": 61.3},))
+    assert poor.notes[0].startswith("the worst fit is 61 %: the model lacks something, a column is wrong")
+
+
+def test_drawn_sets_have_the_errors_and_correlations_found(found):
+    rig = found.drawn(1000, seed=1)
+    names = list(found.values)
+    sets = np.array([[each[name] for name in names] for each in rig.ensemble])
+    np.testing.assert_allclose(sets.std(axis=0), [found.errors[name] for name in names], rtol=0.1)
+    np.testing.assert_allclose(np.corrcoef(sets.T), found.correlations, atol=0.1)
+    assert rig.values == found.rig.values
+    assert found.drawn(3, seed=1).ensemble == rig.ensemble[:3]
+
+
+def test_the_command_identifies_a_plant_of_the_library_from_a_csv_file(tmp_path):
+    run = smc.run(smc.Scenario(plant="duffing", law="none", feedforward=smc.Sine(3.0, 2.0), x0=0.3, duration=2.0))
+    run.export(tmp_path / "run.csv")
+    words = ["identify", "duffing", str(tmp_path / "run.csv"), "--quantities", "delta", "--starts", "1"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    assert re.search(r"delta +0\.[0-9]+ ", done.output)
+    assert re.search(r" (99|100)\.\d \(", done.output)
+
+
+def test_values_that_are_only_tried_warn_of_nothing(moved, recwarn):
+    """The motor gives 352 N at rest. It holds an offset of 340 N, and not the greater ones that the search tries."""
+    smc.identify(smc.rig("emps", offset=-340.0), moved, ["offset"], starts=6, most=2)
+    assert not [each for each in recwarn if "DCMotor gives at most" in str(each.message)]
+
+
+def test_results_are_saved_and_drawn(found, tmp_path):
+    data = json.loads(found.save(tmp_path / "a.json").read_text())
+    assert data["quantities"]["mass"]["unit"] == "kg"
+    assert len(data["correlations"]) == 4
+    assert [path.suffix for path in found.figure(tmp_path / "fit")] == [".svg", ".png"]
+    assert all(path.stat().st_size > 1000 for path in tmp_path.glob("fit.*"))
+
+
+def test_files_of_columns_and_traces_are_read_alike(moved, tmp_path):
+    columns = records.of_trace(moved, AXIS.columns)
+    np.savez(tmp_path / "a.npz", **columns)
+    with (tmp_path / "a.csv").open("w") as file:
+        writer = csv.writer(file)
+        writer.writerow([f"{name} [s]" if name == "t" else name for name in columns])
+        writer.writerows(zip(*columns.values(), strict=True))
+    moved.save(tmp_path / "trace.npz")
+    for name in ("a.npz", "a.csv"):
+        read = dict(records.load(tmp_path / name))
+        assert all(np.array_equal(read[key], columns[key]) for key in columns)
+    assert np.array_equal(records.of_trace(smc.load(tmp_path / "trace.npz"), AXIS.columns)["x"], columns["x"])
+    assert isinstance(records.load(tmp_path / "trace.npz"), smc.Trace)
+    renamed = dict(records.load(tmp_path / "a.csv", {"position": "x"}))
+    np.testing.assert_array_equal(renamed["position"], columns["x"])
+
+
+@pytest.mark.parametrize("cut", [0, 200, -1], ids=["empty", "cut off", "no archive"])
+def test_a_damaged_npz_file_is_one_sentence(tmp_path, cut):
+    file = tmp_path / "a.npz"
+    np.savez(file, t=np.arange(99.0)) if cut >= 0 else np.save(file.with_suffix(".npy"), np.arange(3))
+    content = file.read_bytes()[:cut] if cut >= 0 else file.with_suffix(".npy").read_bytes()
+    file.write_bytes(content)
+    with pytest.raises(smc.ScenarioError, match="as npz"):
+        records.load(file)
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        ("t,x\n0,1\n1\n", "line 3: 1 cells for 2 columns: give one for each"),
+        ("", "has no lines: give a first line"),
+        ("t,x\n", "has only 1 line: give a first line with the columns' names, and samples"),
+    ],
+)
+def test_files_that_are_no_columns_get_one_sentence(content, sentence, tmp_path):
+    (tmp_path / "a.csv").write_text(content)
+    with pytest.raises(smc.ScenarioError) as error:
+        records.load(tmp_path / "a.csv")
+    assert sentence in str(error.value)
+    with pytest.raises(smc.ScenarioError, match="no file at"):
+        records.load(tmp_path / "b.csv")
+
+
+def test_noise_of_a_run_is_in_its_record(swung):
+    noise = records.of_trace(swung, PENDULUM.columns)["position"] - math.pi - swung.x[:, 0]
+    assert np.std(noise) == pytest.approx(math.hypot(1e-3, 2 * math.pi / 4096 / math.sqrt(12)), rel=0.1)

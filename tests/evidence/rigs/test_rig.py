@@ -1,0 +1,237 @@
+"""Rigs make scenarios, repeat records, and refuse what is no record of theirs in one sentence."""
+
+import dataclasses
+import math
+import re
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import smc_mujoco as smc
+from smc_mujoco.cli.main import app
+from smc_mujoco.evidence.rigs.controllers import state_feedback
+from smc_mujoco.simulation import reference
+from smc_mujoco.simulation.trace import ARRAYS
+from smc_mujoco.evidence.rigs.machines import qube_servo
+
+QUBE = smc.rig("qube_servo")
+
+
+def recorded(trace, **changes):
+    """The record that a QUBE-Servo would have written of a run."""
+    t, bias = trace.t, trace.scenario.sensor.bias
+    zero = np.zeros(len(t))
+    record = {
+        "t": t, "theta": trace.x[:, 0] + bias, "alpha": trace.x[:, 1] + bias, "plant_input": trace.u[:, 0],
+        "target_theta": trace.r[:, 0], "target_alpha": zero, "feedforward": zero,
+    }  # fmt: skip
+    return record | changes
+
+
+@pytest.fixture(scope="module")
+def record():
+    """7 s of the twin itself, whose arm follows a sine, read without rounding."""
+    sensor = dataclasses.replace(QUBE.scenario().sensor, counts=math.inf)
+    moving = QUBE.scenario(duration=7.0, reference=smc.Sine(0.3, 1.5), sensor=sensor, x0=(0.02, 0.03))
+    return recorded(smc.run(moving))
+
+
+def test_every_number_has_a_source_and_its_licence():
+    for name in smc.rigs():
+        for quantity, known in smc.rig(name).quantities.items():
+            assert len(known.source) > 5, (name, quantity)
+            if not known.source.startswith(("identified here", "chosen", "part of")):
+                assert re.search(r"\((MIT|BSD-3|no licence stated)\)", known.source), (name, quantity)
+            assert known.least <= known.value <= known.most, (name, quantity)
+
+
+@pytest.mark.parametrize("name", smc.rigs())
+def test_a_rig_makes_scenarios_of_its_machine(name):
+    rig = smc.rig(name)
+    scenario = rig.scenario("none", duration=0.02)
+    trace = smc.run(scenario)
+    assert trace.failure is None
+    assert scenario.efforts[0] == trace.units()["u0" if scenario.plant.n > 1 else "u"]
+    if rig.controller is not None:
+        assert rig.scenario(duration=0.1).law == rig.controller
+
+
+def test_a_changed_quantity_changes_the_machine_and_its_source():
+    other = smc.rig("qube_servo", arm_length=0.1)
+    assert other.scenario("none").plant.parameters["L"] == 0.1
+    assert other.quantities["arm_length"].source == "given"
+    assert QUBE.scenario("none").plant.parameters["L"] != 0.1
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: smc.rig("cube_servo"), "unknown rig 'cube_servo': did you mean 'qube_servo'?"),
+        (lambda: smc.rig("qube_servo", arm=1.0), "unknown quantity of qube_servo 'arm': did you mean 'arm_damping'?"),
+        (lambda: smc.rig("qube_servo", arm_length=-1.0), "qube_servo's arm_length is -1: give at least 0.01"),
+    ],
+)
+def test_what_is_no_rig_is_refused(make, sentence):
+    with pytest.raises(smc.ScenarioError) as error:
+        make()
+    assert str(error.value) == sentence
+
+
+def test_the_twin_repeats_its_own_record(record):
+    """The start's velocities come from positions, and a count in them is forgotten after two seconds."""
+    fit = QUBE.fit(record)
+    assert list(fit) == ["theta", "alpha", "u"]
+    assert min(fit.values()) > 99.0
+
+
+def test_a_trace_is_a_record_too():
+    run = smc.run(smc.rig("emps").scenario(duration=0.3, reference=smc.Sine(0.05, 8.0), x0=0.0))
+    fit = smc.rig("emps").fit(run)
+    assert min(fit.values()) > 99.0
+    assert fit.keys() == {"x", "u"}
+    assert smc.rig("emps", mass=80.0).fit(run)["u"] < 95.0
+    with pytest.raises(smc.ScenarioError, match="is one of servo_axis and the plant of qube_servo is furuta"):
+        QUBE.fit(run)
+
+
+def test_a_record_of_another_machine_fits_less(record):
+    fit = smc.rig("qube_servo", arm_length=0.1, arm_friction=0.0).fit(record)
+    assert min(fit.values()) < 50.0
+
+
+def test_the_replay_is_the_controllers_own_command(record):
+    """On measured positions the law, with what is added to it, gives the recorded command from the first sample on."""
+    start = 1.0
+    target = 0.01 * np.sign(np.sin(3.0 * record["t"]))
+    rng = np.random.default_rng(3)
+    theta, alpha, feedforward = rng.normal(0.0, 0.01, (3, len(target)))
+    e = np.column_stack([theta - record["target_theta"], alpha - target])
+    d, u = np.zeros(2), np.zeros(len(target))
+    for k in range(len(target)):
+        d = (50.0 * (e[k] - e[k - 1]) + d) / (1.0 + 50.0 * 2e-3) if k else d
+        u[k] = 6.0 * e[k, 0] + 1.8 * d[0] + 30.0 * e[k, 1] + 2.5 * d[1] + feedforward[k]
+    changed = record | {"theta": theta, "alpha": alpha, "target_alpha": target, "feedforward": feedforward}
+    scenario = QUBE.replay(changed, start=start)
+    memory, first = np.zeros(5), round(start / 2e-3)
+    gains = reference.Values(**scenario.law.gains)
+    for k in range(400):
+        r = reference.evaluate(scenario.reference, k * 2e-3)[0]
+        y = reference.Measurement(
+            0.0, 2e-3, theta[first + k], 0.0, theta[first + k] - r, 0.0, r, 0.0, 0.0, 0.0, 0.0, q=alpha[first + k]
+        )
+        added = reference.evaluate(scenario.feedforward, k * 2e-3)[0]
+        assert state_feedback.function(y, gains, memory)[0] + added == pytest.approx(u[first + k], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("part", "sentence"),
+    [
+        ({"start": -1.0}, "start is -1: give at least 0"),
+        ({"duration": 0.01}, "duration is 0.01: give at least 0.1"),
+        ({"start": 10.0}, "too short to repeat it from 10 s on: give at least 10.1 s"),
+    ],
+)
+def test_a_part_outside_of_the_record_gets_one_sentence(part, sentence, record):
+    with pytest.raises(smc.ScenarioError, match=sentence):
+        QUBE.replay(record, **part)
+
+
+def test_a_replay_is_an_ordinary_scenario(record, tmp_path):
+    """Both loops run it, and a file brings it back with its controller."""
+    scenario = QUBE.replay(record, duration=0.2)
+    trace, other = smc.run(scenario), reference.run(scenario)
+    for name in ARRAYS:
+        np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name)
+    again = smc.load(trace.save(tmp_path / "a"))
+    assert again.scenario == scenario
+    assert again.scenario.law.function is state_feedback.function
+
+
+def without(record, name):
+    return {key: value for key, value in record.items() if key != name}
+
+
+def changed(record, name, at, value):
+    values = np.array(record[name])
+    values[at] = value
+    return record | {name: values}
+
+
+@pytest.mark.parametrize(
+    ("bad", "sentence"),
+    [
+        (lambda r: without(r, "theta"), "the record of qube_servo has no column theta (it has t, alpha"),
+        (lambda r: without(without(r, "theta"), "plant_input"), "has no column theta, plant_input (it has"),
+        (lambda r: changed(r, "alpha", 100, np.nan), "column alpha of qube_servo is nan at sample 100, one of 1"),
+        (lambda r: r | {"alpha": ["a"] * 3501}, "column alpha of qube_servo is ['a', "),
+        (lambda r: r | {"alpha": r["alpha"][:-1]}, "column alpha of qube_servo has 3500 samples and t has 3501"),
+        (lambda r: changed(r, "t", 7, 0.0), "time of qube_servo runs backward at sample 7, from 0.012 s to 0 s"),
+        (lambda r: r | {"t": r["t"] * 0.5}, "is sampled every 0.001 s and the rig's controller runs every 0.002 s"),
+        (lambda r: {k: v[::2] for k, v in r.items()}, "is sampled every 0.004 s and the rig's controller runs every"),
+        (lambda r: {k: np.delete(v, 9) for k, v in r.items()}, "has a gap after sample 8, from 0.016 s to 0.02 s"),
+        (lambda r: {k: v[:800] for k, v in r.items()}, "lasts 1.6 s, too short to repeat it from 2 s on: give at"),
+        (lambda r: {k: v[:1500] for k, v in r.items()}, "lasts 3 s, too short to score it from 4 s on: give at least"),
+        (lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "alpha", "target_theta")}, "look like degrees"),
+        (lambda r: r | {"alpha": np.rad2deg(r["alpha"])}, "the values of alpha of the record of qube_servo look like"),
+        (lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "target_theta")}, "values of theta and target_theta of"),
+        (lambda r: r | {"target_theta": np.rad2deg(r["target_theta"])}, "the values of target_theta of the record of"),
+        (lambda r: "record.csv", "record is 'record.csv': give a mapping of columns"),
+    ],
+)  # fmt: skip
+def test_bad_data_get_one_sentence(bad, sentence, record):
+    with pytest.raises(smc.ScenarioError) as error:
+        QUBE.fit(bad(record))
+    assert sentence in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_columns_have_the_units_of_the_machine():
+    assert QUBE.units == {"theta": "rad", "alpha": "rad", "plant_input": "V"}
+    assert smc.rig("emps").units == {"x": "m", "u": "V"}
+    assert smc.rig("realaigym_acrobot").units == {"tau_meas1": "N m", "tau_meas2": "N m"}
+
+
+def test_the_delay_is_a_whole_number_of_steps():
+    late = smc.rig("qube_servo", delay=1.1e-3).scenario("none")
+    assert late.delay_steps * late.resolved.physics_step == pytest.approx(1e-3)
+    assert dataclasses.asdict(QUBE.columns)["x"] == ("theta", "alpha")
+    assert qube_servo.PERIOD == 2e-3
+
+
+def test_a_record_is_a_trace_of_what_was_measured(record):
+    """Shifted by the encoder's offset, so that a film shows the machine where its twin counts from."""
+    trace = QUBE.measured(record, start=3.0, duration=1.0)
+    part, bias = slice(1500, 2001), QUBE.values["encoder_offset"]
+    np.testing.assert_allclose(trace.t, record["t"][part] - 3.0, atol=1e-12)
+    np.testing.assert_allclose(trace.x[:, 1], record["alpha"][part] - bias, atol=1e-12)
+    np.testing.assert_array_equal(trace.u[:, 0], record["plant_input"][part])
+    np.testing.assert_array_equal(trace.r[:, 0], record["target_theta"][part])
+    np.testing.assert_allclose(trace.v[:, 0], np.gradient(record["theta"], 2e-3)[part], atol=0.02)
+    assert trace.scenario == QUBE.replay(record, 3.0, 1.0, rounded=False)
+
+
+def test_a_machine_that_does_nothing_follows_its_references(record):
+    idle = QUBE.idle(record | {"theta": record["target_theta"], "alpha": 0.1 * record["target_theta"] + 0.3})
+    assert idle["theta"] == 100.0
+    assert idle["alpha"] < 0.0
+    assert idle["u"] == pytest.approx(0.0, abs=0.5)
+
+
+def test_records_of_torques_are_not_repeated():
+    rig = smc.rig("realaigym_acrobot")
+    with pytest.raises(smc.ScenarioError, match="records of realaigym_acrobot are not replayed, as their torques are"):
+        rig.replay(dict.fromkeys(rig.needed, np.arange(600.0)))
+
+
+def test_the_command_repeats_a_record(record, tmp_path):
+    np.savez(tmp_path / "run.npz", **record)
+    words = ["replay", "qube_servo", str(tmp_path / "run.npz"), "--quantities", "driver"]
+    done = CliRunner().invoke(app, [*words, "--figure", str(tmp_path / "run")])
+    assert done.exit_code == 0, done.output
+    assert re.search(r"twin +(99|100)\.\d +(99|100)\.\d +(99|100)\.\d", done.output)
+    assert re.search(r"driver +-?\d", done.output)
+    assert (tmp_path / "run.svg").stat().st_size > 1000
+    wrong = CliRunner().invoke(app, [*words[:-1], "drivers"])
+    assert wrong.exit_code == 2
+    assert "unknown parameter set of qube_servo 'drivers': did you mean 'driver'?" in wrong.output

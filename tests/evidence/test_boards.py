@@ -1,0 +1,311 @@
+"""RealAIGym's boards: published scores by our formula, the published simulator against MuJoCo, and our entries."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.cli import main as cli
+from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1
+from smc_mujoco.evidence import boards
+from smc_mujoco.evidence.boards import entries, simulator
+from smc_mujoco.evidence.boards.scoring import VERSIONS, of_arrays
+from smc_mujoco.evidence.boards.simulator import Case, Machine
+
+ROBOTS = pytest.mark.parametrize("robot", boards.ROBOTS)
+ROWS = [
+    pytest.param(row, version, id=f"{robot} {version} {row.name}")
+    for robot, versions in boards.SIMULATION.items()
+    for version, rows in versions.items()
+    for row in rows
+]
+# Digits of the published criteria after the point.
+DIGITS = {"torque_smoothness": 3} | dict.fromkeys(
+    ("swing_up_time", "energy", "max_torque", "integrated_torque", "torque_cost", "velocity_cost"), 2
+)
+
+
+@pytest.fixture(scope="module")
+def traces():
+    """The run of our entry of each robot."""
+    found = smc.run([boards.entry(robot) for robot in boards.ROBOTS])
+    return dict(zip(boards.ROBOTS, found, strict=True))
+
+
+@pytest.fixture(scope="module")
+def machines():
+    return {robot: Machine(boards.entry(robot)) for robot in boards.ROBOTS}
+
+
+# criteria and scores
+
+
+@pytest.mark.parametrize(("row", "version"), ROWS)
+def test_published_criteria_give_their_published_score(row, version):
+    """Within what the rounding of the published criteria leaves open, and half a digit of the score.
+
+    That is up to 0.004, most of it by the smoothness: 0.0005 of 0.1 N m. Two rows of 29 are off by 0.0022, where 0.0037
+    and 0.0033 are open; all others by less than 0.002.
+    """
+    names = VERSIONS[version]
+    low, high = (
+        boards.score(
+            row._asdict() | {name: getattr(row, name) + side * 0.5 * 10.0 ** -DIGITS[name] for name in names}, version
+        )
+        for side in (1.0, -1.0)
+    )
+    assert low - 5e-4 <= row.score <= high + 5e-4
+    assert high - low < 0.007
+    if (row.name, row.swing_up_time) not in (("History SAC", 1.00), ("TVLQR", 4.05)):
+        assert boards.score(row, version) == pytest.approx(row.score, abs=0.002)
+
+
+def test_unrounded_criteria_give_their_unrounded_score():
+    """History SAC's run on the acrobot's board: scores.csv of its data."""
+    values = (1.0000000000000007, 8.077749161960673, 1.8037118196867141, 0.009546752841345449, 88.4965605525382)
+    row = dict(zip(VERSIONS["v2"], values, strict=True))
+    assert boards.score(row) == pytest.approx(0.6552699844147534, abs=1e-12)
+
+
+def test_criteria_of_a_motion_are_those_of_its_formula():
+    t = np.arange(1001) * 0.01
+    q, v, u = np.zeros((1001, 2)), np.zeros((1001, 2)), np.where(np.arange(1001) % 2, 1.0, -1.0)
+    q[:, 0] = np.where(t < 3.995, 0.0, math.pi)  # up from the sample at 4 s
+    v[:, 1] = 2.0
+    found = of_arrays(t, q, v, u, "pendubot")
+    assert found.swing_up_time == pytest.approx(4.0)
+    assert found.success
+    assert found.energy == pytest.approx(math.pi)
+    assert found.max_torque == 1.0
+    assert found.integrated_torque == pytest.approx(10.0)
+    assert found.torque_cost == pytest.approx(10.0)
+    assert found.torque_smoothness == pytest.approx(2.0)
+    assert found.velocity_cost == pytest.approx(40.0)
+    q[900, 0] = 0.0  # falls once
+    assert of_arrays(t, q, v, u, "acrobot").swing_up_time == pytest.approx(9.01)
+    q[-2:, 0] = 0.0
+    assert not of_arrays(t, q, v, u, "acrobot").success
+
+
+def test_a_run_that_stays_down_or_diverges_scores_nothing():
+    trace = smc.run(dataclasses.replace(boards.on_board("acrobot", "none"), duration=0.1))
+    assert not boards.criteria(trace).success
+    assert boards.score(trace) == 0.0
+    fast = smc.run(dataclasses.replace(boards.on_board("acrobot", "none"), duration=0.1, v0=99e4))
+    assert fast.failure
+    assert boards.score(fast, "v1") == 0.0
+
+
+# the published simulator
+
+
+@ROBOTS
+def test_the_published_simulator_is_mujocos(robot, traces, machines):
+    states, torque = machines[robot].simulate(Case())
+    order = [1, 0] if robot == "acrobot" else [0, 1]
+    np.testing.assert_allclose(states[:, :2], traces[robot].x[:, order], atol=1e-8)
+    np.testing.assert_allclose(states[:, 2:], traces[robot].v[:, order], atol=1e-7)
+    np.testing.assert_allclose(torque, traces[robot].u[:-1, 0], atol=1e-7)
+
+
+@ROBOTS
+def test_changed_machines_of_the_published_simulator_are_mujocos(robot, machines):
+    """Viscous friction and another mass, where MuJoCo has them: open loop, as u is the trajectory's alone."""
+    law = dict(zip(("acrobot", "pendubot"), (entries.acrobot_swing_up, entries.pendubot_swing_up), strict=True))[robot]
+    weak = law.bind({"k": 1e-9})
+    changed = {"b1": 0.02, "b2": 0.01, "m2": 0.6, "Ir": 5e-5}
+    plant = smc.plant(robot, **changed)
+    trace = smc.run(dataclasses.replace(boards.entry(robot), plant=plant, law=weak, duration=2.0))
+    states, _ = Machine(dataclasses.replace(boards.entry(robot), law=weak)).simulate(Case(parameters=changed))
+    order = [1, 0] if robot == "acrobot" else [0, 1]
+    np.testing.assert_allclose(states[:1001, :2], trace.x[:, order], atol=1e-6)
+
+
+def test_dry_friction_is_the_published_arctangent():
+    state, known = (0.4, -0.2, 0.03, -0.05), tuple((MODEL_1_1 | {"cf1": 0.2, "cf2": -0.1}).values())
+    with_it = simulator._slope(state, 0.0, 0.0, known)
+    without = simulator._slope(state, -0.2 * math.atan(3.0), -0.1 * math.atan(5.0), tuple(MODEL_1_1.values()))
+    np.testing.assert_allclose(with_it, without, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "case",
+    [Case(response=0.5), Case(delay=3), Case(pulses=((0.3, 0.05, 2.0),)), Case(torque_noise=0.1)],
+    ids=["response", "delay", "pulse", "torque noise"],
+)
+def test_what_a_case_does_to_the_torque_and_the_motion(case, machines):
+    machine = machines["pendubot"]
+    (nominal, u), (states, torque) = machine.simulate(Case()), machine.simulate(case)
+    if case.response != 1.0:
+        assert torque[0] == pytest.approx(0.5 * u[0], rel=1e-9)
+    elif case.delay:
+        np.testing.assert_array_equal(torque[0], u[0])
+        assert np.abs(torque[1:100] - u[1:100]).max() > 1e-3
+    elif case.pulses:
+        impulse = 2.0 * 0.05 * math.sqrt(2.0 * math.pi)
+        assert np.abs(states[160] - nominal[160]).max() > 0.1 * impulse
+    else:
+        assert np.std(torque[:20] - u[:20]) == pytest.approx(0.1, rel=0.5)
+
+
+def test_the_grid_is_the_published_one():
+    grid = simulator.cases()
+    counts = {test: sum(case.test == test for case in grid) for test in simulator.TESTS}
+    assert list(counts.values()) == [210, 210, 210, 21, 21, 50]
+    assert grid == simulator.cases()
+    values = {name: [case.value for case in grid if case.name == name] for name in ("Ir", "m2r2", "b1", "cf2", "delay")}
+    for name, (first, last) in {
+        "Ir": (0, 1e-4),
+        "m2r2": (0.75, 1.25),
+        "b1": (-0.1, 0.1),
+        "cf2": (-0.2, 0.2),
+        "delay": (0, 0.04),
+    }.items():
+        np.testing.assert_allclose(values[name], np.linspace(first, last, 21), atol=1e-15)
+    pulses = [pulse for case in grid for pulse in case.pulses]
+    assert len(pulses) == 150
+    assert all(1.0 <= centre <= 9.0 and 0.05 <= width <= 0.1 and 0.5 <= abs(a) <= 5.0 for centre, width, a in pulses)
+
+
+# our entries
+
+
+@ROBOTS
+def test_the_entry_swings_up_and_balances(robot, traces):
+    found = boards.criteria(traces[robot])
+    assert found.success
+    assert found.max_torque <= 6.0
+    order = [1, 0] if robot == "acrobot" else [0, 1]
+    assert np.abs(traces[robot].x[-1, order] - [math.pi, 0.0]).max() < 1e-3
+    assert boards.score(found) > max(row.score for row in boards.SIMULATION[robot]["v2"])
+    assert boards.board(traces[robot])[0].name == boards.NAME
+    own = {"reference": smc.Constant(0.1), "feedforward": smc.Constant(0.1), "velocity": "levant", "seed": 3}
+    designed = dataclasses.replace(traces[robot], scenario=dataclasses.replace(traces[robot].scenario, **own))
+    assert boards.board(designed) == boards.board(traces[robot])
+
+
+@ROBOTS
+def test_the_trajectory_obeys_the_equation_and_the_limits(robot):
+    """Between nodes, the cubic of each coordinate has the accelerations of the plant's nominal model."""
+    table = entries.read_json(entries.FOLDER / f"{robot}.json")
+    x, v, a, q, dq, ddq, u = (np.array(table[key]) for key in ("x", "v", "a", "q", "dq", "ddq", "u"))
+    plant = smc.plant(robot)
+    p = type("P", (), dict(plant.parameters))
+    for k in range(len(u)):
+        for i, acceleration in enumerate((a[k], ddq[k])):
+            f, g = plant.nominal(np.array([x[k], q[k]]), np.array([v[k], dq[k]]), i, p)
+            assert f + g * u[k] == pytest.approx(acceleration, abs=1e-6)
+    step = float(table["step"])
+    for place, rate in ((x, v), (q, dq)):
+        error = np.diff(place) - step / 2 * (rate[1:] + rate[:-1]) + step**2 / 12 * np.diff(a if place is x else ddq)
+        assert np.abs(error).max() < 2e-4
+    assert np.abs(u).max() <= 6.0
+    assert [*x[:1], *v[:1], *q[:1], *dq[:1], u[0], u[-1], v[-1], dq[-1]] == pytest.approx([0.0] * 8, abs=1e-8)
+
+
+@ROBOTS
+def test_the_surface_is_one_of_least_quadratic_cost_at_the_top(robot):
+    """At the end the law's linear part is the LQR of Q = diag(1, 1, 0.1, 0.1), R = 1."""
+    from scipy.linalg import solve_continuous_are
+
+    table, plant = entries.read_json(entries.FOLDER / f"{robot}.json"), smc.plant(robot)
+    p, top = type("P", (), dict(plant.parameters)), np.array([0.0, math.pi] if robot == "acrobot" else [math.pi, 0.0])
+    rest, e = np.zeros(2), 1e-6
+    A, b = np.zeros((4, 4)), np.zeros((4, 1))
+    A[:2, 2:] = np.eye(2)
+    for i in range(2):
+        b[2 + i] = plant.nominal(top, rest, i, p)[1]
+        for j in range(2):
+            d = e * np.eye(2)[j]
+            A[2 + i, j] = (plant.nominal(top + d, rest, i, p)[0] - plant.nominal(top - d, rest, i, p)[0]) / (2 * e)
+    row = (b.T @ solve_continuous_are(A, b, np.diag([1.0, 1.0, 0.1, 0.1]), [[1.0]])).ravel()
+    np.testing.assert_allclose([table[key][-1] for key in ("s_x", "s_q", "s_v", "s_dq")], row, rtol=1e-5)
+
+
+def test_an_entry_is_deterministic_and_runs_in_the_reference_loop_alike(traces):
+    short = dataclasses.replace(boards.entry("acrobot"), duration=0.2)
+    from smc_mujoco.simulation import reference
+
+    plain = reference.run(short)
+    np.testing.assert_allclose(plain.x, traces["acrobot"].x[:101], atol=1e-12)
+
+
+def test_an_entry_survives_a_file(tmp_path, traces):
+    again = smc.load(traces["pendubot"].save(tmp_path / "a.npz"))
+    assert again.scenario == traces["pendubot"].scenario
+    np.testing.assert_array_equal(again.x, traces["pendubot"].x)
+    assert boards.criteria(again) == boards.criteria(traces["pendubot"])
+
+
+def test_an_entry_is_exported_to_c():
+    code = smc.law_to_c(entries.acrobot_swing_up)
+    assert "smc_law" in code
+    assert "tanh" in code
+
+
+# errors and the command
+
+
+ALL = boards.Robustness(dict.fromkeys(boards.RobustnessRow._fields[1:-1], (("a", 1.0, True),)))
+
+
+def ruled(**fields):
+    """A run of acrobot by the rules of the boards, as far as its scenario says, with some fields changed."""
+    short = smc.run(boards.entry("acrobot", duration=0.01))
+    return dataclasses.replace(short, scenario=boards.entry("acrobot", **fields))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda: boards.entry("acrobat"), "acrobot"),
+        (lambda: boards.board(smc.run(boards.entry("acrobot", duration=0.01))), "duration of the run is 0.01"),
+        (lambda: boards.board(ruled(x0=3.0)), "x0 of the run"),
+        (lambda: boards.board(ruled(plant=smc.plant("acrobot", m2=0.3))), "m2 of the run is 0.3 and on the boards 0.6"),
+        (lambda: boards.board(ruled(disturbance=smc.Sine(0.5, 1.0))), "disturbance of the run is"),
+        (lambda: boards.board(ruled(), "TVLQR"), "'TVLQR', which a published row has: give another"),
+        (lambda: boards.robustness_board("acrobot", ALL, boards.ROBUSTNESS["acrobot"][0].name), "a published row has"),
+        (lambda: boards.criteria(smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))), "robot"),
+        (lambda: boards.score({"energy": 1.0}), "swing_up_time of board v2 is missing"),
+        (lambda: boards.score(boards.SIMULATION["acrobot"]["v2"][0], "v1"), "max_torque of board v1 is missing"),
+        (lambda: boards.score(boards.SIMULATION["acrobot"]["v2"][0], "v3"), "v1"),
+        (lambda: Machine(smc.Scenario(plant="acrobot", law="none", reference=smc.Sine(1.0, 2.0))), "leave out"),
+    ],
+)
+def test_a_mistake_is_one_sentence(wrong, words):
+    with pytest.raises(smc.ScenarioError, match=words) as raised:
+        wrong()
+    assert "\n" not in str(raised.value)
+
+
+def test_a_law_that_does_not_compile_is_refused():
+    @smc.law_function(plants=("acrobot",))
+    def lists(y, gains, memory):
+        return sum([{"a": y.e}["a"]] * 2), str(y.e)
+
+    with pytest.raises(smc.ScenarioError, match="compile"):
+        Machine(boards.on_board("acrobot", lists()))
+
+
+def test_the_command_shows_ours_among_the_published(capsys, tmp_path):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["board", "acrobot", "--no-robustness", "--figure", str(tmp_path / "a")])
+    assert ended.value.code in (0, None)
+    out = capsys.readouterr().out
+    assert out.index("smc_mujoco") < out.index("History SAC") < out.index("mcpilco")
+    assert (tmp_path / "a.svg").exists()
+
+
+UNWRITABLE = ["acrobot", "--no-robustness", "--figure", f"{__file__}/a"]  # in no folder
+
+
+@pytest.mark.parametrize("arguments", [["acrobat"], ["acrobot", "--film", "a.avi"], UNWRITABLE])
+def test_the_command_refuses_in_one_sentence(arguments, capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["board", *arguments])
+    assert ended.value.code == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1

@@ -1,0 +1,380 @@
+"""The library's laws written out as C: clean, small, and to the last bit what they are in Python."""
+
+import contextlib
+import ctypes
+import math
+import re
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.compiler import needs_compiler
+from helpers.sources import strange
+
+import smc_mujoco as smc
+from smc_mujoco.cli import main as cli
+from smc_mujoco.common.rebuild import rebuild
+from smc_mujoco.exchange.c import build, export, sandbox
+from smc_mujoco.exchange.c.load import CLaw
+from smc_mujoco.control.component import GainWarning
+from smc_mujoco.control.law import Measurement, catalogue, sliding
+from smc_mujoco.control.laws import observer_free_q15 as q15
+from smc_mujoco.simulation import native
+from smc_mujoco.simulation.reference import gains_of
+
+pytestmark = needs_compiler
+
+LAWS = catalogue()
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wmissing-prototypes")
+PLANTS = ("inverted_pendulum", "duffing", "pendulum_network")
+# What scenarios are like: without the model, with it, and with a surface, where the law takes one.
+WAYS = ({}, {"model": "nominal"}, {"model": "nominal", "surface": "linear"})
+FIELDS = ("x", "v", "u", "applied", "s")
+# Laws whose C takes every turn there is: powers, roots, tables, loops, branches, several results, state.
+SINGLE = (
+    "extended_state",
+    "fuzzy_gain",
+    "nested_third_order",
+    "observer_free_table",
+    "observer_free_taylor",
+    "terminal",
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("laws")
+
+
+@pytest.fixture(scope="module")
+def compiled(folder):
+    """Law -> its C in double precision, compiled without a warning and loaded as a user's law."""
+
+    def make(name: str):
+        path = folder / f"{name}.c"
+        path.write_text(smc.law_to_c(name))
+        return smc.law_from_c(path, flags=STRICT, plants=LAWS[name].plants, timeout=60.0)
+
+    with unmeasured(), ThreadPoolExecutor(2) as pool:
+        made = dict(zip(LAWS, pool.map(make, LAWS), strict=True))
+        for template in LAWS.values():
+            native.component(template())  # compiles, while the others do
+    return made
+
+
+@pytest.fixture(scope="module")
+def traces(compiled):
+    """(law, plant, way) -> its trace, and that of its C."""
+    pairs = {}
+    for name, template in LAWS.items():
+        for plant in template.plants or PLANTS:
+            for way, more in enumerate(WAYS):
+                if "surface" in more and (template.relative_degree != 1 or template.plants):
+                    continue
+                pairs[name, plant, way] = [scenario(law, plant, **more) for law in (template(), compiled[name]())]
+    found = iter(smc.run([s for pair in pairs.values() for s in pair]))
+    return {key: (next(found), next(found)) for key in pairs}
+
+
+@contextlib.contextmanager
+def unmeasured():
+    """Files without the size of their code, and loaded untried, which takes a process or two for each."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(export, "_measured", lambda code: "not measured")
+        patch.setattr(sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1]))
+        yield
+
+
+def scenario(law, plant="duffing", **more) -> smc.Scenario:
+    common = {"duration": 0.1, "noise": smc.Noise(0.003, 0.02), "disturbance": smc.Sine(0.5, 7.0), "v0": 0.3}
+    return smc.Scenario(plant=plant, law=law, **common | {"reference": smc.Sine(0.2, 3.0)} | more)
+
+
+def back(folder: Path, law, numbers="double", **more) -> CLaw:
+    """A law's C, compiled without a warning, as a function (y, gains, memory) -> (u, s)."""
+    path = folder / f"{law.name}-{numbers}.c"
+    path.write_text(smc.law_to_c(law, numbers))
+    made = smc.law_from_c(path, flags=(*STRICT, *more.get("flags", ())), timeout=60.0).function
+    assert isinstance(made, CLaw)
+    return made
+
+
+def measured(k: int, rng) -> list[float]:
+    """Some measurement, with model and surface now and then."""
+    e, de = 0.5 * math.cos(0.02 * k) + 0.01 * rng.normal(), 0.05 * rng.normal() - 0.3 * math.sin(0.02 * k)
+    given = [1e-3 * k, 1e-3, e + 0.2, de, e, de, 0.2, 0.0, 0.0, -1.3 * e, 1.7, 0.1 * de, 6.0, float(k % 4 > 1)]
+    return [*given, float(k % 5 == 0), de + e, -de, 0.1 * e, 0.1 * de, 0.3, -0.4]
+
+
+# the same
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_law_written_out_and_read_back_gives_its_own_trace_to_the_last_bit(traces, name):
+    """With glibc, whose pow, exp, tanh and sin the compiled law calls too; another library's may differ by some ulp."""
+    own = {key: pair for key, pair in traces.items() if key[0] == name}
+    assert len(own) >= 2
+    for first, second in own.values():
+        assert first.failure is None
+        assert second.scenario.law.gains == first.scenario.law.gains
+        for field in FIELDS:
+            np.testing.assert_array_equal(getattr(second, field), getattr(first, field))
+
+
+@pytest.mark.parametrize("name", SINGLE)
+def test_in_single_precision_it_is_the_same_python_in_numpy_s_float32(folder, name):
+    law, f = LAWS[name](), np.float32
+    ours, theirs = back(folder, law, "float", flags=["-Wdouble-promotion"]), rebuild(law.function, lambda g: g)
+    read = gains_of(law)
+    gains, memory, rng = type(read)(*map(f, read)), np.zeros(law.memory, f), np.random.default_rng(0)
+    for k in range(200):
+        y = Measurement(*map(f, measured(k, rng)))
+        before = memory.astype(float)
+        (u, s), (wanted_u, wanted_s) = ours(y, gains, before), theirs(y, gains, memory)
+        assert abs(u - wanted_u) <= 2e-6 * (1.0 + abs(u))
+        assert abs(s - wanted_s) <= 2e-6 * (1.0 + abs(s))
+        assert f(u) == u
+        np.testing.assert_allclose(before, memory, rtol=4e-6, atol=4e-6)
+
+
+def test_every_law_in_single_precision_compiles_without_a_double_in_it(folder):
+    paths = [folder / f"{name}-single.c" for name in LAWS]
+    with unmeasured(), ThreadPoolExecutor(2) as pool:
+        for path, text in zip(paths, pool.map(lambda name: smc.law_to_c(name, "float"), LAWS), strict=True):
+            path.write_text(text)
+            assert re.search(r"(?<![\w.])\d+\.\d+(?![\df])", text[text.index("smc_law_modelled =") :]) is None
+    flags = [*STRICT, "-Wdouble-promotion", "-fsyntax-only"]
+    done = subprocess.run([*build.compiler(), *flags, *paths], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert done.returncode == 0
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_fixed_point_is_the_library_s_to_the_last_bit(folder, plant):
+    (folder / "q15.c").write_text(smc.law_to_c(smc.law("observer_free", lam=5.0, k1=1.7), "q15"))
+    mine, theirs = smc.law_from_c(folder / "q15.c", flags=STRICT), smc.law("observer_free_q15", lam=5.0, k1=1.7)
+    for more in WAYS:
+        first, second = smc.run([scenario(law, plant, **more) for law in (mine, theirs)])
+        assert first.failure is None
+        for field in FIELDS:
+            np.testing.assert_array_equal(getattr(first, field), getattr(second, field))
+
+
+def test_fixed_point_s_core_is_whole_numbers_and_right_for_every_word(folder):
+    text = smc.law_to_c("observer_free", "q15")
+    core = text[text.index("static const int16_t TABLE") : text.index("/* From here on")]
+    assert re.search(r"double|float|smc_real|math", core) is None
+    words = {name: int(value) for name, value in re.findall(r"Q15_(\w+) = (-?\d+)", text)}
+    assert words == {"ON_E": 2560, "ON_DE": 2048, "LAM": 24576}  # 2.5 4/8 and 8/8 in 2^-11, 6/8 in 2^-15
+    core = back(folder, smc.law("observer_free"), "q15").library.smc_q15_u
+    core.restype, core.argtypes = ctypes.c_int16, [ctypes.c_int16] * 2
+    assert core(-32768, 24576) == core(-32767, 24576)  # which the sliding variable's function never gives
+    s = np.arange(-32767, 32768)
+    i, part = np.abs(s) >> 7, np.abs(s) & 127
+    T = q15.TABLE[i] + ((np.diff(q15.TABLE, append=0)[i] * part + 64) >> 7)
+    assert [core(int(n), 24576) for n in s] == (-np.sign(s) * ((24576 * T + 2**14) >> 15)).tolist()
+
+
+# users' laws
+
+
+WIDTH, QUARTERS, NOUGHT = 0.5, (1, 2, 3), -0.0
+
+
+@smc.law_function(gains={"k": 2.0, "out": 3.0, "if_": 1.5}, memory=4)
+def turns(z, K, state):
+    """Every turn of Python that there is: */ and /* too."""
+    a, b = z.e, z.de
+    a, b = b, a  # at once
+    count: int = 0
+    double = 0
+    while count < 3:
+        count += 1
+        if count == 2:
+            continue
+        double += QUARTERS[count - 3] * QUARTERS[-1] / 12  # from the end, the first time
+    if abs(a) > WIDTH and not b < 0.0:
+        late = a
+    elif -1.0 < b <= 0.0 or a == 0:
+        late = -((-b) ** 2)
+    else:
+        late = min(a, b, 1) - max(0, a)
+    for i in range(1, 3):
+        state[2] += i * late
+    for i in range(4):
+        state[3] = state[3] - 0.5 if i & 1 == 1 else state[3]
+    for i in range(2, -4, -1):  # from the end below 0, as in those that follow
+        double += QUARTERS[i] * i
+    for i in range(-2, 2):
+        double += QUARTERS[i] * i
+    for i in range(-3, 0, 1):
+        double += QUARTERS[i] * i
+    for i in range(4):
+        double += QUARTERS[i - 3] * QUARTERS[i + -3]
+    i = 1 - count
+    double += QUARTERS[i]
+    s, _ = sliding(z, K.k)
+    state[0], state[1] = state[1], state[0] + s
+    high, low = (0.75, 0.25) if state[0] > state[1] else (a, b)
+    memory = high - (low - (a - b)) / (2.0 / (b * b + 1.0))
+    u = -K.out * math.tanh(s) - -NOUGHT * a - K.if_ * double + late * abs(count) + memory
+    return u, s + state[2] + (1 if a > b else 0.5) + state[3]
+
+
+def test_a_law_with_every_turn_of_python_gives_what_it_gives(folder):
+    law, rng = turns(), np.random.default_rng(1)
+    ours, theirs = back(folder, law), rebuild(law.function, lambda g: g)
+    mine, its, gains = np.zeros(4), np.zeros(4), gains_of(law)
+    for k in range(300):
+        y = Measurement(*measured(k, rng))
+        assert ours(y, gains, mine) == pytest.approx(theirs(y, gains, its), rel=1e-14, abs=1e-14)
+        np.testing.assert_allclose(mine, its, rtol=1e-14, atol=1e-14)
+
+
+y0 = (0.25, 0.5)
+
+
+def erf(a):
+    return 2.0 * a
+
+
+def main(a):
+    return a - 1.0
+
+
+@smc.law_function
+def taken(y, gains, memory):
+    """Names that C has for something else."""
+    bool, nan, linux, isnan = 1.0, y.de, 2.0, erf(y.e)
+    return main(bool) + y0[1] * nan + linux, isnan
+
+
+@pytest.mark.parametrize("dialect", ["-std=c99", "-std=gnu17"])
+def test_names_that_c_has_for_something_else_are_other_names_in_it(folder, dialect):
+    function, y = back(folder, taken(), flags=[dialect]), Measurement(*measured(7, np.random.default_rng(2)))
+    assert function(y, (), np.zeros(1)) == taken.function(y, (), np.zeros(1))
+
+
+def test_a_law_of_one_s_own_runs_alike_in_both(folder):
+    (folder / "turns.c").write_text(smc.law_to_c(turns))
+    first, second = smc.run([scenario(law) for law in (turns, smc.law_from_c(folder / "turns.c"))])
+    np.testing.assert_array_equal(first.u, second.u)
+
+
+REFUSED = {
+    "u = sum((y.e, y.de))": "Tuple",
+    "u = [y.e, y.de][0]": "List",
+    "u = y.e // 2.0": "the operator FloorDiv",
+    "u = 'a'": "the value 'a'",
+    "u = y.e if y.de else np.sign(y.e)": "sign",
+    "memory[int(y.t)] = 1.0; u = 0.0": "memory at an index that is not constant",
+    "memory[-1] = 1.0; u = 0.0": "memory at a negative index",
+    "memory[8] = 1.0; u = 0.0": r"it uses memory\[8\], and its memory has 8 numbers: give memory=9",
+    "u = TABLE[2]": "an index outside -2 to 1",
+    "for u in (y.e, y.de): pass": "a loop over anything but a range",
+    "n = 3; u = 0.0\n    for i in range(n): n += 1": "a loop that changes its own variable or range",
+    "u = 0.0\n    for i in range(3): i += 1": "a loop that changes its own variable or range",
+    "u = 0.0\n    for i in range(int(memory[0])): memory[0] += 1.0": "a loop that changes its own variable or range",
+    "u = again(y.e)": "again, which calls itself,",
+    "u = 2 ** 40 * y.e": "a power of a whole number",
+    "u = 5000000000 * y.e": "beyond 32 bits",
+    "u = nowhere * y.e": "a name without a value",
+    "try:\n        u = y.e\n    finally:\n        pass": "try",
+    "u = (lambda a: a)(y.e)": "a call",
+    "y = 3.0; u = y": "an assignment to this",
+    "u = y.foo": "it reads an unknown measurement 'foo': choose from a, ",
+    "u = gains.k * y.e": "it reads an unknown gain 'k': there are none",
+    "u = halts(y.e)": "halts, which does not end in a return,",
+}
+
+
+@pytest.mark.parametrize(("line", "words"), REFUSED.items())
+def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line, words):
+    text = (
+        "import numpy as np\nimport smc_mujoco as smc\nTABLE = 1.0, 2.0\n"
+        "def halts(a):\n    while a:\n        return a\n"
+        "def again(a):\n    return again(a - 1.0) if a > 0.0 else a\n"
+        f"@smc.law_function\ndef strange(y, gains, memory):\n    {line}\n    return u, 0.0\n"
+    )
+    law = strange(text, tmp_path, monkeypatch)
+    with pytest.raises(smc.ScenarioError, match=f"law 'strange' cannot be written in C: .*({words})") as error:
+        smc.law_to_c(law)
+    assert "\n" not in str(error.value)
+
+
+# what a file says, and the command
+
+
+def test_the_file_says_formula_source_gains_and_sizes(capsys):
+    with pytest.raises(SystemExit) as end:
+        cli.main(["export-c", "super_twisting", "--gains", "k1=5,c=1.5", "--type", "float"])
+    text = capsys.readouterr().out
+    assert not end.value.code
+    head, _, rest = text.partition("*/")
+    assert head.startswith("/* super_twisting: a control law in C99, written out by smc_mujoco ")
+    gains, state = "k1 = 5, k2 = 4.4, c = 1.5, w_max = inf", "4 bytes a channel, memory[1]"
+    for words in ("u = -k1 [s]^(1/2) + w", "A. Levant", gains, state):
+        assert words in head
+    assert re.search(r"code     [1-9]\d\d bytes, and \d+ of constants", head)
+    assert 'const char smc_law_gains[] = "k1=5.0,k2=4.4,c=1.5,w_max=inf";' in rest
+    assert head.count("licence  use without restriction, without warranty\n") == 1
+    assert "malloc" not in rest
+    assert build.HEADER.read_text() in rest
+    assert max(map(len, text.splitlines())) <= 123
+
+
+def test_without_a_compiler_it_is_written_all_the_same(monkeypatch):
+    with_one = smc.law_to_c("twisting")
+    monkeypatch.setenv("CC", "nocc")
+    without = smc.law_to_c("twisting")
+    assert "not measured: there is no compiler here" in without
+    assert without.partition("*/")[2] == with_one.partition("*/")[2]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["twistin"], "unknown law 'twistin': did you mean 'twisting'?"),
+        (["twisting", "--type", "half"], "unknown type of numbers 'half': choose from double, float, q15"),
+        (["twisting", "--type", "q15"], "law 'twisting' has no Q15 form: give observer_free or observer_free_q15"),
+        (["twisting", "--gains", "r3=1"], "unknown gain of twisting 'r3'"),
+        (["twisting", "--gains", "r1=-1"], "twisting's r1 is -1: give a number greater than 0"),
+        (["twisting", "--gains", "r1"], "--gains is 'r1': give names and numbers"),
+        (["none.py"], "no file 'none.py': give a Python file with a law in it"),
+    ],
+)
+def test_a_mistake_in_the_command_is_one_sentence(capsys, words, said):
+    with pytest.raises(SystemExit) as end:
+        cli.main(["export-c", *words])
+    printed = capsys.readouterr()
+    assert (end.value.code, printed.out) == (2, "")
+    assert printed.err.startswith(f"smc-mujoco: {said}")
+    assert len(printed.err.splitlines()) == 1
+
+
+def test_the_command_writes_the_one_law_of_a_file(tmp_path, capsys):
+    one = "@smc.law_function(gains={'k': 2.0})\ndef mine(y, gains, memory):\n    return -gains.k * y.e, y.e\n"
+    (file := tmp_path / "mine.py").write_text(f"import smc_mujoco as smc\n{one}")
+    with pytest.raises(SystemExit) as end:
+        cli.main(["export-c", str(file), "--gains", "k=4"])
+    assert not end.value.code
+    assert 'smc_law_gains[] = "k=4.0";' in capsys.readouterr().out
+    file.write_text(f"{file.read_text()}{one.replace('mine', 'other')}")
+    with pytest.raises(SystemExit):
+        cli.main(["export-c", str(file)])
+    assert f"{file} has several laws, mine, other: give a file with one" in capsys.readouterr().err
+
+
+def test_what_is_no_law_or_is_in_c_already_is_refused(folder):
+    (folder / "none.c").write_text(smc.law_to_c("none"))
+    with pytest.raises(smc.ScenarioError, match=r"law 'none' is in C already: take none\.c"):
+        smc.law_to_c(smc.law_from_c(folder / "none.c"))
+    with pytest.raises(smc.ScenarioError, match="cannot write 3 in C"):
+        smc.law_to_c(3)
+
+
+def test_gains_that_fixed_point_does_not_hold_are_warned_of():
+    with pytest.warns(GainWarning, match="lam < u_range"):
+        smc.law_to_c(smc.law("observer_free", lam=9.0), "q15")

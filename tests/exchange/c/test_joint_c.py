@@ -1,0 +1,381 @@
+"""Laws of many joints in C: written out, they give the compiled law's bits; every mistake is one sentence."""
+
+import math
+import re
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers import arms
+from helpers.compiler import needs_compiler
+from helpers.runs import assert_same
+from helpers.sources import strange
+from numba import njit
+
+import smc_mujoco as smc
+from smc_mujoco.cli import main as cli
+from smc_mujoco.exchange.c import build, export, sandbox
+from smc_mujoco.control.joint_law import JointMeasurement, catalogue, coriolis, norm, product, saturate, solve, torque
+from smc_mujoco.control.units import Gain
+from smc_mujoco.simulation import reference
+from smc_mujoco.simulation.reference import gains_of
+
+pytestmark = needs_compiler
+
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wmissing-prototypes")
+LAWS = catalogue()
+TYPE = "int smc_law(const smc_joint_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
+EACH = np.array([1.0, 0.25, 3.0])
+ORDER = np.array([2, 0, 1])
+
+
+@njit
+def ends(a, part):
+    return np.minimum(a, 0.0) * part, np.maximum(a, 0.0)
+
+
+@njit
+def scaled(a):
+    return a[0] * a
+
+
+@njit
+def inside(a, b):
+    if a[0] > 0.0:
+        return b
+    return a * b
+
+
+@njit
+def neighbours(a, order):
+    w, signs = np.zeros(len(a)), np.array([1, -1, 2])
+    for i in range(len(a)):  # the first reads the last element, as a[-1]
+        w[i] = a[order[i]] - signs[order[i] - 1] * a[i - 1]
+    return w
+
+
+@smc.law_function(joint=True, gains={"k": 20.0, "c": 5.0, "all": Gain(0.5, shared=True)}, memory=3)
+def turns(y, gains, memory):
+    """Every turn of Python with arrays that there is."""
+    n = len(y.x)
+    s, twice = y.de + gains.c * y.e, np.zeros(n)
+    s = s + 0.1 * product(y.M, s)
+    s = s - s[0] * y.e  # reads an element that it changes
+    s = s + 0.01 * neighbours(s, ORDER)
+    square = np.zeros((n, n))
+    square[:, :] = y.M
+    turned = y.e.copy()
+    turned = scaled(product(square, turned))
+    turned = scaled(turned)
+    s = s + 0.01 * turned
+    twice += 2 * s
+    twice[0] = twice[n - 1] ** 2 + s[1]
+    memory[:, 0] += y.dt * saturate(s)
+    memory[:, 1] = memory[:, 0] - memory[:, 1] * 0.5
+    for i in range(n):
+        memory[i, 2] = memory[i, 1] if s[i] > 0.0 else math.tanh(y.a[i] / y.limit[i])
+    table, column = np.ones((2, n)), np.empty((n, n))
+    table[1] = s * EACH
+    column[:, 0] = table[1]
+    for i in range(1, n):
+        column[:, i] = y.M[i] - column[:, i - 1]
+    low, high = ends(column[:, n - 1], gains.all)
+    total = 0.0
+    for one in twice:
+        total += one
+    if norm(y.e) > 0.1 and total < 1e3:
+        u = np.where(s > low, np.sqrt(np.abs(s)) * np.sign(s), np.minimum(s, high)) - s**3 - 0.1 * np.abs(s) ** 0.5
+    else:
+        u = torque(y, -gains.k * s) - coriolis(y, np.array([s[0], 0.5, total / (1.0 + abs(total))]))
+    kept = u.copy()
+    kept[1] -= inside(kept, y.g)[2]
+    u = kept + gains.k * (memory[:, 2] - low) + table[0] * (twice - np.full(n, gains.all)) + solve(y.M, y.h)
+    return 0.01 * u, s
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("joint_laws")
+
+
+@pytest.fixture(scope="module")
+def compiled(folder):
+    """Name -> a law, and what its C for three joints is as a law, compiled without a warning."""
+    laws = {name: template() for name, template in LAWS.items()} | {
+        "with gains by joint": smc.law("passivity_based", K=[1.0, 2.0, 0.5], k=[0.3, 0.0, 0.1]),
+        "turns": turns(k=[10.0, 20.0, 30.0]),
+    }
+
+    def make(name: str):
+        (path := folder / f"{name}.c").write_text(smc.law_to_c(laws[name], joints=3))
+        return smc.law_from_c(path, flags=STRICT, timeout=60.0, name=f"c {name}")
+
+    with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(2) as pool:
+        patch.setattr(export, "_measured", lambda code: "not measured")
+        patch.setattr(sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1]))
+        return {name: (laws[name], made()) for name, made in zip(laws, pool.map(make, laws), strict=True)}
+
+
+def scenario(law, plant=None, **fields) -> smc.Scenario:
+    common = {"duration": 0.1, "reference": smc.Sine(0.2, 5.0), "noise": smc.Noise(1e-3, 1e-2), "u_max": 50.0}
+    return smc.Scenario(plant=plant or arms.arm(), law=law, **common | fields)
+
+
+WAYS = {
+    "arm": {"x0": (0.1, -0.3, 0.2), "model": "nominal"},
+    "arm without model": {"model": "none", "velocity": "levant", "v0": (0.1, 0.2, -0.3)},
+    "volts": {
+        "plant": smc.plant("inverted_pendulum_network", n=3),
+        "actuator": smc.DCMotor(command="voltage", gear=50.0, voltage=1e3),
+        "model": "nominal",
+    },
+}
+
+
+def ways_of(law):
+    """The scenarios that suit a law: not all laws can do without the model, and one needs a tip."""
+    for way, fields in WAYS.items():
+        if (law.requires_model and fields.get("model") == "none") or (law.name == "hybrid_sliding" and way != "arm"):
+            continue
+        yield fields
+
+
+@pytest.fixture(scope="module")
+def traces(compiled):
+    """Name -> pairs of traces, of the law and of its C."""
+    pairs = {
+        name: [(scenario(law, **f), scenario(c, **f)) for f in ways_of(law)] for name, (law, c) in compiled.items()
+    }
+    found = iter(smc.run([s for each in pairs.values() for pair in each for s in pair]))
+    return {name: [(next(found), next(found)) for _ in each] for name, each in pairs.items()}
+
+
+@pytest.mark.parametrize("name", [*LAWS, "with gains by joint", "turns"])
+def test_a_law_written_out_and_read_back_gives_its_own_trace_to_the_last_bit(traces, name):
+    assert traces[name]
+    for ours, theirs in traces[name]:
+        assert ours.failure is theirs.failure is None
+        for field in ("x", "v", "u", "s"):
+            np.testing.assert_array_equal(getattr(theirs, field), getattr(ours, field))
+        assert len(np.unique(ours.u, axis=0)) > 50
+
+
+def test_gains_by_joint_and_shared_ones_are_read_back(compiled):
+    law, c = compiled["with gains by joint"]
+    assert dict(c.gains) == dict(law.gains)
+    assert compiled["turns"][1].shared == ("all",)
+    assert compiled["unit_vector"][1].shared == ("rho", "eps")
+    assert compiled["turns"][1].joint
+    with pytest.raises(smc.ScenarioError, match=r"all is \(1, 2, 3\): give one number for all channels"):
+        compiled["turns"][1].template(all=[1, 2, 3])
+
+
+@pytest.mark.parametrize("name", ["turns", "hybrid_sliding", "time_delay_sliding"])
+def test_the_reference_loop_calls_it_alike(compiled, name):
+    """Also what the law asks of MuJoCo: Coriolis forces and the Jacobian."""
+    fields = next(ways_of(compiled[name][1])) | {"duration": 0.02}
+    trace = smc.run(scenario(compiled[name][1], **fields))
+    assert trace.failure is None
+    assert_same(trace, reference.run(trace.scenario))
+
+
+@pytest.mark.parametrize("name", ["passivity_based", "super_twisting_computed_torque", "time_delay_sliding"])
+def test_in_single_precision_each_call_is_that_of_double_within_its_rounding(folder, name):
+    (path := folder / f"{name}-single.c").write_text(smc.law_to_c(name, "float", joints=3))
+    flags = (*STRICT, "-Wdouble-promotion")
+    single, law = smc.law_from_c(path, flags=flags, timeout=60.0).function, LAWS[name]()
+    rng, memory = np.random.default_rng(3), np.zeros((3, law.memory))
+    theirs = reference.PythonComponent(law, 3)
+    for k in range(20):
+        vectors = rng.normal(size=(9, 3)).astype(np.float32).astype(float)
+        M, h, g = np.eye(3) + 0.1, rng.normal(size=3), rng.normal(size=3)
+        y = JointMeasurement(1e-3 * k, 1e-3, 1.0, Nothing(), *vectors, M, h, g)
+        theirs.memory[:] = memory[:, : law.memory]
+        expected, found = theirs.together(y), single(y, gains_of(law, 3), memory)
+        for ours, wanted in zip(found, expected, strict=True):
+            scale = 1.0 / y.dt if name == "time_delay_sliding" else 1.0  # it divides a difference of velocities by dt
+            np.testing.assert_allclose(ours, wanted, atol=1e-5 * scale * (1.0 + np.abs(wanted).max()), rtol=0)
+
+
+@smc.law_function(joint=True)
+def edges(y, gains, memory):
+    """What numpy's functions make of zeros and NaN."""
+    low, high, sign = np.minimum(y.x, y.v), np.maximum(y.x, y.v), np.sign(y.x)
+    return np.array([low[0], high[1], sign[2]]), np.where(y.x > y.v, low, high)
+
+
+@pytest.mark.parametrize(
+    "x", [(0.0, -0.0, 0.0), (-0.0, 0.0, -0.0), (math.nan, 1.0, math.nan), (1.0, math.nan, -math.inf)]
+)
+def test_zeros_and_nan_are_those_of_the_compiled_python(folder, x):
+    (path := folder / "edges.c").write_text(smc.law_to_c(edges, joints=3))
+    c, zero = smc.law_from_c(path, flags=STRICT).function, np.zeros(3)
+    for v in ((0.0, 0.0, 0.0), (-0.0, -0.0, 1.0), (2.0, math.nan, math.nan)):
+        x_, v_ = np.array(x), np.array(v)
+        y = JointMeasurement(0.0, 1e-3, 0.0, Nothing(), x_, v_, *[zero] * 7, np.eye(3), zero, zero)
+        numbers = extremes(x_, v_)
+        found, _ = c(y, (), np.zeros((3, 8)))
+        np.testing.assert_array_equal(found, numbers)
+        np.testing.assert_array_equal(np.signbit(found[:2]), np.signbit(numbers[:2]))
+
+
+@njit
+def extremes(x, v):
+    return np.array([np.minimum(x, v)[0], np.maximum(x, v)[1], np.sign(x)[2]])
+
+
+class Nothing:
+    """A plant without Coriolis forces."""
+
+    def coriolis(self, w):
+        return 0.0 * w
+
+
+def test_a_trial_in_a_process_of_its_own_finds_nothing_wrong(folder, capsys):
+    (path := folder / "tried.c").write_text(smc.law_to_c("passivity_based", joints=2))
+    with pytest.raises(SystemExit) as end:
+        cli.main(["check-c", str(path)])
+    assert not end.value.code
+    said = "tried.c: smc_law passes; 2 joints; gains K = 1, k = 1, c = 5, width = 0.1; memory 1"
+    assert capsys.readouterr().out.splitlines()[-1] == said
+
+
+def own(body: str, joints: str = "#define SMC_JOINTS 2", head: str = TYPE) -> str:
+    """A C file with a law of this body for two joints."""
+    quiet = "int i;\n    (void)y; (void)gains; (void)memory;\n    for (i = 0; i < 4; i++) out[i] = 0.0;\n"
+    return f'{joints}\n#include "smc_joint_law.h"\n{head}\n{{\n    {quiet}    {body}\n    return 0;\n}}\n'
+
+
+MISTAKES = {
+    "no number": (own("", joints=""), "mine.c does not compile: define SMC_JOINTS, the number of joints, before"),
+    "type": (own("", head=TYPE.replace("_joint_", "_other_")), "does not compile: line 3"),
+    "header": (own("").replace("smc_law(", "smc_other("), f"has no function smc_law: define {TYPE}"),
+    "less": (own("", head=TYPE.replace(", smc_real *out", "").replace("{", "{ smc_real out[4];")), f"must be {TYPE}"),
+    "memory": (own("memory[16] = 1.0;"), "smc_law writes beyond the 8 numbers of its memory"),
+    "out": (own("out[4] = 1.0;"), "smc_law writes beyond the numbers of out"),
+    "nan": (own("out[1] = gains[0] / memory[0];"), "smc_law returned u = inf, s = 0.0 of joint 1 at t = 0"),
+    "gains": (
+        own("", joints='#define SMC_JOINTS 2\nconst char smc_law_gains[] = "k=1 2 3";'),
+        "gain k of mine.c is (1, 2, 3): give it one number, or 2",
+    ),
+    "one joint": (own("", joints="#define SMC_JOINTS 1"), "does not compile: define SMC_JOINTS as a number from 2"),
+    "shared": (
+        own("", joints='#define SMC_JOINTS 2\nconst char smc_law_gains[] = "k=1 2", smc_law_shared[] = "k";'),
+        "shared gain k of mine.c is (1, 2): give it one number",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_a_mistake_in_the_file_is_one_sentence(tmp_path, case):
+    text, said = MISTAKES[case]
+    (path := tmp_path / "mine.c").write_text(text)
+    gains = {"k": 1.0} if case == "nan" else None
+    with pytest.raises(smc.ScenarioError, match=re.escape(said)) as error:
+        smc.law_from_c(path, isolate=case in ("memory", "out", "nan"), gains=gains)
+    assert "\n" not in str(error.value)
+
+
+def test_a_mistake_in_the_scenario_is_one_sentence(compiled, tmp_path):
+    with pytest.raises(smc.ScenarioError, match="is C code for 3 joints, and panda has 7: write it for 7") as error:
+        smc.Scenario(plant="panda", law=compiled["unit_vector"][1])
+    assert "\n" not in str(error.value)
+    three = smc.plant("inverted_pendulum_network", n=3)
+    trace = smc.run(scenario(compiled["hybrid_sliding"][1], plant=three, duration=0.01))
+    assert "asks for the Jacobian of a tip, and there is none" in str(trace.failure)
+    (path := tmp_path / "mine.c").write_text(smc.law_to_c("unit_vector", joints=2))
+    library = tmp_path / "mine.so"
+    subprocess.run([*build.compiler(), *build.FLAGS, str(path), "-o", str(library), "-lm"], check=True)
+    with pytest.raises(smc.ScenarioError, match=r"mine\.so is a library with a law of many joints: give its \.c file"):
+        smc.law_from_c(library)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["unit_vector"], "law 'unit_vector' is of many joints: give their number, such as --joints 7"),
+        (["unit_vector", "--gains", "c=1 2", "--joints", "3"], "gain c of unit_vector has 2 values, (1, 2), for 3 j"),
+        (["unit_vector", "--joints", "1"], "joints is 1: give a whole number from 2 to 100"),
+        (["unit_vector", "--joints", "2", "--type", "q15"], "law 'unit_vector' has no Q15 form"),
+        (["pid", "--joints", "3"], "law 'pid' is of one channel: leave --joints 3 out"),
+        (["unit_vector", "--gains", "c=1 a"], "--gains is 'c=1 a': give names and numbers"),
+    ],
+)
+def test_a_mistake_in_the_command_is_one_sentence(capsys, words, said):
+    with pytest.raises(SystemExit) as end:
+        cli.main(["export-c", *words])
+    printed = capsys.readouterr()
+    assert (end.value.code, printed.out) == (2, "")
+    assert printed.err.startswith(f"smc-mujoco: {said}")
+    assert len(printed.err.splitlines()) == 1
+
+
+REFUSED = {
+    "u = memory[:, 0]\n    memory[:, 0] = s": "an array, which shares its numbers with another name: write .copy()",
+    "u = torque(y, s)\n    s[0] = 0.0": "an array, which shares its numbers with another name",
+    "u = s\n    u += 1.0": "an array, which shares its numbers with another name",
+    "u = y.M[0]; u[1] = 0.0": "an array, which shares its numbers",
+    "y.x[0] = 1.0; u = s": "an assignment to this, which is no array of the function's own,",
+    "u = y.M @ s": "the operator @",
+    "u = s * np.sum(s)": "sum, which is not a Python function,",
+    "u = y.M * s": "arrays of different shapes in one expression",
+    "u = s[1:]": "a part of an array",
+    "u = memory[0] * s": "a part of an array",
+    "u = s * s[3]": "an index outside 0 to 2",
+    "u = s * memory[0, int(y.t)]": "memory at an index that is not constant",
+    "u = s * memory[:, 8]": "it uses memory[:, 8], and its memory has 8 numbers: give memory=9",
+    "u = np.zeros(int(y.t))": "a length that is not known before the law runs",
+    "u = 0.0": "a result other than two vectors, u and s,",
+    "u = s if norm(s + 1.0) > 0.0 else y.x": "an array that is computed within a condition",
+    "u = y.dynamics * s": "it reads an unknown measurement 'dynamics'",
+    "u = s\n    if y.t > 1.0: u = 0.0": "a name for a number and an array",
+    "s, u = y.x, s": "arrays that change places at once",
+    "u = math.tanh(s)": "tanh of an array",
+    "u = part(s)\n    s[0] = 0.0": "an array, which shares its numbers with another name",
+    "u = part(y.x)\n    u[0] = 0.0": "an array, which shares its numbers with another name",
+    "u = joint_law.torque(y, s)\n    s[0] = 0.0": "an array, which shares its numbers with another name",
+    "u = position(y)\n    u[0] = 0.0": "an array, which shares its numbers with another name",
+    "u = moved(s)": "an assignment to an argument that is an array",
+    "u = np.array([1, 0, 0])\n    u[0] = s[0]": "a real number for an element of an array of whole numbers",
+    "u = np.full(3, 0)\n    u[:] = s": "real numbers for elements of an array of whole numbers",
+    "n = len(s)\n    n += 1\n    u = s * norm(np.zeros(n))": "a length that is not known before the law runs",
+}
+
+
+@pytest.mark.parametrize(("line", "words"), REFUSED.items())
+def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line, words):
+    text = (
+        "import math\nimport numpy as np\nimport smc_mujoco as smc\n"
+        "from smc_mujoco.control import joint_law\n"
+        "from smc_mujoco.control.joint_law import norm, torque\n"
+        "def part(a):\n    b = a if a[0] > 0.0 else -a\n    return b\n"
+        "def position(y):\n    return y.x\n"
+        "def moved(a):\n    a = a + 1.0\n    return a\n"
+        "@smc.law_function(joint=True)\n"
+        f"def strange(y, gains, memory):\n    s = y.de + y.e\n    {line}\n    return u, s\n"
+    )
+    law = strange(text, tmp_path, monkeypatch)
+    with pytest.raises(smc.ScenarioError, match="law 'strange' cannot be written in C: ") as error:
+        smc.law_to_c(law, joints=3)
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_the_file_says_how_many_joints_it_is_for_and_what_it_reads():
+    text = smc.law_to_c(smc.law("hybrid_sliding", c=[1.0, 2.0, 3.0]))
+    head, _, rest = text.partition("*/")
+    assert head.startswith("/* hybrid_sliding: a control law of 3 joints in C99, written out by smc_mujoco ")
+    for words in ("c = (1, 2, 3)", "3 numbers each", "reads    jacobian, M, de, e, ddr, v, h\n", "0 bytes a joint"):
+        assert words in head
+    assert "#define SMC_JOINTS 3\n" in rest
+    assert "c=1.0 2.0 3.0," in rest
+    assert build.JOINT_HEADER.read_text() in rest
+    assert max(map(len, text.splitlines())) <= 123
+
+
+def test_the_page_has_the_whole_header():
+    page = (Path(smc.__file__).parents[1] / "docs" / "c.md").read_text()
+    text = build.JOINT_HEADER.read_text()
+    assert text[text.index("/* Inputs of a law") : text.index("#endif", text.index("smc_setup"))].strip() in page

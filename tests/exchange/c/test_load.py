@@ -1,0 +1,690 @@
+"""Users' laws in C: the same traces as the library's, and for every mistake one sentence, not a dead process."""
+
+import copy
+import os
+import pickle
+import platform
+import re
+import stat
+import subprocess
+import sys
+import time
+import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.compiler import needs_compiler
+
+import smc_mujoco as smc
+from smc_mujoco.cli import main
+from smc_mujoco.exchange.c import build
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.simulation import reference
+from smc_mujoco.studies import run_key
+
+pytestmark = needs_compiler
+
+DOCS = Path(smc.__file__).parents[1] / "docs" / "c.md"
+MINE, HEADER = re.findall(r"^```c\n(.*?)^```$", DOCS.read_text(), re.MULTILINE | re.DOTALL)
+CALLED = "has another smc_law than smc_mujoco calls: it must be"
+TYPE = "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
+FIELDS = ("x", "v", "u", "applied", "s")
+
+
+def law(body: str, more: str = "") -> str:
+    """A C file with a law of this body."""
+    quiet = "(void)y; (void)gains; (void)memory;"
+    return f'#include "smc_law.h"\n{more}\n{TYPE}\n{{\n    {quiet}\n    out[1] = y->e;\n    {body}\n    return 0;\n}}\n'
+
+
+FALLS = law("out[0] = -y->e;", "int smc_setup(void) { return *(volatile int *)16; }")
+WAITS = law("out[0] = -y->e;", "#include <unistd.h>\nint smc_setup(void) { for (;;) pause(); return 0; }")
+# state that is neither in memory nor in static data
+KEPT = """#include <fenv.h>
+#include <signal.h>
+#include <stdlib.h>
+static double *hidden;
+int smc_setup(void) { hidden = calloc(1, sizeof *hidden); return hidden == 0; }"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    """Write a C file, and give its path."""
+
+    def written(text: str, name: str = "my_law.c") -> Path:
+        (tmp_path / name).write_text(text)
+        return tmp_path / name
+
+    return written
+
+
+@pytest.fixture
+def call(capsys):
+    """Run the command line in this process: (exit code, stdout, stderr)."""
+
+    def called(*words: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as end:
+            main.main([str(word) for word in words])
+        printed = capsys.readouterr()
+        return int(end.value.code or 0), printed.out, printed.err
+
+    return called
+
+
+def scenario(law: object, plant: str = "duffing", **more: object) -> smc.Scenario:
+    common = {"duration": 0.3, "noise": smc.Noise(0.01, 0.05), "disturbance": smc.Sine(0.5, 7.0)}
+    return smc.Scenario(plant=plant, law=law, **common | more)
+
+
+def python(code: str) -> str:
+    """What another process prints."""
+    variables = os.environ | {"PYTHONPATH": str(Path(smc.__file__).parents[1])}
+    return subprocess.run(
+        [sys.executable, "-c", code], env=variables, capture_output=True, text=True, check=True
+    ).stdout
+
+
+def same(one: smc.Trace, other: smc.Trace) -> bool:
+    return all(np.array_equal(getattr(one, f), getattr(other, f)) for f in FIELDS)
+
+
+# the same traces
+
+
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing", "pendulum_network"])
+def test_a_law_in_c_gives_the_bits_of_the_library_s_and_of_the_plain_loop(file, plant):
+    mine = smc.law_from_c(file(MINE))
+    fast, theirs = smc.run([scenario(law, plant) for law in (mine(lam=5.0), smc.law("observer_free", lam=5.0))])
+    assert fast.failure is None
+    assert same(fast, theirs)
+    assert same(fast, reference.run(fast.scenario))
+
+
+def test_it_runs_in_the_callback_without_a_word_and_on_threads_alike(file):
+    mine = smc.law_from_c(file(MINE))
+    sweep = [scenario(mine(lam=lam), seed=seed, duration=0.1) for lam in (2.0, 6.0) for seed in range(4)]
+    one, two = smc.run(sweep, threads=1), smc.run(sweep, threads=2)  # a PlainLoopWarning would be an error
+    assert all(same(a, b) for a, b in zip(one, two, strict=True))
+
+
+def test_memory_is_the_channel_s_own_and_zero_at_the_start(file):
+    counts = law("memory[1] += 1.0; out[0] = 0.0; out[1] = memory[1] + 1000.0 * gains[0];")
+    mine = smc.law_from_c(file(counts), gains={"k": 2.0}, memory=2, isolate=True)
+    trace = smc.run(scenario(mine(), "pendulum_network", duration=0.01))
+    assert trace.s.tolist() == [[2001.0 + k] * trace.s.shape[1] for k in range(11)]
+
+
+def test_every_number_of_the_measurement_is_where_the_header_says(file):
+    total = " + ".join(f"{i}.0 * y->{name}" for i, name in enumerate(Measurement._fields) if name != "limit")
+
+    @smc.law_function
+    def summed(y, gains, memory):
+        return (
+            0.0 * y.t + 1.0 * y.dt + 2.0 * y.x + 3.0 * y.v + 4.0 * y.e + 5.0 * y.de + 6.0 * y.r + 7.0 * y.dr
+            + 8.0 * y.ddr + 9.0 * y.f + 10.0 * y.g + 11.0 * y.a + 13.0 * y.model + 14.0 * y.has_surface + 15.0 * y.s
+            + 16.0 * y.v_eq + 17.0 * y.q + 18.0 * y.dq + 19.0 * y.fq + 20.0 * y.gq
+        ), y.limit  # fmt: skip
+
+    more = {"model": "nominal", "surface": "linear", "reference": smc.Sine(0.1, 3.0), "u_max": 1e9}
+    mine = smc.law_from_c(file(law(f"out[0] = {total}; out[1] = y->limit;")), plants=("cart_pole",))
+    theirs = smc.law_function(plants=("cart_pole",))(summed.function)
+    assert same(*smc.run([scenario(law, "cart_pole", **more, duration=0.05) for law in (mine, theirs)]))
+
+
+def test_fields_of_the_measurement_keep_their_old_names(file):
+    with pytest.warns(DeprecationWarning, match="my_law.c reads y->(eq|surfaced), which is now y->(v_eq|has_surface)"):
+        former = smc.law_from_c(file(law("out[0] = y->eq - 2.0 * y->surfaced;")), name="former")
+    present = smc.law_from_c(file(law("out[0] = y->v_eq - 2.0 * y->has_surface;")), name="present")
+    before, now = smc.run([scenario(one, surface="linear", duration=0.02) for one in (former, present)])
+    assert same(before, now)
+    assert now.u.max() < 0.0
+
+
+def test_single_precision_is_single_within_and_double_without(file):
+    single = smc.law_from_c(file("#define SMC_REAL float\n" + MINE.replace("tanh", "tanhf")), isolate=True)
+    fast, exact = smc.run([scenario(law, duration=1.0) for law in (single, smc.law("observer_free"))])
+    assert np.array_equal(fast.s, fast.s.astype(np.float32))
+    assert 0.0 < np.abs(fast.x - exact.x).max() < 1e-6
+    assert same(fast, reference.run(fast.scenario))
+
+
+def test_state_in_single_precision_is_kept(file):
+    mine = smc.law_from_c(
+        file("#define SMC_REAL float\n" + law("memory[0] += 0.1f; out[0] = 0.0f; out[1] = memory[0];"))
+    )
+    expected = np.cumsum(np.full(31, 0.1, np.float32), dtype=np.float32)
+    assert np.array_equal(smc.run(scenario(mine, duration=0.03)).s[:, 0], expected)
+
+
+# libraries, other files, other processes
+
+
+def test_a_shared_library_is_taken_as_it_is_and_again_after_a_new_build(file, tmp_path):
+    target = tmp_path / "my_law.so"
+    traces = []
+    for gain in (1.0, 2.0):
+        source = file(law(f"out[0] = -{gain} * gains[0] * y->e;").replace("smc_law(", "firmware_step("), "built.c")
+        line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-o", str(target)]
+        subprocess.run(line, check=True)
+        mine = smc.law_from_c(target, symbol="firmware_step", gains={"k": 0.5}, isolate=True)
+        traces.append(smc.run(scenario(mine, noise=None)))
+        assert same(traces[-1], reference.run(traces[-1].scenario))
+    assert traces[1].u[0, 0] == pytest.approx(2.0 * traces[0].u[0, 0], rel=1e-12)
+
+
+def test_two_laws_of_one_library_are_two(file, tmp_path):
+    target, text = tmp_path / "laws.so", law("out[0] = -y->e;")
+    second = text.partition("int ")[2].replace("smc_law(", "other(").replace("-y->e", "-2 * y->e")
+    source = file(text + "int " + second)
+    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-o", str(target)]
+    subprocess.run(line, check=True)
+    one, other = (scenario(smc.law_from_c(target, symbol=name, name="mine")()) for name in ("smc_law", "other"))
+    assert one != other
+    assert run_key.key(one) != run_key.key(other)
+    assert repr(other.law.function) == "<C function other of laws.so>"
+
+
+def test_a_scenario_is_its_copies_equal_and_no_other_law_s(file):
+    path = file(MINE)
+    first = scenario(smc.law_from_c(path)(lam=4.0))
+    copies = [pickle.loads(pickle.dumps(first)), copy.deepcopy(first), scenario(smc.law_from_c(path)(lam=4.0))]
+    assert all(each == first and hash(each.law.function) == hash(first.law.function) for each in copies)
+    wider, renamed = smc.law_from_c(path, memory=20), smc.law_from_c(path, name="other")
+    edited = smc.law_from_c(file(MINE.replace("out[1] = s", "out[1] = 0.5 + s")))
+    functions = {each.function for each in (first.law, wider(), renamed(), edited())}
+    assert len(functions) == 4
+
+
+def test_a_library_s_int_is_read_as_an_int(file, tmp_path):
+    """The rest of the register holds what it likes."""
+    target = tmp_path / "my_law.so"
+    text = "long long smc_law(const double *y, const double *gains, double *memory, double *out)\n"
+    text += "{ (void)memory; out[0] = out[1] = -y[4]; return (long long)gains[0] << 32; }"  # the int in it is 0
+    source = file(text)
+    line = [*build.compiler(), "-O2", "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-o", str(target)]
+    subprocess.run(line, check=True)
+    assert smc.run(scenario(smc.law_from_c(target, gains={"k": 3.0}))).failure is None
+
+
+def test_other_files_and_flags_come_along(file, tmp_path):
+    other = file("double twice(double a) { return 2.0 * a; }", "filter.c")
+    mine = file(law("out[0] = -K * twice(y->e);", "double twice(double a);"))
+    trace = smc.run(scenario(smc.law_from_c(mine, flags=["-DK=1.5", str(other)]), noise=None))
+    assert trace.u[0, 0] == -3.0 * trace.x[0, 0]
+
+
+def test_set_up_is_called_before_the_first_run(file):
+    text = law("out[0] = table[3];", "static double table[4];\nint smc_setup(void) { table[3] = 0.25; return 0; }")
+    assert (smc.run(scenario(smc.law_from_c(file(text)))).u == 0.25).all()
+
+
+def test_a_trace_keeps_name_and_gains_but_not_the_code(file, tmp_path):
+    mine = smc.law_from_c(file(MINE), name="squash")
+    trace = smc.load(smc.run(scenario(mine(lam=4.0))).save(tmp_path / "a.npz"))
+    assert str(trace.scenario.law) == "squash(lam=4, k1=2.5)"
+    with pytest.raises(smc.ScenarioError, match="law 'squash' came from a file without its code"):
+        smc.run(trace.scenario)
+
+
+def test_another_process_runs_what_was_loaded_here_whatever_the_file_holds_by_then(file, tmp_path):
+    text = 'const char smc_law_gains[] = "k=2";'
+    first = scenario(smc.law_from_c(file(law("out[0] = table * gains[0] * y->e;", f"static double table;\n{text}\n"
+        "int smc_setup(void) { table = -1.0; return 0; }")), name="mine")(k=4.0), noise=None)  # fmt: skip
+    kept, trace = pickle.dumps([first, first]), smc.run(first)
+    file(law("out[0] = y->e;"))
+    one, two = pickle.loads(kept)
+    assert str(one.law) == "mine(k=4)"
+    assert one.law.function is two.law.function is pickle.loads(kept)[0].law.function  # loaded once
+    assert same(smc.run(one), trace)
+    assert same(reference.run(one), trace)
+    Path(tmp_path / "my_law.c").unlink()
+    code = f"import pickle, smc_mujoco as smc; print(smc.run(pickle.loads({pickle.dumps(first)!r})).u[:, 0].tolist())"
+    assert eval(python(code)) == trace.u[:, 0].tolist()
+
+
+def test_a_law_of_floats_is_as_large_in_another_process(file):
+    text = "#define SMC_REAL float\n" + law("memory[99] += gains[0]; out[0] = 0.0f; out[1] = memory[99];")
+    first = scenario(smc.law_from_c(file(text), gains={"k": 2.0}, memory=100), duration=0.01)
+    trace = smc.run(pickle.loads(pickle.dumps(first)))
+    assert trace.s[:, 0].tolist() == [2.0 * k for k in range(1, 12)]
+
+
+def test_code_of_another_machine_is_one_sentence(file):
+    mine = smc.law_from_c(file(MINE)).function
+    remade, arguments = mine.__reduce__()
+    with pytest.raises(smc.ScenarioError, match=r"my_law\.c cannot be loaded \(my_law\.c: file too short\): run it on"):
+        remade(*arguments[:2], b"\x7fELF", *arguments[3:])
+
+
+def test_what_a_study_knows_of_it_is_its_code(file, tmp_path):
+    def key(gain: float, name: str = "my_law.c", **more: object) -> str:
+        return run_key.key(scenario(smc.law_from_c(file(law(f"out[0] = -{gain} * y->e;"), name), **more)()))
+
+    first = key(1.0)
+    assert key(2.0) != first
+    assert key(1.0) == first
+    assert key(1.0, timeout=20.0) == first
+    assert key(1.0, flags=["-O0"]) != first
+    (tmp_path / "elsewhere").mkdir()
+    assert key(1.0, "elsewhere/my_law.c") == first
+    again = pickle.loads(pickle.dumps(scenario(smc.law_from_c(file(law("out[0] = -1.0 * y->e;")))())))
+    assert run_key.key(again) == first
+
+
+def test_a_study_runs_it_and_after_an_edit_runs_it_again(file, tmp_path):
+    def table(gain: float):
+        mine = smc.law_from_c(file(law(f"out[0] = -{gain} * y->e;")))
+        return smc.study(smc.grid(["duffing"], [mine()], ["nominal"], seeds=1, duration=0.05), tmp_path / "study")
+
+    first, second, third = (table(gain).column("max_u").tolist() for gain in (1.0, 2.0, 1.0))
+    assert first == third
+    assert second[0] == pytest.approx(2.0 * first[0], rel=0.01)
+
+
+def test_its_functions_and_data_are_its_own_whatever_else_has_their_names(file):
+    """y0 and remove are functions of C's, timezone a number: a linker may take those without a word."""
+    more = "double y0(double a) { return -a; }\ndouble remove(double a) { return y0(2.0 * a); }\ndouble timezone = 0.5;"
+    trace = smc.run(scenario(smc.law_from_c(file(law("out[0] = timezone * remove(y->e);", more))), noise=None))
+    assert trace.u[0, 0] == -trace.x[0, 0]
+
+
+# mistakes
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (law("out[0] = y->e return;"), "my_law.c does not compile: line 7, expected ';' before 'return'"),
+        (law("out[0] = y->position;"), "has no member named 'position'"),
+        ('#include "nowhere.h"\n' + MINE, "does not compile: line 1, nowhere.h: No such file"),
+        ("int smc_law(double e, double de) { return e + de; }", f"{CALLED} {TYPE}"),
+        (MINE.replace("int smc_law(", "double smc_law("), f"{CALLED} {TYPE}"),
+        (HEADER.replace("smc_real gq;", ""), "has another smc_law than smc_mujoco calls"),
+        ("int my_law(void) { return 0; }", f"has no function smc_law: define {TYPE}"),
+        (law("out[0] = other(y->e);", "double other(double);"), "cannot be loaded (my_law.c: undefined symbol: other)"),
+        (law("out[0] = other(y->e);", "double other(double);\n/* -Wl,-z,defs */"), "undefined reference to `other'"),
+        (law("out[0] = other(y->e);"), "implicit declaration of function 'other'"),
+        (MINE.replace("k1=2.5", "k1"), "my_law.c's smc_law_gains is 'lam=6,k1': give names and numbers"),
+        (MINE.replace("k1=2.5", "k1=nan"), "smc_law_gains is 'lam=6,k1=nan', and k1 is nan: give it a number"),
+        (MINE.replace("k1=2.5", "lam=2"), "my_law.c's smc_law_gains is 'lam=6,lam=2': give lam once"),
+        (MINE + "const int smc_law_degree = 5;", "degree is 5: give a whole number from 1 to 3"),
+        (law("", "int smc_setup(void) { return 3; }"), "my_law.c: smc_setup returned 3"),
+        (law("", "#include <stdlib.h>\nint smc_setup(void) { exit(7); }"), "ended the process with exit code 7"),
+        (FALLS, "my_law.c: smc_setup died of SIGSEGV (Segmentation fault)"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_loaded_is_one_sentence(file, text, words):
+    flags = re.findall(r"/\* (-Wl\S+) \*/", text)
+    with pytest.raises(smc.ScenarioError, match=re.escape(words)) as error:
+        smc.law_from_c(file(text), flags=flags)
+    assert "\n" not in str(error.value)
+
+
+def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
+    told = tmp_path / "pid"
+    write = f'FILE *f = fopen("{told}", "w"); fprintf(f, "%d", (int)getpid()); fclose(f);'
+    headers = "#include <stdio.h>\n#include <unistd.h>\n"
+    waits = law("out[0] = 0.0;", f"{headers}int smc_setup(void) {{ {write} for (;;) pause(); }}")
+    starts = law("", f"{headers}__attribute__((constructor)) static void start(void) {{ for (;;) pause(); }}")
+    with ThreadPoolExecutor(2) as pool:  # each waits for its time limit
+        files = file(waits, "waits.c"), file(starts, "starts.c")
+        tries = [pool.submit(smc.law_from_c, path, timeout=3.0) for path in files]
+        for tried, words in zip(tries, ("smc_setup did not end within 3 s", "loading did not end"), strict=True):
+            with pytest.raises(smc.ScenarioError, match=words):
+                tried.result()
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(told.read_text()), 0)
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("out[0] = *(volatile int *)(y->t > 0.1 ? 16 : (long)&gains[0]);", "smc_law died of SIGSEGV (Seg"),
+        ("if (y->e > 100.0) __builtin_trap(); out[0] = 0;", "smc_law died of SIG"),
+        ("volatile int on = 1; while (on) { } out[0] = 0;", "smc_law did not end within 3 s"),
+        ("out[0] = y->e / (y->t - y->t);", "smc_law returned u = inf, s = 1.00"),
+        ("out[0] = 0.0; return 4;", "smc_law returned 4 at t = 0, e = 1"),
+        ("memory[8] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
+        ("memory[9] = 1.0f; out[0] = 0.0f; /* of floats */", "smc_law writes beyond the 8 numbers of its memory"),
+        ("memory[-1] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
+        ("memory[100] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
+        ("memory[-1] = 1.0f; out[0] = 0.0f; /* of floats */", "smc_law writes beyond the 8 numbers of its memory"),
+        ("out[2] = y->e; out[0] = 0.0;", "smc_law writes beyond the numbers of out"),
+        ("out[-1] = y->e; out[0] = 0.0;", "smc_law writes beyond the numbers of out"),
+        ("out[2] = y->e; out[0] = 0.0f; /* of floats */", "smc_law writes beyond the numbers of out"),
+        ("out[0] = -gains[1] * y->e;", "smc_law reads more gains than the 1 that have names: name them"),
+        ("out[0] = -gains[1] * y->e; /* of floats */", "smc_law reads more gains than the 1 that have names"),
+        ("out[0] = y->e / (gains[0] - gains[0]);", "smc_law returned u = inf"),
+        ("((double *)y)[4] = 0.0; out[0] = 0.0;", "smc_law changes its gains or its measurement"),
+        ("static double z; out[0] = z += y->e;", "smc_law changes static data (z), which all channels and simul"),
+        ("static volatile int n; n = y->e > 1e3; out[0] = 0.0;", "smc_law changes static data (n)"),  # far away alone
+        ("static volatile int on; on = 1; out[0] = on; /* of floats */", "smc_law changes static data (on)"),
+        ("memory[y->t > 0.6 ? 8 : 0] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
+        ("memory[y->t > 36e3 ? 8 : 0] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
+        ("memory[(int)(memory[0]++ / 1e3)] += 1.0; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its"),
+        ("out[0] = y->e; fesetround(FE_UPWARD);", "smc_law changes the arithmetic of its thread (rounding, flush-"),
+        ("out[0] = *hidden += y->e;", "smc_law gave two answers to one measurement"),
+        ("raise(40); out[0] = 0.0;", "smc_law died of signal 40 (Real-time signal 6)"),
+        ("((double *)gains)[0] = 1.0; out[0] = 0.0;", "smc_law changes its gains"),
+        ("out[1] = 0.0;", "smc_law returned u = nan"),
+    ],
+)  # fmt: skip
+def test_isolated_a_law_that_does_harm_is_one_sentence(file, body, words):
+    timeout = 3.0 if "did not end" in words else 30.0
+    with pytest.raises(smc.ScenarioError, match=re.escape(words)) as error:
+        smc.law_from_c(
+            file("#define SMC_REAL float\n" * ("of floats" in body) + law(body, KEPT)),
+            gains={"k": 3.0},
+            isolate=True,
+            timeout=timeout,
+        )
+    assert "\n" not in str(error.value)
+
+
+HARM = {
+    "volatile double a[4]; volatile int i = 4; a[i] = y->e; out[0] = 0.0;": "index 4 out of bounds for type 'double",
+    "double a[4]; double *volatile p = a; p[-1] = y->e; out[0] = 0.0;": "stack-buffer-overflow, WRITE of size 8",
+    "static const double T[3] = {1, 2, 3}; volatile int i = 3; out[0] = T[i] > 0.0;": "index 3 out of bounds for type",
+    "static const double T[3] = {1, 2, 3}; const double *volatile p = T; out[0] = p[3] > 0;": "global-buffer-overflow",
+    "volatile int n = 2147483647; n = n + 1; out[0] = n;": "signed integer overflow: 2147483647 + 1 cannot",
+    "double *volatile p = malloc(8); free(p); out[0] = *p > 0.0;": "heap-use-after-free, READ of size 8",
+    "out[0] = -y->e; if (gains[1] > 5.0) out[0] = 0.0;": "heap-buffer-overflow, READ of size 8",
+    "double a[2]; memcpy(a, y, 8 * (2 + (y->t > 0.6))); out[0] = 0.0 * a[0];": "stack-buffer-overflow, WRITE of",
+}
+
+
+@pytest.fixture(scope="module")
+def sanitizers():
+    """Skip where the compiler has none."""
+    if build.replayer(tuple(build.compiler())) is None:
+        pytest.skip("the C compiler here has no sanitizers")
+
+
+@pytest.mark.parametrize(("body", "words"), HARM.items())
+@pytest.mark.usefixtures("sanitizers")
+def test_isolated_what_sanitizers_see_is_one_sentence(file, body, words):
+    """Nothing of it changes a number that the trial itself looks at."""
+    text = law(body, "#include <stdlib.h>\n#include <string.h>")
+    line = text[: text.index(body)].count("\n") + 1
+    with pytest.raises(smc.ScenarioError, match=re.escape(f"my_law.c makes an error in line {line}: {words}")) as error:
+        smc.law_from_c(file(text), gains={"k": 3.0}, isolate=True, timeout=60.0)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.usefixtures("sanitizers")
+def test_isolated_harm_is_told_of_the_file_that_does_it(file):
+    other = file("int over(const double *a) { return a[3] > 0.0; }", "filter.c")
+    text = law("static const double T[3] = {1, 2, 3}; out[0] = over(T);", "int over(const double *);")
+    with pytest.raises(smc.ScenarioError, match=r"^filter\.c makes an error in line 1: global-buffer-overflow, READ"):
+        smc.law_from_c(file(text), flags=[str(other)], isolate=True, timeout=60.0)
+
+
+def test_check_c_says_what_it_could_not_see(call, file, tmp_path, monkeypatch):
+    out = call("check-c", file(MINE))[1]
+    wrapper = tmp_path / "cc"
+    wrapper.write_text(f'#!/bin/sh\ncase "$*" in *-fsanitize*) exit 1;; esac\nexec {" ".join(build.compiler())} "$@"\n')
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("CC", str(wrapper))
+    told = call("check-c", file(MINE))[1].splitlines()
+    without = f"my_law.c is tried without address and undefined-behaviour sanitizers: {wrapper} has none that work here"
+    assert told == [without, out.splitlines()[-1]]
+    library = build.library(tmp_path / "my_law.c", "smc_law", ["-s"], 60.0)[0].rename(tmp_path / "my_law.so")
+    assert call("check-c", library)[1].splitlines()[:2] == [
+        "my_law.so: static data that it changes is not seen, as nm shows no names of it",
+        "my_law.so is tried without address and undefined-behaviour sanitizers: give its .c file",
+    ]
+
+
+FLUSHES = """#include <fenv.h>
+__attribute__((constructor)) static void start(void)
+{
+#ifdef __SSE__
+    __builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | 0x8040); /* as crtfastmath does */
+#else
+    fesetround(FE_UPWARD);
+#endif
+}"""
+ENDS = "#include <stdlib.h>\n__attribute__((destructor)) static void end(void) { abort(); }"
+ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps), by which other simulations compute too"
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (FLUSHES, f"loading it {ALTERS}"),
+        ("#include <fenv.h>\nint smc_setup(void) { return fesetround(FE_TOWARDZERO); }", f"smc_setup {ALTERS}"),
+        ("#include <fenv.h>\nint smc_setup(void) { return fesetround(FE_DOWNWARD); }", f"smc_setup {ALTERS}"),
+        ("int feenableexcept(int);\nint smc_setup(void) { feenableexcept(4); return 0; }", "smc_setup died of SIGFPE"),
+        (ENDS, "unloading died of SIGABRT (Aborted): fix where it aborts"),
+    ],
+)
+def test_what_would_harm_other_runs_is_not_loaded(file, more, words):
+    with pytest.raises(smc.ScenarioError, match=re.escape(f"my_law.c: {words}")):
+        smc.law_from_c(file(law("out[0] = -y->e;", more)))
+    assert 5e-324 * np.float64(1.0) > 0.0
+
+
+def test_a_library_that_changes_the_rounding_is_found_too(file, tmp_path):
+    source = file(law("out[0] = y->e; if (y->t > 0.3) fesetround(FE_DOWNWARD);", "#include <fenv.h>"))
+    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-lm", "-o", tmp_path / "a.so"]
+    subprocess.run(line, check=True)
+    with pytest.raises(smc.ScenarioError, match=re.escape(f"a.so: smc_law {ALTERS}")):
+        smc.law_from_c(tmp_path / "a.so", isolate=True)
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the glue knows the state of x86's SSE alone")
+def test_untried_a_law_that_changes_the_rounding_fails_and_harms_no_other(file):
+    ours, own = scenario("super_twisting"), law("out[0] = y->e; fesetround(FE_DOWNWARD);", "#include <fenv.h>")
+    alone = smc.run(ours)
+    theirs, beside = smc.run([scenario(smc.law_from_c(file(own))), ours], threads=1)
+    assert (theirs.failure or "").startswith(f"law 'my_law' raised ArithmeticError (smc_law {ALTERS}) in channel 0")
+    assert same(alone, beside)
+    assert same(alone, smc.run(ours))
+
+
+def test_twenty_thousand_gains_are_tried(file):
+    text = law("out[0] = -gains[19999] * y->e;")
+    mine = smc.law_from_c(file(text), gains={f"k{i}": 1.0 + i for i in range(20_000)}, isolate=True, timeout=60.0)
+    assert mine.defaults["k19999"] == 20_000.0
+
+
+def test_checked_or_refused_it_was_not_in_this_process(call, file, tmp_path):
+    """Not by its constructor, its set-up, a call of the law or its destructor."""
+    told = tmp_path / "pids"
+    lines = [
+        "#include <stdio.h>",
+        "#include <unistd.h>",
+        f'#define TOLD "{told}"',
+        'static void note(void) { FILE *f = fopen(TOLD, "a"); fprintf(f, "%d\\n", (int)getpid()); fclose(f); }',
+        "__attribute__((constructor)) static void start(void) { note(); }",
+        "__attribute__((destructor)) static void end(void) { note(); }",
+        "int smc_setup(void) { note(); return 0; }",
+    ]
+    more = "\n".join(lines)
+    assert call("check-c", file(law("if (y->t == 0.0) note(); out[0] = -y->e;", more)))[0] == 0
+    with pytest.raises(smc.ScenarioError, match="smc_law returned 3"):
+        smc.law_from_c(file(law("out[0] = 0.0; return 3;", more)), isolate=True)
+    assert len(told.read_text().split()) > 8
+    assert str(os.getpid()) not in told.read_text().split()
+
+
+def test_isolated_a_law_may_give_up_far_away(file):
+    text = law("if (y->e * y->e > 1e4) return 7; out[0] = -y->e; /* and say nothing of u */")
+    assert smc.law_from_c(file(text), isolate=True).memory == 8
+
+
+def test_what_a_set_up_prints_is_not_kept(file):
+    """60 MB of it, and then it waits."""
+    line = '"a line of a law, which is as long as the lines of laws usually are"'
+    text = "#include <stdio.h>\n#include <unistd.h>\n"
+    text += f"int smc_setup(void) {{ for (int i = 0; i < 1000000; i++) puts({line}); for (;;) pause(); return 0; }}"
+    tracemalloc.start()
+    try:
+        with pytest.raises(smc.ScenarioError, match="smc_setup did not end"):
+            smc.law_from_c(file(law("", text)), timeout=3.0)
+        assert tracemalloc.get_traced_memory()[1] < 1e7
+    finally:
+        tracemalloc.stop()
+
+
+def test_what_a_command_leaves_behind_is_ended_too(tmp_path):
+    told = tmp_path / "pid"
+    with pytest.raises(build.TimedOut):
+        build.timed(["sh", "-c", f"sleep 60 & echo $! > '{told}'"], 0.3)
+    for _ in range(200):  # until the process that inherits orphans has noticed
+        state = Path(f"/proc/{told.read_text().strip()}/stat")
+        if not state.exists() or state.read_text().rpartition(")")[2].split()[0] == "Z":
+            return
+        time.sleep(0.01)
+    pytest.fail("it still runs")
+
+
+def test_a_law_that_fails_ends_its_run_with_a_reason_and_harms_no_other(file):
+    late = smc.law_from_c(file(law("out[0] = y->t > 0.1 ? y->e / (y->t - y->t) : 0.0;")))
+    code = smc.law_from_c(file(law("out[0] = 0.0; return y->t > 0.1 ? -5 : 0;")), name="mine")
+    first, third = smc.run([scenario(law) for law in (late, "observer_free")])
+    second = smc.run(scenario(code))
+    assert first.failure is not None
+    assert re.match(r"law 'my_law' returned u = -?inf, s = .* in channel 0, at t = 0.101 s", first.failure)
+    assert second.failure == "law 'mine' raised ArithmeticError (smc_law returned -5) in channel 0, at t = 0.101 s"
+    assert third.failure is None
+
+
+def test_a_law_that_says_no_s_ends_its_run(file, tmp_path):
+    silent = file(law("out[0] = 0.0;").replace("    out[1] = y->e;\n", ""))
+    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(silent), "-o", str(tmp_path / "a.so")]
+    subprocess.run(line, check=True)
+    for source in (silent, tmp_path / "a.so"):
+        trace = smc.run(scenario(smc.law_from_c(source)))
+        assert (trace.failure or "").endswith("returned u = 0, s = nan in channel 0, at t = 0 s")
+
+
+def test_names_of_the_law_may_be_those_of_headers_that_it_does_not_include(file):
+    more = [
+        "static double gamma = 2.0, y0 = 3.0;",
+        "typedef struct { int a; } int64_t;",
+        "#define i g",
+        "#define g 9.81",
+    ]
+    taken = law("out[0] = y0 * gamma;", "\n".join(more))
+    assert (smc.run(scenario(smc.law_from_c(file(taken)))).u == 6.0).all()
+
+
+def test_no_compiler_and_one_that_hangs_are_one_sentence(file, tmp_path, monkeypatch):
+    slow = tmp_path / "slowcc"
+    slow.write_text("#!/bin/sh\nsleep 60\n")
+    slow.chmod(slow.stat().st_mode | stat.S_IXUSR)
+    for compiler, words in (
+        ("nocc", "as there is no C compiler 'nocc': install one, or set CC"),
+        (str(slow), "more than 0.5 s to compile"),
+        ("cc '", 'as there is no C compiler "cc \'": install one, or set CC'),
+        ("false", "my_law.c does not compile, false says: it says nothing"),
+    ):
+        monkeypatch.setenv("CC", compiler)
+        with pytest.raises(smc.ScenarioError, match=words):
+            smc.law_from_c(file(MINE), timeout=0.5)
+
+
+@pytest.mark.parametrize(
+    ("source", "more", "words"),
+    [
+        ("nowhere.c", {}, "there is no file nowhere.c"),
+        ("my_law.py", {}, "cannot take a law from 'my_law.py': give a .c file"),
+        (3, {}, "cannot take a law from 3"),
+        (None, {"gains": {"k2": 1.0}}, "unknown gain of my_law.c 'k2': choose from k1, lam"),
+        (None, {"gains": 3}, "gains is 3: give names"),
+        (None, {"gains": {"k1": np.nan}, "isolate": True}, "default of gain k1 is nan: give a finite number"),
+        (None, {"gains": {"k1": np.ones(2)}}, "gain k1 of my_law.c is (1, 1): give it one number"),
+        (None, {"memory": 0}, "memory is 0"),
+        (".", {}, "cannot take a law from '.': give a .c file"),
+        (None, {"timeout": 0}, "timeout is 0"),
+        (None, {"timeout": 1e12}, "timeout is 1e+12: give at most 86400"),
+        (None, {"symbol": "a b"}, "symbol is 'a b': give the name of a C function"),
+        (None, {"symbol": "my_step"}, "my_law.c has no function my_step: define int my_step(const smc_measurement"),
+        (None, {"flags": "-O3"}, "flags is '-O3': give several"),
+        (None, {"flags": None}, "flags is None: give several"),
+        (None, {"name": "a\nb"}, "name is 'a\\nb': give a name of printable"),
+        (None, {"degree": 4}, "degree is 4: give a whole number from 1 to 3"),
+    ],
+)
+def test_wrong_arguments_are_one_sentence(file, source, more, words):
+    with pytest.raises(smc.ScenarioError, match=re.escape(words)):
+        smc.law_from_c(file(MINE) if source is None else source, **more)
+
+
+def test_a_library_that_may_not_be_read_is_one_sentence(file, monkeypatch):
+    def refuse(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("shutil.copy", refuse)  # nothing is forbidden to root
+    with pytest.raises(smc.ScenarioError, match=r"my_law\.so cannot be read \(Permission denied\): give one"):
+        smc.law_from_c(file("", "my_law.so"))
+
+
+def test_what_is_no_library_or_of_single_precision_is_refused(file, tmp_path):
+    with pytest.raises(smc.ScenarioError, match=r"junk.so cannot be loaded \(junk.so: file too short\)"):
+        smc.law_from_c(file("junk", "junk.so"))
+    source = file("#define SMC_REAL float\n" + MINE + "const int smc_law_real = sizeof(smc_real);\n")
+    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-o", str(tmp_path / "a.so")]
+    subprocess.run(line, check=True)
+    with pytest.raises(smc.ScenarioError, match=r"a\.so is a library of single precision: give its \.c file"):
+        smc.law_from_c(tmp_path / "a.so")
+
+
+# the header, the documentation, the command
+
+
+def test_the_docs_show_the_header_and_a_law_that_passes(file):
+    text = build.HEADER.read_text()
+    assert text[text.index("#ifndef") :] == HEADER
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
+    assert smc.law_from_c(file(MINE), flags=strict, isolate=True).doc == "u = -lam tanh(s), s = de + k1 e."
+
+
+def test_the_header_has_the_numbers_of_the_measurement_in_their_order():
+    (struct,) = re.findall(r"typedef struct \{(.*?)\}", HEADER, re.DOTALL)
+    assert tuple(re.findall(r"smc_real (\w+);", struct)) == Measurement._fields
+    assert len(Measurement._fields) == build.INPUTS
+
+
+def test_check_c_names_its_own_options(call, file):
+    wants = file(law("memory[20] = 1.0; out[0] = -gains[0] * y->e;"))
+    for words, said in (
+        ((), "writes beyond the 8 numbers of its memory: say more in smc_law_memory, or give --memory"),
+        (("--memory", 21), "reads more gains than the 0 that have names: name them in smc_law_gains, or give --gains"),
+        (("--memory", 21, "--gains", "k=2", "--flag=-lnowhere"), "fix it, or give other --flag"),
+    ):
+        code, out, err = call("check-c", wants, *words)
+        assert (code, out) == (2, "")
+        assert err.endswith(f"{said}\n")
+    assert call("check-c", wants, "--memory", 21, "--gains", "k=2")[0] == 0
+    assert (
+        "did not end within 3 s: fix what it waits for, or give --timeout\n"
+        in call("check-c", file(WAITS), "--timeout", 3)[2]
+    )
+    assert "cannot take a law from '.'" in call("check-c", ".")[2]
+
+
+def test_gains_may_have_any_name_that_python_takes(file):
+    mine = smc.law_from_c(file(law("out[0] = -gains[0] * y->e;", 'const char smc_law_gains[] = "λ=3";')))
+    assert mine.defaults == {"λ": 3.0}
+
+
+def test_check_c_says_what_it_found(call, file):
+    code, out, err = call("check-c", file(MINE.replace("(void)memory;", "int unused;")), "--gains", "lam=5")
+    assert (code, err) == (0, "")
+    assert "warning: unused variable 'unused'" in out
+    assert out.splitlines()[-1] == "my_law.c: smc_law passes; gains lam = 5, k1 = 2.5; memory 8"
+    code, out, err = call("check-c", file(FALLS))
+    assert (code, out) == (2, "")
+    assert err.startswith("smc-mujoco: my_law.c: smc_setup died of SIGSEGV")
+    assert len(err.splitlines()) == 1
+
+
+def test_nothing_is_left_behind(file):
+    code = f"import smc_mujoco as smc; smc.law_from_c({str(file(MINE))!r})\n"
+    folder = python(code + "from smc_mujoco.exchange.c import build; print(build.folder())").strip()
+    assert folder
+    assert not Path(folder).exists()

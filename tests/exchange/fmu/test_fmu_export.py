@@ -1,0 +1,489 @@
+"""Laws as FMUs: valid by FMPy, bit for bit what smc.run computes, and independent of each other in one process."""
+
+import ctypes
+import itertools
+import subprocess
+import sys
+import zipfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', is not installed")
+
+from fmpy.validation import validate_fmu  # noqa: E402
+from helpers.compiler import needs_compiler  # noqa: E402
+from helpers.fmu import Importer  # noqa: E402
+from helpers.pages import ROOT, titled  # noqa: E402
+
+import smc_mujoco as smc  # noqa: E402
+from smc_mujoco.cli import main as cli  # noqa: E402
+from smc_mujoco.control import estimator, surface  # noqa: E402
+from smc_mujoco.exchange.c import build  # noqa: E402
+from smc_mujoco.exchange.c import export as c_export  # noqa: E402
+from smc_mujoco.control.law import catalogue  # noqa: E402
+from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_PER_SPEED, RATE  # noqa: E402
+from smc_mujoco.exchange.fmu import description  # noqa: E402
+
+pytestmark = needs_compiler
+
+REFERENCE = smc.Sine(0.2, 3.0)
+SURFACES = surface.catalogue()
+FIRST = [n for n, law in catalogue().items() if law.relative_degree == 1 and not (law.plants or law.requires_model)]
+# (law, surface, estimator): each surface and each estimator once or more, laws with memory, of t, and of higher order.
+COMBINED = [
+    *zip(FIRST, [n for n, s in SURFACES.items() if s.relative_degree == 1], itertools.cycle(estimator.catalogue())),
+    ("observer_free_third", None, "extended_state_observer"),
+    ("prescribed_time", None, "kalman"),
+    ("pid", None, "measured"),
+]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def unmeasured():
+    """Without the size of each law's code, which takes a run of the compiler."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(c_export, "_measured", lambda code: "not measured")
+        yield
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("fmu")
+
+
+def scenario(law, of_surface=None, velocity="measured", **more) -> smc.Scenario:
+    common = {"duration": 0.1, "v0": 0.3, "reference": REFERENCE, "disturbance": smc.Sine(0.5, 7.0), "u_max": 20.0}
+    return smc.Scenario(plant="duffing", law=law, surface=of_surface, velocity=velocity, **common | more)
+
+
+@pytest.fixture(scope="module")
+def combined(folder):
+    """Combination -> its FMU and its trace."""
+    scenarios = [scenario(*one) for one in COMBINED]
+    with ThreadPoolExecutor(2) as pool:
+        paths = pool.map(lambda i: smc.export_fmu(scenarios[i], folder / f"{i}.fmu"), range(len(scenarios)))
+        return dict(zip(COMBINED, zip(list(paths), smc.run(scenarios), strict=True), strict=True))
+
+
+@pytest.fixture(scope="module")
+def twisting(folder):
+    """The FMU of a law with memory, with a surface and an estimator with memory, and the folder of its files."""
+    return smc.export_fmu(
+        "super_twisting", folder / "twisting.fmu", surface="integral", velocity="levant", u_max=3.0
+    ), folder / "twisting"
+
+
+def seen(fmu: Importer, trace: smc.Trace, k: int) -> dict[str, float]:
+    """The inputs of an FMU at a sample of a trace."""
+    r, dr, ddr = type(REFERENCE).value(trace.t[k], REFERENCE)
+    every = {"x": trace.x[k, 0], "v": trace.v[k, 0], "r": r, "dr": dr, "ddr": ddr}
+    return {name: value for name, value in every.items() if name in fmu.at}
+
+
+def wave(k: int) -> dict[str, float]:
+    """Inputs of an FMU without v, at a step."""
+    return {"x": 0.3 * np.cos(0.05 * k), "r": 0.1, "dr": 0.0}
+
+
+# the same bits
+
+
+@pytest.mark.parametrize("one", COMBINED, ids=lambda one: "-".join(map(str, one)))
+def test_an_fmu_gives_the_bits_of_a_run(combined, folder, one):
+    path, trace = combined[one]
+    assert trace.failure is None
+    assert validate_fmu(str(path)) == []
+    fmu = Importer(path, folder / path.stem)
+    found = np.array([fmu.step(t, **seen(fmu, trace, k)) for k, t in enumerate(trace.t)])
+    assert fmu.said == []
+    np.testing.assert_array_equal(found[:, 0], trace.u[:, 0])
+    np.testing.assert_array_equal(found[:, 1], trace.s[:, 0])
+    assert len(set(found[:, 1])) > 50
+    assert ("v" in fmu.at) == (one[2] == "measured")
+
+
+def test_all_surfaces_and_estimators_are_among_the_combinations():
+    assert {one[1] for one in COMBINED} >= {n for n, s in SURFACES.items() if s.relative_degree == 1}
+    assert {one[2] for one in COMBINED} >= set(estimator.catalogue())
+
+
+def test_the_sources_compiled_by_another_tool_give_the_same(combined, folder):
+    one = ("observer_free_third", None, "extended_state_observer")
+    trace = combined[one][1]
+    source = smc.export_fmu(scenario(*one), folder / "source.fmu", binary=False)
+    assert fmpy.supported_platforms(str(source)) == ["c-code"]
+    files = Path(fmpy.extract(str(source), str(folder / "source")))
+    from fmpy.build import build_platform_binary
+
+    environment = [str(Path(sys.executable).parent)]  # of FMPy's cmake
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PATH", ":".join(environment), prepend=":")
+        (made := folder / "made").mkdir()
+        build_platform_binary(files, made, configuration="Release", all_warnings=True)
+    fmu = Importer(source, files)
+    found = [fmu.step(t, **seen(fmu, trace, k))[0] for k, t in enumerate(trace.t)]
+    np.testing.assert_array_equal(found, trace.u[:, 0])
+
+
+def test_the_sources_compile_without_a_warning(twisting, folder):
+    files = folder / "warned"
+    with zipfile.ZipFile(twisting[0]) as archive:
+        archive.extractall(files)
+    sources = sorted((files / "sources").glob("*.c"))
+    flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror", "-c", *map(str, sources)]
+    done = subprocess.run([*build.compiler(), *flags], cwd=files, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_an_fmu_holds_no_python_and_no_path_of_this_machine(twisting, folder):
+    again = smc.export_fmu("super_twisting", folder / "again.fmu", surface="integral", velocity="levant", u_max=3.0)
+    assert again.read_bytes() == twisting[0].read_bytes()
+    with zipfile.ZipFile(again) as archive:
+        (library,) = (name for name in archive.namelist() if name.startswith("binaries/"))
+        needed = subprocess.run(["ldd", archive.extract(library, folder)], capture_output=True, text=True, check=True)
+        assert "python" not in needed.stdout
+        assert b"smc_mujoco-" not in archive.read(library)  # the folder in which it was compiled
+
+
+@pytest.mark.parametrize("name", catalogue())
+def test_every_law_is_a_valid_fmu(folder, name):
+    template = catalogue()[name]
+    path = smc.export_fmu(template, folder / f"valid-{name}.fmu", binary=False)
+    assert validate_fmu(str(path)) == []
+    known = {v.name: v for v in fmpy.read_model_description(str(path)).modelVariables}
+    for gain, about in template.gains.items():
+        one = known[f"law.{gain}"]
+        assert (one.causality, one.variability) == ("parameter", "tunable")
+        assert float(one.start) == min(about.default, sys.float_info.max)
+        assert (one.min is not None) == (about.positive or about.nonnegative)
+    assert ("g" in known) == template.requires_model
+
+
+# instances
+
+
+def test_instances_in_one_process_do_not_share_their_memory(twisting):
+    alone = Importer(*twisting)
+    expected = [alone.step(1e-3 * k, **wave(k)) for k in range(60)]
+    first, second = Importer(*twisting), Importer(*twisting)
+    found = []
+    for k in range(60):
+        found.append(first.step(1e-3 * k, **wave(k)))
+        second.step(1e-3 * k, **wave(3 * k + 7))
+    assert found == expected
+    assert first.get("law.memory[1]", "estimator.memory[2]") != second.get("law.memory[1]", "estimator.memory[2]")
+
+
+def test_reset_forgets_everything(twisting):
+    fmu = Importer(*twisting, law__k1=1.0)
+    expected = [fmu.step(1e-3 * k, **wave(k)) for k in range(40)]
+    fmu.set(law__k1=9.0, u_max=0.1)
+    fmu.fmu.reset()
+    start = [fmu.get(name)[0] for name in fmu.at]
+    fresh = Importer(*twisting, begin=False)
+    assert start == [fresh.get(name)[0] for name in fresh.at]
+    fmu.begin(law__k1=1.0)
+    assert [fmu.step(1e-3 * k, **wave(k)) for k in range(40)] == expected
+
+
+def test_a_state_that_was_saved_is_come_back_to(twisting):
+    fmu = Importer(*twisting)
+    for k in range(20):
+        fmu.step(1e-3 * k, **wave(k))
+    saved = fmu.fmu.getFMUState()
+    packed = fmu.fmu.serializeFMUState(saved)
+    expected = [fmu.step(1e-3 * k, **wave(k)) for k in range(20, 50)]
+    fmu.fmu.setFMUState(saved)
+    assert [fmu.step(1e-3 * k, **wave(k)) for k in range(20, 50)] == expected
+    other = Importer(*twisting, begin=False)
+    other.fmu.setFMUState(other.fmu.deserializeFMUState(packed))
+    assert [other.step(1e-3 * k, **wave(k)) for k in range(20, 50)] == expected
+    fmu.fmu.freeFMUState(saved)
+
+
+def test_the_memory_is_seen_and_can_be_set_before_the_start(combined, folder):
+    path = combined["pid", None, "measured"][0]
+    fmu = Importer(path, folder / path.stem)
+    slots = [name for name in fmu.at if "memory" in name]
+    assert slots == ["law.memory[1]", "law.memory[2]", "law.memory[3]"]
+    fmu.step(0.0, x=0.5)
+    fmu.step(1e-3, x=0.5)
+    assert fmu.get("law.memory[1]") != [0.0]
+    warm = Importer(path, folder / path.stem, **{"law__memory[2]": 0.25})
+    cold = Importer(path, folder / path.stem)
+    assert warm.step(0.0, x=0.1) != cold.step(0.0, x=0.1)
+    with pytest.raises(Exception, match="fmi3SetFloat64"):
+        warm.set(**{"law__memory[1]": 0.0})
+    assert "law.memory[1] cannot be set now" in warm.said[-1]
+
+
+# parameters
+
+
+def test_gains_are_in_their_order_and_change_while_it_runs(folder):
+    law = smc.law("observer_free", lam=4.0, k1=2.0)
+    path = smc.export_fmu(law, folder / "gains.fmu")
+    fmu = Importer(path, folder / "gains")
+    u, s = fmu.step(0.0, x=0.5, v=0.1, r=0.2, dr=0.05)
+    assert (u, s) == (pytest.approx(-4.0 * np.tanh(0.05 + 2.0 * 0.3), rel=1e-15), 0.1 - 0.05 + 2.0 * (0.5 - 0.2))
+    fmu.set(law__lam=1.0, law__k1=3.0)
+    u, s = fmu.step(1e-3)
+    assert (u, s) == (pytest.approx(-np.tanh(0.05 + 3.0 * 0.3), rel=1e-15), 0.1 - 0.05 + 3.0 * (0.5 - 0.2))
+    fmu.set(u_max=0.25)
+    assert fmu.step(2e-3)[0] == -0.25
+    fmu.set(u_max=sys.float_info.max)
+    assert fmu.step(3e-3)[0] == u
+
+
+def test_each_component_has_gains_of_its_own(folder):
+    """Law and surface of the same name of a gain, c, which only the surface's value of decides."""
+    path = smc.export_fmu("super_twisting", folder / "two.fmu", surface=smc.surface("linear", c=3.0))
+    fmu = Importer(path, folder / "two")
+    assert fmu.get("law.c", "surface.c") == [2.5, 3.0]
+    assert fmu.step(0.0, x=0.5)[1] == 1.5
+    fmu.set(surface__c=1.0, law__c=7.0)
+    assert fmu.step(1e-3, x=0.5)[1] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"law__k1": -1.0}, "law.k1 = -1 is out of its range"),
+        ({"estimator__L": 0.0}, "estimator.L = 0 is out of its range"),
+        ({"u_max": float("nan")}, "u_max = nan is out of its range"),
+        ({"x": float("nan")}, "x = nan is out of its range"),
+        ({"u_max": 0.0}, "u_max = 0 is out of its range"),
+        ({"dt": 0.01}, "dt cannot be set now"),
+        ({"u": 1.0}, "u cannot be set now"),
+    ],
+)
+def test_a_value_out_of_its_range_is_refused_in_words(twisting, values, said):
+    fmu = Importer(*twisting)
+    with pytest.raises(Exception, match="fmi3SetFloat64"):
+        fmu.set(**values)
+    assert said in fmu.said[-1]
+
+
+# time
+
+
+def test_a_long_step_is_its_samples_and_a_short_one_holds(twisting):
+    fine, long, short = (Importer(*twisting) for _ in range(3))
+    x = {"x": 0.3, "r": 0.1, "dr": 0.0}
+    expected = [fine.step(1e-3 * k, **x) for k in range(10)]
+    assert long.step(0.0, 4e-3, **x) == expected[3]
+    assert long.step(4e-3, 6e-3, **x) == expected[9]
+    found = [short.step(0.25e-3 * k, 0.25e-3, **x) for k in range(40)]
+    assert found[::4] == found[3::4] == expected
+
+
+def test_samples_are_counted_from_the_start_time(folder, combined):
+    path, _ = combined["prescribed_time", None, "kalman"]
+    early, late = Importer(path, folder / path.stem), Importer(path, folder / path.stem, start=100.0)
+    for k in range(5):
+        assert early.step(1e-3 * k, x=0.4) == late.step(100.0 + 1e-3 * k, x=0.4)
+    assert late.get("time") == [pytest.approx(100.005)]
+
+
+def test_with_event_mode_u_follows_x_without_a_step_between(twisting):
+    """At each sample it has the bits of an instance without events after its step; stays held in between."""
+    plain, events = Importer(*twisting), Importer(*twisting, events=True)
+    expected = [plain.step(1e-3 * k, **wave(k)) for k in range(30)]
+    for k in range(30):
+        events.set(**wave(k))
+        assert events.get("u", "s") == expected[k]  # before anything is completed
+        assert events.get("u", "s") == expected[k]
+        again, *_, defined, following = update(events)
+        assert (again, defined) == (False, True)
+        assert following == pytest.approx(1e-3 * (k + 1))
+        events.set(**wave(k + 5))
+        assert events.get("u", "s") == expected[k]  # the sample is over
+        events.fmu.enterStepMode()
+        assert events.fmu.doStep(1e-3 * k, 1e-3)[0]
+        events.fmu.enterEventMode()
+
+
+def test_an_importer_of_events_is_stopped_where_the_next_sample_is(twisting):
+    fmu = Importer(*twisting, events=True, early=True)
+    update(fmu)
+    fmu.fmu.enterStepMode()
+    needed, _, early, reached = fmu.fmu.doStep(0.0, 0.4e-3)
+    assert (needed, early, reached) == (False, False, 0.4e-3)
+    needed, _, early, reached = fmu.fmu.doStep(0.4e-3, 5e-3)
+    assert (needed, early, reached) == (True, True, 1e-3)
+
+
+def update(fmu: Importer) -> list:
+    """The results of fmi3UpdateDiscreteStates."""
+    return list(fmu.fmu.updateDiscreteStates())
+
+
+def test_in_initialization_mode_u_is_that_of_the_first_sample(twisting):
+    fmu = Importer(*twisting, begin=False)
+    fmu.fmu.enterInitializationMode(startTime=0.0)
+    fmu.set(**wave(0))
+    first = fmu.get("u", "s")
+    fmu.set(**wave(9))
+    assert fmu.get("u", "s") != first
+    fmu.set(**wave(0))
+    fmu.fmu.exitInitializationMode()
+    assert fmu.get("u", "s") == first  # seen, although no input of the start was looked at
+    assert fmu.step(0.0) == first
+
+
+# calls that are wrong
+
+
+def test_calls_in_a_wrong_mode_are_refused(twisting):
+    fmu = Importer(*twisting, begin=False)
+    for call in (lambda: fmu.fmu.doStep(0.0, 1e-3), fmu.fmu.terminate, fmu.fmu.exitInitializationMode):
+        with pytest.raises(Exception, match="fmi3"):
+            call()
+        assert "was called in the wrong mode" in fmu.said[-1]
+    fmu.begin()
+    with pytest.raises(Exception, match="fmi3EnterEventMode"):
+        fmu.fmu.enterEventMode()
+    for t, h, said in ((0.5, 1e-3, "the step begins at another time"), (0.0, 0.0, "is not positive")):
+        with pytest.raises(Exception, match="fmi3DoStep"):
+            fmu.fmu.doStep(t, h)
+        assert said in fmu.said[-1]
+
+
+def test_an_input_that_is_not_finite_ends_it_with_the_time(folder):
+    path = smc.export_fmu("classical", folder / "far.fmu")
+    fmu = Importer(path, folder / "far")
+    fmu.step(0.0, x=0.1)
+    fmu.set(x=float("inf"))
+    with pytest.raises(Exception, match="fmi3DoStep"):
+        fmu.fmu.doStep(1e-3, 1e-3)
+    assert fmu.said[-1] == "the law gave u, s that are not finite, at t = 0.001 s"
+    with pytest.raises(Exception, match="fmi3DoStep"):
+        fmu.fmu.doStep(2e-3, 1e-3)
+    fmu.fmu.reset()
+    fmu.begin()
+    fmu.step(0.0, x=0.1)
+
+
+def test_a_token_of_another_fmu_is_refused(twisting):
+    files = twisting[1]
+    Importer(*twisting)
+    about = fmpy.read_model_description(str(files))
+    about.guid = "{another}"
+    said = []
+    with pytest.raises(Exception, match="Failed to instantiate"):
+        fmpy.simulation.instantiate_fmu(str(files), about, "CoSimulation", logger=lambda *words: said.append(words[-1]))
+    assert said == [b"the instantiation token is that of another FMU"]
+
+
+# the page
+
+
+def test_the_page_s_file_for_a_c_caller_block_gives_the_bits_of_a_run(folder):
+    law = smc.law("super_twisting", k1=5.0, k2=8.0)
+    (folder / "super_twisting.c").write_text(smc.law_to_c(law))
+    (folder / "controller.c").write_text(titled(ROOT / "docs" / "simulink.md")["controller.c"])
+    library = folder / "controller.so"
+    flags = [*build.FLAGS, "-Wall", "-Wextra", "-Werror"]
+    subprocess.run([*build.compiler(), *flags, str(folder / "controller.c"), "-o", str(library), "-lm"], check=True)
+    block = ctypes.CDLL(str(library))
+    block.controller.argtypes = [ctypes.c_double] * 5 + [ctypes.POINTER(ctypes.c_double)] * 2
+    trace, u, s, found = smc.run(scenario(law, u_max=6.0)), ctypes.c_double(), ctypes.c_double(), []
+    for _ in range(2):
+        block.controller_start()
+        for k, t in enumerate(trace.t):
+            r, dr, _ = type(REFERENCE).value(t, REFERENCE)
+            block.controller(t, trace.x[k, 0], trace.v[k, 0], r, dr, ctypes.byref(u), ctypes.byref(s))
+            found.append((u.value, s.value))
+    np.testing.assert_array_equal(found, np.tile(np.c_[trace.u, trace.s], (2, 1)))
+
+
+# description
+
+
+@pytest.mark.parametrize(
+    ("unit", "joint", "name", "base"),
+    [
+        (RATE, "hinge", "1/s", {"s": -1}),
+        (FORCE_PER_SPEED, "hinge", "N.m.s/rad", {"kg": 1, "m": 2, "s": -1, "rad": -1}),
+        (FORCE_PER_SPEED, "slide", "N.s/m", {"kg": 1, "s": -1}),
+        (FORCE_PER_ROOT, "slide", "N.s^0.5/m^0.5", None),
+    ],
+)
+def test_units_have_names_and_base_units(unit, joint, name, base):
+    assert description.unit_name(unit, joint) == name
+    assert description.base_units(unit, joint) == base
+
+
+def test_the_units_are_those_of_the_scenario_s_joint(folder):
+    units = {}
+    for plant in ("duffing", "inverted_pendulum"):
+        path = smc.export_fmu(scenario("pid").__class__(plant=plant, law="pid"), folder / f"{plant}.fmu", binary=False)
+        units[plant] = {v.name: v.unit for v in fmpy.read_model_description(str(path)).modelVariables}
+    assert [units["duffing"][n] for n in ("x", "v", "u", "law.kp")] == ["m", "m/s", "N", "N/m"]
+    assert [units["inverted_pendulum"][n] for n in ("x", "v", "u", "law.kp")] == ["rad", "rad/s", "N.m", "N.m/rad"]
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: smc.export_fmu("twistin"), "unknown law 'twistin'"),
+        (lambda: smc.export_fmu("passivity_based"), "is of many joints: give their number, such as joints=7"),
+        (lambda: smc.export_fmu(smc.law("classical", k=[1.0, 2.0])), "has gains by channel"),
+        (lambda: smc.export_fmu("pid", "law.zip"), "cannot save to 'law.zip': end the name in .fmu"),
+        (lambda: smc.export_fmu("pid", joint="ball"), "unknown joint 'ball'"),
+        (lambda: smc.export_fmu("pid", control_period=0.0), "control_period is 0: give a number greater than 0"),
+        (lambda: smc.export_fmu("pid", u_max=-1.0), "u_max is -1"),
+        (lambda: smc.export_fmu("pid", model="full"), "model is 'full': give 'none' or 'nominal'"),
+        (lambda: smc.export_fmu("hierarchical", model="none"), "needs the nominal model"),
+        (lambda: smc.export_fmu("twisting", surface="linear"), "takes no surface such as 'linear'"),
+        (lambda: smc.export_fmu(scenario("pid"), surface="linear"), "a scenario has its own surface"),
+        (lambda: smc.export_fmu(smc.policy(lambda x: 0.0)), "cannot be written in C"),
+    ],
+)
+def test_what_cannot_be_an_fmu_is_one_sentence(call, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(smc.ScenarioError, match=said.replace("(", r"\(")) as error:
+        call()
+    assert "\n" not in str(error.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_compiler_the_cure_is_said(tmp_path, monkeypatch):
+    monkeypatch.setenv("CC", "nocc")
+    with pytest.raises(smc.ScenarioError, match=r"no C compiler 'nocc': install one, set CC, or leave the binary out"):
+        smc.export_fmu("pid", tmp_path / "pid.fmu")
+    assert smc.export_fmu("pid", tmp_path / "pid.fmu", binary=False).exists()
+
+
+def test_the_command_writes_what_it_is_told(tmp_path, capsys):
+    out = tmp_path / "c.fmu"
+    words = ["--gains", "k1=5", "--velocity", "levant(L=900)", "--surface", "linear(c=2)", "--period", "0.002"]
+    with pytest.raises(SystemExit) as end:
+        cli.main(["export-fmu", "super_twisting", *words, "--u-max", "4", "--joint", "slide", "--out", str(out)])
+    assert not end.value.code
+    assert capsys.readouterr().out.startswith(f"{out}, ")
+    known = {v.name: v for v in fmpy.read_model_description(str(out)).modelVariables}
+    names = ("law.k1", "law.k2", "estimator.L", "surface.c", "u_max", "dt")
+    assert [float(known[name].start) for name in names] == [5.0, 4.4, 900.0, 2.0, 4.0, 0.002]
+    assert (known["u"].unit, "v" in known) == ("N", False)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["super_twisting", "--surface", "linear(d=3)"], "unknown gain of linear 'd'"),
+        (["super_twisting", "--velocity", "levan"], "unknown velocity estimator 'levan': did you mean 'levant'?"),
+        (["super_twisting", "--velocity", "levant(3)"], "velocity estimator 'levant(3)' cannot be read: write it as "),
+        (["super_twisting", "--gains", "k1"], "--gains is 'k1': give names and numbers"),
+        (["none.py"], "no file 'none.py': give a Python file with a law in it"),
+    ],
+)
+def test_a_mistake_in_the_command_is_one_sentence(words, said, capsys):
+    with pytest.raises(SystemExit) as end:
+        cli.main(["export-fmu", *words])
+    printed = capsys.readouterr()
+    assert (end.value.code, printed.out) == (2, "")
+    assert printed.err.startswith(f"smc-mujoco: {said}")

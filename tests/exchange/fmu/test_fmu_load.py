@@ -1,0 +1,360 @@
+"""Controllers in FMUs as laws: those of this library come back with the same bits, and others' keep their own steps."""
+
+import gc
+import pickle
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', is not installed")
+
+from helpers import fmu as helper  # noqa: E402
+from helpers.compiler import needs_compiler  # noqa: E402
+
+import smc_mujoco as smc  # noqa: E402
+from smc_mujoco.cli import main as cli  # noqa: E402
+from smc_mujoco.control.law import Measurement  # noqa: E402
+from smc_mujoco.simulation import reference  # noqa: E402
+from smc_mujoco.exchange.fmu import load  # noqa: E402
+from smc_mujoco.exchange.fmu.slave import Slave  # noqa: E402
+from smc_mujoco.simulation.reference import gains_of  # noqa: E402
+
+pytestmark = [
+    needs_compiler,
+    pytest.mark.filterwarnings("ignore::smc_mujoco.PlainLoopWarning"),
+]
+FMI1 = 'fmiVersion="1.0" modelIdentifier="c" numberOfContinuousStates="0" numberOfEventIndicators="0"'
+RENAMED = {"constants": {"mode": 0.0}}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("fmu")
+
+
+@pytest.fixture(scope="module")
+def foreign(folder):
+    """An FMU of FMI 2.0 as another tool writes it, which steps every 10 ms."""
+    return helper.fmi2(folder)
+
+
+def scenario(law, plant="duffing", **more) -> smc.Scenario:
+    common = {"duration": 0.1, "v0": 0.3, "noise": smc.Noise(0.003, 0.02), "reference": smc.Sine(0.2, 3.0)}
+    return smc.Scenario(plant=plant, law=law, **common | more)
+
+
+@pytest.mark.parametrize(
+    ("plant", "law", "more"),
+    [
+        ("duffing", "super_twisting", {"surface": "integral", "velocity": "levant"}),
+        ("pendulum_network", "pid", {}),  # an instance for each channel
+        ("cart_pole", "hierarchical", {}),  # which reads a second joint
+        ("duffing", "computed_torque", {"model": "nominal"}),
+    ],
+)
+def test_an_exported_law_comes_back_with_the_same_bits(folder, plant, law, more):
+    ours = scenario(law, plant, **more)
+    path = smc.export_fmu(ours, folder / f"{plant}-{law}.fmu")
+    theirs = smc.law_from_fmu(path, name="theirs", isolate=False)()
+    first = reference.run(ours) if "model" in more else smc.run(ours)  # the model's last bit differs between the two
+    second = smc.run(scenario(theirs, plant, **{k: v for k, v in more.items() if k == "model"}))
+    assert second.failure is None
+    for field in ("x", "v", "u", "s"):
+        np.testing.assert_array_equal(getattr(second, field), getattr(first, field))
+
+
+def test_gains_are_the_fmu_s_parameters(folder):
+    path = smc.export_fmu(smc.law("observer_free", lam=4.0, k1=2.0), folder / "gains.fmu", u_max=5.0)
+    template = smc.law_from_fmu(path, isolate=False)
+    assert template.defaults == {"u_max": 5.0, "law_lam": 4.0, "law_k1": 2.0}
+    assert load._pace(template.function) == "every control period; inside, it runs every 0.001 s"
+    with pytest.raises(smc.ScenarioError, match="law_lam"):
+        template(law_lam=-1.0)
+    with pytest.raises(smc.ScenarioError, match="unknown gain of gains 'lam'"):
+        template(lam=1.0)
+    first, second = smc.run(
+        [scenario(smc.law("observer_free", lam=3.0, k1=1.5)), scenario(template(law_lam=3.0, law_k1=1.5))]
+    )
+    np.testing.assert_array_equal(first.u, second.u)
+
+
+def test_an_unbounded_parameter_is_infinite_and_comes_back(folder):
+    path = smc.export_fmu("super_twisting", folder / "free.fmu")
+    template = smc.law_from_fmu(path, isolate=False)
+    assert (template.defaults["u_max"], template.defaults["law_w_max"]) == (np.inf, np.inf)
+    first, second = smc.run([scenario("super_twisting"), scenario(template())])
+    np.testing.assert_array_equal(first.u, second.u)
+
+
+def test_runs_have_instances_of_their_own_which_end_with_them(folder):
+    path = smc.export_fmu("super_twisting", folder / "own.fmu")
+    law = smc.law_from_fmu(path, isolate=False)()
+    one, other, again = smc.run([scenario(law), scenario(law, v0=-0.3), scenario(law)])
+    np.testing.assert_array_equal(one.u, again.u)
+    assert (one.u != other.u).any()
+    gc.collect()
+    assert load._running == {}
+
+
+def test_a_memory_set_to_0_starts_a_new_instance_and_ends_the_old(folder):
+    law = smc.law_from_fmu(smc.export_fmu("super_twisting", folder / "written_again.fmu"), isolate=False)()
+    assert law.function is not None
+    y, gains, memory = Measurement(0.0, 1e-3, 0.5, 0.1, 0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0), gains_of(law), np.zeros(1)
+    first, second = [law.function(y._replace(t=t), gains, memory) for t in (0.0, 1e-3)]
+    assert first != second
+    memory[:] = 0.0
+    assert law.function(y, gains, memory) == first
+    assert len(load._running) == 1
+    del memory
+    assert load._running == {}
+
+
+def test_an_fmu_that_has_one_instance_in_a_process_runs_one_channel(foreign, tmp_path):
+    path = changed(foreign, tmp_path, ("<CoSimulation", '<CoSimulation canBeInstantiatedOnlyOncePerProcess="true"'))
+    law = smc.law_from_fmu(path, **RENAMED, isolate=False)()
+    fine = smc.run([scenario(law), scenario(law)])
+    assert [trace.failure for trace in fine] == [None, None]
+    network = smc.run(scenario(law, "pendulum_network"))
+    assert "FMU 'changed.fmu' can have only one instance in a process" in str(network.failure)
+
+
+def test_another_process_takes_the_law_from_the_file(folder):
+    path = smc.export_fmu("pid", folder / "sent.fmu")
+    law = smc.law_from_fmu(path, isolate=False)()
+    copy = pickle.loads(pickle.dumps(law))
+    assert copy == law
+    first, second = smc.run([scenario(law), scenario(copy)])
+    np.testing.assert_array_equal(first.u, second.u)
+    smc.export_fmu("classical", path)
+    load._extracted.cache_clear()
+    changed = smc.run(scenario(law))
+    assert "FMU 'sent.fmu' is gone or has changed: call smc.law_from_fmu again" in str(changed.failure)
+
+
+# another tool's
+
+
+def expected(trace: smc.Trace, k: float = 8.0) -> np.ndarray:
+    """The commands of fmi2.c, from its equation, every tenth sample; `trace` has no noise."""
+    u, total, held = [], 0.0, 0.0
+    for i in range(len(trace.t)):
+        if i % 10 == 0:
+            e = trace.x[i, 0] - trace.r[i, 0]
+            held = -k * e - 2.0 * trace.v[i, 0] - total
+            total += 0.01 * e
+        u.append(held)
+    return np.array(u)
+
+
+def test_a_foreign_fmu_keeps_its_period_and_its_state(foreign):
+    law = smc.law_from_fmu(foreign, **RENAMED)
+    function = law.function
+    assert isinstance(function, load.FmuLaw)
+    assert dict(function.inputs) == {"x": "Plant.Theta", "v": "omega", "r": "setpoint"}
+    assert (function.outputs, function.period) == (("torque",), 0.01)
+    trace, slower = smc.run(
+        [scenario(law(), noise=None, u_max=100.0), scenario(law(gain_k=3.0), noise=None, u_max=100.0)]
+    )
+    np.testing.assert_allclose(trace.u[:, 0], expected(trace), rtol=1e-14, atol=1e-14)
+    np.testing.assert_allclose(slower.u[:, 0], expected(slower, 3.0), rtol=1e-14, atol=1e-14)
+    assert len(set(trace.u[:, 0])) == 11
+    assert (trace.s == 0.0).all()
+
+
+def test_an_fmu_faster_than_the_law_steps_several_times_a_sample(foreign):
+    law = smc.law_from_fmu(foreign, **RENAMED, isolate=False)()
+    trace = smc.run(scenario(law, noise=None, u_max=100.0, control_period=0.02, physics_step=1e-3, duration=0.2))
+    u, total = [], 0.0
+    for i in range(len(trace.t)):
+        e = trace.x[i, 0] - trace.r[i, 0]
+        u.append(-8.0 * e - 2.0 * trace.v[i, 0] - (total + 0.01 * e))  # the second of two steps
+        total += 0.02 * e
+    np.testing.assert_allclose(trace.u[:, 0], u, rtol=1e-13, atol=1e-13)
+
+
+def test_inputs_that_are_not_real_may_be_held(folder):
+    """FMI 3.0: a Boolean and an Int32. It holds u for 5 samples."""
+    path = helper.fmi3(folder)
+    for held, said in (
+        ({}, "inputs 'enable', 'mode' of servo.fmu mean"),
+        ({"enable": 1}, "input 'mode' of servo.fmu means"),
+    ):
+        with pytest.raises(smc.ScenarioError) as error:
+            smc.law_from_fmu(path, constants=held)
+        assert str(error.value) == (
+            f"{said} nothing that a law measures: hold {'it' if held else 'them'}, "
+            "constants={'mode': 0.0} (--constants mode=0)"
+        )
+    laws = [smc.law_from_fmu(path, constants={"enable": on, "mode": 2}) for on in (1, 0)]
+    trace, off = smc.run([scenario(law(), noise=None, u_max=100.0, reference=None) for law in laws])
+    seen = slice(None, None, 5)
+    total = 0.005 * np.cumsum(trace.x[seen, 0])
+    u = -20.0 * trace.x[seen, 0] - 4.0 * trace.v[seen, 0] - total
+    np.testing.assert_allclose(trace.u[:, 0], np.repeat(u, 5)[: len(trace.u)], rtol=1e-13, atol=1e-13)
+    assert (off.u == 0.0).all()
+
+
+def test_periods_that_do_not_fit_are_said(foreign):
+    law = smc.law_from_fmu(foreign, **RENAMED, isolate=False)()
+    trace = smc.run(scenario(law, control_period=3e-3, physics_step=1e-3))
+    assert "the FMU steps every 0.01 s and the law runs every 0.003 s: give control_period=0.01" in str(trace.failure)
+
+
+@pytest.mark.parametrize(
+    ("mode", "said"),
+    [
+        (1.0, r"the step from t = 0 s died of SIGSEGV"),
+        (2.0, r"the step from t = 0 s did not end within 6 s: fix what it waits for, or give timeout="),
+        (3.0, r"torque is nan after 1 steps: fix the FMU"),
+        (4.0, r"the step from t = 0 s fails \(the licence has ended\)"),
+    ],
+)
+def test_a_trial_says_how_an_fmu_fails(foreign, mode, said):
+    with pytest.raises(smc.ScenarioError, match=rf"^controller\.fmu: {said}") as error:
+        smc.law_from_fmu(foreign, constants={"mode": mode}, timeout=6.0 if mode == 2.0 else 60.0)
+    assert "\n" not in str(error.value)
+
+
+def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
+    law = smc.law_from_fmu(foreign, constants={"mode": 4.0}, isolate=False)()
+    trace, fine = smc.run([scenario(law), scenario("pid")])
+    assert "the step from t = 0 s fails (the licence has ended)" in str(trace.failure)
+    assert fine.failure is None
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        (
+            {},
+            "input 'mode' of controller.fmu means nothing that a law measures: say what it is, variables={'x': 'mode'} "
+            "(--variables x=mode), or hold it, constants={'mode': 0.0} (--constants mode=0)",
+        ),
+        ({"constants": {"mod": 1.0}}, "unknown input of controller.fmu 'mod': did you mean 'mode'?"),
+        ({"variables": {"x": "theta"}}, "unknown input of controller.fmu 'theta': did you mean 'Plant.Theta'?"),
+        ({"variables": {"u": "omega"}}, "unknown output of controller.fmu 'omega': choose from torque"),
+        ({"variables": {"position": "omega"}}, "unknown meaning of a variable 'position'"),
+        ({"variables": ["x"]}, "variables is ['x']: give a dict"),
+        ({"constants": {"mode": "on"}}, "constants['mode'] is 'on': give a number"),
+        ({"constants": {"mode": 0.0}, "period": 0.0}, "period is 0: give a number greater than 0"),
+        ({"constants": {"mode": 0.0}, "timeout": -1.0}, "timeout is -1"),
+        ({"constants": {"mode": 0.0}, "name": "\n"}, "name is '\\n': give a name"),
+    ],
+)
+def test_a_mistake_in_the_call_is_one_sentence(foreign, settings, said):
+    with pytest.raises(smc.ScenarioError) as error:
+        smc.law_from_fmu(foreign, **settings)
+    assert str(error.value).startswith(said.replace("\\.", ".").replace("\\n", "\\n"))
+    assert "\n" not in str(error.value)
+
+
+def changed(foreign: Path, folder: Path, *pairs: tuple[str, str]) -> Path:
+    """The foreign FMU with other words in its description."""
+    about = (helper.HERE / "fmi2.xml").read_text()
+    for old, new in pairs:
+        assert old in about
+        about = about.replace(old, new)
+    path = folder / "changed.fmu"
+    with zipfile.ZipFile(foreign) as old, zipfile.ZipFile(path, "w") as archive:
+        for name in old.namelist():
+            archive.writestr(name, about if name == "modelDescription.xml" else old.read(name))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("pair", "said"),
+    [
+        (("CoSimulation", "ModelExchange"), "changed.fmu is for Model Exchange only: export it for Co-Simulation"),
+        (('fmiVersion="2.0"', FMI1),
+         "changed.fmu is of FMI 1.0"),
+        (('modelIdentifier="controller"', 'modelIdentifier="other"'), "changed.fmu has a binary for "),
+        (("<fmiModelDescription", "<fmi"), "changed.fmu is not an FMU ("),
+        (('name="torque" valueReference="4" causality="output"', 'name="torque" valueReference="4"'),
+         "changed.fmu has no output: export it with the command as an output"),
+        (('name="torque"', 'name="s" valueReference="9" causality="output"><Real/></ScalarVariable>'
+          '<ScalarVariable name="kraft"'), "changed.fmu has no output that is named as a command (s, kraft): "
+         "say which it is, as in variables={'u': 'kraft'} (--variables u=kraft)"),
+        (('name="mode" valueReference="3" causality="input"><Real start="0"/>',
+          'name="mode" valueReference="3" causality="input"><String start=""/>'),
+         "'mode' of changed.fmu is not one number: export it without this input"),
+    ],
+)  # fmt: skip
+def test_an_fmu_that_cannot_be_a_law_is_one_sentence(foreign, tmp_path, pair, said):
+    with pytest.raises(smc.ScenarioError) as error:
+        smc.law_from_fmu(changed(foreign, tmp_path, pair), **RENAMED)
+    assert str(error.value).startswith(said)
+    assert "\n" not in str(error.value)
+
+
+def test_a_file_that_is_no_fmu_is_one_sentence(tmp_path):
+    (tmp_path / "text.fmu").write_text("an FMU")
+    with zipfile.ZipFile(tmp_path / "empty.fmu", "w") as archive:
+        archive.writestr("other.xml", "")
+    for path, said in (
+        (tmp_path / "text.fmu", "text.fmu is not an FMU, as it is no zip archive: give an FMU for Co-Simulation"),
+        (tmp_path / "empty.fmu", "empty.fmu is not an FMU, as there is no modelDescription.xml in it: give an FMU for"),
+        (tmp_path / "none.fmu", f"there is no file '{tmp_path / 'none.fmu'}': give the path of an .fmu file"),
+        (3, "cannot take a law from 3: give the path of an .fmu file"),
+    ):
+        with pytest.raises(smc.ScenarioError) as error:
+            smc.law_from_fmu(path)
+        assert str(error.value).startswith(said)
+
+
+def test_an_fmu_for_another_machine_is_refused_by_its_machines(foreign, tmp_path):
+    path = tmp_path / "windows.fmu"
+    with zipfile.ZipFile(foreign) as old, zipfile.ZipFile(path, "w") as archive:
+        for name in old.namelist():
+            archive.writestr(name.replace(fmpy.platform, "win16"), old.read(name))
+    with pytest.raises(
+        smc.ScenarioError, match=r"windows\.fmu has a binary for win16, and this one is .*: export it for"
+    ):
+        smc.law_from_fmu(path)
+    source = smc.export_fmu("pid", tmp_path / "source.fmu", binary=False)
+    with pytest.raises(smc.ScenarioError, match=r"source\.fmu has a binary for no machine, .*: compile its sources"):
+        smc.law_from_fmu(source)
+
+
+def test_without_fmpy_the_cure_is_said(foreign, monkeypatch):
+    monkeypatch.setitem(sys.modules, "fmpy", None)
+    with pytest.raises(smc.ScenarioError, match=r"smc\.law_from_fmu needs an optional package .*smc-mujoco\[fmu\]"):
+        smc.law_from_fmu(foreign, **RENAMED)
+
+
+def test_the_command_says_what_the_variables_mean(foreign, capsys):
+    with pytest.raises(SystemExit) as end:
+        cli.main(["check-fmu", str(foreign), "--constants", "mode=0", "--variables", "u=torque"])
+    assert not end.value.code
+    lines = capsys.readouterr().out.splitlines()
+    assert lines == [
+        "inputs   Plant.Theta is x, omega is v, setpoint is r",
+        "outputs  torque is u",
+        "held     mode = 0",
+        "step     0.01 s",
+        "gains    gain_k = 8",
+        "controller.fmu passes",
+    ]
+
+
+def test_the_command_ends_in_one_sentence(foreign, capsys):
+    for words, said in (
+        (["--constants", "mode=4"], "controller.fmu: the step from t = 0 s fails (the licence has ended)"),
+        (["--constants", "mode=on"], "--constants: mode is 'on': give a number, as mode=0"),
+    ):
+        with pytest.raises(SystemExit) as end:
+            cli.main(["check-fmu", str(foreign), *words])
+        printed = capsys.readouterr()
+        assert (end.value.code, printed.out) == (2, "")
+        assert printed.err.startswith(f"smc-mujoco: {said}")
+
+
+def test_a_slave_says_which_variable_it_could_not_set(foreign, tmp_path):
+    files = fmpy.extract(str(foreign), str(tmp_path / "files"))
+    made = Slave(files, ["Plant.Theta"], ["torque"], {"gain.k": 5.0, "mode": 0.0})
+    assert made.step([0.5], 0.0, 0.01) == [-2.5]
+    with pytest.raises(Exception, match=r"the step from t = 0.01 s fails \(another step\)"):
+        made.step([0.5], 0.01, 0.02)
+    made.close()
