@@ -24,10 +24,10 @@ from scipy.optimize import minimize
 
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.estimator import estimator
-from smc_mujoco.mechanisms.plants.double_pendulum import LIMIT, MODEL_1_1
 from smc_mujoco.evidence.boards import entries
 from smc_mujoco.evidence.boards.scoring import V2
 from smc_mujoco.evidence.boards.simulator import Case, Machine, _slope, upright
+from smc_mujoco.mechanisms.plants.double_pendulum import LIMIT, MODEL_1_1
 
 BEST = {"acrobot": 8, "pendubot": 4}  # start of the search, of twelve, that led to the best score
 DRIVEN = {"acrobot": 1, "pendubot": 0}

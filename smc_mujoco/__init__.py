@@ -10,11 +10,10 @@
 package costs nothing.
 """
 
-import functools
-import importlib
 import re
 from pathlib import Path
 
+from smc_mujoco.common import annexes
 from smc_mujoco.common.interrupts import held_back
 from smc_mujoco.common.version import __version__ as __version__
 from smc_mujoco.envs import registration
@@ -31,8 +30,6 @@ _MODULES = {  # public modules; three of them need an extra
 }
 __all__ = [*_ORIGINS, "arms", "boards", "paper"]  # noqa: PLE0604  # pyright: ignore[reportUnsupportedDunderAll]
 
-__path__.append(str(Path(__file__).parent / "moved"))  # old names of modules, for one release
-
 
 def __getattr__(name: str) -> object:
     if name == "__spec__":  # read by every further import, such as that of gymnasium.make("smc_mujoco:Duffing-v0")
@@ -41,18 +38,15 @@ def __getattr__(name: str) -> object:
         return _SPEC
     if name not in _ORIGINS and name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = _load(name)  # also where the import of an old module has taken the name, see `moved`
+    value = globals()[name] = _load(name)
     return value
 
 
-@functools.cache
 def _load(name: str) -> object:
-    """Return a public function, class or module; always the same one."""
+    """Return a public function, class or module."""
     with held_back():
-        if name in _MODULES:
-            return importlib.import_module(_MODULES[name])
-        value = getattr(importlib.import_module(_ORIGINS[name]), name)
-        return importlib.import_module("smc_mujoco.common.arguments").explained(value)
+        value = annexes.module(_MODULES.get(name) or _ORIGINS[name], f"smc.{name}")
+        return value if name in _MODULES else getattr(value, name)
 
 
 def __dir__() -> list[str]:

@@ -1,5 +1,5 @@
-import smc_mujoco.studies.arms
 import smc_mujoco.evidence.boards
+import smc_mujoco.studies.arms
 from smc_mujoco.analysis.chattering import Chattering as Chattering
 from smc_mujoco.analysis.chattering import chattering as chattering
 from smc_mujoco.analysis.gains_for import Design as Design
@@ -14,8 +14,6 @@ from smc_mujoco.common.catalogue import PackageWarning as PackageWarning
 from smc_mujoco.common.errors import ScenarioError as ScenarioError
 from smc_mujoco.common.errors import ScenarioWarning as ScenarioWarning
 from smc_mujoco.common.gl import choose_gl as choose_gl
-from smc_mujoco.exchange.c.export import law_to_c as law_to_c
-from smc_mujoco.exchange.c.load import law_from_c as law_from_c
 from smc_mujoco.control.component import GainWarning as GainWarning
 from smc_mujoco.control.design import lqr as lqr
 from smc_mujoco.control.estimator import estimator as estimator
@@ -36,11 +34,26 @@ from smc_mujoco.draw.figure import figure as figure
 from smc_mujoco.draw.film.film import clip as clip
 from smc_mujoco.draw.film.film import film as film
 from smc_mujoco.draw.film.film import still as still
-from smc_mujoco.exchange.live.build import live as live
 from smc_mujoco.draw.notebook import frames as frames
 from smc_mujoco.draw.notebook import show as show
 from smc_mujoco.envs import dm_control_env, gymnasium_env, vector_env
 from smc_mujoco.envs.agent import agent as agent
+from smc_mujoco.evidence.audit.audit import Audit as Audit
+from smc_mujoco.evidence.audit.audit import audit as audit
+from smc_mujoco.evidence.audit.audit import claims as claims
+from smc_mujoco.evidence.audit.verdict import Claim as Claim
+from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.evidence.report import report as report
+from smc_mujoco.evidence.rigs.identify import Identified as Identified
+from smc_mujoco.evidence.rigs.identify import identify as identify
+from smc_mujoco.evidence.rigs.rig import Rig as Rig
+from smc_mujoco.evidence.rigs.rig import rig as rig
+from smc_mujoco.evidence.rigs.rig import rigs as rigs
+from smc_mujoco.exchange.c.export import law_to_c as law_to_c
+from smc_mujoco.exchange.c.load import law_from_c as law_from_c
+from smc_mujoco.exchange.fmu.export import export_fmu as export_fmu
+from smc_mujoco.exchange.fmu.load import law_from_fmu as law_from_fmu
+from smc_mujoco.exchange.live.build import live as live
 from smc_mujoco.mechanisms.custom.plant_from import Channel as Channel
 from smc_mujoco.mechanisms.custom.plant_from import plant_from as plant_from
 from smc_mujoco.mechanisms.fidelity import deviation as deviation
@@ -64,8 +77,6 @@ from smc_mujoco.metrics.catalogue import scores as scores
 from smc_mujoco.metrics.tip import joint_scores as joint_scores
 from smc_mujoco.metrics.tip import tip_scores as tip_scores
 from smc_mujoco.simulation.conditions import condition as condition
-from smc_mujoco.exchange.fmu.export import export_fmu as export_fmu
-from smc_mujoco.exchange.fmu.load import law_from_fmu as law_from_fmu
 from smc_mujoco.simulation.grid import grid as grid
 from smc_mujoco.simulation.initial_states import starts as starts
 from smc_mujoco.simulation.perturbations import Jump as Jump
@@ -93,22 +104,11 @@ from smc_mujoco.simulation.waypoints import Waypoints as Waypoints
 from smc_mujoco.simulation.waypoints import cartesian_path as cartesian_path
 from smc_mujoco.studies.advice import Advice as Advice
 from smc_mujoco.studies.adviser import which as which
-from smc_mujoco.evidence.audit.audit import Audit as Audit
-from smc_mujoco.evidence.audit.audit import audit as audit
-from smc_mujoco.evidence.audit.audit import claims as claims
-from smc_mujoco.evidence.audit.verdict import Claim as Claim
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard
 from smc_mujoco.studies.outcome import Outcome as Outcome
-from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.evidence.report import report as report
 from smc_mujoco.studies.scene import Scene as Scene
 from smc_mujoco.studies.study import study as study
 from smc_mujoco.studies.table import Table as Table
-from smc_mujoco.evidence.rigs.identify import Identified as Identified
-from smc_mujoco.evidence.rigs.identify import identify as identify
-from smc_mujoco.evidence.rigs.rig import Rig as Rig
-from smc_mujoco.evidence.rigs.rig import rig as rig
-from smc_mujoco.evidence.rigs.rig import rigs as rigs
 
 __version__: str
 arms = smc_mujoco.studies.arms

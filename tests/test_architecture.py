@@ -3,6 +3,7 @@
 import ast
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -21,10 +22,10 @@ CATALOGUES = {
 }  # fmt: skip
 # The rooms of the package, each of which imports from itself and from those before it.
 ROOMS = (
-    "common", "mechanisms", "control", "simulation", "metrics", "analysis", "draw", "twins", "studies", "envs",
-    "testing", "cli",
+    "common", "mechanisms", "control", "simulation", "metrics", "analysis", "draw", "studies", "envs", "testing", "cli",
+    "exchange", "evidence",
 )  # fmt: skip
-MOVED = "moved"  # old names of modules, for one release
+ANNEXES = ROOMS[-2:]
 HEAVY = {"numpy", "mujoco", "numba", "scipy", "matplotlib", "mediapy", "dm_control", "PIL", "rich", "typer"}
 
 STUB = ast.parse((PACKAGE / "__init__.pyi").read_text())
@@ -48,10 +49,9 @@ def label(path: Path) -> str:
 
 
 def imported(path: Path) -> set[str]:
-    """Dotted names of our modules that a file imports, anywhere in it, except those only for type checkers."""
-    found, tree = set(), ast.parse(path.read_text())
-    tree.body = [n for n in tree.body if not (isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING")]
-    for node in ast.walk(tree):
+    """Dotted names of our modules that a file imports, anywhere in it."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
         match node:
             case ast.Import():
                 found |= {alias.name for alias in node.names}
@@ -68,9 +68,9 @@ def module(name: str) -> str:
     return name
 
 
-def python(code: str, *, folder: Path = ROOT) -> str:
-    """What a fresh interpreter prints."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+def python(code: str, *, folder: Path = ROOT, path: Path = ROOT) -> str:
+    """What a fresh interpreter prints, which takes the package from `path`."""
+    environment = os.environ | {"PYTHONPATH": str(path)}
     done = subprocess.run(
         [sys.executable, "-B", "-c", code],
         cwd=folder,
@@ -89,7 +89,7 @@ def python(code: str, *, folder: Path = ROOT) -> str:
 
 def test_the_package_has_these_rooms_and_no_other():
     entries = {path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"}
-    assert entries - {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"} == {*ROOMS, MOVED}
+    assert entries - {"__init__.py", "__init__.pyi", "__main__.py", "py.typed"} == {*ROOMS}
 
 
 def test_no_two_files_of_tests_share_a_name():
@@ -102,9 +102,35 @@ def test_a_file_imports_from_its_own_room_and_those_below():
     above = {}
     for path in (path for path in FILES if path.parent != PACKAGE):
         room = path.relative_to(PACKAGE).parts[0]
-        below = ROOMS[: ROOMS.index(room) + 1] if room in ROOMS else (MOVED,)
+        below = ROOMS[: ROOMS.index(room) + 1]
         above[label(path)] = [name for name in sorted(imported(path)) if name.split(".")[0] not in below]
     assert {name: found for name, found in above.items() if found} == {}
+
+
+def test_the_core_works_without_the_annexes(tmp_path):
+    left_out = shutil.ignore_patterns(*ANNEXES, "__pycache__")
+    shutil.copytree(PACKAGE, tmp_path / "smc_mujoco", ignore=left_out)
+    for folder in ("models", "scenes"):
+        shutil.copytree(ROOT / folder, tmp_path / "smc_mujoco" / folder)
+    code = """
+import smc_mujoco as smc
+from smc_mujoco.cli.main import main
+scenarios = smc.grid("duffing", ["classical", "pid"], seeds=2, duration=0.1)
+trace = smc.run(scenarios)[0]
+smc.figure(trace, "figure.png")
+smc.leaderboard(smc.study(scenarios, "study"))
+smc.plot
+for name in "law_to_c law_from_c export_fmu law_from_fmu live audit claims rig identify report boards paper".split():
+    try:
+        getattr(smc, name)
+    except smc.ScenarioError as error:
+        assert f"smc.{name} needs smc_mujoco.e" in str(error), error
+    else:
+        raise AssertionError(name)
+main(["bench", "--plants", "duffing", "--laws", "pid", "--seeds", "1", "--duration", "0.1", "--out", "bench"])
+"""
+    run_without = python(code, folder=tmp_path, path=tmp_path)
+    assert "pid" in run_without
 
 
 def test_no_modules_import_each_other_in_a_circle():
@@ -240,7 +266,7 @@ def test_everything_public_is_explained():
     silent = []
     for path in FILES:
         tree = ast.parse(path.read_text())
-        bare = path.parent.name == "plants" or MOVED in path.relative_to(PACKAGE).parts[:-1]
+        bare = path.parent.name == "plants"
         if (path.name != "__init__.py" or path.stat().st_size) and not (ast.get_docstring(tree) or bare):
             silent.append(label(path))
         for node in public(tree):

@@ -17,7 +17,6 @@ import notation
 from smc_mujoco.cli.law_pages import DEGREES
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import gain_sets
-from smc_mujoco.exchange.c.export import law_to_c
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.docstring import SOURCE, entry
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -26,6 +25,7 @@ from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.control.properties import PROPERTIES, families, reads, searched
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.draw import style
+from smc_mujoco.exchange.c.export import law_to_c
 from smc_mujoco.mechanisms.plant import Plant, model_path
 from smc_mujoco.mechanisms.plant import catalogue as plants
 

@@ -28,7 +28,7 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.units import FORCE
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.grid import DURATION
+from smc_mujoco.simulation.conditions import DURATION
 from smc_mujoco.simulation.scenario import Scenario
 
 RANGE = 1e3  # of size: at most so many times the law's own, and at least the inverse

@@ -22,7 +22,7 @@ import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -39,8 +39,8 @@ from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.metrics.conventions import parts, refuse, scale
 from smc_mujoco.simulation.coerce import REST
-from smc_mujoco.simulation.conditions import Condition
-from smc_mujoco.simulation.grid import DURATION, case, listed
+from smc_mujoco.simulation.conditions import DURATION, Condition
+from smc_mujoco.simulation.grid import case, listed
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.run import stream
@@ -390,12 +390,4 @@ def load(path: str | os.PathLike) -> list[Margin]:
       ScenarioError: no such file, or not a file of margins.
     """
     with reading(path, "file of margins", "give a .json file that margins.save wrote") as file:
-        return [_margin(entry) for entry in read_json(file)]
-
-
-def _margin(entry: dict[str, Any]) -> Margin:
-    """Return the margin in a file. Files of version 0.1 have null for NaN, and "inf"."""
-    fields: dict[str, Any] = {name: math.inf if value == "inf" else value for name, value in entry.items()}
-    if fields["value"] is None:
-        fields["value"] = math.nan
-    return Margin(**fields)
+        return [Margin(**entry) for entry in read_json(file)]

@@ -44,8 +44,8 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import BAND, error, last
-from smc_mujoco.simulation.conditions import Condition, find_condition
-from smc_mujoco.simulation.grid import DURATION, case
+from smc_mujoco.simulation.conditions import DURATION, Condition, find_condition
+from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant

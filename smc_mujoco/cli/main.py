@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.commands import analysis, c, catalogue, fmu, live, rigs, runs, studies
+from smc_mujoco.cli.commands import analysis, catalogue, runs, studies
+from smc_mujoco.common import annexes
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.gl import choose_gl
 from smc_mujoco.common.version import __version__
@@ -27,22 +28,13 @@ COMMANDS = {
     "which": studies.which,
     "tune": analysis.tune,
     "bench": studies.bench,
-    "board": studies.board,
-    "identify": rigs.identify,
-    "replay": rigs.replay,
     "margins": analysis.margins,
     "basin": analysis.basin,
     "chatter": analysis.chatter,
-    "claims": studies.claims,
-    "papers": studies.papers,
-    "report": studies.report,
     "view": runs.view,
-    "live": live.live,
-    "check-c": c.check_c,
-    "export-c": c.export_c,
-    "check-fmu": fmu.check_fmu,
-    "export-fmu": fmu.export_fmu,
 }
+for annex in filter(annexes.installed, annexes.ANNEXES):
+    COMMANDS |= annexes.module(f"smc_mujoco.{annex}.commands", "the command line").COMMANDS
 for name, command in COMMANDS.items():
     app.command(name)(command)
 

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich import box
-from rich.console import Console
-from rich.padding import Padding
 from rich.table import Column, Table
 from rich.text import Text
 
@@ -26,9 +24,7 @@ from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.metrics.tip import tip_scores, worst_joint
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.evidence.audit import verdict as verdicts
 from smc_mujoco.studies.board_tables import size, spread
-from smc_mujoco.evidence.boards.published import RobustnessRow, Row
 from smc_mujoco.studies.leaderboard import Block, Board
 
 if TYPE_CHECKING:
@@ -36,8 +32,6 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.gains_for import Design
     from smc_mujoco.analysis.margins import Margin
     from smc_mujoco.studies.advice import Advice
-    from smc_mujoco.evidence.audit.verdict import Claim
-    from smc_mujoco.evidence.rigs.identify import Identified
 
 MAX_TIP_COLUMNS = 5  # with more, the name of the joint that does most work does not fit into 80 characters
 TIP = {  # columns of a table of an arm's tip and worst joint: heading -> score, unit, factor on its SI value
@@ -70,23 +64,7 @@ BOARD_KEY = (
     "conditions: median of their medians, place by mean rank, how many are won and lost; a winner wins in each. "
     "x, u of driven joints, in rad or m, and N m, N or V"
 )
-BOARDS = {  # board of RealAIGym -> title and headings of columns
-    "simulation": ("simulation", ("up at\ns", "energy\nJ", "torque\nN²m²s", "smooth\nN m", "speed\nrad²/s", "score")),
-    "robustness": (
-        "survived",
-        ("model\n%", "noise\nof v %", "noise\nof u %", "lag\n%", "delay\n%", "blows\n%", "score"),
-    ),
-}
 MIN_INTERVAL_RUNS = 6  # with fewer runs no interval of a median covers 95 %, see `analysis.bootstrap`
-MIN_FIT = -1000.0  # %: a twin with a smaller fit moves away from the record, chosen for the width of a column
-# Verdicts have a colour beside their mark, from a palette for the colour-blind.
-COLOURS = {
-    verdicts.SUPPORTED: "blue",
-    verdicts.PARTLY: "yellow",
-    verdicts.REFUTED: "red",
-    verdicts.NOT_TESTABLE: "dim",
-}
-MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}
 
 
 def titled(title: str, *columns: Column | str, **options: Any) -> Table:
@@ -366,20 +344,6 @@ def _winner_cell(board: Board | None) -> Text:
 # boards and advice
 
 
-def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], own: str) -> Table:
-    """Return RealAIGym's simulation board or robustness board of a robot, with the row named `own` in bold."""
-    tests = isinstance(rows[0], RobustnessRow)
-    title, heads = BOARDS["robustness" if tests else "simulation"]
-    columns = [Column(head, justify="right") for head in heads]
-    table = titled(f"{robot}, {title}, version 2", Column("controller", no_wrap=True), *columns, pad_edge=False)
-    for row in rows:
-        values = row[1:8] if tests else row[1:7]
-        digits = (1,) * 6 + (3,) if tests else (2, 2, 2, 3, 1, 3)
-        cells = [f"{value:.{places}f}" for value, places in zip(values, digits, strict=True)]
-        table.add_row(row.name, *cells, style="bold" if row.name == own else None)
-    return table
-
-
 def advice(found: Advice) -> Table:
     """Return a line for each finalist: its place, how often it settles, its median on each need."""
     law, *others = found.heads
@@ -467,101 +431,3 @@ def tuning(tuned: Tuned) -> Table:
 
 
 # claims
-
-
-def print_claims(claims: Sequence[Claim], console: Console, full: bool) -> None:
-    """Print a table of claims with their verdicts, or each claim in full; then how many have each verdict."""
-    if full:
-        for claim in claims:
-            _print_claim(claim, console)
-    else:
-        console.print(_claims_overview(claims))
-    counts = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in verdicts.VERDICTS}
-    flips = sum(claim.flips for claim in claims)
-    parts = [f"{verdicts.MARKS[verdict]} {count} {verdict}" for verdict, count in counts.items() if count]
-    depend = f" ({flips} of them depend{'s' * (flips == 1)} on the gains)" if flips else ""
-    console.print(Text(", ".join(parts) + depend), highlight=False)
-
-
-def _claims_overview(claims: Sequence[Claim]) -> Table:
-    """Return a table with a line per claim: its verdicts, and the check that decides for the last set of gains."""
-    sets = list(claims[0].verdicts) if claims else []
-    shown = sets if len(sets) > 1 else []
-    table = Table(
-        Column("id", justify="right", style="cyan", no_wrap=True, vertical="top"),
-        Column("claim", ratio=2),
-        Column("verdict", no_wrap=True),
-        *(Column(name, justify="center", no_wrap=True) for name in shown),
-        Column(f"decided by, {sets[-1]} gains" if sets else "decided by", ratio=3),
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        show_edge=False,
-        pad_edge=False,
-    )
-    for claim in claims:
-        one = claim.decisive(sets[-1])
-        marks = [MARKS[claim.verdicts[name]] for name in shown]
-        words = Text(f" {claim.verdict}{', flips' * claim.flips}", style=COLOURS[claim.verdict])
-        decided = str(one) if one else claim.note
-        table.add_row(claim.id, Text(claim.text), MARKS[claim.verdict] + words, *marks, Text(decided))
-    return table
-
-
-def _print_claim(claim: Claim, console: Console) -> None:
-    """Print one claim in full, then a table for each set of gains: its checks, and the numbers beside them."""
-    console.print(Text.assemble((claim.id, "bold cyan"), f"  {claim.text}", (f"  {claim.where}", "dim")))
-    about = plain(Column(style="dim", no_wrap=True), "")
-    parts = {
-        "kind": claim.quantifier,
-        "measured": claim.measured,
-        "holds if": claim.holds_if,
-        "note": claim.note,
-        "verdict": Text(f"{claim.verdict}{', flips with the gains' * claim.flips}", f"bold {COLOURS[claim.verdict]}"),
-    }
-    for label, text in parts.items():
-        if text:
-            about.add_row(label, Text(text) if isinstance(text, str) else text)
-    console.print(Padding(about, (0, 0, 1, 2)))
-    for name, verdict in claim.verdicts.items():
-        columns = Column(no_wrap=True), "", Column(justify="right", no_wrap=True), Column(no_wrap=True)
-        title = Text(f"{name} gains: {verdict}", style=COLOURS[verdict])
-        table = plain(*columns, title=title, title_justify="left")
-        for one in claim.checks(name):
-            mark = Text("✓", COLOURS[verdicts.SUPPORTED]) if one.holds else Text("✗", COLOURS[verdicts.REFUTED])
-            limit = f"{one.relation} {verdicts.measured(one.limit, one.what)}"
-            table.add_row(mark, Text(one.what), verdicts.measured(one.value, one.what), limit)
-        for what, value in claim.beside[name].items():
-            table.add_row("", Text(what, style="dim"), Text(verdicts.measured(value, what), style="dim"), "")
-        console.print(Padding(table, (0, 0, 1, 2)))
-
-
-# rigs
-
-
-def fits(title: str, found: Mapping[str, Mapping[str, float]]) -> Table:
-    """Return the fit of each twin of a record, %; "falls" for one below MIN_FIT."""
-    table = titled(f"{title}: fit, %", "", *(Column(head, justify="right") for head in next(iter(found.values()))))
-    for name, fit in found.items():
-        table.add_row(name, *(f"{value:z.1f}" if value > MIN_FIT else "falls" for value in fit.values()))
-    return table
-
-
-def identified(found: Identified, names: Sequence[str]) -> list[Table]:
-    """Return a table of the quantities found, with standard errors and values before, and one of each record's fit.
-
-    Args:
-      names: of the records.
-    """
-    values = titled(
-        found.rig.label, "quantity", *(Column(head, justify="right") for head in ("value", "±", "before")), ""
-    )
-    for name, value in found.values.items():
-        quantity = found.rig.quantities[name]
-        before = number(found.before.values[name])
-        values.add_row(name, number(value), number(found.errors[name]), before, Text(quantity.unit, "dim"))
-    heads = [Column(head, justify="right") for head in found.fits[0]]
-    fits = titled("fit, % (before)", "record", *heads)
-    for name, fit, before in zip(names, found.fits, found.fits_before, strict=True):
-        # a fit before of less than -999 % is cut to the width of the column
-        fits.add_row(name, *(f"{value:.1f} ({max(before[key], -999.0):.1f})" for key, value in fit.items()))
-    return [values, fits]

@@ -115,10 +115,7 @@ def to_json(data: Any, indent: int | None = None, sort_keys: bool = False) -> st
 
 
 def from_json(text: str) -> Any:
-    """Return the data in a JSON text, with numbers in place of the words of `plain`.
-
-    It also reads NaN and Infinity without quotes, which older files have.
-    """
+    """Return the data in a JSON text, with numbers in place of the words of `plain`."""
     return _restored(json.loads(text))
 
 

@@ -32,7 +32,12 @@ from smc_mujoco.common.rebuild import names_in
 
 PACKAGE = Path(__file__).parents[1]
 BESIDE_PACKAGE = ("models", "scenes")  # folders that lie in the package in a wheel, beside it in a checkout
-PRESENTATION = ("studies/report", "cli")  # folders that show results and do not change them
+PRESENTATION = (
+    "evidence/report",
+    "evidence/commands",
+    "exchange/commands",
+    "cli",
+)  # folders that show results and do not change them
 VERSIONED = {*sys.stdlib_module_names, "numpy", "numba", "scipy", "mujoco"}  # packages identified by their version
 VALUES = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.ndarray)
 VALUES += (tuple, list, set, frozenset, Mapping)
@@ -154,10 +159,8 @@ class _CodePickler(pickle._Pickler):
 
 
 def _as_written(thing: Any) -> Any:
-    """Return the function that the user wrote, without its wrappers: compiled, static, cached or `explained`."""
-    if isinstance(thing, FunctionType):
-        return getattr(thing, "explains", thing)
-    if not isinstance(thing, MethodType | type):
+    """Return the function that the user wrote, without its wrappers: compiled, static or cached."""
+    if not isinstance(thing, FunctionType | MethodType | type):
         for name in ("py_func", "__func__", "__wrapped__"):
             thing = getattr(thing, name, thing)
     return thing

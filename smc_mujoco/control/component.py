@@ -27,7 +27,6 @@ from smc_mujoco.control.units import Gain
 Conditions = Mapping[str, Callable[[SimpleNamespace], bool]]
 Value = float | tuple[float, ...]  # of a gain: one number for all channels, or one for each driven channel
 FINITE = ("", "s", "e")  # what a law brings to 0 in finite time
-RENAMED = {"degree": "relative_degree", "modelled": "requires_model"}  # options in version 0.1 -> present names
 
 
 class Rest(NamedTuple):
@@ -80,16 +79,6 @@ class GainWarning(UserWarning):
     """Gains violate a condition of the law's theorem."""
 
 
-def renamed(old: str, new: str) -> Any:
-    """Return a property that reads the attribute `new` under its old name, with a DeprecationWarning."""
-
-    def read(self: object) -> object:
-        warnings.warn(f"{old} is now {new}: read that", DeprecationWarning, users_frame())
-        return getattr(self, new)
-
-    return property(read)
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Component:
     """A function bound to its gains.
@@ -115,9 +104,6 @@ class Component:
     shared: tuple[str, ...] = ()
     each: "tuple[Component, ...]" = ()
     template: "Template | None" = dataclasses.field(default=None, compare=False, repr=False)
-
-    degree = renamed("degree", RENAMED["degree"])
-    modelled = renamed("modelled", RENAMED["modelled"])
 
     def __repr__(self) -> str:
         return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={written(v)}' for k, v in self.gains.items())])})"
@@ -249,9 +235,6 @@ class Template:
     continuous: bool = False
     finite_time: str = ""
     joint: bool = False
-
-    degree = renamed("degree", RENAMED["degree"])
-    modelled = renamed("modelled", RENAMED["modelled"])
 
     def __repr__(self) -> str:
         gains = "".join(f", {name}={written(gain.default)}" for name, gain in self.gains.items())
@@ -404,10 +387,6 @@ def decorated(kind: str, function: Callable | None, options: Mapping) -> "Callab
       ScenarioError: an option that this kind of component does not have, or that is out of range.
     """
     options = dict(options)
-    for old, new in RENAMED.items():
-        if old in options:
-            warnings.warn(f"{kind}_function's {old} is now {new}: write that", DeprecationWarning, users_frame())
-            options[new] = options.pop(old)
     if foreign := options.keys() - OPTIONS[kind].__optional_keys__:
         raise unknown(f"option of {kind}_function", min(foreign), OPTIONS[kind].__optional_keys__)
     decorate = template(kind, **options)
@@ -471,3 +450,22 @@ def template(
         )
 
     return decorate
+
+
+def parsed_gains(text: str, what: str) -> dict[str, Any]:
+    """Return the gains in a text such as "lam=6,k1=3 5", with two joints' k1. `what` names the text in errors."""
+    parsed: dict[str, Value] = {}
+    for part in filter(None, (p.strip() for p in text.split(","))):
+        name, equals, value = (word.strip() for word in part.partition("="))
+        if name in parsed:
+            raise ScenarioError(f"{what} is {shown(text)}: give {name} once")
+        try:
+            values = tuple(map(float, value.split()))
+        except ValueError:
+            values = ()
+        parsed[name] = values[0] if len(values) == 1 else values
+        if not (equals and name.isidentifier() and values):
+            raise ScenarioError(f"{what} is {shown(text)}: give names and numbers, such as lam=6,k1=3")
+        if any(map(math.isnan, values)):
+            raise ScenarioError(f"{what} is {shown(text)}, and {name} is nan: give it a number")
+    return parsed

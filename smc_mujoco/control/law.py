@@ -18,20 +18,17 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Unpack, overload
 
-from numba import njit, types
-from numba.extending import overload_attribute
+from numba import njit
 
-from smc_mujoco.common import jit
 from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.registry import catalogue_of
 from smc_mujoco.control import joint_law
-from smc_mujoco.control.component import Component, LawOptions, Template, decorated, renamed
+from smc_mujoco.control.component import Component, LawOptions, Template, decorated
 from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 
 Law = Component
-OLD_FIELDS = {"surfaced": "has_surface", "eq": "v_eq"}  # fields of the measurement in version 0.1 -> present names
 
 
 class Measurement(NamedTuple):
@@ -58,29 +55,6 @@ class Measurement(NamedTuple):
     dq: float = 0.0  # its velocity
     fq: float = 0.0  # its nominal q'' = fq + gq u
     gq: float = 0.0
-
-    surfaced = renamed("surfaced", "has_surface")
-    eq = renamed("eq", "v_eq")
-
-
-def _keep_old_field(old: str, new: str) -> None:
-    """Let compiled laws read a field of the measurement under its name in version 0.1, with a DeprecationWarning."""
-
-    def read(y):  # without annotations, which numba compares with those of the result
-        if old in y.fields:  # of other tuples, such as gains
-            i = y.fields.index(old)
-        elif y.instance_class is Measurement:
-            jit.warn(f"y.{old} is now y.{new}: read that")
-            i = y.fields.index(new)
-        else:
-            return None
-        return lambda y: y[i]
-
-    overload_attribute(types.NamedUniTuple, old)(read)
-
-
-for _old, _new in OLD_FIELDS.items():
-    _keep_old_field(_old, _new)
 
 
 @njit

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from smc_mujoco.common.errors import find
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.law import OLD_FIELDS, Measurement, catalogue, laws
+from smc_mujoco.control.law import Measurement, catalogue, laws
 from smc_mujoco.mechanisms.plant import Plant
 
 VELOCITY = {"v", "de", "dq"}  # fields of the measurement that a velocity sensor or an estimator gives
@@ -104,7 +104,7 @@ def _reads(function: object, position: int, seen: set[object]) -> set[str]:
     name, found, known = tree.args.args[position].arg, set(), 0
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == name:
-            found.add(OLD_FIELDS.get(node.attr, node.attr))
+            found.add(node.attr)
             known += 1
         elif isinstance(node, ast.Call):
             for i, argument in enumerate(node.args):

@@ -30,6 +30,7 @@ from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.registry import subclasses
+from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.estimator import estimator
@@ -49,10 +50,14 @@ Fields = Mapping[str, Any]
 Recipe = Fields | Callable[[Plant, float], Fields]  # fields, or a function of plant and duration that returns them
 
 OTHERS = ("plant", "law", "model", "surface", "seed", "duration")  # fields that belong to no condition
-FIELDS = [f.name for f in dataclasses.fields(Scenario) if f.init and f.name not in OTHERS]
+FIELDS = [name for name in Scenario.fields() if name not in OTHERS]
 SEVERAL = ("disturbance", "friction", "actuator")  # fields that add up when conditions are joined
 ABSTRACT = (Part, Friction, Actuator, Drive, Signal, Recorded)  # classes that a text cannot name
 CONSTANTS = {"inf": math.inf, "pi": math.pi}
+
+# The suite's defaults, under which its plants and laws are compared.
+PLANTS = tuple(gain_sets.STUDY)  # the plants of the first paper
+DURATION, CONTROL_PERIOD = 10.0, 1e-3  # s
 
 SINE = Sine(amplitude=0.2, omega=5.0)
 SENSOR_NOISE = Noise(position=0.01, velocity=0.05)

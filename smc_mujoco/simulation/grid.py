@@ -29,13 +29,12 @@ from smc_mujoco.control.law import Law, checked_name
 from smc_mujoco.mechanisms.plant import Plant, as_plant, catalogue
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import REST
-from smc_mujoco.simulation.conditions import Condition, find_condition
+from smc_mujoco.simulation.conditions import CONTROL_PERIOD, DURATION, Condition, find_condition
 from smc_mujoco.simulation.initial_states import SEEDS, Starts
 from smc_mujoco.simulation.model import model, start, with_values
 from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.scenario import U_MAX, Scenario
 
-DURATION, CONTROL_PERIOD = 10.0, 1e-3  # s
 NOTHING: Mapping[str, Any] = frozen({})
 MAX_REST_ACCELERATION = 1e-9  # rad/s^2 or m/s^2; chosen: rounding stays below
 

@@ -1,24 +1,23 @@
-"""Scenarios and traces as notebooks show them."""
+"""Scenarios and traces as notebooks show them.
+
+Their classes import this module, so their types are not named here.
+"""
 
 import dataclasses
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from smc_mujoco.common.html import Html, fields, panel
 from smc_mujoco.mechanisms.plant import Plant
 
-if TYPE_CHECKING:
-    from smc_mujoco.simulation.scenario import Scenario
-    from smc_mujoco.simulation.trace import Trace
-
 SECONDS = ("duration", "control_period", "physics_step", "input_delay")
 MAX_CHANNELS = 8  # of one unit in a panel
 MAX_VALUE = 200  # characters of a value
 
 
-def scenario(s: "Scenario") -> Html:
+def scenario(s: Any) -> Html:
     """Return the fields that a scenario was given, and below them the defaults that it resolves to."""
     defaults = {one.name: one.default for one in dataclasses.fields(s)}
     given = {name: getattr(s, name) for name in defaults if name not in ("plant", "law")}
@@ -37,7 +36,7 @@ def scenario(s: "Scenario") -> Html:
     return fields(words, "Scenario", f"by default: {note}" if note else "")
 
 
-def trace(found: "Trace") -> Html:
+def trace(found: Any) -> Html:
     """Return what was run, how it ended, and small figures of x with its reference, and of u."""
     s = found.scenario
     about = {
@@ -54,7 +53,7 @@ def trace(found: "Trace") -> Html:
     return Html(f"{fields(about, 'Trace')}<div>{''.join(_panels(found))}</div>")
 
 
-def _panels(found: "Trace") -> list[Html]:
+def _panels(found: Any) -> list[Html]:
     """Return a panel of x for each unit, and one of u for each unit of the driven channels."""
     s, plant, panels = found.scenario, found.scenario.plant, []
     for unit in dict.fromkeys(plant.units):
@@ -72,7 +71,7 @@ def _nothing(noise: object) -> bool:
     return dataclasses.is_dataclass(noise) and not any(vars(noise).values())
 
 
-def _words(name: str, value: object, s: "Scenario") -> str:
+def _words(name: str, value: object, s: Any) -> str:
     """Return the value of a scenario's field in words."""
     plant = s.plant
     if isinstance(value, Plant):

@@ -219,6 +219,11 @@ class Scenario:
 
         return notebook.scenario(self)
 
+    @classmethod
+    def fields(cls) -> tuple[str, ...]:
+        """Return the names of the fields that a call may give."""
+        return tuple(field.name for field in dataclasses.fields(cls) if field.init)
+
     def named(self, condition: str | None) -> "Scenario":
         """Return this scenario with a name for its condition. Tables show it; the run is the same."""
         made = copy.copy(self)

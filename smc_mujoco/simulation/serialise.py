@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import importlib
+import importlib.util
 from collections.abc import Sequence
 from importlib.metadata import version
 from typing import TypeVar
@@ -15,7 +16,6 @@ from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import known_laws
-from smc_mujoco.evidence.rigs.controllers import CONTROLLERS
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.custom.plant_from import OwnModel, restored
 from smc_mujoco.mechanisms.hardware import backlash, drives, friction, servos  # noqa: F401  # whose parts a file may name
@@ -30,26 +30,8 @@ from smc_mujoco.simulation.signals import PerChannel, Recorded, Signal
 PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
 DEPENDENT = ("model", "physics_step", "integrator", "velocity", "u_max", "x0", "v0", "reference")  # None where left out
 PARTS = ("friction", "contact", "actuator", "sensor")
-OTHER_LAWS = ("smc_mujoco.evidence.boards.entries",)  # modules with laws that are not in the catalogue
+ELSEWHERE = "smc_mujoco.evidence"  # it has laws that are not in the catalogue, such as those of rigs
 T = TypeVar("T")
-
-# Former name of a module, as files of recorded runs have it -> its present name.
-FORMER_PLACES = {
-    "smc_mujoco.actuators": "smc_mujoco.mechanisms.hardware.drives",
-    "smc_mujoco.backlash": "smc_mujoco.mechanisms.hardware.backlash",
-    "smc_mujoco.contact": "smc_mujoco.mechanisms.hardware.contact",
-    "smc_mujoco.friction": "smc_mujoco.mechanisms.hardware.friction",
-    "smc_mujoco.sensors": "smc_mujoco.mechanisms.hardware.encoder",
-    "smc_mujoco.plants": "smc_mujoco.mechanisms.plants",
-    "smc_mujoco.laws": "smc_mujoco.control.laws",
-    "smc_mujoco.surfaces": "smc_mujoco.control.surfaces",
-    "smc_mujoco.estimators": "smc_mujoco.control.estimators",
-    "smc_mujoco.signals": "smc_mujoco.simulation.signals",
-    "smc_mujoco.references": "smc_mujoco.simulation.signals",
-    "smc_mujoco.simulation.references": "smc_mujoco.simulation.signals",
-    "smc_mujoco.studies.paper": "smc_mujoco.evidence.papers.gaber",
-    "smc_mujoco.series": "smc_mujoco.simulation.time_series",
-}
 
 
 def describe(scenario: Scenario) -> dict:
@@ -106,7 +88,7 @@ def restore(data: dict) -> Scenario:
         "jump": data["jump"] and Jump(**data["jump"]),
     }
     exact = Scenario.recorded(**fields)
-    given = Scenario.recorded(**fields | dict.fromkeys(data.get("left_out", ())))
+    given = Scenario.recorded(**fields | dict.fromkeys(data["left_out"]))
     scenario = given if given == exact else exact  # where this version's defaults differ, keep the recorded values
     return scenario.named(data.get("condition"))
 
@@ -122,7 +104,7 @@ def _restore_plant(data: dict) -> Plant:
     if mjcf := plant.pop("mjcf", None):
         del plant["n"]
         return dataclasses.replace(restored(mjcf, name), parameters=plant)
-    if _present_place(module) != find_plant(name).build.__module__:
+    if module != find_plant(name).build.__module__:
         raise ScenarioError(f"plant {name!r} is not one of the library's: import {module}, which defines it, to run it")
     return find_plant(name, **plant)
 
@@ -139,11 +121,11 @@ def _component(c: Component) -> dict:
 def _restore_law(data: dict) -> Component:
     if "each" in data:
         return by_channel([_restore_law(one) for one in data["each"]])
-    return _find(data, "law", known_laws() | CONTROLLERS | _laws_elsewhere(data["module"]))
+    return _find(data, "law", known_laws() | _laws_elsewhere(data["module"]))
 
 
 def _find(data: dict, kind: str, known: Catalogue[Template]) -> Component:
-    module, template = _present_place(data["module"]), known.get(data["name"])
+    module, template = data["module"], known.get(data["name"])
     named = known.own.values() if template is None else [template]  # one of the library may have been renamed
     there = (one for one in named if one.function.__module__ == module and {*data["gains"]} <= {*one.gains})
     if template := next(there, None):
@@ -160,8 +142,8 @@ def _find(data: dict, kind: str, known: Catalogue[Template]) -> Component:
 
 
 def _laws_elsewhere(module: str) -> dict[str, Template]:
-    """Return the laws of a module of this package outside the catalogue, by name; none of another module."""
-    if module not in OTHER_LAWS:
+    """Return the laws of a module of the evidence annex, by name; none of another module."""
+    if not module.startswith(ELSEWHERE) or not importlib.util.find_spec(ELSEWHERE):
         return {}
     values = vars(importlib.import_module(module)).values()
     return {value.name: value for value in values if isinstance(value, Template)}
@@ -178,7 +160,7 @@ def _signal(signal: Signal) -> dict:
 def _restore_signal(data: dict) -> Signal:
     if "each" in data:
         return PerChannel(tuple(_restore_signal(one) for one in data["each"]))
-    kind, values = _kinds(Signal).get((data["kind"], _present_place(data["module"]))), _values(data)
+    kind, values = _kinds(Signal).get((data["kind"], data["module"])), _values(data)
     return kind(**values) if kind else Recorded(data["kind"], data["module"], values)
 
 
@@ -195,7 +177,7 @@ def _restore_parts(data: dict | Sequence[dict] | None) -> Part | tuple[Part, ...
 
 
 def _restore_part(data: dict) -> Part:
-    kind = _kinds(Part).get((data["kind"], _present_place(data["module"])))
+    kind = _kinds(Part).get((data["kind"], data["module"]))
     if kind is None:
         raise ScenarioError(f"part {data['kind']!r} is unknown here: first import {data['module']}, which defines it")
     return kind(**_values(data))
@@ -219,11 +201,3 @@ def _kinds(base: type[T]) -> dict[tuple[str, str], type[T]]:
 
 def _home(kind: type) -> tuple[str, str]:
     return kind.__name__, kind.__module__
-
-
-def _present_place(module: str) -> str:
-    """Return the present name of a module that a file names."""
-    for former, present in FORMER_PLACES.items():
-        if module == former or module.startswith(f"{former}."):
-            return present + module.removeprefix(former)
-    return module

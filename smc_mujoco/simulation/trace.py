@@ -26,7 +26,6 @@ ARRAYS = ("t", *LOGGED)
 PLANT_DIVERGED = "the plant diverged", "the plant left the finite world"  # how failures begin, now and in old files
 MAX_FAILURE = 500  # characters; chosen
 MAX_TEXT = 2**26  # characters of a scenario in a file, 64 million; chosen
-ADDED_ARRAYS = ("force", "reaction")  # which the oldest files lack, as they hold ideal runs
 KIND = "trace of smc_mujoco", "give the path of a .npz file that a run wrote"
 
 
@@ -268,7 +267,6 @@ def load(path: str | os.PathLike) -> Trace:
     with reading(path, *KIND) as file, zipfile.ZipFile(file) as archive:
         about = from_json(str(_member(archive, "about")))
         end = {key: about.pop(key) for key in ("diverged_at", "failure")}
-        older = "mechanism" not in about
     try:
         scenario = serialise.restore(about)
     except ScenarioError as error:  # names its own cure
@@ -279,10 +277,7 @@ def load(path: str | os.PathLike) -> Trace:
             f"{path} holds no scenario that can be read ({why}): give a file that a run wrote"
         ) from None
     with reading(path, *KIND) as file, zipfile.ZipFile(file) as archive:
-        names = [name for name in ARRAYS if not (older and name in ADDED_ARRAYS)]
-        arrays = {name: _member(archive, name, scenario) for name in names}
-    arrays.setdefault("force", arrays["applied"].copy())
-    arrays.setdefault("reaction", np.where(np.isfinite(arrays["applied"]), 0.0, np.nan))
+        arrays = {name: _member(archive, name, scenario) for name in ARRAYS}
     return Trace(**arrays, scenario=scenario, **end)
 
 

@@ -1,10 +1,13 @@
-"""Boards as tables in HTML and LaTeX: a line for each law, a column for each metric, its median with its interval."""
+"""Boards as tables in HTML and LaTeX: a line for each law, a column for each metric, its median with its interval.
+
+`leaderboard` imports this module, so its class Board is not named here.
+"""
 
 import dataclasses
 import math
 import re
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.paired_runs import SETTLES
@@ -12,9 +15,6 @@ from smc_mujoco.common import html
 from smc_mujoco.common.text import number
 from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE
-
-if TYPE_CHECKING:
-    from smc_mujoco.studies.leaderboard import Board
 
 FIT = r"too wide for a column: \resizebox{\textwidth}{!}{...}, of graphicx, or fewer metrics"
 # A character -> as LaTeX writes it, with any engine.
@@ -54,7 +54,7 @@ def spread(interval: Interval, metric: str) -> str:
     return "–".join(ends) if all(ends) else ""
 
 
-def heading(board: "Board") -> str:
+def heading(board: Any) -> str:
     """Return a metric's label with its unit, if that is known."""
     if board.metric == SETTLES:
         return "settles (%)"
@@ -64,7 +64,7 @@ def heading(board: "Board") -> str:
     return metric.label + (f" ({unit})" if unit not in ("", "1") else "")
 
 
-def as_html(boards: Iterable["Board"]) -> html.Html:
+def as_html(boards: Iterable[Any]) -> html.Html:
     """Return a table for each group of runs, with what each metric's board says below."""
     tables = []
     for name, own in _groups(boards).items():
@@ -75,7 +75,7 @@ def as_html(boards: Iterable["Board"]) -> html.Html:
     return html.Html("<br>".join(tables)) if tables else html.table((), [("no boards: no metric applies",)])
 
 
-def as_latex(boards: Iterable["Board"]) -> str:
+def as_latex(boards: Iterable[Any]) -> str:
     """Return a tabular for each group of runs, below comments that say what it is of."""
     tables = []
     for name, own in _groups(boards).items():
@@ -87,13 +87,13 @@ def as_latex(boards: Iterable["Board"]) -> str:
     return "\n".join(tables)
 
 
-def key(boards: Sequence["Board"]) -> str:
+def key(boards: Sequence[Any]) -> str:
     """Return what the cells of a table show."""
     bold = any(cell.best for cells in _laws(boards).values() for cell in cells)
     return f"medians with {100 * boards[0].level:g} % intervals{'; bold: no law is better' * bold}"
 
 
-def _verdicts(boards: Sequence["Board"]) -> list[str]:
+def _verdicts(boards: Sequence[Any]) -> list[str]:
     """Return what the boards say, each sentence once, with its metrics before it where boards differ."""
     verdicts: dict[str, list[str]] = {}
     for board in boards:
@@ -103,7 +103,7 @@ def _verdicts(boards: Sequence["Board"]) -> list[str]:
     return [f"{', '.join(metrics)}: {verdict}" for verdict, metrics in verdicts.items()]
 
 
-def _groups(boards: Iterable["Board"]) -> dict[str, list["Board"]]:
+def _groups(boards: Iterable[Any]) -> dict[str, list[Any]]:
     """Return the boards of each group of runs, under its name."""
     groups: dict[str, list[Board]] = {}
     for board in boards:
@@ -111,7 +111,7 @@ def _groups(boards: Iterable["Board"]) -> dict[str, list["Board"]]:
     return groups
 
 
-def _laws(boards: Sequence["Board"]) -> dict[str, list[Cell]]:
+def _laws(boards: Sequence[Any]) -> dict[str, list[Cell]]:
     """Return each law's cells, one a board, in the order of the first board."""
     laws: dict[str, list[Cell]] = {}
     for i, board in enumerate(boards):

@@ -12,21 +12,16 @@ from smc_mujoco.common.files import to_json
 from smc_mujoco.mechanisms.custom.mjcf import digest_of
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
-from smc_mujoco.simulation.conditions import NAMED
-from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, find_condition
+from smc_mujoco.simulation.scenario import U_MAX, Scenario
 
 PACKAGE = "smc_mujoco."
 # Fields of a description that do not belong to the condition, but to the plant, the law or the run.
 NO_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions", "condition")
 Hashes = dict[Plant, list[str]]  # of the code and the files of other packages' plants, for runs that are keyed together
-UNRELATED = (
-    "studies/audit",
-    "studies/papers",
-    "draw",
-    "testing",
-    "control/tuned_gains",
-)  # folders that do not affect runs
+UNRELATED = (  # folders that do not affect runs
+    "evidence/audit", "evidence/boards", "evidence/papers", "exchange/live", "draw", "testing", "control/tuned_gains",
+)  # fmt: skip
 MAX_NAME = 60  # characters of a condition's name
 
 
@@ -79,18 +74,17 @@ def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
 
 
 def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
-    """Return the name of the run's condition: the given name, the suite's, or the differences from the nominal one.
+    """Return the name of the run's condition: the given name, or the differences from the nominal one.
 
     Plant, law, initial state, seed and duration do not belong to it. `data` is the result of `described`, if the caller
     has it.
     """
     if scenario.condition:
         return scenario.condition
-    known = _conditions(scenario.plant, scenario.duration)
-    if (text := _compared(data or described(scenario))) in known:
-        return known[text]
-    nominal = json.loads(next(iter(known), "{}"))
-    changed = [name for name, value in json.loads(text).items() if nominal.get(name) != value]
+    text, nominal = _compared(data or described(scenario)), _nominal(scenario.plant, scenario.duration)
+    if text == nominal:
+        return "nominal"
+    changed = [name for name, value in json.loads(text).items() if json.loads(nominal).get(name) != value]
     differ = [name for name in changed if getattr(scenario, name) is not None]  # the rest are defaults
     name = ", ".join(f"{name}={' '.join(repr(getattr(scenario, name)).split())}" for name in differ)
     return name if len(name) <= MAX_NAME else f"{name[:MAX_NAME]}... {hashlib.sha256(text.encode()).hexdigest()[:6]}"
@@ -132,17 +126,11 @@ def _compared(data: dict[str, Any]) -> str:
 
 
 @functools.lru_cache(maxsize=256)
-def _conditions(plant: Plant, duration: float) -> dict[str, str]:
-    """Return description -> name of the suite's conditions on a plant, the nominal one first."""
-    found: dict[str, str] = {}
-    common: dict[str, Any] = {"plant": plant, "law": "none", "duration": duration}
-    common["control_period"] = scenarios.CONTROL_PERIOD
+def _nominal(plant: Plant, duration: float) -> str:
+    """Return the description of the nominal condition on a plant; that of no field where it does not fit the plant."""
+    common: dict[str, Any] = {"plant": plant, "law": "none", "duration": duration, "control_period": CONTROL_PERIOD}
     if not plant.limits:  # else its motors bound u
-        common["u_max"] = scenarios.U_MAX
-    for name in NAMED:
-        # ScenarioError: the condition does not fit this plant, or runs as short as this.
-        # `recorded`: the scenario will not be run, so x0 may be outside a joint's range.
-        with contextlib.suppress(ScenarioError):
-            scenario = Scenario.recorded(**common | scenarios.fields(name, plant, duration))
-            found.setdefault(_compared(described(scenario)), name)
-    return found
+        common["u_max"] = U_MAX
+    with contextlib.suppress(ScenarioError):  # `recorded`: x0 may be outside a joint's range, as this is not run
+        return _compared(described(Scenario.recorded(**common | find_condition("nominal").on(plant, duration))))
+    return "{}"

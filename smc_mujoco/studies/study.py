@@ -20,12 +20,12 @@ from smc_mujoco.common.errors import ScenarioError, find, printable, shown
 from smc_mujoco.common.progress import counter
 from smc_mujoco.control.gain_sets import LAWS
 from smc_mujoco.control.law import checked_name
+from smc_mujoco.simulation.conditions import DURATION, PLANTS
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import executors, run_key, saved_traces
 from smc_mujoco.studies.executors import Batch, Outcome
-from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.studies.store import Store
 from smc_mujoco.studies.table import Table
 
@@ -40,11 +40,11 @@ REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
 class Extent:
     """The grid of a study; its fields are arguments of `grid`."""
 
-    plants: tuple[str, ...] = paper.PLANTS
+    plants: tuple[str, ...] = PLANTS
     laws: tuple[str, ...] = LAWS
     conditions: tuple[str, ...]
     seeds: int
-    duration: float = paper.DURATION
+    duration: float = DURATION
 
 
 FULL = Extent(conditions=IDEAL + REAL, seeds=20)

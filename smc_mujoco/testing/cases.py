@@ -5,8 +5,7 @@ from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.mechanisms.plant import catalogue as plants
-from smc_mujoco.simulation.conditions import find_condition
-from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.simulation.conditions import PLANTS, find_condition
 
 EXAMPLE = '@pytest.mark.smc(plants=["duffing"], conditions=["nominal", "noise"])'
 
@@ -28,7 +27,7 @@ def cases(given: Sequence[object], named: Mapping[str, object], arguments: Colle
         if name not in ("plants", "conditions"):
             raise unknown("argument of marker smc", name, ("plants", "conditions"))
     wanted = {
-        "plant": _names("plant", named.get("plants", list(scenarios.GAINS)), plants()),
+        "plant": _names("plant", named.get("plants", list(PLANTS)), plants()),
         "condition": _conditions(named.get("conditions", ["nominal"])),
     }
     for argument, plural in (("plant", "plants"), ("condition", "conditions")):

@@ -11,12 +11,11 @@ from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.metrics.catalogue import score, scores
 from smc_mujoco.metrics.channel_groups import groups
 from smc_mujoco.metrics.conventions import CATALOGUE
-from smc_mujoco.simulation.conditions import Condition, find_condition
+from smc_mujoco.simulation.conditions import DURATION, Condition, find_condition
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, Step
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.testing.limits import bound, judge, quantity, without_frames
 
 IN_REPR = ("settling_time", "overshoot", "tv_rate")  # metrics in the repr of a response
@@ -174,8 +173,8 @@ def respond(
     """
     given = dict(fields or {})
     for name in given:
-        if name not in scenarios.FIELDS:
-            raise unknown("field of a Scenario", name, scenarios.FIELDS)
+        if name not in Scenario.fields():
+            raise unknown("field of a Scenario", name, Scenario.fields())
     if "reference" in given:
         raise ScenarioError(f"reference is {shown(given['reference'])}: leave it out, as it is the step of {step}")
     if isinstance(law, Callable) and not isinstance(law, Template):
@@ -185,7 +184,7 @@ def respond(
         raise ScenarioError("step is 0: give the height of the step in rad or m, such as 0.2")
     chosen = find_condition(condition)
     plant = as_plant(plant)
-    conditions = chosen.on(plant, number("duration", given.get("duration", scenarios.DURATION)))
+    conditions = chosen.on(plant, number("duration", given.get("duration", DURATION)))
     start = {"x0": 0.0, "reference": Step(height)}
     if plant.rest:
         start = {"x0": plant.rest, "reference": [Constant(x + height) for x in plant.rest[: plant.driven]]}

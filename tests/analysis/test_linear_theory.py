@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 import smc_mujoco as smc
 from smc_mujoco.analysis import linear_theory, linearisation
 from smc_mujoco.control import gain_sets as gains
-from smc_mujoco.metrics.catalogue import steady_error
 from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.metrics.catalogue import steady_error
 
 H = 1e-3  # s, control period
 SMALL = 1e-4  # of the plant's x0: there tanh is linear to 1e-8

@@ -20,11 +20,11 @@ from smc_mujoco.analysis.ranking import SEEDS, Rank, compare, friedman, holm
 from smc_mujoco.analysis.ranking import ranks as places
 from smc_mujoco.cli.tables import leaderboard as leaderboard_table
 from smc_mujoco.common.errors import ScenarioError, find
+from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.metrics.catalogue import metrics as every_metric
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies import run_key
 from smc_mujoco.studies.leaderboard import METRICS, Board, leaderboard
-from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.studies.study import study as run_study
 
 INF = math.inf

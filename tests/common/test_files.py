@@ -20,9 +20,9 @@ from smc_mujoco.analysis.region_of_attraction import Basin
 from smc_mujoco.analysis.region_of_attraction import load as load_map
 from smc_mujoco.analysis.tuning import result
 from smc_mujoco.common.files import from_json, plain, reading, replacing, to_json
-from smc_mujoco.simulation import serialise
 from smc_mujoco.evidence.audit.audit import document
 from smc_mujoco.evidence.audit.verdict import Claim
+from smc_mujoco.simulation import serialise
 from smc_mujoco.studies.cache import cached
 from smc_mujoco.testing import golden
 

@@ -15,9 +15,9 @@ from smc_mujoco.cli.main import main
 from smc_mujoco.common import catalogue
 from smc_mujoco.common.errors import find
 from smc_mujoco.control import estimator, gain_sets, joint_law, law, surface
+from smc_mujoco.evidence.audit import paper
 from smc_mujoco.mechanisms import plant
 from smc_mujoco.studies import run_key, scene
-from smc_mujoco.evidence.audit import paper
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "my_smc_package"

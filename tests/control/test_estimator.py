@@ -10,8 +10,8 @@ from scipy.signal import savgol_coeffs
 import smc_mujoco as smc
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.estimator import Reading, catalogue
-from smc_mujoco.simulation import reference
 from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.simulation import reference
 
 H = 1e-3  # s
 FROM_POSITION = [name for name in smc.estimators() if name != "measured"]

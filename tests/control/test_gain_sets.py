@@ -10,8 +10,8 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.units import FORCE
-from smc_mujoco.simulation import grid
 from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.simulation import grid
 
 TUNINGS = [
     (name, plant, seed) for name, plant in itertools.product(gains.OBJECTIVES, scenarios.PLANTS)

@@ -13,8 +13,8 @@ from helpers.plants_ab import called, constant, measured, plant_a, plant_b, plan
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import catalogue
-from smc_mujoco.metrics.catalogue import ultimate_bound
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
+from smc_mujoco.metrics.catalogue import ultimate_bound
 
 LAWS = pytest.mark.parametrize("name", smc.laws())
 ACTING = pytest.mark.parametrize("name", [name for name in smc.laws() if name != "none"])

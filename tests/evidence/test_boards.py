@@ -8,11 +8,11 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
-from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1
 from smc_mujoco.evidence import boards
 from smc_mujoco.evidence.boards import entries, simulator
 from smc_mujoco.evidence.boards.scoring import VERSIONS, of_arrays
 from smc_mujoco.evidence.boards.simulator import Case, Machine
+from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1
 
 ROBOTS = pytest.mark.parametrize("robot", boards.ROBOTS)
 ROWS = [

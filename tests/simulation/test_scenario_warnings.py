@@ -6,8 +6,8 @@ import math
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.simulation import serialise
 from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.simulation import serialise
 
 PENDULUM = smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01)
 DEGREES = [

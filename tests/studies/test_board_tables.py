@@ -14,11 +14,11 @@ from rich.console import Console
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.cli import tables
 from smc_mujoco.common.errors import ScenarioError, find
+from smc_mujoco.evidence.report import words
 from smc_mujoco.studies import board_tables
 from smc_mujoco.studies.advice import _interval
 from smc_mujoco.studies.board_tables import TEX, spread
 from smc_mujoco.studies.leaderboard import Boards, leaderboard
-from smc_mujoco.evidence.report import words
 
 EVIL = r"50 % & <b>x_1^{2}</b> \ λ = 2 #~$"
 LAWS = (EVIL, "second", "third")

@@ -16,10 +16,10 @@ import pytest
 from helpers.runs import fails_late
 
 import smc_mujoco as smc
+from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.studies import executors, run_key
-from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.studies.study import study
 
 ROOT = Path(__file__).parents[2]

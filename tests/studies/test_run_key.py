@@ -16,11 +16,11 @@ from helpers import runs
 
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
+from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.mechanisms.plant import Variant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.studies.study import condition, key
 
 ROOT = Path(__file__).parents[2]

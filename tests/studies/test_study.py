@@ -13,11 +13,11 @@ from helpers.runs import fails_late
 
 import smc_mujoco as smc
 from smc_mujoco.cli.commands.studies import bench
+from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.model import check_starts
 from smc_mujoco.studies import executors, run_key, saved_traces, store
-from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.studies.study import condition, study
 from smc_mujoco.studies.table import Table
 

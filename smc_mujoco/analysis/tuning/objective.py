@@ -29,8 +29,7 @@ from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics import catalogue as metrics
-from smc_mujoco.simulation.conditions import NAMED, Condition, find_condition
-from smc_mujoco.simulation.grid import CONTROL_PERIOD
+from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, Condition, find_condition
 from smc_mujoco.simulation.initial_states import SEEDS, Starts
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -141,8 +140,8 @@ class Objective:
 
 
 def restore(data: Mapping[str, Any]) -> Objective:
-    """Return the objective that `Objective.describe` wrote. Old files have no starts and get the default ones."""
-    starts = dict(data.get("starts", {}))
+    """Return the objective that `Objective.describe` wrote."""
+    starts = dict(data["starts"])
     if starts.get("x0") is not None:
         starts["x0"] = tuple(starts["x0"])
     return Objective(**dict(data) | {"conditions": tuple(data["conditions"]), "starts": Starts(**starts)})

@@ -29,13 +29,11 @@ unchanged. A law without the model takes g as 1, so it treats forces and acceler
 
 import dataclasses
 import math
-import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, users_frame
-from smc_mujoco.control import units
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.component import Component, written
 from smc_mujoco.control.units import FORCE, Gain, Unit
 from smc_mujoco.mechanisms.plant import Plant
@@ -48,30 +46,10 @@ ROUNDING = 1e-3  # of a gain: twice the largest error of four digits
 Box = Mapping[str, tuple[float, float]]  # gain -> lowest, highest
 
 
-# Deprecated: law -> gain -> its unit, or None if it is held. In version 0.1 the units of all laws were here.
-SCALES: dict[str, Mapping[str, Unit | Callable[[Mapping[str, float]], Unit] | None]] = {}
-
-
-def __getattr__(name: str) -> object:
-    """Return a unit that was in this module in version 0.1."""
-    if name not in units.__dict__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    warnings.warn(f"{__name__}.{name} is now in {units.__name__}: import it from there", DeprecationWarning, 2)
-    return getattr(units, name)
-
-
 def _gain(law: Component, name: str) -> Gain:
     """Return a law's gain with its unit, which may depend on the law's exponents."""
     known = law.template.gains if law.template else {}
     gain = known.get(name, Gain(law.gains[name]))
-    old = SCALES.get(law.name, {})
-    if name in old and gain.unit is None and not gain.held:
-        cure = f'write gains={{"{name}": Gain({gain.default:g}, ...)}} in its decorator'
-        warnings.warn(
-            f"SCALES[{law.name!r}] will be removed in the next release: {cure}", DeprecationWarning, users_frame()
-        )
-        entry = old[name]
-        return Gain(gain.default, entry(law.gains) if callable(entry) else entry, held=entry is None)
     return dataclasses.replace(gain, unit=gain.unit_at(law.gains))
 
 

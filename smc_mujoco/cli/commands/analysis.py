@@ -11,7 +11,11 @@ from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import held_back
 
-QUICK = {"plants": ["inverted_pendulum", "duffing"], "kinds": ["delay", "disturbance"]}  # of `margins --quick`
+QUICK = {  # of `margins --quick`
+    "plants": ["inverted_pendulum", "duffing"],
+    "laws": ["observer_free", "classical", "adaptive", "super_twisting"],
+    "kinds": ["delay", "disturbance"],
+}
 
 
 @errors_as_sentences()
@@ -125,15 +129,15 @@ def margins(
         from smc_mujoco.common.files import ended, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
-        from smc_mujoco.evidence.papers.gaber import scenarios
+        from smc_mujoco.simulation.conditions import PLANTS
 
     json, terminal = options.json_file(json)
     if out:
         writable(ended(out, ".csv"))
     if json:
         writable(ended(json, ".json"))
-    machines = [options.plant(text) for text in plants or (QUICK["plants"] if quick else scenarios.PLANTS)]
-    chosen = [options.law(text) for text in options.names(laws, scenarios.LAWS if quick else gain_sets.LAWS)]
+    machines = [options.plant(text) for text in plants or (QUICK["plants"] if quick else PLANTS)]
+    chosen = [options.law(text) for text in options.names(laws, QUICK["laws"] if quick else gain_sets.LAWS)]
     kind = options.names(kinds, QUICK["kinds"] if quick else KINDS)
     with bar("margins") as drawn:
         start = options.starts(x0, None)

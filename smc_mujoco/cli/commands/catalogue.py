@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 @errors_as_sentences()
 def list_() -> None:
-    """List plants, laws, surfaces, velocity estimators, scenes, and the conditions of the paper's study.
+    """List plants, laws, surfaces, velocity estimators, scenes, and conditions.
 
     The line about an entry of another installed package ends with the name of that package, in brackets.
     """
@@ -23,8 +23,8 @@ def list_() -> None:
         from smc_mujoco.cli import law_pages, tables
         from smc_mujoco.common.catalogue import Catalogue
         from smc_mujoco.mechanisms.plant import catalogue as plants
+        from smc_mujoco.simulation.conditions import NAMED
         from smc_mujoco.studies import scene
-        from smc_mujoco.evidence.papers.gaber import scenarios
 
     def first_line(doc: str | None) -> str:
         return (doc or "").strip().partition("\n")[0].rstrip(":")  # a colon where a formula follows
@@ -37,7 +37,7 @@ def list_() -> None:
     for title, templates in law_pages.CATALOGUES.items():
         lists[title] = listed(templates(), lambda template: template.doc)
     lists["Scenes, for smc-mujoco run"] = listed(scene.scenes(), scene.question)
-    lists["Conditions, for smc.paper.comparison(plant, condition)"] = [("", ", ".join(scenarios.CONDITIONS))]
+    lists["Conditions"] = [("", ", ".join(NAMED))]
     terminal = Terminal()
     for title, rows in lists.items():
         terminal.print(tables.catalogue(title, rows), "")

@@ -202,7 +202,7 @@ def law_with(text: str, gains: str) -> "Law":
     Raises:
       ScenarioError: an unknown law, a file without a law or with several, or bad gains.
     """
-    from smc_mujoco.exchange.c.load import parsed_gains
+    from smc_mujoco.control.component import parsed_gains
     from smc_mujoco.control.law import law as find
 
     values = parsed_gains(gains, "--gains")

@@ -1,4 +1,4 @@
-"""smc-mujoco which, bench, board, claims, papers, report: questions that many runs of many laws answer."""
+"""smc-mujoco which, bench: questions that many runs of many laws answer."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -148,13 +148,12 @@ def bench(
     """
     with held_back():
         from smc_mujoco.cli import tables
+        from smc_mujoco.common import annexes
         from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.studies.leaderboard import leaderboard
         from smc_mujoco.studies.study import FULL, QUICK, study
-        from smc_mujoco.evidence.rigs import ensemble
-        from smc_mujoco.evidence.rigs.rig import rig as find_rig
 
-    terminal, size = Terminal(), QUICK if quick else FULL
+    terminal, size, ensemble = Terminal(), QUICK if quick else FULL, None
     count, length = seeds or size.seeds, size.duration if duration is None else duration
     begin = options.starts(x0, spread)
     if rig is not None:
@@ -164,14 +163,16 @@ def bench(
                 "--condition and --gains"
             )
         chosen = None if laws is None else [options.law(text) for text in options.names(laws)]
-        scenarios = ensemble.runs(find_rig(rig), chosen, count, "default", length, begin)
+        ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
+        machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
+        scenarios = ensemble.runs(machine, chosen, count, "default", length, begin)
         used = options.gains_used(chosen or (), "default")
     else:
         scenarios, used = _grid(size, plants, laws, conditions, condition, count, gains or "tuned", length, begin)
     table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)
     boards = leaderboard(table)
     terminal.print(tables.leaderboard(boards))
-    if rig is not None:
+    if ensemble:
         terminal.note(ensemble.verdict(boards))
     failed = len(table) - table.data["failure"].null_count
     runs = f"{len(table)} run{'s' * (len(table) != 1)}, {failed} of them failed"
@@ -202,243 +203,3 @@ def _grid(
     chosen = general_laws(machines, gains) if laws == "all" else [options.law(text) for text in chosen]
     found = options.conditions(options.names(conditions, usual), own)
     return grid(machines, chosen, found, seeds, gains, duration, starts), options.gains_used(chosen, gains)
-
-
-@errors_as_sentences()
-def board(
-    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="acrobot or pendubot.")],
-    robustness: Annotated[
-        bool, typer.Option(help="Whether to run the robustness test too: 722 machines, some 10 s.")
-    ] = True,
-    figure: Annotated[Path | None, typer.Option(help="Also draw the run, as FIGURE.svg and FIGURE.png.")] = None,
-    film: Annotated[Path | None, typer.Option(help="Also film the run, to a .mp4 file.")] = None,
-) -> None:
-    """Show RealAIGym's board of a robot, with this package's sliding-mode entry among the published rows.
-
-    The task: swing the double pendulum up from rest and balance it, with one motor of 6 N m at the shoulder (pendubot)
-    or at the elbow (acrobot), in 10 s. Less is better in every criterion, more in the score. For your own law use
-    smc.boards, see docs/boards.md.
-
-    Example: smc-mujoco board acrobot --figure acrobot --film acrobot.mp4
-    """
-    with held_back():
-        from smc_mujoco.cli import tables
-        from smc_mujoco.cli.scene import filmed
-        from smc_mujoco.common.errors import ScenarioError
-        from smc_mujoco.common.files import writable
-        from smc_mujoco.common.progress import bar
-        from smc_mujoco.simulation.run import run
-        from smc_mujoco.evidence import boards
-
-    terminal = Terminal()
-    scenario = boards.entry(robot)
-    if figure:
-        writable(figure)
-    if film:
-        if film.suffix != ".mp4":
-            raise ScenarioError(f"cannot film to {film.name!r}: end the name in .mp4")
-        writable(film)
-    trace, found = run(scenario), None
-    terminal.print(tables.board(robot, boards.board(trace), boards.NAME))
-    if robustness:
-        with bar(f"robustness of {robot}") as drawn:
-            found = boards.robustness(scenario, drawn.reached)
-        terminal.print(tables.board(robot, boards.robustness_board(robot, found), boards.NAME))
-    terminal.note(f"{boards.verdict(robot, trace, found)}.\n", "bold", wrap=True)
-    terminal.note(f"published rows: {boards.SOURCE}; {terminal.seconds:.0f} s", "dim", wrap=True)
-    title = f"{robot.capitalize()}: swing-up and balance"
-    if figure:
-        from smc_mujoco.draw.figure import figure as draw
-        from smc_mujoco.draw.page import files
-
-        draw([trace], figure, title=title)
-        terminal.wrote(*files(figure))
-    if film:
-        terminal.wrote(*filmed([trace], film, None, title, terminal))
-
-
-@errors_as_sentences()
-def claims(
-    ids: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="ID", help="Numbers of claims, as 3 18; by default all.", show_default=False),
-    ] = None,
-    gains: Annotated[str | None, typer.Option(help="Sets of gains, as a,b; default all of the paper's.")] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Coarser grids and shorter runs, as each claim says; one set of gains.")
-    ] = False,
-    paper: Annotated[
-        str | None,
-        typer.Option(metavar="NAME|FOLDER", help="A paper of `smc-mujoco papers`, or a folder; default Gaber's."),
-    ] = None,
-    table: Annotated[
-        Path | None, typer.Option(help="results.parquet of `smc-mujoco bench`; its runs are not repeated.")
-    ] = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON document instead of tables, like --json - elsewhere.")
-    ] = False,
-    out: Annotated[Path | None, typer.Option(help="Also write that JSON document to a file.")] = None,
-    evidence: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.json", help="Also write claims, runs, numbers, thresholds and verdicts, sealed."),
-    ] = None,
-    badge: Annotated[
-        Path | None, typer.Option(metavar="FILE.svg", help="Also write a badge with the number of claims by verdict.")
-    ] = None,
-    mutants: Annotated[
-        bool,
-        typer.Option(
-            "--mutants",
-            help="Check that the audit can fail: list claims that no broken law loses. Exit code 1 if there are any.",
-        ),
-    ] = False,
-    threads: options.Threads = None,
-) -> None:
-    """Audit a paper's claims: measure each against the threshold that was fixed for it before any run.
-
-    Under a set of gains a claim is supported if all its sentences hold, refuted if none does, and partly supported
-    otherwise. If the verdict depends on the set of gains, the table says so. One counter-example refutes a universal
-    claim. Claims that you name are shown in full, with every check. All of Gaber's, the default, take minutes.
-
-    The file of --evidence has the hashes of each claim's runs, their numbers, thresholds and verdicts, and a seal. A
-    second audit with the same versions writes the same file, to the last bit.
-
-    Example: smc-mujoco claims 3 18 --gains tuned
-
-    Example: smc-mujoco claims --paper ./my_paper --evidence evidence.json --badge badge.svg
-    """
-    with held_back():
-        from smc_mujoco.cli import tables
-        from smc_mujoco.common.errors import ScenarioError
-        from smc_mujoco.common.files import ended, replacing, writable
-        from smc_mujoco.common.progress import bar
-        from smc_mujoco.evidence.audit.audit import DEFAULT, audit, document, evaluations
-        from smc_mujoco.evidence.audit.paper import paper as find_paper
-        from smc_mujoco.studies.table import Table
-        from smc_mujoco.testing import mutants as testing
-
-    terminal = Terminal()
-    about = find_paper(paper or DEFAULT)
-    sets = None if gains is None else options.names(gains)
-    known = None if table is None else Table.read(table)
-    if evidence and known:
-        raise ScenarioError("--evidence needs runs that the audit makes itself: leave out --table")
-    if mutants and json:
-        raise ScenarioError("--mutants prints sentences: leave out --json")
-    for file, ending in ((out, ""), (evidence, ".json"), (badge, ".svg")):
-        if file:
-            writable(ended(file, ending) if ending else file)
-    with bar("claims", evaluations(ids or None, sets, quick, about), counted=True) as drawn:
-        done = audit(about, ids or None, sets, quick, threads, table=known, report=drawn.advance)
-    found = done.claims
-    written = [one for one in (evidence and done.save(evidence), badge and done.badge(badge)) if one]
-    text = document(found)
-    if out:
-        with replacing(out) as file:
-            file.write_text(text + "\n", encoding="utf-8")
-        written.append(out)
-    if json:
-        print(text)
-        return
-    tables.print_claims(found, terminal, full=bool(ids))
-    kept: dict[str, str] = {}
-    if mutants:
-        with bar("mutants", testing.evaluations(about, ids or None, sets, quick), counted=True) as drawn:
-            kept = testing.survivors(about, ids or None, sets, quick, threads, drawn.advance)
-        terminal.note(
-            "\n".join(
-                [f"claim {id} is {why}" for id, why in kept.items()]
-                or ["Every claim is lost by a mutant of its law, or says why it cannot be."]
-            )
-        )
-        asked = [about.claims[claim.id] for claim in found]
-        for entry in [entry for entry in asked if entry.immune]:
-            terminal.note(f"claim {entry.id} cannot be lost: {entry.immune}", wrap=True)
-    notes = [f"{terminal.seconds:.0f} s", "quick: coarser grids than the claims say" * quick]
-    notes.append(f"wrote {printable(', '.join(map(str, written)))}" if written else "")
-    terminal.note("; ".join(filter(None, notes)), "dim")
-    if kept:
-        raise SystemExit(1)
-
-
-@errors_as_sentences()
-def papers(
-    new: Annotated[
-        Path | None,
-        typer.Option("--new", metavar="FOLDER", help="Write a template of your own paper into a folder."),
-    ] = None,
-    check: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.json", help="Check the seal of a file that `smc-mujoco claims --evidence` wrote."),
-    ] = None,
-) -> None:
-    """List the papers whose claims `smc-mujoco claims --paper NAME` audits, begin your own, or check evidence.
-
-    A paper is a folder with paper.toml, its claims and their thresholds, and claims.py, a function for each claim.
-
-    Example: smc-mujoco papers --new my_paper && smc-mujoco claims --paper ./my_paper
-    """
-    with held_back():
-        from smc_mujoco.cli import tables
-        from smc_mujoco.evidence.audit import evidence, paper
-
-    terminal = Terminal()
-    if new:
-        terminal.wrote(*paper.new(new))
-    if check:
-        data = evidence.check(check)
-        counts = ", ".join(f"{count} {verdict}" for verdict, count in data["counts"].items())
-        terminal.note(f"the seal is whole: {data['paper']['authors']}, {data['paper']['title']}: {counts}", wrap=True)
-    if new or check:
-        return
-    lines = {name: f"{one.authors}: {one.title} ({len(one.claims)} claims)" for name, one in paper.papers().items()}
-    rows = [(name, tables.with_package(line, paper.catalogue().package(name))) for name, line in lines.items()]
-    terminal.print(tables.catalogue("Papers, for smc-mujoco claims --paper", rows))
-
-
-@errors_as_sentences()
-def report(
-    quick: Annotated[bool, typer.Option("--quick", help="A small report, in two minutes: less of everything.")] = False,
-    out: Annotated[Path, typer.Option(help="Folder for the report and its data.")] = Path("report"),
-    seeds: Annotated[
-        int | None, typer.Option(min=1, help="Seeds of every cell of the grid. With fewer than 16 no law can win.")
-    ] = None,
-    records: Annotated[
-        Path | None,
-        typer.Option(help="Folder with records of rigs, CSV or npz, which are shown beside their twins; see identify."),
-    ] = None,
-    laws: Annotated[
-        str | None,
-        typer.Option(help="Further laws, as a,b, beside the study's; each needs tuned gains on the study's plants."),
-    ] = None,
-    paper: Annotated[
-        str | None,
-        typer.Option(metavar="NAME|FOLDER", help="Instead of the study, audit a paper of `smc-mujoco papers`."),
-    ] = None,
-    threads: options.Threads = None,
-) -> None:
-    """Compute the whole study, in about 20 minutes, and write it as one HTML file: which controller, where, how sure.
-
-    The report has the grid of plants, laws, conditions and seeds; the paper's claims; margins; regions of attraction;
-    real machines; films. The file OUT/report.html needs no network and no other file; the data are in the same folder.
-    You can stop the command at any time, and continue by starting it again.
-
-    With --paper it is the audit of a paper, and takes seconds or minutes: OUT has report.html, evidence.json, badge.svg
-    and checks.svg.
-
-    Example: smc-mujoco report --quick --out look
-
-    Example: smc-mujoco report --paper ./my_paper --out audit
-    """
-    with held_back():
-        from smc_mujoco.common.errors import ScenarioError
-        from smc_mujoco.evidence.report import paper as of_paper
-        from smc_mujoco.evidence.report import report as make
-
-    if paper and (seeds or records or laws):
-        raise ScenarioError("--seeds, --laws and --records belong to the study: leave them out with --paper")
-    if paper:
-        path = of_paper.report(paper, out, quick, threads, progress=True)
-    else:
-        path = make(out, quick, seeds, threads, progress=True, records=records, laws=options.names(laws))
-    print(f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, taken, unknown
-from smc_mujoco.common.files import to_json
+from smc_mujoco.common.files import ended, to_json, write_json
 from smc_mujoco.common.version import __version__
 from smc_mujoco.evidence.audit.paper import Entry, Paper, failed
 from smc_mujoco.evidence.audit.paper import paper as find_paper
@@ -61,7 +61,7 @@ class Audit:
         """
         from smc_mujoco.evidence.audit import evidence
 
-        return evidence.save(self, path)
+        return write_json(ended(path, ".json"), evidence.document(self))
 
     def badge(self, path: str | Path) -> Path:
         """Write a badge, an .svg file with the number of claims by verdict."""

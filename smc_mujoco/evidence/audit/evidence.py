@@ -14,32 +14,23 @@ from collections import Counter
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.files import ended, read_json, reading, to_json, write_json
+from smc_mujoco.common.files import read_json, reading, to_json
 from smc_mujoco.common.version import __version__
-from smc_mujoco.mechanisms.plant import catalogue as plants
-from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.evidence.audit.paper import Paper, shipped
 from smc_mujoco.evidence.audit.runs import Used
+from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.run_key import condition, portable_key
-
-if TYPE_CHECKING:
-    from smc_mujoco.evidence.audit.audit import Audit
 
 FORMAT = "smc-mujoco evidence 1"
 ENDINGS = (".py", ".toml", ".xml")  # of a paper's files that count
 
 
-def save(audit: "Audit", path: str | Path) -> Path:
-    """Write the evidence of an audit to a .json file, and return its path."""
-    path = ended(path, ".json")
-    return write_json(path, document(audit))
-
-
-def document(audit: "Audit") -> dict[str, Any]:
+def document(audit: Any) -> dict[str, Any]:
     """Return the evidence of an audit as plain data, with its seal.
 
     Raises:
@@ -67,7 +58,7 @@ def document(audit: "Audit") -> dict[str, Any]:
             "smc_mujoco": __version__,
             **{name: version(name) for name in ("mujoco", "numba", "numpy")},
             "python": f"{sys.version_info.major}.{sys.version_info.minor}",
-            "code": fingerprint.package("testing", "draw", *(f"studies/papers/{name}" for name in shipped())),
+            "code": fingerprint.package("testing", "draw", *(f"evidence/papers/{name}" for name in shipped())),
         },
         "quick": audit.quick,
         "left_out": [id for id in audit.paper.claims if id not in audit.used],
@@ -109,7 +100,7 @@ def _hash(path: Path) -> str:
     return hashlib.sha256(path.read_bytes().replace(b"\r\n", b"\n")).hexdigest()
 
 
-def _claim(audit: "Audit", claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
+def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
     """Return what is sealed of a claim."""
     entry = audit.paper.claims[claim.id]
     told = {name: getattr(claim, name) for name in ("id", "text", "where", "measured", "holds_if", "quantifier")}

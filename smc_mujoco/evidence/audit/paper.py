@@ -29,16 +29,15 @@ from smc_mujoco.common.registry import modules
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue as laws_known
+from smc_mujoco.evidence.audit.threshold import Threshold
+from smc_mujoco.evidence.audit.verdict import EXISTENTIAL, NAMED, UNIVERSAL, Statement
 from smc_mujoco.mechanisms.custom.plant_from import plant_from
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.conditions import DURATION, Condition, condition, find_condition, read_fields
 from smc_mujoco.simulation.conditions import NAMED as CONDITIONS
-from smc_mujoco.simulation.conditions import Condition, condition, find_condition, read_fields
-from smc_mujoco.simulation.grid import DURATION
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.evidence.audit.threshold import Threshold
-from smc_mujoco.evidence.audit.verdict import EXISTENTIAL, NAMED, UNIVERSAL, Statement
 
 FILE, CODE = "paper.toml", "claims.py"
 SHIPPED = "smc_mujoco.evidence.papers"

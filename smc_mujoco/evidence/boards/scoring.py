@@ -25,9 +25,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
+from smc_mujoco.evidence.boards.published import Row
 from smc_mujoco.mechanisms.plants.double_pendulum import L2
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.evidence.boards.published import Row
 
 HEIGHT = 0.9  # of the length of both links, which the tip must exceed
 # Criterion -> weight and norm in version 1, norm in version 2.

@@ -31,11 +31,11 @@ from numba import njit
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.control.law import Measurement
+from smc_mujoco.evidence.boards.scoring import shoulder_first
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1, accelerations
 from smc_mujoco.simulation import native
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.evidence.boards.scoring import shoulder_first
 
 SEED = 20240  # of all random numbers; chosen before any run
 STEP, STEPS = 2e-3, 5000  # s; number of

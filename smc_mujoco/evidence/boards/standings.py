@@ -3,12 +3,12 @@
 import dataclasses
 
 from smc_mujoco.common import errors
-from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.evidence.boards.entries import on_board
 from smc_mujoco.evidence.boards.published import ROBUSTNESS, SIMULATION, RobustnessRow, Row
 from smc_mujoco.evidence.boards.scoring import criteria, score, shoulder_first
 from smc_mujoco.evidence.boards.simulator import Robustness
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace
 
 NAME = "smc_mujoco"  # of this package's entry
 # Fields of a Scenario that are an entry's own. The rules fix all others.

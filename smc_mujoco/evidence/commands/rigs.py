@@ -40,13 +40,13 @@ def identify(
     Example: smc-mujoco identify emps run1.csv run2.csv --columns x=position,r=reference,u=voltage
     """
     with held_back():
-        from smc_mujoco.cli import tables
         from smc_mujoco.common.files import ended, writable
-        from smc_mujoco.mechanisms.plant import as_plant
-        from smc_mujoco.mechanisms.plant import catalogue as plants
+        from smc_mujoco.evidence.commands import tables
         from smc_mujoco.evidence.rigs.identify import identify as find
         from smc_mujoco.evidence.rigs.records import load
         from smc_mujoco.evidence.rigs.rig import rigs
+        from smc_mujoco.mechanisms.plant import as_plant
+        from smc_mujoco.mechanisms.plant import catalogue as plants
 
     json, terminal = options.json_file(json)
     for file in (figure, json):
@@ -100,14 +100,14 @@ def replay(
     Example: smc-mujoco replay qube_servo run.csv --quantities driver --duration 6 --film run.mp4
     """
     with held_back():
-        from smc_mujoco.cli import tables
         from smc_mujoco.cli.scene import filmed
         from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import writable
-        from smc_mujoco.simulation.run import run
-        from smc_mujoco.simulation.trace import Trace
+        from smc_mujoco.evidence.commands import tables
         from smc_mujoco.evidence.rigs.records import load
         from smc_mujoco.evidence.rigs.rig import rig as find_rig
+        from smc_mujoco.simulation.run import run
+        from smc_mujoco.simulation.trace import Trace
 
     terminal, twin = Terminal(), find_rig(rig)
     if film and film.suffix != ".mp4":

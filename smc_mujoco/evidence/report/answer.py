@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from smc_mujoco.analysis.differences import ROUNDING
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.common.text import joined
-from smc_mujoco.studies.adviser import MIN_SETTLED
 from smc_mujoco.evidence.audit.verdict import VERDICTS
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.scores import Place, Score
+from smc_mujoco.studies.adviser import MIN_SETTLED
 
 if TYPE_CHECKING:
     from smc_mujoco.evidence.report.stages import Findings

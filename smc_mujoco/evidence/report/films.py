@@ -17,8 +17,8 @@ from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import decimate
 from smc_mujoco.draw.film import film as video
 from smc_mujoco.draw.film.encoder import sigint_blocked
-from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.evidence.report.plan import Report
+from smc_mujoco.simulation.trace import Trace
 
 SIZE, FPS = (960, 540), 20  # px; 1/s
 # Chosen: letters stay clean at 100 to 200 kB for 5 s.

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from smc_mujoco.draw import region
-from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.panels import Figure, Panel, figure, packed, panels, plant_titles, rounded
 from smc_mujoco.evidence.report.words import style
+from smc_mujoco.mechanisms.plant import catalogue as plants
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.region_of_attraction import Basin

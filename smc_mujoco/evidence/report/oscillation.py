@@ -7,12 +7,12 @@ import statistics
 from smc_mujoco.analysis.chattering import chattering
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, write_json
+from smc_mujoco.evidence.report.plan import GAINS, Report, Work
 from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.metrics.limit_cycle import NONE, of_trace
 from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.run import run
 from smc_mujoco.studies.cache import cached
-from smc_mujoco.evidence.report.plan import GAINS, Report, Work
 
 LAG = 0.01  # s, of the actuator
 DURATION = 8.0  # s, of the runs

@@ -21,13 +21,13 @@ from smc_mujoco.analysis.ranking import SEEDS
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control.law import laws
 from smc_mujoco.draw import style
-from smc_mujoco.mechanisms.plant import catalogue as plants
-from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.report import answer, charts, maps, oscillation, rigs, words
 from smc_mujoco.evidence.report.plan import GAINS
 from smc_mujoco.evidence.report.stages import Findings
+from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.metrics.catalogue import metrics
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -8,14 +8,14 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.text import joined
+from smc_mujoco.evidence.report import words
+from smc_mujoco.evidence.report.plan import Report, Work
+from smc_mujoco.evidence.rigs import ensemble, records
+from smc_mujoco.evidence.rigs.rig import Rig, rig, rigs
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.leaderboard import Board, leaderboard
-from smc_mujoco.evidence.report import words
-from smc_mujoco.evidence.report.plan import Report, Work
 from smc_mujoco.studies.study import study
-from smc_mujoco.evidence.rigs import ensemble, records
-from smc_mujoco.evidence.rigs.rig import Rig, rig, rigs
 
 POINTS = 1200  # of a curve; chosen
 FALLS = -1000.0  # percent, of a fit below which the twin is nowhere near the record; chosen

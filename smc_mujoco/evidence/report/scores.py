@@ -13,9 +13,9 @@ import numpy as np
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.evidence.report import words
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies.leaderboard import Board, leaderboard
-from smc_mujoco.evidence.report import words
 
 if TYPE_CHECKING:
     from smc_mujoco.studies.table import Table

@@ -21,17 +21,17 @@ from smc_mujoco.analysis.tuning import result
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.control import gain_sets as sets
-from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.simulation.grid import grid as make_grid
-from smc_mujoco.simulation.run import run
 from smc_mujoco.evidence.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim
-from smc_mujoco.studies.cache import cached
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.papers.gaber.claims import lyapunov
 from smc_mujoco.evidence.report import about, films, oscillation, rigs, scores, words
 from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.evidence.report.scores import Place, Score
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.grid import grid as make_grid
+from smc_mujoco.simulation.run import run
+from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
 

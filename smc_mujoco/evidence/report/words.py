@@ -15,9 +15,9 @@ from smc_mujoco.control.law import laws
 from smc_mujoco.draw import style
 from smc_mujoco.draw.style import law_initials as short
 from smc_mujoco.draw.style import law_name as law
+from smc_mujoco.evidence.audit.verdict import MARKS
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.evidence.audit.verdict import MARKS
 
 PAPER = "observer_free"  # the law that the suite was built to test
 # What the overview compares; the tables' columns.

@@ -11,10 +11,10 @@ from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.law import Law
+from smc_mujoco.evidence.rigs.rig import Rig, Values
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.evidence.rigs.rig import Rig, Values
 
 BY_STARTS = ("x0", "v0")  # fields of a rig's machine that the starts of the grid replace
 

@@ -27,15 +27,15 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, whole
 from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
+from smc_mujoco.evidence.rigs import records as files
+from smc_mujoco.evidence.rigs.records import Columns, Record
+from smc_mujoco.evidence.rigs.rig import Quantity, Rig, Source
+from smc_mujoco.evidence.rigs.rig import rig as find_rig
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.evidence.rigs import records as files
-from smc_mujoco.evidence.rigs.records import Columns, Record
-from smc_mujoco.evidence.rigs.rig import Quantity, Rig, Source
-from smc_mujoco.evidence.rigs.rig import rig as find_rig
 
 STEP = 2e-3  # of a quantity's scale, for central differences; chosen: dry friction makes shorter ones rough
 SPREAD = 0.2  # standard deviation of the logarithm of a quantity in further starts of the search; chosen

@@ -10,9 +10,9 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.evidence.rigs.records import Columns, Record, step_of
 from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.evidence.rigs.records import Columns, Record, step_of
 
 WINDOW, ORDER = 0.04, 3  # s, and degree, of the cubic about each sample; chosen
 PERIOD = 0.01  # s, between the samples that are compared; chosen: the cubics leave nothing above 30 Hz

@@ -21,13 +21,13 @@ from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.registry import catalogue_of
 from smc_mujoco.control.law import Law
+from smc_mujoco.evidence.rigs import inverse, records
+from smc_mujoco.evidence.rigs.records import Columns, Record
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.time_series import TimeSeries
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.evidence.rigs import inverse, records
-from smc_mujoco.evidence.rigs.records import Columns, Record
 
 Values = SimpleNamespace  # quantities by name
 Source = Mapping[str, Any] | Trace  # a record as columns by name, or as a simulated run

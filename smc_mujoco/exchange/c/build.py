@@ -9,14 +9,13 @@ import shlex
 import shutil
 import sys
 import tempfile
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from smc_mujoco.common.errors import ScenarioError, shown, users_frame
+from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.control import joint_law
-from smc_mujoco.control.law import OLD_FIELDS, Measurement
+from smc_mujoco.control.law import Measurement
 
 HERE = Path(__file__).parent
 HEADER, JOINT_HEADER = HERE / "smc_law.h", HERE / "smc_joint_law.h"
@@ -45,7 +44,6 @@ WARNING = re.compile(r"^[^:\n]+:\d+:(?:\d+:)? warning: .*$", re.MULTILINE)
 FUNCTION = re.compile(r"^(\S+) *\|([0-9a-f]+)\| +T +\| +FUNC\|", re.MULTILINE)
 DATA = re.compile(r"^(\S+?)(?:\.\d+)? *\|([0-9a-f]+)\| +[bBdDuV] +\| +OBJECT\|([0-9a-f]+)\|", re.MULTILINE)
 
-OLD_FIELD = re.compile(rf"->\s*({'|'.join(OLD_FIELDS)})\b")
 
 _count = itertools.count()
 
@@ -92,7 +90,6 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
             f"cannot include {shown(str(source))} in C: give a path without quotation marks and backslashes"
         )
     macros = [f'-DSMC_SOURCE="{path}"', f"-DSMC_SYMBOL={symbol}", *LAYOUT, "-I", str(HERE)]
-    macros += _old_names(source)
     files = [str(HERE / "glue.c"), "-o", str(target)]
     try:
         done = timed([*command, *FLAGS, *OWN_NAMES, *STRICT, *macros, *files, *flags, "-lm"], timeout)
@@ -107,18 +104,6 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
     if done.returncode or not target.exists():
         raise ScenarioError(_sentence(source, symbol, " ".join(command), done.stderr))
     return target, WARNING.findall(done.stderr)
-
-
-def _old_names(source: Path) -> list[str]:
-    """Return flags for a file that reads the measurement by names of version 0.1, with a DeprecationWarning."""
-    try:
-        used = sorted(set(OLD_FIELD.findall(source.read_text(encoding="utf-8", errors="replace"))))
-    except OSError:  # the compiler reports it
-        used = []
-    for old in used:
-        text = f"{source.name} reads y->{old}, which is now y->{OLD_FIELDS[old]}: read that"
-        warnings.warn(text, DeprecationWarning, users_frame())
-    return [f"-D{old}={OLD_FIELDS[old]}" for old in used]
 
 
 @functools.cache

@@ -15,12 +15,12 @@ from smc_mujoco.common.errors import ScenarioError, shown, unknown, whole
 from smc_mujoco.common.jit import AtAddress
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.common.version import __version__
-from smc_mujoco.exchange.c import build, joint_translate
-from smc_mujoco.exchange.c.joint_translate import JOINTS, SLOTS
-from smc_mujoco.exchange.c.translate import MATH, Untranslatable, plain, rows, translate
 from smc_mujoco.control.component import Component, Template, Value, written
 from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.control.law import law as find_law
+from smc_mujoco.exchange.c import build, joint_translate
+from smc_mujoco.exchange.c.joint_translate import JOINTS, SLOTS
+from smc_mujoco.exchange.c.translate import MATH, Untranslatable, plain, rows, translate
 
 BYTES = {"double": 8, "float": 4, "q15": 8}  # of a number of memory, by type of numbers
 Q15 = "observer_free_q15"

@@ -9,8 +9,8 @@ import re
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import AtAddress
-from smc_mujoco.exchange.c.translate import MATH, Untranslatable, plain, translate
 from smc_mujoco.control.component import Component
+from smc_mujoco.exchange.c.translate import MATH, Untranslatable, plain, translate
 
 TYPE = r"(?:const )?(?:smc_real|int(?:16|32)_t)"
 # Words that JavaScript reserves or gives a meaning, and C does not.

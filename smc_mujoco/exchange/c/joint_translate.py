@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.control import joint_law
+from smc_mujoco.control.component import Component
 from smc_mujoco.exchange.c.translate import (
     ARGUMENTS,
     ATOM,
@@ -43,7 +44,6 @@ from smc_mujoco.exchange.c.translate import (
     whole_expression,
     wider,
 )
-from smc_mujoco.control.component import Component
 
 JOINTS, SLOTS = "SMC_JOINTS", "SMC_LAW_MEMORY"  # dimensions that are macros in the file
 ROW, COLUMN = "\x00", "\x01"  # stand for the indices in the text of an array's element

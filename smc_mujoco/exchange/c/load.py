@@ -26,11 +26,11 @@ from numba import carray
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, shown, whole
 from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
-from smc_mujoco.exchange.c import build, sandbox
-from smc_mujoco.control.component import Template, Value, as_gains, template, written
+from smc_mujoco.control.component import Template, as_gains, parsed_gains, template, written
 from smc_mujoco.control.joint_law import ARRAYS
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.units import Gain
+from smc_mujoco.exchange.c import build, sandbox
 
 LIBRARIES = (".so", ".dylib")
 MAX_TIMEOUT = 86_400.0  # s
@@ -304,25 +304,6 @@ def _about(
         bool(facts.get("smc_law_modelled")) if modelled is None else modelled,
         joints,
     )
-
-
-def parsed_gains(text: str, what: str) -> dict[str, Any]:
-    """Return the gains in a text such as "lam=6,k1=3 5", with two joints' k1. `what` names the text in errors."""
-    parsed: dict[str, Value] = {}
-    for part in filter(None, (p.strip() for p in text.split(","))):
-        name, equals, value = (word.strip() for word in part.partition("="))
-        if name in parsed:
-            raise ScenarioError(f"{what} is {shown(text)}: give {name} once")
-        try:
-            values = tuple(map(float, value.split()))
-        except ValueError:
-            values = ()
-        parsed[name] = values[0] if len(values) == 1 else values
-        if not (equals and name.isidentifier() and values):
-            raise ScenarioError(f"{what} is {shown(text)}: give names and numbers, such as lam=6,k1=3")
-        if any(map(math.isnan, values)):
-            raise ScenarioError(f"{what} is {shown(text)}, and {name} is nan: give it a number")
-    return parsed
 
 
 def _first_comment(path: Path) -> str | None:

@@ -98,8 +98,8 @@ def call(
     Raises:
       ScenarioError: as in `load`.
     """
-    from smc_mujoco.exchange.c import build
     from smc_mujoco.control.component import at
+    from smc_mujoco.exchange.c import build
 
     calls, unseen, name, each = build.fresh(".calls"), [], library.path.name, max(1, joints)
     anchor, data = build.static_data(library.file, library.symbol)

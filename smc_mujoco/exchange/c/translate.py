@@ -21,7 +21,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
-from smc_mujoco.control.law import OLD_FIELDS, Measurement
+from smc_mujoco.control.law import Measurement
 
 # Kinds of numbers from narrow to wide. `single` is numpy.float32 in Python; `real` is smc_real in the file.
 PARSING = threading.Lock()
@@ -503,7 +503,6 @@ class Function:
             return literal(constant, self.program.single, node)
         owner, name = self.value(node.value), node.attr
         if owner.kind == "y":
-            name = OLD_FIELDS.get(name, name)
             kind = self.program.component.kind
             known(name, "reading" if kind == "estimator" else "measurement", READS[kind])
             return Value(f"{owner.text}->{name}", "real")

@@ -22,16 +22,16 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.common.files import ended, replacing
 from smc_mujoco.common.process import TimedOut, timed
-from smc_mujoco.exchange.c import build
-from smc_mujoco.exchange.c.export import number_of_joints, writable
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
-from smc_mujoco.simulation import coerce
+from smc_mujoco.exchange.c import build
+from smc_mujoco.exchange.c.export import number_of_joints, writable
 from smc_mujoco.exchange.fmu import controller as one_joint
 from smc_mujoco.exchange.fmu import description, joint_controller
 from smc_mujoco.exchange.fmu.controller import Controller
+from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.scenario import Scenario, check_surface
 
 HERE, MIXED = Path(__file__).parent, "mixed"  # kind of joints of which some turn and some slide: without units

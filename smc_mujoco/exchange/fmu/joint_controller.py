@@ -7,11 +7,11 @@ The elements of a vector or matrix follow each other in the array of variables, 
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from smc_mujoco.exchange.c.translate import plain
 from smc_mujoco.control.component import at
 from smc_mujoco.control.units import ACCELERATION, FORCE, FORCE_PER_SPEED, INERTIA, POSITION, SPEED, TIME, Unit
-from smc_mujoco.simulation.controller import MAX_CONTROL
+from smc_mujoco.exchange.c.translate import plain
 from smc_mujoco.exchange.fmu.controller import Controller, Variable, bounded, parameter, place, reads
+from smc_mujoco.simulation.controller import MAX_CONTROL
 
 # Input -> its unit and description, in the order of the variables.
 VECTORS: dict[str, tuple[Unit, str]] = {

@@ -28,10 +28,10 @@ from smc_mujoco.common.errors import ScenarioError, number, one_line, shown, unk
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.jit import Uncompiled
 from smc_mujoco.common.process import TimedOut, timed
-from smc_mujoco.exchange.c import build, sandbox
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Measurement, law_function
 from smc_mujoco.control.units import Gain
+from smc_mujoco.exchange.c import build, sandbox
 from smc_mujoco.exchange.fmu import slave
 from smc_mujoco.exchange.fmu.controller import OUTPUTS, UNBOUNDED
 from smc_mujoco.exchange.fmu.slave import HELD, REAL, Fault, Slave

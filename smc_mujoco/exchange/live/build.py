@@ -10,12 +10,12 @@ from pathlib import Path
 from smc_mujoco.common.errors import ScenarioError, shown, taken
 from smc_mujoco.common.files import plain
 from smc_mujoco.control import estimator, surface
-from smc_mujoco.exchange.c.javascript import to_js
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import checked_name
 from smc_mujoco.control.law import law as find_law
 from smc_mujoco.control.law import laws as laws_for
 from smc_mujoco.control.properties import reads
+from smc_mujoco.exchange.c.javascript import to_js
 from smc_mujoco.exchange.live import facts as known
 from smc_mujoco.exchange.live import npm
 from smc_mujoco.mechanisms.plant import Plant

@@ -16,8 +16,8 @@ from smc_mujoco.analysis.tuning.search import FINALISTS, STAGE, compare, load, t
 from smc_mujoco.cli import main
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.units import Gain, Unit
-from smc_mujoco.metrics.catalogue import itae, tv
 from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.metrics.catalogue import itae, tv
 
 SHORT = Objective(duration=1.0)
 LEAN = Objective(conditions=("nominal",), duration=0.5)

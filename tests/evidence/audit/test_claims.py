@@ -17,9 +17,6 @@ from smc_mujoco.cli import tables
 from smc_mujoco.cli.commands.studies import claims as command
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.variants import reversed_gain, squeezed, with_gains, zero_gain
-from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.metrics.catalogue import metrics
-from smc_mujoco.simulation.grid import grid
 from smc_mujoco.evidence.audit import audit
 from smc_mujoco.evidence.audit import runs as claim_runs
 from smc_mujoco.evidence.audit.audit import claims, evaluations
@@ -43,6 +40,9 @@ from smc_mujoco.evidence.audit.verdict import (
 from smc_mujoco.evidence.papers.gaber.claims import common, lyapunov, searches
 from smc_mujoco.evidence.papers.gaber.claims.common import OURS
 from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.run_key import key
 
 GABER = paper("gaber")

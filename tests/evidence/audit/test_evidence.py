@@ -15,10 +15,10 @@ import smc_mujoco as smc
 from smc_mujoco.cli.commands import studies
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import from_json
-from smc_mujoco.simulation import serialise
 from smc_mujoco.evidence.audit import badge, evidence
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED
+from smc_mujoco.simulation import serialise
 from smc_mujoco.studies.run_key import portable_key
 
 DATA = """

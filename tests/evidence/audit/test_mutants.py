@@ -6,8 +6,8 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.law import law_function
-from smc_mujoco.evidence.audit.paper import new
 from smc_mujoco.evidence.audit.mutants import BLIND, KEPT, evaluations, mutants, survivors
+from smc_mujoco.evidence.audit.paper import new
 
 DATA = """
 title = "t"

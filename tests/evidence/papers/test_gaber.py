@@ -11,9 +11,6 @@ from smc_mujoco.analysis.margins import DELAYS, TOLERATED_ERROR
 from smc_mujoco.control.gain_sets import SETS
 from smc_mujoco.control.law import law_function
 from smc_mujoco.control.variants import reversed_gain, with_gains, zero_gain
-from smc_mujoco.metrics.catalogue import metrics
-from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.trace import ARRAYS, Trace
 from smc_mujoco.evidence.audit.audit import claims
 from smc_mujoco.evidence.audit.paper import paper
 from smc_mujoco.evidence.audit.runs import Runs
@@ -28,6 +25,9 @@ from smc_mujoco.evidence.papers.gaber.claims import (
     table_one,
 )
 from smc_mujoco.evidence.papers.gaber.scenarios import LAWS
+from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import ARRAYS, Trace
 
 GABER = paper("gaber")
 NUMBERS = (27, 28, 29, *range(31, 41), 45, 46, 48, *range(49, 53), 55, 56, 57, 59, 61)

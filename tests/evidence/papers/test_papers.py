@@ -7,8 +7,8 @@ All claims of all papers take minutes; here are the cheap ones of every paper. T
 import pytest
 
 from smc_mujoco.evidence.audit.audit import audit
-from smc_mujoco.evidence.audit.paper import paper, shipped
 from smc_mujoco.evidence.audit.mutants import survivors
+from smc_mujoco.evidence.audit.paper import paper, shipped
 
 CHEAP = {  # paper -> claims that take a few s at most; all of a paper that is not here
     "aldana_lopez_2019": ["1"],

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.evidence.audit import runs as claim_runs
 from smc_mujoco.evidence.audit.audit import audit
+from smc_mujoco.evidence.audit.mutants import survivors
 from smc_mujoco.evidence.audit.paper import paper, shipped
 from smc_mujoco.evidence.papers.aldana_lopez_2019.claims import BAND, classical_bound, least_bound
 from smc_mujoco.evidence.papers.measures import LATE, exponent, late, late_step, settled
 from smc_mujoco.evidence.papers.perez_ventura_2017.claims import predicted
+from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.run_key import key
-from smc_mujoco.evidence.audit.mutants import survivors
 
 ROOT = Path(__file__).parents[3]
 PAPERS = [name for name in shipped() if name != "gaber"]

@@ -23,13 +23,13 @@ import pytest
 from smc_mujoco.analysis.tuning.result import Evaluation
 from smc_mujoco.common import gl
 from smc_mujoco.control import gain_sets as gains
-from smc_mujoco.simulation.run import run
-from smc_mujoco.studies.cache import cached
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.report import answer, charts, films, maps, page, panels, report, stages, words
 from smc_mujoco.evidence.report import scores as scores_of
 from smc_mujoco.evidence.report.plan import QUICK, Bars
 from smc_mujoco.evidence.report.scores import Place, Score
+from smc_mujoco.simulation.run import run
+from smc_mujoco.studies.cache import cached
 
 TINY = dataclasses.replace(
     QUICK,

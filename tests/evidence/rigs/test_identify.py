@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 
 import smc_mujoco as smc
 from smc_mujoco.cli.main import app
-from smc_mujoco.simulation import philox
 from smc_mujoco.evidence.rigs import records
 from smc_mujoco.evidence.rigs.identify import Search
+from smc_mujoco.simulation import philox
 
 AXIS = smc.rig("emps")
 PENDULUM = smc.rig("simple_pendulum_ak80")

@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 import smc_mujoco as smc
 from smc_mujoco.cli.main import app
 from smc_mujoco.evidence.rigs.controllers import state_feedback
+from smc_mujoco.evidence.rigs.machines import qube_servo
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.trace import ARRAYS
-from smc_mujoco.evidence.rigs.machines import qube_servo
 
 QUBE = smc.rig("qube_servo")
 

@@ -16,11 +16,11 @@ from helpers.sources import strange
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
 from smc_mujoco.common.rebuild import rebuild
-from smc_mujoco.exchange.c import build, export, sandbox
-from smc_mujoco.exchange.c.load import CLaw
 from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.law import Measurement, catalogue, sliding
 from smc_mujoco.control.laws import observer_free_q15 as q15
+from smc_mujoco.exchange.c import build, export, sandbox
+from smc_mujoco.exchange.c.load import CLaw
 from smc_mujoco.simulation import native
 from smc_mujoco.simulation.reference import gains_of
 

@@ -11,9 +11,9 @@ from helpers.live import READ, node
 
 import smc_mujoco as smc
 from smc_mujoco.control import estimator, surface
-from smc_mujoco.exchange.c.javascript import to_js
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement, catalogue
+from smc_mujoco.exchange.c.javascript import to_js
 
 TENTHS = 0.1, 0.2, 0.3
 CALLS = 40  # of each component, with random measurements and one memory

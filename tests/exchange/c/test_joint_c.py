@@ -16,9 +16,9 @@ from numba import njit
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
-from smc_mujoco.exchange.c import build, export, sandbox
 from smc_mujoco.control.joint_law import JointMeasurement, catalogue, coriolis, norm, product, saturate, solve, torque
 from smc_mujoco.control.units import Gain
+from smc_mujoco.exchange.c import build, export, sandbox
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.reference import gains_of
 

@@ -19,8 +19,8 @@ from helpers.compiler import needs_compiler
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
-from smc_mujoco.exchange.c import build
 from smc_mujoco.control.law import Measurement
+from smc_mujoco.exchange.c import build
 from smc_mujoco.simulation import reference
 from smc_mujoco.studies import run_key
 

@@ -21,10 +21,10 @@ from helpers.pages import ROOT, titled  # noqa: E402
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.cli import main as cli  # noqa: E402
 from smc_mujoco.control import estimator, surface  # noqa: E402
-from smc_mujoco.exchange.c import build  # noqa: E402
-from smc_mujoco.exchange.c import export as c_export  # noqa: E402
 from smc_mujoco.control.law import catalogue  # noqa: E402
 from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_PER_SPEED, RATE  # noqa: E402
+from smc_mujoco.exchange.c import build  # noqa: E402
+from smc_mujoco.exchange.c import export as c_export  # noqa: E402
 from smc_mujoco.exchange.fmu import description  # noqa: E402
 
 pytestmark = needs_compiler

@@ -17,9 +17,9 @@ from helpers.compiler import needs_compiler  # noqa: E402
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.cli import main as cli  # noqa: E402
 from smc_mujoco.control.law import Measurement  # noqa: E402
-from smc_mujoco.simulation import reference  # noqa: E402
 from smc_mujoco.exchange.fmu import load  # noqa: E402
 from smc_mujoco.exchange.fmu.slave import Slave  # noqa: E402
+from smc_mujoco.simulation import reference  # noqa: E402
 from smc_mujoco.simulation.reference import gains_of  # noqa: E402
 
 pytestmark = [

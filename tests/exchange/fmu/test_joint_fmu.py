@@ -18,8 +18,8 @@ from numba import njit  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.cli import main as cli  # noqa: E402
-from smc_mujoco.exchange.c import build  # noqa: E402
 from smc_mujoco.control.joint_law import catalogue, product  # noqa: E402
+from smc_mujoco.exchange.c import build  # noqa: E402
 from smc_mujoco.simulation import reference  # noqa: E402
 
 pytestmark = needs_compiler

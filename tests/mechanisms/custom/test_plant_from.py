@@ -18,6 +18,7 @@ from smc_mujoco.common import process
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import design
 from smc_mujoco.envs import core, tasks
+from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.mechanisms.custom import channels as own_channels
 from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, prepared
@@ -26,7 +27,6 @@ from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import reference as plain
 from smc_mujoco.simulation import scenario as scenario_module
 from smc_mujoco.studies import run_key
-from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.studies.scene import slug
 
 TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)

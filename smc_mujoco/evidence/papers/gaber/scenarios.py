@@ -9,7 +9,6 @@ in `named_conditions`. The plants' parameters are in their files.
     comparison("duffing", "noise")                         # the four laws: name -> Scenario
 """
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,24 +16,25 @@ from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.simulation.conditions import (  # noqa: F401  # smc.paper has the paper's own numbers, too
+    CONTROL_PERIOD,
     DIFFERENCED,
+    DURATION,
     JUMP_HARD,
     JUMP_MILD,
     NAMED,
+    PLANTS,
     REAL,
     SENSOR_NOISE,
     SINE,
     Condition,
     find_condition,
 )
-from smc_mujoco.simulation.grid import CONTROL_PERIOD, DURATION, NOTHING
+from smc_mujoco.simulation.grid import NOTHING
 from smc_mujoco.simulation.scenario import U_MAX, Scenario
 
 # The four laws that the paper compares; its higher-order one is the last.
 LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
 GAINS = sets.STUDY
-PLANTS = tuple(GAINS)
-FIELDS = [field.name for field in dataclasses.fields(Scenario) if field.init]
 
 CONDITIONS = NAMED  # of the whole suite
 REALISTIC = REAL
@@ -70,13 +70,14 @@ def scenario(
     if not isinstance(changes, Mapping):
         raise ScenarioError(f"changes is {shown(changes)}: give Scenario fields with their values")
     for name in changes:
-        if name not in FIELDS:
-            raise unknown("field of a Scenario", name, FIELDS)
+        if name not in Scenario.fields():
+            raise unknown("field of a Scenario", name, Scenario.fields())
     sets.paper_plant(plant)
     law = sets.law(plant, law_name, "default" if law_name == "none" else gains)
     common = {"duration": duration, "control_period": CONTROL_PERIOD, "u_max": U_MAX, "seed": seed}
     conditioned = fields(condition, plant, duration)
-    return Scenario(**({"plant": plant, "law": law} | common | conditioned | dict(changes)))
+    made = Scenario(**({"plant": plant, "law": law} | common | conditioned | dict(changes)))
+    return made if changes else made.named(find_condition(condition).name)
 
 
 def comparison(

@@ -10,11 +10,11 @@ import numpy as np
 
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.evidence.rigs.controllers import cascade
+from smc_mujoco.evidence.rigs.records import Columns, Record
+from smc_mujoco.evidence.rigs.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import plant
-from smc_mujoco.evidence.rigs.records import Columns, Record
-from smc_mujoco.evidence.rigs.rig import Quantity, Rig
 
 PERIOD, STEP = 1e-3, 5e-4  # s, under RK4. With steps h of first order, positions lead by h/2 v, which biases friction.
 BACK_EMF = 1e-6  # V s/m: too small to have an effect

@@ -5,10 +5,10 @@ No records of them are at hand, so nothing is identified. The dead bands of thei
 
 import math
 
+from smc_mujoco.evidence.rigs.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import plant
-from smc_mujoco.evidence.rigs.rig import Quantity, Rig
 
 DRIVER = "BlueRiverTech/quanser-openai-driver (MIT)"
 QUBE_3 = "Quanser's qube3_rotpen_param.m and user manual (no licence stated)"

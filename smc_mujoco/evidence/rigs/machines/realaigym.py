@@ -6,11 +6,11 @@ The rig's numbers are identified from two records. The published fits of the mac
 
 import math
 
+from smc_mujoco.evidence.rigs.records import Columns
+from smc_mujoco.evidence.rigs.rig import Quantity, Reached, Rig
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0, MODEL_1_1
-from smc_mujoco.evidence.rigs.records import Columns
-from smc_mujoco.evidence.rigs.rig import Quantity, Reached, Rig
 
 SOURCE = "dfki-ric-underactuated-lab/double_pendulum (BSD-3), design C.1"
 FOUND = "identified here from the public sys-id records 03 and 13"

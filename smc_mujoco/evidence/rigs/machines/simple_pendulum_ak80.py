@@ -8,11 +8,11 @@ plant.
 import math
 
 from smc_mujoco.control.law import law
+from smc_mujoco.evidence.rigs.records import Columns
+from smc_mujoco.evidence.rigs.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import plant
-from smc_mujoco.evidence.rigs.records import Columns
-from smc_mujoco.evidence.rigs.rig import Quantity, Rig
 
 SOURCE = "dfki-ric-underactuated-lab/torque_limited_simple_pendulum (BSD-3)"
 FOUND = f"between the values found in runs of {SOURCE}"

@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from smc_mujoco.control.estimator import estimator
-from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.verdict import Beside, Check, ratio
 from smc_mujoco.evidence.papers.gaber.claims.common import OURS, comes_to_rest
+from smc_mujoco.mechanisms.plant import plant as find_plant
 
 FILTERS = {f"filter of {ms} ms": estimator("filtered_difference", tau=ms * 1e-3) for ms in (5, 20)}
 QUICK_IDEAL = 3  # conditions

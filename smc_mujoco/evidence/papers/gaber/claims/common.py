@@ -7,12 +7,12 @@ import numpy as np
 
 from smc_mujoco.analysis.differences import OF_SCALE, OF_VALUE
 from smc_mujoco.control.variants import with_gains
-from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.verdict import Check, ratio
 from smc_mujoco.evidence.papers.gaber.scenarios import LAWS
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace
 
 OURS = LAWS[0]  # the paper's law
 RIVALS = LAWS[1:]  # classical, adaptive, and the paper's HOSMC

@@ -3,7 +3,6 @@
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.control.law import law as find_law
 from smc_mujoco.control.variants import squeezed
-from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.verdict import Beside, Check, ratio
 from smc_mujoco.evidence.papers.gaber.claims.common import (
@@ -15,6 +14,7 @@ from smc_mujoco.evidence.papers.gaber.claims.common import (
     deviation,
 )
 from smc_mujoco.evidence.papers.gaber.claims.timing import nanoseconds
+from smc_mujoco.mechanisms.plant import plant as find_plant
 
 MEASURES = (  # sentence, name, metric, condition
     ("smoothness", "TV rate", "tv_rate", "nominal"),

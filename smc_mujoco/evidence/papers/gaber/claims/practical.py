@@ -12,14 +12,14 @@ from smc_mujoco.analysis.margins import TOLERATED_ERROR
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue, command, law_function, sliding
 from smc_mujoco.control.variants import with_gains
-from smc_mujoco.metrics import conventions
-from smc_mujoco.metrics.catalogue import settling_time
-from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.verdict import Beside, Check, ratio
 from smc_mujoco.evidence.papers.gaber.claims.common import OURS, RIVALS, UNCLAMPED, deviation, scale
 from smc_mujoco.evidence.papers.gaber.claims.searches import critical_delay, largest_delays
 from smc_mujoco.evidence.papers.gaber.scenarios import LAWS
+from smc_mujoco.metrics import conventions
+from smc_mujoco.metrics.catalogue import settling_time
+from smc_mujoco.simulation.trace import Trace
 
 NEAR, FAR = 0.01, (1.0, 2.0)  # of x0, chosen: where tanh is its argument; where the study starts, and beyond
 MIN_BOUND = 1e-9  # N m or N: an actuator's bound if lambda is 0

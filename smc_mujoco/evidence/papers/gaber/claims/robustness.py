@@ -5,11 +5,11 @@ Noise is the study's, 0.01 m on x and 0.05 m/s on v; the disturbance is the pape
 
 import numpy as np
 
-from smc_mujoco.metrics.catalogue import HIGH_PASS, conventions
-from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.verdict import Beside, Check, ratio
 from smc_mujoco.evidence.papers.gaber.claims.common import OURS, RIVALS, UNCLAMPED, command_bound, deviation, scale
+from smc_mujoco.metrics.catalogue import HIGH_PASS, conventions
+from smc_mujoco.simulation.trace import Trace
 
 PLANT = "van_der_pol"
 

@@ -16,11 +16,11 @@ import numpy as np
 from smc_mujoco.analysis import linear_theory
 from smc_mujoco.analysis.margins import DELAYS, TOLERATED_ERROR, Search, find_boundaries
 from smc_mujoco.control.law import law as find_law
-from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.papers.gaber.claims.common import OURS, long_run, scale
 from smc_mujoco.evidence.papers.gaber.scenarios import CONTROL_PERIOD, U_MAX
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.trace import Trace
 
 COARSE = 8  # control periods between which a quick search ends, chosen; it tries none shorter, with a quick integrator
 

@@ -7,7 +7,6 @@ Settling time, overshoot and ripple are those of `metrics`. Overshoot is what go
 claim on it is supported if it holds on both networks of the study.
 """
 
-from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.verdict import Beside, Check, ratio
 from smc_mujoco.evidence.papers.gaber.claims.common import (
@@ -22,6 +21,7 @@ from smc_mujoco.evidence.papers.gaber.claims.common import (
     slower,
 )
 from smc_mujoco.evidence.papers.gaber.scenarios import LAWS
+from smc_mujoco.mechanisms.plant import plant as find_plant
 
 PENDULUM, VAN_DER_POL, DUFFING = "inverted_pendulum", "van_der_pol", "duffing"
 

@@ -4,11 +4,11 @@ import numpy as np
 
 from smc_mujoco.analysis.linear_theory import smallest_lam
 from smc_mujoco.control.variants import reversed_gain
-from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.verdict import Beside, Check
 from smc_mujoco.evidence.papers.gaber.claims import lyapunov
 from smc_mujoco.evidence.papers.gaber.claims.common import OURS, comes_to_rest, long_run
+from smc_mujoco.mechanisms.plant import plant as find_plant
 
 NEAR = 1e-6  # |s| at and below which the claim says nothing
 RISE = 1e-12  # of the run's largest V: less is rounding

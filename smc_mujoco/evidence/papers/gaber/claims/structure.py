@@ -3,15 +3,15 @@
 from smc_mujoco.analysis.linear_theory import smallest_lam
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.control.law import law as find_law
-from smc_mujoco.mechanisms.hardware.drives import Lag
-from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.verdict import Beside, Check
 from smc_mujoco.evidence.papers.gaber.claims.common import OURS, comes_to_rest
 from smc_mujoco.evidence.papers.gaber.claims.lyapunov import input_gain
 from smc_mujoco.evidence.papers.gaber.claims.searches import smallest_stable
 from smc_mujoco.evidence.papers.gaber.scenarios import U_MAX
+from smc_mujoco.mechanisms.hardware.drives import Lag
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.perturbations import Noise
 
 LAG = 0.05  # s, chosen: an actuator's
 SHARE = 1.5  # times the largest jerk that the lag allows, g u_max / LAG: the bound that the differentiator assumes

@@ -1,0 +1,30 @@
+"""The annexes `exchange` and `evidence`. The core reaches them by name only, and works where they are missing."""
+
+import importlib
+import importlib.util
+from types import ModuleType
+
+ANNEXES = ("exchange", "evidence")
+
+
+def module(name: str, what: str) -> ModuleType:
+    """Return a module of the package.
+
+    Args:
+      name: dotted, such as "smc_mujoco.evidence.report".
+      what: what needs it; begins the sentence of an error.
+
+    Raises:
+      MissingPackageError: it belongs to an annex that is not installed.
+    """
+    annex = name.split(".")[1]
+    if annex in ANNEXES and not installed(annex):
+        from smc_mujoco.common.extras import MissingPackageError
+
+        raise MissingPackageError(f"{what} needs smc_mujoco.{annex}, which is missing here: install all of smc-mujoco")
+    return importlib.import_module(name)
+
+
+def installed(annex: str) -> bool:
+    """Return whether an annex is installed."""
+    return importlib.util.find_spec(f"smc_mujoco.{annex}") is not None

@@ -1,0 +1,62 @@
+"""smc-mujoco board: swing-ups among the published rows of RealAIGym."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.common.interrupts import held_back
+
+
+@errors_as_sentences()
+def board(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="acrobot or pendubot.")],
+    robustness: Annotated[
+        bool, typer.Option(help="Whether to run the robustness test too: 722 machines, some 10 s.")
+    ] = True,
+    figure: Annotated[Path | None, typer.Option(help="Also draw the run, as FIGURE.svg and FIGURE.png.")] = None,
+    film: Annotated[Path | None, typer.Option(help="Also film the run, to a .mp4 file.")] = None,
+) -> None:
+    """Show RealAIGym's board of a robot, with this package's sliding-mode entry among the published rows.
+
+    The task: swing the double pendulum up from rest and balance it, with one motor of 6 N m at the shoulder (pendubot)
+    or at the elbow (acrobot), in 10 s. Less is better in every criterion, more in the score. For your own law use
+    smc.boards, see docs/boards.md.
+
+    Example: smc-mujoco board acrobot --figure acrobot --film acrobot.mp4
+    """
+    with held_back():
+        from smc_mujoco.cli.scene import filmed
+        from smc_mujoco.common.errors import ScenarioError
+        from smc_mujoco.common.files import writable
+        from smc_mujoco.common.progress import bar
+        from smc_mujoco.evidence import boards
+        from smc_mujoco.evidence.commands import tables
+        from smc_mujoco.simulation.run import run
+
+    terminal = Terminal()
+    scenario = boards.entry(robot)
+    if figure:
+        writable(figure)
+    if film:
+        if film.suffix != ".mp4":
+            raise ScenarioError(f"cannot film to {film.name!r}: end the name in .mp4")
+        writable(film)
+    trace, found = run(scenario), None
+    terminal.print(tables.board(robot, boards.board(trace), boards.NAME))
+    if robustness:
+        with bar(f"robustness of {robot}") as drawn:
+            found = boards.robustness(scenario, drawn.reached)
+        terminal.print(tables.board(robot, boards.robustness_board(robot, found), boards.NAME))
+    terminal.note(f"{boards.verdict(robot, trace, found)}.\n", "bold", wrap=True)
+    terminal.note(f"published rows: {boards.SOURCE}; {terminal.seconds:.0f} s", "dim", wrap=True)
+    title = f"{robot.capitalize()}: swing-up and balance"
+    if figure:
+        from smc_mujoco.draw.figure import figure as draw
+        from smc_mujoco.draw.page import files
+
+        draw([trace], figure, title=title)
+        terminal.wrote(*files(figure))
+    if film:
+        terminal.wrote(*filmed([trace], film, None, title, terminal))

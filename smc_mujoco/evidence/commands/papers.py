@@ -1,0 +1,150 @@
+"""smc-mujoco claims, papers: audits of the claims of papers."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.common.errors import printable
+from smc_mujoco.common.interrupts import held_back
+
+
+@errors_as_sentences()
+def claims(
+    ids: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="ID", help="Numbers of claims, as 3 18; by default all.", show_default=False),
+    ] = None,
+    gains: Annotated[str | None, typer.Option(help="Sets of gains, as a,b; default all of the paper's.")] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Coarser grids and shorter runs, as each claim says; one set of gains.")
+    ] = False,
+    paper: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|FOLDER", help="A paper of `smc-mujoco papers`, or a folder; default Gaber's."),
+    ] = None,
+    table: Annotated[
+        Path | None, typer.Option(help="results.parquet of `smc-mujoco bench`; its runs are not repeated.")
+    ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON document instead of tables, like --json - elsewhere.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option(help="Also write that JSON document to a file.")] = None,
+    evidence: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.json", help="Also write claims, runs, numbers, thresholds and verdicts, sealed."),
+    ] = None,
+    badge: Annotated[
+        Path | None, typer.Option(metavar="FILE.svg", help="Also write a badge with the number of claims by verdict.")
+    ] = None,
+    mutants: Annotated[
+        bool,
+        typer.Option(
+            "--mutants",
+            help="Check that the audit can fail: list claims that no broken law loses. Exit code 1 if there are any.",
+        ),
+    ] = False,
+    threads: options.Threads = None,
+) -> None:
+    """Audit a paper's claims: measure each against the threshold that was fixed for it before any run.
+
+    Under a set of gains a claim is supported if all its sentences hold, refuted if none does, and partly supported
+    otherwise. If the verdict depends on the set of gains, the table says so. One counter-example refutes a universal
+    claim. Claims that you name are shown in full, with every check. All of Gaber's, the default, take minutes.
+
+    The file of --evidence has the hashes of each claim's runs, their numbers, thresholds and verdicts, and a seal. A
+    second audit with the same versions writes the same file, to the last bit.
+
+    Example: smc-mujoco claims 3 18 --gains tuned
+
+    Example: smc-mujoco claims --paper ./my_paper --evidence evidence.json --badge badge.svg
+    """
+    with held_back():
+        from smc_mujoco.common.errors import ScenarioError
+        from smc_mujoco.common.files import ended, replacing, writable
+        from smc_mujoco.common.progress import bar
+        from smc_mujoco.evidence.audit.audit import DEFAULT, audit, document, evaluations
+        from smc_mujoco.evidence.audit.paper import paper as find_paper
+        from smc_mujoco.evidence.commands import tables
+        from smc_mujoco.studies.table import Table
+        from smc_mujoco.testing import mutants as testing
+
+    terminal = Terminal()
+    about = find_paper(paper or DEFAULT)
+    sets = None if gains is None else options.names(gains)
+    known = None if table is None else Table.read(table)
+    if evidence and known:
+        raise ScenarioError("--evidence needs runs that the audit makes itself: leave out --table")
+    if mutants and json:
+        raise ScenarioError("--mutants prints sentences: leave out --json")
+    for file, ending in ((out, ""), (evidence, ".json"), (badge, ".svg")):
+        if file:
+            writable(ended(file, ending) if ending else file)
+    with bar("claims", evaluations(ids or None, sets, quick, about), counted=True) as drawn:
+        done = audit(about, ids or None, sets, quick, threads, table=known, report=drawn.advance)
+    found = done.claims
+    written = [one for one in (evidence and done.save(evidence), badge and done.badge(badge)) if one]
+    text = document(found)
+    if out:
+        with replacing(out) as file:
+            file.write_text(text + "\n", encoding="utf-8")
+        written.append(out)
+    if json:
+        print(text)
+        return
+    tables.print_claims(found, terminal, full=bool(ids))
+    kept: dict[str, str] = {}
+    if mutants:
+        with bar("mutants", testing.evaluations(about, ids or None, sets, quick), counted=True) as drawn:
+            kept = testing.survivors(about, ids or None, sets, quick, threads, drawn.advance)
+        terminal.note(
+            "\n".join(
+                [f"claim {id} is {why}" for id, why in kept.items()]
+                or ["Every claim is lost by a mutant of its law, or says why it cannot be."]
+            )
+        )
+        asked = [about.claims[claim.id] for claim in found]
+        for entry in [entry for entry in asked if entry.immune]:
+            terminal.note(f"claim {entry.id} cannot be lost: {entry.immune}", wrap=True)
+    notes = [f"{terminal.seconds:.0f} s", "quick: coarser grids than the claims say" * quick]
+    notes.append(f"wrote {printable(', '.join(map(str, written)))}" if written else "")
+    terminal.note("; ".join(filter(None, notes)), "dim")
+    if kept:
+        raise SystemExit(1)
+
+
+@errors_as_sentences()
+def papers(
+    new: Annotated[
+        Path | None,
+        typer.Option("--new", metavar="FOLDER", help="Write a template of your own paper into a folder."),
+    ] = None,
+    check: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.json", help="Check the seal of a file that `smc-mujoco claims --evidence` wrote."),
+    ] = None,
+) -> None:
+    """List the papers whose claims `smc-mujoco claims --paper NAME` audits, begin your own, or check evidence.
+
+    A paper is a folder with paper.toml, its claims and their thresholds, and claims.py, a function for each claim.
+
+    Example: smc-mujoco papers --new my_paper && smc-mujoco claims --paper ./my_paper
+    """
+    with held_back():
+        from smc_mujoco.cli import tables
+        from smc_mujoco.evidence.audit import evidence, paper
+
+    terminal = Terminal()
+    if new:
+        terminal.wrote(*paper.new(new))
+    if check:
+        data = evidence.check(check)
+        counts = ", ".join(f"{count} {verdict}" for verdict, count in data["counts"].items())
+        terminal.note(f"the seal is whole: {data['paper']['authors']}, {data['paper']['title']}: {counts}", wrap=True)
+    if new or check:
+        return
+    lines = {name: f"{one.authors}: {one.title} ({len(one.claims)} claims)" for name, one in paper.papers().items()}
+    rows = [(name, tables.with_package(line, paper.catalogue().package(name))) for name, line in lines.items()]
+    terminal.print(tables.catalogue("Papers, for smc-mujoco claims --paper", rows))

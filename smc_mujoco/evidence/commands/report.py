@@ -1,0 +1,59 @@
+"""smc-mujoco report: the whole study as one HTML file."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import errors_as_sentences
+from smc_mujoco.common.errors import printable
+from smc_mujoco.common.interrupts import held_back
+
+
+@errors_as_sentences()
+def report(
+    quick: Annotated[bool, typer.Option("--quick", help="A small report, in two minutes: less of everything.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for the report and its data.")] = Path("report"),
+    seeds: Annotated[
+        int | None, typer.Option(min=1, help="Seeds of every cell of the grid. With fewer than 16 no law can win.")
+    ] = None,
+    records: Annotated[
+        Path | None,
+        typer.Option(help="Folder with records of rigs, CSV or npz, which are shown beside their twins; see identify."),
+    ] = None,
+    laws: Annotated[
+        str | None,
+        typer.Option(help="Further laws, as a,b, beside the study's; each needs tuned gains on the study's plants."),
+    ] = None,
+    paper: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|FOLDER", help="Instead of the study, audit a paper of `smc-mujoco papers`."),
+    ] = None,
+    threads: options.Threads = None,
+) -> None:
+    """Compute the whole study, in about 20 minutes, and write it as one HTML file: which controller, where, how sure.
+
+    The report has the grid of plants, laws, conditions and seeds; the paper's claims; margins; regions of attraction;
+    real machines; films. The file OUT/report.html needs no network and no other file; the data are in the same folder.
+    You can stop the command at any time, and continue by starting it again.
+
+    With --paper it is the audit of a paper, and takes seconds or minutes: OUT has report.html, evidence.json, badge.svg
+    and checks.svg.
+
+    Example: smc-mujoco report --quick --out look
+
+    Example: smc-mujoco report --paper ./my_paper --out audit
+    """
+    with held_back():
+        from smc_mujoco.common.errors import ScenarioError
+        from smc_mujoco.evidence.report import paper as of_paper
+        from smc_mujoco.evidence.report import report as make
+
+    if paper and (seeds or records or laws):
+        raise ScenarioError("--seeds, --laws and --records belong to the study: leave them out with --paper")
+    if paper:
+        path = of_paper.report(paper, out, quick, threads, progress=True)
+    else:
+        path = make(out, quick, seeds, threads, progress=True, records=records, laws=options.names(laws))
+    print(f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")
