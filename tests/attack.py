@@ -40,7 +40,7 @@ import numpy as np
 import wild
 
 import smc_mujoco as smc
-from smc_mujoco.common import arguments
+from smc_mujoco.common.errors import shown
 from smc_mujoco.simulation.state import LOGGED
 
 START = 600.0  # s in which a process is ready, compiling included
@@ -286,7 +286,7 @@ def calls(random: Random) -> str:
         del named[random.choice(sorted(named))]
     parameters = inspect.signature(call).parameters
     placed = [named.pop(p.name) for p in parameters.values() if p.kind is p.POSITIONAL_ONLY and p.name in named]
-    told = f"smc.{name}({', '.join(f'{key}={arguments.shown(held)}' for key, held in named.items())})"
+    told = f"smc.{name}({', '.join(f'{key}={shown(held)}' for key, held in named.items())})"
     try:
         with alarm(LONG):
             result = call(*placed, **named)
@@ -294,6 +294,8 @@ def calls(random: Random) -> str:
                 next(result, None)
     except smc.ScenarioError as error:
         sentence(str(error))
+        return "refused"
+    except (TypeError, AttributeError):  # Python's own words for a wrong type, or a name that the call does not have
         return "refused"
     except Long:
         return "computes"

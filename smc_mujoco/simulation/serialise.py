@@ -88,7 +88,7 @@ def restore(data: dict) -> Scenario:
         "jump": data["jump"] and Jump(**data["jump"]),
     }
     exact = Scenario.recorded(**fields)
-    given = Scenario.recorded(**fields | dict.fromkeys(data["left_out"]))
+    given = Scenario.recorded(**fields | dict.fromkeys(data.get("left_out", ())))
     scenario = given if given == exact else exact  # where this version's defaults differ, keep the recorded values
     return scenario.named(data.get("condition"))
 

@@ -105,7 +105,7 @@ def _verdicts(boards: Sequence[Any]) -> list[str]:
 
 def _groups(boards: Iterable[Any]) -> dict[str, list[Any]]:
     """Return the boards of each group of runs, under its name."""
-    groups: dict[str, list[Board]] = {}
+    groups: dict[str, list[Any]] = {}
     for board in boards:
         groups.setdefault(board.about, []).append(board)
     return groups

@@ -279,8 +279,6 @@ def test_named_law_is_another_in_tables(tmp_path):
     assert again == runs[0]
     assert again.law.function is QUICK.function
     assert smc.tune("duffing", slow, 2, conditions="nominal").law.name == "slow"
-    with pytest.raises(smc.ScenarioError, match="got its argument 'name' twice"):
-        smc.law("classical", k=2.0, name="slow")  # pyright: ignore[reportCallIssue]
 
 
 def test_grid_warns_of_gains_for_other_parameters():

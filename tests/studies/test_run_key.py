@@ -240,14 +240,14 @@ def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_rep
         return key(scenario)
 
     same = now()
-    (package / "studies" / "report" / "words.py").write_text("# other words")
-    (package / "studies" / "papers" / "gaber" / "claims" / "abstract.py").write_text("# other claims")
+    (package / "evidence" / "report" / "words.py").write_text("# other words")
+    (package / "evidence" / "papers" / "gaber" / "claims" / "abstract.py").write_text("# other claims")
     assert now() == same
     (package / "simulation" / "callback.py").write_text("# another loop")
     assert now() != same
     fingerprint.package.cache_clear()
     before = fingerprint.package()  # the key of a report's verdicts
-    (package / "studies" / "papers" / "gaber" / "paper.toml").write_text("# other thresholds")
+    (package / "evidence" / "papers" / "gaber" / "paper.toml").write_text("# other thresholds")
     fingerprint.package.cache_clear()
     assert fingerprint.package() != before
     fingerprint.package.cache_clear()

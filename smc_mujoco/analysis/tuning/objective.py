@@ -141,7 +141,7 @@ class Objective:
 
 def restore(data: Mapping[str, Any]) -> Objective:
     """Return the objective that `Objective.describe` wrote."""
-    starts = dict(data["starts"])
+    starts = dict(data.get("starts", {}))
     if starts.get("x0") is not None:
         starts["x0"] = tuple(starts["x0"])
     return Objective(**dict(data) | {"conditions": tuple(data["conditions"]), "starts": Starts(**starts)})
