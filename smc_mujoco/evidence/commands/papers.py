@@ -69,7 +69,7 @@ def claims(
         from smc_mujoco.evidence.audit.paper import paper as find_paper
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.studies.table import Table
-        from smc_mujoco.testing import mutants as testing
+        from smc_mujoco.evidence.audit import mutants as testing
 
     terminal = Terminal()
     about = find_paper(paper or DEFAULT)
