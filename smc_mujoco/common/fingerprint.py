@@ -181,7 +181,7 @@ def _function_contents(function: FunctionType) -> list[Any]:
         function.__defaults__,
         function.__kwdefaults__,
         closure,
-        *_reached(function.__globals__, names, set()),
+        *_reached(function.__globals__, names.variables, names.attributes, set()),
         *_overloads(function),
     ]
 
@@ -192,12 +192,13 @@ def _overloads(function: FunctionType) -> list[Any]:
     return [vars(each)["_overload_func"] for kind in kinds for each in kind.templates if "_overload_func" in vars(each)]
 
 
-def _reached(space: Mapping[str, Any], names: set[str], known: set[int]) -> list[Any]:
-    """Return the values of some names in a namespace, and in the modules among those values.
+def _reached(space: Mapping[str, Any], names: set[str], attributes: set[str], known: set[int]) -> list[Any]:
+    """Return the values of some names in a namespace, and of some attributes of the modules among those values.
 
     Args:
       space: the namespace.
       names: in it. Those that it lacks are skipped.
+      attributes: names in the modules.
       known: ids of modules that were read already; new ones are added.
     """
     found: list[Any] = []
@@ -207,7 +208,7 @@ def _reached(space: Mapping[str, Any], names: set[str], known: set[int]) -> list
         own = isinstance(value, ModuleType) and value.__name__.split(".")[0] not in VERSIONED
         if own and id(value) not in known:
             known.add(id(value))
-            found += _reached(vars(value), names, known)
+            found += _reached(vars(value), attributes, attributes, known)
     return found
 
 

@@ -4,11 +4,22 @@ The author of a law may compile its helpers, and numba checks array bounds only 
 with copies of its helpers that are compiled with checks. The reference loop runs it with the helpers' plain Python.
 """
 
+import dis
 from collections.abc import Callable
 from types import CellType, CodeType, FunctionType, ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba.core.dispatcher import Dispatcher
+
+# Instructions with the name of a global variable; those of all others have the name of an attribute.
+OF_VARIABLES = {"LOAD_GLOBAL", "STORE_GLOBAL", "DELETE_GLOBAL", "LOAD_NAME", "LOAD_FROM_DICT_OR_GLOBALS"}
+
+
+class Names(NamedTuple):
+    """Names in code: of global variables, and of attributes, of whatever object."""
+
+    variables: set[str]
+    attributes: set[str]
 
 
 def rebuild(function: Any, finish: Callable[[Any], Any], made: dict[Callable, Any] | None = None) -> Any:
@@ -32,24 +43,25 @@ def _rebuild(function: Any, finish: Callable, made: dict) -> Any:
         cells = tuple(CellType() for _ in function.__closure__ or ())
         made[function] = finish(FunctionType(function.__code__, space, function.__name__, function.__defaults__, cells))
         # filled in only now, because a function may call itself
-        space |= {name: _swapped(space[name], names, finish, made) for name in names & space.keys()}
+        space |= {name: _swapped(space[name], names, finish, made) for name in names.variables & space.keys()}
         for cell, old in zip(cells, function.__closure__ or (), strict=True):
             cell.cell_contents = _swapped(old.cell_contents, names, finish, made)
     return made[function]
 
 
-def _swapped(value: Any, names: set[str], finish: Callable, made: dict) -> Any:
+def _swapped(value: Any, names: Names, finish: Callable, made: dict) -> Any:
     """Return what replaces a value in a copy.
 
-    That is a copy of a compiled function, a copy of a module in which compiled functions with these names are copied,
-    or else the value itself.
+    That is a copy of a compiled function, a copy of a module in which compiled functions with these attributes' names
+    are copied, or else the value itself.
     """
     if isinstance(value, Dispatcher):
         return _rebuild(value.py_func, finish, made)
-    if isinstance(value, ModuleType) and _holds(value, names):
+    if isinstance(value, ModuleType) and _holds(value, names.attributes):
         copy = ModuleType(value.__name__)
         for name, thing in vars(value).items():
-            vars(copy)[name] = _swapped(thing, set(), finish, made) if name in names else thing
+            used = name in names.attributes
+            vars(copy)[name] = _swapped(thing, Names(set(), set()), finish, made) if used else thing
         return copy
     return value
 
@@ -57,9 +69,9 @@ def _swapped(value: Any, names: set[str], finish: Callable, made: dict) -> Any:
 def _calls_compiled(function: FunctionType) -> bool:
     """Return whether a function refers to a compiled function, by name or in a module."""
     names = names_in(function.__code__)
-    values = [function.__globals__[name] for name in names if name in function.__globals__]
+    values = [function.__globals__[name] for name in names.variables if name in function.__globals__]
     values += [cell.cell_contents for cell in function.__closure__ or ()]
-    return any(isinstance(v, Dispatcher) or (isinstance(v, ModuleType) and _holds(v, names)) for v in values)
+    return any(isinstance(v, Dispatcher) or (isinstance(v, ModuleType) and _holds(v, names.attributes)) for v in values)
 
 
 def _holds(module: ModuleType, names: set[str]) -> bool:
@@ -67,6 +79,13 @@ def _holds(module: ModuleType, names: set[str]) -> bool:
     return any(isinstance(vars(module).get(name), Dispatcher) for name in names)
 
 
-def names_in(code: CodeType) -> set[str]:
+def names_in(code: CodeType) -> Names:
     """Return the names that code uses, and those that functions defined in it use."""
-    return set(code.co_names).union(*(names_in(c) for c in code.co_consts if isinstance(c, CodeType)))
+    names = Names(set(), set())
+    for instruction in dis.get_instructions(code):
+        if instruction.opcode in dis.hasname:
+            (names.variables if instruction.opname in OF_VARIABLES else names.attributes).add(instruction.argval)
+    for inner in (names_in(constant) for constant in code.co_consts if isinstance(constant, CodeType)):
+        names.variables.update(inner.variables)
+        names.attributes.update(inner.attributes)
+    return names

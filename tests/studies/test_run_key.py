@@ -283,3 +283,13 @@ def test_metrics_are_the_same_after_a_score():
     before = fingerprint.now(formulas)
     smc.score(smc.run(scenario(smc.law("classical"))))
     assert fingerprint.now(formulas) == before
+
+
+def test_a_global_with_the_name_of_an_attribute_does_not_count():
+    space = {"__name__": "users", "t": 3.0, "G": 2.0}
+    exec("def timed(y, gains, memory):\n    return -G * y.e + 0.0 * y.t, y.e", space)
+    before = fingerprint.now(space["timed"])
+    space["t"] = open  # neither read by the law nor comparable
+    assert fingerprint.now(space["timed"]) == before
+    space["G"] = 5.0
+    assert fingerprint.now(space["timed"]) != before

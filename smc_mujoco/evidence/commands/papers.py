@@ -65,11 +65,11 @@ def claims(
         from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import ended, replacing, writable
         from smc_mujoco.common.progress import bar
+        from smc_mujoco.evidence.audit import mutants as testing
         from smc_mujoco.evidence.audit.audit import DEFAULT, audit, document, evaluations
         from smc_mujoco.evidence.audit.paper import paper as find_paper
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.studies.table import Table
-        from smc_mujoco.evidence.audit import mutants as testing
 
     terminal = Terminal()
     about = find_paper(paper or DEFAULT)

@@ -74,6 +74,9 @@ class Backlash(Actuator):
         yield Field("dof_damping", rotors, self.rotor_damping)
 
 
+MIN_ARM = 1e-6  # m, from a hinge to the centre of mass: a shorter one gives its pointer no direction
+
+
 def _add_rotor(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, rigid: mujoco.MjModel, pose: mujoco.MjData) -> None:
     """Add a rotor on the joint's own axis, with a pointer that shows where in the play it is."""
     i = rigid.joint(joint.name).id
@@ -91,7 +94,9 @@ def _add_rotor(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, rigid: mujoco.MjMode
     rotor.add_joint(name=ROTOR + joint.name, type=joint.type, axis=axis)
     if joint.type == mujoco.mjtJoint.mjJNT_HINGE:
         arm = frame.T @ (pose.xipos[body] - pose.xanchor[i])
-        away = arm / max(float(np.linalg.norm(arm)), 1e-9)
+        if np.linalg.norm(arm) < MIN_ARM:  # a wheel: any direction across its axis does
+            arm = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+        away = arm / np.linalg.norm(arm)
         face = axis * math.copysign(0.045, -axis[1])  # in front of the hub, towards the camera at -y
         ends = (*face, *(face + 0.16 * away))
     else:

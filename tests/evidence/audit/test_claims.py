@@ -13,8 +13,6 @@ from typer.testing import CliRunner
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.linear_theory import lam_range
-from smc_mujoco.cli import tables
-from smc_mujoco.cli.commands.studies import claims as command
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.variants import reversed_gain, squeezed, with_gains, zero_gain
 from smc_mujoco.evidence.audit import audit
@@ -37,6 +35,8 @@ from smc_mujoco.evidence.audit.verdict import (
     ratio,
     verdict,
 )
+from smc_mujoco.evidence.commands import tables
+from smc_mujoco.evidence.commands.papers import claims as command
 from smc_mujoco.evidence.papers.gaber.claims import common, lyapunov, searches
 from smc_mujoco.evidence.papers.gaber.claims.common import OURS
 from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS

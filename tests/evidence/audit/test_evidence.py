@@ -12,12 +12,12 @@ import typer
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
-from smc_mujoco.cli.commands import studies
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import from_json
 from smc_mujoco.evidence.audit import badge, evidence
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED
+from smc_mujoco.evidence.commands import papers
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies.run_key import portable_key
 
@@ -185,8 +185,8 @@ def test_a_badge_has_a_field_for_each_verdict_that_occurs(tmp_path):
 
 def test_the_command_writes_evidence_and_badge_and_checks_the_seal(folder, tmp_path):
     app = typer.Typer()
-    app.command("claims")(studies.claims)
-    app.command("papers")(studies.papers)
+    app.command("claims")(papers.claims)
+    app.command("papers")(papers.papers)
     files = tmp_path / "evidence.json", tmp_path / "badge.svg"
     words = ["claims", "--paper", str(folder), "--evidence", str(files[0]), "--badge", str(files[1])]
     written = CliRunner().invoke(app, words)

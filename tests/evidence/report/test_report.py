@@ -584,7 +584,7 @@ def test_without_a_renderer_the_report_says_so_in_one_sentence(folder, findings,
 
 
 def test_the_command_is_light_to_import():
-    code = "import smc_mujoco.cli.commands.studies, sys; print(*sys.modules)"
+    code = "import smc_mujoco.evidence.commands.report, sys; print(*sys.modules)"
     environment = os.environ | {"PYTHONPATH": str(Path(scenarios.__file__).parents[3])}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert {"mujoco", "numba", "jinja2", "plotly", "pyarrow", "scipy"} & set(done.stdout.split()) == set()

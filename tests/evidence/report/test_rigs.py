@@ -6,12 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.studies.report.test_report import TINY
 
 import smc_mujoco as smc
 from smc_mujoco.evidence.report import charts, page, rigs, stages
 from smc_mujoco.evidence.report.plan import Bars, Work
 from smc_mujoco.evidence.rigs import records
+from tests.evidence.report.test_report import TINY
 
 DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
 AXIS = smc.rig("emps")
