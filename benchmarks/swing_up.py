@@ -2,11 +2,11 @@
 
     python benchmarks/swing_up.py acrobot              # optimise, then write the file; a minute
     python benchmarks/swing_up.py acrobot --starts 12  # also tell what other starts of the search lead to
-    python benchmarks/swing_up.py --gains              # how k, phi and the filter were chosen: on machines of our own
+    python benchmarks/swing_up.py --gains              # how k, phi and the filter were chosen, on other machines
 
 The trajectory has the best version-2 score that was found: direct multiple shooting with RK4, u linear between NODES
 points, both ends at rest with u = 0, |u| <= 6 N m, by scipy's SLSQP from a random arc. The search knows the model and
-the score, and nothing of the robustness test. The surface is that of a Riccati equation along the trajectory, with
+the score, and nothing of the robustness test. The feedback is that of a Riccati equation along the trajectory, with
 Q = diag(1, 1, 0.1, 0.1) and R = 1: the first weights that were tried.
 """
 
@@ -275,7 +275,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("robots", nargs="*", choices=[*BEST, []], help="whose trajectory is found")
     parser.add_argument("--starts", type=int, default=0, help="tell the scores of this many starts")
-    parser.add_argument("--gains", action="store_true", help="compare gains on machines of our own")
+    parser.add_argument("--gains", action="store_true", help="compare gains on machines that the test does not have")
     asked = parser.parse_args()
     for robot in asked.robots:
         for seed in range(asked.starts):

@@ -1,8 +1,7 @@
 """How much dry friction in its free shoulder does the acrobot's swing-up tolerate?
 
-This package's entry on RealAIGym's board: an optimised trajectory from hanging to upright, tracked by a sliding-mode
-law on the surface of its Riccati equation, with 6 N m at the elbow. The law knows nothing of the friction, and has no
-motor in the joint where it acts.
+This package's entry on RealAIGym's board: an optimised trajectory from hanging to upright under a Riccati law, with
+6 N m at the elbow. The law knows nothing of the friction, and has no motor in the joint where it acts.
 
 Look for: 1.2 s to the top. A little friction holds the machine where it leans, a fold of the elbow against the
 shoulder; more keeps it rocking about the top, which is not up by the board's rule.

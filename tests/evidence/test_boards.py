@@ -1,4 +1,4 @@
-"""RealAIGym's boards: published scores by our formula, the published simulator against MuJoCo, and our entries."""
+"""RealAIGym's boards: published scores, the published simulator against MuJoCo, and this package's rows."""
 
 import dataclasses
 import math
@@ -169,7 +169,7 @@ def test_the_grid_is_the_published_one():
     assert all(1.0 <= centre <= 9.0 and 0.05 <= width <= 0.1 and 0.5 <= abs(a) <= 5.0 for centre, width, a in pulses)
 
 
-# our entries
+# this package's rows
 
 
 @ROBOTS
@@ -184,6 +184,46 @@ def test_the_entry_swings_up_and_balances(robot, traces):
     own = {"reference": smc.Constant(0.1), "feedforward": smc.Constant(0.1), "velocity": "levant", "seed": 3}
     designed = dataclasses.replace(traces[robot], scenario=dataclasses.replace(traces[robot].scenario, **own))
     assert boards.board(designed) == boards.board(traces[robot])
+
+
+@ROBOTS
+def test_any_smooth_feedback_scores_the_same_and_a_switching_one_loses(robot, traces):
+    """The control experiments: the score is the trajectory's, so no row may be read as a success of sliding mode."""
+    rows = boards.experiments(robot)
+    assert rows[boards.NAME] == traces[robot].scenario
+    found = dict(zip(rows, smc.run(list(rows.values())), strict=True))
+    gains, s = boards.FEEDBACKS["Riccati"], traces[robot].s[:, 0]
+    assert np.abs(gains["k"] * np.tanh(s / gains["phi"])).max() < 0.015  # N m, of 6
+    score = {name: boards.score(trace) for name, trace in found.items()}
+    assert score["trajectory + linear"] == pytest.approx(score[boards.NAME], abs=1e-9)
+    for name in ("clipped", "Riccati*", "linear*", "clipped*"):
+        assert score[f"trajectory + {name}"] == pytest.approx(score[boards.NAME], abs=2e-4)
+    for name in ("trajectory + sliding", "trajectory + sliding*"):
+        phi = boards.FEEDBACKS["sliding"]["phi"]
+        assert np.abs(np.diff(np.sign(found[name].s[:, 0]))).sum() > 1000  # switches about every other sample
+        assert np.mean(np.abs(found[name].s[:, 0]) > phi) > 0.5
+        assert score[name] < min(row.score for row in boards.SIMULATION[robot]["v2"])
+    top = np.array([row.name for row in boards.board(found)])
+    assert set(rows) <= set(top)
+    assert f"{score['trajectory + sliding']:.3f} with a sliding mode" in boards.comparison(found, None)
+
+
+def test_feedback_of_a_control_experiment_is_what_its_name_says():
+    law, rows = entries.acrobot_swing_up, boards.FEEDBACKS
+    for s in (-30.0, -3.0, 0.01, 7.0):
+        u = {name: gains["k"] * math.tanh(s / gains["phi"]) for name, gains in rows.items()}
+        assert u["linear"] == pytest.approx(1.5 * s, rel=1e-9)
+        assert u["clipped"] == pytest.approx(s, rel=1e-9)
+    assert law().gains == rows["Riccati"]
+    assert boards.entry("acrobot", "clipped").law.of_channel(0).gains == rows["clipped"]
+
+
+def test_with_measured_velocities_the_acrobots_entry_is_less_robust_than_two_published_rows():
+    """As published rows are: 0.725, below 0.751 and 0.727; with the filter it would be first."""
+    result = boards.robustness(boards.experiments("acrobot")[boards.NAME + "*"])
+    rows = boards.robustness_board("acrobot", {boards.NAME: result})
+    assert [row.name for row in rows][2] == boards.NAME
+    assert result.percent["velocity_noise"] < 30.0
 
 
 @ROBOTS
@@ -261,6 +301,7 @@ def ruled(**fields):
     ("wrong", "words"),
     [
         (lambda: boards.entry("acrobat"), "acrobot"),
+        (lambda: boards.entry("acrobot", "slide"), "sliding"),
         (lambda: boards.board(smc.run(boards.entry("acrobot", duration=0.01))), "duration of the run is 0.01"),
         (lambda: boards.board(ruled(x0=3.0)), "x0 of the run"),
         (lambda: boards.board(ruled(plant=smc.plant("acrobot", m2=0.3))), "m2 of the run is 0.3 and on the boards 0.6"),
@@ -289,12 +330,13 @@ def test_a_law_that_does_not_compile_is_refused():
         Machine(boards.on_board("acrobot", lists()))
 
 
-def test_the_command_shows_ours_among_the_published(capsys, tmp_path):
+def test_the_command_shows_this_packages_rows_among_the_published(capsys, tmp_path):
     with pytest.raises(SystemExit) as ended:
         cli.main(["board", "acrobot", "--no-robustness", "--figure", str(tmp_path / "a")])
     assert ended.value.code in (0, None)
     out = capsys.readouterr().out
-    assert out.index("smc_mujoco") < out.index("History SAC") < out.index("mcpilco")
+    order = ["trajectory + linear", "History SAC", "mcpilco", "trajectory + sliding"]
+    assert sorted(order, key=out.index) == order
     assert (tmp_path / "a.svg").exists()
 
 

@@ -1,26 +1,28 @@
-"""Sliding-mode entries for the boards: swing-up and balance of acrobot and pendubot along an optimised trajectory.
+"""This package's entries on the boards: an optimised trajectory under a Riccati law, and its control experiments.
 
     s = b' P (z - z*) / R,    u = u* - k tanh(s / phi)
 
 z = (q1, q2, q1', q2') is the state, z*(t) and u*(t) a trajectory from hanging to upright, b(t) the input vector of the
 motion linearised along it, and P(t) the solution of its Riccati equation -P' = A'P + P A - P b b'P / R + Q, which ends
-in that of the upright equilibrium. After the trajectory all of them stay as they are there: the catch is the same law.
+in that of the upright equilibrium. After the trajectory all of them stay as they are there, and the same law balances.
 
-To first order V = (z - z*)'P (z - z*) obeys V' = -(z - z*)'Q (z - z*) + R s^2 - 2 R s (k tanh(s / phi) - d) under a
-matched disturbance d. On s = 0, V falls whatever u and d are: the surface is stable, and the law has only to bring s to
-0. Without d, V falls wherever k tanh(s / phi) exceeds s / 2, for the default gains where |s| < 2.9 phi. The motor gives
-6 N m, less than k.
+With u = u* - s this is the linear-quadratic regulator along the trajectory. The entry's feedback is 1.5 s near the
+trajectory and bends where |s| nears phi. On the board's undisturbed machine |s| / phi is below 0.002, so the score is
+that of the trajectory, and any feedback that holds the machine on it scores the same. `FEEDBACKS` has three others, as
+control experiments: the same slope without a bend, the regulator itself, and a layer so narrow that the law switches.
+All of them are clipped at the motor's 6 N m.
 
 `trajectories/` has z*, u*, z*'' and b'P/R of each robot, and how they were found; benchmarks/swing_up.py finds them
-again. Velocities are those of a Savitzky-Golay filter of 5 positions, as the rig has encoders and no tachometer.
-Sources: V. I. Utkin, Sliding Modes in Control and Optimization, Springer 1992, chapter 9 (surfaces of least quadratic
-cost); S. Gutman, "Uncertain dynamical systems: a Lyapunov min-max approach", IEEE Trans. Automatic Control 24(3):437,
-1979 (the surface b'P z = 0).
+again. The entry's velocities are those of a Savitzky-Golay filter of 5 positions; the published entries use measured
+ones, so every feedback has a row with each.
+Sources: R. E. Kalman, Contributions to the theory of optimal control, Boletin de la Sociedad Matematica Mexicana 5:102,
+1960 (the regulator); V. I. Utkin, Sliding Modes in Control and Optimization, Springer 1992, chapter 9 (s = 0 as a
+surface of least quadratic cost).
 """
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -38,20 +40,29 @@ from smc_mujoco.simulation.scenario import Scenario
 FOLDER = Path(__file__).parent / "trajectories"
 PERIOD, DURATION = 2e-3, 10.0  # s, of the boards
 WINDOW = 5  # readings of the velocity's filter
+STRAIGHT = 6e6  # N m, a phi for which tanh(s / phi) is s / phi to 1e-10
+FEEDBACKS: Mapping[str, Mapping[str, float]] = {  # feedback along the trajectory -> k and phi, N m
+    "Riccati": {"k": 9.0, "phi": 6.0},  # the entry
+    "linear": {"k": 1.5 * STRAIGHT, "phi": STRAIGHT},  # the entry's slope at s = 0
+    "clipped": {"k": STRAIGHT, "phi": STRAIGHT},  # u = u* - s: the Riccati gain itself
+    "sliding": {"k": 9.0, "phi": 0.06},  # a hundredth of the entry's layer: the law switches on s = 0
+}
 
 
-def entry(robot: str, **fields: Any) -> Scenario:
+def entry(robot: str, feedback: str = "Riccati", **fields: Any) -> Scenario:
     """Return the run of this package's entry on the boards of "acrobot" or "pendubot".
 
     Args:
       robot: "pendubot" or "acrobot".
+      feedback: that of the entry, "Riccati", or of a control experiment: "linear", "clipped" or "sliding".
       fields: of the Scenario, in place of the board's.
 
     Raises:
-      ScenarioError: another robot.
+      ScenarioError: another robot or feedback.
     """
     law = find("robot of the boards", robot, {"acrobot": acrobot_swing_up, "pendubot": pendubot_swing_up})
-    made = on_board(robot, law(), velocity=estimator("savitzky_golay", window=WINDOW, degree=2))
+    gains = find("feedback of the entry", feedback, FEEDBACKS)
+    made = on_board(robot, law(**gains), velocity=estimator("savitzky_golay", window=WINDOW, degree=2))
     return dataclasses.replace(made, **fields)
 
 
@@ -113,13 +124,13 @@ def _named(law: Callable, robot: str) -> Template:
     law.__name__ = law.__qualname__ = f"{robot}_swing_up"
     law.__doc__ = f"Swing-up and balance of the {robot} along an optimised trajectory: u = u* - k tanh(s / phi)."
     decorate = law_function(
-        gains={"k": Gain(9.0, FORCE, positive=True), "phi": Gain(6.0, FORCE, positive=True)},
+        gains={name: Gain(value, FORCE, positive=True) for name, value in FEEDBACKS["Riccati"].items()},
         conditions={"k > phi / 2": lambda g: g.k > g.phi / 2.0},
         memory=1,
         plants=(robot,),
         continuous=True,
-        label="Swing-up on a Riccati surface",
-        short="RS",
+        label="Trajectory under a Riccati law",
+        short="TR",
         colour="#D55E00",
     )
     return decorate(law)

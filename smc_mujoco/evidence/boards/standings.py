@@ -1,16 +1,25 @@
 """The boards as tables: published rows with your own among them, best score first."""
 
 import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
 
 from smc_mujoco.common import errors
-from smc_mujoco.evidence.boards.entries import on_board
+from smc_mujoco.evidence.boards.entries import FEEDBACKS, entry, on_board
 from smc_mujoco.evidence.boards.published import ROBUSTNESS, SIMULATION, RobustnessRow, Row
 from smc_mujoco.evidence.boards.scoring import criteria, score, shoulder_first
 from smc_mujoco.evidence.boards.simulator import Robustness
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-NAME = "smc_mujoco"  # of this package's entry
+NAME = "trajectory + Riccati"  # of this package's entry
+MEASURED = "*"  # ends the name of a row with measured velocities
+KEY = (
+    "trajectory + ...: this package's optimised trajectory under a feedback. Riccati: the entry, 9 tanh(s / 6 N m); "
+    "linear: its slope, 1.5 s; clipped: s, the Riccati gain itself; sliding: 9 tanh(s / 0.06 N m), which switches. All "
+    "are clipped at 6 N m. *: measured velocities, as in published rows; else velocities from a filter of 5 positions"
+)
 # Fields of a Scenario that are an entry's own. The rules fix all others.
 DESIGN = ("law", "model", "surface", "velocity", "reference", "feedforward", "seed", "condition")
 WORDS = {
@@ -30,36 +39,67 @@ TESTS = {
 }
 
 
-def board(trace: Trace, name: str = NAME) -> tuple[Row, ...]:
+def experiments(robot: str) -> dict[str, Scenario]:
+    """Return name of row -> run of the entry and of its control experiments, each with both kinds of velocities.
+
+    Raises:
+      ScenarioError: another robot than pendubot and acrobot.
+    """
+    rows = {f"trajectory + {feedback}": entry(robot, feedback) for feedback in FEEDBACKS}
+    measured = {name + MEASURED: dataclasses.replace(each, velocity="measured") for name, each in rows.items()}
+    return rows | measured
+
+
+def board(runs: Trace | Mapping[str, Trace], name: str = NAME) -> tuple[Row, ...]:
     """Return the rows of the version-2 simulation board of a trace's plant, with the trace's row under this name.
+
+    Args:
+      runs: a trace, or name -> trace for several rows; traces of one plant.
+      name: of the row of a single trace.
 
     Raises:
       ScenarioError: another plant than pendubot and acrobot, a run by other rules than the boards', or a name that
         cannot be printed or is that of a published row.
     """
-    found, robot = criteria(trace), trace.scenario.plant.name
-    ran = _ruled(trace.scenario)
+    traces = runs if isinstance(runs, Mapping) else {name: runs}
+    robot = next(iter(traces.values())).scenario.plant.name
+    shoulder_first(robot)
+    rows = [_row(_new_name(each, SIMULATION[robot]["v2"]), trace, robot) for each, trace in traces.items()]
+    return tuple(sorted((*SIMULATION[robot]["v2"], *rows), key=lambda row: -row.score))
+
+
+def _row(name: str, trace: Trace, robot: str) -> Row:
+    """Return the row of a trace; raise ScenarioError for a run by other rules than the boards'."""
+    values, ran = criteria(trace), _ruled(trace.scenario)
     for rule, right in _ruled(on_board(robot, "none")).items():
         if (value := ran.get(rule)) != right:
             raise errors.ScenarioError(
                 f"{rule} of the run is {errors.shown(value)} and on the boards {errors.shown(right)}: "
                 "use smc.boards.on_board"
             )
-    values = {field: getattr(found, field) for field in Row._fields[1:6]}
-    published = SIMULATION[robot]["v2"]
-    own = Row(name=_new_name(name, published), score=score(found), **values)
-    return tuple(sorted((*published, own), key=lambda row: -row.score))
+    return Row(name=name, score=score(values), **{field: getattr(values, field) for field in Row._fields[1:6]})
 
 
-def robustness_board(robot: str, found: Robustness, name: str = NAME) -> tuple[RobustnessRow, ...]:
+def robustness_board(
+    robot: str, results: Robustness | Mapping[str, Robustness], name: str = NAME
+) -> tuple[RobustnessRow, ...]:
     """Return the rows of the robustness board of a robot, with the row of a result under this name.
+
+    Args:
+      robot: "pendubot" or "acrobot".
+      results: a result, or name -> result for several rows.
+      name: of the row of a single result.
 
     Raises:
       ScenarioError: another robot, or a name that cannot be printed or is that of a published row.
     """
     shoulder_first(robot)
-    own = RobustnessRow(name=_new_name(name, ROBUSTNESS[robot]), score=found.score, **found.percent)
-    return tuple(sorted((*ROBUSTNESS[robot], own), key=lambda row: -row.score))
+    named = results if isinstance(results, Mapping) else {name: results}
+    rows = [
+        RobustnessRow(name=_new_name(each, ROBUSTNESS[robot]), score=result.score, **result.percent)
+        for each, result in named.items()
+    ]
+    return tuple(sorted((*ROBUSTNESS[robot], *rows), key=lambda row: -row.score))
 
 
 def _ruled(scenario: Scenario) -> dict[str, object]:
@@ -102,6 +142,32 @@ def verdict(robot: str, trace: Trace, found: Robustness | None, name: str = NAME
     weak = [parameter for parameter, count in found.parameters.items() if count <= 10]
     text += f"; others survive more of {_listed(worse)}" if worse else "; no other survives more of any test"
     return text + (f"; fewer than half of the values of {_listed(weak)} are survived" if weak else "")
+
+
+def comparison(traces: Mapping[str, Trace], results: Mapping[str, Robustness] | None) -> str:
+    """Return sentences on what the control experiments say about the entry.
+
+    Args:
+      traces: name of each row of `experiments` -> its run.
+      results: name of each row -> its robustness, or None.
+    """
+    trace = traces[NAME]
+    robot, gains = trace.scenario.plant.name, trace.scenario.law.of_channel(0).gains
+    largest = float(np.abs(gains["k"] * np.tanh(trace.s[:, 0] / gains["phi"])).max())
+    linear, clipped, sliding = (score(traces[f"trajectory + {name}"]) for name in ("linear", "clipped", "sliding"))
+    text = (
+        f"In its scored run the feedback of {NAME} is at most {largest:.2g} of {trace.scenario.limits[0]:g} N m: the "
+        f"trajectory makes the score, which is {linear:.3f} with linear feedback, {clipped:.3f} with the clipped "
+        f"Riccati gain and {sliding:.3f} with a sliding mode"
+    )
+    if results is None:
+        return text
+    rows = robustness_board(robot, results[NAME + MEASURED])
+    place = next(i for i, row in enumerate(rows, 1) if row.name == NAME)
+    return text + (
+        f". With measured velocities, as in the published rows, its robustness is {rows[place - 1].score:.3f}: number "
+        f"{place} of {len(rows)}"
+    )
 
 
 def _listed(words: list[str]) -> str:

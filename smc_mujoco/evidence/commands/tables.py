@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from rich import box
 from rich.console import Console
@@ -35,8 +35,8 @@ COLOURS = {
 MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}
 
 
-def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], own: str) -> Table:
-    """Return RealAIGym's simulation board or robustness board of a robot, with the row named `own` in bold."""
+def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], own: Collection[str]) -> Table:
+    """Return RealAIGym's simulation board or robustness board of a robot, with the rows named in `own` in bold."""
     tests = isinstance(rows[0], RobustnessRow)
     title, heads = BOARDS["robustness" if tests else "simulation"]
     columns = [Column(head, justify="right") for head in heads]
@@ -45,7 +45,7 @@ def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], own: str) -
         values = row[1:8] if tests else row[1:7]
         digits = (1,) * 6 + (3,) if tests else (2, 2, 2, 3, 1, 3)
         cells = [f"{value:.{places}f}" for value, places in zip(values, digits, strict=True)]
-        table.add_row(row.name, *cells, style="bold" if row.name == own else None)
+        table.add_row(row.name, *cells, style="bold" if row.name in own else None)
     return table
 
 
