@@ -39,7 +39,7 @@ def test_the_reference_names_every_public_name_where_it_is_defined():
     public = {path.removeprefix("smc_mujoco.") for path in public}
     assert public <= set(named)
     assert len(named) == len(set(named))
-    of_modules = ("pytest_plugin.", "testing.", "studies.arms.", "studies.boards.")
+    of_modules = ("pytest_plugin.", "testing.", "studies.arms.", "evidence.boards.", "evidence.audit.mutants.")
     assert {name for name in set(named) - public if not name.startswith(of_modules)} == set()
 
 
