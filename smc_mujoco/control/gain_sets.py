@@ -4,13 +4,13 @@
     law("duffing", "classical", "study")       # as first chosen
 
 - study: a first tuning of the paper's laws to the same bound |u| <= 6. It is never changed in the light of results.
-- tuned: the result of `tuning` for every general law, with 96 evaluations and a cost of the variation of u. The laws of
-  LAWS are tuned from three seeds, so that their results show the spread of tuning; all others from one. Three tunings
-  are three samples of this spread, however many runs use them in turn.
-- tracking: the same for the laws of LAWS, from one seed and without that cost.
+- tuned: the near-optimal gains of a search by `tuning`, for every general law, with a cost of the variation of u. The
+  laws of LAWS have up to 24 sets of gains: run i of a study uses its own set, so that gains are part of the sample.
+  `converged` tells whether the starts of the search agree. All other laws have the gains of one start.
+- tracking: the same for the laws of LAWS, without that cost.
 - default: the law's own.
 
-`tuned_gains/` contains the complete tunings, with history and versions. `make gains` computes them again.
+`tuned_gains/` has a file for each set that was tuned. `make gains` computes them again.
 """
 
 import dataclasses
@@ -18,6 +18,7 @@ import functools
 import inspect
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json
@@ -35,7 +36,6 @@ LAWS = (
     "observer_free", "classical", "boundary_layer", "adaptive", "super_twisting", "conditioned_super_twisting",
     "implicit_first_order", "twisting", "terminal", "extended_state", "pid",
 )  # fmt: skip
-SEEDS = {"tuned": 3, "tracking": 1}  # set -> number of seeds from which the laws of LAWS are tuned
 
 # Other implementations or names of a law -> the law, whose gains they use.
 FORMS = {f"observer_free_{form}": "observer_free" for form in ("q15", "single", "table", "taylor")}
@@ -91,7 +91,7 @@ def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> C
     """Return the law with its gains for a plant, from a set, without warnings of conditions that they violate.
 
     Args:
-      seed: of a run. It uses the gains from tuning seed `seed` modulo the number of seeds the law was tuned from.
+      seed: of a run. It uses the set of gains number `seed` modulo the number of sets. Set 0 is the best.
 
     Raises:
       ScenarioError: an unknown set, or a set without gains for this law on this plant.
@@ -104,7 +104,8 @@ def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> C
     if gains == "study":
         values = find("law of the paper's study", SAME.get(name, name), STUDY[paper_plant(plant.name)])
     else:
-        values = _tuned(plant, FORMS.get(name, name), gains, seed)
+        sets = tuned(plant, name, gains).sets
+        values = sets[seed % len(sets)]
     return dataclasses.replace(base, gains={gain: values.get(gain, value) for gain, value in base.gains.items()})
 
 
@@ -134,9 +135,62 @@ def general_laws(plants: Sequence[str | Plant], gains: str) -> list[str]:
     return found
 
 
-def tunings(gains: str, name: str) -> int:
-    """Return the number of seeds from which a law was tuned for a set."""
-    return SEEDS[gains] if name in LAWS else 1
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TunedGains:
+    """The near-optimal gains of a law on a plant, and the search that found them.
+
+    Attributes:
+      sets: sets of gains, each name -> value; the best first.
+      objective: J of the best, s^2, see `analysis.tuning.objective`.
+      converged: whether three starts of the search ended within 1 % of the best J; None if it had fewer.
+      ends: best J of each start, s^2.
+      evaluations: number of sets of gains that were evaluated.
+      seed: of the search.
+      at_bound: gain -> "lower" or "upper", for those of the best gains that are at a bound of the search.
+      front: tracking in s^2 and variation in 1/s of the Pareto front.
+      best: tracking and variation of the best gains, which are on the front.
+      rule: the search, in words.
+      versions: versions of the packages that the numbers depend on.
+    """
+
+    sets: tuple[Mapping[str, float], ...]
+    objective: float
+    converged: bool | None
+    ends: tuple[float, ...]
+    evaluations: int
+    seed: int
+    at_bound: Mapping[str, str]
+    front: tuple[tuple[float, float], ...]
+    best: tuple[float, float]
+    rule: str
+    versions: Mapping[str, str]
+
+
+def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:
+    """Return the gains of a law on a plant from a set that was tuned, and the search behind them.
+
+    Raises:
+      ScenarioError: an unknown set, or a set without gains for this law on this plant.
+    """
+    find("set of tuned gains", gains, OBJECTIVES)
+    plant, name = as_plant(plant), FORMS.get(name, name)
+    if (known := _known(plant.name, name, gains)) is not None:
+        return known
+    example = next(iter(find_law(name).gains), "k")
+    cure = f"give the law's gains yourself, as {name}({example}=...)"
+    if not plant.unscaled:
+        cure += f", or as the FILE.json that smc-mujoco tune {plant.argument} {name} --out FILE.json writes"
+    cure += ", or take the defaults (--gains default)"
+    raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant.name}: {cure}")
+
+
+def converged(plant: str | Plant, name: str, gains: str = "tuned") -> bool | None:
+    """Return whether three starts of the search ended within 1 % of the best J; None if it had fewer.
+
+    Raises:
+      ScenarioError: as `tuned`.
+    """
+    return tuned(plant, name, gains).converged
 
 
 def paper_plant(plant: object) -> str:
@@ -150,15 +204,48 @@ def paper_plant(plant: object) -> str:
     )
 
 
-def file(plant: str, name: str, objective: str, seed: int = 0) -> Path:
-    """Return the file with the tuning of a law on a plant for an objective from a seed.
+def file(gains: str) -> Path:
+    """Return the package's file of a set that was tuned."""
+    return Path(__file__).parent / "tuned_gains" / f"{gains}.json"
 
-    It is in the folder tuned_gains/OBJECTIVE beside this file, or beside the code of another package's law or plant.
+
+def _known(plant: str, name: str, gains: str) -> TunedGains | None:
+    """Return a law's gains on a plant, from this package or from the law's or the plant's; None if there are none.
+
+    Another package has them in a file of `smc.tune`, tuned_gains/SET/PLANT-LAW.json beside its code.
     """
-    ending = f"-{seed}" if seed else ""
-    part = Path("tuned_gains") / objective / f"{plant}-{name}{ending}.json"
-    files = [home / part for home in (Path(__file__).parent, *_homes(plant, name))]
-    return next((file for file in files if file.is_file()), files[0])
+    if (known := _collection(gains).get((plant, name))) is not None:
+        return known
+    for home in _homes(plant, name):
+        if (path := home / "tuned_gains" / gains / f"{plant}-{name}.json").is_file():
+            return _of_package(path)
+    return None
+
+
+@functools.cache
+def _collection(gains: str) -> dict[tuple[str, str], TunedGains]:
+    """Return the gains of a set in this package, by plant and law."""
+    data = read_json(file(gains))
+    return {
+        (plant, name): _restored(record | {"rule": data["rules"][record["rule"]]})
+        for plant, laws in data["plants"].items()
+        for name, record in laws.items()
+    }
+
+
+@functools.cache
+def _of_package(path: Path) -> TunedGains:
+    """Return the gains in a file that `Tuned.save` wrote."""
+    return _restored(read_json(path)["record"])
+
+
+def _restored(record: Mapping[str, Any]) -> TunedGains:
+    """Return the gains that `Tuned.record` described."""
+    fields = dict(record)
+    names = fields.pop("gains")
+    sets = tuple(dict(zip(names, values, strict=True)) for values in fields.pop("sets"))
+    pairs = {"front": tuple(map(tuple, fields.pop("front"))), "best": tuple(fields.pop("best"))}
+    return TunedGains(sets=sets, ends=tuple(fields.pop("ends")), **pairs, **fields)
 
 
 def _homes(plant: str, name: str) -> Iterator[Path]:
@@ -167,20 +254,3 @@ def _homes(plant: str, name: str) -> Iterator[Path]:
         yield Path(inspect.getfile(law.function)).parent
     if plants_known().package(plant) and (made := plants_known().get(plant)):
         yield Path(inspect.getfile(made.build)).parent
-
-
-def _tuned(plant: Plant, name: str, gains: str, seed: int) -> Mapping[str, float]:
-    path = file(plant.name, name, OBJECTIVES[gains], seed % tunings(gains, name))
-    if path.is_file():
-        return _read(path)
-    example = next(iter(find_law(name).gains), "k")
-    cure = f"give the law's gains yourself, as {name}({example}=...)"
-    if not plant.unscaled:
-        cure += f", or as the FILE.json that smc-mujoco tune {plant.argument} {name} --out FILE.json writes"
-    cure += ", or take the defaults (--gains default)"
-    raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant.name}: {cure}")
-
-
-@functools.cache
-def _read(path: Path) -> Mapping[str, float]:
-    return read_json(path)["scenario"]["law"]["gains"]

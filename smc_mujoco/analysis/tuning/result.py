@@ -16,14 +16,18 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import ended, read_json, reading, write_json
 from smc_mujoco.common.html import table
 from smc_mujoco.common.version import __version__
-from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 
 ALIKE = ("rule", "plant", "definition", "budget", "seed", "versions")  # what two tunings must share to be compared
 HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of Tuned.lines
-WRITTEN = ("objective", "before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions")
+WRITTEN = (
+    "objective", "before", "rule", "budget", "seed", "screened", "ends", "scales", "bounds", "searched", "versions",
+)  # fmt: skip
+AGREEING, AGREEMENT = 3, 0.01  # a search has converged when so many of its starts end so close to the best J
+NEAR_OPTIMAL = 0.03  # of the best J; as much as a metric must differ to be relevant
+SETS = 24  # near-optimal sets of gains that a search hands on: the runs of a law in a study
 
 
 class Evaluation(NamedTuple):
@@ -47,24 +51,26 @@ class Tuned:
     Attributes:
       law: the law with the best gains.
       objective: their objective J, s^2.
-      history: every evaluation of the search, in order.
-      finals: the best of them, run accurately; one of these has the best gains.
+      history: the accurate evaluations of the search, in order.
+      screened: number of cheap evaluations, with which starts were chosen.
+      ends: best J of each start, s^2.
       before: J of the law's original gains, which the search does not use, s^2.
       plant: the plant.
       definition: the objective, with its conditions and u_max.
       rule: the search, in words.
-      budget: number of sets of gains that were evaluated.
+      budget: largest number of sets of gains that could be evaluated.
       seed: seed of search and noise.
       scales: the plant's X, F, M and T, SI units.
-      bounds: gain -> lowest, highest, by the rule.
-      searched: the bounds at the end; some are wider by a decade.
+      bounds: gain -> lowest, highest, by the rule; starts are drawn from this box.
+      searched: the wider bounds of the search, up to a decade beyond the box.
       versions: versions of the packages that the numbers depend on.
     """
 
     law: Component
     objective: float
     history: tuple[Evaluation, ...]
-    finals: tuple[Evaluation, ...]
+    screened: int
+    ends: tuple[float, ...]
     before: float
     plant: Plant
     definition: Objective
@@ -77,11 +83,12 @@ class Tuned:
     versions: dict[str, str]
 
     def __repr__(self) -> str:
-        return f"Tuned({self.plant.name}, {self.law}, objective={self.objective:.4g}, budget={self.budget})"
+        return f"Tuned({self.plant.name}, {self.law}, objective={self.objective:.4g}, {self.verdict})"
 
     def _repr_html_(self) -> str:
         note = (
-            f"objective {self.objective:.4g} s², of the law's own gains {self.before:.4g} s²; {self.budget} evaluations"
+            f"objective {self.objective:.4g} s², of the law's own gains {self.before:.4g} s²; "
+            f"{self.evaluations} evaluations, {self.verdict}"
         )
         return table(HEADINGS, self.lines(), f"{self.law.name} on {self.plant.name}", note, range(1, 4))
 
@@ -90,7 +97,7 @@ class Tuned:
         lines = []
         for name, (low, high) in self.searched.items():
             notes = [f"at its {self.at_bound[name]} bound"] if name in self.at_bound else []
-            notes += ["bound widened by a decade"] if name in self.widened else []
+            notes += ["beyond the box of the starts"] if name in self.beyond_box else []
             lines.append((name, f"{self.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", ", ".join(notes)))
         return lines
 
@@ -114,18 +121,76 @@ class Tuned:
         return {name: most for name, most in bounds.items() if name in self.bounds}
 
     @property
-    def widened(self) -> list[str]:
-        """Gains with a bound that was moved."""
-        return [name for name in self.bounds if self.bounds[name] != self.searched[name]]
+    def beyond_box(self) -> list[str]:
+        """Gains outside the box from which starts are drawn."""
+        return [name for name, (low, high) in self.bounds.items() if not low <= self.gains[name] <= high]
+
+    @property
+    def evaluations(self) -> int:
+        """Number of sets of gains that were evaluated, cheaply or accurately."""
+        return self.screened + len(self.history)
+
+    @property
+    def converged(self) -> bool | None:
+        """Whether three starts ended within 1 % of the best J; None if there were fewer."""
+        return converged(self.ends)
+
+    @property
+    def verdict(self) -> str:
+        """Whether the search has converged, in words."""
+        if self.converged is None:
+            return f"{len(self.ends)} of the {AGREEING} starts that convergence needs"
+        best = min(self.ends)
+        agreeing = sum(end <= best * (1.0 + AGREEMENT) for end in self.ends)
+        ended = f"{agreeing} of {len(self.ends)} starts end within {100 * AGREEMENT:g} % of the best"
+        return f"{'converged' if self.converged else 'not converged'}: {ended}"
+
+    @property
+    def near_optimal(self) -> list[Evaluation]:
+        """Every evaluation within 3 % of the best J, best first."""
+        return near_optimal(self.history)
+
+    @property
+    def sets(self) -> list[Evaluation]:
+        """At most 24 near-optimal evaluations, whose gains the runs of a law use in turn: the best, then the others.
+
+        They cover the near-optimal gains: each is the one that is farthest, in log gains, from those taken before.
+        Then those after the best are shuffled, so that the first few are not the most extreme ones.
+        """
+        near = self.near_optimal
+        logs = np.log10([one.gains for one in near])
+        taken, distances = [0], np.linalg.norm(logs - logs[0], axis=1)
+        while len(taken) < min(SETS, len(near)):
+            taken.append(int(np.argmax(distances)))
+            distances = np.minimum(distances, np.linalg.norm(logs - logs[taken[-1]], axis=1))
+        order = np.random.default_rng(self.seed).permutation(taken[1:])
+        return [near[0], *(near[k] for k in order)]
 
     @property
     def front(self) -> list[Evaluation]:
-        """The Pareto front of the finals in tracking and variation, by tracking, without failed ones."""
+        """The Pareto front of the history in tracking and variation, by tracking, without failed ones."""
         front: list[Evaluation] = []
-        for one in sorted(self.finals, key=lambda e: (e.tracking, e.variation)):
+        for one in sorted(self.history, key=lambda e: (e.tracking, e.variation)):
             if not one.failed and (not front or one.variation < front[-1].variation):
                 front.append(one)
         return front
+
+    def record(self) -> dict[str, Any]:
+        """Return what `control.gain_sets` stores of it, without the history."""
+        return {
+            "gains": list(self.bounds),
+            "sets": [one.gains for one in self.sets],
+            "objective": self.objective,
+            "converged": self.converged,
+            "ends": self.ends,
+            "evaluations": self.evaluations,
+            "seed": self.seed,
+            "at_bound": self.at_bound,
+            "front": [(one.tracking, one.variation) for one in self.front],
+            "best": (self.sets[0].tracking, self.sets[0].variation),
+            "rule": self.rule,
+            "versions": self.versions,
+        }
 
     def save(self, path: str | os.PathLike) -> Path:
         """Write a .json file that `load` reads back."""
@@ -135,8 +200,8 @@ class Tuned:
             "definition": self.definition.describe(),
             "at_bound": self.at_bound,
             "scenario": serialise.describe(scenario),
+            "record": self.record(),
             "history": self.history,
-            "finals": self.finals,
         }
         return write_json(path, data)
 
@@ -152,29 +217,26 @@ def load(path: str | os.PathLike) -> Tuned:
         scenario = serialise.restore(data["scenario"])
         fields: dict[str, Any] = {name: data[name] for name in WRITTEN}
         fields |= {name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")}
-        history, finals = (
-            tuple(Evaluation(tuple(gains), *costs) for gains, *costs in data.get(name, ()))
-            for name in ("history", "finals")
-        )
-        if not finals:  # tuned before there was a second round: the best of the first one
-            finals = (min(history, key=lambda e: e.objective),)
         return Tuned(
-            **fields,
-            history=history,
-            finals=finals,
+            **fields | {"ends": tuple(fields["ends"])},
+            history=tuple(Evaluation(tuple(gains), *costs) for gains, *costs in data["history"]),
             law=scenario.law,
             plant=scenario.plant,
             definition=restore(data["definition"]),
         )
 
 
-def shipped(plant: str, law: str, objective: str = "balanced", seed: int = 0) -> Tuned:
-    """Return the tuning in the package from which the gains of a set in `gain_sets` come.
+def converged(ends: Sequence[float]) -> bool | None:
+    """Return whether three starts ended within 1 % of the best J, given the best J of each; None if there are fewer."""
+    if len(ends) < AGREEING:
+        return None
+    return sorted(ends)[AGREEING - 1] <= min(ends) * (1.0 + AGREEMENT)
 
-    Raises:
-      ScenarioError: there is no such tuning.
-    """
-    return load(gains.file(plant, law, objective, seed))
+
+def near_optimal(history: Sequence[Evaluation]) -> list[Evaluation]:
+    """Return the evaluations within 3 % of the best J, best first."""
+    ranked = sorted(history, key=lambda e: e.objective)
+    return [one for one in ranked if one.objective <= ranked[0].objective * (1.0 + NEAR_OPTIMAL)]
 
 
 def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
@@ -182,7 +244,7 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
 
     Raises:
       ScenarioError: one has another rule, plant, objective, budget, seed, versions or width of bounds than the first,
-        or did not spend its budget.
+        or spent more than its budget.
     """
     tuned = list(tuned)
     if not tuned or not all(isinstance(one, Tuned) for one in tuned):
@@ -198,9 +260,9 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
                 raise ScenarioError(
                     f"laws tuned with unequal {name} cannot be compared, {pair}: tune them in the same way"
                 )
-        if len(one.history) != one.budget:
-            counts = f"{one.law.name} evaluated {len(one.history)} of {one.budget}"
-            raise ScenarioError(f"laws that did not spend their budget cannot be compared, {counts}: tune it again")
+        if one.evaluations > one.budget:
+            counts = f"{one.law.name} evaluated {one.evaluations} of {one.budget}"
+            raise ScenarioError(f"laws that spent more than their budget cannot be compared, {counts}: tune it again")
         for gain, ends in _bounds(one).items():
             if not np.allclose(one.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
                 pair = f"{one.law.name}'s {gain} was searched in {one.bounds.get(gain)}, not in {ends}"

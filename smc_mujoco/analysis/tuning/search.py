@@ -1,30 +1,32 @@
 """Gains by one rule for every law: same actuator bound, objective, budget and search space.
 
-    tuned = tune("duffing", "classical", budget=96, seed=0)     # Tuned(law, objective, history)
+    tuned = tune("duffing", "classical", seed=0)                 # Tuned(law, objective, history)
     tuned.save("duffing-classical.json")
     compare([tuned, tune("duffing", "observer_free")])           # best first; refuses tunings made in different ways
 
-The rule has two rounds, as in successive halving (K. Jamieson & A. Talwalkar, AISTATS 2016): many candidates are run
-cheaply, and the best of them accurately.
+The search has several starts, each independent of the others and of gains that someone tuned before. A start has 64
+evaluations for each gain:
 
-1. A differential evolution (R. Storn & K. Price, J. Global Optimization 11:341, 1997; scipy's, best1bin, weight 0.2 to
-   0.7, 16 members, no polishing) in the logarithm of the gains. It begins with a Latin hypercube that includes the
-   scales themselves, never with gains that someone tuned before. Its runs use Euler's method at 1 ms if the plant's own
-   method is RK4. That costs a third, and changes the objective by at most 0.5 % for laws that do not chatter.
-2. After every 48 evaluations the six best candidates that have not been run accurately yet are run accurately. The
-   result is the set of gains with the best accurate objective.
+1. An eighth screens a Latin hypercube in the logarithm of the gains.
+2. A half evolves from the best of them by CMA-ES (N. Hansen & A. Ostermeier, Evolutionary Computation 9:159, 2001; the
+   package cmaes), which copes with the rough J of laws that chatter.
+3. The rest descends twice from the best by COBYQA (T. M. Ragonneau, PhD thesis, The Hong Kong Polytechnic University,
+   2022; scipy's), which fits a quadratic model to the logarithm of J within a trust region.
 
-Each generation is one batch of runs. Gains are rounded to four digits, so the printed gains are those that were run. A
-set that was evaluated before costs no budget. `search_space` gives the bounds. After every 48 evaluations the bounds at
-which the best gains lie are moved outwards by a decade, half of the members are drawn again within the new bounds, and
-the search continues. `Tuned.at_bound` names gains that are at a bound at the end. A population that has collapsed
-starts again. None of this depends on the budget, so a search with a larger budget repeats a shorter one and continues.
-It is never worse than one whose budget is a multiple of 48. `objective` defines what is minimised.
+The first two are cheap: they use Euler's method at 1 ms if the plant's own method is RK4, which costs a third. Only the
+accurate evaluations of the descents count as results.
+
+The search has converged when three starts end within 1 % of the best J. It ends when it has converged and knows 24
+near-optimal sets of gains, or when the budget is spent. Near-optimal is every set within 3 % of the best J. A careful
+user could have ended with any of them, so runs of a law use them in turn, see `gain_sets`.
+
+Gains are rounded to four digits, so the printed gains are those that were run. A set that was evaluated before costs no
+budget. `search_space` gives the box from which starts are drawn; a descent may leave it by a decade. `Tuned.at_bound`
+names gains that are at the limit of that. No start depends on the budget, so a search with a larger budget repeats a
+shorter one and continues, and is never worse. `objective` defines what is minimised.
 """
 
-import contextlib
 import dataclasses
-import itertools
 import warnings
 from collections.abc import Callable, Sequence
 
@@ -32,7 +34,20 @@ import numpy as np
 
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.objective import OBJECTIVES, Objective
-from smc_mujoco.analysis.tuning.result import Evaluation, Tuned, compare, load, versions
+from smc_mujoco.analysis.tuning.result import (
+    AGREEING,
+    AGREEMENT,
+    NEAR_OPTIMAL,
+    SETS,
+    Evaluation,
+    Tuned,
+    compare,
+    converged,
+    load,
+    near_optimal,
+    versions,
+)
+from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.common.errors import ScenarioWarning, find, users_frame, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.control.component import Component, Template
@@ -45,24 +60,29 @@ from smc_mujoco.simulation.scenario import Scenario, default_u_max
 
 __all__ = ["Tuned", "compare", "load", "tune"]
 
-RULE = (
-    "differential evolution best1bin (16 members, weight 0.2 to 0.7) in the logarithm of the gains, within 1.5 decades"
-    " about their scale by dimension, forces up to u_max, under Euler's method at 1 ms; after every 48 evaluations the"
-    " six best that were not yet run under RK4 are, bounds that the best is at are widened by a decade and half of the"
-    " members drawn again; the best under RK4 is taken"
-)
-MEMBERS, STAGE = 16, 48  # size of the population; evaluations between accurate runs of the best
-FINALISTS = 6  # candidates run accurately after each stage
-DITHER = (0.2, 0.7)  # differential weight, drawn each generation; of three tried the best within 128 evaluations
+START = 64  # evaluations of a start for each gain
+SCREENED, EVOLVED = 1 / 8, 1 / 2  # of them; the rest descend
+SPREAD = 0.3  # decades: first standard deviation of the evolution; chosen
+RADII = (0.2, 0.1)  # decades: first radius of the trust region in each of a start's descents; chosen
+LAST_RADIUS = 0.005  # decades
+BUDGET = 768  # evaluations: three starts of a law of four gains, six of one of two
 DIGITS = 4  # of a gain
 MAX_CANDIDATES = 1_000_000  # candidates
+RULE = (
+    f"CMA-ES and COBYQA from several starts, in the logarithm of the gains: each start has {START} evaluations a gain."
+    " An eighth screens a Latin hypercube, within 1.5 decades about the gains' scale by dimension, forces up to u_max,"
+    " and a half evolves from the best of them by CMA-ES, both under Euler's method at 1 ms. The rest descends from the"
+    " best of these by COBYQA under RK4. Both may leave the box by a decade. The search ends when"
+    f" {AGREEING} starts end within {100 * AGREEMENT:g} % of the best and {SETS} sets of gains within"
+    f" {100 * NEAR_OPTIMAL:g} % of it are known, or the budget is spent"
+)
 Report = Callable[[int], None]
 
 
 def tune(
     plant: Plant | str,
     law: Component | Template | str,
-    budget: int = 96,
+    budget: int = BUDGET,
     seed: int = 0,
     objective: Objective | str = "balanced",
     threads: int | None = None,
@@ -76,7 +96,7 @@ def tune(
     Args:
       plant, law: names, or your own plant and law. The search does not start from the law's gains; `Tuned.before` is
         their objective. Gains that are held keep their value.
-      budget: number of sets of gains to evaluate, each in one run per condition.
+      budget: largest number of sets of gains to evaluate, each in one run per condition.
       seed: seed of the search, and of initial states and noise, which are the same for all candidates; below 10^9.
       objective: an Objective, "balanced", or "tracking", without a cost of the variation of u.
       threads, progress: as in `run`.
@@ -111,8 +131,9 @@ def tune(
     before = tracking + goal.weight * variation + goal.excess(cases[0])
     with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as drawn:
         ledger = _Ledger(goal, cases, tuple(start), bound, budget, threads, drawn.advance)
-        box = _search(ledger, start, seed)
-    best = min(ledger.finals, key=lambda e: e.objective)
+        searched = search_space.widened(law, start)
+        ends = _search(ledger, start, searched, seed)
+    best = min(ledger.evaluations, key=lambda e: e.objective)
     if best.objective > before:
         warnings.warn(
             f"no set of gains tried for {law.name} on {plant.name} is better than the law's own, with an objective of "
@@ -131,7 +152,8 @@ def tune(
         law=_with(law, tuple(start), best.gains),
         objective=best.objective,
         history=tuple(ledger.evaluations),
-        finals=tuple(ledger.finals),
+        screened=ledger.screened,
+        ends=ends,
         before=before,
         plant=plant,
         definition=goal,
@@ -140,18 +162,14 @@ def tune(
         seed=seed,
         scales=scales,
         bounds=start,
-        searched=box,
+        searched=searched,
         versions=versions(),
     )
 
 
-class _Spent(Exception):
-    """Raised when the budget is spent."""
-
-
 @dataclasses.dataclass
 class _Ledger:
-    """The evaluations, cheap and accurate, in order. It raises _Spent when the budget is spent."""
+    """The accurate evaluations, in order, and the number of cheap ones."""
 
     goal: Objective
     cases: Sequence[Scenario]
@@ -160,28 +178,32 @@ class _Ledger:
     budget: int
     threads: int | None
     report: Report
+    screened: int = 0
     evaluations: list[Evaluation] = dataclasses.field(default_factory=list)
-    finals: list[Evaluation] = dataclasses.field(default_factory=list)
     objectives: dict[tuple[float, ...], float] = dataclasses.field(default_factory=dict)
     excesses: dict[tuple[float, ...], float] = dataclasses.field(default_factory=dict)
 
     @property
-    def best(self) -> Evaluation:
-        """The first of the best evaluations."""
-        return min(self.evaluations, key=lambda e: e.objective)
+    def left(self) -> int:
+        """The evaluations that the budget has left."""
+        return self.budget - self.screened - len(self.evaluations)
 
-    def costs(self, logs: np.ndarray) -> np.ndarray:
-        """Return J of candidates given as columns of log10 gains (gains, candidates)."""
-        candidates = [self.gains(column) for column in logs.T.tolist()]
-        new = [gains for gains in dict.fromkeys(candidates) if gains not in self.objectives]
-        left = self.budget - len(self.evaluations)
-        evaluated = self.evaluate(new[:left], [_cheap(case) for case in self.cases])
-        self.evaluations += evaluated
-        self.objectives |= {one.gains: one.objective for one in evaluated}
-        self.report(len(evaluated))
-        if len(new) >= left:
-            raise _Spent
-        return np.array([self.objectives[gains] for gains in candidates])
+    def screen(self, logs: np.ndarray) -> np.ndarray:
+        """Return J of candidates (candidates, gains), given as log10 gains, from cheap runs."""
+        candidates = [self.gains(row) for row in logs.tolist()]
+        costs = [one.objective for one in self.evaluate(candidates, [_cheap(case) for case in self.cases])]
+        self.screened += len(candidates)
+        self.report(len(candidates))
+        return np.array(costs)
+
+    def cost(self, logs: np.ndarray) -> float:
+        """Return the accurate J of a candidate, given as log10 gains (gains,)."""
+        gains = self.gains(logs.tolist())
+        if gains not in self.objectives:
+            self.evaluations += self.evaluate([gains], self.cases)
+            self.objectives[gains] = self.evaluations[-1].objective
+            self.report(1)
+        return self.objectives[gains]
 
     def gains(self, logs: Sequence[float]) -> tuple[float, ...]:
         """Return the gains of a candidate, none above the actuator's limit, see `search_space`."""
@@ -189,13 +211,6 @@ class _Ledger:
         for name, most in search_space.largest(self.cases[0].law, gains, self.u_max).items():
             gains[name] = min(gains[name], _rounded(most))
         return tuple(gains.values())
-
-    def decide(self, count: int) -> None:
-        """Run the best FINALISTS of the first `count` candidates accurately, without those that were run so before."""
-        ran = {one.gains for one in self.finals}
-        ranked = sorted(self.evaluations[:count], key=lambda e: e.objective)
-        best = [one for one in ranked if one.gains not in ran][:FINALISTS]
-        self.finals += self.evaluate([one.gains for one in best], self.cases)
 
     def evaluate(self, candidates: Sequence[tuple[float, ...]], cases: Sequence[Scenario]) -> list[Evaluation]:
         """Run candidates in all cases, as one batch."""
@@ -231,51 +246,74 @@ def _with(law: Component, names: Sequence[str], values: Sequence[float]) -> Comp
     return dataclasses.replace(law, gains=dict(law.gains) | dict(zip(names, values, strict=True)))
 
 
-def _search(ledger: _Ledger, start: search_space.Box, seed: int) -> search_space.Box:
-    """Spend the budget, and return the bounds at the end."""
-    random, box = np.random.default_rng(seed), start
-    members = _hypercube(box, random)
-    with contextlib.suppress(_Spent):
-        for stage in itertools.count(STAGE, STAGE):
-            while len(ledger.evaluations) < stage:
-                members = _evolve(ledger, box, members, random, until=stage)
-            ledger.decide(stage)
-            sides = search_space.at_bound(dict(zip(ledger.names, ledger.best.gains, strict=True)), box)
-            if sides := search_space.movable(ledger.cases[0].law, sides):
-                box = search_space.widened(box, sides)
-                members[MEMBERS // 2 :] = _hypercube(box, random)[MEMBERS // 2 :]  # else they crowd at the old bound
-    ledger.decide(ledger.budget)
-    return box
+def _search(ledger: _Ledger, start: Box, searched: Box, seed: int) -> tuple[float, ...]:
+    """Make starts until they have converged or the budget is spent, and return the best J of each, s^2.
+
+    Args:
+      start: the box from which starts are drawn.
+      searched: the wider one in which they go on.
+    """
+    ends: list[float] = []
+    whole_start = START * len(start)
+    while not ends or ledger.left >= whole_start:
+        random, size, first = np.random.default_rng([seed, len(ends)]), min(whole_start, ledger.left), ledger.screened
+        logs, cost = _drawn(ledger, start, random, int(SCREENED * size))
+        logs = _evolved(ledger, searched, random, logs, cost, int(EVOLVED * size))
+        ends.append(_descend(ledger, searched, logs, size - (ledger.screened - first)))
+        if converged(ends) and len(near_optimal(ledger.evaluations)) >= SETS:
+            break
+    return tuple(ends)
 
 
-def _evolve(
-    ledger: _Ledger, box: search_space.Box, members: np.ndarray, random: np.random.Generator, until: int
-) -> np.ndarray:
-    """Evolve the members up to `until` evaluations, and return them; a new population if it has collapsed."""
-    from scipy.optimize import differential_evolution
-
-    result = differential_evolution(
-        ledger.costs,
-        [(low, high) for low, high in np.log10(list(box.values()))],
-        strategy="best1bin",
-        init=members,  # pyright: ignore[reportArgumentType]
-        tol=0.0,
-        mutation=DITHER,
-        maxiter=100,
-        rng=random,
-        vectorized=True,
-        updating="deferred",
-        polish=False,
-        callback=lambda intermediate_result: len(ledger.evaluations) >= until,
-    )
-    return result.population if len(ledger.evaluations) >= until else _hypercube(box, random)
-
-
-def _hypercube(box: search_space.Box, random: np.random.Generator) -> np.ndarray:
-    """Return log10 gains of a first population, (members, gains): the middle of the box, and a Latin hypercube."""
+def _drawn(ledger: _Ledger, box: Box, random: np.random.Generator, size: int) -> tuple[np.ndarray, float]:
+    """Return the log10 gains of the best of a Latin hypercube in the box, and their J; the first one if size is 0."""
     from scipy.stats.qmc import LatinHypercube
 
     low, high = np.log10(list(box.values())).T
-    unit = LatinHypercube(len(low), rng=random).random(MEMBERS)
-    unit[0] = 0.5
-    return low + (high - low) * unit
+    logs = low + (high - low) * LatinHypercube(len(low), rng=random).random(max(size, 1))
+    if not size:
+        return logs[0], np.inf
+    costs = ledger.screen(logs)
+    return logs[np.argmin(costs)], costs.min()
+
+
+def _evolved(
+    ledger: _Ledger, box: Box, random: np.random.Generator, logs: np.ndarray, cost: float, size: int
+) -> np.ndarray:
+    """Return the best log10 gains of an evolution from those given, whose J is `cost`, within a box."""
+    from cmaes import CMA
+
+    if len(logs) < 2:  # CMA-ES adapts a covariance
+        return logs
+    bounds, seed = np.log10(list(box.values())), int(random.integers(2**31))
+    evolution = CMA(mean=logs, sigma=SPREAD, bounds=bounds, seed=seed)
+    for _ in range(size // evolution.population_size):
+        candidates = np.array([evolution.ask() for _ in range(evolution.population_size)])
+        costs = ledger.screen(candidates)
+        evolution.tell(list(zip(candidates, costs, strict=True)))
+        if costs.min() < cost:
+            logs, cost = candidates[np.argmin(costs)], costs.min()
+    return logs
+
+
+def _descend(ledger: _Ledger, box: Box, logs: np.ndarray, size: int) -> float:
+    """Descend from log10 gains within a box with at most `size` accurate evaluations, and return the best J."""
+    from scipy.optimize import Bounds, minimize
+
+    low, high = np.log10(list(box.values())).T
+    costs = [ledger.cost(logs)]
+
+    def cost(z: np.ndarray) -> float:
+        costs.append(ledger.cost(np.clip(z, low, high)))
+        return np.log(costs[-1])
+
+    most = (size - 1) // len(RADII)
+    for radius in RADII if most > 2 * len(logs) + 2 else ():  # its first model needs 2 n + 1 evaluations
+        logs = minimize(
+            cost,
+            logs,
+            method="COBYQA",
+            bounds=Bounds(low, high),  # pyright: ignore[reportArgumentType]
+            options={"maxfev": most, "initial_tr_radius": radius, "final_tr_radius": LAST_RADIUS},
+        ).x
+    return min(costs)

@@ -130,13 +130,7 @@ def largest(law: Component, gains: Mapping[str, float], u_max: float) -> dict[st
     return {name: u_max * values[gain.over] for name, gain in known.items() if gain.over is not None}
 
 
-def movable(law: Component, sides: Mapping[str, str]) -> dict[str, str]:
-    """Return the result of `at_bound` without gains at the actuator's limit, which cannot be moved."""
-    return {gain: side for gain, side in sides.items() if side == "lower" or unit(law, gain) != FORCE}
-
-
-def widened(bounds: Box, sides: Mapping[str, str]) -> dict[str, tuple[float, float]]:
-    """Return the bounds, with those that `movable` found moved outwards by a decade."""
+def widened(law: Component, bounds: Box) -> dict[str, tuple[float, float]]:
+    """Return bounds a decade wider on either side, except above the actuator's limit."""
     by = 10**WIDENING
-    moved = {"lower": lambda low, high: (low / by, high), "upper": lambda low, high: (low, high * by)}
-    return {name: moved[sides[name]](*ends) if name in sides else ends for name, ends in bounds.items()}
+    return {name: (low / by, high if unit(law, name) == FORCE else high * by) for name, (low, high) in bounds.items()}
