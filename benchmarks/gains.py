@@ -1,28 +1,74 @@
 """The gains of the sets "tuned" and "tracking", found again: smc_mujoco/control/tuned_gains.
 
-    python benchmarks/gains.py              # what is missing
-    python benchmarks/gains.py --all        # all of it, within 90 minutes on two cores
+    python benchmarks/gains.py              # those that are missing, or that another rule found
+    python benchmarks/gains.py --all        # all of them, within 90 minutes on two cores
 
-Every law by the same rule and budget; a tuning that is whole is kept, so that it may be stopped at any time.
+Every law by the same rule. Those of the report's first page have the full budget; all others, and the set "tracking",
+have that of one start. Gains are stored as soon as their search ends, so it may be stopped at any time.
 """
 
 import argparse
+import warnings
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
 
 import smc_mujoco as smc
-from smc_mujoco.control import gain_sets as gains
-from smc_mujoco.control.gain_sets import general
+from smc_mujoco.analysis.tuning.search import BUDGET, RULE, START
+from smc_mujoco.common.files import read_json, replacing, to_json
+from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS
 
-BUDGET = 96
+PROCESSES = 2
+Task = tuple[str, str, str]  # set, plant and law
 
 
-def tunings() -> Iterator[tuple[str, str, int]]:
-    """Objective, law and seed of all tunings: every law, then those of the first page from their other seeds."""
-    yield from (("balanced", law, 0) for law in general())
-    for name, objective in gains.OBJECTIVES.items():
-        first = 1 if name == "tuned" else 0
-        yield from ((objective, law, seed) for seed in range(first, gains.SEEDS[name]) for law in gains.LAWS)
+def tasks() -> Iterator[Task]:
+    """Every law on every plant: those of the first page first, in the set that ranks them."""
+    yield from (("tuned", plant, law) for plant in PLANTS for law in gain_sets.LAWS)
+    others = [law for law in gain_sets.general() if law not in gain_sets.LAWS]
+    yield from (("tuned", plant, law) for plant in PLANTS for law in others)
+    yield from (("tracking", plant, law) for plant in PLANTS for law in gain_sets.LAWS)
+
+
+def tune(task: Task) -> dict[str, Any]:
+    """Search for the gains of a law on a plant, and return their record."""
+    gains, plant, law = task
+    first_page = gains == "tuned" and law in gain_sets.LAWS
+    budget = BUDGET if first_page else START * len(smc.law(law).gains)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "no set of gains tried", smc.ScenarioWarning)
+        return smc.tune(plant, law, budget, objective=gain_sets.OBJECTIVES[gains], threads=1).record()
+
+
+def store(path: Path, plant: str, law: str, record: dict[str, Any]) -> None:
+    """Put a record into the file of a set, which has one line for each law on each plant."""
+    data = read_json(path) if path.exists() else {"rules": [], "plants": {}}
+    if record["rule"] not in data["rules"]:
+        data["rules"].append(record["rule"])
+    data["plants"].setdefault(plant, {})[law] = record | {"rule": data["rules"].index(record["rule"])}
+    write(path, data)
+
+
+def write(path: Path, data: dict[str, Any]) -> None:
+    """Write the file of a set, a line for each record."""
+    plants = (
+        f"{to_json(plant)}: {{\n" + ",\n".join(f" {to_json(law)}: {to_json(laws[law])}" for law in sorted(laws)) + "\n}"
+        for plant, laws in sorted(data["plants"].items())
+    )
+    with replacing(path) as file:
+        text = f'{{"rules": {to_json(data["rules"], 1)},\n"plants": {{\n' + ",\n".join(plants) + "\n}}\n"
+        file.write_text(text, encoding="utf-8")
+
+
+def wanted(again: bool) -> Iterator[Task]:
+    """Yield the tasks to do: all of them, or those whose gains are missing or have another rule."""
+    for gains, plant, law in tasks():
+        data = read_json(gain_sets.file(gains)) if gain_sets.file(gains).exists() else {"rules": [], "plants": {}}
+        record = data["plants"].get(plant, {}).get(law)
+        if again or record is None or data["rules"][record["rule"]] != RULE:
+            yield gains, plant, law
 
 
 def main() -> None:
@@ -30,14 +76,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--all", action="store_true", help="tune again what is there")
     again = parser.parse_args().all
-    for objective, law, seed in tunings():
-        for plant in PLANTS:
-            path = gains.file(plant, law, objective, seed)
-            if again or not path.exists():
-                found = smc.tune(plant, law, BUDGET, seed, objective, progress=True)
-                found.save(path)
-                at = f", at its bound: {found.at_bound}" if found.at_bound else ""
-                print(f"{objective} {seed}: {plant}, {found.law}: {found.objective:.4g} s²{at}", flush=True)
+    with ProcessPoolExecutor(PROCESSES) as pool:
+        running = {pool.submit(tune, task): task for task in wanted(again)}
+        for done in as_completed(running):
+            (gains, plant, law), record = running[done], done.result()
+            store(gain_sets.file(gains), plant, law, record)
+            ended = {True: "converged", False: "not converged", None: "too few starts"}[record["converged"]]
+            print(f"{gains}: {plant}, {law}: {record['objective']:.4g} s², {ended}", flush=True)
 
 
 if __name__ == "__main__":

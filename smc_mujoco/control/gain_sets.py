@@ -165,6 +165,12 @@ class TunedGains:
     rule: str
     versions: Mapping[str, str]
 
+    @property
+    def search(self) -> str:
+        """The search in a few words: evaluations, and whether its starts agree."""
+        agreed = {True: "converged", False: "not converged", None: "one start"}[self.converged]
+        return f"{self.evaluations} sets of gains tried, {agreed}"
+
 
 def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:
     """Return the gains of a law on a plant from a set that was tuned, and the search behind them.
@@ -182,6 +188,11 @@ def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:
         cure += f", or as the FILE.json that smc-mujoco tune {plant.argument} {name} --out FILE.json writes"
     cure += ", or take the defaults (--gains default)"
     raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant.name}: {cure}")
+
+
+def has(plant: Plant, name: str, gains: str = "tuned") -> bool:
+    """Return whether a set has gains for a law on a plant, for this form of it."""
+    return _known(plant.name, name, gains) is not None
 
 
 def converged(plant: str | Plant, name: str, gains: str = "tuned") -> bool | None:

@@ -82,7 +82,7 @@ def _front(ax: Axes, tuned: Tuned, mark: str, colour: str) -> Line2D:
     x = [one.tracking for one in tuned.front]
     y = [max(one.variation, MIN_VARIATION) for one in tuned.front]
     ax.step(x, y, where="post", color=colour, marker=mark, ms=style.points(4.5), mec="none", alpha=0.9)
-    chosen = min(tuned.finals, key=lambda one: one.objective)
+    chosen = min(tuned.history, key=lambda one: one.objective)
     ax.plot([chosen.tracking], [max(chosen.variation, MIN_VARIATION)], color=colour, marker=mark, zorder=3, **_ring())
     label = f"{words}: J = {tuned.objective:.3g} s²"
     return Line2D([], [], color=colour, lw=style.points(3), marker=mark, ms=style.points(7), mec="none", label=label)

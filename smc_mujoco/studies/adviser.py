@@ -237,11 +237,11 @@ def _with_gains(
 ) -> list[Candidate]:
     """Return the laws with gains for the plant: given, shipped, tuned or default ones, in this order of preference.
 
-    Laws that are tuned beside shipped gains are tuned as these were: the same starts, the same number of evaluations.
+    Laws that are tuned beside shipped gains are tuned as these were: the same starts, the same budget.
     """
     found = [_known(plant, law) for law in laws]
     if any(candidate and candidate.source == SHIPPED for candidate in found):
-        budget, starts = FULL.budget, None
+        budget, starts = search.BUDGET, None
     missing = [k for k, candidate in enumerate(found) if candidate is None]
     with bar("gains", len(missing), shown=progress and bool(missing), counted=True) as drawn:
         for k in missing:
@@ -262,7 +262,7 @@ def _known(plant: Plant, law: Component | Template) -> Candidate | None:
     own = plants_known().get(plant.name)
     if own is None or own.parameters != plant.parameters or catalogue().get(law.name) is not law:
         return None
-    if not gain_sets.file(plant.name, law.name, gain_sets.OBJECTIVES["tuned"]).is_file():
+    if not gain_sets.has(plant, law.name):
         return None
     return Candidate(gain_sets.law(plant, law.name, "tuned"), SHIPPED)
 

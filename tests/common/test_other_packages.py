@@ -11,6 +11,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.cli.main import main
 from smc_mujoco.common import catalogue
 from smc_mujoco.common.errors import find
@@ -189,16 +190,20 @@ def many_estimator(y, gains, memory):
     assert "many_scene" not in sys.modules
 
 
+@pytest.mark.filterwarnings("ignore:no set of gains")
 def test_a_package_brings_the_gains_of_its_law(install):
-    folder = install(
-        "tuned", {"laws": {"tuned_law": "tuned_laws:tuned_law"}}, tuned_laws=LAW.replace("NAME", "tuned_law")
-    )
+    units = "from smc_mujoco.control.units import FORCE_PER_POSITION, Gain"
+    tuned_law = LAW.replace("NAME", "tuned_law").replace("2.0", "Gain(2.0, FORCE_PER_POSITION)")
+    folder = install("tuned", {"laws": {"tuned_law": "tuned_laws:tuned_law"}}, tuned_laws=units + tuned_law)
     with pytest.raises(smc.ScenarioError, match=r"no gains in set 'tuned' for tuned_law on duffing: .*smc-mujoco tune"):
         gain_sets.law("duffing", "tuned_law")
-    (folder / "tuned_gains" / "balanced").mkdir(parents=True)
-    text = '{"scenario": {"law": {"gains": {"k": 7.0}}}}'
-    (folder / "tuned_gains" / "balanced" / "duffing-tuned_law.json").write_text(text)
-    assert gain_sets.law("duffing", "tuned_law").gains["k"] == 7.0
+    budget, brief = 8, Objective(conditions=("nominal",), duration=0.2)
+    tuned = smc.tune("duffing", "tuned_law", budget, objective=brief)
+    tuned.save(folder / "tuned_gains" / "tuned" / "duffing-tuned_law.json")
+    assert [gain_sets.law("duffing", "tuned_law", seed=seed).gains for seed in range(len(tuned.sets))] == [
+        dict(zip(tuned.bounds, one.gains, strict=True)) for one in tuned.sets
+    ]
+    assert gain_sets.converged("duffing", "tuned_law") is None
 
 
 def test_a_plant_of_a_package_may_be_a_model_s_file(install, tmp_path):

@@ -67,7 +67,7 @@ def test_no_tried_gains_lie_below_the_staircase_and_the_chosen_ones_are_on_it(pa
     for tuned, stair, ring in zip(sorted(pair, key=lambda one: one.objective), stairs, rings, strict=True):
         assert stair.get_drawstyle() == "steps-post"
         corners = [(float(x), float(y)) for x, y in zip(*stair.get_data(), strict=True)]
-        for one in tuned.finals:
+        for one in tuned.history:
             reached = [y for x, y in corners if x <= one.tracking]  # the stair's height above what was tried
             assert one.failed or min(reached) <= max(one.variation, MIN_VARIATION)
         (place,) = zip(*ring.get_data(), strict=True)
@@ -79,9 +79,9 @@ def test_no_tried_gains_lie_below_the_staircase_and_the_chosen_ones_are_on_it(pa
 
 def test_a_law_whose_every_run_failed_is_named_and_one_whose_command_rests_is_drawn(pair, page, tmp_path):
     first = pair[0]
-    failed = [one._replace(tracking=1.5 * FAILED, objective=1.5 * FAILED) for one in first.finals]
-    resting = [one._replace(variation=0.0) for one in pair[1].finals]
-    both = [dataclasses.replace(first, finals=tuple(failed)), dataclasses.replace(pair[1], finals=tuple(resting))]
+    failed = [one._replace(tracking=1.5 * FAILED, objective=1.5 * FAILED) for one in first.history]
+    resting = [one._replace(variation=0.0) for one in pair[1].history]
+    both = [dataclasses.replace(first, history=tuple(failed)), dataclasses.replace(pair[1], history=tuple(resting))]
     svg, _ = pareto(both, tmp_path / "fronts")
     assert "Observer-free: every run failed" in svg.read_text()
     assert page[0].axes[0].lines[0].get_ydata()[0] == MIN_VARIATION

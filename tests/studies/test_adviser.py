@@ -294,7 +294,7 @@ def test_laws_are_tuned_as_the_packages_own_gains_were_where_these_are_compared(
     laws = [catalogue()["classical"], catalogue()["observer_free_q15"]]
     for plant in (smc.plant("duffing"), smc.plant("duffing", M=2.0)):
         adviser._with_gains(plant, laws, known, other, "gains", None, False)
-    assert asked == [(adviser.FULL.budget, None), (known, other), (known, other)]
+    assert asked == [(search.BUDGET, None), (known, other), (known, other)]
 
 
 def test_gains_of_the_package_are_taken_where_there_are_some(folder):
@@ -312,14 +312,14 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(folder
 
     heavy, tuned, tune = smc.plant("duffing", M=2.0), [], search.tune
     monkeypatch.setattr(search, "tune", lambda *args, **named: tuned.append(tune(*args, **named)) or tuned[-1])
-    monkeypatch.setattr(adviser, "FULL", adviser.FULL._replace(budget=4))
+    monkeypatch.setattr(adviser, "FULL", adviser.FULL._replace(budget=16))
     options = {"laws": [my_pd], "needs": "fast,continuous", "out": folder} | COMMON
     options |= {"seeds": 2, "duration": 1.0, "conditions": "nominal"}
     found = smc.which(heavy, **options)
-    assert found.choices[0].source == "tuned here, 4 sets of gains tried"
+    assert found.choices[0].source == "tuned here, 16 sets of gains tried"
     assert found.law.function is my_pd.function
     assert found.law.gains == tuned[0].law.gains != my_pd.defaults
-    assert (tuned[0].budget, tuned[0].plant) == (4, heavy)
+    assert (tuned[0].budget, tuned[0].plant) == (16, heavy)
     assert smc.which(heavy, **options).law == found.law
     assert len(tuned) == 1
 

@@ -177,17 +177,18 @@ class Tuned:
 
     def record(self) -> dict[str, Any]:
         """Return what `control.gain_sets` stores of it, without the history."""
+        best = self.sets[0]
         return {
             "gains": list(self.bounds),
             "sets": [one.gains for one in self.sets],
-            "objective": self.objective,
+            "objective": _short(self.objective),
             "converged": self.converged,
-            "ends": self.ends,
+            "ends": [_short(end) for end in self.ends],
             "evaluations": self.evaluations,
             "seed": self.seed,
             "at_bound": self.at_bound,
-            "front": [(one.tracking, one.variation) for one in self.front],
-            "best": (self.sets[0].tracking, self.sets[0].variation),
+            "front": [(_short(one.tracking), _short(one.variation)) for one in self.front],
+            "best": (_short(best.tracking), _short(best.variation)),
             "rule": self.rule,
             "versions": self.versions,
         }
@@ -216,14 +217,20 @@ def load(path: str | os.PathLike) -> Tuned:
         data = read_json(file)
         scenario = serialise.restore(data["scenario"])
         fields: dict[str, Any] = {name: data[name] for name in WRITTEN}
+        fields["ends"] = tuple(fields["ends"])
         fields |= {name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")}
         return Tuned(
-            **fields | {"ends": tuple(fields["ends"])},
+            **fields,
             history=tuple(Evaluation(tuple(gains), *costs) for gains, *costs in data["history"]),
             law=scenario.law,
             plant=scenario.plant,
             definition=restore(data["definition"]),
         )
+
+
+def _short(value: float) -> float:
+    """Return a number with six digits."""
+    return float(f"{value:.6g}")
 
 
 def converged(ends: Sequence[float]) -> bool | None:
@@ -234,8 +241,10 @@ def converged(ends: Sequence[float]) -> bool | None:
 
 
 def near_optimal(history: Sequence[Evaluation]) -> list[Evaluation]:
-    """Return the evaluations within 3 % of the best J, best first."""
+    """Return the evaluations within 3 % of the best J, best first; only the best one if its runs failed."""
     ranked = sorted(history, key=lambda e: e.objective)
+    if ranked[0].failed:
+        return ranked[:1]
     return [one for one in ranked if one.objective <= ranked[0].objective * (1.0 + NEAR_OPTIMAL)]
 
 
@@ -291,4 +300,6 @@ def _bounds(tuned: Tuned) -> Box:
 
 def versions() -> dict[str, str]:
     """Return the versions of the packages that the numbers of a tuning depend on."""
-    return {"smc_mujoco": __version__} | {name: version(name) for name in ("mujoco", "numba", "numpy", "scipy")}
+    return {"smc_mujoco": __version__} | {
+        name: version(name) for name in ("mujoco", "numba", "numpy", "scipy", "cmaes")
+    }

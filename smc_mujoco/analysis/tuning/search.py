@@ -307,13 +307,13 @@ def _descend(ledger: _Ledger, box: Box, logs: np.ndarray, size: int) -> float:
         costs.append(ledger.cost(np.clip(z, low, high)))
         return np.log(costs[-1])
 
-    most = (size - 1) // len(RADII)
-    for radius in RADII if most > 2 * len(logs) + 2 else ():  # its first model needs 2 n + 1 evaluations
+    radii = RADII if size > 4 * len(logs) + 4 else RADII[:1]  # a first model needs 2 n + 1 evaluations
+    for radius in radii if size > 1 else ():
         logs = minimize(
             cost,
             logs,
             method="COBYQA",
             bounds=Bounds(low, high),  # pyright: ignore[reportArgumentType]
-            options={"maxfev": most, "initial_tr_radius": radius, "final_tr_radius": LAST_RADIUS},
+            options={"maxfev": (size - 1) // len(radii), "initial_tr_radius": radius, "final_tr_radius": LAST_RADIUS},
         ).x
     return min(costs)

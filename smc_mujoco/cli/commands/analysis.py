@@ -25,7 +25,7 @@ def tune(
     objective: Annotated[
         str, typer.Option(help="balanced: error, and variation of u; tracking: only error.")
     ] = "balanced",
-    budget: Annotated[int, typer.Option(min=1, help="How many sets of gains to try.")] = 96,
+    budget: Annotated[int, typer.Option(min=1, help="How many sets of gains to try at most.")] = 768,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search and of the noise.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Also write gains, history and provenance to a .json file.")] = None,
     front: Annotated[
@@ -42,12 +42,12 @@ def tune(
 ) -> None:
     """Find a law's gains on a plant by a rule that is the same for every law.
 
-    Every law has the same bound on u, the same objective and the same number of sets of gains to try. Each gain is
+    Every law has the same bound on u, the same objective and the same search, from several starts. Each gain is
     searched over the same number of decades about a scale that follows from its unit and the plant. The objective is
     error times time, plus variation of u, summed over seven conditions in runs of 5 s: nominal, noise, delay, a sine
     and a constant disturbance, 30 % more and 30 % less mass. The same seed gives the same gains.
 
-    Example: smc-mujoco tune duffing observer_free --budget 96 --out duffing.json
+    Example: smc-mujoco tune duffing observer_free --out duffing.json
     """
     with held_back():
         from smc_mujoco.analysis.tuning import search
@@ -72,9 +72,10 @@ def tune(
     )
     terminal.print(tables.tuning(tuned))
     terminal.note(str(tuned.definition))
+    terminal.note(f"{tuned.verdict}; {len(tuned.near_optimal)} near-optimal set{'s' * (len(tuned.near_optimal) > 1)}")
     terminal.note(
         f"objective {tuned.objective:.4g} s², with the law's default gains {tuned.before:.4g}; "
-        f"{len(tuned.history)} set{'s' * (budget > 1)} of gains, seed {seed}, {terminal.seconds:.1f} s"
+        f"{tuned.evaluations} set{'s' * (tuned.evaluations > 1)} of gains, seed {seed}, {terminal.seconds:.1f} s"
     )
     if path:
         terminal.wrote(tuned.save(path))

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
-from smc_mujoco.analysis.tuning import result
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component
@@ -119,7 +118,6 @@ def laws_of(plan: Plan, gains: str) -> dict[str, dict[str, Component]]:
 def _source(plant: str, law: str, name: str) -> str:
     if name not in sets.OBJECTIVES:
         return "chosen by hand before any comparison"
-    its = result.shipped(plant, sets.FORMS.get(law, law), sets.OBJECTIVES[name])
+    its = sets.tuned(plant, law, name)
     bounds = f"; at a bound: {', '.join(its.at_bound)}" if its.at_bound else ""
-    widened = f"; widened: {', '.join(its.widened)}" if its.widened else ""
-    return f"objective {its.objective:.4g} s², {its.budget} sets of gains tried, seed {its.seed}{bounds}{widened}"
+    return f"the best of {len(its.sets)}; objective {its.objective:.4g} s², {its.search}{bounds}"

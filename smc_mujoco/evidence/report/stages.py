@@ -17,7 +17,6 @@ from smc_mujoco.analysis import margins as margin_search
 from smc_mujoco.analysis import region_of_attraction as regions
 from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.analysis.region_of_attraction import Basin
-from smc_mujoco.analysis.tuning import result
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.control import gain_sets as sets
@@ -265,14 +264,13 @@ def fronts(plan: Plan) -> tuple[Front, ...]:
     for plant in plan.plants:
         for law in plan.laws:
             with contextlib.suppress(ScenarioError):
-                tuned = result.shipped(plant, law)
-                best = min(tuned.finals, key=lambda e: e.objective)  # its gains are the study's, and on the front
+                tuned = sets.tuned(plant, law, GAINS)
                 front = Front(
                     plant=plant,
                     law=law,
-                    tracking=tuple(e.tracking for e in tuned.front),
-                    variation=tuple(e.variation for e in tuned.front),
-                    chosen=(best.tracking, best.variation),
+                    tracking=tuple(tracking for tracking, _ in tuned.front),
+                    variation=tuple(variation for _, variation in tuned.front),
+                    chosen=tuned.best,
                 )
                 found.append(front)
     return tuple(found)
