@@ -400,7 +400,7 @@ def save(
     scenarios: Sequence[Scenario],
     cycles: Sequence[Chattering],
     measured: Sequence[tuple[float, float]],
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
 ) -> Path:
     """Write predictions and measurements to a .json file. Return its path.
 

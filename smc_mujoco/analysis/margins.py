@@ -369,12 +369,12 @@ def of(
     ]
 
 
-def save(margins: Sequence[Margin], path: str | os.PathLike) -> Path:
+def save(margins: Sequence[Margin], path: str | os.PathLike[str]) -> Path:
     """Write margins to a .json file that `load` reads. NaN and infinity are words there, see `files.plain`."""
     return write_json(ended(path, ".json"), [dataclasses.asdict(margin) for margin in margins])
 
 
-def save_csv(margins: Sequence[Margin], path: str | os.PathLike) -> Path:
+def save_csv(margins: Sequence[Margin], path: str | os.PathLike[str]) -> Path:
     """Write margins to a .csv file, a column for each attribute. The one of theory is empty where there is none."""
     with replacing(path := ended(path, ".csv")) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [field.name for field in dataclasses.fields(Margin)])
@@ -383,7 +383,7 @@ def save_csv(margins: Sequence[Margin], path: str | os.PathLike) -> Path:
     return path
 
 
-def load(path: str | os.PathLike) -> list[Margin]:
+def load(path: str | os.PathLike[str]) -> list[Margin]:
     """Read the margins that `save` wrote.
 
     Raises:

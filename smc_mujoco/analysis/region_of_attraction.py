@@ -90,7 +90,7 @@ class Basin:
         """The share of the states that converge."""
         return float((self.outcome == CONVERGES).mean())
 
-    def save(self, path: str | os.PathLike) -> Path:
+    def save(self, path: str | os.PathLike[str]) -> Path:
         """Write a .json file that `load` reads back."""
         fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         data = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in fields.items()}
@@ -221,7 +221,7 @@ def judge(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None
     return DOES_NOT if (moved <= limits).all() and not inside.any() else None
 
 
-def load(path: str | os.PathLike) -> Basin:
+def load(path: str | os.PathLike[str]) -> Basin:
     """Read the map that `Basin.save` wrote.
 
     Raises:

@@ -28,7 +28,7 @@ def shipped(folder: str) -> Path:
     raise ScenarioError(f"no folder {folder!r} in {here} or beside it: reinstall smc-mujoco")
 
 
-def ended(path: str | os.PathLike, ending: str) -> Path:
+def ended(path: str | os.PathLike[str], ending: str) -> Path:
     """Return the path if its name ends in `ending`, such as ".json"; raise ScenarioError otherwise."""
     path = Path(path)
     if path.suffix != ending or "\0" in path.name:
@@ -36,7 +36,7 @@ def ended(path: str | os.PathLike, ending: str) -> Path:
     return path
 
 
-def writable(path: str | os.PathLike) -> None:
+def writable(path: str | os.PathLike[str]) -> None:
     """Raise ScenarioError for a file that cannot be written. Call it before a computation that takes minutes."""
     path = Path(path)
     if path.is_dir():
@@ -57,7 +57,7 @@ def _writing(path: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def reading(path: str | os.PathLike, kind: str, cure: str) -> Iterator[Path]:
+def reading(path: str | os.PathLike[str], kind: str, cure: str) -> Iterator[Path]:
     """Turn an exception in the with block, which reads a file, into one sentence. Yield the path.
 
     Args:

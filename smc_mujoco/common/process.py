@@ -32,7 +32,7 @@ def _kill(process: subprocess.Popen[str]) -> None:
 
 
 def timed(
-    command: Sequence[str], timeout: float, output: bool = True, cwd: str | os.PathLike | None = None
+    command: Sequence[str], timeout: float, output: bool = True, cwd: str | os.PathLike[str] | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Run a command, and stop it and every process that it started when its time is up.
 

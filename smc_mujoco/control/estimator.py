@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable
-from typing import NamedTuple, Unpack, overload
+from typing import Any, NamedTuple, Unpack, overload
 
 from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import find
@@ -21,12 +21,12 @@ class Reading(NamedTuple):
 
 
 @overload
-def estimator_function(function: Callable, /) -> Template: ...
+def estimator_function(function: Callable[..., Any], /) -> Template: ...
 @overload
-def estimator_function(**options: Unpack[Options]) -> Callable[[Callable], Template]: ...
+def estimator_function(**options: Unpack[Options]) -> Callable[[Callable[..., Any]], Template]: ...
 def estimator_function(
-    function: Callable | None = None, /, **options: Unpack[Options]
-) -> Callable[[Callable], Template] | Template:
+    function: Callable[..., Any] | None = None, /, **options: Unpack[Options]
+) -> Callable[[Callable[..., Any]], Template] | Template:
     """Turn a function (y, gains, memory) -> velocity, or -> (velocity, acceleration), into an estimator.
 
     Arguments as of `law_function`: gains, memory, positive, nonnegative, conditions and label.

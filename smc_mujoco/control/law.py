@@ -16,7 +16,7 @@ law, otherwise with f = 0 and g = 1.
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Unpack, overload
+from typing import Any, NamedTuple, Unpack, overload
 
 from numba import njit
 
@@ -96,12 +96,12 @@ def power(a, p):
 
 
 @overload
-def law_function(function: Callable, /) -> Template: ...
+def law_function(function: Callable[..., Any], /) -> Template: ...
 @overload
-def law_function(**options: Unpack[LawOptions]) -> Callable[[Callable], Template]: ...
+def law_function(**options: Unpack[LawOptions]) -> Callable[[Callable[..., Any]], Template]: ...
 def law_function(
-    function: Callable | None = None, /, **options: Unpack[LawOptions]
-) -> Callable[[Callable], Template] | Template:
+    function: Callable[..., Any] | None = None, /, **options: Unpack[LawOptions]
+) -> Callable[[Callable[..., Any]], Template] | Template:
     """Turn a function (y, gains, memory) -> (u, s) into a law.
 
     Args:

@@ -6,7 +6,7 @@ acceleration of the error that keeps s constant: s' = 0 for e'' = v_eq. Notation
 
 import functools
 from collections.abc import Callable
-from typing import Unpack, overload
+from typing import Any, Unpack, overload
 
 from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import find
@@ -17,12 +17,12 @@ Surface = Component
 
 
 @overload
-def surface_function(function: Callable, /) -> Template: ...
+def surface_function(function: Callable[..., Any], /) -> Template: ...
 @overload
-def surface_function(**options: Unpack[SurfaceOptions]) -> Callable[[Callable], Template]: ...
+def surface_function(**options: Unpack[SurfaceOptions]) -> Callable[[Callable[..., Any]], Template]: ...
 def surface_function(
-    function: Callable | None = None, /, **options: Unpack[SurfaceOptions]
-) -> Callable[[Callable], Template] | Template:
+    function: Callable[..., Any] | None = None, /, **options: Unpack[SurfaceOptions]
+) -> Callable[[Callable[..., Any]], Template] | Template:
     """Turn a function (y, gains, memory) -> (s, v_eq) into a surface.
 
     Arguments as of `law_function`: gains, memory, positive, nonnegative, relative_degree, conditions and label.

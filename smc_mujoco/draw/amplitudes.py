@@ -46,7 +46,7 @@ def crossover(lags: Sequence[float], one: Sequence[float], other: Sequence[float
 
 def amplitudes(
     traces: Mapping[str, Mapping[str, Trace]],
-    path: str | os.PathLike | None = None,
+    path: str | os.PathLike[str] | None = None,
     title: str | None = None,
     size: Size = None,
     format: str | None = None,

@@ -27,7 +27,7 @@ LINE = 0.18  # inches on a full page, height of a law's line
 
 def plot(
     table: Columns,
-    path: str | os.PathLike | None = None,
+    path: str | os.PathLike[str] | None = None,
     metrics: Sequence[str] = METRICS,
     title: str | None = None,
     size: Size = None,

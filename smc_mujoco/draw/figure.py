@@ -37,7 +37,7 @@ LOW, FILLED = 0.32, 0.6  # relative height of a row, in a panel that has one for
 
 def figure(
     traces: Trace | Sequence[Trace],
-    path: str | os.PathLike | None = None,
+    path: str | os.PathLike[str] | None = None,
     labels: Sequence[str] | None = None,
     title: str | None = None,
     panels: Sequence[str] | None = None,
@@ -284,7 +284,7 @@ def _draw_end(page, cell: SubplotSpec, panel: Panel, names, colours) -> None:
 
 def signals(
     traces: Trace | Sequence[Trace],
-    path: str | os.PathLike | None,
+    path: str | os.PathLike[str] | None,
     labels: Sequence[str],
     title: str | None = None,
     size: Size = None,

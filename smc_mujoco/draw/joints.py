@@ -31,7 +31,7 @@ HALO = 0.8  # opacity of the paper behind these words
 
 def joints(
     traces: Sequence[Trace],
-    path: str | os.PathLike | None = None,
+    path: str | os.PathLike[str] | None = None,
     labels: Sequence[str] | None = None,
     title: str | None = None,
     size: Size = None,

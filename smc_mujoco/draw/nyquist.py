@@ -34,7 +34,7 @@ PERIODS = 6  # of s
 
 def nyquist(
     scenarios: Sequence[Scenario],
-    path: str | os.PathLike | None = None,
+    path: str | os.PathLike[str] | None = None,
     channel: int = 0,
     cycles: Sequence[Chattering] | None = None,
     traces: Sequence[Trace] | None = None,

@@ -154,7 +154,7 @@ def run_handles(traces: Sequence[Trace], names: Sequence[str], colours: Sequence
     return handles
 
 
-def files(path: str | os.PathLike, format: str | None = None) -> list[Path]:
+def files(path: str | os.PathLike[str], format: str | None = None) -> list[Path]:
     """Return the files of a figure: a PDF for .pdf, else an SVG and a PNG; only one of them if `format` is given.
 
     ".5" in "lam_0.5" and ".b c" in "a.b c" do not count as endings.

@@ -28,7 +28,7 @@ CHOSEN = {"mfc": "none", "lw": 0}
 
 def pareto(
     tunings: Sequence[Tuned],
-    path: str | os.PathLike | None = None,
+    path: str | os.PathLike[str] | None = None,
     title: str | None = None,
     size: Size = None,
     format: str | None = None,

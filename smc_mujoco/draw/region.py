@@ -22,7 +22,7 @@ BLUES, OPEN, NOT = ("#00466B", "#0072B2", "#7CC0E8"), "#F4F4F4", "#F2B84B"
 PANEL = (5.4, 5.3)  # inches on a full page, width and height of a map
 
 
-def checked(path: str | os.PathLike) -> Path:
+def checked(path: str | os.PathLike[str]) -> Path:
     """Return the path, if its ending is that of a picture."""
     path = Path(path)
     if path.suffix[1:] not in pages.FORMATS or "\0" in path.name:
@@ -32,7 +32,7 @@ def checked(path: str | os.PathLike) -> Path:
 
 def draw(
     maps: Sequence[Basin],
-    path: str | os.PathLike | None = None,
+    path: str | os.PathLike[str] | None = None,
     size: Size = None,
     fig: "Figure | SubFigure | None" = None,
 ) -> "Figure | SubFigure":

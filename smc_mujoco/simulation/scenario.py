@@ -10,8 +10,8 @@ import dataclasses
 import functools
 import math
 import warnings
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any, TypeVar, dataclass_transform
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import mujoco
 import numpy as np
@@ -19,7 +19,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, number, shown, users_frame, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.control.component import written
+from smc_mujoco.control.component import Template, written
 from smc_mujoco.control.estimator import Estimator, estimator
 from smc_mujoco.control.law import Law, fits
 from smc_mujoco.control.surface import Surface
@@ -51,23 +51,14 @@ MAX_CONDITION = 1e12  # of a mass matrix; chosen: its inverse has 4 digits
 MIN_MILLISECONDS = 1.0  # s, of an input delay: chosen; no plant here tolerates as much, so it may be ms
 
 Out = TypeVar("Out")
-T = TypeVar("T")
 
 
 def field(*, converter: Callable[[Any], Out], default: Any = dataclasses.MISSING) -> Out:
-    """Return a dataclass field whose value the converter makes from what the user gives."""
+    """Return a dataclass field whose value a converter makes from what the user gives."""
     return dataclasses.field(default=default, metadata={"converter": converter})
 
 
-@dataclass_transform(
-    eq_default=False, frozen_default=True, kw_only_default=True, field_specifiers=(field, dataclasses.field)
-)
-def converted(cls: type[T]) -> type[T]:
-    """Make a frozen dataclass whose __init__ takes what its fields' converters take."""
-    return dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls)
-
-
-@converted
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Scenario:
     """Everything that defines a run. SI units; angles in radians.
 
@@ -149,7 +140,39 @@ class Scenario:
     sensor: Encoder | None = field(converter=coerce.sensor, default=None)
     condition: str | None = dataclasses.field(default=None, init=False, repr=False)
 
-    def __post_init__(self):
+    if TYPE_CHECKING:  # what the converters take, which a type checker cannot see
+
+        def __init__(
+            self,
+            *,
+            plant: Plant | str,
+            law: coerce.Laws | None = None,
+            model: str | None = None,
+            surface: Surface | Template | str | None = None,
+            duration: float = 10.0,
+            control_period: float = 1e-3,
+            physics_step: float | None = None,
+            u_max: float | coerce.ByChannel[float] | None = None,
+            x0: float | Sequence[float] | None = None,
+            v0: float | Sequence[float] | None = None,
+            reference: Signal | coerce.ByChannel[Signal] | None = None,
+            feedforward: Signal | None = None,
+            disturbance: Signal | Sequence[Signal] | None = None,
+            noise: Noise | None = None,
+            input_delay: float = 0.0,
+            velocity: Estimator | Template | str | None = None,
+            mismatch: Mapping[str, float] | None = None,
+            jump: Jump | None = None,
+            seed: int = 0,
+            integrator: str | None = None,
+            friction: Friction | Sequence[Friction] | None = None,
+            contact: Contact | str | None = None,
+            mechanism: str = "equation",
+            actuator: Actuator | Sequence[Actuator] | None = None,
+            sensor: Encoder | None = None,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
         self._convert()
         check(self.resolved)
         check_new(self.resolved)

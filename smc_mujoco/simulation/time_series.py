@@ -63,7 +63,7 @@ class TimeSeries(Signal):
         return {}
 
     @classmethod
-    def from_csv(cls, path: str | os.PathLike, column: str | None = None, time: str | None = None) -> "TimeSeries":
+    def from_csv(cls, path: str | os.PathLike[str], column: str | None = None, time: str | None = None) -> "TimeSeries":
         """Return the series in a CSV file: numbers separated by commas, a row per time, at a nearly constant rate.
 
         Args:
@@ -138,7 +138,7 @@ def _check(what: str, times: Sequence[float], values: Sequence[float], where: Ca
         )
 
 
-def _rows(path: str | os.PathLike) -> list[tuple[int, list[str]]]:
+def _rows(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
     """Return the line number and the cells of each row of a CSV file that is not blank."""
     if not isinstance(path, str | os.PathLike):
         raise ScenarioError(f"cannot read a series from {shown(path)}: give the path of a CSV file")
@@ -157,7 +157,7 @@ def _rows(path: str | os.PathLike) -> list[tuple[int, list[str]]]:
 
 
 def _columns(
-    path: str | os.PathLike, rows: list[tuple[int, list[str]]], column: str | None, time: str | None
+    path: str | os.PathLike[str], rows: list[tuple[int, list[str]]], column: str | None, time: str | None
 ) -> tuple[tuple[int, int], list[tuple[int, list[str]]]]:
     """Return the indices of the columns of times and values, and the rows below the header."""
     names = rows[0][1]
@@ -189,7 +189,7 @@ def _columns(
     return (at, int(at == 0) if column is None else places[column]), rows[1:]
 
 
-def _cell(path: str | os.PathLike, line: int, name: str, cell: str) -> float:
+def _cell(path: str | os.PathLike[str], line: int, name: str, cell: str) -> float:
     """Return the number in a cell."""
     if not cell:
         raise ScenarioError(f"{path}, line {line}: {name} is empty: fill it in, or cut the file there")

@@ -82,7 +82,7 @@ class Trace:
 
         return notebook.trace(self)
 
-    def save(self, path: str | os.PathLike) -> Path:
+    def save(self, path: str | os.PathLike[str]) -> Path:
         """Write a .npz file that `smc.load` reads back. Make missing folders, and replace an old file atomically."""
         path = Path(path)
         if not path.name or "\0" in path.name:
@@ -166,7 +166,7 @@ class Trace:
             attrs=about | ({"failure": self.failure} if self.failure else {}),
         )
 
-    def export(self, path: str | os.PathLike) -> Path:
+    def export(self, path: str | os.PathLike[str]) -> Path:
         """Write the trace to a .csv, a .parquet or a .mat file (MATLAB 5), without losing a bit of any number.
 
         CSV: a header line with units, "t [s]", "x [rad]", ..., then a line per sample, with the fewest digits that
@@ -256,7 +256,7 @@ def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str
     return Trace(**arrays, t=t, scenario=scenario, diverged_at=diverged_at, failure=failure)
 
 
-def load(path: str | os.PathLike) -> Trace:
+def load(path: str | os.PathLike[str]) -> Trace:
     """Return the trace in a file that `Trace.save` wrote.
 
     Raises:

@@ -59,7 +59,7 @@ QUICK = Extent(
 
 def study(
     scenarios: Iterable[Scenario],
-    out: str | os.PathLike,
+    out: str | os.PathLike[str],
     resume: bool = True,
     executor: str | Executor = "local",
     threads: int | None = None,

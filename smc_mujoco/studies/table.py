@@ -120,7 +120,7 @@ class Table:
     known: Mapping[str, Scenario] = dataclasses.field(default_factory=dict, repr=False)
 
     @classmethod
-    def read(cls, path: str | os.PathLike) -> "Table":
+    def read(cls, path: str | os.PathLike[str]) -> "Table":
         """Return the table in a parquet file that a study wrote, or in the study's folder.
 
         Raises:

@@ -193,7 +193,7 @@ class Tuned:
             "versions": self.versions,
         }
 
-    def save(self, path: str | os.PathLike) -> Path:
+    def save(self, path: str | os.PathLike[str]) -> Path:
         """Write a .json file that `load` reads back."""
         path = ended(path, ".json")
         scenario = self.definition.scenarios(self.plant, self.law, self.seed)[0]
@@ -207,7 +207,7 @@ class Tuned:
         return write_json(path, data)
 
 
-def load(path: str | os.PathLike) -> Tuned:
+def load(path: str | os.PathLike[str]) -> Tuned:
     """Read the tuning that `Tuned.save` wrote.
 
     Raises:

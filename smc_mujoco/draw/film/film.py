@@ -39,7 +39,7 @@ Report = Callable[[int], None]
 
 def film(
     traces: Trace | Sequence[Trace],
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
     labels: Sequence[str] | None = None,
     title: str | None = None,
     size: tuple[int, int] = (1280, 720),
@@ -89,7 +89,7 @@ def missing() -> str | None:
 
 def clip(
     traces: Trace | Sequence[Trace],
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
     labels: Sequence[str] | None = None,
     title: str | None = None,
     span: tuple[float, float] = (0.0, 4.0),
@@ -120,7 +120,7 @@ def clip(
 def still(
     traces: Trace | Sequence[Trace],
     time: float,
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
     labels: Sequence[str] | None = None,
     title: str | None = None,
     size: tuple[int, int] = (1280, 720),

@@ -30,7 +30,7 @@ TEXT = 0.36  # of the page's width, for the claims
 def figure(
     claims: Sequence[Claim],
     title: str,
-    path: str | os.PathLike | None = None,
+    path: str | os.PathLike[str] | None = None,
     size: Size = None,
     format: str | None = None,
     fig: Figure | SubFigure | None = None,

@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 
 
 def report(
-    out: str | os.PathLike = "report",
+    out: str | os.PathLike[str] = "report",
     quick: bool = False,
     seeds: int | None = None,
     threads: int | None = None,
     progress: bool = False,
     plan: "Plan | None" = None,
-    records: str | os.PathLike | None = None,
+    records: str | os.PathLike[str] | None = None,
     laws: Sequence[str] = (),
 ) -> Path:
     """Compute a study and write its report, out/report.html.

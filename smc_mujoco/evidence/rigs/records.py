@@ -75,7 +75,7 @@ class Columns:
         return tuple(dict.fromkeys((*self.needed(True), self.reference, self.feedforward, *self.others, *self.state)))
 
 
-def load(path: str | os.PathLike, names: Mapping[str, str] | None = None) -> Record | Trace:
+def load(path: str | os.PathLike[str], names: Mapping[str, str] | None = None) -> Record | Trace:
     """Return the columns of a CSV or npz file, or a saved trace.
 
     Args:

@@ -44,7 +44,7 @@ MACHINES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64"
 
 def export_fmu(
     law: Law | Template | str | Scenario,
-    path: str | os.PathLike | None = None,
+    path: str | os.PathLike[str] | None = None,
     *,
     surface: Surface | Template | str | None = None,
     velocity: Estimator | Template | str | None = None,

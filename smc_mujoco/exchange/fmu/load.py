@@ -193,7 +193,7 @@ def _extracted(path: str, digest: str) -> Path:
 
 
 def law_from_fmu(
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
     *,
     variables: Mapping[str, str] | None = None,
     constants: Mapping[str, float] | None = None,
@@ -253,7 +253,7 @@ def law_from_fmu(
     return law_function(gains={ours: gain for ours, (_, gain) in gains.items()}, memory=1)(law)
 
 
-def check(path: str | os.PathLike, timeout: float, **settings: Any) -> Iterator[str]:
+def check(path: str | os.PathLike[str], timeout: float, **settings: Any) -> Iterator[str]:
     """Try an FMU as a law, and yield lines: what its variables mean, its step, its gains.
 
     Arguments and errors are those of `law_from_fmu`.
@@ -280,7 +280,7 @@ def _pace(law: FmuLaw) -> str:
     return f"every control period{f'; inside, it runs every {float(inside):g} s' if inside else ''}"
 
 
-def _file(path: str | os.PathLike) -> Path:
+def _file(path: str | os.PathLike[str]) -> Path:
     """Return the path of an existing file."""
     if not isinstance(path, str | os.PathLike):
         raise ScenarioError(f"cannot take a law from {shown(path)}: give the path of an .fmu file")

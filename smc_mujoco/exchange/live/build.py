@@ -28,7 +28,7 @@ FACTS = "facts.json"  # a folder with this file is a live page, which may be rep
 def live(
     plants: Sequence[str | Plant] = PLANTS,
     laws: Sequence[Component | Template] = (),
-    out: str | os.PathLike = "live",
+    out: str | os.PathLike[str] = "live",
 ) -> Path:
     """Build the live page: plants and laws in a browser, where MuJoCo simulates them and the reader moves the sliders.
 
