@@ -46,7 +46,11 @@ def main() -> None:
         print(f"\n{task}, {len(SEEDS)} seeds\n\n| law | {' | '.join(COLUMNS)} |\n|---|{'---|' * len(COLUMNS)}")
         for name in arms.GAINS:
             runs = [arms.scenario(task, arms.gained(name), seed, payload) for seed in SEEDS]
-            print(row(name, np.array([measured(trace) for trace in smc.run(runs)])), flush=True)
+            traces = smc.run(runs)
+            if arms.unstable(runs, traces):
+                print(f"| {name} | {' | '.join(['unstable'] * len(COLUMNS))} |", flush=True)
+            else:
+                print(row(name, np.array([measured(trace) for trace in traces])), flush=True)
     print("\nwall\n\n| law | mean force, N | off the wanted force, % | in contact, % of the time | deepest, mm |")
     print("|---|---|---|---|---|")
     laws = {"hybrid": arms.hybrid(), "hybrid, friction known": arms.hybrid(friction=True)}

@@ -120,8 +120,8 @@ class Plant:
       name: as in `smc.plants()`.
       parameters: name -> value, SI units; the nominal ones, which laws may know.
       mass: parameter that is meant by "mass" in a mismatch or a jump.
-      added: name -> unit of the parameters that are 0 by default, such as a payload: a mismatch or a jump adds its
-        number to such a parameter, in this unit, instead of multiplying it.
+      added: name -> unit ("": none) of the parameters that are 0 by default, such as a payload: a mismatch or a jump
+        adds its number to such a parameter, in this unit, instead of multiplying it.
       unit: unit of x, "rad" or "m"; that of the first channel if they differ.
       mixed: units of all channels if they differ, (n,), else (); `units` has them in both cases.
       x0: default initial positions, those of the paper study, (n,).
@@ -262,7 +262,7 @@ class Plant:
     def change(self, factors: Mapping[str, float]) -> str:
         """Return a change of the parameters in words: "m × 1.3, payload + 2 kg". Factors are those of `values`."""
         return ", ".join(
-            f"{name} + {factor:g} {self.added[name]}" if name in self.added else f"{name} × {factor:g}"
+            f"{name} + {factor:g} {self.added[name]}".rstrip() if name in self.added else f"{name} × {factor:g}"
             for name, factor in factors.items()
         )
 

@@ -5,9 +5,10 @@ payload. Gains come from `search`: the same number of random draws for each law,
 and a seed that no figure uses. GAINS has the best draws.
 """
 
+import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -31,6 +32,7 @@ ROUGH = 1000.0  # N m/s: variation of u that doubles the cost of a draw; chosen 
 BEFORE, BEHIND, PROBE = 0.0005, 0.004, 0.012  # m, from the wall's face: chosen; the radius of the probe
 SPREAD = 0.05  # rad: largest distance of each joint's start from the task's own start; chosen
 BLOW = 1.0  # s: when the blow comes in its task
+STEP_CHANGE = 0.1  # relative change of an error by a halved physics step, beyond which a run is called unstable; chosen
 PRESS = 20.0  # N: with which the tip is to press on the wall; chosen
 REACH = (0.0, 0.3, 0.0, -2.0, 0.0, 3.1, math.pi / 4)  # rad: pose from which the path along the wall is solved for
 
@@ -188,6 +190,24 @@ def back_within(trace: Trace, distance: float, after: float) -> float:
     if not len(out):
         return 0.0
     return math.inf if out[-1] == len(t) - 1 else float(t[out[-1] + 1]) - after
+
+
+def unstable(scenarios: Sequence[Scenario], traces: Sequence[Trace]) -> bool:
+    """Return whether half the physics step changes the tip's rms error by more than STEP_CHANGE, in the median of runs.
+
+    The numbers of such runs are those of their step and not of the machine.
+
+    Args:
+      scenarios: of the runs.
+      traces: of the runs.
+    """
+    halves = [dataclasses.replace(each, physics_step=each.resolved.physics_step / 2.0) for each in scenarios]
+    errors, finer = (
+        np.array([tip_scores(trace)["rms_error"] if trace.failure is None else math.inf for trace in each])
+        for each in (traces, run(halves))
+    )
+    change = np.abs(finer / errors - 1.0)  # NaN where both fail, which counts as a change
+    return not np.median(change) <= STEP_CHANGE
 
 
 def cost(trace: Trace) -> float:

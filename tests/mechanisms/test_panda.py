@@ -30,6 +30,16 @@ LINKS = (
     (1.666555, (6.0149e-2, -1.4117e-2, -1.0517e-2), (1.964e-3, 4.354e-3, 5.433e-3, 1.09e-4, -1.158e-3, 3.41e-4)),
     (0.735522, (1.0517e-2, -4.252e-3, 6.1597e-2), (1.2516e-2, 1.0027e-2, 4.815e-3, -4.28e-4, -1.196e-3, -7.41e-4)),
 )
+DELTA = (  # the second set, Tables VIII and IX of their supplement, in the same order
+    (2.0643e-5, (5.2e-8, 5.2e-8, -0.1750), (0.6, 0.6, 2e-6, 0, 0, 0)),
+    (9.2017, (0.0015, -0.0578, -0.0384), (0.028, 0.0291, 0.0011, 5.565e-5, 0.0056, -2.7636e-4)),
+    (1.4575, (0.1096, 0.05, -0.1), (2e-6, 2e-6, 2e-6, 0, 0, 0)),
+    (4.5856, (-0.0485, 0.15, 0.0147), (2e-6, 2e-6, 2e-6, 0, 0, 0)),
+    (0.5231, (-0.004, 0.045, -0.05), (2e-6, 2e-6, 2e-6, 0, 0, 0)),
+    (2.0604, (0.0732, -0.0251, -0.0276), (2e-6, 2e-6, 2e-6, 0, 0, 0)),
+    (0.1718, (-0.0326, 0.0087, 0.0396), (2e-6, 2e-6, 2e-6, 0, 0, 0)),
+)
+HOME = np.array([0.0, 0.0, 0.0, -math.pi / 2, 0.0, math.pi / 2, -math.pi / 4])
 LOW = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])  # rad
 HIGH = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
 
@@ -45,10 +55,10 @@ def cross(a, b):
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-def torques(q, v, a, payload=0.0, lp=0.04):
+def torques(q, v, a, payload=0.0, lp=0.04, links=LINKS):
     """The torques of the joints by Newton and Euler's recursion, (7,); J. J. Craig, Introduction to Robotics, 6.5."""
     z, steel = np.array([0.0, 0.0, 1.0]), 7850.0
-    bodies = [[(m, np.array(c), np.array([[A, D, E], [D, B, F], [E, F, C]]))] for m, c, (A, B, C, D, E, F) in LINKS]
+    bodies = [[(m, np.array(c), np.array([[A, D, E], [D, B, F], [E, F, C]]))] for m, c, (A, B, C, D, E, F) in links]
     radius = (3 * payload / (4 * math.pi * steel)) ** (1 / 3)
     bodies[6].append((payload, np.array([0, 0, 0.107 + lp]), 0.4 * payload * radius**2 * np.eye(3)))
     turns = [rotation(alpha, angle) for (_, alpha, _), angle in zip(FRAMES, q, strict=True)]
@@ -97,6 +107,96 @@ def test_gravity_torques_of_a_thousand_states_are_the_published_ones():
         found = plant.nominal.dynamics(q, still, values)
         np.testing.assert_allclose(found.g, torques(q, still, still), atol=1e-11)
         np.testing.assert_array_equal(found.g, found.h)
+
+
+def test_the_second_set_obeys_newton_and_euler():
+    rng, plant = np.random.default_rng(10), smc.plant("panda", delta=1.0)
+    model = plant.load()
+    data = mujoco.MjData(model)
+    for _ in range(100):
+        q, v, u = rng.uniform(LOW, HIGH), rng.uniform(-2.5, 2.5, 7), rng.uniform(-1, 1, 7) * plant.limits
+        data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
+        mujoco.mj_forward(model, data)
+        expected = torques(q, v, data.qacc, links=DELTA)
+        assert np.abs(expected - u).max() < 1e-10 * max(1.0, np.abs(data.qacc).max())
+
+
+@pytest.mark.parametrize(
+    ("delta", "inertia", "gravity"),
+    [
+        (0.0, (1.173, 2.408, 1.136, 0.785, 0.0271, 0.0326, 0.0049), (0, -25.22, 0, 18.53, 0.74, 1.65, 0)),
+        (1.0, (1.056, 2.109, 1.013, 0.650, 0.0044, 0.0135, 0.0002), (0, -26.11, 0, 18.47, 0.74, 1.60, 0)),
+    ],
+)
+def test_inertia_and_gravity_at_home_of_both_sets(delta, inertia, gravity):
+    """Computed from the published tables by other code, to the digits given there."""
+    plant = smc.plant("panda", delta=delta)
+    found = plant.nominal.dynamics(HOME, np.zeros(7), plant.values({}))
+    np.testing.assert_allclose(np.diag(found.M)[:4], inertia[:4], atol=6e-4)
+    np.testing.assert_allclose(np.diag(found.M)[4:], inertia[4:], atol=6e-5)
+    np.testing.assert_allclose(found.g, gravity, atol=6e-3)
+    assert np.linalg.eigvalsh(found.M)[0] > 1e-4
+
+
+def identified(delta):
+    """Coefficients of Table III of Gaz et al. from the compiled links: 3 of inertia and 9 of gravity, kg m^2, kg m."""
+    model = smc.plant("panda", delta=delta).load()
+    ids = [model.body(f"link{i}").id for i in range(1, 8)]
+    m = dict(enumerate(model.body_mass[ids], 1))
+    c = {i: model.body_ipos[body] for i, body in enumerate(ids, 1)}
+    J = {}
+    for i, body in enumerate(ids, 1):
+        turn = np.empty(9)
+        mujoco.mju_quat2Mat(turn, model.body_iquat[body])
+        turn = turn.reshape(3, 3)
+        J[i] = turn @ np.diag(model.body_inertia[body]) @ turn.T
+        J[i] = J[i] + m[i] * (c[i] @ c[i] * np.eye(3) - np.outer(c[i], c[i]))
+    s3, s4, s5 = (sum(m[i] for i in range(first, 8)) for first in (3, 4, 5))
+    return [
+        J[2][1, 1] + J[1][2, 2],
+        J[3][1, 1] + J[2][2, 2] + 0.099856 * m[3] + 0.632 * c[3][2] * m[3] + 0.10666225 * s4,
+        J[5][1, 1] + J[4][2, 2] + 0.15426225 * s5 + 0.768 * c[5][2] * m[5],
+        c[2][0] * m[2],
+        c[2][1] * m[2] - 0.316 * s3 - c[3][2] * m[3],
+        0.0825 * s4 + c[3][0] * m[3],
+        c[4][0] * m[4] - 0.0825 * s5,
+        0.384 * s5 + c[4][1] * m[4] + c[5][2] * m[5],
+        0.088 * m[7] + c[6][0] * m[6],
+        c[6][1] * m[6] - c[7][2] * m[7],
+        c[7][0] * m[7],
+        c[5][1] * m[5] - c[6][2] * m[6],
+    ]
+
+
+def test_both_sets_give_the_coefficients_of_the_published_table():
+    """The table prints those of the first set, but for the last: it prints 0.0824, and the set's c6z gives 0.0679."""
+    printed = [0.0373, 1.036, 0.6325, -0.002, -3.104, 0.6842, -0.4901, 1.721, 0.165, -0.0688, 0.0077, 0.0679]
+    np.testing.assert_allclose(identified(0.0), printed, atol=6e-4)
+    of_delta = [0.04269, 0.9004, 0.5202, 0.0138, -3.1664, 0.7654, -0.4497, 1.7197, 0.1659, -0.05852, -0.0056, 0.0804]
+    np.testing.assert_allclose(identified(1.0), of_delta, atol=6e-5)
+
+
+def test_a_blend_of_both_sets_has_the_blend_of_their_inertia():
+    """M and g are linear in masses, first and second moments."""
+    found = []
+    for delta in (0.0, 0.3, 1.0):
+        plant = smc.plant("panda", delta=delta)
+        found.append(plant.nominal.dynamics(HOME + 0.2, np.zeros(7), plant.values({})))
+    first, blend, second = found
+    np.testing.assert_allclose(blend.M, 0.7 * first.M + 0.3 * second.M, atol=1e-12)
+    np.testing.assert_allclose(blend.g, 0.7 * first.g + 0.3 * second.g, atol=1e-12)
+
+
+def test_a_mismatch_makes_the_arm_that_of_the_second_set():
+    common = {"law": "none", "x0": HOME, "v0": (0.5,) * 7, "duration": 0.1}
+    unknown = smc.Scenario(plant="panda", mismatch={"delta": 1.0}, **common)
+    traces = smc.run(
+        [smc.Scenario(plant="panda", **common), unknown, smc.Scenario(plant=smc.plant("panda", delta=1), **common)]
+    )
+    np.testing.assert_array_equal(traces[1].x, traces[2].x)
+    assert np.abs(traces[0].x[-1] - traces[1].x[-1]).max() > 1e-3
+    with pytest.raises(smc.ScenarioError, match=r"panda's delta is 1\.5: give the share of the second set, 0 to 1"):
+        smc.run(dataclasses.replace(unknown, mismatch={"delta": 1.5}))
 
 
 def test_the_flange_is_where_the_makers_frames_put_it():

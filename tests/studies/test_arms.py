@@ -49,6 +49,13 @@ def test_a_run_that_fails_does_not_come_back_to_its_path():
         assert arms.back_within(trace, 1e-3, after=1.0) == back
 
 
+def test_a_law_whose_error_depends_on_the_physics_step_is_called_unstable():
+    """Time-delay control in the pick and place, 100, 177 or 129 mm by the step; computed torque is not."""
+    for name, expected in (("time_delay_sliding", True), ("computed_torque_sliding", False)):
+        runs = [arms.scenario("payload", arms.gained(name), seed=1)]
+        assert arms.unstable(runs, smc.run(runs)) is expected
+
+
 def test_the_hybrid_law_presses_as_hard_as_it_should_and_stays_on_the_wall():
     """With the friction of a real arm, rubbing on the wall, and noise: within 5 %, and less than 1 mm deep."""
     known, unknown = smc.run([arms.scenario("wall", arms.hybrid(friction=one), seed=5) for one in (True, False)])
