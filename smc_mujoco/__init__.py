@@ -32,10 +32,6 @@ __all__ = [*_ORIGINS, "arms", "boards", "paper"]  # noqa: PLE0604  # pyright: ig
 
 
 def __getattr__(name: str) -> object:
-    if name == "__spec__":  # read by every further import, such as that of gymnasium.make("smc_mujoco:Duffing-v0")
-        if registration.register_if_imported():
-            globals()["__spec__"] = _SPEC
-        return _SPEC
     if name not in _ORIGINS and name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = globals()[name] = _load(name)
@@ -53,8 +49,4 @@ def __dir__() -> list[str]:
     return sorted({*_ORIGINS, *_MODULES, "__doc__", "__version__"})
 
 
-# gymnasium.make imports this package and then looks an id up. If the package was imported before gymnasium, nothing of
-# it runs again, but Python reads its __spec__: so __getattr__ supplies that until the ids are registered.
-_SPEC = __spec__
-if not registration.register_if_imported():
-    del __spec__
+registration.register_when_imported()

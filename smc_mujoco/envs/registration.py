@@ -1,25 +1,48 @@
 """Ids of the plants in gymnasium: "smc/CartPole-v0", and "Duffing-v0" where gymnasium has no environment of that name.
 
-gymnasium has no plugins: `gymnasium.make("smc_mujoco:Duffing-v0")` imports this package and then looks the id up. So
-importing this package registers the ids if gymnasium has been imported; otherwise a later import of the package does
-(see `smc_mujoco.__init__`). The package does not import gymnasium itself, which is optional and slow to import. This
-module imports no plant: it reads the names of the plants from their files.
+gymnasium has no plugins, and its function `register_envs` does nothing. So importing this package registers the ids if
+gymnasium has been imported; otherwise importing gymnasium does. The package does not import gymnasium itself, which is
+optional and slow to import. This module imports no plant: it reads the names of the plants from their files.
 """
 
 import pkgutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 LIBRARY = "gymnasium"
 SPACE = "smc"  # namespace of all plants
 
 
-def register_if_imported() -> bool:
-    """Register the ids if gymnasium has been imported; return whether it has."""
-    if getattr(sys.modules.get(LIBRARY), "envs", None) is None:  # set once gymnasium has registered its own ids
-        return False
-    register()
-    return True
+def register_when_imported() -> None:
+    """Register the ids at once if gymnasium has been imported, else as soon as it is."""
+    if getattr(sys.modules.get(LIBRARY), "envs", None) is not None:  # set once gymnasium has registered its own ids
+        register()
+    else:
+        sys.meta_path.insert(0, Importer())
+
+
+class Importer:
+    """The finder that registers the ids after the first import of gymnasium. It finds nothing else."""
+
+    def find_spec(self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> Any:
+        """Return where gymnasium is, with a loader that registers the ids; None for other packages."""
+        if name != LIBRARY:
+            return None
+        others = [finder for finder in sys.meta_path if finder is not self]
+        spec = next(filter(None, (finder.find_spec(name, path, target) for finder in others)), None)
+        if spec is not None and spec.loader is not None:
+            execute = spec.loader.exec_module
+
+            def load(module: ModuleType) -> None:
+                execute(module)
+                sys.meta_path.remove(self)
+                register()
+
+            spec.loader.exec_module = load
+        return spec
 
 
 def register() -> None:

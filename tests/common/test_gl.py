@@ -123,6 +123,8 @@ import os, sys
 before = dict(os.environ), list(sys.meta_path), list(sys.path_hooks)
 import smc_mujoco as smc
 smc.Scenario(plant="duffing", law="none")
+added = sys.meta_path.pop(0)  # it registers the plants when gymnasium is imported, and then goes
+assert type(added).__module__ == "smc_mujoco.envs.registration"
 assert (dict(os.environ), sys.meta_path, sys.path_hooks) == before, "something changed"
 assert type(smc) is type(sys)
 assert smc.__spec__.name == "smc_mujoco"
