@@ -266,13 +266,13 @@ def _search(ledger: _Ledger, start: Box, searched: Box, seed: int) -> tuple[floa
 
 
 def _drawn(ledger: _Ledger, box: Box, random: np.random.Generator, size: int) -> tuple[np.ndarray, float]:
-    """Return the log10 gains of the best of a Latin hypercube in the box, and their J; the first one if size is 0."""
+    """Return the log10 gains of the best of a Latin hypercube in the box, and their J; the middle if size is 0."""
     from scipy.stats.qmc import LatinHypercube
 
     low, high = np.log10(list(box.values())).T
-    logs = low + (high - low) * LatinHypercube(len(low), rng=random).random(max(size, 1))
     if not size:
-        return logs[0], np.inf
+        return (low + high) / 2.0, np.inf
+    logs = low + (high - low) * LatinHypercube(len(low), rng=random).random(size)
     costs = ledger.screen(logs)
     return logs[np.argmin(costs)], costs.min()
 
