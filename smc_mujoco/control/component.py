@@ -27,6 +27,7 @@ from smc_mujoco.control.units import Gain
 Conditions = Mapping[str, Callable[[SimpleNamespace], bool]]
 Value = float | tuple[float, ...]  # of a gain: one number for all channels, or one for each driven channel
 FINITE = ("", "s", "e")  # what a law brings to 0 in finite time
+Order = float | Callable[[SimpleNamespace], float]  # of accuracy: a number, or a function of the gains
 
 
 class Rest(NamedTuple):
@@ -69,6 +70,7 @@ class LawOptions(SurfaceOptions, total=False):
     family: str
     continuous: bool
     finite_time: str
+    accuracy: Mapping[str, Order]
     joint: bool
 
 
@@ -215,6 +217,7 @@ class Template:
       label, short, colour: as in the decorator; "" means automatic, see `smc_mujoco.draw.style`.
       rest: its linear part; None if it is not linear at rest.
       family, continuous, finite_time: as in the decorator; `smc_mujoco.control.properties` chooses laws by them.
+      accuracy: as in the decorator; `order` evaluates it.
       joint: whether it is a law of many joints.
     """
 
@@ -234,6 +237,7 @@ class Template:
     family: str = ""
     continuous: bool = False
     finite_time: str = ""
+    accuracy: Mapping[str, Order] = dataclasses.field(default_factory=dict)
     joint: bool = False
 
     def __repr__(self) -> str:
@@ -261,6 +265,16 @@ class Template:
         module = inspect.getmodule(self.function)
         own = module is not None and module.__name__.rsplit(".", 1)[-1] == self.name
         return inspect.cleandoc((module.__doc__ if own and module else self.function.__doc__) or self.name)
+
+    def order(self, quantity: str, gains: Mapping[str, Value]) -> float | None:
+        """Return theory's order of accuracy of "s" or "e" with these gains; None if the law does not state it."""
+        stated = self.accuracy.get(quantity)
+        return min(map(stated, _per_channel(gains))) if callable(stated) else stated
+
+    def unmet(self, gains: Mapping[str, Value]) -> list[str]:
+        """Return the conditions of the theorem that these gains violate, in words."""
+        channels = list(_per_channel(gains))
+        return [words for words, holds in self.conditions.items() if not all(_holds(holds, one) for one in channels)]
 
     def __call__(self, **gains: float | Sequence[float]) -> Component:
         """Return `bind(gains, warn=True)`."""
@@ -290,10 +304,9 @@ class Template:
             values[key] = _value(f"{self.name}'s {key}", value, above=above, least=least, infinite=infinite)
             if isinstance(values[key], tuple) and (gain.shared or self.kind != "law"):
                 raise ScenarioError(f"{self.name}'s {key} is {written(values[key])}: give one number for all channels")
-        for words, condition in self.conditions.items():
-            if warn and not all(_holds(condition, one) for one in _per_channel(values)):
-                text = ", ".join(f"{name} = {written(value)}" for name, value in values.items())
-                warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {text}", GainWarning, users_frame())
+        for words in self.unmet(values) if warn else ():
+            text = ", ".join(f"{name} = {written(value)}" for name, value in values.items())
+            warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {text}", GainWarning, users_frame())
         return Component(
             kind=self.kind,
             name=self.name,
@@ -307,6 +320,15 @@ class Template:
             shared=tuple(name for name, gain in self.gains.items() if gain.shared),
             template=self,
         )
+
+
+def _check_orders(accuracy: object) -> None:
+    """Raise ScenarioError for an option `accuracy` that is not a mapping from "s" and "e" to orders."""
+    if not isinstance(accuracy, Mapping) or not accuracy.keys() <= {"s", "e"}:
+        raise ScenarioError(f"accuracy is {shown(accuracy)}: give orders of s and e, such as {{'s': 1, 'e': 1}}")
+    for quantity, order in accuracy.items():
+        if not callable(order):
+            number(f"accuracy of {quantity}", order, least=0.0)
 
 
 def _per_channel(gains: Mapping[str, Value]) -> Iterable[SimpleNamespace]:
@@ -425,6 +447,7 @@ def template(
         raise ScenarioError(f"joint is {shown(words['joint'])}: give True or False")
     if words.get("finite_time", "") not in FINITE:
         raise ScenarioError(f"finite_time is {shown(words['finite_time'])}: give 's', 'e' or ''")
+    _check_orders(words.get("accuracy", {}))
     for sign, names in (("positive", positive), ("nonnegative", nonnegative)):
         for name in names:
             if name not in stated:

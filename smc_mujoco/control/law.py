@@ -122,6 +122,9 @@ def law_function(
         the control period. Default: no.
       finite_time: what is 0 after a finite time by the law's theorem, without a disturbance: "e", the error; "s", the
         sliding variable, so that e then decays as on the surface; "", the default, neither.
+      accuracy: "s" and "e" -> theory's order of accuracy: sampled with the control period h, under a disturbance that
+        the law's theorem admits, |s| and |e| end below a multiple of h to this power. 0: below a bound that h does not
+        change. A number, or a function of the gains, read by attribute. `smc.accuracy` measures the orders.
       joint: whether it is a law of many joints: the function then gets the measurement of all channels, a
         `smc_mujoco.control.joint_law.JointMeasurement`, and returns two vectors u and s, one number for each channel.
 

@@ -22,6 +22,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     joint=True,
     family="observer-free",
     continuous=True,
+    accuracy={"s": 0, "e": 0},
     gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)},
     label="Observer-free (every joint)",
     colour="#0072B2",

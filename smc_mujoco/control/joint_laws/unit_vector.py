@@ -19,6 +19,7 @@ from smc_mujoco.control.units import ACCELERATION, RATE, SPEED, Gain
     joint=True,
     family="first-order",
     continuous=True,
+    accuracy={"s": lambda g: 0.0 if g.eps > 0.0 else 1.0, "e": lambda g: 0.0 if g.eps > 0.0 else 1.0},
     requires_model=True,
     gains={
         "rho": Gain(10.0, ACCELERATION, positive=True, shared=True),

@@ -2,7 +2,8 @@
 
 K grows until it exceeds the matched disturbance, so a bound k* on the disturbance need not be known. The proof uses V =
 s^2/2 + (K - k*)^2 / (2 gamma). K never falls, so noise and sampling make it grow without limit; `adaptive_leak`
-prevents this. K is integrated by the explicit Euler method.
+prevents this. K is integrated by the explicit Euler method. Sampled, |s| <= (K + |d|) dt, which is O(dt) while K hardly
+grows.
 Gains: gamma, adaptation rate [N/m]; c, slope of the surface [1/s]; k0, initial K [N].
 Source: Slotine & Li, Applied Nonlinear Control, Prentice Hall 1991, chapter 8; Plestan, Shtessel, Bregeault & Poznyak,
 "New methodologies for adaptive sliding mode control", Int. J. Control 83(9):1907, 2010.
@@ -15,6 +16,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, Gain
 @law_function(
     family="adaptive",
     finite_time="s",
+    accuracy={"s": 1, "e": 1},
     gains={
         "gamma": Gain(50.0, FORCE_PER_POSITION, nonnegative=True),
         "c": Gain(2.5, RATE, nonnegative=True),

@@ -17,6 +17,7 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, RATE, SPEED, Gain, Unit
 @law_function(
     family="adaptive",
     continuous=True,
+    accuracy={"s": 0, "e": 0},
     label="Adaptive super-twisting",
     gains={
         "rate": Gain(2.0, Unit(force=1, position=-0.5, time=-0.5), positive=True),  # of K, a force per root

@@ -19,6 +19,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gai
 @law_function(
     family="adaptive",
     continuous=True,
+    accuracy={"s": 0, "e": 0},
     gains={
         "K0": Gain(50.0, FORCE_PER_POSITION, nonnegative=True),
         "eps": Gain(0.1, SPEED, positive=True),

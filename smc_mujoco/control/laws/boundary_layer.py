@@ -22,6 +22,7 @@ REST = Rest(
 @law_function(
     family="first-order",
     continuous=True,
+    accuracy={"s": 0, "e": 0},
     gains={
         "k": Gain(6.0, FORCE, nonnegative=True),
         "c": Gain(2.5, RATE, nonnegative=True),

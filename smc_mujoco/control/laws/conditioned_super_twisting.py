@@ -4,8 +4,8 @@ This is super-twisting without wind-up. U is the actuator's bound on u. While u 
 and the law is plain super-twisting. While u is saturated, w tends to the bound and stays there. Theorem for |d'| <= L
 and |d| < U: the same conditions suffice as without saturation, k2 > L and k1 > sqrt(k2 + L). If u was saturated while s
 was reached and d = 0, s overshoots 0 by at most U^2 / (2 k2) and at most (U / k1)^2 (derived here: w then rises from -U
-at the rate k2). w is integrated by the explicit Euler method. With the nominal model, u in w - u is the acceleration
-that the saturated u gives.
+at the rate k2). w is integrated by the explicit Euler method, so that |s| = O(dt^2), as of plain super-twisting. With
+the nominal model, u in w - u is the acceleration that the saturated u gives.
 Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of the surface [1/s].
 Source: R. Seeber & M. Reichhartinger, "Conditioned super-twisting algorithm for systems with saturated control action",
 Automatica 116:108921, 2020.
@@ -19,6 +19,7 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
     family="super-twisting",
     continuous=True,
     finite_time="s",
+    accuracy={"s": 2, "e": 2},
     gains={
         "k1": Gain(3.0, FORCE_PER_ROOT, positive=True),
         "k2": Gain(4.4, FORCE_RATE, positive=True),

@@ -19,6 +19,7 @@ from smc_mujoco.control.units import FORCE_RATE, Gain, Unit
     family="higher-order",
     continuous=True,
     finite_time="e",
+    accuracy={"s": 3, "e": 3},
     gains={
         "L": Gain(1.0, FORCE_RATE, positive=True),
         "k1": Gain(7.0, Unit(force=1 / 3, position=-1 / 3, time=2 / 3), positive=True),  # the cube root of an inertia

@@ -18,6 +18,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
 @law_function(
     family="first-order",
     finite_time="s",
+    accuracy={"s": 2, "e": 2},
     label="Discrete-time",
     gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)},
     memory=3,

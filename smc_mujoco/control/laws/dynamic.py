@@ -17,6 +17,7 @@ from smc_mujoco.control.units import FORCE_RATE, RATE, Gain
 @law_function(
     family="first-order",
     continuous=True,
+    accuracy={"s": 1, "e": 1},
     gains={
         "k": Gain(30.0, FORCE_RATE, nonnegative=True),
         "q": Gain(5.0, RATE, nonnegative=True),

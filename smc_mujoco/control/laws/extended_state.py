@@ -26,6 +26,7 @@ from smc_mujoco.control.units import ACCELERATION, INPUT_GAIN, RATE, Gain
 @law_function(
     family="disturbance-observer",
     finite_time="s",
+    accuracy={"s": 1, "e": 1},
     label="Extended-state",
     gains={
         "k": Gain(2.0, ACCELERATION, nonnegative=True, over="b"),

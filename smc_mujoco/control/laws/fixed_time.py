@@ -14,9 +14,15 @@ from smc_mujoco.control.law import command, law_function, power, sgn, sliding
 from smc_mujoco.control.units import FORCE, RATE, Gain, force_per
 
 
+def order(gains):
+    """Return the order of accuracy: that of a relay, or 0 without one."""
+    return 1.0 if gains.k > 0.0 else 0.0
+
+
 @law_function(
     family="first-order",
     finite_time="s",
+    accuracy={"s": order, "e": order},
     label="Fixed-time",
     gains={
         "k1": Gain(2.0, force_per("a"), nonnegative=True),

@@ -4,8 +4,8 @@ For a joint with an actuator, e'' = f + g u - r'', that moves a joint without on
 - c1 de) / g the first joint stays on its surface, under u2 = (-fq - c2 dq) / gq the second. The law mixes the two so
 that S' = -k sgn(S) - rate S. While u is not saturated, S = 0 from the time ln(1 + rate |S(0)| / k) / rate on, and stays
 0 under a matched disturbance d with |(a g + gq) d| < k. A larger one leaves |S| <= (|(a g + gq) d| - k) / rate. Sampled
-explicitly, S chatters within about k dt. A scenario gives this law the nominal model by default. s1 may be the
-scenario's surface instead.
+explicitly, S chatters within about k dt. A force on the joint without an actuator leaves an error e all the same. A
+scenario gives this law the nominal model by default. s1 may be the scenario's surface instead.
 
 The motion on S = 0 must bring both joints to rest. The authors conclude this from V = S^2/2 by Barbalat's lemma, which
 proves only S -> 0. To first order, without friction, both joints come to rest if and only if the roots p of
@@ -34,6 +34,7 @@ from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
 @law_function(
     family="underactuated",
     finite_time="s",
+    accuracy={"s": 1, "e": 0},
     gains={
         "a": Gain(0.67, Unit(), positive=True),
         "c1": Gain(0.67, RATE, positive=True),

@@ -6,6 +6,6 @@ The baseline that shows the motion of the plant by itself, with or without a mod
 from smc_mujoco.control.law import law_function
 
 
-@law_function(family="baseline", continuous=True, label="No control", colour="#6E7781")
+@law_function(family="baseline", continuous=True, accuracy={"s": 0, "e": 0}, label="No control", colour="#6E7781")
 def none(y, gains, memory):
     return 0.0, 0.0

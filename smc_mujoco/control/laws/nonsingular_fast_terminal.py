@@ -2,8 +2,9 @@
 
 v_eq = -[de]^(2-p) (1 + a q |e|^(q-1)) / (b p), and s' = b p |de|^(p-1) (e'' - v_eq). s = 0 is reached in finite time
 for e'' = u + d, |d| <= D < k, and sooner from far away because of the term rate s. On s = 0, de = -[(e + a [e]^q) /
-b]^(1/p), so e reaches 0 in finite time, faster from far away than with a = 0. Without the model, e'' = f + g u + d
-contains (g - 1) v_eq too: the condition is k g > |f + d| + |g - 1| |v_eq|, with the de above on s = 0.
+b]^(1/p), so e reaches 0 in finite time, faster from far away than with a = 0. Sampled, |de| = O(dt), and so |s| and |e|
+are O(dt^p) (derived here). Without the model, e'' = f + g u + d contains (g - 1) v_eq too: the condition is k g > |f +
+d| + |g - 1| |v_eq|, with the de above on s = 0.
 Gains: k, switching gain [N]; rate, reaching rate [N/m]; a [m^(1-q)] and b [m^(1-p) s^p], of the surface; p and q,
 exponents.
 Source: L. Yang & J. Yang, "Nonsingular fast terminal sliding-mode control for nonlinear dynamical systems", Int. J.
@@ -17,6 +18,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, Gain, Unit
 @law_function(
     family="terminal",
     finite_time="e",
+    accuracy={"s": lambda g: g.p, "e": lambda g: g.p},
     gains={
         "k": Gain(4.0, FORCE, positive=True),
         "rate": Gain(3.0, FORCE_PER_POSITION, nonnegative=True),

@@ -21,6 +21,7 @@ REST = Rest(linear=lambda g: (g.lam, g.k1), force=lambda g, x: g.lam * np.tanh(g
 @law_function(
     family="observer-free",
     continuous=True,
+    accuracy={"s": 0, "e": 0},
     gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)},
     label="Observer-free",
     short="OF",

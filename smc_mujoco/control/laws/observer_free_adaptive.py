@@ -24,6 +24,7 @@ from smc_mujoco.control.units import FORCE, FORCE_PER_POSITION, RATE, SPEED, Gai
 @law_function(
     family="observer-free",
     continuous=True,
+    accuracy={"s": 0, "e": 0},
     label="Observer-free, adaptive",
     gains={
         "lam": Gain(6.0, FORCE, positive=True),

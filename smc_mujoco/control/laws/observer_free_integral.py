@@ -25,6 +25,7 @@ from smc_mujoco.control.units import FORCE, RATE, RATE2, Gain
 @law_function(
     family="observer-free",
     continuous=True,
+    accuracy={"s": 0, "e": 0},
     label="Observer-free, integral",
     gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "ki": Gain(2.0, RATE2, positive=True)},
     memory=1,

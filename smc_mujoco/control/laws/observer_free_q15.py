@@ -49,6 +49,7 @@ def saturated(n):
 @law_function(
     family="observer-free",
     continuous=True,
+    accuracy={"s": 0, "e": 0},
     label="Observer-free, Q15",
     gains={
         "lam": Gain(6.0, FORCE, positive=True),

@@ -21,6 +21,7 @@ QUARTER, END = np.float32(0.25), np.float32(9.0)  # tanh(9) rounds to 1
 @law_function(
     family="observer-free",
     continuous=True,
+    accuracy={"s": 0, "e": 0},
     label="Observer-free, single",
     gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)},
 )

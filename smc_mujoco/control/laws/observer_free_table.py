@@ -24,6 +24,7 @@ TABLE = np.array([math.tanh(END * i / MAX_STEPS) for i in range(MAX_STEPS)] + [1
 @law_function(
     family="observer-free",
     continuous=True,
+    accuracy={"s": 0, "e": 0},
     label="Observer-free, table",
     gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "size": Gain(64.0, positive=True, held=True)},
     conditions={"1 <= size <= 256": lambda g: 1.0 <= g.size <= MAX_STEPS},

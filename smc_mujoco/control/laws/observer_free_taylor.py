@@ -20,6 +20,7 @@ END = 8.0  # 1 - tanh(8) = 2.3e-7
 @law_function(
     family="observer-free",
     continuous=True,
+    accuracy={"s": 0, "e": 0},
     label="Observer-free, Taylor",
     gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "terms": Gain(3.0, positive=True, held=True)},
     conditions={"terms is 1, 2, 3, 4 or 5": lambda g: g.terms in (1.0, 2.0, 3.0, 4.0, 5.0)},

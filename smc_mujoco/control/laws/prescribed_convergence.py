@@ -15,6 +15,7 @@ from smc_mujoco.control.units import FORCE, PARABOLA, Gain
 @law_function(
     family="higher-order",
     finite_time="e",
+    accuracy={"s": 2, "e": 2},
     gains={"a": Gain(5.0, FORCE, positive=True), "b": Gain(2.0, PARABOLA, positive=True)},
     memory=1,
     relative_degree=2,

@@ -25,6 +25,7 @@ def brakes(gains):
 @law_function(
     family="higher-order",
     finite_time="e",
+    accuracy={"s": 2, "e": 2},
     label="Quasi-continuous",
     gains={"a": Gain(6.0, FORCE, positive=True), "b": Gain(1.0, PARABOLA, positive=True)},
     memory=1,

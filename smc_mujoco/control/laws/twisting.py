@@ -15,6 +15,7 @@ from smc_mujoco.control.units import FORCE, Gain
 @law_function(
     family="higher-order",
     finite_time="e",
+    accuracy={"s": 2, "e": 2},
     gains={"r1": Gain(3.7, FORCE, positive=True), "r2": Gain(2.3, FORCE, positive=True)},
     memory=1,
     relative_degree=2,

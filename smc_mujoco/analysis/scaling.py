@@ -1,0 +1,236 @@
+"""Orders of accuracy: the exponent with which an error falls with the control period, its interval, and remarks.
+
+The order is the slope of a line through the logarithms of error and period. Its variance is the sum of two: that of the
+slope through the means of the starts, from their distance to the line, and that of the starts' own slopes.
+
+A period counts only if its errors are ultimate bounds of the law. So no run fails there, all errors are above rounding,
+and each run's errors have stopped growing or falling.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+STEADY = 2.0  # ratio of the errors in two parts of a run up to which they count as the same; chosen
+CLOSE = 0.2  # difference of two orders up to which they agree
+LEVEL = 0.5  # how far the local order at the shortest periods lies below theory's where an error levels off; chosen
+CONFIDENCE = 0.95  # of intervals
+QUANTITIES = ("e", "s")
+
+
+class Errors(NamedTuple):
+    """The errors of one quantity in runs from several starts at several control periods, each (starts, periods).
+
+    Attributes:
+      last: the largest magnitude in the last part of a run; inf for a failed run.
+      before: the same in the part before that one.
+    """
+
+    last: np.ndarray
+    before: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Scaling:
+    """How the error of one quantity depends on the control period.
+
+    Attributes:
+      errors: the error of each run: a tuple for each start, with a number for each period; inf for a failed run.
+      used: the periods in the fit, s.
+      order: exponent of the period; NaN with fewer than two periods.
+      low, high: its 95 % interval; NaN with fewer than three periods.
+      theory: the order that the law's theorem promises, at least; None if it promises none here.
+      why: why periods were left out, and why the order is not theory's where the runs show a reason; "" for neither.
+    """
+
+    errors: tuple[tuple[float, ...], ...]
+    used: tuple[float, ...]
+    order: float
+    low: float
+    high: float
+    theory: float | None
+    why: str
+
+    @property
+    def largest(self) -> tuple[float, ...]:
+        """The largest error over the starts, for each period."""
+        return tuple(np.max(self.errors, axis=0).tolist())
+
+    @property
+    def as_promised(self) -> bool:
+        """Whether the order is within 0.2 of theory's."""
+        return self.theory is not None and abs(self.order - self.theory) <= CLOSE
+
+    def __str__(self) -> str:
+        promised = "" if self.theory is None else f" ({self.theory:.3g})"
+        if math.isnan(self.order):
+            return f"none{promised}"
+        return f"{self.order:.2f}" + ("" if math.isnan(self.low) else f" ±{self.high - self.order:.2f}") + promised
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Accuracy:
+    """The accuracy of one law on one plant in one condition.
+
+    Attributes:
+      plant, condition, law: their names.
+      gains: the set that the law's gains are from, "default", or "yours".
+      unit: of e. That of s depends on the law; for s = de + c e it is this unit per second.
+      periods: control periods, s, longest first.
+      e, s: how the tracking error and the law's sliding variable depend on the period.
+      runs, failed: the number of runs, and of those that failed.
+      floor: errors up to this size are rounding.
+    """
+
+    plant: str
+    condition: str
+    law: str
+    gains: str
+    unit: str
+    periods: tuple[float, ...]
+    e: Scaling
+    s: Scaling
+    runs: int
+    failed: int
+    floor: float
+
+    @property
+    def place(self) -> tuple[float, ...]:
+        """What sorts laws: the number of failed runs, then the largest |e| at each period, from the shortest on."""
+        return self.failed, *(max(error, self.floor) for error in reversed(self.e.largest))
+
+    @property
+    def why(self) -> str:
+        """The remarks on e and on s in one text; "" for none."""
+        if self.e.why == self.s.why:
+            return self.e.why
+        return ". ".join(f"{name} {remark}" for name in QUANTITIES if (remark := getattr(self, name).why))
+
+    def error(self, k: int) -> str:
+        """Return the largest |e| at period k as text."""
+        value = self.e.largest[k]
+        if not math.isfinite(value):
+            return "failed"
+        return f"<{self.floor:.0e}" if value <= self.floor else f"{value:.1e}"
+
+    def row(self) -> dict[str, Any]:
+        """Return its numbers by name: the columns of `AccuracyTable.to_pandas`."""
+        found: dict[str, Any] = {
+            name: getattr(self, name) for name in ("plant", "condition", "law", "gains", "runs", "failed", "unit")
+        }
+        for name in QUANTITIES:
+            its: Scaling = getattr(self, name)
+            found |= {f"{name}_order": its.order, f"{name}_low": its.low, f"{name}_high": its.high}
+            found |= {f"{name}_theory": math.nan if its.theory is None else its.theory, f"{name}_why": its.why}
+            found |= {f"{name}_at_{h:g}": error for h, error in zip(self.periods, its.largest, strict=True)}
+        return found
+
+
+def scaling(
+    errors: Errors,
+    periods: Sequence[float],
+    theory: float | None,
+    floor: float,
+    reasons: Mapping[str, str],
+) -> Scaling:
+    """Return how errors depend on the control period.
+
+    Args:
+      errors: of the runs.
+      periods: of the columns, s, longest first.
+      theory: the order that theory promises, or None.
+      floor: errors up to this size are rounding.
+      reasons: what may keep the order from theory's, known without the errors: "always" is said in any case, all others
+        only where the order is lower than promised, or there is none.
+    """
+    failed = ~np.isfinite(errors.last).all(axis=0)
+    rounded = ~failed & (errors.last <= floor).any(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = errors.before / errors.last
+    falling = ~failed & ~rounded & (ratio > STEADY).any(axis=0)
+    growing = ~failed & ~rounded & ~falling & (ratio < 1.0 / STEADY).any(axis=0)
+    used = ~(failed | rounded | falling | growing)
+    h = np.array(periods)[used]
+    order, low, high = fit(h, errors.last[:, used])
+    said = [reasons["always"]] if "always" in reasons else []
+    for mask, words in (
+        (rounded, f"up to {floor:.0e}, which is rounding"),
+        (falling, "still falling at the end of the run"),
+        (growing, "still growing at the end of the run"),
+    ):
+        if mask.any():
+            said.append(f"{_periods(periods, mask)} {words}")
+    said += _difference(errors.last[:, used], h, order, (low, high), theory, reasons)
+    return Scaling(
+        errors=tuple(map(tuple, errors.last.tolist())),
+        used=tuple(h.tolist()),
+        order=order,
+        low=low,
+        high=high,
+        theory=theory,
+        why="; ".join(said),
+    )
+
+
+def fit(periods: np.ndarray, errors: np.ndarray) -> tuple[float, float, float]:
+    """Return the exponent of the period with its interval; NaN where there are too few periods.
+
+    Args:
+      periods: (P,), s.
+      errors: (starts, P), all positive.
+    """
+    if len(periods) < 2:
+        return math.nan, math.nan, math.nan
+    x, y = np.log(periods), np.log(errors)
+    x = x - x.mean()
+    spread = float(x @ x)
+    slopes = y @ x / spread  # of each start
+    mean = y.mean(axis=0)
+    order = float(slopes.mean())
+    if len(periods) < 3:
+        return order, math.nan, math.nan
+    from scipy.stats import t
+
+    freedom = len(periods) - 2
+    residual = mean - mean.mean() - order * x
+    variance = float(residual @ residual) / freedom / spread
+    if len(slopes) > 1:
+        variance += float(slopes.var(ddof=1)) / len(slopes)
+    half = float(t.ppf(0.5 + CONFIDENCE / 2.0, freedom)) * math.sqrt(variance)
+    return order, order - half, order + half
+
+
+def _difference(
+    errors: np.ndarray,
+    periods: np.ndarray,
+    order: float,
+    interval: tuple[float, float],
+    theory: float | None,
+    reasons: Mapping[str, str],
+) -> list[str]:
+    """Return why the order is not the promised one, as far as is seen; [] where it is, or nothing was promised."""
+    if theory is None or abs(order - theory) <= CLOSE:
+        return []
+    if order > theory:
+        return ["falls faster than promised, which theory allows"]
+    seen = [text for name, text in reasons.items() if name != "always"]
+    if len(periods) > 1 and theory > 0.0:
+        fine = np.log(errors[:, -2:]).mean(axis=0)
+        local = float((fine[1] - fine[0]) / math.log(periods[-1] / periods[-2]))
+        if local < theory - LEVEL:
+            seen.insert(
+                0, f"levels off (order {local:.2g} at the shortest periods): these gains, not sampling, limit it"
+            )
+    if interval[0] <= theory <= interval[1]:
+        seen.append("its interval contains the promised order")
+    return seen or ([] if math.isnan(order) else ["no reason seen"])
+
+
+def _periods(periods: Sequence[float], mask: np.ndarray) -> str:
+    """Return the marked periods in words."""
+    if mask.all():
+        return "all periods:"
+    return "at " + ", ".join(f"{1e3 * h:g}" for h, marked in zip(periods, mask, strict=True) if marked) + " ms"

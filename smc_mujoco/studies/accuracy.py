@@ -1,0 +1,414 @@
+"""Accuracy: how a law's error falls with the control period, beside the order that theory promises.
+
+    table = accuracy(["classical", "twisting", "super_twisting"], "duffing", conditions="coulomb")
+    print(table)                                  # the most accurate law first
+    table[0].e.order, table[0].e.theory           # exponent of the control period, measured and promised
+
+Runs have no noise. The error of a run is the largest |e|, or |s|, at the control samples of its last 20 %, over all
+driven channels: an ultimate bound, as the theorems on accuracy state it, |e| <= C h^r for a control period h.
+`analysis.scaling` determines the exponent r and says which errors do not count. Every law states what theory promises
+in its own file, see `law_function`. It promises nothing of the period where a drive, a delay, a sensor or an estimate
+of the velocity stands between law and mechanism.
+
+A mechanism with friction, contacts or other parts takes at least 16 physics steps in each control period, because the
+error of an integrator of first order must not grow beside the period. The run of the shortest period is repeated with
+half the step. RK4, for plain equations, keeps the scenario's own step.
+"""
+
+import dataclasses
+import math
+import os
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from smc_mujoco.analysis.scaling import QUANTITIES, Accuracy, Errors, Scaling, scaling
+from smc_mujoco.common import html
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, shown, taken, users_frame, whole
+from smc_mujoco.common.extras import package
+from smc_mujoco.common.files import ended, read_json, reading, write_json
+from smc_mujoco.common.progress import Report, summed
+from smc_mujoco.common.text import joined
+from smc_mujoco.common.text import table as text_table
+from smc_mujoco.control import gain_sets as sets
+from smc_mujoco.control.component import Template
+from smc_mujoco.control.law import Law
+from smc_mujoco.mechanisms.plant import Plant, as_plant
+from smc_mujoco.metrics.conventions import last
+from smc_mujoco.simulation.conditions import Condition, find_condition
+from smc_mujoco.simulation.grid import DURATION, case, listed
+from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.perturbations import Noise
+from smc_mujoco.simulation.run import stream
+from smc_mujoco.simulation.scenario import MIN_TIME, Scenario
+from smc_mujoco.simulation.trace import Trace
+
+if TYPE_CHECKING:
+    import pandas  # pyright: ignore[reportMissingImports]
+    from matplotlib.figure import Figure, SubFigure
+
+    from smc_mujoco.draw.page import Size
+
+PERIODS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)  # s
+CONDITION = "constant"  # chosen: a disturbance that every law can bear, and that leaves an error to smooth laws
+STARTS = 3  # initial states of each law at each period; chosen
+MIN_STEPS = 16  # physics steps in a control period of a mechanism with friction, contacts or other parts
+RESOLUTION = 1e-12  # of the initial error; chosen, above the rounding and the creep that runs leave
+STEP_CHANGE = 0.25  # of an error when the physics step is halved, from which on it is said; chosen
+SATURATED = 0.05  # of the last samples at the bound on u, from which on it is said; chosen
+MAX_SEEDS = 10_000
+FULL = 1.0 - 1e-9  # of the bound on u, above the rounding of a saturated u
+RELATIVE_DEGREE = 2  # of a mechanism without a drive
+KEY = (
+    "Errors are the largest at the samples of the last 20 % of all runs, without noise. Order: exponent of the control "
+    "period with its 95 % interval, and in brackets the least that theory promises. * see below."
+)
+
+
+class AccuracyTable(list[Accuracy]):
+    """Accuracies of laws, for each plant and condition the most accurate law first. Notebooks show them as tables."""
+
+    def __str__(self) -> str:
+        parts = [
+            f"{title}\n{text_table(heads(rows), lines(rows))}\n" + "".join(f"* {text}\n" for text in remarks(rows))
+            for title, rows in self.groups.items()
+        ]
+        return "\n".join([*parts, KEY])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return "".join(
+            html.table(heads(rows), lines(rows), title, f"{KEY} {'. '.join(remarks(rows))}", range(1, 6), len(rows))
+            for title, rows in self.groups.items()
+        )
+
+    @property
+    def groups(self) -> "dict[str, AccuracyTable]":
+        """The rows of each plant and condition, by both names."""
+        found: dict[str, AccuracyTable] = {}
+        for row in self:
+            found.setdefault(f"{row.plant}, {row.condition}", AccuracyTable()).append(row)
+        return found
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a pandas DataFrame with a row for each law on each plant in each condition.
+
+        Raises:
+          MissingPackageError: pandas is not installed.
+        """
+        with package("pandas", "AccuracyTable.to_pandas"):
+            import pandas  # pyright: ignore[reportMissingImports]
+
+        return pandas.DataFrame([row.row() for row in self])
+
+    def plot(
+        self,
+        path: str | os.PathLike | None = None,
+        title: str | None = None,
+        size: "Size" = None,
+        format: str | None = None,
+        fig: "Figure | SubFigure | None" = None,
+    ) -> "Figure | SubFigure":
+        """Draw error over control period, both logarithmic; arguments as in `smc.figure`."""
+        from smc_mujoco.draw.orders import orders
+
+        return orders(self, path, title, size, format, fig)
+
+    def save(self, path: str | os.PathLike) -> Path:
+        """Write a .json file that `load` reads."""
+        return write_json(ended(path, ".json"), [dataclasses.asdict(row) for row in self])
+
+
+def load(path: str | os.PathLike) -> AccuracyTable:
+    """Read the table that `AccuracyTable.save` wrote.
+
+    Raises:
+      ScenarioError: no such file, or not a file of accuracies.
+    """
+    with reading(path, "file of accuracies", "give a .json file that AccuracyTable.save wrote") as file:
+        return AccuracyTable(_loaded(entry) for entry in read_json(file))
+
+
+def _loaded(entry: dict[str, Any]) -> Accuracy:
+    """Return the row in a file."""
+    parts = {name: Scaling(**_tuples(entry[name])) for name in QUANTITIES}
+    return Accuracy(**_tuples(entry) | parts)
+
+
+def _tuples(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a mapping with tuples for lists, also for lists of lists."""
+    return {
+        name: tuple(tuple(one) if isinstance(one, list) else one for one in value) if isinstance(value, list) else value
+        for name, value in entry.items()
+    }
+
+
+def heads(rows: Sequence[Accuracy]) -> list[str]:
+    """Return the headings of a table of rows that share plant and condition."""
+    periods, unit = [f"{1e3 * h:g} ms" for h in rows[0].periods], rows[0].unit
+    return ["law", f"|e| at {periods[0]}, {unit}", f"at {periods[-1]}", "order of e", "order of s", ""]
+
+
+def lines(rows: Sequence[Accuracy]) -> list[list[str]]:
+    """Return the cells of a table of rows that share plant and condition."""
+    return [[row.law, row.error(0), row.error(-1), str(row.e), str(row.s), "*" * bool(row.why)] for row in rows]
+
+
+def remarks(rows: Sequence[Accuracy]) -> list[str]:
+    """Return a sentence for each row that has something to say."""
+    return [f"{row.law}: {row.why}" for row in rows if row.why]
+
+
+def accuracy(
+    laws: str | Law | Template | Sequence[str | Law | Template],
+    plants: str | Plant | Sequence[str | Plant],
+    periods: Sequence[float] = PERIODS,
+    conditions: str | Condition | Sequence[str | Condition] = CONDITION,
+    seeds: int | Iterable[int] = STARTS,
+    gains: str = "tuned",
+    duration: float = DURATION,
+    starts: Starts | None = None,
+    threads: int | None = None,
+    report: Report = lambda done, whole: None,
+) -> AccuracyTable:
+    """Measure how the errors of laws fall with the control period: the order of accuracy, beside theory's.
+
+    Args:
+      laws, plants: names, or your own laws and plants, one or several.
+      periods: control periods, s; two or more, and three or more for an interval.
+      conditions: names, such as "coulomb" or "constant + sine", or your own conditions. Theory promises an order under
+        a disturbance. The default, "constant", is a constant force of 0.2 N or N m.
+      seeds: a number of seeds, or the seeds: initial states, and gains where a law was tuned several times.
+      gains: set of gains for laws given by name, see `gain_sets`. A law without gains in the set for a plant gets its
+        defaults, with a warning.
+      duration: of each run, s.
+      starts: initial states, see `smc.starts`. Default: within 20 % of the plant's own x0.
+      threads: as in `run`.
+      report: called with the work done and the whole work, in simulated steps.
+
+    Returns:
+      An `AccuracyTable`, a list of `Accuracy`. For each plant and condition laws whose runs all succeed come first, and
+      of these the one with the smallest error at the shortest period.
+
+    Raises:
+      ScenarioError: fewer than two periods, a condition that sets the period, a plant whose driven channels have
+        different units, or as `grid`.
+
+    Warns:
+      ScenarioWarning: laws that have no gains in the set.
+    """
+    h = _longest_first(periods)
+    numbers = listed("seeds", seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_SEEDS)))
+    cells = [
+        _cell(as_plant(plant), find_condition(condition), law, h, numbers, gains, duration, starts)
+        for plant in listed("plants", plants)
+        for condition in listed("conditions", conditions)
+        for law in listed("laws", laws)
+    ]
+    _warn_of_defaults(cells, gains)
+    scenarios = [scenario for cell in cells for scenario in cell.scenarios]
+    runs: dict[int, Run] = {}
+    counted = summed(report, 0.0, sum(scenario.work for scenario in scenarios))
+    for k, trace in stream(scenarios, threads, counted):
+        runs[k] = _measured(trace)
+    rows, first = [], 0
+    for cell in cells:
+        rows.append(_row(cell, [runs[first + k] for k in range(len(cell.scenarios))]))
+        first += len(cell.scenarios)
+    groups: dict[tuple[str, str], list[Accuracy]] = {}
+    for row in rows:
+        groups.setdefault((row.plant, row.condition), []).append(row)
+    return AccuracyTable(row for group in groups.values() for row in sorted(group, key=lambda row: row.place))
+
+
+def _longest_first(periods: Sequence[float]) -> tuple[float, ...]:
+    """Return the control periods in descending order.
+
+    Raises:
+      ScenarioError: fewer than two, two that are equal, or one that is no period.
+    """
+    found = {number("a period", h, above=0.0, least=MIN_TIME) for h in taken("periods", periods)}
+    if len(found) < 2 or len(found) < len(taken("periods", periods)):
+        raise ScenarioError(f"periods is {shown(periods)}: give two or more different ones in s, such as {PERIODS}")
+    return tuple(sorted(found, reverse=True))
+
+
+class Run(NamedTuple):
+    """What is kept of a run.
+
+    Attributes:
+      last, before: "e" and "s" -> the largest magnitude in the last part of the run, and in the part before it; inf for
+        a failed run.
+      saturated: share of the samples of the last part at which u is at its bound.
+      failure: what happened if the run failed.
+    """
+
+    last: Mapping[str, float]
+    before: Mapping[str, float]
+    saturated: float = 0.0
+    failure: str | None = None
+
+
+def _measured(trace: Trace) -> Run:
+    """Return what is kept of a run, over its driven channels."""
+    if trace.diverged_at is not None:
+        lost = dict.fromkeys(QUANTITIES, math.inf)
+        return Run(lost, lost, failure=trace.failure or f"it diverged at {trace.diverged_at:g} s")
+    driven = slice(trace.scenario.plant.driven)
+    end = last(trace)
+    before = slice(max(0, 2 * end.start - len(trace.t)), end.start)
+    signals = {"e": (trace.x - trace.r)[:, driven], "s": trace.s[:, driven]}
+    parts = ({name: float(np.abs(signal[part]).max()) for name, signal in signals.items()} for part in (end, before))
+    return Run(*parts, float((np.abs(trace.u[end, driven]) >= FULL * np.array(trace.scenario.limits)).mean()))
+
+
+class Cell(NamedTuple):
+    """A law on a plant in a condition.
+
+    Attributes:
+      scenarios: its runs: for each start one for each period, and last the run of the first start at the shortest
+        period with half the physics step.
+      periods: s, longest first.
+      starts: their number.
+      gains: the set that the law's gains are from, "default", or "yours".
+    """
+
+    scenarios: list[Scenario]
+    periods: tuple[float, ...]
+    starts: int
+    gains: str
+
+
+def _cell(
+    plant: Plant,
+    condition: Condition,
+    law: str | Law | Template,
+    periods: tuple[float, ...],
+    seeds: Sequence[int],
+    gains: str,
+    duration: float,
+    starts: Starts | None,
+) -> Cell:
+    """Return the runs of a law on a plant in a condition.
+
+    Raises:
+      ScenarioError: a condition that sets the period, driven channels in several units, or as `case`.
+    """
+    fields = condition.on(plant, duration)
+    if "control_period" in fields:
+        raise ScenarioError(f"condition {condition.name!r} sets control_period, which accuracy varies: leave it out")
+    if len(units := set(plant.units[: plant.driven])) > 1:
+        raise ScenarioError(f"{plant.name} has driven channels in {joined(sorted(units))}: give a plant with one unit")
+    source = _source(plant, law, gains)
+
+    def at(seed: int, h: float, finer: int = 1) -> Scenario:
+        chosen = "default" if source == "default" else gains
+        made = case(plant, law, condition, duration, chosen, seed, starts, {"control_period": h})
+        if "physics_step" in fields:
+            return dataclasses.replace(made, physics_step=fields["physics_step"] / finer).named(made.condition)
+        steps = made.steps if made.resolved.integrator == "RK4" else max(made.steps, MIN_STEPS)
+        return dataclasses.replace(made, physics_step=h / (steps * finer)).named(made.condition)
+
+    runs = [at(seed, h) for seed in seeds for h in periods]
+    return Cell([*runs, at(seeds[0], periods[-1], finer=2)], periods, len(seeds), source)
+
+
+def _source(plant: Plant, law: str | Law | Template, gains: str) -> str:
+    """Return where a law's gains are from: the set `gains`, "default" where it lacks the law, or "yours"."""
+    if not isinstance(law, str):
+        return "yours"
+    try:
+        sets.law(plant, law, gains)
+    except ScenarioError:
+        sets.law(plant, law, "default")  # an unknown law raises here
+        return "default"
+    return gains
+
+
+def _warn_of_defaults(cells: Sequence[Cell], gains: str) -> None:
+    """Warn of laws that have no gains in the set that was asked for."""
+    pairs = {
+        f"{cell.scenarios[0].law.name} on {cell.scenarios[0].plant.name}": None
+        for cell in cells
+        if cell.gains == "default" != gains and cell.scenarios[0].law.gains
+    }
+    if pairs:
+        warnings.warn(
+            f"no gains in set {gains!r} for {', '.join(pairs)}: these have their default gains; tune them, or give "
+            "laws with gains",
+            ScenarioWarning,
+            users_frame(),
+        )
+
+
+def _row(cell: Cell, runs: Sequence[Run]) -> Accuracy:
+    """Return the row of a law from its runs, in the order of `Cell.scenarios`."""
+    base, halved = cell.scenarios[0], runs[-1]
+    counted = runs[:-1]
+    failures = [run.failure for run in counted if run.failure]
+    shape = cell.starts, len(cell.periods)
+    floor = RESOLUTION * (max(map(abs, base.resolved.x0)) or 1.0)
+    outside = _outside(base)
+    law = base.law
+    scalings = {}
+    for name in QUANTITIES:
+        errors = (np.reshape([getattr(run, part)[name] for run in counted], shape) for part in ("last", "before"))
+        reasons = dict(_reasons(cell, counted))
+        if failures:
+            reasons["always"] = f"{len(failures)} of {len(counted)} runs failed ({failures[0]})"
+        if change := _step_change(counted[len(cell.periods) - 1].last[name], halved.last[name], floor):
+            reasons["step"] = change
+        theory = None if outside or law.template is None else law.template.order(name, law.gains)
+        if outside:
+            reasons["always"] = "; ".join(filter(None, [reasons.get("always"), outside]))
+        scalings[name] = scaling(Errors(*errors), cell.periods, theory, floor, reasons)
+    return Accuracy(
+        plant=base.plant.name,
+        condition=base.condition or "",
+        law=law.name,
+        gains=cell.gains,
+        unit=base.plant.units[0],
+        periods=cell.periods,
+        runs=len(counted),
+        failed=len(failures),
+        floor=floor,
+        **scalings,
+    )
+
+
+def _outside(scenario: Scenario) -> str:
+    """Return why theory promises no order in the control period here; "" if it does."""
+    if scenario.actuator:
+        return "no promise behind a drive, which adds to the relative degree"
+    if scenario.input_delay:
+        return "no promise with an input delay"
+    if scenario.noise != Noise() or scenario.sensor:
+        return "no promise with noise or an encoder"
+    if scenario.resolved.velocity.name != "measured":
+        return "no promise with an estimated velocity"
+    if scenario.law.relative_degree > RELATIVE_DEGREE:
+        return f"no promise on a plant of relative degree {RELATIVE_DEGREE}, because the law is for a higher one"
+    return ""
+
+
+def _reasons(cell: Cell, runs: Sequence[Run]) -> Iterator[tuple[str, str]]:
+    """Yield what may keep a law from the order that theory promises: name -> words."""
+    laws = [scenario.law for scenario in cell.scenarios]
+    unmet = {words for law in laws if law.template for words in law.template.unmet(law.gains)}
+    if unmet:
+        yield "conditions", f"the gains violate {joined(sorted(unmet))}"
+    saturated = max((run.saturated for run in runs), default=0.0)
+    if saturated >= SATURATED:
+        yield "saturated", f"u is at its bound in up to {100 * saturated:.0f} % of the last samples"
+
+
+def _step_change(error: float, halved: float, floor: float) -> str:
+    """Return how an error changes with half the physics step, in words; "" if it hardly does."""
+    if not (math.isfinite(error) and math.isfinite(halved)) or max(error, halved) <= floor:
+        return ""
+    change = halved / max(error, floor) - 1.0
+    return f"with half the physics step it is {100 * change:+.0f} %" if abs(change) > STEP_CHANGE else ""
