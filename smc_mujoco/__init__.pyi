@@ -103,6 +103,8 @@ from smc_mujoco.simulation.trace import Trace as Trace
 from smc_mujoco.simulation.trace import load as load
 from smc_mujoco.simulation.waypoints import Waypoints as Waypoints
 from smc_mujoco.simulation.waypoints import cartesian_path as cartesian_path
+from smc_mujoco.studies.accuracy import AccuracyTable as AccuracyTable
+from smc_mujoco.studies.accuracy import accuracy as accuracy
 from smc_mujoco.studies.advice import Advice as Advice
 from smc_mujoco.studies.adviser import which as which
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard

@@ -4,33 +4,21 @@ The order is the slope of a line through the logarithms of error and period. Its
 slope through the means of the starts, from their distance to the line, and that of the starts' own slopes.
 
 A period counts only if its errors are ultimate bounds of the law. So no run fails there, all errors are above rounding,
-and each run's errors have stopped growing or falling.
+and no run's error still falls or grows: by more than a factor of 1.5 from each of the last three parts to the next.
 """
 
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-STEADY = 2.0  # ratio of the errors in two parts of a run up to which they count as the same; chosen
+TREND = 1.5  # ratio of the errors in one part of a run and the next above which they fall or grow; chosen
 CLOSE = 0.2  # difference of two orders up to which they agree
 LEVEL = 0.5  # how far the local order at the shortest periods lies below theory's where an error levels off; chosen
 CONFIDENCE = 0.95  # of intervals
 QUANTITIES = ("e", "s")
-
-
-class Errors(NamedTuple):
-    """The errors of one quantity in runs from several starts at several control periods, each (starts, periods).
-
-    Attributes:
-      last: the largest magnitude in the last part of a run; inf for a failed run.
-      before: the same in the part before that one.
-    """
-
-    last: np.ndarray
-    before: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -65,10 +53,9 @@ class Scaling:
         return self.theory is not None and abs(self.order - self.theory) <= CLOSE
 
     def __str__(self) -> str:
-        promised = "" if self.theory is None else f" ({self.theory:.3g})"
         if math.isnan(self.order):
-            return f"none{promised}"
-        return f"{self.order:.2f}" + ("" if math.isnan(self.low) else f" ±{self.high - self.order:.2f}") + promised
+            return "none"
+        return f"{self.order:z.2f}" + ("" if math.isnan(self.low) else f" ±{self.high - self.order:.2f}")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -109,6 +96,12 @@ class Accuracy:
             return self.e.why
         return ". ".join(f"{name} {remark}" for name in QUANTITIES if (remark := getattr(self, name).why))
 
+    @property
+    def theory(self) -> str:
+        """The orders of e and s that theory promises, as text: one number if they are the same, "" for none."""
+        promised = ["" if one.theory is None else f"{one.theory:.2g}" for one in (self.e, self.s)]
+        return ", ".join(dict.fromkeys(promised))
+
     def error(self, k: int) -> str:
         """Return the largest |e| at period k as text."""
         value = self.e.largest[k]
@@ -130,7 +123,7 @@ class Accuracy:
 
 
 def scaling(
-    errors: Errors,
+    parts: np.ndarray,
     periods: Sequence[float],
     theory: float | None,
     floor: float,
@@ -139,22 +132,24 @@ def scaling(
     """Return how errors depend on the control period.
 
     Args:
-      errors: of the runs.
-      periods: of the columns, s, longest first.
+      parts: largest magnitudes in the last three parts of each run, (starts, periods, 3), in order of time; inf for a
+        failed run. The last one is the error.
+      periods: s, longest first.
       theory: the order that theory promises, or None.
       floor: errors up to this size are rounding.
       reasons: what may keep the order from theory's, known without the errors: "always" is said in any case, all others
         only where the order is lower than promised, or there is none.
     """
-    failed = ~np.isfinite(errors.last).all(axis=0)
-    rounded = ~failed & (errors.last <= floor).any(axis=0)
+    errors = parts[..., -1]
+    failed = ~np.isfinite(errors).all(axis=0)
+    rounded = ~failed & (errors <= floor).any(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = errors.before / errors.last
-    falling = ~failed & ~rounded & (ratio > STEADY).any(axis=0)
-    growing = ~failed & ~rounded & ~falling & (ratio < 1.0 / STEADY).any(axis=0)
+        ratios = parts[..., 1:] / parts[..., :-1]
+    unsettled = [(ratios < 1.0 / TREND).all(axis=2).any(axis=0), (ratios > TREND).all(axis=2).any(axis=0)]
+    falling, growing = (~failed & ~rounded & moving for moving in unsettled)
     used = ~(failed | rounded | falling | growing)
     h = np.array(periods)[used]
-    order, low, high = fit(h, errors.last[:, used])
+    order, low, high = fit(h, errors[:, used])
     said = [reasons["always"]] if "always" in reasons else []
     for mask, words in (
         (rounded, f"up to {floor:.0e}, which is rounding"),
@@ -163,9 +158,9 @@ def scaling(
     ):
         if mask.any():
             said.append(f"{_periods(periods, mask)} {words}")
-    said += _difference(errors.last[:, used], h, order, (low, high), theory, reasons)
+    said += _difference(errors[:, used], h, order, (low, high), theory, reasons)
     return Scaling(
-        errors=tuple(map(tuple, errors.last.tolist())),
+        errors=tuple(map(tuple, errors.tolist())),
         used=tuple(h.tolist()),
         order=order,
         low=low,
@@ -192,14 +187,14 @@ def fit(periods: np.ndarray, errors: np.ndarray) -> tuple[float, float, float]:
     order = float(slopes.mean())
     if len(periods) < 3:
         return order, math.nan, math.nan
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     freedom = len(periods) - 2
     residual = mean - mean.mean() - order * x
     variance = float(residual @ residual) / freedom / spread
     if len(slopes) > 1:
         variance += float(slopes.var(ddof=1)) / len(slopes)
-    half = float(t.ppf(0.5 + CONFIDENCE / 2.0, freedom)) * math.sqrt(variance)
+    half = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2.0)) * math.sqrt(variance)
     return order, order - half, order + half
 
 
@@ -215,7 +210,7 @@ def _difference(
     if theory is None or abs(order - theory) <= CLOSE:
         return []
     if order > theory:
-        return ["falls faster than promised, which theory allows"]
+        return ["falls faster than promised"]
     seen = [text for name, text in reasons.items() if name != "always"]
     if len(periods) > 1 and theory > 0.0:
         fine = np.log(errors[:, -2:]).mean(axis=0)

@@ -168,7 +168,9 @@ def _promises(template: Template) -> str:
         return ""
     u = "a continuous u" if template.continuous else "u jumps"
     arrival = {"s": "s = 0 after a finite time", "e": "e = 0 after a finite time", "": ""}[template.finite_time]
-    return ", ".join(filter(None, [u, arrival]))
+    orders = [f"|{name}| of order {template.order(name, template.defaults):.3g}" for name in template.accuracy]
+    accuracy = f"{' and '.join(orders)} in the control period" if orders else ""
+    return ", ".join(filter(None, [u, arrival, accuracy]))
 
 
 def _degree(template: Template) -> str:

@@ -29,6 +29,7 @@ COMMANDS = {
     "tune": analysis.tune,
     "bench": studies.bench,
     "margins": analysis.margins,
+    "accuracy": analysis.accuracy,
     "basin": analysis.basin,
     "chatter": analysis.chatter,
     "view": runs.view,

@@ -24,6 +24,7 @@ from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.metrics.tip import tip_scores, worst_joint
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.accuracy import AccuracyTable, heads, lines, remarks
 from smc_mujoco.studies.board_tables import size, spread
 from smc_mujoco.studies.leaderboard import Block, Board
 
@@ -379,6 +380,19 @@ def margins(kind: str, found: Sequence[Margin]) -> Table:
         table.add_row(plant, law, value, within, theory, margin.unit)
         last = margin.plant
     return table
+
+
+def accuracy(found: AccuracyTable) -> Iterator[Table | Text]:
+    """Yield a table for each plant and condition, then the remarks on its laws."""
+    for title, rows in found.groups.items():
+        law, *numbers = heads(rows)
+        columns = Column(law, no_wrap=True), *(Column(head, justify="right", no_wrap=True) for head in numbers)
+        table = titled(title, *columns, padding=(0, 2, 0, 0), pad_edge=False, show_edge=False)
+        for row, (name, *cells) in zip(rows, lines(rows), strict=True):
+            table.add_row(Text(name, style.law_colour(row.law)), *cells)
+        yield table
+        for text in remarks(rows):
+            yield Text(f"* {text}")
 
 
 def chattering(

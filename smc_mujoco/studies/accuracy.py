@@ -18,6 +18,7 @@ half the step. RK4, for plain equations, keeps the scenario's own step.
 import dataclasses
 import math
 import os
+import textwrap
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -25,7 +26,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.analysis.scaling import QUANTITIES, Accuracy, Errors, Scaling, scaling
+from smc_mujoco.analysis.scaling import QUANTITIES, Accuracy, Scaling, scaling
 from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, shown, taken, users_frame, whole
 from smc_mujoco.common.extras import package
@@ -56,15 +57,18 @@ PERIODS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)  # s
 CONDITION = "constant"  # chosen: a disturbance that every law can bear, and that leaves an error to smooth laws
 STARTS = 3  # initial states of each law at each period; chosen
 MIN_STEPS = 16  # physics steps in a control period of a mechanism with friction, contacts or other parts
-RESOLUTION = 1e-12  # of the initial error; chosen, above the rounding and the creep that runs leave
+RESOLUTION = 1e-11  # of the initial error; chosen, above rounding and the creep of stuck joints
 STEP_CHANGE = 0.25  # of an error when the physics step is halved, from which on it is said; chosen
 SATURATED = 0.05  # of the last samples at the bound on u, from which on it is said; chosen
+WIDTH = 80  # characters of a line of text
+PARTS = 3  # of a run, each as long as its last part, in which errors are compared
 MAX_SEEDS = 10_000
 FULL = 1.0 - 1e-9  # of the bound on u, above the rounding of a saturated u
 RELATIVE_DEGREE = 2  # of a mechanism without a drive
 KEY = (
-    "Errors are the largest at the samples of the last 20 % of all runs, without noise. Order: exponent of the control "
-    "period with its 95 % interval, and in brackets the least that theory promises. * see below."
+    "|e| is the largest at the samples of the last 20 % of all runs, without noise, at the longest and the shortest "
+    "control period. Orders are exponents of the control period, with 95 % intervals. Theory promises at least "
+    "the order in the last column, for e and s if they differ."
 )
 
 
@@ -72,11 +76,11 @@ class AccuracyTable(list[Accuracy]):
     """Accuracies of laws, for each plant and condition the most accurate law first. Notebooks show them as tables."""
 
     def __str__(self) -> str:
-        parts = [
-            f"{title}\n{text_table(heads(rows), lines(rows))}\n" + "".join(f"* {text}\n" for text in remarks(rows))
-            for title, rows in self.groups.items()
-        ]
-        return "\n".join([*parts, KEY])
+        parts = []
+        for title, rows in self.groups.items():
+            below = [textwrap.fill(f"* {text}", WIDTH, subsequent_indent="  ") for text in remarks(rows)]
+            parts.append("\n".join([title, text_table(heads(rows), lines(rows)), *below, ""]))
+        return "\n".join([*parts, textwrap.fill(KEY, WIDTH)])
 
     __repr__ = __str__
 
@@ -88,10 +92,10 @@ class AccuracyTable(list[Accuracy]):
 
     @property
     def groups(self) -> "dict[str, AccuracyTable]":
-        """The rows of each plant and condition, by both names."""
+        """The rows of each plant and condition, by a title."""
         found: dict[str, AccuracyTable] = {}
         for row in self:
-            found.setdefault(f"{row.plant}, {row.condition}", AccuracyTable()).append(row)
+            found.setdefault(f"{row.plant}, {row.condition}: |e| in {row.unit}", AccuracyTable()).append(row)
         return found
 
     def to_pandas(self) -> "pandas.DataFrame":
@@ -135,8 +139,10 @@ def load(path: str | os.PathLike) -> AccuracyTable:
 
 def _loaded(entry: dict[str, Any]) -> Accuracy:
     """Return the row in a file."""
-    parts = {name: Scaling(**_tuples(entry[name])) for name in QUANTITIES}
-    return Accuracy(**_tuples(entry) | parts)
+    fields = _tuples(entry)
+    for name in QUANTITIES:
+        fields[name] = Scaling(**_tuples(entry[name]))
+    return Accuracy(**fields)
 
 
 def _tuples(entry: Mapping[str, Any]) -> dict[str, Any]:
@@ -149,13 +155,15 @@ def _tuples(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 def heads(rows: Sequence[Accuracy]) -> list[str]:
     """Return the headings of a table of rows that share plant and condition."""
-    periods, unit = [f"{1e3 * h:g} ms" for h in rows[0].periods], rows[0].unit
-    return ["law", f"|e| at {periods[0]}, {unit}", f"at {periods[-1]}", "order of e", "order of s", ""]
+    first, *_, last = rows[0].periods
+    return ["law", f"{1e3 * first:g} ms", f"{1e3 * last:g} ms", "order of e", "order of s", "theory"]
 
 
 def lines(rows: Sequence[Accuracy]) -> list[list[str]]:
     """Return the cells of a table of rows that share plant and condition."""
-    return [[row.law, row.error(0), row.error(-1), str(row.e), str(row.s), "*" * bool(row.why)] for row in rows]
+    return [
+        [row.law + "*" * bool(row.why), row.error(0), row.error(-1), str(row.e), str(row.s), row.theory] for row in rows
+    ]
 
 
 def remarks(rows: Sequence[Accuracy]) -> list[str]:
@@ -241,14 +249,12 @@ class Run(NamedTuple):
     """What is kept of a run.
 
     Attributes:
-      last, before: "e" and "s" -> the largest magnitude in the last part of the run, and in the part before it; inf for
-        a failed run.
+      parts: "e" and "s" -> largest magnitude in each of the last three parts of the run; inf if it failed.
       saturated: share of the samples of the last part at which u is at its bound.
       failure: what happened if the run failed.
     """
 
-    last: Mapping[str, float]
-    before: Mapping[str, float]
+    parts: Mapping[str, Sequence[float]]
     saturated: float = 0.0
     failure: str | None = None
 
@@ -256,14 +262,16 @@ class Run(NamedTuple):
 def _measured(trace: Trace) -> Run:
     """Return what is kept of a run, over its driven channels."""
     if trace.diverged_at is not None:
-        lost = dict.fromkeys(QUANTITIES, math.inf)
-        return Run(lost, lost, failure=trace.failure or f"it diverged at {trace.diverged_at:g} s")
+        return Run(
+            dict.fromkeys(QUANTITIES, (math.inf,) * PARTS),
+            failure=trace.failure or f"it diverged at {trace.diverged_at:g} s",
+        )
     driven = slice(trace.scenario.plant.driven)
     end = last(trace)
-    before = slice(max(0, 2 * end.start - len(trace.t)), end.start)
-    signals = {"e": (trace.x - trace.r)[:, driven], "s": trace.s[:, driven]}
-    parts = ({name: float(np.abs(signal[part]).max()) for name, signal in signals.items()} for part in (end, before))
-    return Run(*parts, float((np.abs(trace.u[end, driven]) >= FULL * np.array(trace.scenario.limits)).mean()))
+    count = len(trace.t) - end.start
+    sizes = {"e": np.abs(trace.x - trace.r)[-PARTS * count :, driven], "s": np.abs(trace.s)[-PARTS * count :, driven]}
+    parts = {name: [float(part.max()) for part in np.array_split(size, PARTS)] for name, size in sizes.items()}
+    return Run(parts, float((np.abs(trace.u[end, driven]) >= FULL * np.array(trace.scenario.limits)).mean()))
 
 
 class Cell(NamedTuple):
@@ -350,22 +358,22 @@ def _row(cell: Cell, runs: Sequence[Run]) -> Accuracy:
     base, halved = cell.scenarios[0], runs[-1]
     counted = runs[:-1]
     failures = [run.failure for run in counted if run.failure]
-    shape = cell.starts, len(cell.periods)
+    shape = cell.starts, len(cell.periods), PARTS
     floor = RESOLUTION * (max(map(abs, base.resolved.x0)) or 1.0)
     outside = _outside(base)
     law = base.law
     scalings = {}
     for name in QUANTITIES:
-        errors = (np.reshape([getattr(run, part)[name] for run in counted], shape) for part in ("last", "before"))
+        parts = np.reshape([run.parts[name] for run in counted], shape)
         reasons = dict(_reasons(cell, counted))
         if failures:
             reasons["always"] = f"{len(failures)} of {len(counted)} runs failed ({failures[0]})"
-        if change := _step_change(counted[len(cell.periods) - 1].last[name], halved.last[name], floor):
+        if change := _step_change(parts[0, -1, -1], halved.parts[name][-1], floor):
             reasons["step"] = change
         theory = None if outside or law.template is None else law.template.order(name, law.gains)
         if outside:
             reasons["always"] = "; ".join(filter(None, [reasons.get("always"), outside]))
-        scalings[name] = scaling(Errors(*errors), cell.periods, theory, floor, reasons)
+        scalings[name] = scaling(parts, cell.periods, theory, floor, reasons)
     return Accuracy(
         plant=base.plant.name,
         condition=base.condition or "",

@@ -154,6 +154,79 @@ def margins(
 
 
 @errors_as_sentences()
+def accuracy(
+    plants: Annotated[
+        list[str], typer.Argument(metavar="PLANT", help="Plants from `smc-mujoco list`, or FILE.xml:joint+joint.")
+    ],
+    laws: Annotated[
+        str | None,
+        typer.Option(help=f"Laws, as a,b, or all; default those of the report's first page. {options.OWN_GAINS}"),
+    ] = None,
+    condition: options.Condition = "constant",
+    periods: Annotated[str, typer.Option(help="Control periods, s, as a,b.")] = "0.004,0.002,0.001,0.0005,0.00025",
+    seeds: Annotated[int, typer.Option(min=1, help="Initial states of each law at each period.")] = 3,
+    gains: options.Gains = "tuned",
+    duration: Annotated[float, typer.Option(help="Duration of the runs, s.")] = 10.0,
+    x0: options.X0 = None,
+    spread: options.Spread = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Also draw error over period, as OUT.svg and OUT.png, or OUT.pdf.")
+    ] = None,
+    json: options.Json = None,
+    threads: options.Threads = None,
+) -> None:
+    """Find how accurate laws are without noise: how their errors fall as they are computed more often.
+
+    Under a disturbance, a law that is sampled with the control period h keeps |e| and |s| below a multiple of h to some
+    power, the order of accuracy. Theory promises the order 0 for a smooth law or one with a boundary layer (a shorter
+    period does not help), 1 for a relay (half the period, half the error), 2 for second-order sliding modes such as
+    twisting and super-twisting (a quarter), and r for order r. The command runs every law at several periods and prints
+    the order that it measures beside the one that is promised. A line with * says what was left out, and why an order
+    is not as promised: the runs may still be settling, the gains may be too small for the disturbance, or the error may
+    be mere rounding.
+
+    The default disturbance is a constant force of 0.2 N or N m. --condition coulomb asks the same of dry friction, and
+    --condition "constant + sine" of a force that changes, against which laws need gains for its rate.
+
+    Example: smc-mujoco accuracy duffing --condition coulomb --laws classical,twisting,super_twisting,observer_free
+    """
+    with held_back():
+        from smc_mujoco.cli import tables
+        from smc_mujoco.common.files import ended, writable
+        from smc_mujoco.common.progress import bar
+        from smc_mujoco.control import gain_sets
+        from smc_mujoco.control.law import laws as known
+        from smc_mujoco.draw.page import files
+        from smc_mujoco.studies.accuracy import KEY
+        from smc_mujoco.studies.accuracy import accuracy as measure
+
+    json, terminal = options.json_file(json)
+    pictures = files(out) if out else []
+    for file in (*pictures, *([ended(json, ".json")] if json else [])):
+        writable(file)
+    machines = [options.plant(text) for text in plants]
+    names = known(machines[0]) if laws == "all" else options.names(laws, gain_sets.LAWS)
+    chosen = [options.law(text) for text in names]
+    try:
+        h = [float(text) for text in options.names(periods)]
+    except ValueError:
+        raise ScenarioError(f"--periods {periods!r} cannot be read: give numbers in s, as 0.004,0.002,0.001") from None
+    with bar("accuracy") as drawn:
+        found = measure(
+            chosen, machines, h, condition, seeds, gains, duration, options.starts(x0, spread), threads, drawn.reached
+        )
+    for table in tables.accuracy(found):
+        terminal.print(table)
+    terminal.note(KEY, "dim", wrap=True)
+    terminal.note(f"{sum(row.runs for row in found)} runs, {terminal.seconds:.0f} s", "dim")
+    if json:
+        terminal.wrote(found.save(json))
+    if pictures:
+        found.plot(out)
+        terminal.wrote(*pictures)
+
+
+@errors_as_sentences()
 def basin(
     plant: options.PlantName,
     law: Annotated[str, typer.Option(help=f"A law. {options.OWN_GAINS}")] = "observer_free",

@@ -1,0 +1,108 @@
+"""Error over control period, both logarithmic: a panel for e and one for s, a colour for each law.
+
+Filled marks are in the fit, hollow ones are not. The solid line is the fit, the dashed one has theory's slope.
+"""
+
+import itertools
+import math
+import os
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+
+from smc_mujoco.analysis.scaling import QUANTITIES, Accuracy, Scaling
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import style
+from smc_mujoco.draw.page import Size
+from smc_mujoco.draw.pareto import MARKS
+
+ROW = 5.2  # inches on a full page, height of the panels of a plant in a condition
+NAMES = {"e": "largest |e|", "s": "largest |s|"}
+
+
+def orders(
+    rows: Sequence[Accuracy],
+    path: str | os.PathLike | None = None,
+    title: str | None = None,
+    size: Size = None,
+    format: str | None = None,
+    fig: Figure | SubFigure | None = None,
+) -> Figure | SubFigure:
+    """Draw how the errors of laws fall with the control period.
+
+    Args:
+      rows: of `smc.accuracy`. Each plant and condition has its own panels.
+      path, size, format, fig: as in `figure`.
+      title: default: "Accuracy", with the plant and the condition if there is one of each.
+
+    Returns:
+      The figure.
+
+    Raises:
+      ScenarioError: no rows, or as `figure`.
+    """
+    groups: dict[str, list[Accuracy]] = {}
+    for row in rows:
+        groups.setdefault(f"{row.plant.replace('_', ' ')}, {row.condition.replace('_', ' ')}", []).append(row)
+    if not groups:
+        raise ScenarioError("no accuracy to draw: give at least one row")
+    paths = [] if path is None else pages.files(path, format)
+    width, height = pages.measure(size, fig)
+    laws = list(dict.fromkeys(row.law for row in rows))
+    looks = dict(zip(laws, zip(style.law_colours(laws), itertools.cycle(MARKS), strict=False), strict=True))
+    with style.page(width):
+        narrow = width < pages.NARROW
+        down = len(groups) * (len(QUANTITIES) if narrow else 1)
+        page = pages.blank(width, height or style.points(ROW * down), fig)
+        axes = page.subplots(down, 1 if narrow else len(QUANTITIES), squeeze=False).ravel()
+        panels = itertools.product(groups.items(), QUANTITIES)
+        for ax, ((name, group), quantity) in zip(axes, panels, strict=True):
+            for row in group:
+                _draw(ax, row.periods, getattr(row, quantity), *looks[row.law])
+            unit = group[0].unit if quantity == "e" else "unit of s"
+            ax.set(xscale="log", yscale="log", ylabel=f"{NAMES[quantity]} ({unit})", xlabel="control period (ms)")
+            ax.set_xticks([1e3 * h for h in group[0].periods])
+            ax.minorticks_off()
+            ax.xaxis.set_major_formatter("{x:g}")
+            ax.set_title(name if len(groups) > 1 else "")
+        handles = [
+            Line2D([], [], color=colour, marker=mark, lw=style.points(2.0), label=_label(law, rows))
+            for law, (colour, mark) in looks.items()
+        ]
+        handles.append(Line2D([], [], color=style.MUTED, ls="--", label="theory's slope"))
+        whole = "Accuracy" if len(groups) > 1 else f"Accuracy: {next(iter(groups))}"
+        pages.set_head(page, width, title or whole, handles)
+        pages.write(page, paths)
+    return page
+
+
+def _label(law: str, rows: Sequence[Accuracy]) -> str:
+    """Return a law's entry in the legend, with its order of s, and theory's, if it has a single row."""
+    own = [row.s for row in rows if row.law == law]
+    if len(own) > 1 or math.isnan(own[0].order):
+        return style.label(law)
+    promised = "" if own[0].theory is None else f" ({own[0].theory:.2g})"
+    return f"{style.label(law)}: {own[0].order:z.2f}{promised}"
+
+
+def _draw(ax: Axes, periods: Sequence[float], scaling: Scaling, colour: str, mark: str) -> None:
+    """Draw the errors of one law, its fit and theory's slope."""
+    h, errors = np.array(periods), np.array(scaling.errors)
+    for k in np.flatnonzero(np.isfinite(errors).all(axis=0) & (errors > 0.0).all(axis=0)):
+        counted = periods[k] in scaling.used
+        ends = [errors[:, k].min(), errors[:, k].max()]
+        ax.plot([1e3 * h[k]] * 2, ends, color=colour, lw=style.points(1.0), alpha=0.6)
+        ax.plot(1e3 * h[k], ends[1], mark, color=colour, ms=style.points(6.0), mfc=colour if counted else "none")
+    if math.isnan(scaling.order):
+        return
+    counted = np.isin(h, scaling.used)
+    middle = np.exp(np.log(errors[:, counted]).mean()), np.exp(np.log(h[counted]).mean())
+    ends = h[counted][[0, -1]]
+    for slope, line in ((scaling.order, "-"), (scaling.theory, "--")):
+        if slope is not None:
+            values = middle[0] * (ends / middle[1]) ** slope
+            ax.plot(1e3 * ends, values, line, color=colour, lw=style.points(1.6 if line == "-" else 1.0))

@@ -1,0 +1,145 @@
+"""What `smc.accuracy` promises: the textbook's order of laws, theory's exponents, and a reason for every other one."""
+
+import math
+import warnings
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.control.law import catalogue, known_laws
+from smc_mujoco.studies.accuracy import load
+
+PERIODS = (4e-3, 2e-3, 1e-3, 5e-4)
+SHORT = {"periods": PERIODS, "seeds": 1, "duration": 8.0}
+
+
+def double_integrator():
+    return smc.plant("duffing", M=1.0, delta=0.0, alpha=0.0, beta=0.0)
+
+
+def defaults(names, **options):
+    return smc.accuracy(names, double_integrator(), gains="default", **SHORT | options)
+
+
+@smc.law_function(gains={"k": 4.0, "c": 2.5}, accuracy={"s": 1, "e": 1})
+def my_relay(y, gains, memory):
+    s = y.de + gains.c * y.e
+    return (-gains.k if s > 0.0 else gains.k), s
+
+
+@smc.law_function
+def pushing_away(y, gains, memory):
+    return 6.0 if y.e > 0.0 else -6.0, y.e
+
+
+@pytest.mark.parametrize("name", known_laws())
+def test_every_law_states_its_order_of_accuracy(name):
+    law = known_laws()[name]
+    for quantity in ("s", "e"):
+        assert (order := law.order(quantity, law.defaults)) is not None
+        assert order >= 0.0
+
+
+def test_dry_friction_orders_the_laws_as_textbooks_do():
+    laws = ["observer_free", "classical", "super_twisting", "twisting"]
+    table = smc.accuracy(laws, "duffing", periods=(4e-3, 2e-3), conditions="coulomb", seeds=1)
+    assert [row.law for row in table] == ["super_twisting", "twisting", "classical", "observer_free"]
+    by_law = {row.law: row.e for row in table}
+    assert by_law["classical"].as_promised
+    assert by_law["observer_free"].as_promised
+    assert by_law["super_twisting"].largest[-1] < 1e-3 * by_law["twisting"].largest[-1]
+
+
+def test_second_order_laws_are_of_second_order_on_the_double_integrator_or_the_table_says_why_not():
+    names = [name for name, law in catalogue().items() if law.order("s", law.defaults) == 2.0]
+    table = defaults(names)
+    assert all(row.s.as_promised or row.s.why for row in table), str(table)
+    kept = [row.law for row in table if row.s.as_promised]
+    assert len(kept) >= len(names) - 2, str(table)  # those that end at rounding are exact under a constant force
+
+
+def test_relays_are_of_first_order_and_layers_of_none():
+    table = defaults(["classical", "boundary_layer", my_relay])
+    orders = {row.law: (row.s.order, row.s.theory) for row in table}
+    assert orders["classical"] == pytest.approx((1.0, 1.0), abs=0.1)
+    assert orders["boundary_layer"] == pytest.approx((0.0, 0.0), abs=0.01)
+    assert orders["my_relay"] == pytest.approx(orders["classical"], abs=1e-6)
+    assert [row.law for row in table][-1] == "boundary_layer"
+
+
+def test_gains_that_cannot_hold_the_disturbance_are_said_to_limit_the_error():
+    load = smc.condition("load", disturbance=smc.Sine(1.0, 3.0))
+    table = defaults([smc.law("super_twisting", k1=3.0, k2=0.5), smc.law("twisting")], conditions=load)
+    weak = next(row.s for row in table if row.law == "super_twisting")
+    assert not weak.as_promised
+    assert "these gains, not sampling, limit it" in weak.why
+    assert table[0].law == "twisting"
+
+
+def test_laws_that_fail_come_last_and_say_so():
+    table = defaults([pushing_away, "boundary_layer"], duration=4.0, starts=smc.starts(x0=1e6 - 10.0))
+    failing = table[-1]
+    assert failing.law == "pushing_away"
+    assert failing.failed == failing.runs == 4
+    assert "4 of 4 runs failed" in failing.why
+    assert failing.error(0) == "failed"
+    assert math.isnan(failing.e.order)
+
+
+def test_theory_promises_nothing_behind_a_drive():
+    drive = smc.condition("slow valve", actuator=smc.Lag(0.02))
+    row = smc.accuracy("twisting", "duffing", (4e-3, 2e-3), drive, seeds=1, duration=10.0)[0]
+    assert row.e.theory is None
+    assert "no promise behind a drive" in row.why
+    assert abs(row.e.order) < 0.5, "the lag, not the period, sets the amplitude"
+
+
+def test_laws_without_tuned_gains_get_their_defaults_with_one_warning():
+    with pytest.warns(smc.ScenarioWarning, match="no gains in set 'tuned' for hierarchical on cart_pole") as caught:
+        table = smc.accuracy(["hierarchical"], "cart_pole", (4e-3, 2e-3), "nominal", seeds=2, duration=1.0)
+    assert len(caught) == 1
+    assert table[0].gains == "default"
+
+
+def test_a_table_reads_as_text_html_data_and_file(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        table = smc.accuracy(
+            ["classical", "observer_free"],
+            [double_integrator(), "van_der_pol"],
+            (4e-3, 2e-3, 1e-3),
+            seeds=2,
+            duration=4.0,
+        )
+    text = str(table)
+    assert max(map(len, text.splitlines())) <= 80
+    assert repr(table) == text
+    assert text.index("duffing, constant: |e| in m") < text.index("van_der_pol, constant")
+    assert table._repr_html_().count("<table") == 2
+    assert "order of e" in table._repr_html_()
+    frame = table.to_pandas()
+    assert isinstance(frame, pandas.DataFrame)
+    assert list(frame.law) == [row.law for row in table]
+    assert frame.loc[0, "s_theory"] == 1.0
+    assert frame.loc[0, "e_at_0.001"] == table[0].e.largest[-1]
+    assert repr(load(table.save(tmp_path / "table.json"))[0]) == repr(table[0])
+    figure = table.plot(tmp_path / "table.svg")
+    assert len(figure.axes) == 4
+    assert (tmp_path / "table.svg").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"periods": (1e-3,)}, "give two or more different ones in s"),
+        ({"periods": (1e-3, 1e-3)}, "give two or more different ones in s"),
+        ({"periods": (0.0, 1e-3)}, "a period is 0: give a number greater than 0"),
+        ({"conditions": "period_10ms"}, "condition 'period_10ms' sets control_period, which accuracy varies"),
+        ({"laws": "nonsense"}, "nonsense"),
+        ({"seeds": 0}, "seeds is 0"),
+    ],
+)
+def test_what_cannot_be_measured_is_one_sentence(options, message):
+    with pytest.raises(smc.ScenarioError, match=message):
+        smc.accuracy(**{"laws": "classical", "plants": "duffing"} | options)
