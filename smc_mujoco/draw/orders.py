@@ -92,7 +92,7 @@ def _label(law: str, rows: Sequence[Accuracy]) -> str:
 def _draw(ax: Axes, periods: Sequence[float], scaling: Scaling, colour: str, mark: str) -> None:
     """Draw the errors of one law, its fit and theory's slope."""
     h, errors = np.array(periods), np.array(scaling.errors)
-    for k in np.flatnonzero(np.isfinite(errors).all(axis=0) & (errors > 0.0).all(axis=0)):
+    for k in np.flatnonzero(np.isfinite(errors).all(axis=0) & (errors > 0.0).all(axis=0)).tolist():
         counted = periods[k] in scaling.used
         ends = [errors[:, k].min(), errors[:, k].max()]
         ax.plot([1e3 * h[k]] * 2, ends, color=colour, lw=style.points(1.0), alpha=0.6)

@@ -28,7 +28,7 @@ import numpy as np
 
 from smc_mujoco.analysis.scaling import QUANTITIES, Accuracy, Scaling, scaling
 from smc_mujoco.common import html
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, shown, taken, users_frame, whole
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, one_line, shown, taken, users_frame, whole
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import ended, read_json, reading, write_json
 from smc_mujoco.common.progress import Report, summed
@@ -367,7 +367,7 @@ def _row(cell: Cell, runs: Sequence[Run]) -> Accuracy:
         parts = np.reshape([run.parts[name] for run in counted], shape)
         reasons = dict(_reasons(cell, counted))
         if failures:
-            reasons["always"] = f"{len(failures)} of {len(counted)} runs failed ({failures[0]})"
+            reasons["always"] = f"{len(failures)} of {len(counted)} runs failed, the first: {one_line(failures[0])}"
         if change := _step_change(parts[0, -1, -1], halved.parts[name][-1], floor):
             reasons["step"] = change
         theory = None if outside or law.template is None else law.template.order(name, law.gains)
