@@ -145,8 +145,8 @@ def scaling(
     rounded = ~failed & (errors <= floor).any(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         ratios = parts[..., 1:] / parts[..., :-1]
-    unsettled = [(ratios < 1.0 / TREND).all(axis=2).any(axis=0), (ratios > TREND).all(axis=2).any(axis=0)]
-    falling, growing = (~failed & ~rounded & moving for moving in unsettled)
+    falling = ~failed & ~rounded & np.any(np.all(ratios < 1.0 / TREND, axis=2), axis=0)
+    growing = ~failed & ~rounded & np.any(np.all(ratios > TREND, axis=2), axis=0)
     used = ~(failed | rounded | falling | growing)
     h = np.array(periods)[used]
     order, low, high = fit(h, errors[:, used])
