@@ -75,6 +75,10 @@ def attempt(random: Random) -> smc.Scenario | None:
     except smc.ScenarioError as error:
         sentence(str(error))
         return None
+    except TypeError as error:  # a field that a Scenario does not have
+        if "unexpected keyword" not in str(error):
+            raise
+        return None
     knots = [scenario.duration / d.dt for d in scenario.disturbance if isinstance(d, smc.OrnsteinUhlenbeck)]
     work = scenario.samples * scenario.steps * scenario.plant.n
     return scenario if work <= MOST and max(knots, default=0.0) < 1e5 and scenario.readings < 10_000 else None
@@ -296,6 +300,10 @@ def calls(random: Random) -> str:
         sentence(str(error))
         return "refused"
     except (TypeError, AttributeError):  # Python's own words for a wrong type, or a name that the call does not have
+        return "refused"
+    except ZeroDivisionError as error:  # of an argument's own code
+        if str(error) != "awkward":
+            raise Found(f"{_where(error)} from {told}: {_first(error)}") from None
         return "refused"
     except Long:
         return "computes"

@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def play(scene: str) -> None:
     """Run a scene file as a script: `if __name__ == "__main__": smc.play(__file__)`."""
-    main(["run", scene, *sys.argv[1:]])
+    main(["run", os.fspath(scene), *sys.argv[1:]])
 
 
 def _print_version(wanted: bool) -> None:

@@ -111,7 +111,7 @@ class Store:
         """Return a part, or None for a file that is damaged or not a part."""
         try:
             with reading(path, "part", "start the study again") as file:
-                part = table.read(file)
+                part = table.read(file, sealed=True)
         except ScenarioError:
             return None
         own = part.schema.equals(self.schema, check_metadata=True) and not part["hash"].null_count

@@ -86,19 +86,6 @@ def margin(value: float, searched: float) -> Margin:
     )
 
 
-def test_margins_of_both_versions(tmp_path):
-    odd = margin(math.nan, math.inf)
-    path = save_margins([odd], tmp_path / "a.json")
-    (told,) = strict(path.read_text())
-    assert told["value"] == "NaN"
-    (tmp_path / "old.json").write_text(
-        '[{"plant": "duffing", "law": "classical", "kind": "delay", "value": null, "unit": "s", '
-        '"resolution": 0.1, "searched": "inf", "theory": null}]'
-    )
-    for name in ("a.json", "old.json"):
-        assert same(load_margins(tmp_path / name), [odd])
-
-
 def test_maps_of_both_versions(tmp_path):
     axis, one = np.array([0.0]), np.ones((1, 1))
     odd = Basin(

@@ -4,7 +4,6 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.control.units import RATE, Gain
-from smc_mujoco.simulation import reference
 
 
 def zero(y, gains, memory):
@@ -19,37 +18,12 @@ def test_gain_keeps_its_unit_and_the_decorators_sign():
         made(a=0.0)
 
 
-@pytest.mark.parametrize(
-    ("old", "value", "new"), [("degree", 2, "relative_degree"), ("modelled", True, "requires_model")]
-)
-def test_old_word_works_with_a_deprecation_warning(old, value, new):
-    with pytest.warns(DeprecationWarning, match=f"{old} is now {new}"):
-        made = smc.law_function(**{old: value})(zero)
-    assert getattr(made, new) == value
-    for thing in (made, made()):
-        with pytest.warns(DeprecationWarning, match=f"{old} is now {new}"):
-            assert getattr(thing, old) == value
-
-
 def present(y, gains, memory):
     return -y.v_eq - gains.eq * y.has_surface, y.s
 
 
 def former(y, gains, memory):
     return -y.eq - gains.eq * y.surfaced, y.s
-
-
-def test_fields_of_a_measurement_keep_their_old_names_compiled_and_not():
-    laws = [smc.law_function(gains={"eq": 2.0})(function) for function in (present, former)]  # a gain may be called so
-    cases = [smc.Scenario(plant="duffing", law=law, surface="linear", duration=0.02) for law in laws]
-    with pytest.warns(DeprecationWarning, match=r"is now y\.(v_eq|has_surface)"):
-        now, before = smc.run(cases)
-    assert before.u.tolist() == now.u.tolist()
-    with pytest.warns(DeprecationWarning, match="is now (v_eq|has_surface)"):
-        looped = reference.run(cases[1])
-    assert looped.u.tolist() == now.u.tolist()
-    assert abs(now.u).max() > 1.0
-    assert "-y->v_eq - gains[GAIN_eq] * y->has_surface" in smc.law_to_c(laws[1]())
 
 
 @pytest.mark.parametrize("decorator", [smc.surface_function, smc.estimator_function, smc.law_function])

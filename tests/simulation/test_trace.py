@@ -568,19 +568,6 @@ def test_a_file_of_a_real_mechanism_loads_in_a_fresh_process(tmp_path):
     assert "LuGre" in done.stdout
 
 
-def test_a_file_of_the_first_version_loads_with_what_its_actuator_gave(traces, tmp_path):
-    trace = traces["plain"]
-    with np.load(trace.save(tmp_path / "a.npz")) as file:
-        held = {name: file[name] for name in file if name not in ("force", "reaction")}
-    about = json.loads(str(held.pop("about")))
-    for name in ("mechanism", "friction", "contact", "actuator", "sensor", "left_out"):
-        del about[name]
-    np.savez(tmp_path / "old.npz", about=np.array(json.dumps(about)), **held)
-    old = smc.load(tmp_path / "old.npz")
-    np.testing.assert_array_equal(old.force, trace.applied)
-    assert not old.reaction.any()
-
-
 def test_a_voltage_and_a_feedforward_come_back_and_have_their_unit(tmp_path):
     motor = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0, command="voltage")
     trace = smc.run(

@@ -112,7 +112,7 @@ def test_no_bit_that_flips_in_a_part_makes_other_rows(tmp_path):
 def test_a_table_without_a_digest_is_read_and_a_part_without_one_is_computed_again(tmp_path):
     rows = study(small(), tmp_path).rows()
     paths = [tmp_path / "results.parquet", *(tmp_path / "parts").glob("*.parquet")]
-    for path in paths:  # as version 0.1 wrote them
+    for path in paths:  # as another program writes them
         old = pq.read_table(path)
         pq.write_table(old.replace_schema_metadata({"scores": old.schema.metadata[b"scores"]}), path)
     assert Table.read(tmp_path).rows() == rows

@@ -170,7 +170,7 @@ class Runs:
         if "law" not in changes:
             fields["law"] = self.law(plant, law_name)
         scenario = Scenario(**fields | changes)
-        return scenario.named(condition) if isinstance(condition, str) and condition in paper.conditions else scenario
+        return scenario.named(condition if isinstance(condition, str) else condition.name)
 
     def grid(self, **changes: Any) -> dict[tuple[str, str, str], Scenario]:
         """Return (plant, law, condition) -> scenario for all that the claim names, with some fields changed."""

@@ -133,15 +133,6 @@ def test_every_number_of_the_measurement_is_where_the_header_says(file):
     assert same(*smc.run([scenario(law, "cart_pole", **more, duration=0.05) for law in (mine, theirs)]))
 
 
-def test_fields_of_the_measurement_keep_their_old_names(file):
-    with pytest.warns(DeprecationWarning, match="my_law.c reads y->(eq|surfaced), which is now y->(v_eq|has_surface)"):
-        former = smc.law_from_c(file(law("out[0] = y->eq - 2.0 * y->surfaced;")), name="former")
-    present = smc.law_from_c(file(law("out[0] = y->v_eq - 2.0 * y->has_surface;")), name="present")
-    before, now = smc.run([scenario(one, surface="linear", duration=0.02) for one in (former, present)])
-    assert same(before, now)
-    assert now.u.max() < 0.0
-
-
 def test_single_precision_is_single_within_and_double_without(file):
     single = smc.law_from_c(file("#define SMC_REAL float\n" + MINE.replace("tanh", "tanhf")), isolate=True)
     fast, exact = smc.run([scenario(law, duration=1.0) for law in (single, smc.law("observer_free"))])

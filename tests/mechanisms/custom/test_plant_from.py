@@ -18,7 +18,6 @@ from smc_mujoco.common import process
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import design
 from smc_mujoco.envs import core, tasks
-from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.mechanisms.custom import channels as own_channels
 from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, prepared
@@ -715,12 +714,10 @@ def test_a_recorded_run_is_read_whatever_would_be_refused_today(bounded, tmp_pat
             dataclasses.replace(trace.scenario, law="classical")
 
 
-def test_conditions_of_a_model_with_motors_have_the_paper_s_names(arm):
+def test_conditions_of_a_model_with_motors_are_told_by_what_differs_from_the_nominal_one(arm):
     plant = arm(["shoulder"])
     assert plant.limits
-    for name in ("nominal", "noise", "delay_5ms"):
-        fields = scenarios.fields(name, plant)
-        assert run_key.condition(smc.Scenario(plant=plant, law="classical", **fields)) == name
+    assert run_key.condition(smc.Scenario(plant=plant, law="classical")) == "nominal"
     assert run_key.condition(smc.Scenario(plant=plant, law="classical", u_max=6.0)) == "u_max=6.0"
 
 
