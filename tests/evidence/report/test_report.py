@@ -539,8 +539,8 @@ def test_what_is_there_is_not_computed_again(made, folder, monkeypatch):
     for name in (
         "analysis.region_of_attraction.basin",
         "analysis.margins.margins",
-        "studies.audit.audit.claims",
-        "studies.report.films.film",
+        "evidence.audit.audit.claims",
+        "evidence.report.films.film",
         "studies.executors.outcome",
     ):
         module, _, function = f"smc_mujoco.{name}".rpartition(".")
