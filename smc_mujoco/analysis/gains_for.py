@@ -25,6 +25,7 @@ from smc_mujoco.analysis.chattering import Chattering, chattering, predict
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, users_frame
 from smc_mujoco.common.progress import bar
+from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.units import FORCE
 from smc_mujoco.mechanisms.plant import Plant
@@ -33,6 +34,7 @@ from smc_mujoco.simulation.scenario import Scenario
 
 RANGE = 1e3  # of size: at most so many times the law's own, and at least the inverse
 STEP = 2.0  # from one size to the next until the wanted one lies between
+RULE = "largest gains of a predicted amplitude or frequency"
 CLOSE = 1e-3  # relative: the search ends when the size is known so well
 SPEEDS = tuple(10.0 ** (0.1 * k) for k in range(-10, 11))
 
@@ -98,6 +100,7 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if value is not None:
             number(name, value, above=0.0)
+    tried: list[tuple[float, float]] = []
     with bar(f"gains of {base.law.name} on {base.plant.name}") as drawn:
 
         def scaled(size: float, speed: float) -> Scenario:
@@ -105,6 +108,7 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
 
         def cycle(size: float, speed: float) -> Chattering:
             drawn.advance(1.0)
+            tried.append((size, speed))
             return predict(scaled(size, speed), channel, ranges=False)
 
         strength = _strength(base)
@@ -126,7 +130,8 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
             ScenarioWarning,
             users_frame(),
         )
-    return Design(law=chosen.law, chattering=found, disturbance=tolerated.value, size=size, speed=speed)
+    law = chosen.law.sourced(source.TUNED, source.Search(rule=RULE, evaluations=len(tried), converged=True))
+    return Design(law=law, chattering=found, disturbance=tolerated.value, size=size, speed=speed)
 
 
 def _speed(cycle: Callable[[float], Chattering], amplitude: float | None, frequency: float, strength: float) -> float:

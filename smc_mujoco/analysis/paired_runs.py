@@ -16,6 +16,7 @@ import numpy as np
 from smc_mujoco.analysis.differences import OF_SCALE, coarse
 from smc_mujoco.analysis.ranking import first_of_kind
 from smc_mujoco.common.errors import ScenarioError, shown, taken, unknown
+from smc_mujoco.control.source import Source, restored
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.channel_groups import groups as channel_groups
 from smc_mujoco.simulation.scenario import Scenario
@@ -208,6 +209,19 @@ def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
         with contextlib.suppress(ScenarioError):
             scenarios[k] = table.scenario(int(rows[rows >= 0].min()))
     return scenarios
+
+
+def sources(table: Columns, group: Group) -> dict[str, tuple[Source, ...]]:
+    """Return law -> where the gains of its runs in a group come from; nothing for a table without these columns."""
+    try:
+        columns = table.column("source"), table.column("search")
+    except ScenarioError:
+        return {}
+    found = {}
+    for law, rows in zip(group.laws, group.rows, strict=True):
+        pairs = dict.fromkeys(zip(*(column[rows[rows >= 0]].tolist() for column in columns), strict=True))
+        found[law] = tuple(restored({"kind": kind, "search": search and json.loads(search)}) for kind, search in pairs)
+    return found
 
 
 def floor(scenario: Scenario | None, unit: str) -> float:

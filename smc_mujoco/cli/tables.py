@@ -15,6 +15,8 @@ from rich.text import Text
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.tuning.result import HEADINGS, Tuned
 from smc_mujoco.common.text import number
+from smc_mujoco.control import source as sources
+from smc_mujoco.control.source import Source
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.metrics.catalogue import metrics
@@ -63,7 +65,7 @@ BOARD_KEY = (
     "median, #place, {level:.3g} % interval over seeds; * undefeated: no law is better in any condition. A winner is "
     "better than every other law: its median is lower by more than 3 %, and the seeds confirm it. Over several "
     "conditions: median of their medians, place by mean rank, how many are won and lost; a winner wins in each. "
-    "x, u of driven joints, in rad or m, and N m, N or V"
+    "No winner is named over rivals at their default gains, unless with --defaults. x, u of driven joints, in rad or m, and N m, N or V"
 )
 MIN_INTERVAL_RUNS = 6  # with fewer runs no interval of a median covers 95 %, see `analysis.bootstrap`
 
@@ -102,6 +104,8 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
             )
             table.add_row(_label(label, trace), *cells)
         tables.append(table)
+    gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
+    tables[-1].caption, tables[-1].caption_justify = sources.in_words(gains) or None, "left"
     return tables
 
 
@@ -255,8 +259,19 @@ def leaderboard(boards: Sequence[Board]) -> Table:
     table.caption = BOARD_KEY.format(level=100 * boards[0].level) if boards else "no boards: no metric applies"
     if any(block.runs < MIN_INTERVAL_RUNS for board in boards for block in board.blocks):
         table.caption += f"; with fewer than {MIN_INTERVAL_RUNS} runs an interval is their range, and covers less"
+    if gains := sources.in_words(_sources(boards)):
+        table.caption += f". {gains[:1].upper()}{gains[1:]}"
     table.caption_justify = "left"
     return table
+
+
+def _sources(boards: Iterable[Board]) -> dict[str, list[Source]]:
+    """Return law -> where its gains come from, in any board."""
+    found: dict[str, list[Source]] = {}
+    for board in boards:
+        for entry in board.entries:
+            found.setdefault(entry.law, []).extend(entry.sources)
+    return {law: found[law] for law in sorted(found)}
 
 
 def _group_lines(name: str, own: Mapping[str, Board], shown: Sequence[Board | None]) -> Iterator[list[Text]]:
@@ -272,8 +287,9 @@ def _group_lines(name: str, own: Mapping[str, Board], shown: Sequence[Board | No
         yield [head, *(_block_cell(board, block) for board in shown)]
     if several:
         yield [Text(f"\nall {len(largest.blocks)}\n{largest.kind}", "dim")]
-    for law in sorted({entry.law for board in own.values() for entry in board.entries}):
-        yield [Text(_folded(law), style.law_colour(law)), *(_law_cell(board, law) for board in shown)]
+    for law, its in _sources(own.values()).items():
+        head = Text(_folded(law), style.law_colour(law)).append(f"\n{sources.kinds(its)}" * bool(its), "dim")
+        yield [head, *(_law_cell(board, law) for board in shown)]
     yield [Text(""), *(_winner_cell(board) for board in shown)]
 
 
@@ -294,6 +310,8 @@ def _block_cell(board: Board | None, like: Block) -> Text:
     block = blocks.get((like.plant, like.condition))
     if board is None or block is None:
         return Text("")
+    if block.barred:
+        return Text("rivals at\ndefaults", "dim")
     if block.winner is None:
         return Text("too few" if board.too_few else f"{len(block.best)} level", "dim")
     first, second = sorted(block.medians, key=block.medians.__getitem__)[:2]
@@ -317,8 +335,9 @@ def _law_cell(board: Board | None, law: str) -> Text:
     ends = spread(entry.interval, board.metric)
     if len(ends) > INTERVAL_WIDTH:
         ends = ends.replace("–", "–\n")
-    text = Text(f"{middle} " if middle else "", "bold" if entry.rank.best else "")
-    text.append(f"#{entry.rank.place:g}").append("*" if entry.rank.best else " ")
+    best = entry.rank.best and not board.barred
+    text = Text(f"{middle} " if middle else "", "bold" if best else "")
+    text.append(f"#{entry.rank.place:g}").append("*" if best else " ")
     return text.append(f"\n{ends}" if ends else "", "dim not bold")
 
 
@@ -329,6 +348,8 @@ def _winner_cell(board: Board | None) -> Text:
     if board.winner:
         return Text("winner\n").append(_folded(board.winner, 12), f"bold {style.law_colour(board.winner)}")
     text = Text("no winner\n", "dim")
+    if board.barred:
+        return text.append("rivals at\ndefaults")
     wins = {entry.law: len(board.wins(entry.law)) for entry in board.entries}
     if not any(wins.values()):
         if len(board.best) == 1 and not board.why:

@@ -22,6 +22,7 @@ import numpy as np
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, shown, taken, unknown, users_frame, whole
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
 from smc_mujoco.control.units import Gain
 
 Conditions = Mapping[str, Callable[[SimpleNamespace], bool]]
@@ -92,6 +93,7 @@ class Component:
       shared: gains of which a law of many joints has one number for all joints.
       each: the laws of the driven channels, where they are not the same law; then `function` is None.
       template: the Template it was made from; None if that is not available.
+      source: where the gains come from. Laws with equal gains are equal, whatever their sources.
     """
 
     kind: str
@@ -106,6 +108,7 @@ class Component:
     shared: tuple[str, ...] = ()
     each: "tuple[Component, ...]" = ()
     template: "Template | None" = dataclasses.field(default=None, compare=False, repr=False)
+    source: Source = dataclasses.field(default=Source(), compare=False, repr=False)
 
     def __repr__(self) -> str:
         return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={written(v)}' for k, v in self.gains.items())])})"
@@ -115,12 +118,14 @@ class Component:
         name = getattr(self.function, "__module__", ""), getattr(self.function, "__qualname__", "?")
         template = _template_at(*name)
         if template is not None and template.function is self.function:
-            return _unpickled, (*name, dict(self.gains), self.name)
+            return _unpickled, (*name, dict(self.gains), self.name, self.source)
         return super().__reduce__()
 
     def __post_init__(self):
         gains = {name: _value(f"{self.name}'s {name}", gain, infinite=True) for name, gain in self.gains.items()}
         object.__setattr__(self, "gains", frozen(gains))
+        if self.source.gains != self.gains:  # the gains were replaced
+            object.__setattr__(self, "source", Source(kind=YOURS if gains else NONE, gains=self.gains))
         if self.template and (self.template.function is not self.function or self.template.name != self.name):
             object.__setattr__(self, "template", None)  # the function or the name was replaced
         whole(f"memory of {self.name}", self.memory, 1, 10_000)
@@ -136,6 +141,15 @@ class Component:
         errors.name(f"name of the {self.kind}", name)
         template = self.template and dataclasses.replace(self.template, name=name, label="", short="", colour="")
         return dataclasses.replace(self, name=name, template=template)
+
+    def sourced(self, kind: str, search: Search | None = None) -> "Component":
+        """Return the same law with another source of its gains, a key of `source.KINDS`. A law without gains has none.
+
+        Raises:
+          ScenarioError: an unknown kind.
+        """
+        source = Source(kind=kind, gains=self.gains, search=search)
+        return dataclasses.replace(self, source=source) if self.gains else self
 
     @property
     def uniform(self) -> bool:
@@ -159,7 +173,8 @@ class Component:
             return self
         if self.each:
             return self.each[min(i, len(self.each) - 1)]
-        return dataclasses.replace(self, gains={name: at(value, i) for name, value in self.gains.items()})
+        gains = {name: at(value, i) for name, value in self.gains.items()}
+        return dataclasses.replace(self, gains=gains, source=self.source.of(gains))
 
     def __str__(self):
         return f"{self.name}({', '.join(f'{k}={written(v)}' for k, v in self.gains.items())})"
@@ -195,12 +210,12 @@ def _template_at(module: str, name: str) -> "Template | None":
     return value if isinstance(value, Template) else None
 
 
-def _unpickled(module: str, qualname: str, gains: dict[str, float], name: str = "") -> Component:
+def _unpickled(module: str, qualname: str, gains: dict[str, float], name: str, source: Source) -> Component:
     importlib.import_module(module)
     template = _template_at(module, qualname)
     assert template is not None
-    component = template.bind(gains)
-    return component.named(name) if name and name != component.name else component
+    component = dataclasses.replace(template.bind(gains), source=source)
+    return component.named(name) if name != component.name else component
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -307,7 +322,7 @@ class Template:
         for words in self.unmet(values) if warn else ():
             text = ", ".join(f"{name} = {written(value)}" for name, value in values.items())
             warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {text}", GainWarning, users_frame())
-        return Component(
+        made = Component(
             kind=self.kind,
             name=self.name,
             gains=values,
@@ -320,6 +335,7 @@ class Template:
             shared=tuple(name for name, gain in self.gains.items() if gain.shared),
             template=self,
         )
+        return made if gains else made.sourced(DEFAULT)
 
 
 def _check_orders(accuracy: object) -> None:
@@ -349,12 +365,14 @@ def by_channel(laws: "Sequence[Component]") -> Component:
         if law.joint or not law.uniform:
             kind = "of many joints" if law.joint else f"{law}, with gains by channel,"
             raise ScenarioError(f"the law of channel {i} is {law.name!r}, {kind}: give it a law of one channel")
+    source = combined([law.source for law in laws])
     if all(law == first for law in laws):
-        return first
+        return dataclasses.replace(first, source=source.of(first.gains))
     if all(law.function is first.function and law.name == first.name for law in laws):
-        gains = {name: tuple(law.gains[name] for law in laws) for name in first.gains}
-        return dataclasses.replace(first, gains={k: v if len(set(v)) > 1 else v[0] for k, v in gains.items()})
-    return Component(
+        each = {name: tuple(law.gains[name] for law in laws) for name in first.gains}
+        gains = {name: values if len(set(values)) > 1 else values[0] for name, values in each.items()}
+        return dataclasses.replace(first, gains=gains, source=source.of(gains))
+    made = Component(
         kind=first.kind,
         name=" + ".join(dict.fromkeys(law.name for law in laws)),
         gains={f"{name}[{i}]": value for i, law in enumerate(laws) for name, value in law.gains.items()},
@@ -364,6 +382,7 @@ def by_channel(laws: "Sequence[Component]") -> Component:
         requires_model=any(law.requires_model for law in laws),
         each=tuple(laws),
     )
+    return made.sourced(source.kind, source.search)
 
 
 def at(value: Value, i: int) -> float:

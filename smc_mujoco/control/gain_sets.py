@@ -22,6 +22,7 @@ from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json
+from smc_mujoco.control import source
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.law import law as find_law
@@ -102,11 +103,12 @@ def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> C
         return base
     plant = as_plant(plant)
     if gains == "study":
-        values = find("law of the paper's study", SAME.get(name, name), STUDY[paper_plant(plant.name)])
+        values, search = find("law of the paper's study", SAME.get(name, name), STUDY[paper_plant(plant.name)]), None
     else:
-        sets = tuned(plant, name, gains).sets
-        values = sets[seed % len(sets)]
-    return dataclasses.replace(base, gains={gain: values.get(gain, value) for gain, value in base.gains.items()})
+        found = tuned(plant, name, gains)
+        values, search = found.sets[seed % len(found.sets)], found.search
+    made = dataclasses.replace(base, gains={gain: values.get(gain, value) for gain, value in base.gains.items()})
+    return made.sourced(source.SHIPPED if search else source.STUDY, search)
 
 
 def general() -> tuple[str, ...]:
@@ -166,10 +168,9 @@ class TunedGains:
     versions: Mapping[str, str]
 
     @property
-    def search(self) -> str:
-        """The search in a few words: evaluations, and whether its starts agree."""
-        agreed = {True: "converged", False: "not converged", None: "one start"}[self.converged]
-        return f"{self.evaluations} sets of gains tried, {agreed}"
+    def search(self) -> source.Search:
+        """The search that found them: its rule, evaluations, and whether its starts agree."""
+        return source.Search(rule=self.rule, evaluations=self.evaluations, converged=self.converged)
 
 
 def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:

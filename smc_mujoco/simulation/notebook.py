@@ -28,7 +28,7 @@ def scenario(s: Any) -> Html:
         for name, value in given.items()
         if value not in blank and value != defaults[name] and not plain.get(name, False)
     }
-    rows = {"plant": s.plant, "law": s.law, "duration": s.duration} | shown
+    rows = {"plant": s.plant, "law": s.law, "gains": s.law.source, "duration": s.duration} | shown
     resolved = {name: getattr(s.resolved, name) for name, value in given.items() if value is None}
     kept = {name: value for name, value in resolved.items() if value is not None}
     note = ", ".join(f"{name.replace('_', ' ')} {_words(name, value, s)}" for name, value in kept.items())
@@ -42,6 +42,7 @@ def trace(found: Any) -> Html:
     about = {
         "plant": _words("plant", s.plant, s),
         "law": str(s.law),
+        "gains": str(s.law.source),
         "samples": f"{len(found.t)}, every {s.control_period:g} s",
     }
     last = np.flatnonzero(np.isfinite(found.x).all(axis=1))

@@ -13,6 +13,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.fingerprint import arithmetic
 from smc_mujoco.common.registry import subclasses
 from smc_mujoco.common.version import __version__
+from smc_mujoco.control import source as sources
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import known_laws
@@ -43,6 +44,7 @@ def describe(scenario: Scenario) -> dict:
             "plant": _plant(scenario.plant),
             "versions": dict(_versions()),
             "law": _component(scenario.law),
+            "source": scenario.law.source.about(),
             "velocity": _component(scenario.velocity),
             "surface": scenario.surface and _component(scenario.surface),
             "model": scenario.model,
@@ -70,14 +72,16 @@ def _versions() -> dict[str, str]:
 def restore(data: dict) -> Scenario:
     """Return the scenario that `describe` wrote. A law or signal that is not installed here loses its code.
 
+    Gains without a source, as in a file that somebody wrote, count as the user's.
     Recorded scenarios skip validation rules added after they were recorded.
     """
     fields = {name: data[name] for name in PLAIN}
     fields |= {name: _restore_parts(data[name]) for name in PARTS if name in data}  # an ideal run's file may lack them
     fields |= {name: data[name] for name in ("mechanism", "model") if name in data}
+    source = sources.restored(data["source"]) if "source" in data else sources.Source(kind=sources.YOURS)
     fields |= {
         "plant": _restore_plant(data["plant"]),
-        "law": _restore_law(data["law"]),
+        "law": _restore_law(data["law"]).sourced(source.kind, source.search),
         "velocity": _find(data["velocity"], "estimator", estimators()),
         "surface": data.get("surface") and _find(data["surface"], "surface", surfaces()),
         "reference": _restore_signal(data["reference"]),

@@ -13,6 +13,7 @@ from smc_mujoco.common import html
 from smc_mujoco.common.text import joined, number, table
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue
+from smc_mujoco.control.source import in_words
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.conventions import Metric
@@ -34,7 +35,7 @@ class Choice:
 
     Attributes:
       law: with its gains for the plant.
-      source: where the gains are from, in words.
+      remark: what is to be said of the gains besides their source.
       rank: its mean rank over the blocks, and its place with an interval; NaN if it is not compared.
       settles: share of its runs that settle.
       fit: whether it settles often enough to be advised.
@@ -42,11 +43,16 @@ class Choice:
     """
 
     law: Component
-    source: str
+    remark: str
     rank: Rank
     settles: float
     fit: bool
     medians: Mapping[str, Interval]
+
+    @property
+    def gains(self) -> str:
+        """Where the gains come from, in words."""
+        return f"gains {self.law.source}" + f"; {self.remark}" * bool(self.remark)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,6 +69,7 @@ class Advice:
       comparison: of the finalists that are fit, or of all if none is; its blocks are those of `blocks`.
       table: the finalists' runs.
       effort: unit of u, "N m", "N" or "V"; "" for that of a force, or where conditions differ.
+      untuned: names of the laws with default gains, also of those left out, over which no other law is advised.
     """
 
     plant: Plant
@@ -74,6 +81,12 @@ class Advice:
     comparison: Comparison
     table: Table
     effort: str = ""
+    untuned: tuple[str, ...] = ()
+
+    @property
+    def barred(self) -> list[str]:
+        """The rivals with default gains over which the first of the `choices` is not advised."""
+        return [name for name in self.untuned if name != self.choices[0].law.name]
 
     @property
     def law(self) -> Component:
@@ -122,7 +135,7 @@ class Advice:
     @property
     def code(self) -> str:
         """The advised law as Python, "" if none is advised or it is not in the catalogue under its name."""
-        if not self.choices[0].settles or not self.choices[0].fit:
+        if not self.choices[0].settles or not self.choices[0].fit or self.barred:
             return ""
         known = catalogue().get(self.law.name)
         return f"smc.{self.law!r}" if known is not None and known.function is self.law.function else ""
@@ -177,6 +190,8 @@ class Advice:
         of = f" of {len(self.conditions)} conditions" if len(self.conditions) > 1 else ""
         text = f"place by mean rank, and medians{of}, with 95 % intervals over {seeds} seeds. "
         text += f"*: no finalist is better{' in any condition' if of else ''}."
+        if sources := in_words({choice.law.name: [choice.law.source] for choice in self.choices}):
+            text += f" {sources[:1].upper()}{sources[1:]}."
         if any(self.dominated(name) for name in self.compared):
             text += " A law stands behind those that dominate it: better somewhere, worse nowhere."
         return text + " –: settles too seldom to be advised." * any(not choice.fit for choice in self.choices)
@@ -187,11 +202,19 @@ class Advice:
     def answer(self) -> list[str]:
         """The advice in sentences: what to use and why, what to use for one need, the second choice, how sure it is."""
         parts = [self._use(), self._because(), *self._instead(), self._second(), self._sure(), self._left_out()]
+        if self.barred:
+            parts = [self._refusal(), self._left_out()]
         return list(filter(None, parts))
+
+    def _refusal(self) -> str:
+        """Return why no law is advised over rivals with default gains."""
+        one = len(self.barred) == 1
+        why = f"No law is advised over {joined(self.barred)}, whose gains are {'its' if one else 'their'} defaults"
+        return f"{why}: tune {'it' if one else 'them'}, or ask for it with defaults=True (--defaults)."
 
     def _use(self) -> str:
         first, others = self.choices[0], self.compared[1:]
-        law = f"{first.law} ({first.source})"
+        law = f"{first.law} ({first.gains})"
         if not first.settles or not first.fit:
             why = "none settles in any run" if not first.settles else "none settles often enough in every condition"
             longer = f"longer runs than {self.table.scenario(0).duration:g} s"
@@ -267,7 +290,7 @@ class Advice:
         if len(self.choices) < 2:
             return ""
         first, second = self.choices[:2]
-        named = f"Second choice: {second.law} ({second.source})"
+        named = f"Second choice: {second.law} ({second.gains})"
         if not second.fit:
             return f"{named}; it settles too seldom to be advised."
         ahead, behind = self.wins(second.law.name, first.law.name), self.wins(first.law.name, second.law.name)
@@ -332,7 +355,7 @@ class Advice:
         return "\n".join([self.title, table(self.heads, self.rows), self.key, "", *answer])
 
     def __repr__(self) -> str:
-        return f"Advice({self.plant.name}: {self.law})"
+        return f"Advice({self.plant.name}: {'no law' if self.barred else self.law})"
 
     def _repr_html_(self) -> str:
         paragraphs = "".join(f"<p>{html.text(sentence)}</p>" for sentence in self.answer)

@@ -40,7 +40,7 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, number, unknown, whole
 from smc_mujoco.common.progress import bar
-from smc_mujoco.control import gain_sets
+from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import PROPERTIES, suitable
@@ -59,7 +59,6 @@ from smc_mujoco.studies.table import Table
 USUAL = ("fast", "accurate", "calm")  # what is compared where nothing is asked
 CONDITIONS = ("nominal", "noise", "sine")  # where none is given
 NO_VELOCITY = "no-velocity"
-SHIPPED = "tuned gains of the package"
 MIN_SETTLED = 0.5  # of the share of runs that settle under the law that settles in the most; chosen
 
 
@@ -78,10 +77,10 @@ QUICK = Extent(screening=4, seeds=16, finalists=4, duration=3.0, budget=32)
 
 
 class Candidate(NamedTuple):
-    """A law with its gains for the plant, and where these are from, in words."""
+    """A law with its gains for the plant, and what is to be said of them, in words."""
 
     law: Component
-    source: str
+    remark: str = ""
 
 
 def which(
@@ -96,6 +95,7 @@ def which(
     quick: bool = False,
     threads: int | None = None,
     progress: bool = False,
+    defaults: bool = False,
 ) -> Advice:
     """Advise a law for a plant: compare all laws that suit, with gains for the plant, and say how sure the answer is.
 
@@ -113,6 +113,7 @@ def which(
       quick: fewer seeds and finalists, shorter runs, a third of the evaluations of a tuning.
       threads: simulations at once; None for one per available core.
       progress: whether to show progress bars.
+      defaults: whether a law may be advised over rivals whose gains are their defaults.
 
     Raises:
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
@@ -153,6 +154,7 @@ def which(
         comparison=finals.comparison,
         table=finals.table,
         effort=efforts.pop() if len(efforts) == 1 else "",
+        untuned=() if defaults else tuple(one.law.name for one in found if one.law.source.kind == source.DEFAULT),
     )
 
 
@@ -240,7 +242,7 @@ def _with_gains(
     Laws that are tuned beside shipped gains are tuned as these were: the same starts, the same budget.
     """
     found = [_known(plant, law) for law in laws]
-    if any(candidate and candidate.source == SHIPPED for candidate in found):
+    if any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in found):
         budget, starts = search.BUDGET, None
     missing = [k for k, candidate in enumerate(found) if candidate is None]
     with bar("gains", len(missing), shown=progress and bool(missing), counted=True) as drawn:
@@ -254,17 +256,15 @@ def _with_gains(
 def _known(plant: Plant, law: Component | Template) -> Candidate | None:
     """Return a law whose gains need no search; None for one that must be tuned."""
     if isinstance(law, Component):
-        return Candidate(law, "gains as given")
+        return Candidate(law)
     if plant.unscaled:
-        return Candidate(
-            law.bind({}), f"default gains, as tuning is not possible here: {plant.unscaled.partition(':')[0]}"
-        )
+        return Candidate(law.bind({}), f"tuning is not possible here: {plant.unscaled.partition(':')[0]}")
     own = plants_known().get(plant.name)
     if own is None or own.parameters != plant.parameters or catalogue().get(law.name) is not law:
         return None
     if not gain_sets.has(plant, law.name):
         return None
-    return Candidate(gain_sets.law(plant, law.name, "tuned"), SHIPPED)
+    return Candidate(gain_sets.law(plant, law.name, "tuned"))
 
 
 def _tuned(
@@ -281,7 +281,7 @@ def _tuned(
 
     def tuned_now() -> result.Tuned:
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)  # the source says so
+            warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)  # the remark says so
             return search.tune(plant, law, budget, objective=goal, threads=threads)
 
     tuned = cached(
@@ -291,10 +291,10 @@ def _tuned(
         lambda made, path: made.save(path),
         result.load,
     )
+    its, chosen = tuned.law.source, coerce.law(law)
     if tuned.before < tuned.objective:
-        return Candidate(coerce.law(law), f"its own gains, better than the {budget} sets tried here")
-    gains = tuned.law.gains
-    return Candidate(dataclasses.replace(coerce.law(law), gains=gains), f"tuned here, {budget} sets of gains tried")
+        return Candidate(chosen.sourced(its.kind, its.search), "its defaults, better than those tried")
+    return Candidate(dataclasses.replace(chosen, gains=tuned.law.gains, source=its))
 
 
 # the comparison
@@ -385,7 +385,7 @@ def _choices(finals: Contest, candidates: Mapping[str, Candidate], needs: Sequen
     for rank in finals.order:
         choice = Choice(
             law=candidates[rank.law].law,
-            source=candidates[rank.law].source,
+            remark=candidates[rank.law].remark,
             rank=rank,
             settles=float(settled[group.laws.index(rank.law)]),
             fit=rank.law in finals.fit,

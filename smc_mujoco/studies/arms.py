@@ -14,6 +14,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import find
 from smc_mujoco.control.law import Law, law
+from smc_mujoco.control.source import SHIPPED, Search
 from smc_mujoco.mechanisms.plant import Plant, Values, plant
 from smc_mujoco.metrics.catalogue import tv_rate
 from smc_mujoco.metrics.tip import tip_error, tip_scores
@@ -82,7 +83,8 @@ def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
         found[gain] = [found[gain] * limit for limit in arm().limits]  # pyright: ignore[reportArgumentType]
     for gain in BY_INERTIA.get(name, ()):
         found[gain] = [found[gain] * one for one in inertia()]  # pyright: ignore[reportArgumentType]
-    return law(name, **found)
+    made = law(name, **found)
+    return made if gains else made.sourced(SHIPPED, Search(rule="random draws", evaluations=DRAWS))
 
 
 def hybrid(friction: bool = False) -> Law:
@@ -95,7 +97,7 @@ def hybrid(friction: bool = False) -> Law:
     if friction:
         known = arm().friction
         gains |= {"f1": known.p1, "f2": known.p2, "f3": known.p3}
-    made = law("hybrid_sliding", **gains)  # pyright: ignore[reportArgumentType]
+    made = law("hybrid_sliding", **gains).sourced(SHIPPED)  # pyright: ignore[reportArgumentType]
     return made.named("hybrid_with_friction") if friction else made
 
 

@@ -13,6 +13,7 @@ from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.common import html
 from smc_mujoco.common.text import number
+from smc_mujoco.control.source import Source, in_words, kinds
 from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
@@ -68,10 +69,11 @@ def as_html(boards: Iterable[Any]) -> html.Html:
     """Return a table for each group of runs, with what each metric's board says below."""
     tables = []
     for name, own in _groups(boards).items():
-        heads = ("law", *(heading(board).replace("^2", "²") for board in own))
-        lines = [(law, *map(_html_cell, cells)) for law, cells in _laws(own).items()]
+        heads = ("law", "gains", *(heading(board).replace("^2", "²") for board in own))
+        gains = sources(own)
+        lines = [(law, kinds(gains[law]), *map(_html_cell, cells)) for law, cells in _laws(own).items()]
         note = html.Html("<br>".join(map(html.text, [*_verdicts(own), key(own)])))
-        tables.append(html.table(heads, lines, name, note, range(1, 1 + len(own)), most=40))
+        tables.append(html.table(heads, lines, name, note, range(2, 2 + len(own)), most=40))
     return html.Html("<br>".join(tables)) if tables else html.table((), [("no boards: no metric applies",)])
 
 
@@ -80,9 +82,10 @@ def as_latex(boards: Iterable[Any]) -> str:
     tables = []
     for name, own in _groups(boards).items():
         lines = [f"% {text}" for text in (name, *_verdicts(own), f"{key(own)}; needs booktabs", FIT)]
-        lines += [f"\\begin{{tabular}}{{l{'r' * len(own)}}}", "\\toprule"]
-        lines += [_tex_line(["law", *(_tex(heading(board)) for board in own)]), "\\midrule"]
-        lines += [_tex_line([_tex(law), *map(_tex_cell, cells)]) for law, cells in _laws(own).items()]
+        lines += [f"\\begin{{tabular}}{{ll{'r' * len(own)}}}", "\\toprule"]
+        lines += [_tex_line(["law", "gains", *(_tex(heading(board)) for board in own)]), "\\midrule"]
+        gains = {law: _tex(kinds(its)) for law, its in sources(own).items()}
+        lines += [_tex_line([_tex(law), gains[law], *map(_tex_cell, cells)]) for law, cells in _laws(own).items()]
         tables.append("\n".join([*lines, "\\bottomrule", "\\end{tabular}\n"]))
     return "\n".join(tables)
 
@@ -90,7 +93,14 @@ def as_latex(boards: Iterable[Any]) -> str:
 def key(boards: Sequence[Any]) -> str:
     """Return what the cells of a table show."""
     bold = any(cell.best for cells in _laws(boards).values() for cell in cells)
-    return f"medians with {100 * boards[0].level:g} % intervals{'; bold: no law is better' * bold}"
+    gains = in_words(sources(boards))
+    words = f"medians with {100 * boards[0].level:g} % intervals{'; bold: no law is better' * bold}"
+    return f"{words}; {gains}" if gains else words
+
+
+def sources(boards: Sequence["Board"]) -> dict[str, tuple[Source, ...]]:
+    """Return law -> where its gains come from, for every law of the boards of one group of runs."""
+    return {entry.law: entry.sources for board in boards for entry in board.entries}
 
 
 def _verdicts(boards: Sequence[Any]) -> list[str]:
@@ -117,7 +127,7 @@ def _laws(boards: Sequence[Any]) -> dict[str, list[Cell]]:
     for i, board in enumerate(boards):
         for entry in board.entries:
             middle = size(entry.interval.median, board.metric)
-            best = entry.rank.best and middle != "" and not board.too_few
+            best = entry.rank.best and middle != "" and not board.too_few and not board.barred
             cell = Cell(middle, spread(entry.interval, board.metric), best)
             laws.setdefault(entry.law, [Cell("", "", False)] * len(boards))[i] = cell
     return laws

@@ -22,6 +22,8 @@ from smc_mujoco.analysis.bootstrap import RESAMPLES, Interval, median_of, share_
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns
 from smc_mujoco.analysis.ranking import SEEDS, Comparison, Friedman, Rank, compare, friedman, ranks
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
+from smc_mujoco.common.text import joined
+from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies import board_tables
 
@@ -30,11 +32,15 @@ METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Entry:
-    """A law's line in a board: its median, or the share of its runs that settle, and its place."""
+    """A law's line in a board: its median, or the share of its runs that settle, and its place.
+
+    `sources`: where its gains come from; none where the table does not say.
+    """
 
     law: str
     interval: Interval
     rank: Rank
+    sources: tuple[Source, ...] = ()
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -49,6 +55,7 @@ class Block:
       runs: number of distinct runs among these. In the others every law has the same result as in an earlier seed.
       most: largest number of distinct runs of any two laws. A seed that changes neither law is no sample of the two.
       fewest: smallest number of distinct runs of any two of the best laws; `most` if only one law is best.
+      untuned: the laws with default gains, over which no other law is named the winner.
     """
 
     plant: str
@@ -59,11 +66,17 @@ class Block:
     runs: int
     most: int
     fewest: int
+    untuned: tuple[str, ...] = ()
 
     @property
     def winner(self) -> str | None:
-        """The law that is better than every other, among several."""
-        return self.best[0] if len(self.best) == 1 < len(self.medians) else None
+        """The law that is better than every other, among several, unless `barred`."""
+        return self.best[0] if len(self.best) == 1 < len(self.medians) and not self.barred else None
+
+    @property
+    def barred(self) -> tuple[str, ...]:
+        """The laws with default gains that are worse than the only best law, which is then not named the winner."""
+        return tuple(law for law in self.untuned if law not in self.best) if len(self.best) == 1 else ()
 
     @property
     def sample(self) -> str:
@@ -164,7 +177,14 @@ class Board:
         """Why there is no winner; "" if there is one, or if several laws are the best."""
         if len(self.entries) == 1:
             return "one law"
+        if barred := self.barred:
+            return f"none is named over {joined(barred)} with default gains"
         return self.too_few or ("" if self.best else "each loses to another")
+
+    @property
+    def barred(self) -> list[str]:
+        """The laws with default gains over which no winner is named in any block, see `Block.barred`."""
+        return list(dict.fromkeys(law for block in self.blocks for law in block.barred))
 
     @property
     def too_few(self) -> str:
@@ -210,6 +230,7 @@ def leaderboard(
     level: float = 0.95,
     resamples: int = RESAMPLES,
     seed: int = 0,
+    defaults: bool = False,
 ) -> Boards:
     """Compare the laws of a table in each metric within each group.
 
@@ -223,6 +244,7 @@ def leaderboard(
       by: what the runs of a group have in common, of "plant" and "condition"; () for one group of all runs.
       level: level of confidence.
       resamples, seed: number of resamples of the bootstrap, and seed of their draws.
+      defaults: whether a winner may be named over laws whose gains are their defaults.
 
     Raises:
       ScenarioError: no runs, an unknown metric or group, two runs in a cell, or laws without a common cell.
@@ -234,7 +256,9 @@ def leaderboard(
     boards, seed = Boards(), whole("seed", seed, 0, 2**53 - 1)
     by_row = {name: cells.values(table, name) for name in units}
     for group in cells.groups(table, by):
-        ran = cells.scenarios(table, group)
+        ran, sources = cells.scenarios(table, group), cells.sources(table, group)
+        at_default = (law for law, its in sources.items() if any(source.kind == DEFAULT for source in its))
+        untuned = () if defaults else tuple(at_default)
         for metric, unit in units.items():
             there, scores, outcomes = group.scores(by_row[metric])
             if not scores:
@@ -243,13 +267,13 @@ def leaderboard(
             if all((scenario := ran[k]) is not None and scenario.amplifier for k in there):
                 unit = unit.replace("({u})", "V").replace("{u}", "V")  # noqa: PLW2901
             found = compare(scores, floors, metric == SETTLES, level, outcomes)
-            blocks = tuple(_block(group, found, at, k) for at, k in enumerate(there))
+            blocks = tuple(_block(group, found, at, k, untuned) for at, k in enumerate(there))
             mixed = "{" in unit and len({block.plant for block in blocks}) > 1
             board = Board(
                 group=group.name,
                 metric=metric,
                 unit=unit,
-                entries=_entries(found, mixed, resamples, seed),
+                entries=_entries(found, mixed, resamples, seed, sources),
                 blocks=blocks,
                 cells=sum(block.runs for block in blocks),
                 seeds=max(block.seeds for block in blocks),
@@ -261,7 +285,7 @@ def leaderboard(
     return boards
 
 
-def _block(group: cells.Group, found: Comparison, at: int, k: int) -> Block:
+def _block(group: cells.Group, found: Comparison, at: int, k: int, untuned: tuple[str, ...]) -> Block:
     """Return block k of a group, which is number `at` of the compared blocks."""
     plant, condition = group.blocks[k]
     runs, laws = found.runs[at], np.array([law in found.best[at] for law in found.laws], bool)
@@ -276,10 +300,13 @@ def _block(group: cells.Group, found: Comparison, at: int, k: int) -> Block:
         runs=int(found.seeds[at]),
         most=most,
         fewest=int(best.min(initial=most)),
+        untuned=untuned,
     )
 
 
-def _entries(found: Comparison, mixed: bool, resamples: int, seed: int) -> tuple[Entry, ...]:
+def _entries(
+    found: Comparison, mixed: bool, resamples: int, seed: int, sources: Mapping[str, tuple[Source, ...]]
+) -> tuple[Entry, ...]:
     """Return the laws' lines. If `mixed`, values have several units, so there is no median."""
     entries = []
     for rank in ranks(found, resamples, seed):
@@ -291,5 +318,5 @@ def _entries(found: Comparison, mixed: bool, resamples: int, seed: int) -> tuple
             interval = Interval(math.nan, math.nan, math.nan, n)
         else:
             interval = median_of(scores, found.level, resamples, seed)
-        entries.append(Entry(law=rank.law, interval=interval, rank=rank))
+        entries.append(Entry(law=rank.law, interval=interval, rank=rank, sources=sources.get(rank.law, ())))
     return tuple(entries)

@@ -26,9 +26,9 @@ MAX_NAME = 60  # characters of a condition's name
 
 
 def described(scenario: Scenario) -> dict[str, Any]:
-    """Return the scenario as plain data, the same for equal scenarios."""
+    """Return the scenario as plain data, the same for equal scenarios, so without the source of its gains."""
     data = serialise.describe(scenario)
-    del data["left_out"]
+    del data["left_out"], data["source"]
     return data
 
 
@@ -65,12 +65,19 @@ def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
         "plant": scenario.plant.name,
         "law": scenario.law.name,
         "gains": to_json(dict(scenario.law.gains)),
+        **source(scenario),
         "condition": condition(scenario, data),
         "seed": scenario.seed,
         "duration": scenario.duration,
         "versions": to_json(data["versions"]),
         "scenario": to_json(data),
     }
+
+
+def source(scenario: Scenario) -> dict[str, str | None]:
+    """Return the columns of a table that say where the run's gains come from."""
+    found = scenario.law.source.about()
+    return {"source": found["kind"], "search": found["search"] and to_json(found["search"])}
 
 
 def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:

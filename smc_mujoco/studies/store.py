@@ -82,8 +82,12 @@ class Store:
         table.write(path, self.schema, [pa.Table.from_pylist(list(rows), schema=self.schema)])
         self.where.update((name, (path, i)) for i, name in enumerate(hashes))
 
-    def collect(self, hashes: Sequence[str]) -> None:
+    def collect(self, hashes: Sequence[str], sources: Mapping[str, Mapping[str, str | None]]) -> None:
         """Write the table of these finished runs, in this order.
+
+        Args:
+          sources: hash -> the columns of `run_key.source`. A part may have those of an earlier study, as equal runs
+            have one hash.
 
         Raises:
           ScenarioError: the folder cannot be written, or a part has been removed.
@@ -102,7 +106,11 @@ class Store:
                     raise ScenarioError(f"part {path} was removed or broken while the study ran: start it again")
                 found.append(part.take([self.where[names[i]][1] for i in indices]))
             order = np.argsort(np.concatenate(list(places.values())))
-            return pa.concat_tables(found).take(order).combine_chunks()
+            data = pa.concat_tables(found).take(order).combine_chunks()
+            for name in ("source", "search"):
+                column = pa.array([sources[one][name] for one in names], pa.string())
+                data = data.set_column(data.column_names.index(name), data.field(name), column)
+            return data
 
         groups = (hashes[i : i + GROUP] for i in range(0, len(hashes), GROUP))
         table.write(self.results, self.schema, map(rows, groups))

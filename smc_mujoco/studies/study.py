@@ -115,7 +115,7 @@ def study(
         else:
             with executors.opened(where) as pool:
                 executors.compute_elsewhere(executors.batches(missing, 1), pool, finish, counts.stepped)
-    store.collect(list(by_key))
+    store.collect(list(by_key), {name: run_key.source(scenario) for name, scenario in by_key.items()})
     table = dataclasses.replace(Table.read(store.results), known=by_key)
     saved_traces.save(table, traces, folder, threads, progress)
     return table

@@ -4,7 +4,8 @@
     best = table.select(plant="duffing", condition=["noise", "coulomb"]).column("ultimate_bound")
     table.scenario(0), table.trace(0)          # the scenario of a row, and its trace, by repeating the run
 
-Columns: the run (`hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `duration` in s); every metric of
+Columns: the run (`hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `duration` in s); where its gains come
+from (`source`, a kind of `control.source`, and `search` as JSON, null if no search found them); every metric of
 `smc.score`, null if the run failed or the metric does not apply, inf for "never"; how the run failed (`diverged_at` in
 s, `failure`); and the data to repeat it (`versions`, `scenario`, both JSON).
 """
@@ -33,10 +34,10 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 # Column -> its type, before and after the metrics.
-BEFORE = dict.fromkeys(("hash", "plant", "law", "gains", "condition"), "string")
+BEFORE = dict.fromkeys(("hash", "plant", "law", "gains", "source", "search", "condition"), "string")
 BEFORE |= {"seed": "int64", "duration": "float64"}
 AFTER = {"diverged_at": "float64", "failure": "string", "versions": "string", "scenario": "string"}
-SHOWN = ("plant", "law", "condition", "seed", "settling_time", "ultimate_bound", "itae", "tv_rate", "failure")
+SHOWN = ("plant", "law", "source", "condition", "seed", "settling_time", "ultimate_bound", "itae", "tv_rate", "failure")
 MAX_ROWS = 8  # of a table in a notebook
 DIGEST = b"digest"  # in a file's metadata
 
@@ -151,7 +152,7 @@ class Table:
         cells = [["" if v is None else number(v) if isinstance(v, float) else v for v in row] for row in rows]
         rest = len(self) - len(rows)
         return table(
-            names, cells, repr(self), f"and {rest} more: Table.rows, Table.column" if rest else "", range(3, 8)
+            names, cells, repr(self), f"and {rest} more: Table.rows, Table.column" if rest else "", range(4, 9)
         )
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
@@ -193,8 +194,11 @@ class Table:
         if not isinstance(i, int | np.integer) or not -len(self) <= i < len(self):
             raise ScenarioError(f"the table has no row {shown(i)}: it has {len(self)}, from 0 on")
         row = self.data.slice(int(i) % len(self), 1)
-        known = self.known.get(row["hash"][0].as_py())
-        return known or serialise.restore(from_json(row["scenario"][0].as_py()))
+        if known := self.known.get(row["hash"][0].as_py()):
+            return known
+        search = row["search"][0].as_py()
+        source = {"kind": row["source"][0].as_py(), "search": search and from_json(search)}
+        return serialise.restore(from_json(row["scenario"][0].as_py()) | {"source": source})
 
     def trace(self, i: int) -> Trace:
         """Run row i again and return its trace; with the same versions it is the same to the last bit."""

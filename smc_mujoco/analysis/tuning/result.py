@@ -16,6 +16,7 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import ended, read_json, reading, write_json
 from smc_mujoco.common.html import table
 from smc_mujoco.common.version import __version__
+from smc_mujoco.control import source
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
@@ -100,6 +101,11 @@ class Tuned:
             notes += ["beyond the box of the starts"] if name in self.beyond_box else []
             lines.append((name, f"{self.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", ", ".join(notes)))
         return lines
+
+    def sourced(self, kind: str = source.TUNED) -> "Tuned":
+        """Return the tuning with a law that names this search as the source of its gains."""
+        search = source.Search(rule=self.rule, evaluations=self.evaluations, converged=self.converged)
+        return dataclasses.replace(self, law=self.law.sourced(kind, search))
 
     @property
     def gains(self) -> dict[str, float]:
@@ -225,7 +231,7 @@ def load(path: str | os.PathLike[str]) -> Tuned:
             law=scenario.law,
             plant=scenario.plant,
             definition=restore(data["definition"]),
-        )
+        ).sourced()
 
 
 def _short(value: float) -> float:

@@ -164,7 +164,7 @@ def tune(
         bounds=start,
         searched=searched,
         versions=versions(),
-    )
+    ).sourced()
 
 
 @dataclasses.dataclass

@@ -46,6 +46,9 @@ Condition = Annotated[
         help='The condition of all runs, as encoder, noise+encoder or "worn gear: friction=Coulomb(0.05)".',
     ),
 ]
+Defaults = Annotated[
+    bool, typer.Option("--defaults", help="Name a winner also over laws whose gains are their defaults.")
+]
 Gains = Annotated[str, typer.Option(help="Set of gains: tuned, study, tracking or default.")]
 Joints = Annotated[
     int | None, typer.Option(help="Number of joints of a law of many joints; default that of the values of a gain.")
@@ -217,8 +220,13 @@ def law_with(text: str, gains: str) -> "Law":
 
 
 def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:
-    """Return where the laws' gains are from, in words: from the set `gains`, unless every law has its own."""
-    return f"gains {gains!r}" if any(isinstance(one, str) for one in laws) else "gains as given"
+    """Return where the laws' gains come from, in words: those of names from the set `gains`."""
+    from smc_mujoco.control import source
+
+    of_set = source.Source(kind={"default": source.DEFAULT, "study": source.STUDY}.get(gains, source.SHIPPED))
+    named = {one: [of_set] for one in laws if isinstance(one, str)}
+    words = source.in_words(named | {one.name: [one.source] for one in laws if not isinstance(one, str)})
+    return f"{words or 'no gains'}, set {gains!r}" if named else words or "no gains"
 
 
 def plant(text: str) -> "str | Plant":

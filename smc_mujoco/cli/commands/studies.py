@@ -46,6 +46,7 @@ def which(
     x0: options.X0 = None,
     spread: options.Spread = None,
     out: Annotated[Path, typer.Option(help="Folder for gains and runs; a later call reuses them.")] = Path("which"),
+    defaults: options.Defaults = False,
     threads: options.Threads = None,
 ) -> None:
     """Advise a law for a plant: which to use, with which gains, why, the second choice, and how sure that is.
@@ -78,6 +79,7 @@ def which(
         quick,
         threads,
         progress=True,
+        defaults=defaults,
     )
     terminal.print(tables.advice(advice))
     for sentence in advice.answer:
@@ -133,6 +135,7 @@ def bench(
         str | None,
         typer.Option(help="A real machine, with its parameter sets, in place of plants, conditions and gains."),
     ] = None,
+    defaults: options.Defaults = False,
     threads: options.Threads = None,
 ) -> None:
     """Compare laws on plants in conditions: run every combination from every seed, to OUT/results.parquet.
@@ -140,7 +143,8 @@ def bench(
     Finished runs are kept: you can stop the command at any time, and continue by starting it again with the same
     options. The table has only the runs of the last command, so give each study its own --out. `smc-mujoco list` shows
     laws and conditions. --laws all compares every general law that has gains for these plants in the set of --gains;
-    the set default has gains for all laws. The leaderboard names the winner under each condition, and over all of them.
+    the set default has gains for all laws. The leaderboard names the winner under each condition, and over all of them,
+    but none over laws with default gains, unless you ask for it with --defaults.
     With --rig the machine's parameter sets take the place of the conditions, and a line for each metric says if one
     law wins on all of them.
 
@@ -170,7 +174,7 @@ def bench(
     else:
         scenarios, used = _grid(size, plants, laws, conditions, condition, count, gains or "tuned", length, begin)
     table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)
-    boards = leaderboard(table)
+    boards = leaderboard(table, defaults=defaults)
     terminal.print(tables.leaderboard(boards))
     if ensemble:
         terminal.note(ensemble.verdict(boards))

@@ -29,6 +29,7 @@ from smc_mujoco.common.registry import modules
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue as laws_known
+from smc_mujoco.control.source import STUDY
 from smc_mujoco.evidence.audit.threshold import Threshold
 from smc_mujoco.evidence.audit.verdict import EXISTENTIAL, NAMED, UNIVERSAL, Statement
 from smc_mujoco.mechanisms.custom.plant_from import plant_from
@@ -160,8 +161,10 @@ class Paper:
         if isinstance(base, Component):
             base = base if base.template is None else base.template
         if isinstance(base, Template):
-            return base.bind(dict(gains))
-        return dataclasses.replace(base, gains={**base.gains, **gains})
+            made = base.bind(dict(gains))
+        else:
+            made = dataclasses.replace(base, gains={**base.gains, **gains})
+        return made.sourced(STUDY) if gains else made
 
 
 def shipped() -> dict[str, Path]:

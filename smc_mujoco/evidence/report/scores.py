@@ -25,7 +25,8 @@ class Score(NamedTuple):
     """A law's median in a cell over the seeds, with its 95 % interval; inf is never.
 
     `best`: no other law is better there, see `ranking`; several laws may be. `seeds`: of the runs, `runs`: how many of
-    them are distinct, `failed`: how many have no score. `floor`: the least difference that counts between small values.
+    them are distinct, `failed`: how many have no score. `floor`: the least difference that counts between small
+    values. `barred`: no winner is named there, over laws with default gains.
     """
 
     plant: str
@@ -40,6 +41,7 @@ class Score(NamedTuple):
     failed: int
     runs: int
     floor: float = 0.0
+    barred: bool = False
 
 
 class Place(NamedTuple):
@@ -94,6 +96,7 @@ def scores(table: "Table") -> tuple[Score, ...]:
                     failed=failed[plant, condition, law],
                     runs=block.runs,
                     floor=paired_runs.floor(ran, CATALOGUE[metric].unit),
+                    barred=bool(block.barred),
                 )
                 found.append(score)
     return tuple(found)

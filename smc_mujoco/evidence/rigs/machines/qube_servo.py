@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from smc_mujoco.control.laws.rotary_swing_up import rotary_swing_up
+from smc_mujoco.control.source import SHIPPED
 from smc_mujoco.evidence.rigs.controllers import state_feedback
 from smc_mujoco.evidence.rigs.records import Columns, Record
 from smc_mujoco.evidence.rigs.rig import Quantity, Reached, Rig
@@ -77,7 +78,8 @@ def law(name, k, phi, k1=0.0, k2=0.0):
     """Return a law on SURFACE, with gains in volts: those of scene furuta, in N m, over the torque per volt."""
     force = 1.0 / TORQUE_PER_VOLT
     gains = {"k": k * force, "phi": phi * force, "k1": k1 * math.sqrt(force), "k2": k2 * force}
-    return rotary_swing_up(**gains, w_max=0.03 * force, catch=0.05 * force, **SURFACE).named(name)
+    made = rotary_swing_up(**gains, w_max=0.03 * force, catch=0.05 * force, **SURFACE)
+    return made.named(name).sourced(SHIPPED)
 
 
 QUBE_SERVO = Rig(

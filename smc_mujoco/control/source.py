@@ -1,0 +1,110 @@
+"""Where the gains of a law come from, and the search behind them.
+
+    smc.law("classical").source                            # default
+    smc.law("classical", k=3).source                       # yours
+    smc.tune("duffing", "classical").law.source            # tuned here (differential evolution best1bin, 96 ...)
+
+A source is of one set of gains. A law whose gains are replaced has the source "yours", so no law keeps a wrong one.
+"""
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from smc_mujoco.common.errors import find
+from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.text import joined
+
+NONE, DEFAULT, TUNED, SHIPPED, STUDY, YOURS = "none", "default", "tuned here", "shipped", "study", "yours"
+KINDS = {  # kind -> what it means
+    NONE: "the law has no gains",
+    DEFAULT: "the defaults of the law's own file",
+    TUNED: "found by a search that the user ran",
+    SHIPPED: "those of the package for this plant",
+    STUDY: "those of a published study",
+    YOURS: "given by the user",
+}
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Search:
+    """The search that found gains.
+
+    Attributes:
+      rule: how it searches, in words; its name stands before the first comma, colon or bracket.
+      evaluations: number of sets of gains that it tried.
+      converged: whether its starts agree, see `analysis.tuning`; None if it made too few to tell.
+    """
+
+    rule: str
+    evaluations: int
+    converged: bool | None = None
+
+    def __str__(self) -> str:
+        name = self.rule
+        for mark in ("(", ",", ":", ";"):
+            name = name.partition(mark)[0].rstrip()
+        ended = {True: "converged", False: "not converged", None: "convergence not tested"}[self.converged]
+        return f"{name}, {self.evaluations} evaluations, {ended}"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Source:
+    """Where a set of gains comes from.
+
+    Attributes:
+      kind: a key of KINDS.
+      gains: the set.
+      search: the search that found the gains; None if no search did.
+    """
+
+    kind: str = NONE
+    gains: Mapping[str, Any] = dataclasses.field(default=frozen({}), repr=False)
+    search: Search | None = None
+
+    def __post_init__(self):
+        find("source of gains", self.kind, KINDS)
+
+    def __str__(self) -> str:
+        return f"{self.kind} ({self.search})" if self.search else self.kind
+
+    def of(self, gains: Mapping[str, Any]) -> "Source":
+        """Return the same source of another set of gains."""
+        return dataclasses.replace(self, gains=gains)
+
+    def about(self) -> dict[str, Any]:
+        """Return the kind and the search as plain data. The gains are with the law."""
+        return {"kind": self.kind, "search": self.search and dataclasses.asdict(self.search)}
+
+
+def restored(data: Mapping[str, Any]) -> Source:
+    """Return the source that `Source.about` wrote, without its gains."""
+    return Source(kind=data["kind"], search=data["search"] and Search(**data["search"]))
+
+
+def combined(sources: Sequence[Source]) -> Source:
+    """Return the source of gains that are from several sources: theirs if it is the same, else the user's choice."""
+    first = sources[0]
+    alike = all((one.kind, one.search) == (first.kind, first.search) for one in sources)
+    return first if alike else Source(kind=YOURS)
+
+
+def kinds(sources: Iterable[Source]) -> str:
+    """Return the kinds of sources, each once, such as "shipped" or "shipped, default"."""
+    return ", ".join(dict.fromkeys(source.kind for source in sources))
+
+
+def in_words(sources: Mapping[str, Iterable[Source]]) -> str:
+    """Return where the gains of laws come from: "gains shipped (...)", or "gains: default of a and b, yours of c".
+
+    Args:
+      sources: law -> the sources of its gains; one that has no gains is left out.
+    """
+    laws: dict[str, list[str]] = {}
+    for law, its in sources.items():
+        words = ", ".join(dict.fromkeys(str(source) for source in its if source.kind != NONE))
+        if words:
+            laws.setdefault(words, []).append(law)
+    if len(laws) < 2:
+        return "".join(f"gains {words}" for words in laws)
+    return f"gains: {', '.join(f'{words} of {joined(names)}' for words, names in laws.items())}"
