@@ -211,17 +211,21 @@ def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
     return scenarios
 
 
-def sources(table: Columns, group: Group) -> dict[str, tuple[Source, ...]]:
-    """Return law -> where the gains of its runs in a group come from; nothing for a table without these columns."""
+def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[Source, ...]]:
+    """Return law -> where the gains of its runs come from; nothing for a table without these columns.
+
+    Args:
+      rows: indices of the runs; default: all.
+    """
     try:
-        columns = table.column("source"), table.column("search")
+        columns = [np.asarray(table.column(name)) for name in ("law", "source", "search")]
     except ScenarioError:
         return {}
-    found = {}
-    for law, rows in zip(group.laws, group.rows, strict=True):
-        pairs = dict.fromkeys(zip(*(column[rows[rows >= 0]].tolist() for column in columns), strict=True))
-        found[law] = tuple(restored({"kind": kind, "search": search and json.loads(search)}) for kind, search in pairs)
-    return found
+    found: dict[str, list[Source]] = {}
+    every = zip(*(column if rows is None else column[rows] for column in columns), strict=True)
+    for law, kind, search in sorted(dict.fromkeys(every), key=str):
+        found.setdefault(law, []).append(restored({"kind": kind, "search": search and json.loads(search)}))
+    return {law: tuple(its) for law, its in found.items()}
 
 
 def floor(scenario: Scenario | None, unit: str) -> float:

@@ -42,6 +42,7 @@ from smc_mujoco.common.files import ended, read_json, reading, write_json
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
+from smc_mujoco.control.source import NONE
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import BAND, error, last
 from smc_mujoco.simulation.conditions import DURATION, Condition, find_condition
@@ -74,6 +75,7 @@ class Basin:
       decided_at: duration of the run that decided, s, (nv, nx); the whole duration if undecided.
       unit: of x, "rad" or "m".
       duration: s, of the longest runs.
+      source: where the law's gains come from, a kind of `control.source`.
     """
 
     plant: str
@@ -84,6 +86,7 @@ class Basin:
     decided_at: np.ndarray
     unit: str
     duration: float
+    source: str = NONE
 
     @property
     def share(self) -> float:
@@ -195,6 +198,7 @@ def of(
         decided_at=decided_at,
         unit=base.plant.unit,
         duration=base.duration,
+        source=base.law.source.kind,
     )
 
 

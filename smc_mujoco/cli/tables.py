@@ -65,7 +65,8 @@ BOARD_KEY = (
     "median, #place, {level:.3g} % interval over seeds; * undefeated: no law is better in any condition. A winner is "
     "better than every other law: its median is lower by more than 3 %, and the seeds confirm it. Over several "
     "conditions: median of their medians, place by mean rank, how many are won and lost; a winner wins in each. "
-    "No winner is named over rivals at their default gains, unless with --defaults. x, u of driven joints, in rad or m, and N m, N or V"
+    "No winner is named over laws with default gains, unless with --defaults. x, u of driven joints, in rad or m, and "
+    "N m, N or V"
 )
 MIN_INTERVAL_RUNS = 6  # with fewer runs no interval of a median covers 95 %, see `analysis.bootstrap`
 

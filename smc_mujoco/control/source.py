@@ -94,15 +94,17 @@ def kinds(sources: Iterable[Source]) -> str:
     return ", ".join(dict.fromkeys(source.kind for source in sources))
 
 
-def in_words(sources: Mapping[str, Iterable[Source]]) -> str:
+def in_words(sources: Mapping[str, Iterable[Source]], short: bool = False) -> str:
     """Return where the gains of laws come from: "gains shipped (...)", or "gains: default of a and b, yours of c".
 
     Args:
       sources: law -> the sources of its gains; one that has no gains is left out.
+      short: whether to leave out the searches.
     """
     laws: dict[str, list[str]] = {}
     for law, its in sources.items():
-        words = ", ".join(dict.fromkeys(str(source) for source in its if source.kind != NONE))
+        known = [source for source in its if source.kind != NONE]
+        words = kinds(known) if short else ", ".join(dict.fromkeys(map(str, known)))
         if words:
             laws.setdefault(words, []).append(law)
     if len(laws) < 2:

@@ -78,14 +78,15 @@ def amplitudes(
         ax = page.subplots()
         colours = style.law_colours([of[0].scenario.law for of in runs.values()])
         handles, predicted = [], {}
-        for (label, of), colour in zip(runs.items(), colours, strict=True):
+        gains, shared = pages.gained([[trace.scenario.law.source for trace in of] for of in runs.values()])
+        for (label, of), colour, source in zip(runs.items(), colours, gains, strict=True):
             of.sort(key=lambda trace: lag(trace.scenario))
             lags = [1e3 * lag(trace.scenario) for trace in of]
             predicted[label] = lags, [predict(trace.scenario, ranges=False).amplitude for trace in of]
             ax.plot(*predicted[label], color=colour, lw=style.points(2.0))
             measured = [of_trace(trace)[0] for trace in of]
             ax.plot(lags, measured, "o", color=colour, ms=style.points(7.0), mec=style.PAPER)
-            handles.append(Line2D([], [], color=colour, lw=style.points(3.0), label=style.label(label)))
+            handles.append(Line2D([], [], color=colour, lw=style.points(3.0), label=f"{style.label(label)}{source}"))
         if len(predicted) == 2:
             (lags, one), (_, other) = predicted.values()
             if not math.isnan(equal := crossover(lags, one, other)):
@@ -95,6 +96,7 @@ def amplitudes(
                 ax.annotate(text, (equal, 0.0), xycoords=("data", "axes fraction"), **place)
         handles.append(Line2D([], [], color=style.MUTED, label="predicted"))
         handles.append(Line2D([], [], color=style.MUTED, marker="o", lw=0, label="run"))
+        handles += shared
         unit = next(iter(runs.values()))[0].scenario.plant.unit
         ax.set(xscale="log", yscale="log", xlabel="lag of the actuator (ms)", ylabel=f"amplitude of s ({unit}/s)")
         ax.xaxis.set_major_formatter("{x:g}")

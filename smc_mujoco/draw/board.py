@@ -10,7 +10,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
 from smc_mujoco.analysis.bootstrap import Interval, median_interval, share_interval
-from smc_mujoco.analysis.paired_runs import SETTLES, Columns, values
+from smc_mujoco.analysis.paired_runs import SETTLES, Columns, sources, values
 from smc_mujoco.common.errors import ScenarioError, taken, unknown
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
@@ -63,10 +63,13 @@ def plot(
     marks = dict(zip(laws, itertools.cycle(MARKS), strict=False))
     with style.page(width):
         key: list[Handle] = []
-        for law in laws:
+        known = sources(table)
+        gains, shared = pages.gained([known.get(law, ()) for law in laws])
+        for law, source in zip(laws, gains, strict=True):
             look = {"marker": marks[law], "ms": style.points(6), "mec": "none", "lw": style.points(1.5)}
-            key.append(Line2D([], [], color=colours[law], label=style.law_name(law), **look))
+            key.append(Line2D([], [], color=colours[law], label=style.law_name(law) + source, **look))
         key.append(Line2D([], [], color=style.MUTED, lw=style.points(1.5), label="95 % interval of the median"))
+        key += shared
         tall = [0.5 + LINE * (len(laws) + 1) * len(_there(table, plant, conditions)) for plant in plants]
         space = pages.head(width, key) + style.points(0.6)
         page = pages.blank(width, height or space + style.points(sum(tall)), fig)
@@ -80,11 +83,13 @@ def plot(
                 _panel(axes[i, k], table, plant, name, conditions, laws, colours, marks)
                 axes[i, k].set_xlabel(labels[k])
                 axes[i, k].tick_params(labelleft=k == 0)
-            known = plants_catalogue().get(plant)
+            shipped = plants_catalogue().get(plant)
             above = (
                 None if width >= pages.NARROW else 1.0 + style.points(1.7 * pages.LETTERS / 72) / style.points(tall[i])
             )
-            axes[i, 0].set_title(style.plant_name(known) if known else plant, y=above, parse_math=False)  # over "never"
+            axes[i, 0].set_title(
+                style.plant_name(shipped) if shipped else plant, y=above, parse_math=False
+            )  # over "never"
         pages.set_head(page, width, title or "Medians by condition", key)
         pages.write(page, paths)
     return page

@@ -331,9 +331,10 @@ def signals(
             if room > points(250):
                 drawing.note(ax, _variation(trace, group))
         drawing.scale_ticks(axes[0, 0].yaxis, control)  # which all share
-        for law, ax in zip(laws, axes[:, 0], strict=True):
+        gains, shared = pages.gained([[of_law[law].source] for law in laws])
+        for law, source, ax in zip(laws, gains, axes[:, 0], strict=True):
             ax.set_ylabel(control.label.replace("control ", ""))
-            words = style.cropped(style.law_name(of_law[law]), 0.55 * room, points(11), bold=True)
+            words = style.cropped(f"{style.law_name(of_law[law])}{source}", 0.55 * room, points(11), bold=True)
             ax.set_title(words, color=colours[law], parse_math=False)
         for i, condition in enumerate(conditions):
             changes = style.jumps([cells[key] for key in cells if key[1] == condition][:1], [condition])
@@ -346,6 +347,7 @@ def signals(
         key = _meaning([control])
         if room > points(250):
             key.append(Line2D([], [], lw=0, label="at the right: total variation per second over the last 20 %"))
+        key += shared
         pages.set_head(page, width, title or f"{style.plant_name(traces[0].scenario.plant)}: control", key)
         pages.write(page, paths)
     return page

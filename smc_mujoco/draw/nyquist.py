@@ -21,7 +21,7 @@ from smc_mujoco.analysis.harmonics import Loop
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
-from smc_mujoco.draw.page import Size
+from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -66,10 +66,12 @@ def nyquist(
     width, height = pages.measure(size, fig)
     with style.page(width):
         colours = style.law_colours([scenario.law for scenario in scenarios])
-        handles = [
-            Line2D([], [], color=colour, lw=style.points(3), label=_legend(scenario, cycle))
-            for scenario, cycle, colour in zip(scenarios, cycles, colours, strict=True)
+        gains, shared = pages.gained([[scenario.law.source] for scenario in scenarios])
+        handles: list[Handle] = [
+            Line2D([], [], color=colour, lw=style.points(3), label=_legend(scenario, cycle) + source)
+            for scenario, cycle, colour, source in zip(scenarios, cycles, colours, gains, strict=True)
         ]
+        handles += shared
         whole = pages.head(width, handles) + style.points(ROW) * len(scenarios)
         page = pages.blank(width, height or whole, fig)
         axes = page.subplots(len(scenarios), 2, squeeze=False, width_ratios=[1.0, 2.0])

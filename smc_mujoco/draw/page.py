@@ -6,7 +6,7 @@ A figure is new, or is drawn into the caller's matplotlib Figure or SubFigure. I
 
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from matplotlib.patches import Patch
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.files import replacing
+from smc_mujoco.control.source import NONE, Source, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.simulation.trace import Trace
 
@@ -145,13 +146,26 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
 
 
 def run_handles(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) -> list[Handle]:
-    """Return the entries of a legend for runs: a line and a label for each, and when it failed if it did."""
+    """Return the entries of a legend for runs: a line and a label for each, when it failed, and whose gains it has."""
     handles: list[Handle] = []
-    for trace, name, colour in zip(traces, names, colours, strict=True):
+    gains, shared = gained([[trace.scenario.law.source] for trace in traces])
+    for trace, name, colour, source in zip(traces, names, colours, gains, strict=True):
         how = style.ending(trace)
-        words = style.cropped(name, 0.3 * 72 * style.FULL_PAGE, LETTERS) + (f" ({how})" if how else "")
+        words = style.cropped(name, 0.3 * 72 * style.FULL_PAGE, LETTERS) + source + (f" ({how})" if how else "")
         handles.append(Line2D([], [], color=colour, lw=style.points(3), label=words))
-    return handles
+    return [*handles, *shared]
+
+
+def gained(sources: Sequence[Iterable[Source]]) -> tuple[list[str], list[Handle]]:
+    """Return where gains come from: what follows each label, such as ", gains default", or one entry for all alike.
+
+    Args:
+      sources: those of each label's law.
+    """
+    words = [f"gains {found}" if (found := kinds(each)) not in ("", NONE) else "" for each in sources]
+    if len(said := {one for one in words if one}) == 1:
+        return [""] * len(words), [Line2D([], [], lw=0, label=said.pop())]
+    return [f", {one}" if one else "" for one in words], []
 
 
 def files(path: str | os.PathLike[str], format: str | None = None) -> list[Path]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, Basin
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control.source import NONE
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
@@ -69,7 +70,8 @@ def fill(ax, region: Basin) -> None:
     )
     ax.plot(0.0, 0.0, "+", color=style.PAPER, markersize=style.points(11), markeredgewidth=style.points(1.6))
     ax.grid(visible=False)
-    ax.set_title(f"{style.law_name(region.law)} on {region.plant.replace('_', ' ')}")
+    gains = f"\ngains {region.source}" * (region.source != NONE)
+    ax.set_title(f"{style.law_name(region.law)} on {region.plant.replace('_', ' ')}{gains}")
     ax.set_xlabel(f"initial position ({region.unit})")
     ax.set_ylabel(f"initial velocity ({region.unit}/s)")
     marks = [Patch(facecolor=colour, edgecolor=style.RULE, label=words) for colour, words in entries]

@@ -256,7 +256,7 @@ def leaderboard(
     boards, seed = Boards(), whole("seed", seed, 0, 2**53 - 1)
     by_row = {name: cells.values(table, name) for name in units}
     for group in cells.groups(table, by):
-        ran, sources = cells.scenarios(table, group), cells.sources(table, group)
+        ran, sources = cells.scenarios(table, group), cells.sources(table, group.rows[group.rows >= 0])
         at_default = (law for law, its in sources.items() if any(source.kind == DEFAULT for source in its))
         untuned = () if defaults else tuple(at_default)
         for metric, unit in units.items():

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from PIL import Image, ImageDraw
 
+from smc_mujoco.control.source import in_words
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film import pace
 from smc_mujoco.draw.film.arrows import Scale
@@ -60,7 +61,9 @@ class Caption:
         )
         notes = [style.width(f"{words} since {time:g} s", KEY * scale, bold=True) for time, words in self.jumps.items()]
         self.note_room = min(max(notes, default=0.0) + EDGE * scale, 0.4 * inside)
-        self.key = wrapped(key(traces, scales) if parts is None else parts, inside - self.note_room, KEY * scale)
+        gains = in_words({name: [t.scenario.law.source] for name, t in zip(names, traces, strict=True)}, short=True)
+        parts = [*(key(traces, scales) if parts is None else parts), *filter(None, [gains])]
+        self.key = wrapped(parts, inside - self.note_room, KEY * scale)
         self.beside = not row  # machines behind each other have their labels at the left
         words = [{state.words for state in each if state} for each in states] or [set()] * len(traces)
         badges = [max((self.badge_width(text) for text in each), default=0.0) for each in words]

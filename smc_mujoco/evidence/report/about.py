@@ -9,9 +9,11 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
+from smc_mujoco.analysis import paired_runs
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component
+from smc_mujoco.control.source import in_words
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.plan import FULL, Plan
@@ -38,6 +40,7 @@ class About:
       plan: how much of everything.
       runs, failed: number of runs of the grid, and of those that failed.
       seeds: number of seeds of a cell of the grid, the largest where cells differ.
+      sources: where the gains of the grid's laws come from, in words.
       versions: package -> version.
       spent: stage -> s of this call; less where results were there already.
       no_film: why there are no films, or None.
@@ -47,6 +50,7 @@ class About:
     runs: int
     failed: int
     seeds: int
+    sources: str
     versions: Mapping[str, str]
     spent: Mapping[str, float]
     no_film: str | None = None
@@ -84,6 +88,7 @@ def about(plan: Plan, table: Table, spent: Mapping[str, float], no_film: str | N
         runs=len(table),
         failed=sum(failure is not None for failure in table.column("failure")),
         seeds=len(set(table.column("seed").tolist())),
+        sources=in_words(paired_runs.sources(table)),
         versions=json.loads(table.column("versions")[0]) | {name: version(name) for name in SHOWN},
         spent=dict(spent),
         no_film=no_film,
@@ -120,4 +125,4 @@ def _source(plant: str, law: str, name: str) -> str:
         return "chosen by hand before any comparison"
     its = sets.tuned(plant, law, name)
     bounds = f"; at a bound: {', '.join(its.at_bound)}" if its.at_bound else ""
-    return f"the best of {len(its.sets)}; objective {its.objective:.4g} s², {its.search}{bounds}"
+    return f"shipped ({its.search}); the best of {len(its.sets)}; objective {its.objective:.4g} s²{bounds}"

@@ -95,8 +95,9 @@ def leaders(found: Cells, plant: str, condition: str, metric: str) -> list[str]:
 
 def winner(found: Cells, plant: str, condition: str, metric: str) -> str | None:
     """Return the law that wins, as on a board: it alone leads, among several, and may be named."""
-    leading, scores = leaders(found, plant, condition, metric), found.get((plant, condition, metric), ())
-    return leading[0] if len(leading) == 1 < len(scores) and not scores[0].barred else None
+    leading, scores = leaders(found, plant, condition, metric), found.get((plant, condition, metric), [])
+    barred = any(score.barred for score in scores)
+    return leading[0] if len(leading) == 1 < len(scores) and not barred else None
 
 
 def standings(findings: "Findings", metric: str) -> list[Standing]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.text import joined
+from smc_mujoco.control.source import in_words
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.plan import Report, Work
 from smc_mujoco.evidence.rigs import ensemble, records
@@ -37,6 +38,12 @@ class Machine:
     def colours(self) -> dict[str, str]:
         """Name of each law -> its colour, all different."""
         return dict(zip(self.laws, words.style.law_colours(self.rig.laws), strict=True))
+
+    @property
+    def gains(self) -> str:
+        """Where the gains of the laws come from, in words."""
+        found = in_words({words.style.law_name(law): [law.source] for law in self.rig.laws})
+        return found[:1].upper() + found[1:]
 
     def unit(self, metric: str) -> str:
         """Return the unit of a metric on this machine."""
