@@ -15,8 +15,7 @@ from rich.text import Text
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.tuning.result import HEADINGS, Tuned
 from smc_mujoco.common.text import number
-from smc_mujoco.control import source as sources
-from smc_mujoco.control.source import Source
+from smc_mujoco.control.source import in_words, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.metrics.catalogue import metrics
@@ -27,7 +26,7 @@ from smc_mujoco.metrics.tip import tip_scores, worst_joint
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.accuracy import AccuracyTable, heads, lines, remarks
-from smc_mujoco.studies.board_tables import size, spread
+from smc_mujoco.studies.board_tables import size, sources, spread
 from smc_mujoco.studies.leaderboard import Block, Board
 
 if TYPE_CHECKING:
@@ -106,7 +105,7 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
             table.add_row(_label(label, trace), *cells)
         tables.append(table)
     gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
-    tables[-1].caption, tables[-1].caption_justify = sources.in_words(gains) or None, "left"
+    tables[-1].caption, tables[-1].caption_justify = in_words(gains) or None, "left"
     return tables
 
 
@@ -260,19 +259,10 @@ def leaderboard(boards: Sequence[Board]) -> Table:
     table.caption = BOARD_KEY.format(level=100 * boards[0].level) if boards else "no boards: no metric applies"
     if any(block.runs < MIN_INTERVAL_RUNS for board in boards for block in board.blocks):
         table.caption += f"; with fewer than {MIN_INTERVAL_RUNS} runs an interval is their range, and covers less"
-    if gains := sources.in_words(_sources(boards)):
+    if gains := in_words(sources(boards)):
         table.caption += f". {gains[:1].upper()}{gains[1:]}"
     table.caption_justify = "left"
     return table
-
-
-def _sources(boards: Iterable[Board]) -> dict[str, list[Source]]:
-    """Return law -> where its gains come from, in any board."""
-    found: dict[str, list[Source]] = {}
-    for board in boards:
-        for entry in board.entries:
-            found.setdefault(entry.law, []).extend(entry.sources)
-    return {law: found[law] for law in sorted(found)}
 
 
 def _group_lines(name: str, own: Mapping[str, Board], shown: Sequence[Board | None]) -> Iterator[list[Text]]:
@@ -288,8 +278,8 @@ def _group_lines(name: str, own: Mapping[str, Board], shown: Sequence[Board | No
         yield [head, *(_block_cell(board, block) for board in shown)]
     if several:
         yield [Text(f"\nall {len(largest.blocks)}\n{largest.kind}", "dim")]
-    for law, its in _sources(own.values()).items():
-        head = Text(_folded(law), style.law_colour(law)).append(f"\n{sources.kinds(its)}" * bool(its), "dim")
+    for law, its in sources(own.values()).items():
+        head = Text(_folded(law), style.law_colour(law)).append(f"\n{kinds(its)}" * bool(its), "dim")
         yield [head, *(_law_cell(board, law) for board in shown)]
     yield [Text(""), *(_winner_cell(board) for board in shown)]
 

@@ -95,7 +95,7 @@ def kinds(sources: Iterable[Source]) -> str:
 
 
 def in_words(sources: Mapping[str, Iterable[Source]], short: bool = False) -> str:
-    """Return where the gains of laws come from: "gains shipped (...)", or "gains: default of a and b, yours of c".
+    """Return where the gains of laws come from: "gains shipped (...)", or "gains: a and b default, c yours".
 
     Args:
       sources: law -> the sources of its gains; one that has no gains is left out.
@@ -109,4 +109,4 @@ def in_words(sources: Mapping[str, Iterable[Source]], short: bool = False) -> st
             laws.setdefault(words, []).append(law)
     if len(laws) < 2:
         return "".join(f"gains {words}" for words in laws)
-    return f"gains: {', '.join(f'{words} of {joined(names)}' for words, names in laws.items())}"
+    return f"gains: {', '.join(f'{joined(names)} {words}' for words, names in laws.items())}"

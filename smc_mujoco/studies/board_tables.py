@@ -69,11 +69,11 @@ def as_html(boards: Iterable[Any]) -> html.Html:
     """Return a table for each group of runs, with what each metric's board says below."""
     tables = []
     for name, own in _groups(boards).items():
-        heads = ("law", "gains", *(heading(board).replace("^2", "²") for board in own))
-        gains = sources(own)
-        lines = [(law, kinds(gains[law]), *map(_html_cell, cells)) for law, cells in _laws(own).items()]
+        left = _left(own)
+        heads = *left[""], *(heading(board).replace("^2", "²") for board in own)
+        lines = [(*left[law], *map(_html_cell, cells)) for law, cells in _laws(own).items()]
         note = html.Html("<br>".join(map(html.text, [*_verdicts(own), key(own)])))
-        tables.append(html.table(heads, lines, name, note, range(2, 2 + len(own)), most=40))
+        tables.append(html.table(heads, lines, name, note, range(len(left[""]), len(heads)), most=40))
     return html.Html("<br>".join(tables)) if tables else html.table((), [("no boards: no metric applies",)])
 
 
@@ -81,11 +81,11 @@ def as_latex(boards: Iterable[Any]) -> str:
     """Return a tabular for each group of runs, below comments that say what it is of."""
     tables = []
     for name, own in _groups(boards).items():
+        left = {law: list(map(_tex, texts)) for law, texts in _left(own).items()}
         lines = [f"% {text}" for text in (name, *_verdicts(own), f"{key(own)}; needs booktabs", FIT)]
-        lines += [f"\\begin{{tabular}}{{ll{'r' * len(own)}}}", "\\toprule"]
-        lines += [_tex_line(["law", "gains", *(_tex(heading(board)) for board in own)]), "\\midrule"]
-        gains = {law: _tex(kinds(its)) for law, its in sources(own).items()}
-        lines += [_tex_line([_tex(law), gains[law], *map(_tex_cell, cells)]) for law, cells in _laws(own).items()]
+        lines += [f"\\begin{{tabular}}{{{'l' * len(left[''])}{'r' * len(own)}}}", "\\toprule"]
+        lines += [_tex_line([*left[""], *(_tex(heading(board)) for board in own)]), "\\midrule"]
+        lines += [_tex_line([*left[law], *map(_tex_cell, cells)]) for law, cells in _laws(own).items()]
         tables.append("\n".join([*lines, "\\bottomrule", "\\end{tabular}\n"]))
     return "\n".join(tables)
 
@@ -98,9 +98,20 @@ def key(boards: Sequence[Any]) -> str:
     return f"{words}; {gains}" if gains else words
 
 
-def sources(boards: Sequence["Board"]) -> dict[str, tuple[Source, ...]]:
-    """Return law -> where its gains come from, for every law of the boards of one group of runs."""
-    return {entry.law: entry.sources for board in boards for entry in board.entries}
+def sources(boards: Iterable[Any]) -> dict[str, list[Source]]:
+    """Return law -> where its gains come from, by name, for every law of some boards."""
+    found: dict[str, list[Source]] = {}
+    for board in boards:
+        for entry in board.entries:
+            found.setdefault(entry.law, []).extend(entry.sources)
+    return dict(sorted(found.items()))
+
+
+def _left(boards: Sequence[Any]) -> dict[str, list[str]]:
+    """Return the first cells of each law's line, and of the headings under "": the gains only if they are known."""
+    found = sources(boards)
+    known = any(found.values())
+    return {"": ["law", *["gains"] * known]} | {law: [law, *[kinds(its)] * known] for law, its in found.items()}
 
 
 def _verdicts(boards: Sequence[Any]) -> list[str]:

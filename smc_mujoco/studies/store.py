@@ -23,6 +23,7 @@ import numpy as np
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import reading
+from smc_mujoco.common.frozen import frozen
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies import table
 
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 GROUP = 4096  # rows in memory at once while the table is written; chosen
 PARTS_HELD = 64  # parts in memory at once while the table is written; chosen
 ABANDONED = 3600.0  # s, age of temporary files that belong to a killed study; chosen
+NOTHING: Mapping[str, Any] = frozen({})
 PART = re.compile(r"[0-9a-f]{32}\.parquet")
 
 
@@ -82,12 +84,12 @@ class Store:
         table.write(path, self.schema, [pa.Table.from_pylist(list(rows), schema=self.schema)])
         self.where.update((name, (path, i)) for i, name in enumerate(hashes))
 
-    def collect(self, hashes: Sequence[str], sources: Mapping[str, Mapping[str, str | None]]) -> None:
+    def collect(self, hashes: Sequence[str], sources: Mapping[str, Mapping[str, str | None]] = NOTHING) -> None:
         """Write the table of these finished runs, in this order.
 
         Args:
-          sources: hash -> the columns of `run_key.source`. A part may have those of an earlier study, as equal runs
-            have one hash.
+          sources: hash -> the columns of `run_key.source`; default: those of the parts, which an earlier study may
+            have written, as runs with equal gains have one hash.
 
         Raises:
           ScenarioError: the folder cannot be written, or a part has been removed.
@@ -107,7 +109,7 @@ class Store:
                 found.append(part.take([self.where[names[i]][1] for i in indices]))
             order = np.argsort(np.concatenate(list(places.values())))
             data = pa.concat_tables(found).take(order).combine_chunks()
-            for name in ("source", "search"):
+            for name in ("source", "search") if sources else ():
                 column = pa.array([sources[one][name] for one in names], pa.string())
                 data = data.set_column(data.column_names.index(name), data.field(name), column)
             return data

@@ -196,9 +196,11 @@ class Table:
         row = self.data.slice(int(i) % len(self), 1)
         if known := self.known.get(row["hash"][0].as_py()):
             return known
-        search = row["search"][0].as_py()
-        source = {"kind": row["source"][0].as_py(), "search": search and from_json(search)}
-        return serialise.restore(from_json(row["scenario"][0].as_py()) | {"source": source})
+        about = from_json(row["scenario"][0].as_py())
+        if "source" in row.column_names:
+            search = row["search"][0].as_py()
+            about["source"] = {"kind": row["source"][0].as_py(), "search": search and from_json(search)}
+        return serialise.restore(about)
 
     def trace(self, i: int) -> Trace:
         """Run row i again and return its trace; with the same versions it is the same to the last bit."""

@@ -425,7 +425,7 @@ def test_commands_take_laws_with_gains_of_their_own(file, tmp_path, monkeypatch)
     bench = ["bench", "--plants", "arm.xml:shoulder", "--laws", laws, "--seeds", "1", "--duration", "0.1", *common]
     done = runner.invoke(app, bench)
     assert done.exit_code == 0, done.output
-    assert "gains as given" in done.output
+    assert "Gains: classical and quick yours, pid tuned here (" in " ".join(done.output.split())
     table = smc.Table.read(tmp_path / "study")
     laws = {s.law.name: s.law for s in map(table.scenario, range(len(table)))}
     assert laws["pid"] == load(tmp_path / "arm_pid.json").law

@@ -44,6 +44,7 @@ def test_a_scenario_shows_what_it_was_given_and_names_its_defaults():
     assert shown == {
         "plant": "inverted_pendulum (m = 0.5, l = 0.5, b = 0.02, grav = 9.81)",
         "law": "classical(k=2, c=3)",
+        "gains": "yours",
         "duration": "0.2 s",
         "x0": "0.3 rad",
         "noise": "Noise(position=0.01, velocity=0.05)",
@@ -56,7 +57,7 @@ def test_a_scenario_shows_what_it_was_given_and_names_its_defaults():
     loaded = smc.Scenario(plant="panda", law="none", mismatch={"m": 1.1, "payload": 2.0})
     assert cells(loaded)["mismatch"] == "m × 1.1, payload + 2 kg"
     bare = cells(smc.Scenario(plant="duffing", law="classical"))
-    assert list(bare)[:-1] == ["plant", "law", "duration"]
+    assert list(bare)[:-1] == ["plant", "law", "gains", "duration"]
     assert "x0 1.5 m" in list(bare)[-1]
 
 

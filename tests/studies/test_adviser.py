@@ -80,13 +80,13 @@ def test_wins_are_those_of_the_comparison(advice):
 
 def test_the_answer_says_what_why_and_how_sure(advice):
     use, because, second, sure = advice.answer
-    assert use == f"Use {FAST} (gains as given)."
+    assert use == f"Use {FAST} (gains yours)."
     assert because.startswith(
         "Because it has the best mean rank of 3 finalists. It settles in 100 % of its runs. Fast: "
     )
     settling, calm = (number(advice.choices[0].medians[need].median) for need in ("fast", "calm"))
     assert f"Fast: settling time {settling} s; no finalist is better. Calm: TV rate {calm} N/s; no fin" in because
-    assert second == f"Second choice: {advice.second} (gains as given); worse on fast and calm."
+    assert second == f"Second choice: {advice.second} (gains yours); worse on fast and calm."
     low, high = advice.choices[0].rank.low, advice.choices[0].rank.high
     assert sure.startswith("How sure: it dominates slow and classical: better somewhere, worse nowhere; ")
     assert f"its place by mean rank is {low:g}{f' to {high:g}' if high > low else ''} of 3" in sure
@@ -120,7 +120,7 @@ def test_a_need_in_one_condition_is_named_with_it(advice):
     found = with_cells(advice, observer_free=[1, 1, 9, 9], slow=[2, 2, 9, 3], classical=[3, 3, 10, 10])
     assert found.law.name == "observer_free"
     assert "Calm: TV rate 9.00 N/s; better is slow under noise." in text(found)
-    assert f"Second choice: {SLOW} (gains as given); better on calm under noise; worse on fast." in text(found)
+    assert f"Second choice: {SLOW} (gains yours); better on calm under noise; worse on fast." in text(found)
 
 
 def test_a_law_that_is_better_in_one_condition_and_worse_over_all_is_not_named_for_a_need(advice):
@@ -170,7 +170,7 @@ def test_a_law_that_ties_with_one_of_better_mean_rank_is_advised_for_the_rule(ad
     assert second.rank.mean < first.rank.mean
     assert found.answer[0].startswith("No law can be called the best")
     assert found.answer[0].endswith(
-        f"overshoot, then of energy of u, less first; first is {first.law} ({first.source})."
+        f"overshoot, then of energy of u, less first; first is {first.law} ({first.gains})."
     )
     three = with_cells(advice, restraint | {"classical": (1.0,)}, **cells, classical=[3 * even] * 4)
     assert three.law.name == "observer_free"
@@ -253,7 +253,7 @@ def test_one_law_is_the_only_one(folder):
     found = smc.which("duffing", laws=FAST, out=folder, **COMMON)
     assert (found.second, found.needs) == (None, adviser.USUAL)
     assert found.answer == [
-        f"Use {FAST} (gains as given).",
+        f"Use {FAST} (gains yours).",
         "Because it is the only law here that suits. It settles in 100 % of its runs.",
         "How sure: nothing could be compared with it.",
     ]
@@ -300,7 +300,7 @@ def test_laws_are_tuned_as_the_packages_own_gains_were_where_these_are_compared(
 def test_gains_of_the_package_are_taken_where_there_are_some(folder):
     found = smc.which("duffing", laws=["classical"], out=folder, **COMMON)
     assert found.law == gain_sets.law("duffing", "classical")
-    assert found.choices[0].source == "tuned gains of the package"
+    assert found.law.source.kind == "shipped"
 
 
 def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(folder, monkeypatch):
@@ -316,7 +316,7 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(folder
     options = {"laws": [my_pd], "needs": "fast,continuous", "out": folder} | COMMON
     options |= {"seeds": 2, "duration": 1.0, "conditions": "nominal"}
     found = smc.which(heavy, **options)
-    assert found.choices[0].source == "tuned here, 16 sets of gains tried"
+    assert found.choices[0].gains.startswith("gains tuned here (CMA-ES and COBYQA from several starts, 16 evaluations")
     assert found.law.function is my_pd.function
     assert found.law.gains == tuned[0].law.gains != my_pd.defaults
     assert (tuned[0].budget, tuned[0].plant) == (16, heavy)
@@ -332,7 +332,7 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
     def build(n):
         return mujoco.MjSpec.from_string("<mujoco/>")
 
-    asked, tuned = [], types.SimpleNamespace(before=1.0, objective=2.0)
+    asked, tuned = [], types.SimpleNamespace(before=1.0, objective=2.0, law=FAST)
     monkeypatch.setattr(adviser, "cached", lambda path, depends, *rest: asked.append(depends) or tuned)
     held = dataclasses.replace(my_spring, gains={**my_spring.gains, "kd": Gain(1.0, FORCE_PER_SPEED, held=True)})
     duffing = smc.plant("duffing")
@@ -351,16 +351,17 @@ def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(folder, monkeyp
     tuned = types.SimpleNamespace(before=1.0, objective=2.0, law=FAST)
     monkeypatch.setattr(adviser, "cached", lambda *rest: tuned)
     own = adviser._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None)
-    assert own == (smc.law("observer_free"), "its own gains, better than the 4 sets tried here")
+    assert own == (smc.law("observer_free"), "its defaults, better than those tried")
+    assert own.law.source.kind == FAST.source.kind
     tuned.before = 3.0
     found = adviser._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None)
-    assert found == (FAST, "tuned here, 4 sets of gains tried")
+    assert found == (FAST, "")
 
 
 def test_a_plant_that_cannot_be_tuned_has_default_gains_and_says_so(folder):
     found = smc.which("overhead_crane", "nominal", "fast", seeds=2, duration=1.0, out=folder)
     assert found.law == smc.law("hierarchical")
-    assert found.choices[0].source.startswith("default gains, as tuning is not possible here: it has free joints")
+    assert found.choices[0].gains.startswith("gains default; tuning is not possible here: it has free joints")
 
 
 # what is asked
@@ -421,10 +422,9 @@ def test_the_command_prints_the_table_and_the_answer(folder, capsys, monkeypatch
     printed = " ".join(capsys.readouterr().out.split())
     assert not end.value.code
     assert (
-        "Use fast(lam=6, k1=2) (gains as given). Because it has the best mean rank of 2 finalists. It settles"
-        in printed
+        "Use fast(lam=6, k1=2) (gains yours). Because it has the best mean rank of 2 finalists. It settles" in printed
     )
-    assert "Second choice: slow(lam=6, k1=4) (gains as given); worse on fast." in printed
+    assert "Second choice: slow(lam=6, k1=4) (gains yours); worse on fast." in printed
     assert "How sure: it dominates slow: better somewhere, worse nowhere; its place" in printed
     assert math.isfinite(float(printed.partition("results.parquet; ")[2].split()[0]))
 

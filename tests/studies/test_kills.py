@@ -49,9 +49,9 @@ def told(pipe):
         tell("write")
         add(self, rows)
         tell("wrote", *(row["hash"] for row in rows))
-    def collecting(self, hashes):
+    def collecting(self, *given):
         tell("collect")
-        collect(self, hashes)
+        collect(self, *given)
     executors.simulated, store.Store.add, store.Store.collect = simulated, adding, collecting
 
 def live(folder, doomed):

@@ -170,9 +170,8 @@ def bench(
         ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
         machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
         scenarios = ensemble.runs(machine, chosen, count, "default", length, begin)
-        used = options.gains_used(chosen or (), "default")
     else:
-        scenarios, used = _grid(size, plants, laws, conditions, condition, count, gains or "tuned", length, begin)
+        scenarios = _grid(size, plants, laws, conditions, condition, count, gains or "tuned", length, begin)
     table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)
     boards = leaderboard(table, defaults=defaults)
     terminal.print(tables.leaderboard(boards))
@@ -180,7 +179,7 @@ def bench(
         terminal.note(ensemble.verdict(boards))
     failed = len(table) - table.data["failure"].null_count
     runs = f"{len(table)} run{'s' * (len(table) != 1)}, {failed} of them failed"
-    terminal.note(f"{runs}, {used}, {terminal.seconds:.0f} s")
+    terminal.note(f"{runs}, {terminal.seconds:.0f} s")
     terminal.wrote(out / "results.parquet")
 
 
@@ -194,8 +193,8 @@ def _grid(
     gains: str,
     duration: float,
     starts: "Starts | None",
-) -> "tuple[list[Scenario], str]":
-    """Return the scenarios of `bench` from the texts of its options, and in words where their gains are from."""
+) -> "list[Scenario]":
+    """Return the scenarios of `bench` from the texts of its options."""
     from smc_mujoco.control.gain_sets import general_laws
     from smc_mujoco.mechanisms.plant import as_plant
     from smc_mujoco.simulation.conditions import applicable
@@ -206,4 +205,4 @@ def _grid(
     chosen = options.names(laws, size.laws)
     chosen = general_laws(machines, gains) if laws == "all" else [options.law(text) for text in chosen]
     found = options.conditions(options.names(conditions, usual), own)
-    return grid(machines, chosen, found, seeds, gains, duration, starts), options.gains_used(chosen, gains)
+    return grid(machines, chosen, found, seeds, gains, duration, starts)

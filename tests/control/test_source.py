@@ -1,0 +1,116 @@
+"""Where gains come from: set where they are chosen, kept with the law, and never left on gains that were replaced."""
+
+import copy
+import dataclasses
+import pickle
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.tuning import result
+from smc_mujoco.control import gain_sets, source
+from smc_mujoco.control.component import by_channel
+from smc_mujoco.control.law import law_function
+
+PLANT, LAW = "inverted_pendulum", "super_twisting"
+
+
+@law_function(gains={"k": 2.0})
+def my_law(y, gains, memory):
+    return -gains.k * y.e, y.e
+
+
+def sets(name=LAW):
+    """The same law with gains of each source."""
+    return {
+        "default": smc.law(name),
+        "shipped": gain_sets.law(PLANT, name, "tuned"),
+        "study": gain_sets.law(PLANT, name, "study"),
+        "yours": smc.law(name, k1=2.0),
+    }
+
+
+def test_one_name_with_three_sets_of_gains_is_told_apart():
+    laws = sets()
+    runs = smc.run([smc.Scenario(plant=PLANT, law=law, duration=3.0) for law in laws.values()])
+    settled = {kind: smc.score(trace)["settling_time"] for kind, trace in zip(laws, runs, strict=True)}
+    assert settled["default"] > 3 * settled["shipped"] > 3.5 * settled["study"]  # 1.61, 0.41 and 0.32 s
+    for kind, trace in zip(laws, runs, strict=True):
+        assert trace.scenario.law.source.kind == kind
+        assert f"gains {kind}" in repr(trace)
+        assert kind in trace._repr_html_()
+
+
+def test_a_law_is_the_users_only_with_gains_of_the_user():
+    assert [law.source.kind for law in (my_law(), my_law(k=2.0), smc.law("pid"), smc.law("pid", kp=9.0))] == [
+        "default",
+        "yours",
+        "default",
+        "yours",
+    ]
+    assert smc.Scenario(plant=PLANT, law=my_law).law.source.kind == "default"
+    assert (smc.law("none").source.kind, smc.law("none").named("idle").source.kind) == ("none", "none")
+    assert gain_sets.law(PLANT, LAW, "default").source.kind == "default"
+
+
+def test_the_search_is_that_of_the_file():
+    law, tuning = gain_sets.law("duffing", "classical"), result.shipped("duffing", "classical")
+    assert law.source == tuning.law.source
+    assert (law.source.search.rule, law.source.search.evaluations) == (tuning.rule, tuning.budget)
+    assert str(tuning.budget) in str(law.source)
+
+
+@pytest.mark.parametrize("kind", sets())
+def test_copies_keep_the_source(kind, tmp_path):
+    law = sets()[kind]
+    its = law.source
+    kept = [
+        pickle.loads(pickle.dumps(law)),
+        pickle.loads(pickle.dumps(law.named("other"))),
+        copy.deepcopy(law),
+        dataclasses.replace(law, memory=9),
+        dataclasses.replace(law, gains=dict(law.gains)),
+        by_channel([law, law]),
+        by_channel([law, smc.law("none").named("x")]).of_channel(0),
+    ]
+    trace = smc.run(smc.Scenario(plant=PLANT, law=law, duration=0.01))
+    kept.append(smc.load(trace.save(tmp_path / "trace.npz")).scenario.law)
+    assert [one.source for one in kept] == [its] * len(kept)
+
+
+def test_replaced_gains_are_the_users():
+    for law in sets().values():
+        changed = dataclasses.replace(law, gains={**law.gains, "k1": 7.5})
+        assert changed.source.kind == "yours"
+        assert changed.source.search is None
+
+
+def test_gains_by_channel_are_of_their_common_source():
+    default, shipped = smc.law("pid"), gain_sets.law("duffing", "pid")
+    both = by_channel(
+        [shipped, dataclasses.replace(shipped, gains=default.gains, source=shipped.source.of(default.gains))]
+    )
+    assert both.source.kind == both.of_channel(1).source.kind == "shipped"
+    assert by_channel([default, shipped]).source.kind == "yours"
+    assert by_channel([smc.law("classical"), default]).source.kind == "default"
+
+
+def test_laws_with_equal_gains_are_equal():
+    default = smc.law("classical")
+    same = smc.law("classical", **default.gains)
+    assert (default == same, hash(default) == hash(same)) == (True, True)
+    assert default.source != same.source
+
+
+def test_words_name_each_source_once_with_its_laws():
+    laws = {"a": [sets()["default"].source], "b": [sets()["study"].source], "c": [sets()["default"].source]}
+    assert source.in_words(laws) == "gains: a and c default, b study"
+    assert source.in_words({"a": laws["a"], "none": [source.Source()]}) == "gains default"
+    assert source.in_words({"none": [source.Source()]}) == ""
+    search = source.Search(rule="CMA-ES (three starts), in logarithms", evaluations=288, converged=False)
+    assert str(smc.law("pid").sourced("shipped", search).source) == "shipped (CMA-ES, 288 evaluations, not converged)"
+
+
+def test_an_unknown_kind_is_refused():
+    with pytest.raises(smc.ScenarioError, match="did you mean 'default'"):
+        smc.law("pid").sourced("defualt")

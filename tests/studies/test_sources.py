@@ -1,0 +1,115 @@
+"""Whose gains: a study keeps their sources, boards and pictures show them, and no winner is named over defaults."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+import smc_mujoco as smc
+from smc_mujoco.cli import main, tables
+from smc_mujoco.control import gain_sets
+from smc_mujoco.studies import run_key
+
+FAST, SLOW = (smc.law("observer_free", lam=6.0, k1=k1).named(name) for k1, name in ((2.0, "fast"), (4.0, "slow")))
+
+
+def at_default(law):
+    """The same run, with gains that count as the law's defaults."""
+    return law.sourced("default")
+
+
+def ranked(laws, out, **options):
+    """The board of settling times of laws on the Duffing oscillator."""
+    table = smc.study(smc.grid("duffing", laws, "nominal", 16, duration=2.5), out)
+    return smc.leaderboard(table, ["settling_time"], **options)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("study")
+
+
+def text(table) -> str:
+    console = Console(width=100, file=io.StringIO())
+    console.print(table)
+    return " ".join(console.file.getvalue().split())
+
+
+def test_a_winner_is_named_over_rivals_at_their_defaults_only_where_it_is_asked_for(folder):
+    (fair,) = ranked([FAST, SLOW], folder)
+    assert fair.winner == "fast"
+    boards = ranked([FAST, at_default(SLOW)], folder)
+    (unfair,) = boards
+    assert (unfair.winner, unfair.blocks[0].winner, unfair.wins("fast")) == (None, None, [])
+    assert unfair.verdict == "no winner: none is named over slow with default gains"
+    assert "textbf" not in boards.to_latex()
+    assert "rivals at defaults" in text(tables.leaderboard(boards))
+    (asked,) = ranked([FAST, at_default(SLOW)], folder, defaults=True)
+    assert asked.winner == "fast"
+
+
+def test_a_law_at_its_own_defaults_may_win_over_others(folder):
+    (board,) = ranked([at_default(FAST), SLOW], folder)
+    assert board.winner == "fast"
+
+
+def test_boards_print_the_sources(folder):
+    boards = ranked([FAST, at_default(SLOW)], folder)
+    for printed in (text(tables.leaderboard(boards)), boards._repr_html_(), boards.to_latex()):
+        assert "slow default" in printed
+        assert "fast yours" in printed
+    assert "slow & default &" in boards.to_latex()
+
+
+def test_equal_gains_are_one_run_and_the_table_has_the_source_of_this_study(folder):
+    first = ranked([FAST, SLOW], folder)
+    parts = sorted((folder / "parts").iterdir())
+    again = ranked([FAST, at_default(SLOW)], folder)
+    assert sorted((folder / "parts").iterdir()) == parts  # nothing ran again
+    assert [entry.interval for entry in first[0].entries] == [entry.interval for entry in again[0].entries]
+    table = smc.Table.read(folder)
+    assert dict(zip(table.column("law"), table.column("source"), strict=True)) == {"fast": "yours", "slow": "default"}
+    assert table.scenario(16).law.source.kind == "default"
+    one, other = (smc.Scenario(plant="duffing", law=law) for law in (SLOW, at_default(SLOW)))
+    assert run_key.key(one) == run_key.key(other)
+
+
+def test_a_table_keeps_the_search_behind_the_gains(tmp_path):
+    law = gain_sets.law("duffing", "classical")
+    smc.study(smc.grid("duffing", "classical", duration=0.1), tmp_path)
+    assert smc.Table.read(tmp_path).scenario(0).law.source == law.source
+
+
+def test_an_adviser_names_no_law_over_rivals_at_their_defaults(tmp_path):
+    options = {"seeds": 16, "duration": 2.5, "conditions": "nominal", "needs": "fast", "out": tmp_path}
+    advice = smc.which("duffing", laws=[FAST, at_default(SLOW)], **options)
+    (sentence,) = advice.answer
+    assert sentence.startswith("No law is advised over slow, whose gains are its defaults: ")
+    assert (advice.code, "fast" in repr(advice)) == ("", False)
+    assert "Gains: fast yours, slow default." in advice.key
+    asked = smc.which("duffing", laws=[FAST, at_default(SLOW)], defaults=True, **options)
+    assert asked.answer[0] == f"Use {FAST} (gains yours)."
+
+
+def test_bench_names_a_winner_over_defaults_with_an_option(tmp_path, capsys):
+    laws = "fast: observer_free(lam=6, k1=2), adaptive()"
+    options = ["--conditions", "nominal", "--seeds", "16", "--duration", "2", "--out", str(tmp_path)]
+    for extra in ([], ["--defaults"]):
+        with pytest.raises(SystemExit):
+            main.main(["bench", "--plants", "duffing", "--laws", laws, *options, *extra])
+        printed = " ".join(capsys.readouterr().out.split())
+        assert ("rivals at" in printed) == (not extra)
+        assert "adaptive default" in printed
+
+
+def test_figures_and_films_say_whose_gains_are_drawn():
+    from smc_mujoco.draw.film import caption
+
+    laws = [FAST, at_default(SLOW)]
+    mixed = smc.run([smc.Scenario(plant="duffing", law=law, duration=0.1) for law in laws])
+    alike = [mixed[0], mixed[0]]
+    drawn = [[label.get_text() for label in smc.figure(runs).legends[0].get_texts()] for runs in (mixed, alike)]
+    assert {"fast, gains yours", "slow, gains default"} <= set(drawn[0])
+    assert "gains yours" in drawn[1]
+    made = caption.Caption(mixed, ["fast", "slow"], ["#000000"] * 2, None, (1280, 460), 1.0, {})
+    assert any("gains: fast yours, slow default" in line for line in made.key)
