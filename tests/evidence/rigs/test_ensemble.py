@@ -17,7 +17,8 @@ LAWS = (smc.law("pid", kp=30.0, kd=6.0), smc.law("super_twisting"))
 @pytest.fixture(scope="module")
 def boards(tmp_path_factory):
     runs = ensemble.runs(PENDULUM, LAWS, seeds=16, duration=1.5, starts=smc.starts(0.3))
-    return smc.leaderboard(smc.study(runs, tmp_path_factory.mktemp("study"), progress=False))
+    table = smc.study(runs, tmp_path_factory.mktemp("study"), progress=False)
+    return smc.leaderboard(table, defaults=True)  # super_twisting has its default gains
 
 
 def test_every_set_is_a_condition_with_its_own_numbers():
