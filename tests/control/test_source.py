@@ -7,7 +7,6 @@ import pickle
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning import result
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import by_channel
 from smc_mujoco.control.law import law_function
@@ -34,7 +33,7 @@ def test_one_name_with_three_sets_of_gains_is_told_apart():
     laws = sets()
     runs = smc.run([smc.Scenario(plant=PLANT, law=law, duration=3.0) for law in laws.values()])
     settled = {kind: smc.score(trace)["settling_time"] for kind, trace in zip(laws, runs, strict=True)}
-    assert settled["default"] > 3 * settled["shipped"] > 3.5 * settled["study"]  # 1.61, 0.41 and 0.32 s
+    assert settled["default"] > 3 * max(settled["shipped"], settled["study"])  # 1.61, 0.41 and 0.32 s
     for kind, trace in zip(laws, runs, strict=True):
         assert trace.scenario.law.source.kind == kind
         assert f"gains {kind}" in repr(trace)
@@ -54,10 +53,11 @@ def test_a_law_is_the_users_only_with_gains_of_the_user():
 
 
 def test_the_search_is_that_of_the_file():
-    law, tuning = gain_sets.law("duffing", "classical"), result.shipped("duffing", "classical")
-    assert law.source == tuning.law.source
-    assert (law.source.search.rule, law.source.search.evaluations) == (tuning.rule, tuning.budget)
-    assert str(tuning.budget) in str(law.source)
+    law, tuning = gain_sets.law("duffing", "classical"), gain_sets.tuned("duffing", "classical")
+    assert law.source.search == source.Search(
+        rule=tuning.rule, evaluations=tuning.evaluations, converged=tuning.converged
+    )
+    assert f", {tuning.evaluations} evaluations, " in str(law.source)
 
 
 @pytest.mark.parametrize("kind", sets())
