@@ -33,6 +33,10 @@ check: ## lint, format and types
 	$(BIN)/ruff format --check .
 	@# without this variable pyright asks the package index for a newer version of itself
 	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python
+	@# what a user's type checkers say of README's and the tutorial's scripts
+	$(BIN)/python tests/snippets.py .cache/snippets
+	$(BIN)/mypy --follow-imports silent .cache/snippets
+	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python --project .cache/snippets
 
 docs: ## the documentation as a site, site/index.html
 	@./setup.sh requirements-docs.lock

@@ -301,8 +301,8 @@ def calls(random: Random) -> str:
         return "refused"
     except (TypeError, AttributeError):  # Python's own words for a wrong type, or a name that the call does not have
         return "refused"
-    except ZeroDivisionError as error:  # of an argument's own code
-        if str(error) != "awkward":
+    except (ZeroDivisionError, ValueError) as error:  # of an argument's own code: a wild value's, or an array's truth
+        if str(error) != "awkward" and "truth value of an" not in str(error):
             raise Found(f"{_where(error)} from {told}: {_first(error)}") from None
         return "refused"
     except Long:
