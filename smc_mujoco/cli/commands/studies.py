@@ -1,5 +1,7 @@
 """smc-mujoco which, bench: questions that many runs of many laws answer."""
 
+import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +13,8 @@ from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import held_back
 
 if TYPE_CHECKING:
+    from smc_mujoco.control.law import Law
+    from smc_mujoco.mechanisms.plant import Plant
     from smc_mujoco.simulation.initial_states import Starts
     from smc_mujoco.simulation.scenario import Scenario
     from smc_mujoco.studies.study import Extent
@@ -171,7 +175,7 @@ def bench(
         machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
         scenarios = ensemble.runs(machine, chosen, count, "default", length, begin)
     else:
-        scenarios = _grid(size, plants, laws, conditions, condition, count, gains or "tuned", length, begin)
+        scenarios = _grid(size, plants, laws, conditions, condition, count, gains, length, begin)
     table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)
     boards = leaderboard(table, defaults=defaults)
     terminal.print(tables.leaderboard(boards))
@@ -190,7 +194,7 @@ def _grid(
     conditions: str | None,
     own: list[str] | None,
     seeds: int,
-    gains: str,
+    gains: str | None,
     duration: float,
     starts: "Starts | None",
 ) -> "list[Scenario]":
@@ -203,6 +207,53 @@ def _grid(
     machines = [options.plant(text) for text in options.names(plants, size.plants)]
     usual = () if own else applicable(size.conditions, [as_plant(plant) for plant in machines], duration)
     chosen = options.names(laws, size.laws)
-    chosen = general_laws(machines, gains) if laws == "all" else [options.law(text) for text in chosen]
+    chosen = general_laws(machines, gains or "tuned") if laws == "all" else [options.law(text) for text in chosen]
     found = options.conditions(options.names(conditions, usual), own)
-    return grid(machines, chosen, found, seeds, gains, duration, starts)
+    if gains is not None:
+        return grid(machines, chosen, found, seeds, gains, duration, starts)
+    known = {machine: _with_gains(machine, chosen, laws is None) for machine in machines}
+    if all(laws == chosen for laws in known.values()):
+        return grid(machines, chosen, found, seeds, "tuned", duration, starts)
+    return [
+        scenario
+        for machine, laws_here in known.items()
+        for scenario in grid(machine, laws_here, found, seeds, "tuned", duration, starts)
+    ]
+
+
+def _with_gains(plant: "str | Plant", laws: "Sequence[str | Law]", usual: bool) -> "list[str | Law]":
+    """Return laws as they can run on a plant: those without tuned gains for it with their defaults, and a warning.
+
+    Args:
+      usual: whether the user named no laws: then those that are not for the plant are left out, with a note.
+
+    Raises:
+      ScenarioError: no law is for the plant.
+    """
+    from smc_mujoco.common.errors import ScenarioError
+    from smc_mujoco.control.gain_sets import FORMS, has
+    from smc_mujoco.control.law import fits
+    from smc_mujoco.control.law import law as find_law
+    from smc_mujoco.mechanisms.plant import as_plant
+
+    machine, chosen, untuned, unfit = as_plant(plant), [], [], []
+    for one in laws:
+        if usual and isinstance(one, str) and not fits(find_law(one), machine):
+            unfit.append(one)
+        elif isinstance(one, str) and not has(machine, FORMS.get(one, one)):
+            untuned.append(one)
+            chosen.append(find_law(one))
+        else:
+            chosen.append(one)
+    if not chosen:
+        raise ScenarioError(f"none of the usual laws is for {machine.name}: name others, as --laws none")
+    if unfit:
+        warnings.warn(f"not for {machine.name}, and left out: {', '.join(unfit)}", UserWarning, 2)
+    if untuned:
+        warnings.warn(
+            f"on {machine.name} these laws have their default gains, as none were tuned for it: {', '.join(untuned)}. "
+            f"Tune each with smc-mujoco tune {machine.argument} LAW, or ask smc-mujoco which {machine.argument}",
+            UserWarning,
+            2,
+        )
+    return chosen
