@@ -33,7 +33,12 @@ from smc_mujoco.control.surface import surface
 STEPS = (1e-2, 1e-3, 2e-4)
 HUM = sine(1 / 6, 6.0) + constant(0.3)  # |d'| <= 1, of a period that the last 20 % of 6 s hold
 DECADES = math.log10(STEPS[0] / STEPS[2])
-TWISTED = ("implicit_super_twisting", "proper_super_twisting", "conditioned_super_twisting")
+TWISTED = (
+    "implicit_super_twisting",
+    "proper_super_twisting",
+    "conditioned_super_twisting",
+    "proper_conditioned_super_twisting",
+)
 
 
 def law(name, **gains):
@@ -206,6 +211,7 @@ def test_memory_grows_by_the_clock_and_not_by_the_sample(h):
         "conditioned_super_twisting": [-4.4],
         "implicit_super_twisting": [-4.4],
         "proper_super_twisting": [-4.4],
+        "proper_conditioned_super_twisting": [-4.4],
         "adaptive_super_twisting": [-3.0, 2.0],  # w' = -(2 + 2 t)
         "continuous_twisting": [-3.4],
     }

@@ -67,12 +67,29 @@ def test_conditioned_super_twisting_tolerates_disturbances_up_to_its_bound(force
 # proper implicit super-twisting: R. Seeber & B. Andritsch, Automatica 173:112027, 2025; abstract read
 
 
+@pytest.mark.parametrize("name", ["proper_super_twisting", "proper_conditioned_super_twisting"])
 @pytest.mark.parametrize("period", [1e-2, 2e-3])
-def test_proper_super_twisting_has_the_best_worst_case_of_a_sampled_law(period):
+def test_proper_super_twisting_has_the_best_worst_case_of_a_sampled_law(period, name):
     """L h^2: what d can do to s, from a period that ends at s = 0, before the law can know of it."""
     d = smc.Sine(1.0, L)
-    (trace,) = run([smc.law("proper_super_twisting", k1=1.5, k2=1.1, c=0.0)], disturbance=d, control_period=period)
+    bound = BOUND if name == "proper_conditioned_super_twisting" else math.inf
+    law = smc.law(name, k1=1.5, k2=1.1, c=0.0)
+    (trace,) = run([law], disturbance=d, control_period=period, u_max=bound, v0=5.0)
     assert residual(trace) == pytest.approx(L * period**2, rel=0.01)
+
+
+def test_proper_conditioned_super_twisting_is_the_proper_law_until_u_is_saturated_and_then_does_not_wind_up():
+    """Of the inner branch too, where |s| <= dt^2 k2; and from s = 20 with |u| <= U, it overshoots by a fraction."""
+    laws = [
+        smc.law(name, k1=3.0, k2=4.4, c=0.0) for name in ("proper_conditioned_super_twisting", "proper_super_twisting")
+    ]
+    d = smc.Sine(1.5, 0.6)
+    ours, plain = run(laws, v0=0.1, disturbance=d, duration=2.0)
+    np.testing.assert_allclose(ours.v, plain.v, atol=1e-12)
+    ours, plain = run(laws, v0=20.0, u_max=BOUND, disturbance=d, duration=60.0)
+    assert -ours.v.min() < 0.2
+    assert -plain.v.min() > 5.0
+    assert residual(ours) <= 0.9 * 1e-3**2 * (1 + 1e-4)
 
 
 # fixed-time reaching: R. Aldana-Lopez et al., Int. J. Robust Nonlinear Control, 2019, arXiv 1809.07012; abstract read

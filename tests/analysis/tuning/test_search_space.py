@@ -39,6 +39,7 @@ WITHOUT_MODEL = dict.fromkeys(
         "nonsingular_fast_terminal",
         "nonsingular_terminal",
         "prescribed_time",
+        "proper_conditioned_super_twisting",
         "proper_super_twisting",
         "terminal",
     ),
