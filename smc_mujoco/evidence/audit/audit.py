@@ -192,9 +192,20 @@ def document(claims: Sequence[Claim]) -> str:
 def measure(entry: Entry, runs: Runs) -> Evidence:
     """Return the checks of a claim under one set of gains, and the numbers beside them.
 
+    Of a claim about all or some of the gains that the paper allows, those at the gains that decide.
+
     Raises:
       ScenarioError: the claim's function raises something, or returns what its thresholds are not about.
     """
+    if entry.over:
+        from smc_mujoco.evidence.audit import search
+
+        return search.decisive(entry, runs, lambda at: _measured(entry, at))
+    return _measured(entry, runs)
+
+
+def _measured(entry: Entry, runs: Runs) -> list[Check | Beside]:
+    """Return what a claim's function measures with these runs, as checks and numbers beside them."""
     try:
         found = entry.evidence(runs)
     except (Exception, SystemExit) as error:  # whatever a user's function raises

@@ -1,13 +1,14 @@
-"""A badge of an audit: an SVG file with the number of claims by verdict, as READMEs show."""
+"""A badge of an audit: an SVG file with the number of the paper's own sentences by verdict, as READMEs show."""
 
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
 from smc_mujoco.common.files import ended, replacing
-from smc_mujoco.evidence.audit.verdict import NOT_TESTABLE, PARTLY, REFUTED, SUPPORTED, VERDICTS, Claim
+from smc_mujoco.evidence.audit.verdict import ANSWERS, NOT_TESTABLE, PARTLY, REFUTED, SUPPORTED, Claim, totals
 
 COLOURS = {SUPPORTED: "#2b7a3d", PARTLY: "#8a6100", REFUTED: "#b3322b", NOT_TESTABLE: "#6a6a6a"}  # white on each: 5:1
+COLOURS |= dict.fromkeys(ANSWERS.values(), "#3d5a80")  # of a question
 SHORT = {PARTLY: "partly"}
 LABEL = "#444"
 HEIGHT, SIZE, MARGIN = 20, 11, 6  # px
@@ -23,10 +24,10 @@ def save(name: str, claims: Sequence[Claim], path: str | Path) -> Path:
 
 
 def svg(name: str, claims: Sequence[Claim]) -> str:
-    """Return the badge: the paper's name, and a field for each verdict that some claim has."""
-    counts = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in VERDICTS}
+    """Return the badge: the paper's name, and a field for each verdict that some sentence of the paper has."""
+    counts = totals(claims)
     fields = [(f"claims of {name}", LABEL)]
-    fields += [(f"{count} {SHORT.get(one, one)}", COLOURS[one]) for one, count in counts.items() if count]
+    fields += [(f"{count} {SHORT.get(one, one)}", COLOURS[one]) for one, count in counts.items()]
     about = f"{fields[0][0]}: {', '.join(text for text, _ in fields[1:])}"
     boxes, texts, x = [], [], 0.0
     for text, colour in fields:

@@ -10,7 +10,6 @@ hashes. The seal is a hash of all the rest. There are no times, no paths and not
 
 import hashlib
 import sys
-from collections import Counter
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -22,11 +21,13 @@ from smc_mujoco.common.files import read_json, reading, to_json
 from smc_mujoco.common.version import __version__
 from smc_mujoco.evidence.audit.paper import Paper, shipped
 from smc_mujoco.evidence.audit.runs import Used
+from smc_mujoco.evidence.audit.verdict import totals
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.run_key import condition, portable_key
 
 FORMAT = "smc-mujoco evidence 1"
+TOLD = ("id", "text", "where", "whose", "how", "read", "measured", "holds_if", "quantifier", "over")  # of a claim
 ENDINGS = (".py", ".toml", ".xml")  # of a paper's files that count
 
 
@@ -46,12 +47,14 @@ def document(audit: Any) -> dict[str, Any]:
             if name not in runs:
                 runs[name] = _run(one.scenario)
             runs[name] |= _results(one)
-    sealed = [claim.verdict for claim in audit.claims if not audit.paper.claims[claim.id].varies]
+    sealed = [claim for claim in audit.claims if not audit.paper.claims[claim.id].varies]
     data = {
         "format": FORMAT,
         "paper": {
             "name": audit.paper.name,
-            **{field: getattr(audit.paper, field) for field in ("title", "authors", "source", "read", "note")},
+            **{
+                field: getattr(audit.paper, field) for field in ("title", "authors", "source", "read", "access", "note")
+            },
             "files": files(audit.paper),
         },
         "software": {
@@ -62,7 +65,7 @@ def document(audit: Any) -> dict[str, Any]:
         },
         "quick": audit.quick,
         "left_out": [id for id in audit.paper.claims if id not in audit.used],
-        "counts": dict(sorted(Counter(sealed).items())),
+        "counts": dict(sorted(totals(sealed).items())),  # of the paper's own sentences
         "claims": [_claim(audit, claim, names) for claim in audit.claims],
         "runs": dict(sorted(runs.items())),
     }
@@ -103,7 +106,7 @@ def _hash(path: Path) -> str:
 def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
     """Return what is sealed of a claim."""
     entry = audit.paper.claims[claim.id]
-    told = {name: getattr(claim, name) for name in ("id", "text", "where", "measured", "holds_if", "quantifier")}
+    told = {name: getattr(claim, name) for name in TOLD}
     if entry.immune:
         told["immune"] = entry.immune
     if entry.varies:

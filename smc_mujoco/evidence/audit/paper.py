@@ -31,7 +31,7 @@ from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue as laws_known
 from smc_mujoco.control.source import STUDY
 from smc_mujoco.evidence.audit.threshold import Threshold
-from smc_mujoco.evidence.audit.verdict import EXISTENTIAL, NAMED, UNIVERSAL, Statement
+from smc_mujoco.evidence.audit.verdict import DERIVED, EXISTENTIAL, NAMED, OURS, PAPER, UNIVERSAL, WHOSE, Statement
 from smc_mujoco.mechanisms.custom.plant_from import plant_from
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
@@ -44,14 +44,21 @@ FILE, CODE = "paper.toml", "claims.py"
 SHIPPED = "smc_mujoco.evidence.papers"
 QUANTIFIERS = {"universal": UNIVERSAL, "existential": EXISTENTIAL, "named": NAMED}
 NOTHING: Mapping[str, Any] = frozen({})
-TEXTS = ("title", "authors", "source", "read", "note", "runs")  # of a paper
+TEXTS = ("title", "authors", "source", "read", "access", "note", "runs")  # of a paper
+READ = ("full text", "abstract", "textbook", "second hand", "nothing")  # what of a paper was read
+KINDS_OF_CLAIM = {PAPER: "of its sentences", DERIVED: "derived", OURS: "questions"}
+OVER = ("all", "some")  # of the gains that a paper allows
 SETS = (*gain_sets.SETS, "default")  # of the suite
-OF_CLAIM = {  # field of a claim -> its type and what to write; the first five are needed
+OF_CLAIM = {  # field of a claim -> its type and what to write; the first six are needed
     "id": (str, "a text"),
     "text": (str, "a text"),
+    "whose": (str, '"paper" for a sentence of the paper, "derived" for what follows from one, "ours" for a question'),
     "where": (str, "a text"),
     "function": (str, "the name of a function"),
     "holds_if": (dict | str, 'a table, as { "settling time, s" = "< 2" }'),
+    "how": (str, "a text: how it is derived, or why it is asked"),
+    "read": (str, f"one of {', '.join(READ)}"),
+    "over": (str, '"all" or "some" of the gains in [allowed.LAW]'),
     "words": (str, "a text: holds_if in words"),
     "measured": (str, "a text"),
     "note": (str, "a text"),
@@ -66,7 +73,20 @@ OF_CLAIM = {  # field of a claim -> its type and what to write; the first five a
     "runs": (str, 'fields of a scenario, as "duration=5.0"'),
     "values": (dict, "a table of numbers"),
 }
-NEEDED = tuple(OF_CLAIM)[:5]
+NEEDED = tuple(OF_CLAIM)[:6]
+
+
+class Allowed(NamedTuple):
+    """The gains of a law that a paper allows, within the bounds of the search.
+
+    Attributes:
+      bounds: gain -> lowest and highest value, both positive.
+      margins: function of gains, name -> value, that returns condition of the theorem -> margin, positive where it is
+        met. None without conditions.
+    """
+
+    bounds: Mapping[str, tuple[float, float]]
+    margins: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -105,12 +125,14 @@ class Paper:
     Attributes:
       name: of its folder.
       title, authors, source: as one cites it.
-      read: what could be read of it, and what was not.
+      read: what was read of it, one of READ.
+      access: where, and what could not be read.
       note: what a reader of the audit should know.
       sets: set of gains -> plant ("" for all) -> law -> gain -> value; None for a set of the suite.
       quick_sets: the sets of a quick audit.
       plants, conditions, laws: its own, by name.
       fields: of the scenarios of all its runs.
+      allowed: law -> gains that the paper allows, for claims about all or some of them.
       claims: in the order of the file.
     """
 
@@ -119,7 +141,8 @@ class Paper:
     title: str
     authors: str
     source: str
-    read: str = ""
+    read: str
+    access: str = ""
     note: str = ""
     sets: Mapping[str, Mapping[str, Mapping[str, Mapping[str, float]]] | None]
     quick_sets: tuple[str, ...]
@@ -127,7 +150,15 @@ class Paper:
     conditions: Mapping[str, Condition]
     laws: Mapping[str, Template | Component]
     fields: Mapping[str, Any]
+    allowed: Mapping[str, Allowed]
     claims: Mapping[str, Entry]
+
+    @property
+    def contents(self) -> str:
+        """How many claims of each kind it has, and what of the paper was read, in a few words."""
+        kinds = [claim.whose for claim in self.claims.values()]
+        counts = [f"{kinds.count(kind)} {word}" for kind, word in KINDS_OF_CLAIM.items() if kind in kinds]
+        return f"{', '.join(counts)}; {self.read} read"
 
     def plant(self, plant: str) -> Plant:
         """Return a plant by the paper's name or the suite's."""
@@ -316,12 +347,13 @@ def failed(paper: Paper, entry: Entry, error: BaseException) -> ScenarioError:
 def _checked(folder: Path, data: Mapping[str, Any], code: Sequence[ModuleType]) -> Paper:
     """Return the paper in a file's data."""
     for field in data:
-        if field not in (known := (*TEXTS, "sets", "quick_sets", "plants", "conditions", "gains", "claim")):
+        if field not in (known := (*TEXTS, "sets", "quick_sets", "plants", "conditions", "gains", "allowed", "claim")):
             raise unknown("field", field, known)
     texts = {field: _text(_typed(field, data.get(field, ""), str, "a text")) for field in TEXTS}
     for field in TEXTS[:3]:
         if not texts[field].strip():
             raise ScenarioError(f"no {field}: write one, as {field} = {_example(field)}")
+    _one_of("read", texts["read"], READ)
     parts: dict[str, Any] = {
         "fields": _fields("runs", texts.pop("runs")),
         "plants": {key: _plant(key, one, folder) for key, one in _table(data, "plants")},
@@ -333,12 +365,21 @@ def _checked(folder: Path, data: Mapping[str, Any], code: Sequence[ModuleType]) 
     for one in quick:
         find("set of gains in quick_sets", one, sets)
     paper = Paper(
-        name=folder.resolve().name, folder=folder, sets=sets, quick_sets=quick, claims={}, **texts, **parts
-    )  # fmt: skip
+        name=folder.resolve().name,
+        folder=folder,
+        sets=sets,
+        quick_sets=quick,
+        allowed={},
+        claims={},
+        **texts,
+        **parts,
+    )
     functions: dict[str, Callable] = {}
     for module in code:
         own = {key: value for key, value in vars(module).items() if inspect.isfunction(value)}
         functions |= own | {f"{module.__name__.rpartition('.')[2]}.{key}": value for key, value in own.items()}
+    allowed = {law: _allowed(law, one, functions, paper) for law, one in _table(data, "allowed")}
+    paper = dataclasses.replace(paper, allowed=allowed)
     claims = _typed("claim", data.get("claim", []), list, "tables, each under a line [[claim]]")
     if not claims:
         raise ScenarioError("no claims: write each under a line [[claim]]")
@@ -364,6 +405,7 @@ def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Pa
             what = "threshold" if field == "holds_if" else field
             raise ScenarioError(f"it has no {what}: write {field}, {OF_CLAIM[field][1]}")
     values = {field: _text(_typed(field, one, *OF_CLAIM[field])) for field, one in data.items()}
+    values.setdefault("read", paper.read)
     names: dict[str, Any] = {field: _names(field, values.pop(field, [])) for field in ("plants", "laws", "conditions")}
     function = find(f"function of {CODE}", values.pop("function"), functions)
     asked = values.pop("holds_if")
@@ -383,7 +425,46 @@ def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Pa
         fields=fields,
     )
     _check_names(entry, paper)
+    _check_source(entry, paper)
     return entry
+
+
+def _check_source(entry: Entry, paper: Paper) -> None:
+    """Raise ScenarioError unless a claim says whose it is, from something that was read, and over which gains."""
+    _one_of("whose", entry.whose, WHOSE)
+    _one_of("read", entry.read, READ)
+    if entry.whose == DERIVED and not entry.how:
+        raise ScenarioError("it is derived, and does not say how: write how, a text")
+    if entry.whose != OURS and entry.read == "nothing":
+        raise ScenarioError(f'nothing of the paper was read, and it is {entry.whose!r}: write whose = "ours"')
+    if entry.over:
+        _one_of("over", entry.over, OVER)
+        if not entry.laws or entry.laws[0] not in paper.allowed:
+            law = entry.laws[0] if entry.laws else "LAW"
+            raise ScenarioError(f"it is about {entry.over} gains, and there is no table [allowed.{law}]: write one")
+
+
+def _allowed(law: str, data: object, functions: Mapping[str, Callable], paper: Paper) -> Allowed:
+    """Return the gains that a paper allows for a law, from the table [allowed.LAW]."""
+    table = dict(_typed(f"allowed.{law}", data, dict, "a table, as { k1 = [1.0, 9.0] }"))
+    find("law in allowed", law, laws_known() | paper.laws)
+    margins = table.pop("margins", None)
+    if margins is not None:
+        margins = find(f"function of {CODE} in allowed.{law}", margins, functions)
+    bounds = {}
+    for gain, ends in table.items():
+        find(f"gain of {law} in allowed", gain, paper._bound(law, {}).gains)
+        pair = [end for end in ends if isinstance(end, int | float)] if isinstance(ends, list) else []
+        if len(pair) != 2 or not 0.0 < pair[0] < pair[1]:
+            raise ScenarioError(f"allowed.{law}.{gain} is {shown(ends)}: write two positive numbers, the lower first")
+        bounds[gain] = (float(pair[0]), float(pair[1]))
+    return Allowed(bounds, margins)
+
+
+def _one_of(field: str, value: str, known: Sequence[str]) -> None:
+    """Raise ScenarioError for a text that is none of the known ones."""
+    if value not in known:
+        raise ScenarioError(f"{field} is {value!r}: write one of {', '.join(map(repr, known))}")
 
 
 def _check_names(entry: Entry, paper: Paper) -> None:

@@ -88,6 +88,7 @@ class Runs:
         self.used: dict[str, Used] = {}
         self.asked: set[str] = set()
         self._entry: Entry | None = None
+        self._searched: dict[str, dict[str, float]] = {}  # law -> gains in place of the set's
         self._substitute = substitute or {}
         self._table = table or {}
         self._known = ChainMap({} if shared is None else shared, self._table)  # shared with the Runs of other sets
@@ -97,6 +98,18 @@ class Runs:
         """Return these runs as a claim sees them: with its names and fields, and none used yet."""
         own = copy.copy(self)
         own._entry, own.used, own.asked = entry, {}, set()
+        return own
+
+    def at(self, law: str, gains: Mapping[str, float], quick: bool) -> "Runs":
+        """Return the claim's runs with some gains of a law in place of the set's; they count as used by the claim."""
+        own = copy.copy(self)
+        own._searched, own.quick = {law: dict(gains)}, quick
+        return own
+
+    def on(self, plant: str) -> "Runs":
+        """Return the claim's runs on one of its plants; they count as used by the claim."""
+        own = copy.copy(self)
+        own._entry = self._entry and dataclasses.replace(self._entry, plants=(plant,))
         return own
 
     @property
@@ -147,6 +160,7 @@ class Runs:
     def law(self, plant: str, name: str, **gains: float) -> Component:
         """Return a law, or its mutant in this audit, with the set's gains for a plant and some of them changed."""
         law = self.paper.law(plant, name, self.gains)
+        gains = {**self._searched.get(name, {}), **gains}
         for gain in gains:
             find(f"gain of {name}", gain, law.gains)
         return self.mutated(dataclasses.replace(law, gains={**law.gains, **gains}))

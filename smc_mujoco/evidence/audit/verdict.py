@@ -4,6 +4,9 @@ A claim consists of one sentence or several. A sentence holds if all its checks 
 "there is") if one does. Under one set of gains a claim is supported if all its sentences hold, refuted if none does,
 partly supported between; without checks it is not testable.
 
+A verdict is of what the paper says, or of what follows from it. A question beside the paper has an answer in its
+place, "yes" for "supported", and totals count the paper's sentences alone (`totals`).
+
 If all sets of gains give the same verdict, that is the verdict of the claim. If they differ, the claim is partly
 supported, and flips. A universal claim ("every", "any", "by construction") is about all gains: a counter-example under
 one set refutes it. An existential one is supported by an example under one set.
@@ -19,7 +22,12 @@ from smc_mujoco.common import files, html
 from smc_mujoco.common.errors import ScenarioError, find
 
 SUPPORTED, PARTLY, REFUTED, NOT_TESTABLE = VERDICTS = ("supported", "partly supported", "refuted", "not testable")
+ANSWERS = {SUPPORTED: "yes", PARTLY: "in part", REFUTED: "no", NOT_TESTABLE: "no answer"}  # to a question
 MARKS = {SUPPORTED: "●", PARTLY: "◐", REFUTED: "○", NOT_TESTABLE: "–"}
+MARKS |= dict(zip(ANSWERS.values(), "■◧□–", strict=True))
+
+PAPER, DERIVED, OURS = WHOSE = ("paper", "derived", "ours")  # whose a claim is
+WHOSE_WORDS = {PAPER: "the paper's", DERIVED: "derived", OURS: "a question"}
 
 UNIVERSAL, NAMED, EXISTENTIAL = "universal", "of what it names", "existential"  # quantifiers
 
@@ -105,6 +113,10 @@ class Statement:
       holds_if: the threshold, in words.
       note: what a reader must know to judge the numbers.
       quantifier: UNIVERSAL, EXISTENTIAL, or NAMED: about the plants and conditions that it names, and no others.
+      whose: PAPER, a sentence of the paper; DERIVED from one; or OURS, a question beside it.
+      how: how it was derived, or why it is asked.
+      read: what was read of the place where it stands, one of `paper.READ`.
+      over: "all" or "some" gains that the paper allows; "" if the paper's gains are known, or none matter.
     """
 
     id: str
@@ -114,6 +126,15 @@ class Statement:
     holds_if: str
     note: str = ""
     quantifier: str = NAMED
+    whose: str = PAPER
+    how: str = ""
+    read: str = ""
+    over: str = ""
+
+    @property
+    def source(self) -> str:
+        """Whose the claim is and what was read, in a few words."""
+        return WHOSE_WORDS[self.whose] + (f", {self.read}" if self.read and self.whose != OURS else "")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -121,7 +142,7 @@ class Claim(Statement):
     """A claim and its verdict. Besides the attributes of a `Statement` it has:
 
     Attributes:
-      verdict: over all sets of gains, one of VERDICTS.
+      verdict: over all sets of gains, one of VERDICTS; of a question one of ANSWERS.
       numbers: set of gains -> what was measured -> {"value", "relation", "limit", "holds"}; inf is "never".
       beside: set of gains -> what else was measured -> its value, which decides nothing.
       verdicts: set of gains -> verdict.
@@ -149,7 +170,7 @@ class Claim(Statement):
                 value, limit = (measured(size, one.what) for size in (one.value, one.limit))
                 lines.append((name, "✓" if one.holds else "✗", one.what, value, f"{one.relation} {limit}"))
         about = f"{self.id}: {self.text} ({self.where}): {self.verdict}{', flips with the gains' * self.flips}"
-        note = ". ".join(filter(None, (self.measured, f"It holds if: {self.holds_if}", self.note)))
+        note = ". ".join(filter(None, (self.source, self.measured, f"It holds if: {self.holds_if}", self.note)))
         return html.table(("gains", "", "measured", "value", "asked"), lines, about, note, range(3, 5), most=24)
 
     def plain(self) -> dict[str, Any]:
@@ -165,10 +186,31 @@ class Claims(list[Claim]):
         for claim in self:
             decided = claim.decisive(list(claim.verdicts)[-1]) if claim.verdicts else None
             words = f"{MARKS[claim.verdict]} {claim.verdict}{', flips' * claim.flips}"
-            rows.append((claim.id, claim.text, html.strong(words), decided or claim.note))
-        counts = {kind: sum(claim.verdict == kind for claim in self) for kind in VERDICTS}
-        note = ", ".join(f"{MARKS[kind]} {count} {kind}" for kind, count in counts.items() if count)
-        return html.table(("id", "claim", "verdict", "decided by"), rows, note=note, most=99)
+            rows.append((claim.id, claim.text, claim.source, html.strong(words), decided or claim.note))
+        heads = ("id", "claim", "whose, read", "verdict", "decided by")
+        return html.table(heads, rows, note=summary(self), most=99)
+
+
+def totals(claims: Sequence[Claim]) -> dict[str, int]:
+    """Return verdict -> how many of the paper's own sentences have it, where some do."""
+    of_paper = [claim.verdict for claim in claims if claim.whose == PAPER]
+    return {kind: of_paper.count(kind) for kind in VERDICTS if kind in of_paper}
+
+
+def summary(claims: Sequence[Claim]) -> str:
+    """Return a line: the totals of the paper's own sentences and what was read, then what is not in them."""
+    read = ", ".join(dict.fromkeys(claim.read for claim in claims if claim.whose == PAPER and claim.read))
+    parts = [f"the paper's own sentences{f' ({read} read)' if read else ''}: {_marked(totals(claims))}"]
+    for whose, words in ((DERIVED, "derived from it"), (OURS, "questions beside it")):
+        rest = [claim.verdict for claim in claims if claim.whose == whose]
+        if rest:
+            parts.append(f"{words}: {_marked({kind: rest.count(kind) for kind in dict.fromkeys(rest)})}")
+    return "; ".join(parts)
+
+
+def _marked(counts: Mapping[str, int]) -> str:
+    """Return counts of verdicts with their marks; "none" without any."""
+    return ", ".join(f"{MARKS[kind]} {count} {kind}" for kind, count in counts.items()) or "none"
 
 
 def verdict(evidence: Evidence, quantifier: str = NAMED) -> str:
@@ -211,6 +253,8 @@ def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     """
     verdicts = {name: verdict(some, statement.quantifier) for name, some in evidence.items()}
     overall, flips, sentence = combined(verdicts, statement.quantifier)
+    if statement.whose == OURS:
+        overall, verdicts = ANSWERS[overall], {name: ANSWERS[one] for name, one in verdicts.items()}
     shared = {field.name: getattr(statement, field.name) for field in dataclasses.fields(Statement)}
     return Claim(
         **shared | {"note": " ".join(filter(None, (statement.note, sentence)))},

@@ -37,7 +37,7 @@ def claims(
         typer.Option(metavar="FILE.json", help="Also write claims, runs, numbers, thresholds and verdicts, sealed."),
     ] = None,
     badge: Annotated[
-        Path | None, typer.Option(metavar="FILE.svg", help="Also write a badge with the number of claims by verdict.")
+        Path | None, typer.Option(metavar="FILE.svg", help="Also write a badge: the paper's own sentences by verdict.")
     ] = None,
     mutants: Annotated[
         bool,
@@ -53,6 +53,9 @@ def claims(
     Under a set of gains a claim is supported if all its sentences hold, refuted if none does, and partly supported
     otherwise. If the verdict depends on the set of gains, the table says so. One counter-example refutes a universal
     claim. Claims that you name are shown in full, with every check. All of Gaber's, the default, take minutes.
+
+    Totals are of the paper's own sentences. What is derived from them is listed apart, and so are questions beside the
+    paper, which have answers and no verdicts.
 
     The file of --evidence has the hashes of each claim's runs, their numbers, thresholds and verdicts, and a seal. A
     second audit with the same versions writes the same file, to the last bit.
@@ -145,6 +148,6 @@ def papers(
         terminal.note(f"the seal is whole: {data['paper']['authors']}, {data['paper']['title']}: {counts}", wrap=True)
     if new or check:
         return
-    lines = {name: f"{one.authors}: {one.title} ({len(one.claims)} claims)" for name, one in paper.papers().items()}
+    lines = {name: f"{one.authors}: {one.title} ({one.contents})" for name, one in paper.papers().items()}
     rows = [(name, tables.with_package(line, paper.catalogue().package(name))) for name, line in lines.items()]
     terminal.print(tables.catalogue("Papers, for smc-mujoco claims --paper", rows))

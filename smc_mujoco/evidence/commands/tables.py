@@ -31,6 +31,7 @@ COLOURS = {
     verdicts.PARTLY: "yellow",
     verdicts.REFUTED: "red",
     verdicts.NOT_TESTABLE: "dim",
+    **dict.fromkeys(verdicts.ANSWERS.values(), "cyan"),  # to a question
 }
 MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}
 
@@ -50,17 +51,16 @@ def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], own: Collec
 
 
 def print_claims(claims: Sequence[Claim], console: Console, full: bool) -> None:
-    """Print a table of claims with their verdicts, or each claim in full; then how many have each verdict."""
+    """Print a table of claims with their verdicts, or each in full; then the totals of the paper's own sentences."""
     if full:
         for claim in claims:
             _print_claim(claim, console)
     else:
         console.print(_claims_overview(claims))
-    counts = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in verdicts.VERDICTS}
     flips = sum(claim.flips for claim in claims)
-    parts = [f"{verdicts.MARKS[verdict]} {count} {verdict}" for verdict, count in counts.items() if count]
-    depend = f" ({flips} of them depend{'s' * (flips == 1)} on the gains)" if flips else ""
-    console.print(Text(", ".join(parts) + depend), highlight=False)
+    depend = f" ({flips} of all depend{'s' * (flips == 1)} on the gains)" if flips else ""
+    words = verdicts.summary(claims)
+    console.print(Text(words[0].upper() + words[1:] + depend), highlight=False)
 
 
 def _claims_overview(claims: Sequence[Claim]) -> Table:
@@ -70,6 +70,7 @@ def _claims_overview(claims: Sequence[Claim]) -> Table:
     table = Table(
         Column("id", justify="right", style="cyan", no_wrap=True, vertical="top"),
         Column("claim", ratio=2),
+        Column("whose, read"),
         Column("verdict", no_wrap=True),
         *(Column(name, justify="center", no_wrap=True) for name in shown),
         Column(f"decided by, {sets[-1]} gains" if sets else "decided by", ratio=3),
@@ -83,7 +84,7 @@ def _claims_overview(claims: Sequence[Claim]) -> Table:
         marks = [MARKS[claim.verdicts[name]] for name in shown]
         words = Text(f" {claim.verdict}{', flips' * claim.flips}", style=COLOURS[claim.verdict])
         decided = str(one) if one else claim.note
-        table.add_row(claim.id, Text(claim.text), MARKS[claim.verdict] + words, *marks, Text(decided))
+        table.add_row(claim.id, Text(claim.text), claim.source, MARKS[claim.verdict] + words, *marks, Text(decided))
     return table
 
 
@@ -92,7 +93,9 @@ def _print_claim(claim: Claim, console: Console) -> None:
     console.print(Text.assemble((claim.id, "bold cyan"), f"  {claim.text}", (f"  {claim.where}", "dim")))
     about = plain(Column(style="dim", no_wrap=True), "")
     parts = {
+        "whose": claim.source + (f": {claim.how}" if claim.how else ""),
         "kind": claim.quantifier,
+        "gains": f"{claim.over} gains that the paper allows" if claim.over else "",
         "measured": claim.measured,
         "holds if": claim.holds_if,
         "note": claim.note,

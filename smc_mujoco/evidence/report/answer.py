@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from smc_mujoco.analysis.differences import ROUNDING
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.common.text import joined
-from smc_mujoco.evidence.audit.verdict import VERDICTS
+from smc_mujoco.evidence.audit.verdict import totals
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.scores import Place, Score
 from smc_mujoco.studies.adviser import MIN_SETTLED
@@ -154,9 +154,8 @@ def losses(found: Cells, metrics: Sequence[str], law: str = words.PAPER) -> list
 
 
 def counts(findings: "Findings") -> dict[str, int]:
-    """Return verdict -> how many claims have it, where some do."""
-    found = Counter(claim.verdict for claim in findings.claims)
-    return {verdict: found[verdict] for verdict in VERDICTS if found[verdict]}
+    """Return verdict -> how many of the paper's own sentences have it, where some do."""
+    return totals(findings.claims)
 
 
 def overall(findings: "Findings", metric: str) -> list[Place]:

@@ -14,7 +14,7 @@ from smc_mujoco.common.version import __version__
 from smc_mujoco.evidence.audit import badge, evidence
 from smc_mujoco.evidence.audit.audit import Audit, audit, evaluations
 from smc_mujoco.evidence.audit.paper import paper as find_paper
-from smc_mujoco.evidence.audit.verdict import VERDICTS
+from smc_mujoco.evidence.audit.verdict import ANSWERS, VERDICTS, summary
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.page import TEMPLATES, environment, uri
 
@@ -66,6 +66,7 @@ def page(done: Audit, seal: str, runs: int, figure: bytes) -> str:
     from markupsafe import Markup
 
     found = Counter(claim.verdict for claim in done.claims)
+    kinds = (*VERDICTS, *ANSWERS.values())
     sets = list(done.claims[0].verdicts)
     return (
         environment()
@@ -75,7 +76,8 @@ def page(done: Audit, seal: str, runs: int, figure: bytes) -> str:
             js=Markup((TEMPLATES / "page.js").read_text(encoding="utf-8")),
             paper=done.paper,
             claims=done.claims,
-            counts={verdict: found[verdict] for verdict in VERDICTS if found[verdict]},
+            counts={verdict: found[verdict] for verdict in kinds if found[verdict]},
+            summary=summary(done.claims),
             sets=sets,
             gains_set=sets[-1],
             gains={name: gains(done, name) for name in sets},

@@ -25,6 +25,7 @@ DATA = """
 title = "Small"
 authors = "A. Nobody"
 source = "nowhere, 2026"
+read = "full text"
 runs = "duration=0.2"
 sets = ["slow", "tuned"]
 [conditions]
@@ -33,6 +34,7 @@ pushed = "disturbance=Sine(amplitude=0.5, omega=2.0)"
 classical = { k = 3.0, c = 2.0 }
 [[claim]]
 id = "1"
+whose = "paper"
 text = "the law is calm"
 where = "p. 1"
 function = "calm"
@@ -42,6 +44,7 @@ conditions = ["pushed", "noise"]
 holds_if = { "TV rate" = "< 1e9", "largest |x|" = "< 1e-9" }
 [[claim]]
 id = "2"
+whose = "paper"
 text = "it is fast"
 where = "p. 2"
 function = "fast"
@@ -162,7 +165,7 @@ def test_evidence_of_mutants_or_under_another_ending_is_refused(folder, done, tm
 
 
 def claim(verdict):
-    return type("One", (), {"verdict": verdict})()
+    return type("One", (), {"verdict": verdict, "whose": "paper"})()
 
 
 def test_a_badge_has_a_field_for_each_verdict_that_occurs(tmp_path):

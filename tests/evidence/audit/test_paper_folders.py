@@ -21,8 +21,10 @@ MINIMAL = """
 title = "t"
 authors = "a"
 source = "s"
+read = "full text"
 [[claim]]
 id = "1"
+whose = "paper"
 text = "it is small"
 where = "p. 1"
 function = "small"
@@ -88,7 +90,7 @@ def test_the_template_runs_and_the_wrong_sign_loses_its_claims(tmp_path):
     assert [path.name for path in written] == [FILE, CODE]
     found = paper(tmp_path / "levant")
     assert (found.name, list(found.claims), list(found.sets)) == ("levant", ["1", "2"], ["paper"])
-    assert {one.verdict for one in claims(paper=found)} == {SUPPORTED}
+    assert [one.verdict for one in claims(paper=found)] == ["yes", SUPPORTED]  # a question, and a sentence
     with pytest.raises(ScenarioError, match="is there already"):
         new(tmp_path / "levant")
 
@@ -137,7 +139,7 @@ def test_functions_may_be_in_several_files(folder):
 BROKEN = [
     (None, SMALL, "no paper at .*paper.toml"),
     (MINIMAL, None, "no claims.py in .*mine"),
-    (MINIMAL.replace('"p. 1"', "p. 1"), SMALL, r"paper.toml is no TOML: .*line 8"),
+    (MINIMAL.replace('"p. 1"', "p. 1"), SMALL, r"paper.toml is no TOML: .*line 10"),
     (MINIMAL.replace('title = "t"', ""), SMALL, "paper.toml: no title: write one"),
     (MINIMAL.replace("title", "titel"), SMALL, "paper.toml: unknown field 'titel': did you mean 'title'"),
     (MINIMAL.split("[[claim]]", maxsplit=1)[0], SMALL, "no claims: write each under a line"),

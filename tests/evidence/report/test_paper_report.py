@@ -18,13 +18,14 @@ DATA = """
 title = "A <small> paper"
 authors = "A. Nobody"
 source = "nowhere, 2026"
-read = "all of it"
+read = "full text"
 runs = "duration=0.1"
 sets = ["slow", "study"]
 [gains.slow]
 classical = { k = 3.0, c = 2.0 }
 [[claim]]
 id = "1"
+whose = "paper"
 text = "the law & its plant are calm"
 where = "p. 1"
 function = "calm"
@@ -33,6 +34,7 @@ laws = ["classical"]
 holds_if = { "TV rate" = "< 1e9" }
 [[claim]]
 id = "2"
+whose = "paper"
 text = "nothing moves"
 where = "p. 2"
 function = "calm"
@@ -76,7 +78,7 @@ def made(tmp_path_factory):
 def test_the_page_has_every_claim_its_numbers_and_gains(made):
     _, page = made
     words = " ".join(" ".join(page.words).split())
-    for part in ("A <small> paper", "A. Nobody", "the law & its plant are calm", "nothing moves", "all of it", "k = 3"):
+    for part in ("A <small> paper", "A. Nobody", "the law & its plant are calm", "nothing moves", "full text", "k = 3"):
         assert part in words
     assert {"claim-1", "claim-2", "gains-slow", "gains-study", "verdict"} <= set(page.ids)
     assert re.search(r"TV rate < 1.0e9", words)

@@ -2,11 +2,46 @@
 
 import math
 
+from smc_mujoco.control.law import law_function
 from smc_mujoco.evidence.papers.measures import settled
 
 BAND = 1e-6  # m/s, of |s|: it counts as reached
 SWITCHING = 1e-3  # m/s, the band with a switching gain, which chatters in k dt
+FAR, BEYOND = 5000.0, 0.02  # m/s, a start that stands for infinity; share of the time that may lie beyond it
+CLOSE = 0.3  # least k p: below it a sample of 10 us takes s across the band
 LONGER = 1.5  # least bounds that a run lasts
+
+
+@law_function(
+    gains={"A": 2.0, "B": 2.0, "p": 0.5, "q": 1.5, "k": 1.0}, positive=("A", "B", "p", "q", "k"), relative_degree=1
+)
+def general_fixed_time(y, gains, memory):
+    """The general system: u = -(A |s|^p + B |s|^q)^k sgn s, s the velocity."""
+    size = abs(y.de)
+    pull = (gains.A * size**gains.p + gains.B * size**gains.q) ** gains.k
+    return (-pull if y.de > 0.0 else pull if y.de < 0.0 else 0.0), y.de
+
+
+def gamma(gains):
+    """Return the least bound of the general system, s."""
+    A, B, p, q, k = (gains[name] for name in "ABpqk")
+    m, n = (1.0 - k * p) / (q - p), (k * q - 1.0) / (q - p)
+    return math.gamma(m) * math.gamma(n) * (A / B) ** m / (A**k * math.gamma(k) * (q - p))
+
+
+def general_margins(gains):
+    """The conditions of the formula, and what a start at 5000 m/s and a sampling of 10 us ask for."""
+    A, B, p, q, k = (gains[name] for name in "ABpqk")
+    conditions = {"k p < 1": 1.0 - k * p, "k q > 1": k * q - 1.0}
+    if min(conditions.values()) <= 0.0:
+        return conditions
+    beyond = FAR ** (1.0 - k * q) / (B**k * (k * q - 1.0)) / gamma(gains)
+    steep = (A * FAR**p + B * FAR**q) ** k * 1e-5 / FAR
+    return conditions | {
+        "time beyond the start < 2 %": BEYOND - beyond,
+        "k p >= 0.3, for the band": k * p - CLOSE,
+        "first step < 1 % of the start": 0.01 - steep,
+    }
 
 
 def least_bound(law):
@@ -71,3 +106,12 @@ def disturbed(runs):
     found = times(runs, [(plant, law)], starts, SWITCHING)
     names = [f"from {start:g} m/s" for start in starts]
     return {"time / least bound": {one: time / least_bound(law) for one, time in zip(names, found, strict=True)}}
+
+
+def general(runs):
+    """Time from which |s| stays within 1e-6 m/s, from 5000 m/s, over gamma."""
+    (plant,), (name,) = runs.plants, runs.laws
+    law = runs.law(plant, name)
+    scenario = runs.scenario(plant, name, law=law, v0=runs.values["start"], duration=LONGER * gamma(law.gains))
+    (trace,) = runs.traces([scenario])
+    return {"time from far / gamma": settled(trace, trace.s, BAND) / gamma(law.gains)}

@@ -4,6 +4,25 @@ import numpy as np
 
 from smc_mujoco.evidence.papers.measures import LATE, exponent, late, late_step, settled
 
+FORCE = 2.0  # N: d, and what the plants add to it within 0.6 of the origin
+SLOPE = 6.0  # N/s, of that
+
+
+def classical_margins(gains):
+    """What the switching gain exceeds, N, with s' = u + d + c v and |v| up to 0.5."""
+    return {"k > D + c |v|, N": gains["k"] - FORCE - 0.25 * gains["c"]}
+
+
+def twisting_margins(gains):
+    """The two conditions of twisting for e'' = g (u + d), N."""
+    r1, r2 = gains["r1"], gains["r2"]
+    return {"(r1 + r2) - D > (r1 - r2) + D, N": 2.0 * (r2 - FORCE), "r1 - r2 > D, N": r1 - r2 - FORCE}
+
+
+def super_twisting_margins(gains):
+    """The two conditions of super-twisting for s' = g (u + d), g >= 1 and |d'| <= L."""
+    return {"k2 > L, N/s": gains["k2"] - SLOPE, "k1 > sqrt(k2 + L)": gains["k1"] - (gains["k2"] + SLOPE) ** 0.5}
+
 
 def sweep(runs):
     """Return plant -> traces, each start at each control period, in the order of the periods."""

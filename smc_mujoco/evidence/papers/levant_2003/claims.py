@@ -76,6 +76,16 @@ def output_feedback(runs):
     return {"largest |x| of the last tenth / |x0|": shares}
 
 
+def standard_chatters(runs):
+    """Largest step of u of the last tenth of 12 s over 2 k, and half the range of the force behind the lag over k."""
+    grid, steps, forces = runs.grid(), {}, {}
+    for (plant, *_), scenario, trace in zip(grid, grid.values(), runs.traces(grid.values()), strict=True):
+        last, k = slice(-int(END * len(trace.t)), -1), scenario.law.gains["k"]
+        steps[plant] = float(np.abs(np.diff(trace.u[last], axis=0)).max()) / (2.0 * k)
+        forces[plant] = float(np.ptp(trace.force[last])) / (2.0 * k)
+    return {"largest step of u / 2 k": steps, "amplitude of the force / k": forces}
+
+
 def chattering(runs):
     """Largest |x| of the last tenth under the nested law over that under the classical law, behind the same lag."""
     grid = runs.grid()

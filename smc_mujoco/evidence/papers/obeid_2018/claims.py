@@ -2,7 +2,16 @@
 
 import numpy as np
 
+import smc_mujoco as smc
 from smc_mujoco.evidence.papers.measures import settled
+
+JUMP = 1.9  # h (k_max + D) / eps: at 2 a step from one end of the set reaches the other
+PERIOD, FORCE = 5e-4, 13.0  # s, of a quick audit; N, the largest d with what a spring adds
+
+
+def margins(gains):
+    """What the sampling leaves of the largest disturbance, N: 2 sqrt(eps/h) - 1 - D."""
+    return {"D < 2 sqrt(eps/h) - 1, N": 2.0 * (gains["eps"] / PERIOD) ** 0.5 - 1.0 - FORCE}
 
 
 def sampled(runs):
@@ -23,6 +32,27 @@ def stays(runs):
         for ((plant, _, condition), scenario), trace in zip(grid.items(), runs.traces(grid.values()), strict=True)
     }
     return {"largest |s| of the last half / eps": shares}
+
+
+def limit(runs):
+    """Largest |s| of the last half over eps, under d = D sin 2t with D below and above 2 sqrt(eps/h) - 1."""
+    (plant,), (law,), periods = runs.plants, runs.laws, runs.values["periods"]
+    eps, sides = runs.law(plant, law).gains["eps"], dict(zip(("below", "above"), runs.values["shares"], strict=True))
+    cells = [(side, h, share * (2.0 * (eps / h) ** 0.5 - 1.0)) for side, share in sides.items() for h in periods]
+    traces = runs.traces(
+        runs.scenario(
+            plant,
+            law,
+            law=runs.law(plant, law, k_max=JUMP * eps / h - size),
+            control_period=h,
+            disturbance=smc.Sine(size, 2.0),
+        )
+        for _, h, size in cells
+    )
+    found: dict[str, dict[str, float]] = {f"{side}: largest |s| of the last half / eps": {} for side in sides}
+    for (side, h, size), trace in zip(cells, traces, strict=True):
+        found[f"{side}: largest |s| of the last half / eps"][f"{1e3 * h:g} ms, D = {size:.3g} N"] = half(trace.s) / eps
+    return found
 
 
 def predefined(runs):

@@ -13,6 +13,11 @@ FINE = 50  # samples in the ATC
 QUICK = 1  # the shortest ATCs that a quick audit leaves out
 
 
+def super_twisting_margins(gains):
+    """The two conditions of super-twisting for |d'| <= 1."""
+    return {"k2 > L": gains["k2"] - 1.0, "k1 > sqrt(k2 + L)": gains["k1"] - math.sqrt(gains["k2"] + 1.0)}
+
+
 def behind(runs, law, lag, **changes):
     """Return the scenario of a law behind two lags, long enough for its cycle."""
     (plant,) = runs.plants
@@ -21,8 +26,9 @@ def behind(runs, law, lag, **changes):
 
 
 def super_twisting(runs, slope):
-    """Return super-twisting with Levant's gains for |d'| <= slope."""
-    return runs.law(runs.plants[0], "super_twisting", k1=1.5 * math.sqrt(slope), k2=1.1 * slope)
+    """Return super-twisting with the gains of |d'| <= 1, scaled to |d'| <= slope."""
+    gains = runs.law(runs.plants[0], "super_twisting").gains
+    return runs.law(runs.plants[0], "super_twisting", k1=gains["k1"] * math.sqrt(slope), k2=gains["k2"] * slope)
 
 
 def relay(runs, bound):

@@ -7,6 +7,12 @@ import numpy as np
 from smc_mujoco.evidence.papers.measures import settled
 
 BAND = 1e-3  # m/s
+SLOPE = 0.9  # N/s, of the disturbance 1.5 sin 0.6 t
+
+
+def margins(gains):
+    """The two conditions of the law."""
+    return {"k2 > L, N/s": gains["k2"] - SLOPE, "k1 > sqrt(k2 + L)": gains["k1"] - math.sqrt(gains["k2"] + SLOPE)}
 
 
 def winds_up(runs):

@@ -1,0 +1,139 @@
+"""A search over the gains that a paper allows, for a claim about all of them or about some.
+
+What is said of all gains is refuted by one, and what is said of some is supported by one: the search stops there. It
+tries the gains of the set first, then points spread over the bounds, then points around the best of them; these points
+as a quick audit measures the claim, and the one that decides in full. There is no chance in it, so that a second audit
+comes to the same gains.
+"""
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.evidence.audit.paper import Allowed, Entry, failed
+from smc_mujoco.evidence.audit.runs import Runs
+from smc_mujoco.evidence.audit.verdict import Beside, Check, Evidence
+
+SPREAD, NEAR = 6, 3  # sets of gains tried over the whole bounds, and around the best of them
+QUICK_SPREAD, QUICK_NEAR = 2, 0  # in a quick audit
+SHRINK = 0.25  # share of the bounds, on a logarithmic scale, around the best
+DRAWS = 2000  # points drawn for gains that meet the conditions of the theorem
+
+Gains = dict[str, float]
+Bounds = Mapping[str, tuple[float, float]]
+
+
+class Tried(NamedTuple):
+    """Gains, the evidence at them, and how far they are from deciding: whether all checks hold, and the least slack."""
+
+    gains: Gains
+    evidence: Evidence
+    rank: tuple[bool, float]
+
+    @classmethod
+    def of(cls, gains: Gains, evidence: Evidence) -> "Tried":
+        checks = [one for one in evidence if isinstance(one, Check)]
+        rank = all(one.holds for one in checks), min((one.slack for one in checks), default=math.inf)
+        return cls(gains, evidence, rank)
+
+
+def decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence]) -> Evidence:
+    """Return the evidence at the gains that decide, with these gains and their margins beside.
+
+    What is said of some gains is said of each plant by itself: other plants have other gains.
+
+    Args:
+      entry: a claim with `over`.
+      runs: of the claim, under a set of gains.
+      measure: runs -> evidence.
+
+    Raises:
+      ScenarioError: no gains within the bounds meet the conditions, or as `audit.measure`.
+    """
+    if entry.over == "all" or len(entry.plants) == 1:
+        return _decisive(entry, runs, measure, "")
+    each = [(one, dataclasses.replace(entry, plants=(one,))) for one in entry.plants]
+    return [found for plant, alone in each for found in _decisive(alone, runs.on(plant), measure, f"{plant}: ")]
+
+
+def _decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], prefix: str) -> Evidence:
+    """Return the evidence at the gains that decide on all plants of a claim."""
+    law, best = entry.laws[0], min if entry.over == "all" else max
+    theorem = Theorem(entry, runs)
+    in_full: list[Tried] = []
+    quickly: list[Tried] = []
+
+    def decides(gains: Gains, quick: bool) -> bool:
+        """Try gains, and return whether they decide: a counter-example to "all", or an example of "some"."""
+        one = Tried.of(gains, measure(runs.at(law, gains, quick or runs.quick)))
+        (quickly if quick else in_full).append(one)
+        return one.rank[0] != (entry.over == "all")
+
+    def search() -> None:
+        spread, near = (QUICK_SPREAD, QUICK_NEAR) if runs.quick else (SPREAD, NEAR)
+        if any(decides(gains, True) for gains in theorem.points(theorem.allowed.bounds, spread)):
+            return
+        centre = best(quickly, key=lambda one: one.rank).gains
+        any(decides(gains, True) for gains in theorem.points(theorem.around(centre), near))
+
+    start = {gain: theorem.rest[gain] for gain in theorem.allowed.bounds}
+    if theorem.smallest(start) <= 0.0 or not decides(start, False):
+        search()
+        decides(best(quickly, key=lambda one: one.rank).gains, False)
+    last = best(in_full, key=lambda one: one.rank)
+    beside = [Beside(f"{prefix}decided at {gain}", value) for gain, value in last.gains.items()]
+    beside += [Beside(f"{prefix}margin of {name}", value) for name, value in theorem.margins(last.gains).items()]
+    return [*last.evidence, *beside, Beside(f"{prefix}sets of gains tried", len(quickly) + 1)]
+
+
+class Theorem:
+    """What a paper asks of the gains of a claim's first law.
+
+    Attributes:
+      allowed: bounds and margins, from [allowed.LAW].
+      rest: all gains of the law, as the set has them.
+    """
+
+    def __init__(self, entry: Entry, runs: Runs):
+        self.allowed: Allowed = runs.paper.allowed[entry.laws[0]]
+        self.rest: Mapping[str, float] = runs.paper.law(entry.plants[0], entry.laws[0], runs.gains).gains
+        self._failed = lambda error: failed(runs.paper, entry, error)
+
+    def points(self, bounds: Bounds, count: int) -> Iterator[Gains]:
+        """Yield gain sets within bounds that meet the conditions, spread over the logarithms (Halton's points)."""
+        from scipy.stats import qmc
+
+        low, high = np.log(list(bounds.values())).T
+        drawn = qmc.Halton(len(bounds), scramble=False).random(DRAWS)[1:]
+        sets = (dict(zip(bounds, np.exp(low + (high - low) * one).tolist(), strict=True)) for one in drawn)
+        met = (gains for gains in sets if self.smallest(gains) > 0.0)
+        first = next(met, None)
+        if first is None:
+            raise self._failed(ScenarioError("no gains in [allowed] meet the conditions: widen its bounds"))
+        return itertools.islice(itertools.chain([first], met), count)
+
+    def around(self, gains: Gains) -> Bounds:
+        """Return narrower bounds around gains, within those of the paper."""
+        narrow = {}
+        for gain, (low, high) in self.allowed.bounds.items():
+            reach = (high / low) ** (SHRINK / 2.0)
+            narrow[gain] = max(low, gains[gain] / reach), min(high, gains[gain] * reach)
+        return narrow
+
+    def margins(self, gains: Gains) -> dict[str, float]:
+        """Return condition of the theorem -> margin at these gains; none without conditions."""
+        if self.allowed.margins is None:
+            return {}
+        try:
+            return {name: float(value) for name, value in self.allowed.margins({**self.rest, **gains}).items()}
+        except Exception as error:  # whatever a user's function raises
+            raise self._failed(error) from error
+
+    def smallest(self, gains: Gains) -> float:
+        """Return the smallest margin; infinite without conditions."""
+        return min(self.margins(gains).values(), default=math.inf)

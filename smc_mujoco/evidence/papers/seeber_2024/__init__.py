@@ -1,0 +1,1 @@
+"""Paper seeber_2024: claims in paper.toml, measured in claims.py."""

@@ -1,0 +1,122 @@
+"""How the claims of Seeber & Andritsch 2024 are measured."""
+
+import math
+
+import numpy as np
+
+import smc_mujoco as smc
+
+L = 1.0  # N/s, bound on the slope of d
+LARGEST = 1.0  # N, of |d|
+RISE = 40  # periods of the triangle before its slope flips
+
+
+def margins(gains):
+    """The two conditions of theorem 3.4, with |d'| <= 1."""
+    return {"k2 > L, N/s": gains["k2"] - L, "k1 > sqrt(k2 + L)": gains["k1"] - math.sqrt(gains["k2"] + L)}
+
+
+def slopes(period, duration, seed):
+    """Return d with a slope of L or -L over each period, drawn by a seed, and |d| <= 1."""
+    count = round(duration / period)
+    values, steps = [0.0], np.random.default_rng(seed).choice((-1.0, 1.0), count) * L * period
+    for step in steps:
+        values.append(values[-1] + (step if abs(values[-1] + step) <= LARGEST else -step))
+    return smc.TimeSeries((np.arange(count + 1) * period).tolist(), values)
+
+
+def flip(period, sign):
+    """Return a triangle of slopes L and -L, of mean 0 over every period, that goes on with one slope after RISE."""
+    corners = sign * 0.5 * L * period * (-1.0) ** np.arange(RISE + 1)  # the last one is sign L T / 2
+    last = corners[-1] + sign * L * period
+    return smc.TimeSeries((np.arange(RISE + 2) * period).tolist(), [*corners.tolist(), last])
+
+
+def late(trace):
+    """Return the largest |x| of the last half over L T^2; NaN if the run failed."""
+    return float(np.abs(trace.v[len(trace.v) // 2 : -1]).max()) / (L * trace.scenario.control_period**2)
+
+
+def random_runs(runs, law):
+    """Return name -> trace under random slopes, for each period and seed."""
+    seeds, periods = (runs.values[name][: 1 if runs.quick else None] for name in ("seeds", "periods"))
+    cells = [(period, seed) for period in periods for seed in seeds]
+    duration = 5.0
+    scenarios = [
+        runs.scenario(
+            runs.plant,
+            law,
+            runs.conditions[0],
+            control_period=period,
+            duration=duration,
+            v0=0.1,
+            disturbance=slopes(period, duration, seed),
+        )
+        for period, seed in cells
+    ]
+    names = [f"{1e3 * period:g} ms, seed {seed}" for period, seed in cells]
+    return dict(zip(names, runs.traces(scenarios), strict=True))
+
+
+def bounded(runs):
+    """Largest |x| of the last half of 5 s over L T^2, under slopes of L and -L drawn for each period."""
+    return {
+        "largest |x| of the last half / (L T^2)": {
+            name: late(trace) for name, trace in random_runs(runs, runs.laws[0]).items()
+        }
+    }
+
+
+def flipped(runs, law, condition, sign):
+    """Return the scenario of a law under a triangle whose slope goes on, from rest."""
+    (period,) = {runs.scenario(runs.plant, law, condition).control_period}
+    return runs.scenario(
+        runs.plant, law, condition, duration=(RISE + 1) * period, v0=0.0, disturbance=flip(period, sign)
+    )
+
+
+def last(trace):
+    """Return |x| after the last period over L T^2."""
+    return float(abs(trace.v[-1, 0])) / (L * trace.scenario.control_period**2)
+
+
+def attained(runs):
+    """|x| over L T^2 a period after a triangle of mean 0 over every period goes on with its slope."""
+    cells = [(law, condition) for law in runs.laws for condition in runs.conditions]
+    traces = runs.traces(flipped(runs, law, condition, 1.0) for law, condition in cells)
+    shares = {f"{law}, {condition}": last(one) for (law, condition), one in zip(cells, traces, strict=True)}
+    return {"largest |x| after the slope flips / (L T^2)": shares}
+
+
+def best_possible(runs):
+    """The larger |x| over L T^2 of two runs under disturbances that a sampled law cannot tell apart, for seven laws."""
+    (condition,) = runs.conditions
+    cells = [(law, sign) for law in runs.laws for sign in (1.0, -1.0)]
+    ends = [last(one) for one in runs.traces(flipped(runs, law, condition, sign) for law, sign in cells)]
+    worse = np.reshape(ends, (-1, 2)).max(axis=1)
+    return {"worse of the two |x| / (L T^2)": dict(zip(runs.laws, worse.tolist(), strict=True))}
+
+
+def compared(runs):
+    """Largest |x| of the last half of 5 s under random slopes, over that of the explicit and the older implicit law."""
+    proper, *others = runs.laws
+    ours = {name: late(trace) for name, trace in random_runs(runs, proper).items()}
+    ratios = {}
+    for law in others:
+        for name, trace in random_runs(runs, law).items():
+            ratios[f"{law}, {name}"] = ours[name] / late(trace)
+    return {"proper / other, largest |x| of the last half": ratios}
+
+
+def no_windup(runs):
+    """How far s goes beyond 0 from 20 m/s, over that of the law without conditioning; largest |x| of the last half."""
+    d = smc.Sine(1.5, 0.6)
+    ours, plain = runs.traces(
+        runs.scenario(runs.plant, law, v0=runs.values["start"], u_max=runs.values["u_max"], disturbance=d)
+        for law in runs.laws
+    )
+    beyond = [max(-float(one.v[:-1].min()), 0.0) for one in (ours, plain)]
+    return {
+        "overshoot / that of the law without conditioning": beyond[0] / beyond[1] if beyond[1] else math.inf,
+        "largest |x| of the last half / (L T^2)": late(ours),
+    }

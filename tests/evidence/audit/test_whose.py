@@ -1,0 +1,121 @@
+"""Whose a claim is decides what is counted, and what is said of all or some gains is decided by one set of them."""
+
+import pytest
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.evidence.audit.audit import audit
+from smc_mujoco.evidence.audit.badge import svg
+from smc_mujoco.evidence.audit.paper import paper
+from smc_mujoco.evidence.audit.verdict import DERIVED, OURS, PAPER, Statement, check, judged, summary, totals
+
+DATA = """
+title = "t"
+authors = "a"
+source = "s"
+read = "abstract"
+[gains.paper]
+classical = {{ k = 2.0, c = 1.0 }}
+[allowed.classical]
+k = [1.0, 9.0]
+{margins}
+[[claim]]
+id = "1"
+whose = "paper"
+over = "{over}"
+text = "k is as it should be"
+where = "p. 1"
+function = "gain"
+plants = {plants}
+laws = ["classical"]
+holds_if = {{ "gain" = "{limit}" }}
+"""
+CODE = """
+def gain(runs):
+    return {"gain": {plant: runs.law(plant, "classical").gains["k"] for plant in runs.plants}}
+def margins(gains):
+    return {"k < 5": 5.0 - gains["k"]}
+"""
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(data, code=CODE):
+        (tmp_path / "paper.toml").write_text(data)
+        (tmp_path / "claims.py").write_text(code)
+        return tmp_path
+
+    return write
+
+
+def claim(whose, holds, read="abstract"):
+    statement = Statement(id=whose, text="t", where="w", measured="m", holds_if="h", whose=whose, read=read)
+    return judged(statement, {"paper": [check("x", 1.0 if holds else 3.0, "<", 2.0)]})
+
+
+def test_totals_and_badge_count_the_paper_s_own_sentences_and_questions_have_answers():
+    claims = [claim(PAPER, True), claim(DERIVED, False), claim(OURS, False), claim(OURS, True)]
+    assert [one.verdict for one in claims] == ["supported", "refuted", "no", "yes"]
+    assert totals(claims) == {"supported": 1}
+    assert "refuted" not in svg("small", claims)
+    assert "1 supported" in svg("small", claims)
+    assert "own sentences (abstract read): ● 1 supported; derived from it: ○ 1 refuted; questions" in summary(claims)
+
+
+def decided(folder):
+    (found,) = audit(folder).claims
+    return found.verdict, found.beside["paper"]
+
+
+def test_all_gains_are_refuted_by_one_that_the_theorem_allows_with_its_margin(written):
+    folder = written(DATA.format(over="all", limit="< 4", plants='["duffing"]', margins='margins = "margins"'))
+    verdict, beside = decided(folder)
+    assert verdict == "refuted"
+    assert 4.0 <= beside["decided at k"] < 5.0
+    assert beside["margin of k < 5"] == pytest.approx(5.0 - beside["decided at k"])
+    assert decided(folder) == (verdict, beside)
+
+
+def test_gains_outside_the_conditions_are_no_counter_example(written):
+    conditions = 'margins = "margins"'
+    assert (
+        decided(written(DATA.format(over="all", limit="< 5", plants='["duffing"]', margins=conditions)))[0]
+        == "supported"
+    )
+    assert decided(written(DATA.format(over="all", limit="< 5", plants='["duffing"]', margins="")))[0] == "refuted"
+
+
+def test_some_gains_are_enough_on_each_plant_and_the_set_s_own_are_tried_first(written):
+    both = '["duffing", "van_der_pol"]'
+    verdict, beside = decided(written(DATA.format(over="some", limit="> 3", plants=both, margins="")))
+    assert verdict == "supported"
+    assert min(beside["duffing: decided at k"], beside["van_der_pol: decided at k"]) > 3.0
+    first = decided(written(DATA.format(over="some", limit="> 1", plants=both, margins="")))[1]
+    assert (first["duffing: decided at k"], first["duffing: sets of gains tried"]) == (2.0, 1)
+    assert decided(written(DATA.format(over="some", limit="> 9", plants=both, margins="")))[0] == "refuted"
+
+
+GOOD = DATA.format(over="all", limit="< 9", plants='["duffing"]', margins='margins = "margins"')
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (GOOD.replace('whose = "paper"', ""), 'claim 1: it has no whose: write whose, "paper" for a sentence'),
+        (GOOD.replace('whose = "paper"', 'whose = "mine"'), "whose is 'mine': write one of 'paper', 'derived', 'ours'"),
+        (
+            GOOD.replace('whose = "paper"', 'whose = "derived"'),
+            "it is derived, and does not say how: write how",
+        ),
+        (GOOD.replace('read = "abstract"', 'read = "nothing"'), "nothing of the paper was read, and it is 'paper'"),
+        (GOOD.replace('read = "abstract"', 'read = "most of it"'), "read is 'most of it': write one of 'full text'"),
+        (GOOD.replace('over = "all"', 'over = "many"'), "over is 'many': write one of 'all', 'some'"),
+        (GOOD.replace("[allowed.classical]", "[allowed.twisting]"), "allowed"),
+        (GOOD.replace("k = [1.0, 9.0]", "k = [9.0, 1.0]"), "write two positive numbers, the lower first"),
+        (GOOD.replace("k = [1.0, 9.0]", "k = [6.0, 9.0]"), "no gains in .allowed. meet the conditions: widen"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(written, data, said):
+    folder = written(data)
+    with pytest.raises(ScenarioError, match=said) as raised:
+        audit(paper(folder))
+    assert "\n" not in str(raised.value)
