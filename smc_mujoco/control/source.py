@@ -101,12 +101,18 @@ def in_words(sources: Mapping[str, Iterable[Source]], short: bool = False) -> st
       sources: law -> the sources of its gains; one that has no gains is left out.
       short: whether to leave out the searches.
     """
+    known = {law: [source for source in its if source.kind != NONE] for law, its in sources.items()}
+    return by_words(
+        {law: kinds(its) if short else ", ".join(dict.fromkeys(map(str, its))) for law, its in known.items()}
+    )
+
+
+def by_words(words: Mapping[str, str]) -> str:
+    """Return law -> where its gains come from as one text, see `in_words`; "" stands for a law without gains."""
     laws: dict[str, list[str]] = {}
-    for law, its in sources.items():
-        known = [source for source in its if source.kind != NONE]
-        words = kinds(known) if short else ", ".join(dict.fromkeys(map(str, known)))
-        if words:
-            laws.setdefault(words, []).append(law)
+    for law, its in words.items():
+        if its not in ("", NONE):
+            laws.setdefault(its, []).append(law)
     if len(laws) < 2:
         return "".join(f"gains {words}" for words in laws)
     return f"gains: {', '.join(f'{joined(names)} {words}' for words, names in laws.items())}"

@@ -37,6 +37,7 @@ from smc_mujoco.common.text import table as text_table
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
+from smc_mujoco.control.source import by_words, kinds
 from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.metrics.conventions import last
 from smc_mujoco.simulation.conditions import Condition, find_condition
@@ -92,11 +93,12 @@ class AccuracyTable(list[Accuracy]):
 
     @property
     def groups(self) -> "dict[str, AccuracyTable]":
-        """The rows of each plant and condition, by a title."""
+        """The rows of each plant and condition, by a title, which says where the laws' gains come from."""
         found: dict[str, AccuracyTable] = {}
         for row in self:
             found.setdefault(f"{row.plant}, {row.condition}: |e| in {row.unit}", AccuracyTable()).append(row)
-        return found
+        gains = {title: by_words({row.law: row.gains for row in rows}) for title, rows in found.items()}
+        return {f"{title}, {gains[title]}" if gains[title] else title: rows for title, rows in found.items()}
 
     def to_pandas(self) -> "pandas.DataFrame":
         """Return a pandas DataFrame with a row for each law on each plant in each condition.
@@ -378,7 +380,7 @@ def _row(cell: Cell, runs: Sequence[Run]) -> Accuracy:
         plant=base.plant.name,
         condition=base.condition or "",
         law=law.name,
-        gains=cell.gains,
+        gains=kinds(one.law.source for one in cell.scenarios),
         unit=base.plant.units[0],
         periods=cell.periods,
         runs=len(counted),
