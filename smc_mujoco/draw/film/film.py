@@ -7,6 +7,7 @@ and written one by one, so that memory does not grow with a film's length.
 
 import contextlib
 import os
+import warnings
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import numpy as np
 from PIL import Image
 
 from smc_mujoco.common import extras, gl
-from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, users_frame
 from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import finite, windows
@@ -33,6 +34,7 @@ MAX_MACHINES = 8  # more are too small to tell apart
 MIN_SIZE, MAX_SIZE = (320, 180), (1920, 1080)  # px
 FULL_WIDTH = 1280  # px, for which sizes of letters are stated
 CHARTS = 0.36  # height of the charts, of the film's
+BLANK = 8  # of 255: a picture whose colours differ by less shows nothing; chosen
 PAUSE = 1200  # ms for which a clip's last picture stays before it repeats
 Report = Callable[[int], None]
 
@@ -199,11 +201,24 @@ def frames(
                 for i, longest in enumerate([] if failed[k] or arms else by_channel[k][: stage.shown[k]]):
                     drawn += [(k, i, arrow) for arrow in arrows.arrows(loads[k], frame, i, longest, colour)]
             picture = stage.render(drawn)
+            if frame == 0:
+                warn_of_nothing(traces[0].scenario.plant.name, stage, picture)
             if over:
                 picture = over.over(picture, frame, stage.find)
             moods = tuple(each[frame] for each in timelines)
             picture = caption.over(picture, time, failed, moods, float(shown.speeds[frame]))
             yield np.concatenate([picture, charts.at(time)])
+
+
+def warn_of_nothing(name: str, stage: Stage, picture: np.ndarray) -> None:
+    """Warn of a picture, (height, width, 3), of one colour, and of machines without a visible part that moves."""
+    if np.ptp(picture.reshape(-1, 3), axis=0).max() <= BLANK:
+        fact = "has one colour: give another camera, such as camera=(60, -20)"
+    elif not any(len(links) for links in stage.links):
+        fact = "shows no part that moves: give it geoms in groups 0 to 2 that are not transparent"
+    else:
+        return
+    warnings.warn(f"the picture of {name} {fact}", ScenarioWarning, users_frame())
 
 
 def positions(t: np.ndarray, x: np.ndarray, times: np.ndarray) -> np.ndarray:

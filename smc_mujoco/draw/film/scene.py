@@ -33,6 +33,7 @@ CELLS = 7  # of the floor's grid, in the width of what is seen; chosen
 HAZE = (0.66, 0.725, 0.80)  # red, green, blue, chosen
 FADED = 0.9  # part of the haze at the top of the picture, chosen
 HORIZON = 3.0  # distances of the farthest machine, where the haze is as thick if the floor reaches further
+NO_HAZE = 1.05  # a floor less far than this, of the distance of the farthest point, gets no haze; chosen
 FRONT = (1.0, 0.0, 0.0, 0.0, 0.2, 1.0)  # right and up of a camera before an own model, a little above it
 ABOVE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.35)  # of one above, for joints with vertical axes
 EMISSION = 0.13  # of the floor, so that it is nearly as white as the page below
@@ -116,6 +117,8 @@ def set_floor(
     model.mat_texrepeat[model.material("floor").id] = 1.0 / cell
     start = float(((points - place) @ -turn[:, 2]).max())
     stop = min(camera.floor_distance(turn, place, size), HORIZON * start)
+    if stop < NO_HAZE * start:  # a view from above: the floor is no farther than the machine
+        stop = HORIZON * start
     model.vis.map.fogstart = start / model.stat.extent
     model.vis.map.fogend = (start + (stop - start) / FADED) / model.stat.extent
     model.vis.rgba.fog[:] = (*HAZE, 1.0)

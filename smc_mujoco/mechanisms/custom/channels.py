@@ -23,7 +23,8 @@ class Channel:
 
     Attributes:
       actuator: name of the motor that drives the joint; None: its only actuator.
-      motor: whether to replace the joint's actuators, if it has any, by an ideal motor.
+      motor: whether to replace the joint's actuators, if it has any, by an ideal motor. It keeps their forcerange, and
+        the joint's actuatorfrcrange.
       partner: a joint without an actuator that moves with this one, such as a pole on its cart. It is measured and
         scored as a separate channel, after the driven ones. The law of this channel reads it in y.q, y.dq, y.fq and
         y.gq. If it has an actuator, that stays at ctrl = 0: a motor then does nothing, a servo holds its position.

@@ -45,9 +45,8 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
     if channel.motor:
         if wanted is not None:
             raise ScenarioError(f"channel {joint!r} has motor=True and actuator {shown(wanted)}: give one of the two")
-        return Motor(
-            joint, _limit(f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange", *bounds), tuple(own)
-        )
+        takes = f"joint {joint!r} of {label} takes"
+        return Motor(joint, _limit(takes, "widen its actuatorfrcrange", *bounds, _together(model, own)), tuple(own))
     if wanted is not None:
         chosen = pick(label, "actuator", wanted, [model.actuator(i).name for i in range(model.nactuator)])
         if chosen not in own:
@@ -101,6 +100,19 @@ def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
         low, high = (float(min(max(end, least), most)) for end in (low, high))
     low, high = sorted((float(gear * low), float(gear * high)))
     return low, high
+
+
+def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[float, float]:
+    """Return the least and the largest force that the forceranges of a joint's actuators allow together, N m or N.
+
+    There is no bound without an actuator, if one has no forcerange, and if they push only one way: an ideal motor that
+    replaces them pushes both ways.
+    """
+    if not actuators or not all(model.actuator_forcelimited[i] for i in actuators):
+        return -math.inf, math.inf
+    ends = [sorted(float(model.actuator_gear[i, 0] * end) for end in model.actuator_forcerange[i]) for i in actuators]
+    low, high = sum(low for low, _ in ends), sum(high for _, high in ends)
+    return (low, high) if low < 0.0 < high else (-math.inf, math.inf)
 
 
 def put(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:

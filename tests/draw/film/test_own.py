@@ -1,6 +1,7 @@
 """A model that nobody here wrote has its picture and its figure."""
 
 import importlib.util
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ FOREIGN = Path(SUITE.submodule_search_locations[0]) / "suite"
         ("cartpole", {"slider": smc.Channel(partner="hinge_1")}),
         ("acrobot", {"elbow": None}),
         ("manipulator", {"arm_root": None, "arm_shoulder": None}),
+        ("reacher", {"shoulder": None, "wrist": None}),  # from above, and its target reaches below the floor
     ],
 )
 def test_a_foreign_model_has_its_picture(tmp_path, name, channels):
@@ -37,6 +39,24 @@ def test_a_foreign_model_has_its_picture(tmp_path, name, channels):
     assert np.asarray(Image.open(still))[60:200].std() > 5.0
     smc.figure(traces, tmp_path / "a.svg")
     assert all((tmp_path / name).stat().st_size for name in ("a.svg", "a.png"))
+
+
+@pytest.mark.parametrize(
+    ("group", "floor", "words"), [(3, "", "shows no part that moves"), (0, '<geom type="box" size="9 9 .1"/>', None)]
+)
+def test_a_picture_that_shows_nothing_is_told(tmp_path, group, floor, words):
+    (tmp_path / "one.xml").write_text(f"""
+      <mujoco><worldbody>{floor}<body pos="0 0 .5"><joint name="j" axis="0 1 0"/>
+        <geom size=".1" pos="0 0 .3" group="{group}"/></body></worldbody>
+      <actuator><motor joint="j"/></actuator></mujoco>""")
+    trace = smc.run(smc.Scenario(plant=smc.plant_from(tmp_path / "one.xml", ["j"]), law="none", duration=0.1))
+    if words:
+        with pytest.warns(smc.ScenarioWarning, match=words):
+            smc.still([trace], 0.1, tmp_path / "a.png", size=(320, 180))
+    else:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            smc.still([trace], 0.1, tmp_path / "a.png", size=(320, 180))
 
 
 def test_arrows_of_a_foreign_cart_are_seen_and_all_of_its_rail_is_in_the_picture():

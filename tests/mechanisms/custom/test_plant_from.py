@@ -335,7 +335,19 @@ LIMITS = {
     "both": ('<motor joint="elbow" gear="3" ctrlrange="-2 2" forcerange="-.5 .5"/>', "", 1.5),
     "the joint's": ('<motor joint="elbow" ctrlrange="-9 9"/>', 'actuatorfrcrange="-2 1"', 1.0),
     "no clamp": ('<motor joint="elbow" ctrlrange="-2 2"/>', "", math.inf),
-    "ideal": ('<position joint="elbow" forcerange="-1 1"/>', "", math.inf),
+    "ideal": ('<position joint="elbow" kp="17.8" forcerange="-3.35 3.35"/>', "", 3.35),  # as of an SO-101
+    "ideal, with a gear": ('<position joint="elbow" gear="-2" forcerange="-3 4"/>', "", 6.0),
+    "ideal, of two": (
+        '<position joint="elbow" forcerange="-3 3"/><velocity joint="elbow" forcerange="-1 1"/>',
+        "",
+        4.0,
+    ),
+    "ideal, of one with a range": (
+        '<position joint="elbow" forcerange="-3 3"/><velocity joint="elbow"/>',
+        "",
+        math.inf,
+    ),
+    "ideal, of one way": ('<motor joint="elbow" forcerange="0 3"/>', "", math.inf),
     "ideal, of the joint": ('<position joint="elbow"/>', 'actuatorfrcrange="-2 2"', 2.0),
 }
 
