@@ -41,6 +41,7 @@ LAWS = (
 # Other implementations or names of a law -> the law, whose gains they use.
 FORMS = {f"observer_free_{form}": "observer_free" for form in ("q15", "single", "table", "taylor")}
 FORMS["super_twisting_unclamped"] = "super_twisting"
+FORMS["proper_conditioned_super_twisting"] = "proper_super_twisting"  # the same law while u is not saturated
 SAME = FORMS | {"conditioned_super_twisting": "super_twisting"}  # in the set "study"
 
 # The set "study": plant -> law -> gains. Super-twisting was tuned with w_max = u_max, and runs with it.
