@@ -62,7 +62,7 @@ def timed(
     except subprocess.TimeoutExpired:
         raise TimedOut from None
     finally:
-        if process.poll() is None or (process.stdout and not process.stdout.closed):  # it runs, or what it started
-            _kill(process)
+        _kill(process)  # what it started too, which may run on after it
+        if process.poll() is None or (process.stdout and not process.stdout.closed):
             process.communicate()
     return subprocess.CompletedProcess(command, process.returncode, *printed)

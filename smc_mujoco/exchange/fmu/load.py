@@ -51,6 +51,7 @@ NAMES = {
 INPUTS = tuple(n for n in Measurement._fields if n not in ("has_surface", "s", "v_eq"))
 CLOSE = 1e-6  # relative difference below which two periods are equal
 MAX_TIMEOUT = 86_400.0  # s: a day
+MAX_SIZE, MAX_FILES = 500_000_000, 10_000  # unpacked bytes and files of an FMU; chosen
 CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
 
 _running: dict[int, "Running"] = {}  # number of an instance, which its law's memory holds -> the instance
@@ -303,6 +304,12 @@ def _description(file: Path, digest: str) -> Any:
         with zipfile.ZipFile(file) as archive:
             if (wanted := "modelDescription.xml") not in archive.namelist():
                 raise ScenarioError(f"{file.name} is not an FMU, as there is no {wanted} in it: {CURE}")
+            members = archive.infolist()
+            if (size := sum(member.file_size for member in members)) > MAX_SIZE or len(members) > MAX_FILES:
+                raise ScenarioError(
+                    f"{file.name} unpacks to {len(members):,} files of {size / 1e6:,.0f} MB in all: give one of at "
+                    f"most {MAX_FILES:,} files and {MAX_SIZE / 1e6:,.0f} MB"
+                )
         folder = _extracted(str(file.resolve()), digest)
         about = fmpy.read_model_description(str(folder), validate=False)
     except ScenarioError:
@@ -316,6 +323,11 @@ def _description(file: Path, digest: str) -> Any:
     if about.coSimulation is None:
         kind = "Model Exchange" if about.modelExchange is not None else "Scheduled Execution"
         raise ScenarioError(f"{file.name} is for {kind} only: export it for Co-Simulation")
+    if not about.coSimulation.modelIdentifier.isidentifier():
+        raise ScenarioError(
+            f"{file.name} has the modelIdentifier {shown(about.coSimulation.modelIdentifier)}, which is no name in C: "
+            "export it with one of letters, digits and _"
+        )
     here = fmpy.platform if str(about.fmiVersion).startswith("2") else fmpy.platform_tuple
     if not list((folder / "binaries" / here).glob(f"{about.coSimulation.modelIdentifier}.*")):
         places = sorted(each.name for each in (folder / "binaries").glob("*")) if (folder / "binaries").exists() else []

@@ -4,8 +4,10 @@ The script must start quickly, so this file imports nothing of smc_mujoco. It wr
 line names the step in which the process died, or the fault.
 """
 
+import ctypes
 import json
 import math
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -32,6 +34,30 @@ class Group(NamedTuple):
     places: list[int]
 
 
+class Arithmetic:
+    """How this thread rounds and flushes, which foreign code may change for all that computes after it."""
+
+    NUMBERS = (1.0, 2.0, 3.0, 2.0**-53, 1e-310)
+
+    def __init__(self) -> None:
+        self.environment = ctypes.create_string_buffer(256)  # C's fenv_t has 8 to 32 bytes
+        self.library = ctypes.CDLL(None if os.name == "posix" else "ucrtbase")
+        self.library.fegetenv(self.environment)
+        self.results = self._computed()
+
+    def changed(self) -> bool:
+        """Return whether this thread computes differently from before, and restore it if it does."""
+        if self._computed() == self.results:
+            return False
+        self.library.fesetenv(self.environment)
+        return True
+
+    def _computed(self) -> tuple[float, ...]:
+        """Return results that differ between the directions of rounding, and where small numbers are flushed to 0."""
+        one, two, three, half_digit, small = self.NUMBERS
+        return one / three, two / three, -one / three, -two / three, one + half_digit, small / two, small + 0.0
+
+
 class Slave:
     """An instance of an FMU, initialised at a time.
 
@@ -48,6 +74,7 @@ class Slave:
         import fmpy
         from fmpy.simulation import instantiate_fmu
 
+        self.arithmetic = Arithmetic()
         about = fmpy.read_model_description(folder, validate=False)
         self.known = {variable.name: variable for variable in about.modelVariables}
         self.two, self.said = str(about.fmiVersion).startswith("2"), list[str]()
@@ -93,11 +120,8 @@ class Slave:
         for kind, names, references, places in groups:
             own = [_of_type(kind, values[place]) for place in places]
             setter = ("setInteger" if self.two else "setInt64") if kind == "Enumeration" else f"set{kind}"
-            try:
-                getattr(self.fmu, setter)(references, own)
-            except Exception as error:
-                what = ", ".join(f"{name} = {value:g}" for name, value in zip(names, own, strict=True))
-                raise self._fault(f"setting {what}", error) from error
+            what = ", ".join(f"{name} = {value:g}" for name, value in zip(names, own, strict=True))
+            self._called(f"setting {what}", getattr(self.fmu, setter), references, own)
 
     def _get(self, groups: Sequence[Group]) -> list[float]:
         """Return the values of variables in the order of their places."""
@@ -109,11 +133,16 @@ class Slave:
         return found
 
     def _called(self, what: str, function: Any, *arguments: Any, **named: Any) -> Any:
-        """Call a function of FMPy. Raise Fault with the FMU's own words if it fails."""
+        """Call a function of FMPy. Raise Fault if it fails, with the FMU's own words, or changes our arithmetic."""
         try:
-            return function(*arguments, **named)
+            result = function(*arguments, **named)
         except Exception as error:
             raise self._fault(what, error) from error
+        finally:
+            changed = self.arithmetic.changed()
+        if changed:
+            raise Fault(f"{what} changes how this process rounds, by which other simulations compute too")
+        return result
 
     def _fault(self, what: str, error: Exception) -> Fault:
         """Return the Fault of a call that failed, with the FMU's last words or else those of the error."""

@@ -2,6 +2,7 @@
 
 import gc
 import pickle
+import shutil
 import sys
 import zipfile
 from pathlib import Path
@@ -210,6 +211,7 @@ def test_periods_that_do_not_fit_are_said(foreign):
         (2.0, r"the step from t = 0 s did not end within 6 s: fix what it waits for, or give timeout="),
         (3.0, r"torque is nan after 1 steps: fix the FMU"),
         (4.0, r"the step from t = 0 s fails \(the licence has ended\)"),
+        (5.0, r"the step from t = 0 s changes how this process rounds, by which other simulations compute too"),
     ],
 )
 def test_a_trial_says_how_an_fmu_fails(foreign, mode, said):
@@ -223,6 +225,15 @@ def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
     trace, fine = smc.run([scenario(law), scenario("pid")])
     assert "the step from t = 0 s fails (the licence has ended)" in str(trace.failure)
     assert fine.failure is None
+
+
+def test_an_fmu_that_changes_the_rounding_fails_and_other_runs_keep_their_bits(foreign):
+    one, alone = 1.0, smc.run(scenario("pid"))
+    law = smc.law_from_fmu(foreign, constants={"mode": 5.0}, isolate=False)()
+    trace, fine = smc.run([scenario(law), scenario("pid")])
+    assert "changes how this process rounds" in str(trace.failure)
+    assert one / 3.0 == float.fromhex("0x1.5555555555555p-2")
+    np.testing.assert_array_equal(fine.x, alone.x)
 
 
 @pytest.mark.parametrize(
@@ -287,6 +298,23 @@ def test_an_fmu_that_cannot_be_a_law_is_one_sentence(foreign, tmp_path, pair, sa
         smc.law_from_fmu(changed(foreign, tmp_path, pair), **RENAMED)
     assert str(error.value).startswith(said)
     assert "\n" not in str(error.value)
+
+
+def test_an_fmu_that_unpacks_to_too_much_is_refused_before(foreign, tmp_path):
+    bomb = shutil.copy(foreign, tmp_path / "bomb.fmu")
+    with zipfile.ZipFile(bomb, "a", zipfile.ZIP_DEFLATED) as archive:
+        for i in range(6):
+            archive.writestr(f"zeros{i}", bytes(100_000_000))
+    with pytest.raises(smc.ScenarioError, match=r"bomb.fmu unpacks to .* files of 600 MB in all: give one of at most"):
+        smc.law_from_fmu(bomb, constants={"mode": 0.0})
+
+
+@pytest.mark.parametrize("name", ["/lib/x", "a**", "../a"])
+def test_an_identifier_that_is_no_name_is_refused(tmp_path, name):
+    text = (helper.HERE / "fmi2.xml").read_text().replace('modelIdentifier="controller"', f'modelIdentifier="{name}"')
+    assert name in text
+    with pytest.raises(smc.ScenarioError, match=r"has the modelIdentifier .*, which is no name in C"):
+        smc.law_from_fmu(helper.fmi2(tmp_path, text), constants={"mode": 0.0})
 
 
 def test_a_file_that_is_no_fmu_is_one_sentence(tmp_path):
