@@ -142,11 +142,11 @@ def scaling(
     """
     errors = parts[..., -1]
     failed = ~np.isfinite(errors).all(axis=0)
-    rounded: np.ndarray = ~failed & (errors <= floor).any(axis=0)
+    rounded = np.asarray(~failed & (errors <= floor).any(axis=0))
     with np.errstate(invalid="ignore", divide="ignore"):
         ratios = parts[..., 1:] / parts[..., :-1]
-    falling: np.ndarray = ~failed & ~rounded & np.any(np.all(ratios < 1.0 / TREND, axis=2), axis=0)
-    growing: np.ndarray = ~failed & ~rounded & np.any(np.all(ratios > TREND, axis=2), axis=0)
+    falling = np.asarray(~failed & ~rounded & np.any(np.all(ratios < 1.0 / TREND, axis=2), axis=0))
+    growing = np.asarray(~failed & ~rounded & np.any(np.all(ratios > TREND, axis=2), axis=0))
     used = ~(failed | rounded | falling | growing)
     h = np.array(periods)[used]
     order, low, high = fit(h, errors[:, used])
