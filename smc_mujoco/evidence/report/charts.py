@@ -17,8 +17,10 @@ from smc_mujoco.evidence.report.words import style
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.margins import Margin
+    from smc_mujoco.analysis.scaling import Accuracy
     from smc_mujoco.evidence.report.rigs import Repeated
     from smc_mujoco.evidence.report.stages import Front
+    from smc_mujoco.studies.accuracy import AccuracyTable
 
 KEYS = 5  # laws in a line of a legend
 # Of logarithmic axes; plotly writes powers a quarter larger than the size says.
@@ -163,6 +165,45 @@ def _margin(margin: "Margin", most: float) -> list[dict[str, Any]]:
         bar = {"size": 15, "symbol": "line-ns", "line": {"width": 2.5, "color": style.INK}}
         hover = f"linear theory<br>{words.number(margin.theory)} {margin.unit}<extra></extra>"
         traces.append(common | {"x": [margin.theory], "marker": bar, "hovertemplate": hover})
+    return traces
+
+
+def accuracies(found: "AccuracyTable") -> Figure:
+    """Draw the largest error over the control period: a panel for each condition, and dashed theory's slope."""
+    groups = found.groups
+    grid = panels(1, len(groups), (0.08, 0))
+    data: list[dict] = []
+    layout: dict[str, Any] = {"annotations": []}
+    laws: set[str] = set()
+    for panel, (title, rows) in zip(grid, groups.items(), strict=True):
+        name, _, unit = title.rpartition(": |e| in ")
+        layout["annotations"].append(panel.title(f"{words.pretty(name)}, {unit}"))
+        for row in rows:
+            data += [trace | panel.trace for trace in _accuracy(row, row.law not in laws)]
+            laws.add(row.law)
+        errors = [error for row in rows for error in row.e.largest if row.floor < error < math.inf]
+        low, high = min(errors, default=1.0), max(errors, default=1.0)
+        span = [math.log10(low) - 0.2, math.log10(high) + 0.2]
+        x = {"type": "log", "title": {"text": "control period, ms"}, "tickvals": [1e3 * h for h in rows[0].periods]}
+        layout |= panel.axes(x, POWERS | {"range": span, "dtick": 1})
+    legend = 21 * math.ceil(len(laws) / KEYS)  # px that it takes above the panels
+    layout["legend"] = {"y": 1 + 28 / 264}
+    return figure(data, layout, 380 + legend, (60, 12, 62 + legend, 54), showlegend=True)
+
+
+def _accuracy(row: "Accuracy", named: bool) -> list[dict[str, Any]]:
+    """Return the line of a law's errors over the control period in ms, and theory's slope through its middle."""
+    colour, name = words.colour(row.law), _named(row.law)
+    h = [1e3 * period for period in row.periods]
+    common = {"type": "scatter", "legendgroup": row.law, "x": rounded(h)}
+    hover = f"<b>{name}</b><br>%{{y:.2g}} {row.unit} at %{{x:g}} ms<br>order {row.e}<extra></extra>"
+    line = {"mode": "lines+markers", "line": {"color": colour, "width": 1.8}, "marker": {"size": 7, "color": colour}}
+    traces = [common | line | {"y": rounded(row.e.largest), "name": name, "showlegend": named, "hovertemplate": hover}]
+    if row.e.theory is not None and not math.isnan(row.e.order):
+        middle = len(h) // 2
+        bound = [row.e.largest[middle] * (one / h[middle]) ** row.e.theory for one in h]
+        dashed = {"mode": "lines", "line": {"color": colour, "width": 1, "dash": "dash"}, "hoverinfo": "skip"}
+        traces.append(common | dashed | {"y": rounded(bound), "showlegend": False})
     return traces
 
 

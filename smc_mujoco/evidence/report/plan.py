@@ -10,6 +10,7 @@ from typing import TypeVar
 from smc_mujoco.analysis.ranking import SEEDS
 from smc_mujoco.common import progress
 from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.studies.accuracy import PERIODS, STARTS
 from smc_mujoco.studies.study import FULL as GRID
 from smc_mujoco.studies.study import QUICK as QUICK_GRID
 from smc_mujoco.studies.study import Extent
@@ -39,6 +40,9 @@ class Plan(Extent):
       scene_laws: laws side by side in a scene.
       scene: duration of traces and films, s.
       rigs: machines whose laws are compared on all their sets of quantities.
+      accurate: plants on which accuracy is measured without noise.
+      periods: control periods of that, s.
+      accuracy_starts: initial states of that.
     """
 
     quick: bool
@@ -56,6 +60,9 @@ class Plan(Extent):
     scene_laws: tuple[str, ...] = scenarios.LAWS
     scene: float = 5.0
     rigs: tuple[str, ...] = ("qube_servo", "simple_pendulum_ak80")
+    accurate: tuple[str, ...] = ("duffing",)
+    periods: tuple[float, ...] = PERIODS
+    accuracy_starts: int = STARTS
 
 
 FULL = Plan(quick=False)
@@ -69,6 +76,8 @@ QUICK = Plan(
     scenes=tuple((plant, "nominal") for plant in QUICK_GRID.plants),
     filmed=1,
     rigs=("qube_servo",),
+    periods=PERIODS[:3],
+    accuracy_starts=1,
 )
 
 

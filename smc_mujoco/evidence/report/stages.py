@@ -24,12 +24,13 @@ from smc_mujoco.evidence.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.papers.gaber.claims import lyapunov
-from smc_mujoco.evidence.report import about, films, oscillation, rigs, scores, words
+from smc_mujoco.evidence.report import about, films, oscillation, precision, rigs, scores, words
 from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.evidence.report.scores import Place, Score
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.grid import grid as make_grid
 from smc_mujoco.simulation.run import run
+from smc_mujoco.studies.accuracy import AccuracyTable
 from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
@@ -82,6 +83,7 @@ class Findings:
     margins: tuple[Margin, ...]
     by_set: Mapping[str, tuple[Margin, ...]]
     oscillations: tuple[oscillation.Oscillation, ...]
+    accuracies: AccuracyTable
     basins: tuple[Basin, ...]
     machines: tuple[rigs.Machine, ...]
     repeated: tuple[rigs.Repeated, ...]
@@ -114,6 +116,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
     by_set, basins, scenes = margins_by_set(work, margins), all_basins(work), all_scenes(work)
     machines = rigs.machines(work)
     oscillations = oscillation.oscillations(work)
+    accuracies = precision.accuracies(work)
     no_film = films.missing() if plan.filmed else None
     with bars.stage("statistics"):
         return Findings(
@@ -125,6 +128,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
             margins=margins,
             by_set=by_set,
             oscillations=oscillations,
+            accuracies=accuracies,
             basins=basins,
             machines=machines,
             repeated=repeated,

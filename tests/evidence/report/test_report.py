@@ -22,7 +22,7 @@ import pytest
 from smc_mujoco.common import gl
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.evidence.report import answer, charts, films, maps, page, panels, report, stages, words
+from smc_mujoco.evidence.report import answer, charts, films, maps, page, panels, precision, report, stages, words
 from smc_mujoco.evidence.report import scores as scores_of
 from smc_mujoco.evidence.report.plan import QUICK, Bars
 from smc_mujoco.evidence.report.scores import Place, Score
@@ -47,6 +47,7 @@ TINY = dataclasses.replace(
     scene_laws=("observer_free", "classical"),
     scene=0.6,
     rigs=("qube_servo",),
+    periods=(4e-3, 2e-3),
 )
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
@@ -179,6 +180,18 @@ def test_margins_and_fronts_are_told_as_found(reader, findings):
     assert [float(cells[3][0]["data-v"]) for cells in rows] == [m.value for m in findings.margins]
     rows = [row[1] for row in reader.rows["fronts"] if row[1]]
     assert [float(cells[2][0]["data-v"]) for cells in rows] == [f.chosen[0] for f in findings.fronts]
+
+
+def test_accuracy_is_the_second_section_and_told_as_found(text, reader, findings):
+    assert list(page.SECTIONS)[1] == "accuracy"
+    rows = [row[1] for row in reader.rows["accuracy-table"] if row[1]]
+    assert len(rows) == len(findings.accuracies) == 2 * len(TINY.laws)
+    for cells, row in zip(rows, findings.accuracies, strict=True):
+        assert [cells[k][0]["data-v"] for k in (3, 4, 6)] == [
+            str(row.e.largest[0]), str(row.e.largest[-1]), str(row.s.order)
+        ]  # fmt: skip
+        assert cells[7][1] == (row.theory or "–")
+    assert next(precision.sentences(findings.accuracies)) in text
 
 
 def test_margins_are_told_under_every_set_of_gains_side_by_side(text, reader, findings):
