@@ -64,7 +64,7 @@ class Accuracy:
 
     Attributes:
       plant, condition, law: their names.
-      gains: the set that the law's gains are from, "default", or "yours".
+      gains: the kinds of sources of the law's gains, see `control.source`, such as "shipped".
       unit: of e. That of s depends on the law; for s = de + c e it is this unit per second.
       periods: control periods, s, longest first.
       e, s: how the tracking error and the law's sliding variable depend on the period.
@@ -212,15 +212,15 @@ def _difference(
     if order > theory:
         return ["falls faster than promised"]
     seen = [text for name, text in reasons.items() if name != "always"]
-    if len(periods) > 1 and theory > 0.0:
+    if interval[0] <= theory <= interval[1]:
+        seen.append("its interval contains the promised order")
+    elif len(periods) > 1 and theory > 0.0:
         fine = np.log(errors[:, -2:]).mean(axis=0)
         local = float((fine[1] - fine[0]) / math.log(periods[-1] / periods[-2]))
         if local < theory - LEVEL:
             seen.insert(
                 0, f"levels off (order {local:.2g} at the shortest periods): these gains, not sampling, limit it"
             )
-    if interval[0] <= theory <= interval[1]:
-        seen.append("its interval contains the promised order")
     return seen or ([] if math.isnan(order) else ["no reason seen"])
 
 

@@ -28,7 +28,17 @@ import numpy as np
 
 from smc_mujoco.analysis.scaling import QUANTITIES, Accuracy, Scaling, scaling
 from smc_mujoco.common import html
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, one_line, shown, taken, users_frame, whole
+from smc_mujoco.common.errors import (
+    ScenarioError,
+    ScenarioWarning,
+    find,
+    number,
+    one_line,
+    shown,
+    taken,
+    users_frame,
+    whole,
+)
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import ended, read_json, reading, write_json
 from smc_mujoco.common.progress import Report, summed
@@ -80,16 +90,18 @@ class AccuracyTable(list[Accuracy]):
         parts = []
         for title, rows in self.groups.items():
             below = [textwrap.fill(f"* {text}", WIDTH, subsequent_indent="  ") for text in remarks(rows)]
-            parts.append("\n".join([title, text_table(heads(rows), lines(rows)), *below, ""]))
+            heading = textwrap.fill(title, WIDTH)
+            parts.append("\n".join([heading, text_table(heads(rows), lines(rows)), *below, ""]))
         return "\n".join([*parts, textwrap.fill(KEY, WIDTH)])
 
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        return "".join(
-            html.table(heads(rows), lines(rows), title, f"{KEY} {'. '.join(remarks(rows))}", range(1, 6), len(rows))
-            for title, rows in self.groups.items()
-        )
+        parts = []
+        for title, rows in self.groups.items():
+            note = f"{KEY} {'. '.join(remarks(rows))}"
+            parts.append(html.table(heads(rows), lines(rows), title, note, range(1, 6), len(rows)))
+        return "".join(parts)
 
     @property
     def groups(self) -> "dict[str, AccuracyTable]":
@@ -284,13 +296,13 @@ class Cell(NamedTuple):
         period with half the physics step.
       periods: s, longest first.
       starts: their number.
-      gains: the set that the law's gains are from, "default", or "yours".
+      lacking: whether the law has its default gains because the set of gains lacks it.
     """
 
     scenarios: list[Scenario]
     periods: tuple[float, ...]
     starts: int
-    gains: str
+    lacking: bool
 
 
 def _cell(
@@ -313,39 +325,40 @@ def _cell(
         raise ScenarioError(f"condition {condition.name!r} sets control_period, which accuracy varies: leave it out")
     if len(units := set(plant.units[: plant.driven])) > 1:
         raise ScenarioError(f"{plant.name} has driven channels in {joined(sorted(units))}: give a plant with one unit")
-    source = _source(plant, law, gains)
+    lacking = isinstance(law, str) and not _has_gains(plant, law, gains)
 
     def at(seed: int, h: float, finer: int = 1) -> Scenario:
-        chosen = "default" if source == "default" else gains
-        made = case(plant, law, condition, duration, chosen, seed, starts, {"control_period": h})
+        made = case(
+            plant, law, condition, duration, "default" if lacking else gains, seed, starts, {"control_period": h}
+        )
         if "physics_step" in fields:
             return dataclasses.replace(made, physics_step=fields["physics_step"] / finer).named(made.condition)
         steps = made.steps if made.resolved.integrator == "RK4" else max(made.steps, MIN_STEPS)
         return dataclasses.replace(made, physics_step=h / (steps * finer)).named(made.condition)
 
     runs = [at(seed, h) for seed in seeds for h in periods]
-    return Cell([*runs, at(seeds[0], periods[-1], finer=2)], periods, len(seeds), source)
+    return Cell([*runs, at(seeds[0], periods[-1], finer=2)], periods, len(seeds), lacking)
 
 
-def _source(plant: Plant, law: str | Law | Template, gains: str) -> str:
-    """Return where a law's gains are from: the set `gains`, "default" where it lacks the law, or "yours"."""
-    if not isinstance(law, str):
-        return "yours"
+def _has_gains(plant: Plant, law: str, gains: str) -> bool:
+    """Return whether a set has gains for a law on a plant, or the law needs none.
+
+    Raises:
+      ScenarioError: an unknown law or set.
+    """
+    if not sets.law(plant, law, "default").gains:
+        return True
+    find("set of gains", gains, dict.fromkeys((*sets.SETS, "default")))
     try:
         sets.law(plant, law, gains)
     except ScenarioError:
-        sets.law(plant, law, "default")  # an unknown law raises here
-        return "default"
-    return gains
+        return False
+    return True
 
 
 def _warn_of_defaults(cells: Sequence[Cell], gains: str) -> None:
     """Warn of laws that have no gains in the set that was asked for."""
-    pairs = {
-        f"{cell.scenarios[0].law.name} on {cell.scenarios[0].plant.name}": None
-        for cell in cells
-        if cell.gains == "default" != gains and cell.scenarios[0].law.gains
-    }
+    pairs = {f"{cell.scenarios[0].law.name} on {cell.scenarios[0].plant.name}": None for cell in cells if cell.lacking}
     if pairs:
         warnings.warn(
             f"no gains in set {gains!r} for {', '.join(pairs)}: these have their default gains; tune them, or give "

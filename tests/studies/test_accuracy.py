@@ -6,6 +6,7 @@ import warnings
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.cli.main import main
 from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.studies.accuracy import load
 
@@ -143,3 +144,21 @@ def test_a_table_reads_as_text_html_data_and_file(tmp_path):
 def test_what_cannot_be_measured_is_one_sentence(options, message):
     with pytest.raises(smc.ScenarioError, match=message):
         smc.accuracy(**{"laws": "classical", "plants": "duffing"} | options)
+
+
+def test_the_command_prints_a_table_that_fits_and_writes_what_was_asked(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    options = "--laws classical,pid(kp=20) --periods 0.004,0.002 --seeds 1 --duration 1 --json a.json --out a.pdf"
+    with pytest.raises(SystemExit) as end:
+        main(["accuracy", "duffing", *options.split()])
+    printed = capsys.readouterr()
+    assert not end.value.code, printed.err
+    assert max(map(len, printed.out.splitlines())) <= 80
+    assert "order of s" in printed.out
+    assert "gains: classical shipped, pid yours" in " ".join(printed.out.split())
+    assert {row.law for row in load("a.json")} == {"classical", "pid"}
+    assert (tmp_path / "a.pdf").is_file()
+    with pytest.raises(SystemExit):
+        main(["accuracy", "duffing", "--periods", "4ms,2ms"])
+    assert "--periods '4ms,2ms' cannot be read: give numbers in s" in capsys.readouterr().err
