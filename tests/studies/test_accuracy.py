@@ -54,9 +54,8 @@ def test_dry_friction_orders_the_laws_as_textbooks_do():
 def test_second_order_laws_are_of_second_order_on_the_double_integrator_or_the_table_says_why_not():
     names = [name for name, law in catalogue().items() if law.order("s", law.defaults) == 2.0]
     table = defaults(names)
-    assert all(row.s.as_promised or row.s.why for row in table), str(table)
-    kept = [row.law for row in table if row.s.as_promised]
-    assert len(kept) >= len(names) - 2, str(table)  # those that end at rounding are exact under a constant force
+    assert all(row.s.as_promised or "which is rounding" in row.s.why for row in table), str(table)
+    assert sum(row.s.as_promised for row in table) > len(names) / 2
 
 
 def test_relays_are_of_first_order_and_layers_of_none():

@@ -21,6 +21,7 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
     family="super-twisting",
     continuous=True,
     finite_time="s",
+    accuracy={"s": 2, "e": 2},
     label="Proper conditioned super-twisting",
     gains={
         "k1": Gain(3.0, FORCE_PER_ROOT, positive=True),
