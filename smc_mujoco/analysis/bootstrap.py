@@ -16,10 +16,9 @@ seeds, and 1 - 2^(1 - n) with fewer, the coverage of the sample's range.
 A block may have fewer runs than there are seeds, because seeds that change nothing in it count as one run. A resample
 that draws none of the block's runs takes each of them once.
 
-An interval expresses the effect of initial states and noise only. Gains that were tuned from three seeds are used in
-turn: run s has those of tuning seed s modulo 3. So 16 runs have three samples of tuning, not 16. If gains differ much
-between tuning seeds, the runs with one tuning are alike, the interval is too narrow, and the p-values of `ranking` are
-too small. For laws tuned from one seed, intervals hold for these gains only.
+A law's gains are part of the sample. Runs that share one of several sets of gains are drawn together, as one sample:
+the interval of 24 runs with three sets of gains has three samples. If all runs have the same gains, the seeds are the
+sample, and the interval expresses initial states and noise for these gains.
 
 The median of several blocks is the median of their medians. Then a law with the lower median in every block also has
 the lower median overall, which the median of all runs together does not guarantee.
@@ -27,6 +26,7 @@ the lower median overall, which the median of all runs together does not guarant
 
 import functools
 import math
+from collections.abc import Sequence
 from statistics import NormalDist
 from typing import NamedTuple
 
@@ -45,7 +45,7 @@ class Interval(NamedTuple):
       median: of the values; for `share_interval` the share.
       low: lower end; NaN for the median of a single seed.
       high: upper end; NaN for the median of a single seed, inf if it may be "never".
-      n: number of seeds.
+      n: number of samples: seeds, or sets of gains.
     """
 
     median: float
@@ -77,13 +77,24 @@ def median_interval(values: ArrayLike, level: float = 0.95, resamples: int = RES
     return median_of(np.sort(rows) if len(rows) == 1 else rows, level, resamples, seed)
 
 
-def median_of(values: np.ndarray, level: float = 0.95, resamples: int = RESAMPLES, seed: int = 0) -> Interval:
-    """As `median_interval`, for (blocks, n) in which NaN is a cell without a run. Every column has a run."""
-    n, centre = values.shape[1], float(middle(middle(values)))
+def median_of(
+    values: np.ndarray,
+    level: float = 0.95,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
+    samples: Sequence[int] | None = None,
+) -> Interval:
+    """As `median_interval`, for (blocks, n) in which NaN is a cell without a run. Every column has a run.
+
+    Args:
+      samples: the sample of each column, numbered from 0, see `ranking.linked`; None if each is one.
+    """
+    n, centre = values.shape[1] if samples is None else max(samples) + 1, float(middle(middle(values)))
     if n < 2:
         return Interval(centre, math.nan, math.nan, n)
-    at = outermost(n, level, resamples)
-    lower, upper = (np.sort(middle(ends)) for ends in drawn_medians(values, draws(n, resamples, seed)))
+    at, drawn = outermost(n, level, resamples), draws(n, resamples, seed)
+    drawn = drawn if samples is None else drawn[list(samples)]
+    lower, upper = (np.sort(middle(ends)) for ends in drawn_medians(values, drawn))
     return Interval(centre, float(lower[at - 1]), float(upper[resamples - at]), n)
 
 

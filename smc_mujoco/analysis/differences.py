@@ -1,35 +1,42 @@
 """The least relevant difference of two values of a metric, and differences by rounding.
 
     exceeds(0.31, 0.30)                                # True: more than 3 % of the larger value
-    exceeds(0.31, 0.30, scale=2.5)                     # False: less than 0.5 % of the scale
+    exceeds(0.31, 0.30, resolution=0.02)               # False: less than the sensor resolves
 
-All comparisons use the same least relevant difference: `ranking` of laws, and claims about larger or slower values.
+All comparisons use the same least relevant difference: `ranking` of laws, and the answers of scenes.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-OF_VALUE, OF_SCALE = 0.03, 0.005  # shares in the least relevant difference, see `least_difference`
+from smc_mujoco.common.errors import number
+
+RELEVANT = 0.03  # default share of the larger value that is relevant; chosen
 # In SI units, and relative: smaller differences are a tie, because they depend on how runs are integrated.
 ROUNDING, ALIKE = 1e-9, 1e-6
 
 
-def least_difference(value: ArrayLike, scale: ArrayLike = 0.0, resolution: ArrayLike = 0.0) -> np.ndarray:
+def least_difference(value: ArrayLike, resolution: ArrayLike = 0.0, relevant: float = RELEVANT) -> np.ndarray:
     """Return the least relevant difference between a value >= 0 and a smaller one.
 
-    It is the largest of 3 % of the value, 0.5 % of the scale, and the resolution. Any difference from inf is relevant.
+    It is the larger of a share of the value and the resolution. Any difference from inf is relevant.
 
     Args:
-      scale: usual size of such values: the largest |x0| for a position error, u_max for a command, 100 for percentages.
-      resolution: least difference that the sensor can resolve; 0 for any.
+      resolution: what the sensor resolves, in the unit of the value; 0 without a limit.
+      relevant: the share of the value.
     """
-    own = OF_VALUE * np.where(np.isinf(value), 0.0, np.abs(value))
-    return np.maximum(np.maximum(own, OF_SCALE * np.abs(scale)), np.maximum(resolution, ROUNDING))
+    share = relevant * np.where(np.isinf(value), 0.0, np.abs(value))
+    return np.maximum(share, np.maximum(resolution, ROUNDING))
 
 
-def exceeds(a: ArrayLike, b: ArrayLike, scale: ArrayLike = 0.0, resolution: ArrayLike = 0.0) -> np.ndarray:
+def exceeds(a: ArrayLike, b: ArrayLike, resolution: ArrayLike = 0.0, relevant: float = RELEVANT) -> np.ndarray:
     """Return whether a is larger than b by more than the least relevant difference; a, b >= 0."""
-    return np.asarray(a) - least_difference(a, scale, resolution) > np.asarray(b)
+    return np.asarray(a) - least_difference(a, resolution, relevant) > np.asarray(b)
+
+
+def share_that_matters(relevant: float) -> float:
+    """Return the share of a value that is relevant. Raise ScenarioError if it is out of range."""
+    return number("relevant", relevant, least=0.0, most=0.5)
 
 
 def worse(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Paired runs: the runs of a table in groups, and in each the cells (plant, condition, seed) in which every law ran.
 
 for group in groups(table, by=("plant",)):
-    group.scores(values(table, "itae"))        # blocks, law -> (blocks, seeds), and outcomes, for `ranking`
+    group.scores(values(table, "itae"))        # `Scores` of the group's laws, for `ranking`
 """
 
 import contextlib
@@ -9,11 +9,11 @@ import dataclasses
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from smc_mujoco.analysis.differences import OF_SCALE, coarse
+from smc_mujoco.analysis.differences import coarse
 from smc_mujoco.analysis.ranking import first_of_kind
 from smc_mujoco.common.errors import ScenarioError, shown, taken, unknown
 from smc_mujoco.control.source import Source, restored
@@ -24,6 +24,7 @@ from smc_mujoco.simulation.scenario import Scenario
 SETTLES = "settles"  # a name used like a metric's: whether the settling time is finite
 GROUPS = ("plant", "condition")
 FREE = ("law", "model", "surface", "velocity", "versions")  # entries of descriptions that may differ within a cell
+GAINS = ("law", "surface", "velocity")  # those of them that have gains
 
 
 class Columns(Protocol):
@@ -47,13 +48,33 @@ def values(table: Columns, metric: str) -> np.ndarray:
     name = "settling_time" if metric == SETTLES else metric
     scores = np.array(table.column(name), float)
     scores[np.isnan(scores)] = CATALOGUE[name].absent
-    failed = np.array([failure is not None for failure in table.column("failure")], bool)
-    failed |= ~np.isnan(np.array(table.column("diverged_at"), float))
-    plants, lacking = np.asarray(table.column("plant"), str), np.isnan(scores) & ~failed
-    without = set(plants[lacking]) - set(plants[~lacking & ~failed])
-    scores[failed] = np.inf
+    plants, lacking = np.asarray(table.column("plant"), str), np.isnan(scores) & ~failed(table)
+    without = set(plants[lacking]) - set(plants[~lacking & ~failed(table)])
+    scores[failed(table)] = np.inf
     scores[np.isin(plants, list(without))] = np.nan
     return np.isinf(scores).astype(float) if metric == SETTLES else scores
+
+
+def failed(table: Columns) -> np.ndarray:
+    """Return which rows are runs that failed."""
+    lost = np.array([failure is not None for failure in table.column("failure")], bool)
+    return lost | ~np.isnan(np.array(table.column("diverged_at"), float))
+
+
+class Scores(NamedTuple):
+    """The scores of a group's laws in the blocks in which a metric applies; nothing if there is none.
+
+    Attributes:
+      blocks: the numbers of these blocks in the group.
+      values: law -> (blocks, seeds), NaN in cells that not all laws have, and in seeds in which every law did the same
+        as in an earlier seed.
+      outcomes, sets: law -> (blocks, seeds), as `Group.outcome` and `Group.sets`.
+    """
+
+    blocks: list[int]
+    values: dict[str, np.ndarray]
+    outcomes: dict[str, np.ndarray]
+    sets: dict[str, np.ndarray]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -66,6 +87,7 @@ class Group:
       blocks: (plant, condition), in the table's order.
       rows: (laws, blocks, seeds), the row of each run in the table; -1 where there is no run.
       outcome: (laws, blocks, seeds), equal for runs of a law that differ only by rounding; -1 where there is no run.
+      sets: (laws, blocks, seeds), equal for runs with the same gains; -1 where there is no run.
     """
 
     name: Mapping[str, str]
@@ -73,6 +95,7 @@ class Group:
     blocks: tuple[tuple[str, str], ...]
     rows: np.ndarray
     outcome: np.ndarray
+    sets: np.ndarray
 
     @property
     def plants(self) -> int:
@@ -89,18 +112,15 @@ class Group:
         """The number of seeds of each block in which every law ran."""
         return tuple(self.common.sum(axis=1).tolist())
 
-    def scores(self, by_row: np.ndarray) -> tuple[list[int], dict[str, np.ndarray], dict[str, np.ndarray]]:
-        """Return the blocks in which a metric applies, law -> (these blocks, seeds), and law -> its outcomes in them.
-
-        Without such blocks both dicts are empty. Scores are NaN in cells that not all laws have, and in seeds in which
-        every law did the same as in an earlier seed.
+    def scores(self, by_row: np.ndarray) -> Scores:
+        """Return the scores of the laws in the blocks in which a metric applies.
 
         Raises:
           ScenarioError: the laws share no cell.
         """
         cube = np.where(self.rows >= 0, by_row[self.rows], np.nan)
         if np.isnan(cube).all():
-            return [], {}, {}
+            return Scores([], {}, {}, {})
         common = ~np.isnan(cube).any(axis=0)
         if not common.any():
             where = f" of {', '.join(self.name.values())}" if self.name else ""
@@ -109,8 +129,10 @@ class Group:
         common &= first_of_kind(self.outcome, self.common)
         cube[:, ~common] = np.nan
         blocks, seeds = np.flatnonzero(common.any(axis=1)), np.flatnonzero(common.any(axis=0))
-        own, outcomes = (dict(zip(self.laws, of[:, blocks][:, :, seeds], strict=True)) for of in (cube, self.outcome))
-        return blocks.tolist(), own, outcomes
+        parts = (
+            dict(zip(self.laws, of[:, blocks][:, :, seeds], strict=True)) for of in (cube, self.outcome, self.sets)
+        )
+        return Scores(blocks.tolist(), *parts)
 
 
 def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
@@ -128,7 +150,7 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
     if not seeds.size:
         raise ScenarioError("the table has no runs: run a study first")
     columns |= {"seed": seeds, "outcome": _outcomes(table)}
-    _check_alike(table, columns)
+    columns["sets"] = _checked_sets(table, columns)
     members: dict[tuple[str, ...], list[int]] = {}
     for row in range(seeds.size):
         members.setdefault(tuple(str(columns[name][row]) for name in by), []).append(row)
@@ -137,19 +159,24 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
         yield _group(dict(zip(by, key, strict=True)), np.array(rows), own)
 
 
-def _check_alike(table: Columns, columns: Mapping[str, np.ndarray]) -> None:
-    """Raise ScenarioError for runs of one plant, condition and seed that differ in more than the law.
+def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return a number for each row: the same for runs with the same gains. Without the column "scenario" it is 0.
 
-    A table without the column "scenario" is not looked at.
+    Raises:
+      ScenarioError: runs of one plant, condition and seed differ in more than the law.
     """
     try:
         texts = table.column("scenario")
     except ScenarioError:
-        return
+        return np.zeros(columns["seed"].size, np.int64)
     cells = list(zip(columns["plant"], columns["condition"], columns["seed"].tolist(), strict=True))
     first: dict[tuple, tuple[str, dict[str, Any]]] = {}
+    known_gains: dict[str, int] = {}
+    sets = []
     for cell, law, text in zip(cells, columns["law"], texts, strict=True):
-        about = {name: value for name, value in json.loads(text).items() if name not in FREE}
+        about = json.loads(text)
+        free = {name: about.pop(name, None) for name in FREE}
+        sets.append(known_gains.setdefault(json.dumps({name: free[name] for name in GAINS}), len(known_gains)))
         about["plant"].get("mjcf", {}).pop("path", None)  # models are identified by their contents
         known, other = first.setdefault(cell, (law, about))
         if about != other and (difference := _difference(other, about)):
@@ -158,6 +185,7 @@ def _check_alike(table: Columns, columns: Mapping[str, np.ndarray]) -> None:
                 f"runs of {cell[0]}, {cell[1]}, seed {cell[2]} are not alike: {what} is {shown(one)} under {known} and "
                 f"{shown(two)} under {law}: give runs that differ only in the law"
             )
+    return np.array(sets, np.int64)
 
 
 def _difference(one: Mapping[Any, Any], two: Mapping[Any, Any]) -> tuple[str, Any, Any] | None:
@@ -193,13 +221,14 @@ def _group(name: dict[str, str], rows: np.ndarray, columns: dict[str, np.ndarray
     index = {key: i for i, key in enumerate(blocks)}
     block = np.array([index[key] for key in keys])
     numbers, seed = np.unique(columns["seed"], return_inverse=True)
-    place, outcome = np.full((2, len(laws), len(blocks), len(numbers)), -1)
+    place, outcome, sets = np.full((3, len(laws), len(blocks), len(numbers)), -1)
     if (twice := np.bincount(np.ravel_multi_index((law, block, seed), place.shape)) > 1).any():
         a, b, c = np.unravel_index(int(np.argmax(twice)), place.shape)
         cell = f"{laws[a]} on {', '.join(blocks[b])}, seed {numbers[c]}"
         raise ScenarioError(f"the table has several runs of {cell}: give those of one set of gains and one duration")
-    place[law, block, seed], outcome[law, block, seed] = rows, columns["outcome"]
-    return Group(name=name, laws=tuple(laws.tolist()), blocks=blocks, rows=place, outcome=outcome)
+    for part, numbers in ((place, rows), (outcome, columns["outcome"]), (sets, columns["sets"])):
+        part[law, block, seed] = numbers
+    return Group(name=name, laws=tuple(laws.tolist()), blocks=blocks, rows=place, outcome=outcome, sets=sets)
 
 
 def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
@@ -229,17 +258,17 @@ def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[S
 
 
 def floor(scenario: Scenario | None, unit: str) -> float:
-    """Return the least relevant difference of any two values of a metric in this unit; 0 for no scenario.
+    """Return the difference of two values of a metric in this unit that the sensor of a run does not resolve.
 
-    It is 0.5 % of the scale of such values, see `differences`: the largest |x0| of a driven channel, the bound on u, or
-    100 %. For a position it is at least half a count of the encoder, if there is one.
+    For a position it is the larger of half a count of the encoder and the standard deviation of the noise, for a share
+    of the initial error that of the largest |x0| of a driven channel. It is 0 for other units, and for no scenario.
     """
-    if scenario is None:
+    if scenario is None or unit not in ("{x}", "%"):
         return 0.0
     driven = [group for group in channel_groups(scenario) if group.driven]
-    x0 = max(abs(scenario.resolved.x0[i]) for group in driven for i in group.channels)
-    limit = max(scenario.limits)
-    scale = {"{x}": x0, "{u}": limit, "{u}/s": limit, "{force}": limit * scenario.drive.gain, "%": 100.0}.get(unit, 0.0)
     counts = [scenario.sensor.quantum(group.unit == "rad") for group in driven] if scenario.sensor else []
-    half = max(counts) / 2 if counts and unit == "{x}" else 0.0
-    return max(OF_SCALE * scale if math.isfinite(scale) else 0.0, half)
+    resolution = max(scenario.noise.position, *(count / 2 for count in counts), 0.0)
+    if unit == "{x}":
+        return resolution
+    x0 = max(abs(scenario.resolved.x0[i]) for group in driven for i in group.channels)
+    return 100.0 * resolution / x0 if x0 else 0.0

@@ -1,44 +1,49 @@
 """Comparison of laws on the runs that they share: which law is better in which block, and places over all blocks.
 
     comparison = compare({"classical": a, "adaptive": b})  # a, b: (blocks, seeds), lower is better
+    comparison.winners                                 # the winner of each block, or None
     comparison.best                                    # the laws of each block that no other is better than
-    ranks(comparison)                                  # the laws' places over all blocks
+    comparison.effect(0, "classical", "adaptive")      # how much less the one has than the other, with its interval
 
-As in `bootstrap`, seeds are the sample, blocks are fixed, and inf is the worst value, equal to itself. One law is
-better than another in a block if three conditions hold.
+Blocks are fixed, runs are the sample. inf is the worst value, equal to itself.
 
-- Its median is lower by more than the least relevant difference, see `differences`. Smaller differences are ties.
-- It is ahead in more seeds, and the sign test over them rejects that both are ahead equally often (W. J. Conover,
-  Practical Nonparametric Statistics, 1999, 3.4). The test is exact for any number of seeds and free of units. Its
-  p-values are two-sided and corrected by S. Holm's method (Scandinavian Journal of Statistics 6(2), 1979) for all pairs
-  of laws in all blocks: the probability that any law is wrongly called better, in any block, is at most 1 - level.
-- There are at least 16 seeds. With fewer, hardly anything survives the correction.
+The sample. A law's gains are part of it. Where its runs have several sets of gains, runs that share a set are one
+sample, whatever their seeds: three sets are three samples. Where all runs of a law have the same gains, its seeds are
+the sample, and the conclusion holds for these gains. For two laws, runs that are linked by a shared set of either law
+are one sample, whose difference is the median of theirs. A run that repeats the results of both laws is not counted.
 
-A seed is a sample of two laws if it changes the result of one of them. If both have the same results as in an earlier
-seed, the pair of runs is repeated: such seeds count once in the test and among the 16, whatever other laws do in them.
+The test. The difference of two laws in a sample is the logarithm of the ratio of their values. It is their difference
+where 3 % of a value is less than the sensor resolves, and for shares. A law is better than another if the signed-rank
+test (see `signed_rank`) rejects that its values are less by no more than the least relevant difference. That is the
+same as an interval of the ratio that ends beyond it. Its median must not be the higher one, and it must not fail more
+often.
 
-A law that no other is better than is among the best of its block; if it is the only one, it is the winner. "Better"
-follows the medians, so every block has a best law, and a winner has the lowest median.
+The correction. There are two families, over all blocks of a metric in a table, however the table is grouped into
+boards. Both are corrected by S. Holm's method (Scandinavian Journal of Statistics 6(2), 1979), with two-sided p-values.
 
-A law's rank in a block is that of its median; medians that differ by less than the least relevant difference are tied.
-Its place follows from its mean rank over the blocks. So a law that wins in every block has the first place. Friedman's
-test says whether the order would hold in other conditions.
+- Winners. The winner of a block is better than every other law. Its p-value is the largest of those against the others,
+  and needs no correction for their number (S. Gutmann, Z. Maymin, Annals of Statistics 15(1), 1987: it is most often
+  wrong where two laws are equal and the others far behind). So the family is the blocks. The probability of any wrong
+  winner is at most 1 - level.
+- Pairs. The family is all pairs of laws in all blocks. The probability that any law is wrongly called better than
+  another is at most 1 - level, besides the statements about winners.
+
+A law with a run that failed, or has no value, wins nothing. In every order the laws with fewer such runs come first.
 """
 
 import dataclasses
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from smc_mujoco.analysis.bootstrap import RESAMPLES, confidence, counts, drawn_medians, draws, middle, outermost
-from smc_mujoco.analysis.differences import exceeds, least_difference, worse
+from smc_mujoco.analysis.bootstrap import confidence, middle
+from smc_mujoco.analysis.differences import RELEVANT, ROUNDING, least_difference, share_that_matters
+from smc_mujoco.analysis.signed_rank import interval, p_values
 from smc_mujoco.common.errors import ScenarioError, shown
-
-SEEDS = 16  # the fewest, of distinct runs, with which one law is called better than another
 
 
 class Rank(NamedTuple):
@@ -46,22 +51,43 @@ class Rank(NamedTuple):
 
     Attributes:
       law: name of the law.
-      mean: mean rank over the blocks.
-      place: place by mean rank.
-      median: median of the place over resamples of the seeds.
-      low, high: interval of the place; NaN for a single seed.
-      p: least corrected p-value with which another law is ahead of it in a block; 1 if none is.
+      mean: mean rank over the blocks, which orders laws and decides nothing.
+      place: place by the number of runs without a value, then by mean rank.
       best: whether the law is among the best of every block.
     """
 
     law: str
     mean: float
     place: float
-    median: float
+    best: bool
+
+
+class Effect(NamedTuple):
+    """How a law's values compare with a rival's, in one block.
+
+    Attributes:
+      value: ratio of the law's values to the rival's, or their difference if not `relative`.
+      low, high: its interval, at the level that the correction leaves for one comparison.
+      relative: whether it is a ratio.
+      ahead: number of samples in which the law is better by more than the least relevant difference.
+      samples: number of samples.
+      sets: whether the samples are sets of gains; otherwise they are seeds.
+    """
+
+    value: float
     low: float
     high: float
-    p: float
-    best: bool
+    relative: bool
+    ahead: int
+    samples: int
+    sets: bool
+
+
+class Limits(NamedTuple):
+    """The largest one-sided p-values with which a law is better than another, and with which it wins a block."""
+
+    pair: float
+    winner: float
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,24 +98,40 @@ class Comparison:
       laws: names, in alphabetical order.
       cells: (laws, blocks, seeds), the scores; NaN where there is no run.
       shares: whether scores are 0.0 or 1.0, and means are compared instead of medians.
-      floors: (blocks,), lower bound on the least relevant difference of medians.
+      floors: (blocks,), lower bound on the least relevant difference.
+      relevant: share of a value that is relevant.
       level: level of confidence.
-      p: (blocks, laws, laws), corrected p-value of the sign test that a law is ahead of another; 1 where it is not.
-      runs: (blocks, laws, laws), number of seeds that are samples of two laws.
+      differences: (blocks, laws, laws, seeds), by how much the second law's value is higher, a number for each sample,
+        then NaN.
+      relative: (blocks, laws, laws), whether differences are logarithms of ratios.
+      shifts: (blocks, laws, laws), the least relevant difference of a law that is better than another.
+      p: (blocks, laws, laws), one-sided p-value, not corrected, that a law is better than another; 1 of itself.
+      sets: (laws, blocks), number of sets of gains of a law's runs.
+      limits: of the p-values, after the correction.
     """
 
     laws: tuple[str, ...]
     cells: np.ndarray
     shares: bool
     floors: np.ndarray
+    relevant: float
     level: float
+    differences: np.ndarray
+    relative: np.ndarray
+    shifts: np.ndarray
     p: np.ndarray
-    runs: np.ndarray
+    sets: np.ndarray
+    limits: Limits
 
     @functools.cached_property
     def centres(self) -> np.ndarray:
         """The medians, or means, over the seeds, (laws, blocks)."""
-        return np.nanmean(self.cells, axis=2) if self.shares else middle(self.cells)
+        return _centres(self.cells, self.shares)
+
+    @functools.cached_property
+    def without_value(self) -> np.ndarray:
+        """The number of runs that failed or have no value, (laws, blocks); 0 for shares."""
+        return np.isinf(self.cells).sum(axis=2)
 
     @property
     def seeds(self) -> np.ndarray:
@@ -97,33 +139,80 @@ class Comparison:
         return (~np.isnan(self.cells[0])).sum(axis=1)
 
     @functools.cached_property
+    def samples(self) -> np.ndarray:
+        """The number of samples of two laws, (blocks, laws, laws)."""
+        return (~np.isnan(self.differences)).sum(axis=3)
+
+    @functools.cached_property
+    def _eligible(self) -> np.ndarray:
+        """Whether a law has no higher median than another, and no more runs without a value, (blocks, laws, laws)."""
+        centre, lacking = self.centres.T, self.without_value.T
+        lower = centre[:, :, None] <= centre[:, None, :]
+        return lower & (lacking[:, :, None] <= lacking[:, None, :])
+
+    @functools.cached_property
+    def winners(self) -> list[str | None]:
+        """The law of each block that is better than every other, if there is one."""
+        found = []
+        for p, eligible, lacking in zip(self.p, self._eligible, self.without_value.T, strict=True):
+            wins = np.all((p <= self.limits.winner) & eligible | np.eye(len(p), dtype=bool), axis=1) & (lacking == 0)
+            found.append(self.laws[int(wins.argmax())] if wins.any() and len(p) > 1 else None)
+        return found
+
+    @functools.cached_property
     def better(self) -> np.ndarray:
         """Whether a law is better than another, (blocks, laws, laws)."""
-        own, rival = self.centres.T[:, :, None], self.centres.T[:, None, :]
-        lower = exceeds(rival, own, resolution=self.floors[:, None, None])
-        return lower & (self.p <= 1 - self.level) & (self.runs >= SEEDS)
+        better = (self.p <= self.limits.pair) & self._eligible
+        for block, winner in zip(better, self.winners, strict=True):
+            if winner is not None:
+                at = self.laws.index(winner)
+                block[at], block[:, at] = True, False
+                block[at, at] = False
+        return better
+
+    @functools.cached_property
+    def beaten(self) -> np.ndarray:
+        """Whether another law is better, or fails less often, (laws, blocks). A law that fails is beaten everywhere."""
+        lacking = self.without_value > 0
+        return np.any(self.better, axis=1).T | lacking
 
     @functools.cached_property
     def tied(self) -> np.ndarray:
-        """Whether two laws tie, (laws, laws).
-
-        They do if neither is better in any block; in blocks with fewer than 16 seeds, if their medians do not differ
-        relevantly.
-        """
-        own, rival = self.centres.T[:, :, None], self.centres.T[:, None, :]
-        lower = exceeds(rival, own, resolution=self.floors[:, None, None])
-        differs = np.any(np.where(self.runs < SEEDS, lower, self.better), axis=0)
+        """Whether two laws tie, (laws, laws): neither is better in any block, and no median is relevantly lower."""
+        least = least_difference(self.centres, self.floors, self.relevant).T
+        centre = self.centres.T
+        lower = centre[:, None, :] - least[:, None, :] > centre[:, :, None]
+        differs = np.any(lower | self.better, axis=0)
         return ~np.logical_or(differs, differs.T)
 
     @property
     def best(self) -> list[tuple[str, ...]]:
-        """The laws of each block that no other is better than."""
-        return [tuple(np.array(self.laws)[~row].tolist()) for row in np.any(self.better, axis=1)]
+        """The laws of each block that are not beaten."""
+        return [tuple(np.array(self.laws)[~row].tolist()) for row in self.beaten.T]
 
     @property
     def pairs(self) -> int:
-        """The number of comparisons for which the p-values are corrected."""
-        return len(self.p) * math.comb(len(self.laws), 2)
+        """The number of pairs of laws in all blocks."""
+        return len(self.differences) * math.comb(len(self.laws), 2)
+
+    def effect(self, block: int, law: str, rival: str, winner: bool = True) -> Effect:
+        """Return how a law compares with a rival in a block.
+
+        Args:
+          winner: whether the interval has the level of a winner's comparison, or that of one of all pairs.
+        """
+        a, b = self.laws.index(law), self.laws.index(rival)
+        differences, relative = self.differences[block, a, b], bool(self.relative[block, a, b])
+        found = interval(-differences, self.limits.winner if winner else self.limits.pair)
+        with np.errstate(over="ignore"):
+            ends = np.exp(found) if relative else np.array(found)
+        return Effect(
+            *ends.tolist(),
+            relative=relative,
+            ahead=int((differences > self.shifts[block, a, b]).sum()),
+            samples=int(self.samples[block, a, b]),
+            sets=bool(self.sets[[a, b], block].max() > 1),
+        )
 
 
 def compare(
@@ -132,33 +221,66 @@ def compare(
     shares: bool = False,
     level: float = 0.95,
     outcomes: Mapping[str, ArrayLike] | None = None,
+    sets: Mapping[str, ArrayLike] | None = None,
+    relevant: float = RELEVANT,
+    limits: Limits | None = None,
 ) -> Comparison:
     """Compare every law with every other in every block.
 
     Args:
       scores: law -> (blocks, n) or (n,), lower is better, inf for never. NaN where no law has a run.
       floors: one for all blocks, or one for each, see `Comparison`.
-      shares, level: see `Comparison`.
+      shares, level, relevant: see `Comparison`.
       outcomes: law -> a number per cell, equal if the law had the same result from two seeds. Default: all runs differ.
+      sets: law -> a number per cell, equal if the law had the same gains. Default: one set of gains.
+      limits: of the p-values, where the blocks belong to a larger family. Default: those of these blocks.
 
     Raises:
       ScenarioError: no laws, or laws with different cells.
     """
     laws, cells = _cells(scores)
-    k, blocks, _ = cells.shape
-    a, b = np.triu_indices(k, 1)
-    ran = np.tile(~np.isnan(cells[0]), (len(a), 1, 1))  # (pairs, blocks, seeds)
-    if outcomes is not None:
-        did = np.array([np.atleast_2d(outcomes[law]) for law in laws])
-        ran = np.array([first_of_kind(did[[i, j]], there) for i, j, there in zip(a, b, ran, strict=True)], bool)
-        ran = ran.reshape(len(a), *cells.shape[1:])
-    value, ahead = _sign_test(np.where(ran, worse(cells[a], cells[b]), 0))
-    value = holm(value)
-    p, runs = np.ones((blocks, k, k)), np.zeros((blocks, k, k), int)
-    p[:, a, b], p[:, b, a] = np.where(ahead < 0, value, 1.0).T, np.where(ahead > 0, value, 1.0).T
-    runs[:, a, b] = runs[:, b, a] = ran.sum(axis=2).T
-    widths = np.broadcast_to(np.asarray(floors, float), blocks)
-    return Comparison(laws=laws, cells=cells, shares=shares, floors=widths, level=confidence(level), p=p, runs=runs)
+    k, blocks, seeds = cells.shape
+    own_sets = (
+        np.zeros(cells.shape, np.int64)
+        if sets is None
+        else np.array([np.atleast_2d(sets[law]) for law in laws], np.int64)
+    )
+    did = None if outcomes is None else np.array([np.atleast_2d(outcomes[law]) for law in laws])
+    floors = np.broadcast_to(np.asarray(floors, float), blocks)
+    differences, relative = np.full((blocks, k, k, seeds), math.nan), np.zeros((blocks, k, k), bool)
+    counts = np.ones((k, blocks), int)
+    relevant = share_that_matters(relevant)
+    for block in range(blocks):
+        there = ~np.isnan(cells[0, block])
+        counts[:, block] = [np.unique(own[there]).size for own in own_sets[:, block]]
+        ratios = np.zeros((k, k), bool) if shares else _ratios_make_sense(cells[:, block], floors[block], relevant)
+        for a in range(k - 1):
+            found = _pairwise(cells[a, block], cells[a + 1 :, block], ratios[a, a + 1 :])
+            if did is not None:
+                for row, rival in enumerate(did[a + 1 :, block]):
+                    found[row, ~first_of_kind(np.stack([did[a, block], rival])[:, None], there[None])[0]] = math.nan
+            for row, rival in enumerate(own_sets[a + 1 :, block]):
+                found[row] = _by_sample(found[row], own_sets[a, block], rival)
+            differences[block, a, a + 1 :], differences[block, a + 1 :, a] = found, -found
+        relative[block] = ratios
+    shifts = _shifts(_centres(cells, shares), floors, relative, relevant, shares)
+    p = p_values(differences - shifts[..., None])
+    p[:, *np.diag_indices(k)] = 1.0
+    comparison = Comparison(
+        laws=laws,
+        cells=cells,
+        shares=shares,
+        floors=floors,
+        relevant=relevant,
+        level=confidence(level),
+        differences=differences,
+        relative=relative,
+        shifts=shifts,
+        p=p,
+        sets=counts,
+        limits=limits or Limits(0.0, 0.0),
+    )
+    return comparison if limits else dataclasses.replace(comparison, limits=corrected([comparison], level))
 
 
 def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray]:
@@ -172,6 +294,101 @@ def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray
     if (missing != missing[0]).any() or missing[0].all(axis=0).any() or missing[0].all(axis=1).any():
         raise ScenarioError(f"scores of {shown(laws)} lack different cells, or a seed: give nan to all laws")
     return laws, cells
+
+
+def _centres(cells: np.ndarray, shares: bool) -> np.ndarray:
+    """Return the medians, or means of shares, over the seeds, (laws, blocks)."""
+    return np.nanmean(cells, axis=2) if shares else middle(cells)
+
+
+def _shifts(centres: np.ndarray, floors: np.ndarray, relative: np.ndarray, relevant: float, shares: bool) -> np.ndarray:
+    """Return the least relevant difference of every law from every rival, (blocks, laws, laws)."""
+    if shares:
+        return np.full(relative.shape, relevant)
+    absolute = least_difference(centres.T[:, None, :], floors[:, None, None], relevant)
+    return np.where(relative, -math.log1p(-relevant), absolute)
+
+
+def _ratios_make_sense(cells: np.ndarray, floor: float, relevant: float) -> np.ndarray:
+    """Return for which laws (laws, laws) the relevant share of both medians is above what the sensor resolves.
+
+    Args:
+      cells: (laws, seeds), of one block.
+    """
+    smallest = middle(cells) * (relevant or RELEVANT) >= max(floor, ROUNDING)
+    smallest &= ~np.any(cells < 0, axis=1)
+    return smallest[:, None] & smallest
+
+
+def _pairwise(law: np.ndarray, rivals: np.ndarray, relative: np.ndarray) -> np.ndarray:
+    """Return by how much rivals' values (rivals, seeds) are higher than a law's (seeds,); 0 if both are inf."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratios = np.log(np.abs(rivals)) - np.log(np.abs(law))
+        found = np.where(relative[:, None], ratios, rivals - law)
+    equal = (rivals == law) | (np.isinf(rivals) & np.isinf(law))
+    return np.where(equal, 0.0, found)
+
+
+def _by_sample(differences: np.ndarray, sets: np.ndarray, rival_sets: np.ndarray) -> np.ndarray:
+    """Return the median difference of each sample, then NaN: runs linked by a set of gains are one sample."""
+    there = np.flatnonzero(~np.isnan(differences))
+    labels = linked(*(of[there].tobytes() for of in (sets, rival_sets)))
+    if labels is None:
+        return differences
+    found = np.full(differences.shape, math.nan)
+    for sample in range(max(labels) + 1):
+        own = np.sort(differences[there[np.array(labels) == sample]])
+        low, high = own[(own.size - 1) // 2], own[own.size // 2]
+        found[sample] = 0.0 if low == -high else (low + high) / 2  # also of two opposite infinite values
+    return found
+
+
+@functools.lru_cache(maxsize=4096)
+def linked(*sets: bytes) -> tuple[int, ...] | None:
+    """Return a number for each run, the same for runs that share a set of gains, directly or through others.
+
+    A law with one set of gains links nothing. None if every run is a sample of its own.
+
+    Args:
+      sets: for each law the number of the set of each run, as bytes of int64.
+    """
+    parent: list[int] | None = None
+    for numbers in (np.frombuffer(one, np.int64) for one in sets):
+        if np.unique(numbers).size < 2:
+            continue
+        parent = parent or list(range(numbers.size))
+        first: dict[int, int] = {}
+        for run, number in enumerate(numbers.tolist()):
+            one, other = _root(parent, run), _root(parent, first.setdefault(number, run))
+            parent[max(one, other)] = min(one, other)
+    if parent is None:
+        return None
+    roots = [_root(parent, run) for run in range(len(parent))]
+    labels = {root: k for k, root in enumerate(dict.fromkeys(roots))}
+    return None if len(labels) == len(roots) else tuple(labels[root] for root in roots)
+
+
+def samples_of(sets: np.ndarray) -> tuple[int, ...] | None:
+    """Return the sample of each run of one law, see `linked`.
+
+    Args:
+      sets: (blocks, runs), the number of the set of gains; -1 where there is no run.
+    """
+    return linked(*map(_as_key, np.atleast_2d(sets)))
+
+
+def _as_key(sets: np.ndarray) -> bytes:
+    """Return the sets of a block as `linked` takes them, where a missing run shares no set."""
+    if np.unique(sets[sets >= 0]).size < 2:
+        return np.zeros(sets.size, np.int64).tobytes()
+    return np.where(sets < 0, -1 - np.arange(sets.size), sets).astype(np.int64).tobytes()
+
+
+def _root(parent: Sequence[int], run: int) -> int:
+    """Return the first run of the group to which a run belongs."""
+    while parent[run] != run:
+        run = parent[run]
+    return run
 
 
 def first_of_kind(outcomes: np.ndarray, there: np.ndarray) -> np.ndarray:
@@ -188,64 +405,51 @@ def first_of_kind(outcomes: np.ndarray, there: np.ndarray) -> np.ndarray:
     return first
 
 
-def _sign_test(signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the two-sided p-values of signs along their last axis, and the signs that prevail."""
-    from scipy.special import bdtr
-
-    up, down = (signs > 0).sum(axis=-1), (signs < 0).sum(axis=-1)
-    p = 2 * bdtr(np.minimum(up, down).astype(float), up + down, 0.5)
-    return np.minimum(p, 1.0), np.sign(up - down)
-
-
-def holm(p: np.ndarray) -> np.ndarray:
-    """Return p-values, of any shape, corrected for their number by Holm's method."""
-    order = np.argsort(p, axis=None)
-    corrected = np.empty(p.size)
-    corrected[order] = np.minimum(np.maximum.accumulate(p.flat[order] * np.arange(p.size, 0, -1)), 1.0)
-    return corrected.reshape(p.shape)
+def corrected(comparisons: Sequence[Comparison], level: float = 0.95) -> Limits:
+    """Return the limits of p-values for comparisons that form one family."""
+    pairs, winners = [], []
+    for one in comparisons:
+        if len(one.laws) > 1:
+            pairs.append(np.minimum(one.p, one.p.transpose(0, 2, 1))[:, *np.triu_indices(len(one.laws), 1)].ravel())
+            diagonal = np.eye(len(one.laws), dtype=bool)
+            winners.append(np.where(diagonal, 0.0, one.p).max(axis=2).min(axis=1))
+    error = 1.0 - confidence(level)
+    return Limits(*(_holm(np.concatenate([*each, []]), error / 2) for each in (pairs, winners)))
 
 
-def ranks(comparison: Comparison, resamples: int = RESAMPLES, seed: int = 0) -> list[Rank]:
-    """Return the laws' ranks, lowest mean rank first."""
-    n, k = comparison.cells.shape[2], len(comparison.laws)
-    mean = block_ranks(comparison.centres[None], comparison.floors).mean(axis=2)
-    place = _places(mean)[0]
-    middles, low, high = place, np.full(k, math.nan), np.full(k, math.nan)
-    if n > 1:
-        drawn = block_ranks(_drawn_centres(comparison, draws(n, resamples, seed)), comparison.floors)
-        places, at = np.sort(_places(drawn.mean(axis=2)), axis=0), outermost(n, comparison.level, resamples)
-        middles, low, high = np.median(places, axis=0), places[at - 1], places[resamples - at]
-    numbers = np.column_stack([mean[0], place, middles, low, high, comparison.p.min(axis=(0, 1))]).tolist()
-    best = (~np.any(comparison.better, axis=(0, 1))).tolist()
-    rows = [Rank(law, *row, best=one) for law, row, one in zip(comparison.laws, numbers, best, strict=True)]
-    return sorted(rows, key=lambda rank: rank.mean)
+def _holm(p: np.ndarray, error: float) -> float:
+    """Return the p-value up to which Holm's method rejects."""
+    allowed = error / np.arange(p.size, 0, -1)
+    kept = np.flatnonzero(np.sort(p) > allowed)
+    return float(allowed[kept[0]]) if kept.size else error
 
 
-def _drawn_centres(comparison: Comparison, drawn: np.ndarray) -> np.ndarray:
-    """Return the centres of resamples, (resamples, laws, blocks)."""
-    if not comparison.shares:
-        return np.stack([sum(drawn_medians(own, drawn)) / 2 for own in comparison.cells], axis=1)
-    means = []
-    for block in comparison.cells.swapaxes(0, 1):
-        runs = np.flatnonzero(~np.isnan(block[0]))
-        count = counts(drawn, runs)
-        means.append(block[:, runs] @ count / count.sum(axis=0))
-    return np.stack(means).transpose(2, 1, 0)
+def ranks(comparison: Comparison) -> list[Rank]:
+    """Return the laws' ranks: those with the fewest runs without a value first, then by mean rank."""
+    mean = block_ranks(comparison).mean(axis=1)
+    lacking = comparison.without_value.sum(axis=1)
+    order = [tuple(row) for row in zip(lacking.tolist(), mean.round(9).tolist(), strict=True)]
+    places = [sum(other < one for other in order) + (1 + order.count(one)) / 2 for one in order]
+    best = (~comparison.beaten.any(axis=1)).tolist()
+    rows = [Rank(*row) for row in zip(comparison.laws, mean.tolist(), places, best, strict=True)]
+    return sorted(rows, key=lambda rank: (rank.place, rank.law))
 
 
-def block_ranks(centres: np.ndarray, floors: np.ndarray) -> np.ndarray:
-    """Return the laws' ranks in each block, (..., laws, blocks) as the centres."""
-    lowered, twice = centres - least_difference(centres, resolution=floors), np.zeros(centres.shape, np.int16)
-    for rival in range(centres.shape[-2]):
-        own = slice(rival, rival + 1)
-        twice += (lowered > centres[..., own, :]).view(np.int8)
-        twice -= (lowered[..., own, :] > centres).view(np.int8)
-    return (centres.shape[-2] + 1 + twice) / 2
+def block_ranks(comparison: Comparison) -> np.ndarray:
+    """Return the laws' ranks in each block, (laws, blocks): by runs without a value, then by medians.
+
+    Medians that differ by less than the least relevant difference are tied.
+    """
+    return ranked(comparison.centres, comparison.floors, comparison.without_value, comparison.relevant)
 
 
-def _places(mean: np.ndarray) -> np.ndarray:
-    """Return the places by mean rank, (draws, laws); ties share theirs."""
-    return (mean.shape[1] + 1 + worse(mean[:, :, None], mean[:, None, :]).sum(axis=2)) / 2
+def ranked(centres: np.ndarray, floors: np.ndarray, lacking: ArrayLike = 0, relevant: float = RELEVANT) -> np.ndarray:
+    """Return the ranks of laws (laws, blocks) with these medians and numbers of runs without a value."""
+    lowered = centres - least_difference(centres, floors, relevant)
+    lacking = np.broadcast_to(lacking, centres.shape)
+    behind = lacking[:, None] > lacking[None]
+    behind |= (lacking[:, None] == lacking[None]) & (lowered[:, None] > centres[None])
+    return (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -275,7 +479,7 @@ def friedman(comparison: Comparison) -> Friedman | None:
     k, blocks = comparison.centres.shape
     if k < 2 or blocks < 2:
         return None
-    place = block_ranks(comparison.centres, comparison.floors)
+    place = block_ranks(comparison)
     spread = float(((place - (k + 1) / 2) ** 2).sum())
     between = float(((place.sum(axis=1) - blocks * (k + 1) / 2) ** 2).sum())
     return Friedman(

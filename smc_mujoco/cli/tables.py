@@ -12,7 +12,6 @@ from rich import box
 from rich.table import Column, Table
 from rich.text import Text
 
-from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.tuning.result import HEADINGS, Tuned
 from smc_mujoco.common.text import number
 from smc_mujoco.control.source import in_words, kinds
@@ -26,7 +25,7 @@ from smc_mujoco.metrics.tip import tip_scores, worst_joint
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.accuracy import AccuracyTable, heads, lines, remarks
-from smc_mujoco.studies.board_tables import size, sources, spread
+from smc_mujoco.studies.board_tables import relevance, size, sources, spread
 from smc_mujoco.studies.leaderboard import Block, Board
 
 if TYPE_CHECKING:
@@ -61,9 +60,11 @@ MAX_NAMED_JOINTS = 4  # in the heading of a group
 SPARKS = "▁▂▃▄▅▆▇█"
 INTERVAL_WIDTH = 13  # characters of a line: four metrics fit in 80 columns
 BOARD_KEY = (
-    "median, #place, {level:.3g} % interval over seeds; * undefeated: no law is better in any condition. A winner is "
-    "better than every other law: its median is lower by more than 3 %, and the seeds confirm it. Over several "
-    "conditions: median of their medians, place by mean rank, how many are won and lost; a winner wins in each. "
+    "median, #place, {level:.3g} % interval over the samples: runs, or sets of gains that several runs share. Laws "
+    "with fewer failed runs come first. * no law is better in any condition, and no run failed. A winner is better "
+    "than every other law by more than the least relevant difference, in a paired test that is corrected for all "
+    "plants and conditions of the table ({family}); below its name, how much less it has than the closest other law, "
+    "with the interval. Over several conditions: median of their medians; a winner wins in each. {relevance}. "
     "No winner is named over laws with default gains, unless with --defaults. x, u of driven joints, in rad or m, and "
     "N m, N or V"
 )
@@ -256,7 +257,13 @@ def leaderboard(boards: Sequence[Board]) -> Table:
         for line in _group_lines(name, own, [own.get(metric) for metric in metrics]):
             table.add_row(*line)
         table.add_section()
-    table.caption = BOARD_KEY.format(level=100 * boards[0].level) if boards else "no boards: no metric applies"
+    table.caption = "no boards: no metric applies"
+    if boards:
+        family = max(board.family for board in boards)
+        said = relevance(boards)
+        table.caption = BOARD_KEY.format(
+            level=100 * boards[0].level, family=family, relevance=said[0].upper() + said[1:]
+        )
     if any(block.runs < MIN_INTERVAL_RUNS for board in boards for block in board.blocks):
         table.caption += f"; with fewer than {MIN_INTERVAL_RUNS} runs an interval is their range, and covers less"
     if gains := in_words(sources(boards)):
@@ -291,7 +298,7 @@ def _sample(blocks: Sequence[Block]) -> str:
 
 
 def _block_cell(board: Board | None, like: Block) -> Text:
-    """Return the winner of a block with its median and the next one, or how many laws are level.
+    """Return the winner of a block with how much less it has than the closest other law, or how many laws are level.
 
     Args:
       board: None if the metric has no board.
@@ -304,12 +311,18 @@ def _block_cell(board: Board | None, like: Block) -> Text:
     if block.barred:
         return Text("rivals at\ndefaults", "dim")
     if block.winner is None:
-        return Text("too few" if board.too_few else f"{len(block.best)} level", "dim")
-    first, second = sorted(block.medians, key=block.medians.__getitem__)[:2]
-    settles = board.metric == SETTLES  # its medians are shares that do not settle
-    medians = [1 - block.medians[law] if settles else block.medians[law] for law in (first, second)]
-    text = (">" if settles else "<").join(size(median, board.metric, digits=2) for median in medians)
-    return Text(_folded(first, 12), style.law_colour(first)).append(f"\n{text}", "dim")
+        some = "all fail" if all(block.lacking.values()) else f"{len(block.best)} level"
+        return Text("too few" if board.too_few else some, "dim")
+    return Text(_folded(block.winner, 12), style.law_colour(block.winner)).append(f"\n{_how_much(block)}", "dim")
+
+
+def _how_much(block: Block) -> str:
+    """Return how much less the winner of a block has than the closest other law, on two lines; shares for "settles"."""
+    if block.lead is None:
+        first, second = sorted(block.medians.values())[:2]
+        return f"{100 * (1 - first):.0f}>{100 * (1 - second):.0f}"
+    less, _, interval = block.lead.size.partition(" (")
+    return f"{less}\n{interval.removesuffix(')').replace(' to ', '–')}"
 
 
 def _folded(name: str, width: int = 13) -> str:
@@ -329,7 +342,9 @@ def _law_cell(board: Board | None, law: str) -> Text:
     best = entry.rank.best and not board.barred
     text = Text(f"{middle} " if middle else "", "bold" if best else "")
     text.append(f"#{entry.rank.place:g}").append("*" if best else " ")
-    return text.append(f"\n{ends}" if ends else "", "dim not bold")
+    text.append(f"\n{ends}" if ends else "", "dim not bold")
+    failures = board.failures(entry)
+    return text.append(f"\n{_folded(failures)}" if failures else "", "red not bold")
 
 
 def _winner_cell(board: Board | None) -> Text:
@@ -337,7 +352,8 @@ def _winner_cell(board: Board | None) -> Text:
     if board is None:
         return Text("")
     if board.winner:
-        return Text("winner\n").append(_folded(board.winner, 12), f"bold {style.law_colour(board.winner)}")
+        text = Text("winner\n").append(_folded(board.winner, 12), f"bold {style.law_colour(board.winner)}")
+        return text.append(f"\n{_how_much(board.blocks[0])}" if len(board.blocks) == 1 else "", "dim")
     text = Text("no winner\n", "dim")
     if board.barred:
         return text.append("rivals at\ndefaults")

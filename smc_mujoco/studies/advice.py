@@ -7,8 +7,11 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from smc_mujoco.analysis.bootstrap import Interval
-from smc_mujoco.analysis.ranking import SEEDS, Comparison, Rank
+from smc_mujoco.analysis.ranking import Comparison, Rank
+from smc_mujoco.analysis.signed_rank import least_p
 from smc_mujoco.common import html
 from smc_mujoco.common.text import joined, number, table
 from smc_mujoco.control.component import Component
@@ -17,6 +20,7 @@ from smc_mujoco.control.source import in_words
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.conventions import Metric
+from smc_mujoco.studies.leaderboard import size_in_words
 from smc_mujoco.studies.table import Table
 
 NAMED = 6  # names of laws that the screening left out
@@ -36,8 +40,9 @@ class Choice:
     Attributes:
       law: with its gains for the plant.
       remark: what is to be said of the gains besides their source.
-      rank: its mean rank over the blocks, and its place with an interval; NaN if it is not compared.
+      rank: its mean rank over the blocks, and its place; NaN if it is not compared.
       settles: share of its runs that settle.
+      reliable: whether it settles in nearly all runs of every condition.
       fit: whether it settles often enough to be advised.
       medians: need -> median over the conditions, with its interval.
     """
@@ -46,6 +51,7 @@ class Choice:
     remark: str
     rank: Rank
     settles: float
+    reliable: bool
     fit: bool
     medians: Mapping[str, Interval]
 
@@ -116,6 +122,11 @@ class Advice:
                 found[rival] = its
         return dict(sorted(found.items(), key=lambda item: -len(item[1])))
 
+    def _fails(self, law: str, need: str) -> bool:
+        """Whether a law has runs without a value on a need."""
+        lacking = self.comparison.without_value[self.comparison.laws.index(law)].tolist()
+        return any(count for (asked, _), count in zip(self.blocks, lacking, strict=True) if asked == need)
+
     def dominated(self, law: str) -> list[str]:
         """Return the finalists that are better than a law in some block, and worse in none."""
         rivals = (name for name in self.compared if name != law)
@@ -133,16 +144,21 @@ class Advice:
         return [name for name in others if not self.wins(first, name) and not self.wins(name, first)]
 
     @property
+    def all_level(self) -> bool:
+        """Whether no finalist is better than the advised law or worse, among several."""
+        return 1 < len(self.compared) == len(self.level) + 1
+
+    @property
     def code(self) -> str:
         """The advised law as Python, "" if none is advised or it is not in the catalogue under its name."""
-        if not self.choices[0].settles or not self.choices[0].fit or self.barred:
+        if not self.choices[0].reliable or not self.choices[0].fit or self.all_level or self.barred:
             return ""
         known = catalogue().get(self.law.name)
         return f"smc.{self.law!r}" if known is not None and known.function is self.law.function else ""
 
     @property
     def tied(self) -> list[str]:
-        """The finalists that tie with the advised law: of those that are level with it, seeds enough say so."""
+        """The finalists that are level with the advised law, and whose medians do not differ relevantly from its."""
         laws, first = self.comparison.laws, self.compared[0]
         return [name for name in self.compared[1:] if self.comparison.tied[laws.index(first), laws.index(name)]]
 
@@ -174,11 +190,10 @@ class Advice:
         rows = []
         for choice in self.choices:
             place = f"{choice.rank.place:g}" if choice.fit else "–"
-            if choice.fit and not math.isnan(choice.rank.low):
-                place += f" ({_range(choice.rank.low, choice.rank.high)})"
             name = choice.law.name
             rivalled = len(self.compared) > 1 and name in self.compared
-            stars = [" *" * (rivalled and not self.better(name, need)) for need in self.needs]
+            unbeaten = [need for need in self.needs if rivalled and not self.better(name, need)]
+            stars = [" *" * (need in unbeaten and not self._fails(name, need)) for need in self.needs]
             cells = [_interval(choice.medians[need]) + star for need, star in zip(self.needs, stars, strict=True)]
             rows.append([choice.law.name, place, f"{100 * choice.settles:.0f} %", *cells])
         return rows
@@ -186,15 +201,42 @@ class Advice:
     @property
     def key(self) -> str:
         """The meaning of the table's signs."""
-        seeds = int(self.comparison.seeds.max())
         of = f" of {len(self.conditions)} conditions" if len(self.conditions) > 1 else ""
-        text = f"place by mean rank, and medians{of}, with 95 % intervals over {seeds} seeds. "
-        text += f"*: no finalist is better{' in any condition' if of else ''}."
+        text = f"place by failed runs, then by mean rank, and medians{of}, with 95 % intervals over {self.samples}. "
+        text += f"*: no finalist is better{' in any condition' if of else ''}, and every run has a value."
         if sources := in_words({choice.law.name: [choice.law.source] for choice in self.choices}):
             text += f" {sources[:1].upper()}{sources[1:]}."
         if any(self.dominated(name) for name in self.compared):
             text += " A law stands behind those that dominate it: better somewhere, worse nowhere."
-        return text + " –: settles too seldom to be advised." * any(not choice.fit for choice in self.choices)
+        if self._shared and len(self._shared) < len(self.comparison.laws):
+            text += f" Sets of gains, which are the sample of a law that has several: {', '.join(self._shared)}."
+        text += " –: settles too seldom to be advised." * any(not choice.fit for choice in self.choices)
+        resolved = float(self.comparison.floors.max())
+        sensor = f", for positions at least what the sensor resolves, {number(resolved)} {self.plant.unit}"
+        return f"{text} Least relevant difference: {100 * self.comparison.relevant:g} %{sensor * bool(resolved)}."
+
+    @property
+    def samples(self) -> str:
+        """The largest sample of two finalists in words: "24 runs", or "3 sets of gains" where runs share them."""
+        samples, sets = self.comparison.samples, self.comparison.sets.max(axis=1)
+        block, a, b = np.unravel_index(int(samples.argmax()), samples.shape)
+        count = int(samples[block, a, b]) if len(sets) > 1 else int(self.comparison.seeds.max())
+        kind = "set{} of gains" if max(sets[a], sets[b]) > 1 else "run{}"
+        return f"{count} {kind.format('s' * (count != 1))}"
+
+    @property
+    def _shared(self) -> list[str]:
+        """The finalists whose runs share several sets of gains."""
+        seeds = self.comparison.seeds.max()
+        counts = self.comparison.sets.max(axis=1).tolist()
+        named = zip(self.comparison.laws, counts, strict=True)
+        return [f"{law} {count}" for law, count in named if 1 < count < seeds]
+
+    @property
+    def _too_few(self) -> bool:
+        """Whether no comparison can tell two laws apart, with the samples that there are."""
+        least = 2 * least_p(int(self.comparison.samples.max()))
+        return least > (1 - self.comparison.level) / len(self.blocks)
 
     # the answer
 
@@ -215,25 +257,36 @@ class Advice:
     def _use(self) -> str:
         first, others = self.choices[0], self.compared[1:]
         law = f"{first.law} ({first.gains})"
+        longer = f"longer runs than {self.table.scenario(0).duration:g} s"
+        cure = f"give {longer}, a stronger actuator, more suitable laws or easier conditions"
         if not first.settles or not first.fit:
             why = "none settles in any run" if not first.settles else "none settles often enough in every condition"
-            longer = f"longer runs than {self.table.scenario(0).duration:g} s"
-            cure = f"give {longer}, a stronger actuator, more suitable laws or easier conditions"
-            best = f" The best mean rank has {law}." if others else ""
-            return f"No law can be advised, because {why}: {cure}.{best}"
-        if others and len(self.level) == len(others):
+            return f"No law can be advised, because {why}: {cure}."
+        if not first.reliable:
+            runs = f"{100 * first.settles:.0f} % of its runs"
+            return f"No law is reliable here: {first.law.name}, {self._among}, settles in {runs}; {cure}."
+        if self.all_level and self._too_few:
+            comparisons = f"{len(self.blocks)} comparison{'s' * (len(self.blocks) > 1)}"
+            return f"No law can be called the best: {self.samples} are too few for {comparisons}."
+        if self.all_level:
             every = f"all {len(self.compared)} finalists" if len(others) > 1 else "both laws"
-            best = f"The best mean rank has {law}."
-            if self.tied:
-                best = f"{self.rule.capitalize()}; first is {law}."
-            none = f"No law can be called the best: {every} are level in every comparison"
-            return f"{none}. Use the one that you know. {best}"
+            return (
+                f"No law can be called the best: {every} are level in every comparison of {self.samples}. Use the one "
+                "that you know."
+            )
         return f"Use {law}."
+
+    @property
+    def _among(self) -> str:
+        return f"the first of {len(self.compared)}" if len(self.compared) > 1 else "the only one compared"
 
     def _because(self) -> str:
         first, count = self.choices[0], len(self.compared)
-        if not first.settles or not first.fit:
+        if not first.reliable or not first.fit:
             return ""
+        if self.all_level:
+            least = min(choice.settles for choice in self.choices if choice.fit)
+            return f"Each settles in {'at least ' * (least < 1)}{100 * least:.0f} % of its runs."
         leads = first.rank.mean == min(choice.rank.mean for choice in self.choices if choice.fit)
         equals = [c.law.name for c in self.choices[1:] if c.fit and c.rank.mean == first.rank.mean]
         why = f"it has the best mean rank of {count} finalists"
@@ -246,8 +299,6 @@ class Advice:
         if count == 1:
             alone = "is the only law here that suits" if len(self.choices) == 1 else "alone settles often enough"
             why = f"it {alone}"
-        if len(self.level) == count - 1 > 0:
-            return f"It settles in {100 * first.settles:.0f} % of its runs."
         parts = [f"Because {why}. It settles in {100 * first.settles:.0f} % of its runs."]
         parts += [self._standing(first, need) for need in self.needs] if count > 1 else []
         return " ".join(parts)
@@ -266,7 +317,7 @@ class Advice:
     def _instead(self) -> list[str]:
         """Return for each need on which a finalist is better than the advised law: which, what it gives and costs."""
         first, sentences = self.choices[0], []
-        if len(self.needs) == 1 or not first.fit:
+        if len(self.needs) == 1 or not first.fit or not first.reliable or self.all_level:
             return []
         known = {choice.law.name: choice for choice in self.choices}
         for need in self.needs:
@@ -287,7 +338,7 @@ class Advice:
         return sentences
 
     def _second(self) -> str:
-        if len(self.choices) < 2:
+        if len(self.choices) < 2 or self.all_level or not self.choices[0].reliable:
             return ""
         first, second = self.choices[:2]
         named = f"Second choice: {second.law} ({second.gains})"
@@ -301,12 +352,10 @@ class Advice:
         if len(self.compared) < 2:
             return "How sure: nothing could be compared with it."
         first, *others = self.compared
-        rank, runs, seeds = self.choices[0].rank, int(self.comparison.runs.max()), int(self.comparison.seeds.max())
-        if runs < SEEDS:
-            what = f"{seeds} seeds"
-            if runs < seeds:
-                what = f"{runs} distinct runs of two laws, since seeds change little here"
-            return f"How sure: not at all, with {what}. A law is called better from {SEEDS} on."
+        if self._too_few:
+            return f"How sure: not at all, with {self.samples}."
+        if self.all_level:
+            return f"How sure: {self._against(others[0])}. {self._holds}"
         beaten = [name for name in others if first in self.dominated(name)]
         mixed = [name for name in others if self.wins(name, first)]
         unsure = [name for name in self.level if name not in self.tied]
@@ -315,9 +364,35 @@ class Advice:
             f"it ties with {joined(self.tied)}; {self.rule}" if self.tied else "",
             f"not to be told from {joined(unsure)}" if unsure else "",
             f"a matter of what counts against {joined(mixed)}, better here and worse there" if mixed else "",
-            f"its place by mean rank is {_range(rank.low, rank.high)} of {len(self.compared)} with 95 % confidence",
+            self._against(others[0]),
         ]
-        return f"How sure: {'; '.join(filter(None, parts))}. This holds for these gains, over starts and noise."
+        return f"How sure: {'; '.join(filter(None, parts))}. {self._holds}"
+
+    def _against(self, rival: str) -> str:
+        """Return how the first law compares with a rival on each need, in the condition in which it leads least."""
+        first = self.compared[0]
+        a, b = (self.comparison.laws.index(name) for name in (first, rival))
+        parts = []
+        for need in self.needs:
+            blocks = [k for k, block in enumerate(self.blocks) if block[0] == need]
+            least = max(blocks, key=lambda k: self.comparison.p[k, a, b])
+            effect = self.comparison.effect(least, first, rival, winner=False)
+            where = f" under {self.blocks[least][1]}, where it leads least," * (len(blocks) > 1)
+            if math.isfinite(effect.value):
+                samples = "sets of gains" if effect.sets else "runs"
+                ahead = f"ahead with {effect.ahead} of {effect.samples} {samples}"
+                parts.append(f"{need}{where} {size_in_words(effect)}, {ahead}")
+        return f"{first} against {rival}: {'; '.join(parts)}" if parts else ""
+
+    @property
+    def _holds(self) -> str:
+        """What the answer holds for, in words."""
+        several = self.comparison.sets.max(axis=1) > 1
+        gains = "over sets of gains" if several.all() else "for these gains"
+        if several.any() and not several.all():
+            ones = [law for law, its in zip(self.comparison.laws, several.tolist(), strict=True) if not its]
+            gains = f"over sets of gains, but for these gains of {joined(ones)}"
+        return f"This holds {gains}, over starts and noise."
 
     def _left_out(self) -> str:
         if not self.others:
@@ -366,7 +441,3 @@ def _interval(interval: Interval) -> str:
     """Return a median with its interval, where that has a width."""
     middle, low, high = (number(value) for value in interval[:3])
     return middle if math.isnan(interval.low) or low == middle == high else f"{middle} ({low} to {high})"
-
-
-def _range(low: float, high: float) -> str:
-    return f"{low:g}" if low == high else f"{low:g} to {high:g}"

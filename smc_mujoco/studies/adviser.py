@@ -17,10 +17,13 @@ two-gains ...). With "no-velocity", laws that read a velocity get one that is di
    same in every condition, and the tests are corrected for all pairs of finalists in all blocks.
 
 A law is not fit if it settles in less than half as many runs of a condition as the law that settles in the most: to do
-nothing would be calmest. Laws that are not fit are not compared. A law dominates another if it is better in some block
-and worse in none. Laws are ordered by mean rank, but none before a law that dominates it. Laws that tie with the one
-whose turn it is are ordered among themselves: less overshoot first, then less energy of u. The first law is advised.
-"""
+nothing would be calmest. Laws that are not fit are not compared. A law is reliable if it settles in 90 % of the runs of
+every condition; otherwise the answer is that no law is. Laws with gains of the package run with all sets of these, a
+run with each in turn, so that the answer holds over the gains that a tuning may end with.
+
+A law dominates another if it is better in some block and worse in none. Laws with fewer runs that fail come first, then
+laws by mean rank, but none before a law that dominates it. Laws that tie with the one whose turn it is are ordered
+among themselves: less overshoot first, then less energy of u. The first law is advised, unless all are level."""
 
 import dataclasses
 import math
@@ -33,8 +36,9 @@ import numpy as np
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of
+from smc_mujoco.analysis.differences import RELEVANT, share_that_matters
 from smc_mujoco.analysis.paired_runs import SETTLES
-from smc_mujoco.analysis.ranking import Comparison, Rank, block_ranks, compare, ranks
+from smc_mujoco.analysis.ranking import Comparison, Rank, block_ranks, compare, ranked, ranks, samples_of
 from smc_mujoco.analysis.tuning import result, search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import fingerprint
@@ -59,6 +63,7 @@ from smc_mujoco.studies.table import Table
 USUAL = ("fast", "accurate", "calm")  # what is compared where nothing is asked
 CONDITIONS = ("nominal", "noise", "sine")  # where none is given
 NO_VELOCITY = "no-velocity"
+RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 MIN_SETTLED = 0.5  # of the share of runs that settle under the law that settles in the most; chosen
 
 
@@ -73,7 +78,7 @@ class Extent(NamedTuple):
 
 
 FULL = Extent(screening=8, seeds=24, finalists=6, duration=5.0, budget=96)
-QUICK = Extent(screening=4, seeds=16, finalists=4, duration=3.0, budget=32)
+QUICK = Extent(screening=4, seeds=24, finalists=4, duration=3.0, budget=32)
 
 
 class Candidate(NamedTuple):
@@ -81,6 +86,12 @@ class Candidate(NamedTuple):
 
     law: Component
     remark: str = ""
+    shipped: bool = False  # runs with all sets of gains of the package in turn, as `grid` does with a name
+
+    @property
+    def runs_as(self) -> str | Component:
+        """The law as `grid` takes it: by its name if its gains differ from run to run."""
+        return self.law.name if self.shipped else self.law
 
 
 def which(
@@ -96,6 +107,7 @@ def which(
     threads: int | None = None,
     progress: bool = False,
     defaults: bool = False,
+    relevant: float = RELEVANT,
 ) -> Advice:
     """Advise a law for a plant: compare all laws that suit, with gains for the plant, and say how sure the answer is.
 
@@ -106,7 +118,7 @@ def which(
         "no-overshoot"; by default fast, accurate and calm. And what every law must have: "no-velocity", "continuous"
         and the other names in `smc_mujoco.control.properties.PROPERTIES`.
       laws: the laws to compare, by name or with your own gains. Default: all that suit.
-      seeds: of the finals. With fewer than 16 no law is called better than another. Default: 24, or 16 if quick.
+      seeds: of the finals, the number of runs of a law in a condition. Default: 24.
       duration: of a run, s. Default: 5, or 3 if quick.
       starts: where runs begin, see `starts`.
       out: folder for gains and runs. Another call takes from there what it needs again.
@@ -114,11 +126,13 @@ def which(
       threads: simulations at once; None for one per available core.
       progress: whether to show progress bars.
       defaults: whether a law may be advised over rivals whose gains are their defaults.
+      relevant: the least relevant difference, as a share of the larger value, see `leaderboard`.
 
     Raises:
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
     """
     extent, machine, folder = QUICK if quick else FULL, as_plant(plant), Path(out)
+    relevant = share_that_matters(relevant)
     seeds = whole("seeds", extent.seeds if seeds is None else seeds, 1, 10_000)
     duration = extent.duration if duration is None else number("duration", duration, above=0.0)
     compared, properties = _needs(needs, machine)
@@ -134,8 +148,9 @@ def which(
         raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")
 
     def ran(names: Sequence[str], numbers: range, part: str) -> Contest:
-        runs = grid(machine, [candidates[name].law for name in names], asked, numbers, "default", duration, starts)
-        return _contest(study(runs, folder / part, threads=threads, progress=progress), machine, compared)
+        laws = [candidates[name].runs_as for name in names]
+        runs = grid(machine, laws, asked, numbers, "tuned", duration, starts)
+        return _contest(study(runs, folder / part, threads=threads, progress=progress), machine, compared, relevant)
 
     names, others = list(candidates), []
     if len(names) > extent.finalists:
@@ -264,7 +279,7 @@ def _known(plant: Plant, law: Component | Template) -> Candidate | None:
         return None
     if not gain_sets.has(plant, law.name):
         return None
-    return Candidate(gain_sets.law(plant, law.name, "tuned"))
+    return Candidate(gain_sets.law(plant, law.name, "tuned"), shipped=True)
 
 
 def _tuned(
@@ -314,24 +329,25 @@ class Contest(NamedTuple):
     specialists: list[str]
 
 
-def _contest(table: Table, plant: Plant, needs: Sequence[str]) -> Contest:
+def _contest(table: Table, plant: Plant, needs: Sequence[str], relevant: float) -> Contest:
     """Compare laws over all needs and conditions."""
     (group,) = paired_runs.groups(table, by=("plant",))
     fit, ran = _fit(group, table), paired_runs.scenarios(table, group)
     parts, floors = [], []
     for need in needs:
-        there, scores, outcomes = group.scores(paired_runs.values(table, NEEDS[need].name))
-        if not scores:
+        scores = group.scores(paired_runs.values(table, NEEDS[need].name))
+        if not scores.blocks:
             raise ScenarioError(f"need {need!r} has no number in any run on {plant.name}: leave it out")
-        parts.append((scores, outcomes))
-        floors += [paired_runs.floor(ran[k], NEEDS[need].unit) for k in there]
+        parts.append(scores[1:])
+        floors += [paired_runs.floor(ran[k], NEEDS[need].unit) for k in scores.blocks]
     laws = [law for law in group.laws if law in fit] or group.laws
-    scores, outcomes = ({law: np.concatenate([part[i][law] for part in parts]) for law in laws} for i in (0, 1))
-    comparison = compare(scores, floors, outcomes=outcomes)
-    by_need = np.split(block_ranks(comparison.centres, comparison.floors), len(needs), axis=1)
+    joint = ({law: np.concatenate([part[i][law] for part in parts]) for law in laws} for i in range(3))
+    values, outcomes, sets = joint
+    comparison = compare(values, floors, outcomes=outcomes, sets=sets, relevant=relevant)
+    by_need = np.split(block_ranks(comparison), len(needs), axis=1)
     specialists = [comparison.laws[int(own.mean(axis=1).argmin())] for own in by_need]
     nan = math.nan
-    unfit = [Rank(law, nan, nan, nan, nan, nan, 1.0, best=False) for law in group.laws if law not in laws]
+    unfit = [Rank(law, nan, nan, best=False) for law in group.laws if law not in laws]
     return Contest(
         table, comparison, [*_order(comparison, _restraint(group, ran, table, plant)), *unfit], fit, specialists
     )
@@ -341,11 +357,11 @@ def _restraint(group: paired_runs.Group, ran: Sequence, table: Table, plant: Pla
     """Return the mean rank of each law on each of the metrics that order laws which tie, less is first."""
     found = []
     for metric in ties(plant):
-        there, scores, _ = group.scores(paired_runs.values(table, metric.name))
-        if scores:
-            centres = np.array([np.nanmedian(scores[law], axis=1) for law in group.laws])
-            floors = np.array([paired_runs.floor(ran[k], metric.unit) for k in there])
-            found.append(block_ranks(centres, floors).mean(axis=1))
+        scores = group.scores(paired_runs.values(table, metric.name))
+        if scores.blocks:
+            centres = np.array([np.nanmedian(scores.values[law], axis=1) for law in group.laws])
+            floors = np.array([paired_runs.floor(ran[k], metric.unit) for k in scores.blocks])
+            found.append(ranked(centres, floors).mean(axis=1))
     return {law: tuple(float(mean[i]) for mean in found) for i, law in enumerate(group.laws)}
 
 
@@ -380,16 +396,20 @@ def _fit(group: paired_runs.Group, table: Table) -> set[str]:
 def _choices(finals: Contest, candidates: Mapping[str, Candidate], needs: Sequence[str]) -> tuple[Choice, ...]:
     """Return the finalists with all that is said of them, best first."""
     (group,) = paired_runs.groups(finals.table, by=("plant",))
-    settled, choices = _settled(group, finals.table).mean(axis=1), []
-    scores = {need: group.scores(paired_runs.values(finals.table, NEEDS[need].name))[1] for need in needs}
+    settled, choices = _settled(group, finals.table), []
+    scores = {need: group.scores(paired_runs.values(finals.table, NEEDS[need].name)) for need in needs}
     for rank in finals.order:
         choice = Choice(
             law=candidates[rank.law].law,
             remark=candidates[rank.law].remark,
             rank=rank,
-            settles=float(settled[group.laws.index(rank.law)]),
+            settles=float(settled[group.laws.index(rank.law)].mean()),
+            reliable=bool((settled[group.laws.index(rank.law)] >= RELIABLE).all()),
             fit=rank.law in finals.fit,
-            medians={need: median_of(scores[need][rank.law]) for need in needs},
+            medians={
+                need: median_of(own.values[rank.law], samples=samples_of(own.sets[rank.law]))
+                for need, own in scores.items()
+            },
         )
         choices.append(choice)
     return tuple(choices)

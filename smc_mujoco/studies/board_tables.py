@@ -36,7 +36,8 @@ class Cell(NamedTuple):
 
     median: str
     interval: str
-    best: bool  # no law is better, and there are enough runs for a winner
+    failures: str
+    best: bool  # no law is better, no run failed, and there are enough runs for a winner
 
 
 def size(value: float, metric: str, digits: int = 3) -> str:
@@ -93,9 +94,17 @@ def as_latex(boards: Iterable[Any]) -> str:
 def key(boards: Sequence[Any]) -> str:
     """Return what the cells of a table show."""
     bold = any(cell.best for cells in _laws(boards).values() for cell in cells)
+    better = "; bold: no law is better, and no run failed" * bold
+    words = f"medians with {100 * boards[0].level:g} % intervals{better}; {relevance(boards)}"
     gains = in_words(sources(boards))
-    words = f"medians with {100 * boards[0].level:g} % intervals{'; bold: no law is better' * bold}"
     return f"{words}; {gains}" if gains else words
+
+
+def relevance(boards: Sequence[Any]) -> str:
+    """Return the least relevant difference of boards in words."""
+    resolved = max((board.resolution for board in boards if board.unit == "{x}"), default=0.0)
+    sensor = f", for positions at least what the sensor resolves, up to {number(resolved)} rad or m" if resolved else ""
+    return f"least relevant difference: {100 * boards[0].relevant:g} % of the larger value{sensor}"
 
 
 def sources(boards: Iterable[Any]) -> dict[str, list[Source]]:
@@ -139,15 +148,16 @@ def _laws(boards: Sequence[Any]) -> dict[str, list[Cell]]:
         for entry in board.entries:
             middle = size(entry.interval.median, board.metric)
             best = entry.rank.best and middle != "" and not board.too_few and not board.barred
-            cell = Cell(middle, spread(entry.interval, board.metric), best)
-            laws.setdefault(entry.law, [Cell("", "", False)] * len(boards))[i] = cell
+            cell = Cell(middle, spread(entry.interval, board.metric), board.failures(entry), best)
+            laws.setdefault(entry.law, [Cell("", "", "", False)] * len(boards))[i] = cell
     return laws
 
 
 def _html_cell(cell: Cell) -> html.Html:
     """Return a median, bold if it is the best, with its interval below it."""
     strong = html.strong(cell.median) if cell.best else html.text(cell.median)
-    return html.Html(f'{strong}<br><small style="white-space:nowrap">{html.text(cell.interval)}</small>')
+    below = "<br>".join(html.text(text) for text in (cell.interval, cell.failures) if text)
+    return html.Html(f'{strong}<br><small style="white-space:nowrap">{below}</small>')
 
 
 def _tex_line(cells: Iterable[str]) -> str:
@@ -158,7 +168,8 @@ def _tex_cell(cell: Cell) -> str:
     """Return a median, bold if it is the best, with its interval beside it."""
     middle, interval = (re.sub(r"([\d.]+)e(-?\d+)", r"\1·10^\2", text) for text in cell[:2])
     strong = f"\\textbf{{{_tex(middle)}}}" if cell.best else _tex(middle)
-    return f"{strong} [{_tex(interval)}]" if interval else strong
+    failures = f", {_tex(cell.failures)}" if cell.failures else ""
+    return (f"{strong} [{_tex(interval)}]" if interval else strong) + failures
 
 
 def _tex(text: str) -> str:

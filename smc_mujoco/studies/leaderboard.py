@@ -2,45 +2,90 @@
 
     boards = leaderboard(table)                        # a Board for each plant and metric
     boards[0].winner                                   # a law's name, or None if no law is significantly better
+    print(boards[0].verdict)                           # the winner, and how much it has less than the next law
     rich.print(tables.leaderboard(boards))             # of `cli.tables`
 
-`analysis.bootstrap` and `analysis.ranking` define intervals, ranks and winners. A board is one metric in one group of
-runs. Laws are compared in each of its blocks, a plant in a condition. The p-values are corrected for all pairs of laws
-in all blocks of the board. The winner of a board with several blocks wins in every one. The conclusions hold for the
-plants and conditions of the table, over initial states and noise. `Board.friedman` says whether they would hold in
-others.
+`analysis.ranking` defines samples, tests, winners and the correction, `analysis.bootstrap` the intervals of medians. A
+board is one metric in one group of runs. Laws are compared in each of its blocks, a plant in a condition. The tests are
+corrected for all blocks of the table in this metric, so the verdict on a block is the same on every board that has it.
+The winner of a board with several blocks wins in every one. The conclusions hold for the plants and conditions of the
+table, over initial states and noise, and over the gains with which the laws ran. `Board.friedman` says whether they
+would hold in other conditions.
 """
 
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs as cells
 from smc_mujoco.analysis.bootstrap import RESAMPLES, Interval, median_of, share_interval
+from smc_mujoco.analysis.differences import RELEVANT
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns
-from smc_mujoco.analysis.ranking import SEEDS, Comparison, Friedman, Rank, compare, friedman, ranks
+from smc_mujoco.analysis.ranking import (
+    Comparison,
+    Effect,
+    Friedman,
+    Limits,
+    Rank,
+    compare,
+    corrected,
+    friedman,
+    ranks,
+    samples_of,
+)
+from smc_mujoco.analysis.signed_rank import least_p
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
-from smc_mujoco.common.text import joined
+from smc_mujoco.common.text import joined, number
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies import board_tables
 
+FEW_TIMES = 0.5  # ratio below which values are called so many times less, not so many percent; chosen
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Entry:
-    """A law's line in a board: its median, or the share of its runs that settle, and its place.
+    """A law's line in a board.
 
-    `sources`: where its gains come from; none where the table does not say.
+    Attributes:
+      law: its name.
+      interval: its median, or the share of its runs that settle, over its samples.
+      rank: its place.
+      failed: number of its runs that failed, or have no value, such as those that never settle.
+      runs: number of its runs, equal ones counted once.
+      sources: where its gains come from; none where the table does not say.
     """
 
     law: str
     interval: Interval
     rank: Rank
+    failed: int
+    runs: int
     sources: tuple[Source, ...] = ()
+
+
+class Lead(NamedTuple):
+    """The law in front in a block, the rival that it is least sure to be better than, and how they compare."""
+
+    law: str
+    rival: str
+    effect: Effect
+
+    @property
+    def size(self) -> str:
+        """How much less the law has, with the interval, such as "12 % less (8 to 16 %)"."""
+        return size_in_words(self.effect)
+
+    @property
+    def words(self) -> str:
+        """How the law compares with its rival, such as "12 % less than pid (8 to 16 %), ahead in 24 of 24 seeds"."""
+        less, _, rest = self.size.partition(" (")
+        samples = "sets of gains" if self.effect.sets else "runs"
+        return f"{less} than {self.rival} ({rest}, ahead in {self.effect.ahead} of {self.effect.samples} {samples}"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -50,39 +95,47 @@ class Block:
     Attributes:
       plant, condition: their names.
       medians: law -> median over the seeds; for "settles" the share of runs that do not settle.
-      best: the laws that no other law is better than.
+      lacking: law -> number of runs that failed or have no value.
+      best: the laws without such a run that no other law is better than.
+      lead: how the law in front compares with its closest rival; None for one law, for "settles", or if it has runs
+        without a value.
       seeds: number of seeds in which every law ran.
       runs: number of distinct runs among these. In the others every law has the same result as in an earlier seed.
-      most: largest number of distinct runs of any two laws. A seed that changes neither law is no sample of the two.
-      fewest: smallest number of distinct runs of any two of the best laws; `most` if only one law is best.
+      samples: largest number of samples of any two laws, see `ranking`; of one law that of its runs.
+      sets: smallest number of sets of gains of a law that has several; 1 if none has.
       untuned: the laws with default gains, over which no other law is named the winner.
+      ahead: the law that is better than every other, also over laws with default gains.
     """
 
     plant: str
     condition: str
     medians: Mapping[str, float]
+    lacking: Mapping[str, int]
     best: tuple[str, ...]
+    ahead: str | None
+    lead: Lead | None
     seeds: int
     runs: int
-    most: int
-    fewest: int
+    samples: int
+    sets: int
     untuned: tuple[str, ...] = ()
 
     @property
     def winner(self) -> str | None:
         """The law that is better than every other, among several, unless `barred`."""
-        return self.best[0] if len(self.best) == 1 < len(self.medians) and not self.barred else None
+        return None if self.barred else self.ahead
 
     @property
     def barred(self) -> tuple[str, ...]:
-        """The laws with default gains that are worse than the only best law, which is then not named the winner."""
-        return tuple(law for law in self.untuned if law not in self.best) if len(self.best) == 1 else ()
+        """The laws with default gains that are worse than the law ahead, which is then not named the winner."""
+        return tuple(law for law in self.untuned if law != self.ahead) if self.ahead else ()
 
     @property
     def sample(self) -> str:
-        """The size of the sample in words, such as "20 seeds, 1 distinct run"."""
+        """The size of the sample in words, such as "20 seeds, 1 distinct run" or "24 seeds, 3 sets of gains"."""
         seeds = f"{self.seeds} seed{'s' * (self.seeds > 1)}"
-        return seeds if self.runs == self.seeds else f"{seeds}, {_distinct(self.runs)}"
+        parts = [seeds] + [_distinct(self.runs)] * (self.runs < self.seeds)
+        return ", ".join(parts + [f"{self.sets} sets of gains"] * (self.sets > 1))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -97,8 +150,11 @@ class Board:
       blocks: the same laws on each plant in each condition.
       cells: number of runs of each law, counting only cells that all laws have, and equal runs once.
       seeds: number of seeds, equal runs included.
-      pairs: number of comparisons for which the tests are corrected: all pairs of laws, in every block.
+      family: number of blocks of the table for which winners are corrected.
+      limits: of the p-values, after the correction.
       level: level of intervals and tests.
+      relevant: share of a value that is relevant.
+      resolution: the largest difference that a sensor does not resolve, in the unit of the board.
       friedman: Friedman's test; None for one law, or for one plant in one condition.
     """
 
@@ -109,8 +165,11 @@ class Board:
     blocks: tuple[Block, ...]
     cells: int
     seeds: int
-    pairs: int
+    family: int
+    limits: Limits
     level: float
+    relevant: float
+    resolution: float
     friedman: Friedman | None
 
     @property
@@ -141,7 +200,7 @@ class Board:
         return [self.name(block) for block in self.blocks if block.winner == law]
 
     def losses(self, law: str) -> list[str]:
-        """Return the names of the blocks in which another law is better."""
+        """Return the names of the blocks in which another law is better, or in which this one has runs that fail."""
         return [self.name(block) for block in self.blocks if law not in block.best]
 
     def name(self, block: Block) -> str:
@@ -158,19 +217,28 @@ class Board:
     def verdict(self) -> str:
         """The result in words: the winner, else where laws win and lose, why there is no winner, or the best laws."""
         if self.winner:
-            return f"winner: {self.winner}" + f", in all {len(self.blocks)} {self.kind}" * (len(self.blocks) > 1)
+            leads = [block.lead for block in self.blocks if block.lead]
+            least = min(leads, key=_shown_lead, default=None)
+            several = f", in all {len(self.blocks)} {self.kind}" * (len(self.blocks) > 1)
+            how = f"{', at least' * (len(leads) > 1)} {least.words}" if least else ""
+            return f"winner: {self.winner}{several}{':' * bool(least and len(leads) == 1)}{how}{self.gains}"
         results = []
         for law in (entry.law for entry in self.entries):
             if wins := self.wins(law):
                 losses = self.losses(law)
                 results.append(f"{law} wins under {_listed(wins)}" + f", loses under {_listed(losses)}" * any(losses))
         if results:
-            return f"no winner in all {len(self.blocks)} {self.kind}: {'; '.join(results)}"
+            return f"no winner in all {len(self.blocks)} {self.kind}: {'; '.join(results)}{self.gains}"
         if self.why:
             return f"no winner: {self.why}"
-        fewest = min(block.fewest for block in self.blocks)
-        few = f", two of which have {_distinct(fewest)}"
-        return f"no winner, undefeated: {_listed(self.best)}{few * (fewest < SEEDS)}"
+        if len(self.best) == len(self.entries):
+            return "no winner: all laws are level" if len(self.best) > 2 else "no winner: both laws are level"
+        return f"no winner, undefeated: {_listed(self.best)}"
+
+    @property
+    def gains(self) -> str:
+        """The words "for these gains", after a comma, if no law ran with several sets of gains; else ""."""
+        return ", for these gains" if all(block.sets == 1 for block in self.blocks) else ""
 
     @property
     def why(self) -> str:
@@ -179,7 +247,9 @@ class Board:
             return "one law"
         if barred := self.barred:
             return f"none is named over {joined(barred)} with default gains"
-        return self.too_few or ("" if self.best else "each loses to another")
+        if all(not block.best for block in self.blocks) and all(all(block.lacking.values()) for block in self.blocks):
+            return f"every law has runs that {'never end' if self.unit == 's' else 'fail'}"
+        return self.too_few or ("" if self.best else "each loses to another, or fails")
 
     @property
     def barred(self) -> list[str]:
@@ -188,15 +258,51 @@ class Board:
 
     @property
     def too_few(self) -> str:
-        """The size of the sample in words, if no block has enough runs for a winner; else ""."""
-        most = max(self.blocks, key=lambda block: block.most)
-        if most.runs < SEEDS:
-            return most.sample + ", too few" * (most.runs == most.seeds)
-        if most.most < SEEDS:
-            return f"{most.sample}, of two laws {_distinct(most.most)}"
-        if 2.0 ** (1 - most.most) * self.pairs > 1 - self.level:  # the least p-value of the sign test
-            return f"{most.sample}, too few for {self.pairs} comparisons"
-        return ""
+        """The size of the sample in words, if no block has enough samples for a winner; else ""."""
+        largest = max(self.blocks, key=lambda block: block.samples)
+        least, error = 2 * least_p(largest.samples), 1 - self.level
+        if least <= error / self.family:
+            return ""
+        compared = f", too few for {self.family} comparisons" if least <= error else ", too few"
+        if largest.samples < largest.sets or (largest.sets > 1 and largest.samples > largest.sets):
+            return f"{largest.samples} samples{compared}"
+        if largest.sets > 1:
+            return f"{largest.sets} sets of gains{compared}"
+        if largest.samples < largest.runs:
+            return f"{largest.sample}, of two laws {_distinct(largest.samples)}"
+        return largest.sample + compared * (largest.runs == largest.seeds or least <= error)
+
+    def failures(self, entry: Entry) -> str:
+        """Return how many of a law's runs failed, such as "2 of 24 failed"; "" if none did.
+
+        In a metric that is a time, runs that never end are counted too: "2 of 24 never".
+        """
+        return f"{entry.failed} of {entry.runs} {'never' if self.unit == 's' else 'failed'}" if entry.failed else ""
+
+
+def size_in_words(effect: Effect) -> str:
+    """Return how much less a law has than a rival, with the interval, such as "12 % less (8 to 16 %)"."""
+    if effect.low == effect.high == float(effect.relative):
+        return "no difference"
+    if not effect.relative:
+        ends = (number(-value) for value in (effect.high, effect.low))
+        return f"{number(abs(effect.value))} {'less' if effect.value <= 0 else 'more'} ({' to '.join(ends)} less)"
+    if effect.high < FEW_TIMES:
+        times = [number(1 / value) if value else "inf" for value in (effect.value, effect.high, effect.low)]
+        return f"{times[0]} times less ({times[1]} to {times[2]} times)"
+    low, high = (_percent(1 - value) for value in (effect.high, effect.low))
+    value = 1 - effect.value
+    return f"{_percent(abs(value))} % {'less' if value >= 0 else 'more'} ({low} to {high} %{' less' * (value < 0)})"
+
+
+def _percent(share: float) -> str:
+    """Return a share in percent, with two digits where it is small."""
+    return "-inf" if math.isinf(share) else f"{100 * share:.2g}" if abs(share) < 0.0995 else f"{100 * share:.0f}"
+
+
+def _shown_lead(lead: Lead) -> float:
+    """Return the key by which the closest of several leads is chosen: ratios by their size, then differences."""
+    return -lead.effect.high if lead.effect.relative else math.inf
 
 
 def _distinct(runs: int) -> str:
@@ -231,12 +337,14 @@ def leaderboard(
     resamples: int = RESAMPLES,
     seed: int = 0,
     defaults: bool = False,
+    relevant: float = RELEVANT,
 ) -> Boards:
     """Compare the laws of a table in each metric within each group.
 
     Only cells (plant, condition, seed) that every law of the group has are compared. A failed run is inf in all
     metrics. A seed in which two laws both have the same results as in an earlier seed is no further sample of the two.
-    A metric that does not apply to a group has no board for it.
+    Runs that share one of several sets of gains of a law are one sample. A metric that does not apply to a group has no
+    board for it.
 
     Args:
       table: a study's runs, as `smc.Table.read` returns them.
@@ -245,6 +353,8 @@ def leaderboard(
       level: level of confidence.
       resamples, seed: number of resamples of the bootstrap, and seed of their draws.
       defaults: whether a winner may be named over laws whose gains are their defaults.
+      relevant: the least relevant difference, as a share of the larger value; at least what the sensor of a condition
+        resolves is relevant too.
 
     Raises:
       ScenarioError: no runs, an unknown metric or group, two runs in a cell, or laws without a common cell.
@@ -255,68 +365,134 @@ def leaderboard(
     units = {name: find("metric", name, known) for name in metrics}
     boards, seed = Boards(), whole("seed", seed, 0, 2**53 - 1)
     by_row = {name: cells.values(table, name) for name in units}
-    for group in cells.groups(table, by):
-        ran, sources = cells.scenarios(table, group), cells.sources(table, group.rows[group.rows >= 0])
+    groups = list(cells.groups(table, by))
+    every = groups if set(by) == set(cells.GROUPS) else list(cells.groups(table, cells.GROUPS))
+    families = {name: _family(table, every, by_row[name], name, units[name], level, relevant) for name in units}
+    for group in groups:
+        ran = cells.scenarios(table, group)
+        sources = cells.sources(table, group.rows[group.rows >= 0])
         at_default = (law for law, its in sources.items() if any(source.kind == DEFAULT for source in its))
         untuned = () if defaults else tuple(at_default)
         for metric, unit in units.items():
-            there, scores, outcomes = group.scores(by_row[metric])
-            if not scores:
+            limits, family = families[metric]
+            scores = group.scores(by_row[metric])
+            if not (there := scores.blocks):
                 continue
             floors = [cells.floor(ran[k], unit) for k in there]
             if all((scenario := ran[k]) is not None and scenario.amplifier for k in there):
                 unit = unit.replace("({u})", "V").replace("{u}", "V")  # noqa: PLW2901
-            found = compare(scores, floors, metric == SETTLES, level, outcomes)
+            found = compare(
+                scores.values, floors, metric == SETTLES, level, scores.outcomes, scores.sets, relevant, limits
+            )
             blocks = tuple(_block(group, found, at, k, untuned) for at, k in enumerate(there))
             mixed = "{" in unit and len({block.plant for block in blocks}) > 1
             board = Board(
                 group=group.name,
                 metric=metric,
                 unit=unit,
-                entries=_entries(found, mixed, resamples, seed, sources),
+                entries=_entries(found, scores.sets, sources, mixed, resamples, seed),
                 blocks=blocks,
                 cells=sum(block.runs for block in blocks),
                 seeds=max(block.seeds for block in blocks),
-                pairs=found.pairs,
+                family=family,
+                limits=found.limits,
                 level=found.level,
+                relevant=found.relevant,
+                resolution=max(floors),
                 friedman=friedman(found),
             )
             boards.append(board)
     return boards
 
 
+def _family(
+    table: Columns,
+    blocks: Sequence[cells.Group],
+    by_row: np.ndarray,
+    metric: str,
+    unit: str,
+    level: float,
+    relevant: float,
+) -> tuple[Limits, int]:
+    """Return the limits of the p-values of a metric, corrected for all blocks of a table, and the number of these."""
+    found = []
+    for group in blocks:
+        try:
+            scores = group.scores(by_row)
+        except ScenarioError:  # laws that share no run: there is nothing to compare
+            continue
+        if scores.values:
+            floors = [cells.floor(cells.scenarios(table, group)[k], unit) for k in scores.blocks]
+            found.append(
+                compare(
+                    scores.values,
+                    floors,
+                    metric == SETTLES,
+                    level,
+                    scores.outcomes,
+                    scores.sets,
+                    relevant,
+                    Limits(0.0, 0.0),
+                )
+            )
+    return corrected(found, level), sum(len(one.laws) > 1 for one in found) or 1
+
+
 def _block(group: cells.Group, found: Comparison, at: int, k: int, untuned: tuple[str, ...]) -> Block:
     """Return block k of a group, which is number `at` of the compared blocks."""
     plant, condition = group.blocks[k]
-    runs, laws = found.runs[at], np.array([law in found.best[at] for law in found.laws], bool)
-    best = runs[np.ix_(laws, laws)][np.triu_indices(laws.sum(), 1)]
-    most = int(runs.max()) if len(laws) > 1 else int(found.seeds[at])
+    several = found.sets[:, at][found.sets[:, at] > 1]
     return Block(
         plant=plant,
         condition=condition,
         medians=dict(zip(found.laws, found.centres[:, at].tolist(), strict=True)),
+        lacking=dict(zip(found.laws, found.without_value[:, at].tolist(), strict=True)),
         best=found.best[at],
+        ahead=found.winners[at],
+        lead=_lead(found, at),
         seeds=group.seeds[k],
         runs=int(found.seeds[at]),
-        most=most,
-        fewest=int(best.min(initial=most)),
+        samples=int(found.samples[at].max()) if len(found.laws) > 1 else int(found.seeds[at]),
+        sets=int(several.min(initial=found.cells.shape[2])) if several.size else 1,
         untuned=untuned,
     )
 
 
+def _lead(found: Comparison, at: int) -> Lead | None:
+    """Return how the law in front of a block compares with its closest rival: the one with the largest p-value."""
+    if len(found.laws) < 2 or found.shares:
+        return None
+    order = sorted(range(len(found.laws)), key=lambda i: (found.without_value[i, at], found.centres[i, at]))
+    first = order[0] if found.winners[at] is None else found.laws.index(found.winners[at])
+    if found.without_value[first, at]:
+        return None
+    rival = max((i for i in order if i != first), key=lambda i: found.p[at, first, i])
+    names = found.laws[first], found.laws[rival]
+    effect = found.effect(at, *names)
+    return Lead(*names, effect) if math.isfinite(effect.value) and effect.samples else None
+
+
 def _entries(
-    found: Comparison, mixed: bool, resamples: int, seed: int, sources: Mapping[str, tuple[Source, ...]]
+    found: Comparison,
+    sets: Mapping[str, np.ndarray],
+    sources: Mapping[str, tuple[Source, ...]],
+    mixed: bool,
+    resamples: int,
+    seed: int,
 ) -> tuple[Entry, ...]:
     """Return the laws' lines. If `mixed`, values have several units, so there is no median."""
     entries = []
-    for rank in ranks(found, resamples, seed):
-        scores = found.cells[found.laws.index(rank.law)]
-        n = scores.shape[1]
+    for rank in ranks(found):
+        at = found.laws.index(rank.law)
+        own, samples = found.cells[at], samples_of(sets[rank.law])
+        n = own.shape[1] if samples is None else max(samples) + 1
         if found.shares:
-            interval = share_interval(float(1 - np.nanmean(scores, axis=1).mean()), n, found.level)
+            interval = share_interval(float(1 - np.nanmean(own, axis=1).mean()), n, found.level)
         elif mixed:
             interval = Interval(math.nan, math.nan, math.nan, n)
         else:
-            interval = median_of(scores, found.level, resamples, seed)
-        entries.append(Entry(law=rank.law, interval=interval, rank=rank, sources=sources.get(rank.law, ())))
+            interval = median_of(own, found.level, resamples, seed, samples)
+        failed, runs = int(found.without_value[at].sum()), int((~np.isnan(own)).sum())
+        its = sources.get(rank.law, ())
+        entries.append(Entry(law=rank.law, interval=interval, rank=rank, failed=failed, runs=runs, sources=its))
     return tuple(entries)

@@ -47,12 +47,12 @@ class Extent:
     duration: float = DURATION
 
 
-FULL = Extent(conditions=IDEAL + REAL, seeds=20)
-# It has the fewest seeds with which a winner can be named, see `ranking`, and takes half a minute on 2 cores.
+FULL = Extent(conditions=IDEAL + REAL, seeds=24)
+# It takes a minute on 2 cores.
 QUICK = Extent(
     plants=("inverted_pendulum", "van_der_pol", "duffing"),
     conditions=("nominal", "noise", "coulomb"),
-    seeds=16,
+    seeds=24,
     duration=3.0,
 )
 

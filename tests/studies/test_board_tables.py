@@ -14,6 +14,7 @@ from rich.console import Console
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.cli import tables
 from smc_mujoco.common.errors import ScenarioError, find
+from smc_mujoco.common.html import text
 from smc_mujoco.evidence.report import words
 from smc_mujoco.studies import board_tables
 from smc_mujoco.studies.advice import _interval
@@ -123,11 +124,11 @@ def test_only_what_no_law_beats_is_bold(boards):
 
 def test_verdicts_are_said_once_with_their_metrics(boards):
     html = boards._repr_html_()
-    assert f"ITAE: {boards[0].verdict}" in html
+    assert f"ITAE: {text(boards[0].verdict)}" in html
     assert html.count("winner: third") == 1
     alone = Boards([boards[0]])._repr_html_()
     assert "ITAE: " not in alone
-    assert boards[0].verdict in alone
+    assert text(boards[0].verdict) in alone
 
 
 def test_a_group_is_a_table_and_no_board_is_said():

@@ -78,9 +78,15 @@ def test_most_names_who_never_settles():
     assert single(a=0.50, b=0.51, c=0.2).most("settling_time") == "a and b tied (1.00 to 1.02 s)"
 
 
-def test_positions_are_tied_by_half_a_percent_of_the_start_as_on_leaderboards():
+def test_positions_that_the_sensor_does_not_tell_apart_are_tied_as_on_leaderboards():
     runs = {label: made(RUN, 0.2, size) for label, size in {"a": 1.0, "b": 5.0, "c": 7.0}.items()}
-    # 1.1e-3, 5.5e-3 and 7.7e-3 m, of x0 = 1 m
+    # 1.1e-3, 5.5e-3 and 7.7e-3 m
+    assert Outcome(traces={"nominal": runs}).least("ultimate_bound") == "a (0.00110 m)"
+    noise = smc.Noise(position=5e-3)
+    runs = {
+        label: dataclasses.replace(run, scenario=dataclasses.replace(run.scenario, noise=noise))
+        for label, run in runs.items()
+    }
     assert Outcome(traces={"nominal": runs}).least("ultimate_bound") == "a and b tied (0.00110 to 0.00550 m)"
 
 

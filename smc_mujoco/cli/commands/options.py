@@ -68,6 +68,10 @@ PlantName = Annotated[
     str,
     typer.Argument(metavar="PLANT", help="A plant from `smc-mujoco list`, or FILE.xml:joint+joint for your own model."),
 ]
+Relevant = Annotated[
+    float | None,
+    typer.Option("--relevant", help="Least relevant difference, as a share of the larger value; default 0.03."),
+]
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A scene from `smc-mujoco list`, or a scene file.")]
 Spread = Annotated[
     float | None, typer.Option("--spread", help="How far starts vary about x0, as a fraction of it; default 0.2.")

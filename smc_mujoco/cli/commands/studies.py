@@ -42,13 +42,12 @@ def which(
     ] = False,
     seeds: Annotated[
         int | None,
-        typer.Option(
-            min=1, help="Starts and noises of the finals; default 24, --quick 16. With fewer than 16 no law can win."
-        ),
+        typer.Option(min=1, help="Runs of a law in each condition of the finals, each from another start; default 24."),
     ] = None,
     duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 5, with --quick 3.")] = None,
     x0: options.X0 = None,
     spread: options.Spread = None,
+    relevant: options.Relevant = None,
     out: Annotated[Path, typer.Option(help="Folder for gains and runs; a later call reuses them.")] = Path("which"),
     defaults: options.Defaults = False,
     threads: options.Threads = None,
@@ -57,9 +56,10 @@ def which(
 
     All laws that suit are compared, with gains that were tuned for the plant by one rule: those of the package, or else
     found now, which takes some seconds for each law. A first round with few starts selects the finalists. They run from
-    new starts and noises, and are compared by the rules of `bench`: a law is better only if its median is lower by more
-    than 3 % and a test over the starts, corrected for all comparisons, confirms it. If no law is better than another,
-    the answer says so. If you stop the command, it continues when you start it again.
+    new starts and noises, and over all gains that their tuning may end with. They are compared by the rules of `bench`:
+    a law is better only if its values are lower by more than the least relevant difference, in a paired test that is
+    corrected for all comparisons. If no law is better than another, the answer says so. If you stop the command, it
+    continues when you start it again.
 
     Example: smc-mujoco which duffing --conditions noise,coulomb --needs calm,fast
 
@@ -84,6 +84,7 @@ def which(
         threads,
         progress=True,
         defaults=defaults,
+        **_relevant(relevant),
     )
     terminal.print(tables.advice(advice))
     for sentence in advice.answer:
@@ -102,7 +103,7 @@ def bench(
     quick: Annotated[
         bool,
         typer.Option(
-            "--quick", help="A small study: 3 plants, 3 conditions, 16 seeds, 3 s a run; half a minute on 2 cores."
+            "--quick", help="A small study: 3 plants, 3 conditions, 24 seeds, 3 s a run; a minute on 2 cores."
         ),
     ] = False,
     plants: Annotated[
@@ -121,14 +122,13 @@ def bench(
     spread: options.Spread = None,
     seeds: Annotated[
         int | None,
-        typer.Option(
-            min=1, help="Number of starts and noises; default 20, --quick 16. With fewer than 16 no law can win."
-        ),
+        typer.Option(min=1, help="Runs of a law in each condition, each from another start; default 24."),
     ] = None,
     gains: Annotated[
         str | None, typer.Option(help="Set of gains: tuned, study, tracking or default; by default tuned.")
     ] = None,
     duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 10, --quick 3.")] = None,
+    relevant: options.Relevant = None,
     out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("study"),
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
     traces: Annotated[
@@ -152,7 +152,7 @@ def bench(
     With --rig the machine's parameter sets take the place of the conditions, and a line for each metric says if one
     law wins on all of them.
 
-    Example: smc-mujoco bench --plants duffing --conditions noise,coulomb --seeds 16 --out duffing
+    Example: smc-mujoco bench --plants duffing --conditions noise,coulomb --out duffing
     """
     with held_back():
         from smc_mujoco.cli import tables
@@ -177,7 +177,7 @@ def bench(
     else:
         scenarios = _grid(size, plants, laws, conditions, condition, count, gains, length, begin)
     table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)
-    boards = leaderboard(table, defaults=defaults)
+    boards = leaderboard(table, defaults=defaults, **_relevant(relevant))
     terminal.print(tables.leaderboard(boards))
     if ensemble:
         terminal.note(ensemble.verdict(boards))
@@ -185,6 +185,11 @@ def bench(
     runs = f"{len(table)} run{'s' * (len(table) != 1)}, {failed} of them failed"
     terminal.note(f"{runs}, {terminal.seconds:.0f} s")
     terminal.wrote(out / "results.parquet")
+
+
+def _relevant(relevant: float | None) -> dict[str, float]:
+    """Return the argument relevant, if it was given."""
+    return {} if relevant is None else {"relevant": relevant}
 
 
 def _grid(

@@ -16,7 +16,7 @@ def report(
     quick: Annotated[bool, typer.Option("--quick", help="A small report, in two minutes: less of everything.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for the report and its data.")] = Path("report"),
     seeds: Annotated[
-        int | None, typer.Option(min=1, help="Seeds of every cell of the grid. With fewer than 16 no law can win.")
+        int | None, typer.Option(min=1, help="Runs of a law in every cell of the grid; default 24.")
     ] = None,
     records: Annotated[
         Path | None,
@@ -30,6 +30,7 @@ def report(
         str | None,
         typer.Option(metavar="NAME|FOLDER", help="Instead of the study, audit a paper of `smc-mujoco papers`."),
     ] = None,
+    relevant: options.Relevant = None,
     threads: options.Threads = None,
 ) -> None:
     """Compute the whole study, in about 20 minutes, and write it as one HTML file: which controller, where, how sure.
@@ -50,10 +51,14 @@ def report(
         from smc_mujoco.evidence.report import paper as of_paper
         from smc_mujoco.evidence.report import report as make
 
-    if paper and (seeds or records or laws):
-        raise ScenarioError("--seeds, --laws and --records belong to the study: leave them out with --paper")
+    if paper and (seeds or records or laws or relevant is not None):
+        raise ScenarioError(
+            "--seeds, --laws, --records and --relevant belong to the study: leave them out with --paper"
+        )
     if paper:
         path = of_paper.report(paper, out, quick, threads, progress=True)
     else:
-        path = make(out, quick, seeds, threads, progress=True, records=records, laws=options.names(laws))
+        path = make(
+            out, quick, seeds, threads, progress=True, records=records, laws=options.names(laws), relevant=relevant
+        )
     print(f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")

@@ -26,24 +26,28 @@ def report(
     plan: "Plan | None" = None,
     records: str | os.PathLike[str] | None = None,
     laws: Sequence[str] = (),
+    relevant: float | None = None,
 ) -> Path:
     """Compute a study and write its report, out/report.html.
 
     Args:
       out: the folder; what it holds already is not computed again.
       quick: a look in two minutes: less of everything, one set of gains for the claims.
-      seeds: of every cell of the grid; fewer than 16 name no winner.
+      seeds: of every cell of the grid; by default 24.
       threads: simulations at once; None for one per available core.
       progress: whether to show a bar a stage.
       plan: how much of everything, instead of `quick`.
       records: a folder with records of rigs, CSV or npz files, which their twins repeat; see docs/rigs.md.
       laws: names of further laws, beside those of the plan; each needs tuned gains on every plant of the plan.
 
+      relevant: the least relevant difference, as a share of the larger value, see `leaderboard`; by default 0.03.
+
     Raises:
       ScenarioError: a number of seeds or threads that cannot be, a folder that cannot be written, records of no rig, or
         a further law that is unknown or has no tuned gains.
       MissingPackageError: jinja2 or plotly is not installed.
     """
+    from smc_mujoco.analysis.differences import share_that_matters
     from smc_mujoco.common import extras
     from smc_mujoco.common.errors import whole
     from smc_mujoco.common.files import replacing
@@ -55,6 +59,8 @@ def report(
     plan = plan or (QUICK if quick else FULL)
     if seeds is not None:
         plan = dataclasses.replace(plan, seeds=whole("seeds", seeds, 1, 10_000))
+    if relevant is not None:
+        plan = dataclasses.replace(plan, relevant=share_that_matters(relevant))
     if laws:
         plan = dataclasses.replace(plan, laws=tuple(dict.fromkeys((*plan.laws, *laws))))
     folder = Path(out)

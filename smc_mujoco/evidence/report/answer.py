@@ -40,8 +40,9 @@ class Standing(NamedTuple):
 class Pick(NamedTuple):
     """The law to take for a metric on a plant, or on all plants, over the conditions.
 
-    `median`: of the conditions' medians, NaN over all plants. `wins`, `losses`: in how many of the `of` cells it wins,
-    and in how many another law is better. `level`: the other laws that are beaten in no more cells.
+    `law`: "" where all laws are level. `median`: of the conditions' medians, NaN over all plants. `wins`, `losses`: in
+    how many of the `of` cells it wins, and in how many another law is better, or it has runs that fail. `level`: the
+    other laws that are beaten in no more cells.
     """
 
     law: str
@@ -54,6 +55,8 @@ class Pick(NamedTuple):
     @property
     def sure(self) -> str:
         """How sure the choice is, in words."""
+        if not self.law:
+            return f"all {len(self.level)} laws level in {'each of ' * (self.of > 1)}{self.of}"
         if self.wins == self.of:
             return f"wins in all {self.of}"
         unbeaten = f"unbeaten in {self.of - self.losses or 'none'} of {self.of}"
@@ -94,10 +97,14 @@ def leaders(found: Cells, plant: str, condition: str, metric: str) -> list[str]:
 
 
 def winner(found: Cells, plant: str, condition: str, metric: str) -> str | None:
-    """Return the law that wins, as on a board: it alone leads, among several, and may be named."""
-    leading, scores = leaders(found, plant, condition, metric), found.get((plant, condition, metric), [])
-    barred = any(score.barred for score in scores)
-    return leading[0] if len(leading) == 1 < len(scores) and not barred else None
+    """Return the law that wins, as on a board, if there is one."""
+    return next((score.law for score in found.get((plant, condition, metric), ()) if score.wins), None)
+
+
+def lead(found: Cells, plant: str, condition: str, metric: str) -> str:
+    """Return how the winner compares with its closest rival, in words; "" if there is no winner."""
+    said = next((score.lead for score in found[plant, condition, metric] if score.wins), "")
+    return words.pretty(said)
 
 
 def standings(findings: "Findings", metric: str) -> list[Standing]:
@@ -160,14 +167,16 @@ def counts(findings: "Findings") -> dict[str, int]:
 
 def overall(findings: "Findings", metric: str) -> list[Place]:
     """Return the laws' places over all runs, best first."""
-    return sorted((p for p in findings.places if p.metric == metric and not p.plant), key=lambda p: p.mean)
+    rows = [place for place in findings.places if place.metric == metric and not place.plant]
+    return sorted(rows, key=lambda place: (place.failed, place.mean))
 
 
 def pick(findings: "Findings", metric: str, plant: str = "") -> Pick | None:
-    """Return the law that is beaten in the fewest conditions, by mean rank where several are; "" for all plants.
+    """Return the law that is beaten in the fewest conditions; "" for all plants.
 
-    Laws that settle in less than half as many runs as the law that settles in the most are left out: to do nothing
-    would be calm. None for a metric without numbers.
+    Of several such laws it is the one with the fewest runs that fail, then by mean rank. If no law is beaten anywhere,
+    none is named. Laws that settle in less than half as many runs as the law that settles in the most are left out: to
+    do nothing would be calm. None for a metric without numbers.
     """
     here = [place for place in findings.places if place.plant == plant]
     settled = {place.law: place.median for place in here if place.metric == SETTLES}
@@ -175,8 +184,10 @@ def pick(findings: "Findings", metric: str, plant: str = "") -> Pick | None:
     rows = [place for place in here if place.metric == metric and settled.get(place.law, 1.0) >= enough]
     if not rows:
         return None
-    best = min(rows, key=lambda row: (row.losses, row.mean))
+    best = min(rows, key=lambda row: (row.losses, row.failed, row.mean))
     level = tuple(row.law for row in sorted(rows, key=lambda row: row.mean) if row.losses == best.losses)
+    if len(rows) > 1 and not any(row.wins or row.losses for row in rows):
+        return Pick("", math.nan, 0, 0, best.of, level)
     others = tuple(law for law in level if law != best.law)
     return Pick(best.law, best.median, best.wins, best.losses, best.of, others)
 
@@ -205,6 +216,8 @@ def first(findings: "Findings", metrics: Sequence[str]) -> str:
     if winner := set.intersection(*winners) if winners else set():
         return f"{words.law(winner.pop())} wins in every respect compared here, on every plant in every condition."
     if common := set.intersection(*unbeaten) if unbeaten else set():
+        if len(common) == len(findings.laws):
+            return "No law can be called the best: in every respect compared here, all laws are level."
         names = joined([words.law(law) for law in sorted(common)])
         return f"No law can be called the best; none is better than {names} anywhere, in any respect compared here."
     return "No law is the best in every respect, nor in every condition: it depends on what is asked, and where."
@@ -246,9 +259,10 @@ def rest(findings: "Findings", metrics: Sequence[str]) -> list[str]:
 def _sure(findings: "Findings", metrics: Sequence[str]) -> str:
     open, of = undecided(cells(findings.scores), metrics)
     repeated = len({(s.plant, s.condition) for s in findings.scores if s.runs < s.seeds})
+    samples = list(dict.fromkeys(s.sample for s in findings.scores if s.runs == s.seeds)) or ["distinct runs only"]
     return (
-        f"In {open} of {of} comparisons no single winner can be declared; each has {findings.about.seeds} seeds, and "
-        "the tests are corrected for all comparisons of a metric on a plant."
+        f"In {open} of {of} comparisons no single winner can be declared; each has {samples[0]}, and the tests of a "
+        f"metric are corrected for all {len({(s.plant, s.condition) for s in findings.scores})} cells."
         + f" In {repeated} of the cells seeds change nothing, or not each: equal runs count once."
         * bool(repeated)
     )

@@ -16,8 +16,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from smc_mujoco.analysis.differences import OF_SCALE, OF_VALUE
-from smc_mujoco.analysis.ranking import SEEDS
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control.law import laws
 from smc_mujoco.draw import style
@@ -104,7 +102,7 @@ def page(findings: Findings) -> str:
         objective=Objective(),
         u_max=scenarios.U_MAX,
         control_period=scenarios.CONTROL_PERIOD,
-        least={"value": 100 * OF_VALUE, "scale": 100 * OF_SCALE, "seeds": SEEDS},
+        relevant=100 * findings.about.plan.relevant,
         metrics={metric.name: paragraphs(inspect.getdoc(metric.formula) or "") for metric in metrics()},
     )
 

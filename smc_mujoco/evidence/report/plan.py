@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from smc_mujoco.analysis.ranking import SEEDS
+from smc_mujoco.analysis.differences import RELEVANT
 from smc_mujoco.common import progress
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.studies.accuracy import PERIODS, STARTS
@@ -28,6 +28,7 @@ class Plan(Extent):
 
     Attributes:
       quick: whether margins and claims are quick.
+      relevant: the least relevant difference, see `leaderboard`.
       kinds: of margins, searched for all plants and laws.
       compared: those kinds that are searched under every set of gains.
       basins: plants with maps of their regions of attraction: on 2 cores a map of 1000 states takes 12 s.
@@ -47,7 +48,8 @@ class Plan(Extent):
 
     quick: bool
     conditions: tuple[str, ...] = GRID.conditions
-    seeds: int = SEEDS  # the fewest that name a winner
+    seeds: int = GRID.seeds
+    relevant: float = RELEVANT
     kinds: tuple[str, ...] = ("delay", "disturbance", "friction", "mass", "noise")
     compared: tuple[str, ...] = ("disturbance",)
     basins: tuple[str, ...] = ("inverted_pendulum", "van_der_pol", "duffing")

@@ -95,7 +95,7 @@ def machines(work: Work) -> tuple[Machine, ...]:
         runs = ensemble.runs(twin, seeds=plan.seeds, duration=plan.duration)
         with work.bars.stage("rigs", f"{len(runs)} runs", bar=False):
             table = study(runs, work.folder / "rigs" / name, threads=work.threads, progress=work.bars.shown)
-        found.append(Machine(rig=twin, boards=tuple(leaderboard(table, words.HEADLINE))))
+        found.append(Machine(rig=twin, boards=tuple(leaderboard(table, words.HEADLINE, relevant=plan.relevant))))
     return tuple(found)
 
 

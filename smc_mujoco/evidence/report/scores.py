@@ -12,7 +12,9 @@ import numpy as np
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of
+from smc_mujoco.analysis.differences import RELEVANT
 from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.analysis.ranking import samples_of
 from smc_mujoco.evidence.report import words
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies.leaderboard import Board, leaderboard
@@ -24,9 +26,10 @@ if TYPE_CHECKING:
 class Score(NamedTuple):
     """A law's median in a cell over the seeds, with its 95 % interval; inf is never.
 
-    `best`: no other law is better there, see `ranking`; several laws may be. `seeds`: of the runs, `runs`: how many of
-    them are distinct, `failed`: how many have no score. `floor`: the least difference that counts between small
-    values. `barred`: no winner is named there, over laws with default gains.
+    `best`: no other law is better there, and no run failed, see `ranking`; several laws may be. `wins`: it is better
+    than every other, `lead` says by how much. `seeds`: of the runs, `runs`: how many of them are distinct, `sample`:
+    the size of the sample in words, `failed`: how many runs failed. `floor`: what the sensor does not resolve.
+    `barred`: no winner is named there, over laws with default gains.
     """
 
     plant: str
@@ -37,9 +40,12 @@ class Score(NamedTuple):
     low: float
     high: float
     best: bool
+    wins: bool
+    lead: str
     seeds: int
     failed: int
     runs: int
+    sample: str
     floor: float = 0.0
     barred: bool = False
 
@@ -47,18 +53,17 @@ class Score(NamedTuple):
 class Place(NamedTuple):
     """A law's place in a metric over all cells of a plant, or of all plants, where `plant` is "".
 
-    `mean`: its mean rank over the cells, 1 is the best. `low`, `high`: the 95 % interval of its place, NaN of all
-    plants. `best`: no law is better in any cell. `median`: of the cells' medians, NaN where units differ; of "settles"
-    the share of runs that settle. `wins`, `losses`: in how many of the `of` cells it wins, and in how many another law
-    is better. `why`: why there is no winner, "" if there can be one.
+    `mean`: its mean rank over the cells, 1 is the best. `failed`: how many of its runs failed or have no value; laws
+    with fewer come first. `best`: no law is better in any cell. `median`: of the cells' medians, NaN where units
+    differ; of "settles" the share of runs that settle. `wins`, `losses`: in how many of the `of` cells it wins, and in
+    how many another law is better or it has runs that fail. `why`: why there is no winner, "" if there can be one.
     """
 
     plant: str
     metric: str
     law: str
     mean: float
-    low: float
-    high: float
+    failed: int
     best: bool
     median: float
     wins: int
@@ -67,12 +72,12 @@ class Place(NamedTuple):
     why: str
 
 
-def scores(table: "Table") -> tuple[Score, ...]:
+def scores(table: "Table", relevant: float = RELEVANT) -> tuple[Score, ...]:
     """Return a score for every law, cell and column of the leaderboard, in the table's order."""
     columns = [table.column(name).tolist() for name in ("plant", "condition", "law", "failure")]
     failed = Counter(tuple(cell) for *cell, failure in zip(*columns, strict=True) if failure is not None)
     order = list(dict.fromkeys(columns[2]))
-    boards = leaderboard(table, words.COLUMNS, by=("plant",))
+    boards = leaderboard(table, words.COLUMNS, by=("plant",), relevant=relevant)
     blocks = {(block.plant, block.condition, board.metric): block for board in boards for block in board.blocks}
     by_row = {metric: paired_runs.values(table, metric) for metric in words.COLUMNS}
     found = []
@@ -80,9 +85,11 @@ def scores(table: "Table") -> tuple[Score, ...]:
         ((plant, condition),) = group.blocks
         (ran,) = paired_runs.scenarios(table, group)
         for metric in words.COLUMNS:
-            _, by_law, _ = group.scores(by_row[metric])
-            for law in sorted(by_law, key=order.index):
-                block, interval = blocks[plant, condition, metric], median_of(by_law[law])
+            own = group.scores(by_row[metric])
+            for law in sorted(own.values, key=order.index):
+                block = blocks[plant, condition, metric]
+                interval = median_of(own.values[law], samples=samples_of(own.sets[law]))
+                wins = block.winner == law
                 score = Score(
                     plant=plant,
                     condition=condition,
@@ -92,9 +99,12 @@ def scores(table: "Table") -> tuple[Score, ...]:
                     low=interval.low,
                     high=interval.high,
                     best=law in block.best,
+                    wins=wins,
+                    lead=block.lead.words if wins and block.lead else "",
                     seeds=block.seeds,
                     failed=failed[plant, condition, law],
                     runs=block.runs,
+                    sample=block.sample,
                     floor=paired_runs.floor(ran, CATALOGUE[metric].unit),
                     barred=bool(block.barred),
                 )
@@ -102,9 +112,9 @@ def scores(table: "Table") -> tuple[Score, ...]:
     return tuple(found)
 
 
-def places(table: "Table") -> tuple[Place, ...]:
+def places(table: "Table", relevant: float = RELEVANT) -> tuple[Place, ...]:
     """Return every law's place in each metric that the overview ranks, by plant and over all plants."""
-    boards = leaderboard(table, words.RANKED, by=("plant",))
+    boards = leaderboard(table, words.RANKED, by=("plant",), relevant=relevant)
     found = [place for board in boards for place in _places(board)]
     by_law: dict[tuple[str, str], list[Place]] = {}
     for place in found:
@@ -120,8 +130,7 @@ def _places(board: Board) -> list[Place]:
             metric=board.metric,
             law=entry.law,
             mean=entry.rank.mean,
-            low=entry.rank.low,
-            high=entry.rank.high,
+            failed=entry.failed,
             best=entry.rank.best,
             median=entry.interval.median,
             wins=len(board.wins(entry.law)),
@@ -140,8 +149,7 @@ def _overall(by_plant: Sequence[Place]) -> Place:
     return first._replace(
         plant="",
         mean=mean,
-        low=math.nan,
-        high=math.nan,
+        failed=sum(place.failed for place in by_plant),
         best=all(place.best for place in by_plant),
         median=median if first.metric == SETTLES else math.nan,
         wins=sum(place.wins for place in by_plant),

@@ -120,8 +120,8 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
     no_film = films.missing() if plan.filmed else None
     with bars.stage("statistics"):
         return Findings(
-            scores=scores.scores(table),
-            places=scores.places(table),
+            scores=scores.scores(table, plan.relevant),
+            places=scores.places(table, plan.relevant),
             claims=claims,
             fields=fields(plan),
             fronts=fronts(plan),

@@ -303,9 +303,10 @@ def test_a_law_and_a_verdict_that_nobody_foresaw_are_shown(findings):
 
 def scores(condition="nominal", plant="duffing", runs=16, **medians):
     """One cell's scores of settling time; the laws within 0.1 of the best are level with it."""
-    best = min(medians.values())
+    level = [law for law, m in medians.items() if m <= min(medians.values()) + 0.1]
+    wins = {law: level == [law] and len(medians) > 1 for law in medians}
     return [
-        Score(plant, condition, law, "settling_time", m, m, m, m <= best + 0.1, 16, 0, runs)
+        Score(plant, condition, law, "settling_time", m, m, m, law in level, wins[law], "", 16, 0, runs, "16 seeds")
         for law, m in medians.items()
     ]
 
@@ -327,6 +328,7 @@ def test_laws_that_are_level_share_the_lead_and_no_winner_is_named(findings):
     assert answer.undecided(found, ["settling_time"]) == (1, 1)
     text = told(findings, scores(observer_free=1.0, classical=1.05))
     assert "no winner on settling time in any of 1 cells; none is better than Observer-free and Classical" in text
+    assert text.startswith("No law can be called the best: in every respect compared here, all laws are level.")
     assert "wins" not in text
 
 
@@ -349,7 +351,7 @@ def test_over_several_cells_the_answer_says_who_wins_where_and_loses_where(findi
 
 
 def test_a_law_that_is_level_with_one_that_seldom_settles_keeps_it_from_winning(findings):
-    cell = [s._replace(best=True) for s in scores(observer_free=1.0, classical=math.inf)]
+    cell = [s._replace(best=True, wins=False) for s in scores(observer_free=1.0, classical=math.inf)]
     assert answer.leaders(answer.cells(cell), "duffing", "nominal", "settling_time") == ["observer_free", "classical"]
     assert "wins" not in told(findings, cell)
 
@@ -373,7 +375,7 @@ def test_places_over_all_plants_count_the_cells_that_a_law_wins(folder):
     assert {p.law: (p.mean, p.wins, p.losses, p.of, p.best) for p in own} == {
         p.law: (p.mean, p.wins, p.losses, p.of, p.best) for p in overall
     }
-    assert {p.why for p in overall} == {"2 seeds, too few"}
+    assert {p.why for p in overall} <= {"2 seeds, too few", "2 sets of gains, too few"}
     assert {p.of for p in overall} == {2}
 
 
@@ -397,8 +399,7 @@ def test_where_the_papers_law_loses_is_listed_worst_first():
 
 def test_the_answer_tells_who_settles_least_and_how_many_runs_failed(findings):
     share = [
-        Place("", "settles", law, 1.0, 1.0, 1.0, True, of, 0, 0, 1, "")
-        for law, of in (("classical", 0.5), ("adaptive", 1))
+        Place("", "settles", law, 1.0, 0, True, of, 0, 0, 1, "") for law, of in (("classical", 0.5), ("adaptive", 1))
     ]
     few = dataclasses.replace(
         findings, places=tuple(share), about=dataclasses.replace(findings.about, runs=40, failed=3)
@@ -409,7 +410,7 @@ def test_the_answer_tells_who_settles_least_and_how_many_runs_failed(findings):
 
 
 def place(law, losses=0, wins=0, mean=1.0, metric="itae", median=1.0, plant="duffing"):
-    return Place(plant, metric, law, mean, 1.0, 2.0, not losses, median, wins, losses, 4, "")
+    return Place(plant, metric, law, mean, 0, not losses, median, wins, losses, 4, "")
 
 
 def picked(findings, *places):
@@ -424,6 +425,10 @@ def test_the_law_to_take_is_beaten_in_the_fewest_conditions_then_has_the_best_me
     assert one.sure == "unbeaten in 3 of 4"
     assert picked(findings, place("a", 4, median=2.0), place("b", 1, 1)).sure == "unbeaten in 3 of 4, wins in 1"
     assert picked(findings, place("a", 0, 4)).sure == "wins in all 4"
+    failing = place("a", 1, mean=1.0)._replace(failed=2)
+    assert picked(findings, failing, place("b", 1, mean=2.0)).law == "b"
+    level = picked(findings, place("a"), place("b"), place("c"))
+    assert (level.law, level.sure) == ("", "all 3 laws level in each of 4")  # none is named, by the alphabet or else
     assert picked(findings, place("a", 4)).sure == "unbeaten in none of 4"
     assert answer.pick(dataclasses.replace(findings, places=()), "itae", "duffing") is None
 
@@ -434,6 +439,7 @@ def test_a_law_that_seldom_settles_is_not_one_to_take(findings):
 
     calm, other = place("idle"), place("pid", 3)
     assert picked(findings, calm, other, settling("idle", 0.39), settling("pid", 0.8)).law == "pid"
+    calm = place("idle", wins=1)
     assert picked(findings, calm, other, settling("idle", 0.41), settling("pid", 0.8)).law == "idle"
 
 
@@ -445,9 +451,9 @@ def test_the_first_screen_says_for_each_plant_and_need_what_to_use(text, finding
     for metric, cell in zip(words.HEADLINE, cells, strict=True):
         one = answer.pick(findings, metric, "duffing")
         assert one
-        assert words.law(one.law) in cell
         assert one.sure in cell.replace("\N{NO-BREAK SPACE}", " ")
-        assert words.number(one.median) in cell
+        assert (words.law(one.law) in cell) if one.law else not re.search(r'class="(key|chip)', cell)
+        assert not one.law or words.number(one.median) in cell
     assert text.index('id="picks"') < text.index("Who wins where")
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from smc_mujoco.analysis.differences import OF_SCALE, OF_VALUE
+from smc_mujoco.analysis.differences import RELEVANT
 from smc_mujoco.control.variants import with_gains
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.verdict import Check, ratio
@@ -19,6 +19,7 @@ RIVALS = LAWS[1:]  # classical, adaptive, and the paper's HOSMC
 HOSMC = LAWS[3]
 UNCLAMPED = "super_twisting_unclamped"  # as published; in the first gains its integral is clamped
 CONDITIONED = "conditioned_super_twisting"  # not the paper's: without the wind-up of the plain one
+OF_SCALE = 0.005  # share of a scale; chosen
 LONG, PERIOD = 40.0, 5e-3  # s; s, of control and physics: runs near rest, where the smooth law asks no more
 
 
@@ -57,7 +58,7 @@ def comes_to_rest(runs: Runs, grid: Mapping[str, Scenario]) -> list[Check]:
 
 def larger_than(value: float, of: float = 0.0) -> float:
     """Return the least value that is relevantly larger: by 3 % of the larger one, and by 0.5 % of a scale."""
-    return max(value / (1.0 - OF_VALUE), value + OF_SCALE * of)
+    return max(value / (1.0 - RELEVANT), value + OF_SCALE * of)
 
 
 def overshoot(runs: Runs, plant: str, law: str) -> float:
