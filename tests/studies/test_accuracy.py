@@ -155,7 +155,8 @@ def test_the_command_prints_a_table_that_fits_and_writes_what_was_asked(tmp_path
     assert not end.value.code, printed.err
     assert max(map(len, printed.out.splitlines())) <= 80
     assert "order of s" in printed.out
-    assert "gains: classical shipped, pid yours" in " ".join(printed.out.split())
+    assert "classical shipped" in printed.out
+    assert "pid yours" in printed.out
     assert {row.law for row in load("a.json")} == {"classical", "pid"}
     assert (tmp_path / "a.pdf").is_file()
     with pytest.raises(SystemExit):
