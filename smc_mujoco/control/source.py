@@ -25,6 +25,8 @@ KINDS = {  # kind -> what it means
     YOURS: "given by the user",
 }
 
+ENDED = {True: "converged", False: "not converged", None: "convergence not tested"}
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Search:
@@ -40,12 +42,21 @@ class Search:
     evaluations: int
     converged: bool | None = None
 
-    def __str__(self) -> str:
+    @property
+    def name(self) -> str:
+        """The name of the rule."""
         name = self.rule
         for mark in ("(", ",", ":", ";"):
             name = name.partition(mark)[0].rstrip()
-        ended = {True: "converged", False: "not converged", None: "convergence not tested"}[self.converged]
-        return f"{name}, {self.evaluations} evaluations, {ended}"
+        return name
+
+    @property
+    def ended(self) -> str:
+        """Whether the search has converged, in words."""
+        return ENDED[self.converged]
+
+    def __str__(self) -> str:
+        return f"{self.name}, {self.evaluations} evaluations, {self.ended}"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -102,9 +113,31 @@ def in_words(sources: Mapping[str, Iterable[Source]], short: bool = False) -> st
       short: whether to leave out the searches.
     """
     known = {law: [source for source in its if source.kind != NONE] for law, its in sources.items()}
+    found = {law: kinds(its) for law, its in known.items()}
+    if short:
+        return by_words(found)
+    searches: dict[str, dict[str, list[Search]]] = {}
+    for law, its in known.items():
+        if some := [source.search for source in its if source.search]:
+            searches.setdefault(found[law], {})[law] = some
     return by_words(
-        {law: kinds(its) if short else ", ".join(dict.fromkeys(map(str, its))) for law, its in known.items()}
+        {law: f"{its} ({_searched(searches[its])})" if its in searches else its for law, its in found.items()}
     )
+
+
+def _searched(searches: Mapping[str, Sequence[Search]]) -> str:
+    """Return the searches of several laws in words, with the laws whose search did not converge."""
+    every = [search for its in searches.values() for search in its]
+    counts = sorted({search.evaluations for search in every})
+    words = [" or ".join(dict.fromkeys(search.name for search in every))]
+    words.append(f"{' to '.join(map(str, dict.fromkeys([counts[0], counts[-1]])))} evaluations")
+    ends: dict[str, list[str]] = {}
+    for law, its in searches.items():
+        for end in dict.fromkeys(search.ended for search in its):
+            ends.setdefault(end, []).append(law)
+    if len(ends) == 1:
+        return ", ".join([*words, *ends])
+    return ", ".join([*words, *(f"{end}: {joined(laws)}" for end, laws in ends.items() if end != ENDED[True])])
 
 
 def by_words(words: Mapping[str, str]) -> str:

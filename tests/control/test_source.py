@@ -111,6 +111,16 @@ def test_words_name_each_source_once_with_its_laws():
     assert str(smc.law("pid").sourced("shipped", search).source) == "shipped (CMA-ES, 288 evaluations, not converged)"
 
 
+def test_searches_of_several_laws_are_one_phrase_that_names_those_that_did_not_converge():
+    first, other = (source.Search(rule="CMA-ES", evaluations=n, converged=n < 100) for n in (90, 200))
+    laws = {
+        "a": [smc.law("pid").sourced("shipped", first).source],
+        "b": [smc.law("pid").sourced("shipped", other).source],
+    }
+    assert source.in_words(laws) == "gains shipped (CMA-ES, 90 to 200 evaluations, not converged: b)"
+    assert source.in_words({"a": laws["a"]}) == "gains shipped (CMA-ES, 90 evaluations, converged)"
+
+
 def test_an_unknown_kind_is_refused():
     with pytest.raises(smc.ScenarioError, match="did you mean 'default'"):
         smc.law("pid").sourced("defualt")
