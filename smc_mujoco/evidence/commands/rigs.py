@@ -22,6 +22,10 @@ def identify(
     quantities: Annotated[
         str | None, typer.Option(help="Quantities to find, as a,b; default those that the rig's records determine.")
     ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option("--set", metavar="NAME=VALUE,...", help="Values from which the search starts, SI units: M=5,b=8."),
+    ] = None,
     starts: Annotated[int, typer.Option(min=1, help="How many sets of values the search may start from.")] = 4,
     seed: Annotated[int, typer.Option(min=0, help="Seed of these starts.")] = 0,
     figure: Annotated[
@@ -37,7 +41,7 @@ def identify(
     for each signal, sampled at the rate of the rig's controller, angles in rad and time in s. The first line of a CSV
     file has the names of the columns.
 
-    Example: smc-mujoco identify emps run1.csv run2.csv --columns x=position,r=reference,u=voltage
+    Example: smc-mujoco identify servo_axis run.csv --set M=5,b=8 --columns x=position,u=force
     """
     with held_back():
         from smc_mujoco.common.files import ended, writable
@@ -57,6 +61,7 @@ def identify(
         as_plant(options.plant(rig)) if rig not in rigs() and (rig in plants() or ".xml:" in rig) else rig,
         [load(file, named) for file in files],
         options.names(quantities) or None,
+        start=_numbers(start),
         starts=starts,
         seed=seed,
         progress=True,
@@ -70,6 +75,23 @@ def identify(
         terminal.wrote(found.save(ended(json, ".json")))
     if figure:
         terminal.wrote(*found.figure(figure))
+
+
+def _numbers(text: str | None) -> dict[str, float]:
+    """Return name -> value from the option --set, such as "M=5,b=8"; {} for None.
+
+    Raises:
+      ScenarioError: a value that is not a number.
+    """
+    from smc_mujoco.common.errors import ScenarioError
+
+    found = {}
+    for name, value in options.pairs(text, "--set", "M=5,b=8").items():
+        try:
+            found[name] = float(value)
+        except ValueError:
+            raise ScenarioError(f"--set {name}={value} is no number: write it as M=5,b=8") from None
+    return found
 
 
 @errors_as_sentences()

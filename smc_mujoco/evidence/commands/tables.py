@@ -24,7 +24,6 @@ BOARDS = {  # board of RealAIGym -> title and headings of columns
         ("model\n%", "noise\nof v %", "noise\nof u %", "lag\n%", "delay\n%", "blows\n%", "score"),
     ),
 }
-MIN_FIT = -1000.0  # %: a twin with a smaller fit moves away from the record, chosen for the width of a column
 # Verdicts have a colour beside their mark, from a palette for the colour-blind.
 COLOURS = {
     verdicts.SUPPORTED: "blue",
@@ -119,10 +118,10 @@ def _print_claim(claim: Claim, console: Console) -> None:
 
 
 def fits(title: str, found: Mapping[str, Mapping[str, float]]) -> Table:
-    """Return the fit of each twin of a record, %; "falls" for one below MIN_FIT."""
+    """Return the fit of each twin of a record, %, or when it falls."""
     table = titled(f"{title}: fit, %", "", *(Column(head, justify="right") for head in next(iter(found.values()))))
     for name, fit in found.items():
-        table.add_row(name, *(f"{value:z.1f}" if value > MIN_FIT else "falls" for value in fit.values()))
+        table.add_row(name, *(f"{value:z.1f}" for value in fit.values()))
     return table
 
 
@@ -142,6 +141,5 @@ def identified(found: Identified, names: Sequence[str]) -> list[Table]:
     heads = [Column(head, justify="right") for head in found.fits[0]]
     fits = titled("fit, % (before)", "record", *heads)
     for name, fit, before in zip(names, found.fits, found.fits_before, strict=True):
-        # a fit before of less than -999 % is cut to the width of the column
-        fits.add_row(name, *(f"{value:.1f} ({max(before[key], -999.0):.1f})" for key, value in fit.items()))
+        fits.add_row(name, *(f"{value:.1f} ({before[key]:.1f})" for key, value in fit.items()))
     return [values, fits]

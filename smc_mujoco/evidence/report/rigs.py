@@ -1,6 +1,7 @@
 """Rigs in a report: who wins on a real machine's parameter sets, and how well its twin repeats records of it."""
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -12,14 +13,13 @@ from smc_mujoco.control.source import in_words
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.plan import Report, Work
 from smc_mujoco.evidence.rigs import ensemble, records
-from smc_mujoco.evidence.rigs.rig import Rig, rig, rigs
+from smc_mujoco.evidence.rigs.rig import Fall, Rig, rig, rigs
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.leaderboard import Board, leaderboard
 from smc_mujoco.studies.study import study
 
 POINTS = 1200  # of a curve; chosen
-FALLS = -1000.0  # percent, of a fit below which the twin is nowhere near the record; chosen
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -145,9 +145,10 @@ def read(folder: Path) -> list[tuple[Path, Rig, Mapping[str, np.ndarray]]]:
 
 
 def fit(values: Mapping[str, float], unit: str = "%") -> str:
-    """Return a fit in words, "theta 94.1, u 86.7 %"; "falls" for a twin that leaves its machine's range."""
-    if unit == "%" and min(values.values()) < FALLS:
-        return "falls"
+    """Return a fit in words: "theta 94.1, u 86.7 %", "falls at 8.4 s", or "falls" for a median that is a fall."""
+    if -math.inf in values.values():
+        fall = next((value for value in values.values() if isinstance(value, Fall)), None)
+        return "falls" if fall is None else str(fall)
     digits = 1 if unit == "%" else 3
     return ", ".join(f"{name} {value:z.{digits}f}" for name, value in values.items()) + f" {words.typeset(unit)}"
 

@@ -23,6 +23,7 @@ Record = dict[str, np.ndarray]  # column -> values, (K,)
 MIN_SAMPLES = 50  # of a replay; chosen
 STATE_SAMPLES = 15  # on each side of a sample, for the cubic that gives its velocity; chosen: 30 ms at 500 Hz
 RATE_TOLERANCE = 0.02  # of a period, by which the median step of time may differ from it; chosen
+MAX_PERIOD = 0.2  # s, between samples: beyond it the time is in another unit, or the motion is missed; chosen
 MAX_GAP = 10  # periods: a longer gap in an open-loop record is refused, shorter ones are interpolated; chosen
 MAX_GAP_CLOSED = 1.5  # periods: the same for a closed loop, of which no sample may be missing
 NORMAL_MEDIAN = 0.6745  # median of |z| for a standard normal z
@@ -186,6 +187,11 @@ def checked(record: Mapping[str, Any], columns: Columns, period: float | None, r
             "give times that increase"
         )
     step = step_of(data, columns)
+    if step > MAX_PERIOD:
+        raise ScenarioError(
+            f"the record of {rig} is sampled every {step:g} s and lasts {t[-1] - t[0]:g} s: give time in s (a column "
+            f"in ms divided by 1000), with a sample every {MAX_PERIOD:g} s or more often"
+        )
     if period is not None and abs(step - period) > RATE_TOLERANCE * period:
         raise ScenarioError(
             f"the record of {rig} is sampled every {step:.4g} s and the rig's controller runs every {period:g} s: "

@@ -25,14 +25,15 @@ from smc_mujoco.evidence.rigs import inverse, records
 from smc_mujoco.evidence.rigs.records import Columns, Record
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.run import run
-from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.scenario import Scenario, default_u_max
 from smc_mujoco.simulation.time_series import TimeSeries
 from smc_mujoco.simulation.trace import Trace
 
 Values = SimpleNamespace  # quantities by name
 Source = Mapping[str, Any] | Trace  # a record as columns by name, or as a simulated run
 FAR_BETTER = 50.0  # percent: if radians improve a fit by this, and beyond this, its angles are in degrees; chosen
-UNSCORED = -1e3  # percent: fit of a replay that fails or leaves the machine's range
+UNSCORED = -1e3  # percent: fit of a replay that fails in an open loop
+LOST = 2.0  # ranges of a measured joint, beyond which the twin of a closed loop has fallen; chosen
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,6 +52,46 @@ class Quantity:
     source: str
     least: float = -np.inf
     most: float = np.inf
+
+
+class Fall(float):
+    """The fit of a closed loop that the twin cannot hold: minus infinity, which prints as "falls at 8.4 s".
+
+    Attributes:
+      time: s of the record, when a joint is first further from the measured one than that joint's whole range.
+    """
+
+    time: float
+
+    def __new__(cls, time: float) -> "Fall":
+        made = super().__new__(cls, -np.inf)
+        made.time = time
+        return made
+
+    def __format__(self, spec: str) -> str:
+        return f"falls at {self.time:.1f} s"
+
+    def __str__(self) -> str:
+        return format(self)
+
+    __repr__ = __str__
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """What a replay takes from a record, whatever the quantities of the rig.
+
+    Attributes:
+      fields: of the replay's Scenario: law, duration, signals.
+      state: measured positions and velocities at the start, (2n,).
+      first: index of its first sample.
+      largest_u: of the recorded command, in the unit of u.
+    """
+
+    fields: Mapping[str, Any]
+    state: np.ndarray
+    first: int
+    largest_u: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -197,6 +238,16 @@ class Rig:
         Raises:
           ScenarioError: a start before the record, fewer than 50 samples to repeat, or what `fit` raises of a record.
         """
+        return self.repeated(self.part(record, start, duration, closed), rounded, state)
+
+    def part(
+        self,
+        record: Mapping[str, Any],
+        start: float | None = None,
+        duration: float | None = None,
+        closed: bool = True,
+    ) -> "Part":
+        """Return what a replay takes from a record. Arguments and errors are those of `replay`."""
         if self.dynamics is not None:
             raise ScenarioError(f"records of {self.name} are not replayed, as their torques are predicted: use fit")
         data = self.checked(record)
@@ -211,29 +262,42 @@ class Rig:
                 f"the record of {self.name} lasts {len(data[self.columns.time]) * period:.3g} s, too short to repeat "
                 f"it from {first * period:g} s on: give at least {(first + records.MIN_SAMPLES + 1) * period:.3g} s"
             )
+        times = (period * np.arange(last + 1 - first)).tolist()
+
+        def signal(values: np.ndarray) -> TimeSeries:
+            return TimeSeries(times, values[: len(times)].tolist())
+
+        law = self.controller if closed else None
+        fields: dict[str, Any] = {"law": law or "none", "duration": times[-1]}
+        if law is None:
+            fields |= {"feedforward": signal(data[self.columns.u][first:]), "control_period": period}
+        else:
+            added = data.get(self.columns.feedforward, np.zeros(last + 1))[first:]
+            fields["reference"] = signal(data[self.columns.reference][first:])
+            fields["feedforward"] = signal(added if self.commands is None else self.commands(data, first))
+        largest = float(np.abs(data[self.columns.u][first : last + 1]).max())
+        state = np.concatenate(records.state(data, self.columns, period, first))
+        return Part(fields=fields, state=state, first=first, largest_u=largest)
+
+    def repeated(self, part: "Part", rounded: bool = True, state: np.ndarray | None = None, **changes: Any) -> Scenario:
+        """Return the scenario that repeats a part of a record.
+
+        Args:
+          part: of the record.
+          rounded, state: as in `replay`.
+          changes: fields of the Scenario that differ.
+        """
         fields = self.machine(Values(**self.values))
         sensor = fields.get("sensor")
         if sensor is not None and not rounded:
             fields["sensor"] = sensor = dataclasses.replace(sensor, counts=np.inf)
-        x, v = records.state(data, self.columns, period, first) if state is None else np.split(state, 2)
-        times = period * np.arange(last + 1 - first)
-
-        def signal(values: np.ndarray) -> TimeSeries:
-            return TimeSeries(times.tolist(), values[: len(times)].tolist())
-
-        own = self.controller if closed else None
-        known: dict[str, Any] = {"law": own or "none", "duration": float(times[-1])}
+        x, v = np.split(part.state if state is None else state, 2)
         bias = sensor.bias if sensor and not self.columns.state else 0.0
-        known |= {"x0": tuple(x - bias), "v0": tuple(v)}
-        if own is None:
-            known |= {"feedforward": signal(data[self.columns.u][first:]), "control_period": period}
-            if self.controller is None:
-                fields.pop("physics_step", None)
-        else:
-            known["reference"] = signal(data[self.columns.reference][first:])
-            added = data.get(self.columns.feedforward, np.zeros(last + 1))[first:]
-            known["feedforward"] = signal(added if self.commands is None else self.commands(data, first))
-        return Scenario.recorded(**fields | known)
+        if self.controller is None:
+            fields.pop("physics_step", None)
+            if fields.get("actuator") is None and fields.get("u_max") is None:  # the machine has had this command
+                fields["u_max"] = max(part.largest_u, default_u_max(fields["plant"]))
+        return Scenario.recorded(**fields | dict(part.fields) | {"x0": tuple(x - bias), "v0": tuple(v)} | changes)
 
     def measured(self, record: Mapping[str, Any], start: float | None = None, duration: float | None = None) -> Trace:
         """Return a record as a trace of the machine, for figures and films beside those of twins.
@@ -326,7 +390,7 @@ class Rig:
 
         Returns:
           Name -> percentage, for each joint's column and, in a closed loop, "u". If torques are predicted, for each
-          torque.
+          torque. If the twin falls where the machine stands, each is a `Fall`.
 
         Raises:
           ScenarioError: a missing column, NaN, time that is not increasing at the rig's rate, a record too short, or
@@ -373,7 +437,12 @@ class Rig:
         Args:
           states: positions and velocities at the start of each, as in `replay`; None: those measured.
         """
-        found = [percentages(*each[:2]) for each in self.predictions(many, rounded, states)]
+        predictions = self.predictions(many, rounded, states)
+        found = [percentages(*each[:2]) for each in predictions]
+        if self.controller is not None:
+            for fit, (predicted, measured, t) in zip(found, predictions, strict=True):
+                if (fall := fallen({name: predicted[name] for name in self.columns.x}, measured, t)) is not None:
+                    fit.update(dict.fromkeys(fit, fall))
         return [{"u" if name == self.columns.u else name: value for name, value in fit.items()} for fit in found]
 
     def predictions(
@@ -462,6 +531,20 @@ def percentages(predicted: Record, measured: Record) -> dict[str, float]:
             share = float(np.linalg.norm(y - values) / np.linalg.norm(y - y.mean()))
         found[name] = 100.0 * (1.0 - share) if np.isfinite(share) else UNSCORED
     return found
+
+
+def fallen(predicted: Record, measured: Record, t: np.ndarray) -> Fall | None:
+    """Return the fall of a twin whose joints leave the measured ones by more than LOST of their ranges; else None.
+
+    Args:
+      predicted, measured: columns of the joints.
+      t: times of the record, s.
+    """
+    for name, values in predicted.items():
+        error, span = np.nan_to_num(np.abs(values - measured[name]), nan=np.inf), np.ptp(measured[name])
+        if error.max() > LOST * span > 0.0:
+            return Fall(float(t[np.argmax(error > span)]))
+    return None
 
 
 @functools.cache

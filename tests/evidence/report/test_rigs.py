@@ -11,6 +11,7 @@ import smc_mujoco as smc
 from smc_mujoco.evidence.report import charts, page, rigs, stages
 from smc_mujoco.evidence.report.plan import Bars, Work
 from smc_mujoco.evidence.rigs import records
+from smc_mujoco.evidence.rigs.rig import Fall
 from tests.evidence.report.test_report import TINY
 
 DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
@@ -100,7 +101,8 @@ def test_a_sentence_says_whether_a_ranking_survives(winners, sentence):
 
 def test_a_twin_that_leaves_the_machines_range_falls():
     assert rigs.fit({"theta": 94.06, "u": -0.01}) == "theta 94.1, u 0.0 %"
-    assert rigs.fit({"theta": 50.0, "u": -1e4}) == "falls"
+    assert rigs.fit({"theta": Fall(8.44), "u": Fall(8.44)}) == "falls at 8.4 s"
+    assert rigs.fit({"theta": -np.inf, "u": -np.inf}) == "falls"
     assert rigs.fit({"elbow": 0.0731}, "N m") == "elbow 0.073 N·m"
 
 

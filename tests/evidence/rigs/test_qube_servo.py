@@ -42,6 +42,14 @@ def test_published_numbers_let_it_fall_or_fit_less(records):
         assert max(fit.values()) < -100.0
 
 
+def test_a_fall_is_told_with_its_time_in_place_of_a_number():
+    """Not reached: the machine stands on this record. A torque per volt 3 % larger would hold the twin, too."""
+    record = dict(np.load(DATA / "qube-11.npz"))
+    (fit,) = RIG.fits([record])
+    assert {str(value) for value in fit.values()} == {"falls at 8.4 s"}
+    assert max(abs(record["alpha"][1000:])) < 0.3
+
+
 def test_degrees_are_told_from_radians(records):
     angles = ("theta", "alpha", "target_theta", "target_alpha")
     degrees = records[0] | {name: np.rad2deg(records[0][name]) for name in angles}

@@ -1,0 +1,155 @@
+"""What an identification gives: quantities with errors and correlations, fits, and notes on what to doubt."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from smc_mujoco.common.errors import whole
+from smc_mujoco.common.files import write_json
+from smc_mujoco.common.text import joined
+from smc_mujoco.evidence.rigs.records import Record, percent
+from smc_mujoco.evidence.rigs.rig import Fall, Rig
+from smc_mujoco.evidence.rigs.uncertainty import MAX_CORRELATION
+
+POOR = 80.0  # percent: a fit below this may mean that the search ended in the wrong place; chosen
+FAR = 5.0  # factor between a quantity before and after, beyond which a column may be in another unit; chosen
+COMMON = 0.1  # relative difference up to which such factors count as the same; chosen
+LOSS = 0.1  # percent, by which the fit of a whole record may fall without a note; chosen
+
+
+@dataclasses.dataclass(frozen=True)
+class Identified:
+    """The quantities of a rig that were found from records, and how well they fit.
+
+    Attributes:
+      rig: the rig with the values found.
+      before: the rig with the values before.
+      values, errors: quantity -> value found, and its standard error.
+      correlations: of the errors, (p, p), in the order of `values`.
+      fits, fits_before: `Rig.fit` of each record after and before; for `fits` the states at the starts are found too.
+      predictions: of each record, the predicted columns, the measured columns and their times.
+      evaluations: how many sets of values were simulated.
+    """
+
+    rig: Rig
+    before: Rig
+    values: Mapping[str, float]
+    errors: Mapping[str, float]
+    correlations: np.ndarray
+    fits: tuple[Mapping[str, float], ...]
+    fits_before: tuple[Mapping[str, float], ...]
+    predictions: tuple[tuple[Record, Record, np.ndarray], ...]
+    evaluations: int
+
+    @property
+    def notes(self) -> list[str]:
+        """Sentences on what the records cannot determine, and on a poor fit."""
+        names, found = list(self.values), []
+        for i, one in enumerate(names):
+            for j, other in enumerate(names[:i]):
+                if abs(self.correlations[i, j]) > MAX_CORRELATION:
+                    found.append(f"{other} and {one} cannot be told apart (correlation {self.correlations[i, j]:.3f})")
+        for name, value in self.values.items():
+            quantity = self.rig.quantities[name]
+            if value in (quantity.least, quantity.most):
+                found.append(f"{name} is at the end of its range, {value:g} {quantity.unit}".rstrip())
+            elif self.errors[name] > abs(value):
+                found.append(f"{name} may as well be 0 ({value:.3g} ± {self.errors[name]:.2g})")
+        found += self._scale_notes() + self._loss_notes()
+        if (worst := min(min(fit.values()) for fit in self.fits)) < POOR:
+            poor = f"the twin {worst}" if isinstance(worst, Fall) else f"the worst fit is {worst:.0f} %"
+            found.append(
+                f"{poor}: the model lacks something, a column is wrong or in another unit, or "
+                "the search ended in a local minimum; start from other values, with more starts or another seed"
+            )
+        return found
+
+    def _scale_notes(self) -> list[str]:
+        """Sentences on quantities that cannot be negative and are far from their values before."""
+        before = {name: self.before.quantities[name] for name in self.values}
+        positive = {name: each.value for name, each in before.items() if each.least >= 0.0 and each.value > 0.0}
+        factors = {name: self.values[name] / value for name, value in positive.items()}
+        far = {name: factor for name, factor in factors.items() if not 1.0 / FAR < factor < FAR}
+        if not far:
+            return []
+        middle = float(np.median(list(far.values())))
+        if len(far) > 1 and all(abs(factor / middle - 1.0) < COMMON for factor in far.values()):
+            return [
+                f"{joined(list(far))} are {middle:.3g} times what they were before: look at the unit of the command"
+            ]
+        each = [f"{name} is {factor:.3g} times its value before" for name, factor in far.items()]
+        return [f"{joined(each)}: look at the units of the columns, unless the values before were only a guess"]
+
+    def _loss_notes(self) -> list[str]:
+        """Sentences on whole records that the values before repeat better."""
+        found = []
+        for i, (fit, before) in enumerate(zip(self.fits, self.fits_before, strict=True)):
+            if min(fit.values()) < min(before.values()) - LOSS:
+                found.append(
+                    f"record {i + 1}, repeated as a whole, fits by {percent(fit)} and by {percent(before)} with the "
+                    "values before, though its pieces fit better: errors add up over the record, or the model lacks "
+                    "something"
+                )
+        return found
+
+    def drawn(self, count: int = 8, seed: int = 0) -> Rig:
+        """Return the rig with an ensemble of other sets of values that the records allow, for rankings over them.
+
+        Args:
+          count: number of sets. They are drawn from the normal distribution of the errors, and cut to the ranges.
+          seed: of the draws.
+
+        Raises:
+          ScenarioError: count or seed is out of range.
+        """
+        whole("count", count, 1, 1000)
+        names, rng = list(self.values), np.random.default_rng(whole("seed", seed, 0, 2**53 - 1))
+        spread, middle = (np.array([each[name] for name in names]) for each in (self.errors, self.values))
+        draws = rng.multivariate_normal(middle, self.correlations * np.outer(spread, spread), count, method="eigh")
+        known = [self.rig.quantities[name] for name in names]
+        kept = np.clip(draws, [each.least for each in known], [each.most for each in known])
+        return dataclasses.replace(
+            self.rig, ensemble=tuple(dict(zip(names, row, strict=True)) for row in kept.tolist())
+        )
+
+    def __repr__(self) -> str:
+        found = ", ".join(f"{name} = {value:.4g} ± {self.errors[name]:.1g}" for name, value in self.values.items())
+        return f"identified({self.rig.name!r}, {found})"
+
+    def save(self, path: str | Path) -> Path:
+        """Write values, errors, correlations and fits to a JSON file. Return its path."""
+        quantities = {
+            name: {"value": value, "error": self.errors[name], "unit": self.rig.quantities[name].unit}
+            for name, value in self.values.items()
+        }
+        return write_json(
+            Path(path),
+            {
+                "rig": self.rig.name, "quantities": quantities, "correlations": self.correlations.tolist(),
+                "fits": list(map(_plain, self.fits)), "fits_before": list(map(_plain, self.fits_before)),
+            },
+        )  # fmt: skip
+
+    def figure(self, path: str | Path, record: int = 0) -> list[Path]:
+        """Draw measured and predicted columns of a record, and their residuals, as PATH.svg and PATH.png.
+
+        Args:
+          path: of the figure.
+          record: index of the record.
+
+        Returns:
+          The paths of both files.
+        """
+        from smc_mujoco.evidence.rigs.figure import residual_figure
+
+        whole("record", record, 0, len(self.fits) - 1)
+        predicted, measured, t = self.predictions[record]
+        fits = {"twin": self.fits[record]}
+        return residual_figure(self.rig.label, t, measured, {"twin": predicted}, fits, self.rig.units, path)
+
+
+def _plain(fit: Mapping[str, float]) -> dict[str, float | str]:
+    """Return a fit for a JSON file, with a fall as text."""
+    return {name: str(value) if isinstance(value, Fall) else value for name, value in fit.items()}

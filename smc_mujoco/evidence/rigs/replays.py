@@ -1,0 +1,297 @@
+"""Residuals of records and their slopes: what a twin predicts at trial values, in pieces that have states of their own.
+
+A piece of a record is replayed from positions and velocities at its start. These are free numbers of the search, one
+set for each piece (multiple shooting), because no few samples give them well enough. They enter almost linearly, so
+each step of the search moves them by linear least squares, and only the quantities remain.
+Source: H. G. Bock, "Recent advances in parameter identification techniques for ODE", 1983.
+
+MuJoCo's steps are of first order where there is dry friction or a motor. Their error may exceed the noise of an
+encoder, and bias the quantities. So `exact` residuals of open loops are extrapolated from two runs, with steps h and
+h/2: 2 x(h/2) - x(h).
+"""
+
+import dataclasses
+import functools
+import itertools
+import math
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioWarning
+from smc_mujoco.evidence.rigs import records
+from smc_mujoco.evidence.rigs.records import Record
+from smc_mujoco.evidence.rigs.rig import Part, Quantity, Rig
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
+
+DIFFERENCE = 2e-3  # of a quantity's scale, for central differences; chosen: dry friction makes shorter ones rough
+STATE_SCALE = 0.05  # scale of a state at the start, relative to the standard deviation of its column or rate; chosen
+LARGEST_STEP = 5e-4  # s, of RK4 in exact replays; chosen: half of it changes an axis' mass by less than its error
+WORST = 1.0  # largest residual of a sample, relative to the norm of the record; that of a run that fails
+DEPENDENT = 1e-6  # ratio of singular values below which states at the start have no effect of their own
+
+
+@dataclasses.dataclass(frozen=True)
+class Piece:
+    """A part of a record that is compared with its replay.
+
+    Attributes:
+      record: index of the record.
+      part: what its replay takes from the record; None if torques are predicted.
+      skipped: samples at its start that are not compared.
+      measured: the columns compared, (N,) each.
+      spread: norm of each whole column about its mean, of which residuals are parts.
+      scales: units of the free states, (s,).
+    """
+
+    record: int
+    part: Part | None
+    skipped: int
+    measured: Record
+    spread: Mapping[str, float]
+    scales: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class Point:
+    """A point of the search: quantities in their scales, (p,), and moves of each piece's free states, (pieces, s)."""
+
+    values: np.ndarray
+    states: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class Slopes:
+    """Residuals of each piece at a point, (N,), and their derivatives by quantities (N, p) and by its states (N, s).
+
+    The rows of a piece are its samples in the order of time, each with all columns. All records have `columns` columns
+    that are compared.
+    """
+
+    point: Point
+    residuals: list[np.ndarray]
+    by_values: list[np.ndarray]
+    by_states: list[np.ndarray]
+    columns: int
+
+    def freed(self, rows: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return rows of each piece, (N,) or (N, p), without the part that states at its start can cause."""
+        return [
+            each - S @ np.linalg.lstsq(S, each, rcond=DEPENDENT)[0]
+            for S, each in zip(self.by_states, rows, strict=True)
+        ]
+
+    def moves(self, step: np.ndarray) -> np.ndarray:
+        """Return the moves of each piece's states, (pieces, s), that suit a step of the quantities (p,) best."""
+        pieces = zip(self.residuals, self.by_values, self.by_states, strict=True)
+        return np.array([-np.linalg.lstsq(S, r + J @ step, rcond=DEPENDENT)[0] for r, J, S in pieces])
+
+    @functools.cached_property
+    def cost(self) -> float:
+        """Sum of the squared residuals."""
+        return cost(self.residuals)
+
+    @property
+    def fit(self) -> float:
+        """Fit of all pieces together, percent: 100 (1 - rms of the columns' relative residuals)."""
+        return 100.0 * (1.0 - math.sqrt(self.cost / self.columns))
+
+
+def cost(rows: Sequence[np.ndarray]) -> float:
+    """Return the sum of squares."""
+    return float(sum(np.sum(each**2) for each in rows))
+
+
+class Replays:
+    """Replays of records at trial values of some quantities."""
+
+    def __init__(
+        self, twin: Rig, names: list[str], data: Sequence[Mapping[str, Any]], closed: bool,
+        report: Callable[[int], None], whole: bool = False,
+    ):  # fmt: skip
+        """Cut the records into pieces.
+
+        Args:
+          twin: the rig; its values stay for quantities that are not in `names`.
+          names: of the quantities, (p,).
+          data: the records.
+          closed: whether each record is replayed as a whole, by the rig's own controller. Otherwise its pieces of the
+            rig's `window` are replayed under the recorded command.
+          report: is called with the number of replays of all records after a batch.
+          whole: whether records are replayed as a whole in an open loop, too.
+        """
+        self.twin, self.names, self.data, self.closed, self.report = twin, names, data, closed, report
+        self.whole = whole or closed or not twin.window
+        known = [twin.quantities[name] for name in names]
+        self.scales = np.array([_scale(quantity) for quantity in known])
+        self.low = np.array([quantity.least for quantity in known]) / self.scales
+        self.high = np.array([quantity.most for quantity in known]) / self.scales
+        n = len(twin.columns.x)
+        known_start = twin.columns.state or twin.dynamics is not None or (closed and twin.score_from > twin.start)
+        # a controller reads the first positions as they were measured
+        self.free = np.zeros(0, int) if known_start else np.arange(2 * n)[n if closed else 0 :]
+        self.evaluations = 0
+        self.pieces = [piece for i in range(len(data)) for piece in self._pieces(i)]
+
+    @property
+    def start(self) -> Point:
+        """The point of the rig's own values, and of the measured states."""
+        values = np.array([self.twin.values[name] for name in self.names]) / self.scales
+        return Point(values, np.zeros((len(self.pieces), len(self.free))))
+
+    def values(self, point: Point) -> dict[str, float]:
+        """Return the quantities at a point, cut to their ranges."""
+        known = [self.twin.quantities[name] for name in self.names]
+        cut = np.clip(point.values * self.scales, [each.least for each in known], [each.most for each in known])
+        return dict(zip(self.names, cut.tolist(), strict=True))
+
+    def rig(self, point: Point) -> Rig:
+        """Return the rig at a point."""
+        return self.twin.with_values(self.values(point))
+
+    def _part(self, k: int) -> Part:
+        """Return what the replay of piece k takes from its record."""
+        part = self.pieces[k].part
+        assert part is not None
+        return part
+
+    def state(self, point: Point, k: int) -> np.ndarray | None:
+        """Return positions and velocities at the start of piece k, (2n,); None if they are not free."""
+        if not len(self.free):
+            return None
+        state = self._part(k).state.copy()
+        state[self.free] += point.states[k] * self.pieces[k].scales
+        return state
+
+    def at_rest(self, point: Point) -> Point:
+        """Return the point with velocity 0 at the start of each piece. Velocities must be free."""
+        n, states = len(self.twin.columns.x), point.states.copy()
+        for k, piece in enumerate(self.pieces):
+            states[k, -n:] = -self._part(k).state[n:] / piece.scales[-n:]
+        return Point(point.values, states)
+
+    def residuals(self, points: Sequence[Point], exact: bool = False) -> list[list[np.ndarray]]:
+        """Return the residuals of each piece, (N,), at each point. All replays are one batch.
+
+        Args:
+          exact: whether to extrapolate from two steps, where MuJoCo is of first order.
+        """
+        return [
+            [self.relative(piece, each) for piece, each in zip(self.pieces, one, strict=True)]
+            for one in self.predicted(points, exact)
+        ]
+
+    def predicted(self, points: Sequence[Point], exact: bool = False) -> list[list[Record]]:
+        """Return the predicted columns of each piece at each point. Arguments are those of `residuals`."""
+        self.evaluations += len(points)
+        rigs = [self.rig(point) for point in points]
+        if self.twin.dynamics is not None:
+            found = [[each[0] for each in rig.predictions(list(self.data))] for rig in rigs]
+        else:
+            found = self._replayed(rigs, points, exact)
+        self.report(len(points))
+        return found
+
+    def _replayed(self, rigs: Sequence[Rig], points: Sequence[Point], exact: bool) -> list[list[Record]]:
+        """Return `predicted` by replays."""
+        with warnings.catch_warnings():  # about values that are only tried
+            warnings.simplefilter("ignore", ScenarioWarning)
+            steps = [{}]
+            if exact and not self.closed and (first := rigs[0].repeated(self._part(0), rounded=False)).realistic:
+                steps = [(large := _large_steps(first)), large | {"physics_step": large["physics_step"] / 2}]
+            scenarios = [
+                rig.repeated(self._part(k), rounded=False, state=self.state(point, k), **fields)
+                for fields in steps
+                for rig, point in zip(rigs, points, strict=True)
+                for k in range(len(self.pieces))
+            ]
+            traces = run(scenarios)
+        size = len(self.pieces)
+        total = size * len(points)
+        columns = []
+        for i in range(total):
+            skipped = self.pieces[i % size].skipped
+            coarse, fine = (rigs[i // size].predicted(trace) for trace in (traces[i], traces[i - total]))
+            columns.append({name: (2.0 * fine[name] - coarse[name])[skipped:] for name in fine})
+        return [columns[i * size : (i + 1) * size] for i in range(len(points))]
+
+    def relative(self, piece: Piece, predicted: Record) -> np.ndarray:
+        """Return the residuals of a piece, sample by sample with all columns, (N,), as parts of the columns' spread."""
+        rows = np.column_stack([(piece.measured[name] - predicted[name]) / piece.spread[name] for name in predicted])
+        return np.clip(np.nan_to_num(rows, nan=WORST, posinf=WORST, neginf=-WORST), -WORST, WORST).ravel()
+
+    def slopes(self, point: Point, exact: bool = False) -> Slopes:
+        """Return residuals and their derivatives at a point, by central differences that stay within the ranges.
+
+        Args:
+          exact: of the residuals; derivatives need not be.
+        """
+        p, s = len(self.names), len(self.free)
+        moved = []
+        for sign in (1.0, -1.0):
+            for e in np.eye(p):
+                values = np.clip(point.values + sign * DIFFERENCE * e, self.low, self.high)
+                moved.append(Point(values, point.states))
+            for e in np.eye(s):
+                moved.append(Point(point.values, point.states + sign * DIFFERENCE * e))
+        if exact:
+            (residuals,), rows = self.residuals([point], exact=True), self.residuals(moved)
+        else:
+            residuals, *rows = self.residuals([point, *moved])
+        ahead, back = rows[: p + s], rows[p + s :]
+        gaps = [moved[j].values[j] - moved[p + s + j].values[j] for j in range(p)] + [2.0 * DIFFERENCE] * s
+        columns = [
+            np.column_stack([(ahead[j][k] - back[j][k]) / gap for j, gap in enumerate(gaps)])
+            for k in range(len(self.pieces))
+        ]
+        compared = len(self.data) * len(self.pieces[0].measured)
+        by_values, by_states = ([each[:, part] for each in columns] for part in (slice(p), slice(p, None)))
+        return Slopes(point, residuals, by_values, by_states, compared)
+
+    def _pieces(self, i: int) -> list[Piece]:
+        """Return the pieces of record i."""
+        twin, data = self.twin, self.twin.checked(self.data[i])
+        if twin.dynamics is not None:
+            measured = twin.measured_torques(self.data[i])
+            spread = {name: _norm(values) for name, values in measured.items()}
+            return [Piece(i, None, 0, measured, spread, np.zeros(0))]
+        period, t = twin.step(data), data[twin.columns.time]
+        count = 1 if self.whole else max(1, round((float(t[-1] - t[0]) - twin.start) / twin.window))
+        ends = np.linspace(round(twin.start / period), len(t) - 1, count + 1).round().astype(int)
+        names = [*twin.columns.x, *([twin.columns.u] if self.closed else [])]
+        rates = [records.rate(data[name], period) for name in twin.columns.x]
+        varied = np.array([each.std() or 1.0 for each in (*(data[name] for name in twin.columns.x), *rates)])
+        found = []
+        for first, last in itertools.pairwise(ends):
+            duration = None if count == 1 else float(period * (last - first))
+            part = twin.part(self.data[i], float(period * first), duration, self.closed)
+            skipped = round((twin.score_from - twin.start) / period) if self.closed else 0
+            measured = {name: data[name][first + skipped : last + 1] for name in names}
+            spread = {name: _norm(data[name]) for name in names}
+            found.append(Piece(i, part, skipped, measured, spread, STATE_SCALE * varied[self.free]))
+        return found
+
+
+def _norm(values: np.ndarray) -> float:
+    """Return the norm of a column about its mean; 1 for a constant one."""
+    return float(np.linalg.norm(values - values.mean())) or 1.0
+
+
+def _large_steps(scenario: Scenario) -> dict[str, Any]:
+    """Return integrator and step of a scenario, the largest whose error halves with the step.
+
+    RK4 has errors of first order only where dry friction changes its direction. It cannot integrate drives with states.
+    """
+    if scenario.input_delay or any(part.stateful for part in (*scenario.friction, *scenario.actuator)):
+        return {"integrator": scenario.resolved.integrator, "physics_step": scenario.resolved.physics_step}
+    step = scenario.control_period / math.ceil(scenario.control_period / LARGEST_STEP - 1e-9)
+    return {"integrator": "RK4", "physics_step": step}
+
+
+def _scale(quantity: Quantity) -> float:
+    """Return the scale of a quantity: its magnitude, at least a hundredth of its range; 1e-3 for 0 without a range."""
+    span = quantity.most - quantity.least
+    return max(abs(quantity.value), 0.01 * span if np.isfinite(span) else 1e-3 * (quantity.value == 0.0))

@@ -1,0 +1,126 @@
+"""The search of identification: starts over decades, and damped Gauss-Newton steps from the best of them.
+
+Quantities that cannot be negative, as masses and frictions, differ between machines by powers of ten. So further starts
+are drawn evenly in their logarithms, and no step changes such a quantity by more than a factor of ten.
+"""
+
+import numpy as np
+
+from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes, cost
+
+DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
+CANDIDATES = 8  # further starts that are drawn for each one that is refined; chosen
+DAMPINGS = (0.0, 1e-2, 1.0, 1e3)  # of the steps that are tried at once, relative to the curvature; chosen
+SHARES = (0.3, 1.0)  # of its linear move that a state at the start of a piece makes in trials; chosen
+FACTOR = 10.0  # by which a step may change a quantity that cannot be negative; chosen
+NEGLIGIBLE = 1e-4  # of its scale: below it such a quantity may become 0; chosen
+ENDING = 1e-5  # relative change of the cost at which the search ends; chosen
+ROUGH_STEPS = 8  # steps from each start before the best is chosen; chosen
+GOOD = 97.0  # percent: fit of the pieces beyond which a start needs no rival; chosen
+
+
+def search(replays: Replays, starts: int, seed: int, most: int) -> Slopes:
+    """Return the slopes at the least squares near the best of several starts, the rig's own values first.
+
+    Args:
+      starts: largest number of starts, of which further ones are only tried while none fits well.
+      seed: of the random ones.
+      most: largest number of steps from the best start.
+    """
+    reached = [refine(replays, replays.start, min(most, ROUGH_STEPS))]
+    if reached[0].fit < GOOD and starts > 1:
+        for point in _random(replays, starts - 1, seed):
+            reached.append(refine(replays, point, min(most, ROUGH_STEPS)))
+            if reached[-1].fit > GOOD:
+                break
+    return refine(replays, min(reached, key=lambda slopes: slopes.cost).point, most)
+
+
+def _random(replays: Replays, count: int, seed: int) -> list[Point]:
+    """Return the best `count` of many random points, best first."""
+    rng, start = np.random.default_rng(seed), replays.start
+    magnitudes = np.maximum(np.abs(start.values), 1.0)
+    drawn = []
+    for _ in range(CANDIDATES * count):
+        factors = 10.0 ** rng.uniform(-DECADES, DECADES, len(magnitudes))
+        signs = np.where(replays.low < 0.0, rng.choice((-1.0, 1.0), len(magnitudes)), 1.0)
+        drawn.append(Point(np.clip(signs * factors * magnitudes, replays.low, replays.high), start.states))
+    costs = [cost(rows) for rows in replays.residuals(drawn)]
+    return [drawn[i] for i in np.argsort(costs, kind="stable")[:count]]
+
+
+def better(replays: Replays, *points: Point) -> Point:
+    """Return the point of least cost, the first one if several are equal."""
+    costs = [cost(rows) for rows in replays.residuals(points)]
+    return points[costs.index(min(costs))]
+
+
+def not_worse(replays: Replays, reached: Slopes) -> Slopes:
+    """Return what a search reached, or what the rig's own values lead to if these fit better, both exactly."""
+    first = replays.slopes(replays.start, exact=True)
+    if reached.cost <= cost(first.freed(first.residuals)):
+        return reached
+    return min(reached, refine(replays, first.point, ROUGH_STEPS, exact=True), key=lambda slopes: slopes.cost)
+
+
+def refine(replays: Replays, point: Point, most: int, exact: bool = False) -> Slopes:
+    """Return the slopes at the least squares near a point, whose cost is not above that of the point.
+
+    Args:
+      most: largest number of steps.
+      exact: see `Replays.residuals`.
+    """
+    best = replays.slopes(point, exact)
+    for _ in range(most):
+        chosen, reached = _best_step(replays, best, exact)
+        if not reached < best.cost:
+            break
+        after = replays.slopes(chosen, exact)
+        gain = best.cost - after.cost
+        best = after
+        if gain < ENDING * best.cost:
+            break
+    return best
+
+
+def _best_step(replays: Replays, slopes: Slopes, exact: bool) -> tuple[Point, float]:
+    """Return the best point of several damped steps, and its cost. Each piece moves its own states as far as it gains.
+
+    All steps are simulated in one batch. Exact ones are slow, begin near the solution, and need little damping.
+    """
+    dampings = DAMPINGS[:2] if exact else DAMPINGS
+    groups = [_variants(replays, slopes, _moved(replays, slopes, damping)) for damping in dampings]
+    trials, size = [point for group in groups for point in group], len(groups[0])
+    costs = np.array([[cost([rows]) for rows in one] for one in replays.residuals(trials, exact)])
+    reached = []
+    for i, group in enumerate(groups):
+        own = costs[i * size : (i + 1) * size]
+        states = [group[variant].states[k] for k, variant in enumerate(own.argmin(axis=0))]
+        reached.append((Point(group[0].values, np.array(states)), float(own.min(axis=0).sum())))
+    return min(reached, key=lambda each: each[1])
+
+
+def _variants(replays: Replays, slopes: Slopes, values: np.ndarray) -> list[Point]:
+    """Return points with the same quantities, and states at the starts that a piece may choose from.
+
+    Dry friction makes a kink in the cost at velocity 0, which no step crosses from another velocity. So rest is tried.
+    """
+    moves = slopes.moves(values - slopes.point.values)
+    moved = [Point(values, slopes.point.states + share * moves) for share in SHARES]
+    return [*moved, replays.at_rest(moved[-1])] if len(replays.free) else moved[-1:]
+
+
+def _moved(replays: Replays, slopes: Slopes, damping: float) -> np.ndarray:
+    """Return the quantities after a damped Gauss-Newton step, within their ranges, (p,)."""
+    J, r = (np.concatenate(slopes.freed(rows)) for rows in (slopes.by_values, slopes.residuals))
+    values, low, high = slopes.point.values, replays.low, replays.high
+    descent = -J.T @ r
+    inside = ~((values <= low) & (descent < 0.0) | (values >= high) & (descent > 0.0))
+    A = J.T @ J
+    A[np.diag_indices_from(A)] *= 1.0 + damping
+    step = np.zeros(len(values))
+    step[inside] = np.linalg.lstsq(A[np.ix_(inside, inside)], descent[inside], rcond=1e-14)[0]
+    moved = values + step
+    positive = (low >= 0.0) & (values > NEGLIGIBLE)
+    moved = np.where(positive, np.clip(moved, values / FACTOR, values * FACTOR), moved)
+    return np.clip(moved, low, high)

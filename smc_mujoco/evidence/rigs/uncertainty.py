@@ -1,0 +1,124 @@
+"""Standard errors and correlations of identified quantities, and errors where records cannot tell them apart.
+
+Standard errors allow for residuals that depend on their neighbours: they come from a jackknife, at first order, that
+leaves out one block of time after the other. The states at the start of the block's piece are found again without it,
+because they share its samples.
+
+A closed loop feeds the noise of its measurement back. If one short transient decides a quantity, the other blocks do
+not show the effect of that noise. So closed loops are also simulated with their own noise and rounding, and a standard
+error is at least the deviation that these cause.
+"""
+
+import dataclasses
+from collections.abc import Iterable
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.evidence.rigs import records
+from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes
+from smc_mujoco.simulation.perturbations import Noise
+from smc_mujoco.simulation.run import run
+
+MAX_CORRELATION = 0.98  # beyond this correlation records cannot tell two quantities apart; chosen
+REPEATS = 24  # simulated repetitions of the records of a closed loop, for standard errors; chosen
+BLOCKS = 60  # blocks of time in all pieces together, at least, for standard errors; chosen
+DEPENDENT = 1e-6  # ratio of the slopes' singular values below which quantities cannot be told apart; chosen
+
+
+def statistics(replays: Replays, slopes: Slopes) -> tuple[dict[str, float], np.ndarray]:
+    """Return the standard error of each quantity, and their correlations (p, p), at the solution.
+
+    Raises:
+      ScenarioError: records that cannot tell the quantities apart.
+    """
+    names, twin = replays.names, replays.twin
+    J = np.concatenate(slopes.freed(slopes.by_values))
+    sizes = np.linalg.norm(J, axis=0)
+    for name, size in zip(names, sizes, strict=True):
+        if size == 0.0:
+            raise ScenarioError(f"nothing in the records depends on {name}: leave it out, or give other records")
+    _, singular, rows = np.linalg.svd(J / sizes, full_matrices=False)
+    if singular[-1] < DEPENDENT * singular[0]:
+        raise _alike(twin.name, (names[i] for i in np.argsort(-np.abs(rows[-1]))[:2]))
+    covariance = _jackknife(slopes)
+    deviation = np.sqrt(np.diag(covariance))
+    with np.errstate(all="ignore"):
+        correlations = np.nan_to_num(covariance / np.outer(deviation, deviation))
+    if replays.closed:
+        deviation = np.maximum(deviation, _fed_back(replays, slopes.point, J))
+    errors = dict(zip(names, (deviation * replays.scales).tolist(), strict=True))
+    _refuse_alike(twin.name, replays.values(slopes.point), errors, correlations)
+    return errors, correlations
+
+
+def _refuse_alike(rig: str, values: dict[str, float], errors: dict[str, float], correlations: np.ndarray) -> None:
+    """Raise ScenarioError for two quantities of which only a sum is known: neither is above its standard error."""
+    names = list(values)
+    unknown = np.array([errors[name] > abs(value) for name, value in values.items()])
+    pairs = np.triu(np.abs(correlations), 1) * np.outer(unknown, unknown)
+    i, j = np.unravel_index(int(pairs.argmax()), pairs.shape)
+    if pairs[i, j] > MAX_CORRELATION:
+        two = names[i], names[j]
+        raise _alike(rig, (f"{name} ({values[name]:.3g} ± {errors[name]:.2g})" for name in two))
+
+
+def _alike(rig: str, quantities: Iterable[str]) -> ScenarioError:
+    """Return the error that the records of a rig cannot tell some quantities apart."""
+    return ScenarioError(
+        f"the records of {rig} cannot tell {' and '.join(quantities)} apart: leave one out, or give a longer record or "
+        "one of a richer motion, or look at its units and columns"
+    )
+
+
+def _jackknife(slopes: Slopes) -> np.ndarray:
+    """Return the covariance of the solution, (p, p), from leaving out one block of time after the other."""
+    pieces = list(zip(slopes.residuals, slopes.by_values, slopes.by_states, strict=True))
+    parts = -(-BLOCKS // len(pieces))
+    normal = [_normal(*piece) for piece in pieces]
+    A, g = (np.sum([one[i] for one in normal], axis=0) for i in range(2))
+    moves = []
+    for (r, J, S), (own_A, own_g) in zip(pieces, normal, strict=True):
+        block = np.arange(len(r)) * parts // len(r)
+        for b in range(parts):
+            rest = block != b
+            left_A, left_g = _normal(r[rest], J[rest], S[rest])
+            moves.append(np.linalg.lstsq(A - own_A + left_A, g - own_g + left_g, rcond=None)[0])
+    moved = np.array(moves) - np.linalg.lstsq(A, g, rcond=None)[0]
+    return (len(moved) - 1) / len(moved) * moved.T @ moved
+
+
+def _normal(r: np.ndarray, J: np.ndarray, S: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return J'J and J'r of a piece, (p, p) and (p,), of the part of J that no states S at its start can cause."""
+    J = J - S @ np.linalg.lstsq(S, J, rcond=DEPENDENT)[0]
+    return J.T @ J, J.T @ r
+
+
+def _fed_back(replays: Replays, point: Point, J: np.ndarray) -> np.ndarray:
+    """Return the deviation of the solution, (p,), that the measurement's noise causes through the controller.
+
+    It is the root mean square over REPEATS simulations of the records with their noise and rounding, at first order.
+
+    Args:
+      J: slopes of the residuals, (N, p).
+    """
+    rig, pieces = replays.rig(point), replays.pieces
+    known = [(piece.part, replays.state(point, k)) for k, piece in enumerate(pieces) if piece.part is not None]
+    calm = [rig.repeated(part, rounded=False, state=state) for part, state in known]
+    noise = [records.noise(rig.checked(replays.data[piece.record]), rig.columns) for piece in pieces]
+    noisy = [
+        dataclasses.replace(rig.repeated(part, state=state), noise=Noise(noise[k]), seed=repeat)
+        for repeat in range(REPEATS)
+        for k, (part, state) in enumerate(known)
+    ]
+    predicted = [
+        {name: values[pieces[k % len(pieces)].skipped :] for name, values in rig.predicted(trace).items()}
+        for k, trace in enumerate(run(calm + noisy))
+    ]
+    rows = [replays.relative(pieces[k % len(pieces)], each) for k, each in enumerate(predicted)]
+    size = len(pieces)
+    expected = np.concatenate(rows[:size])
+    changes = [np.concatenate(rows[size * i : size * (i + 1)]) - expected for i in range(1, REPEATS + 1)]
+    moved = np.array([np.linalg.lstsq(J, change, rcond=None)[0] for change in changes])
+    replays.report(1)
+    return np.sqrt(np.mean(moved**2, axis=0))
