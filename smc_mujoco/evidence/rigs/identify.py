@@ -108,9 +108,10 @@ def _solved(
         _refuse_swapped(twin, names, data, reached)
         return pieces, search.not_worse(pieces, search.refine(pieces, reached.point, EXACT_STEPS, exact=True))
     closed = Replays(twin, names, data, True, report)
-    from_pieces = Point(reached.point.values, closed.start.states)
-    best = search.better(closed, closed.start, from_pieces)
-    slopes = search.refine(closed, best, most)
+    points = [closed.start, Point(reached.point.values, closed.start.states)]
+    if len(closed.free):  # a record may begin at rest with a jump of the command
+        points += [closed.at_rest(point) for point in points]
+    slopes = search.refine(closed, search.better(closed, *points), most)
     closed.evaluations += pieces.evaluations
     return closed, slopes
 

@@ -200,7 +200,8 @@ class Replays:
         with warnings.catch_warnings():  # about values that are only tried
             warnings.simplefilter("ignore", ScenarioWarning)
             steps = [{}]
-            if exact and not self.closed and (first := rigs[0].repeated(self._part(0), rounded=False)).realistic:
+            simulated = self.closed or self.twin.columns.state  # runs of this package have its errors, too
+            if exact and not simulated and (first := rigs[0].repeated(self._part(0), rounded=False)).realistic:
                 steps = [(large := _large_steps(first)), large | {"physics_step": large["physics_step"] / 2}]
             scenarios = [
                 rig.repeated(self._part(k), rounded=False, state=self.state(point, k), **fields)
@@ -259,8 +260,10 @@ class Replays:
             spread = {name: _norm(values) for name, values in measured.items()}
             return [Piece(i, None, 0, measured, spread, np.zeros(0))]
         period, t = twin.step(data), data[twin.columns.time]
-        count = 1 if self.whole else max(1, round((float(t[-1] - t[0]) - twin.start) / twin.window))
-        ends = np.linspace(round(twin.start / period), len(t) - 1, count + 1).round().astype(int)
+        first, last = round(twin.start / period), len(t) - 1
+        shortest = max(twin.window, (records.MIN_SAMPLES + 1) * period)
+        count = 1 if self.whole else max(1, int((last - first) * period / shortest + 0.01))
+        ends = np.linspace(first, last, count + 1).round().astype(int)
         names = [*twin.columns.x, *([twin.columns.u] if self.closed else [])]
         rates = [records.rate(data[name], period) for name in twin.columns.x]
         varied = np.array([each.std() or 1.0 for each in (*(data[name] for name in twin.columns.x), *rates)])

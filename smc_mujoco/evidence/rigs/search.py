@@ -12,6 +12,7 @@ DECADES = 2.0  # by which a quantity of a further start may differ from the rig'
 CANDIDATES = 8  # further starts that are drawn for each one that is refined; chosen
 DAMPINGS = (0.0, 1e-2, 1.0, 1e3)  # of the steps that are tried at once, relative to the curvature; chosen
 SHARES = (0.3, 1.0)  # of its linear move that a state at the start of a piece makes in trials; chosen
+FARTHEST = 100.0  # scales of a state at the start, by which it may differ from the measured one; chosen
 FACTOR = 10.0  # by which a step may change a quantity that cannot be negative; chosen
 NEGLIGIBLE = 1e-4  # of its scale: below it such a quantity may become 0; chosen
 ENDING = 1e-5  # relative change of the cost at which the search ends; chosen
@@ -106,7 +107,7 @@ def _variants(replays: Replays, slopes: Slopes, values: np.ndarray) -> list[Poin
     Dry friction makes a kink in the cost at velocity 0, which no step crosses from another velocity. So rest is tried.
     """
     moves = slopes.moves(values - slopes.point.values)
-    moved = [Point(values, slopes.point.states + share * moves) for share in SHARES]
+    moved = [Point(values, np.clip(slopes.point.states + share * moves, -FARTHEST, FARTHEST)) for share in SHARES]
     return [*moved, replays.at_rest(moved[-1])] if len(replays.free) else moved[-1:]
 
 
