@@ -144,9 +144,7 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
         smc.identify(AXIS, smc.run(AXIS.scenario(duration=0.06, x0=0.0)), starts=1)
     assert "cannot tell" in str(error.value) or "nothing in the records depends on" in str(error.value)
     known, errors = {"coulomb": 1.0, "offset": -1.0}, {"coulomb": 2.0, "offset": 3.0}
-    with pytest.raises(
-        smc.ScenarioError, match=r"tell coulomb \(1 ± 2\) and offset \(-1 ± 3\) apart: leave"
-    ):
+    with pytest.raises(smc.ScenarioError, match=r"tell coulomb \(1 ± 2\) and offset \(-1 ± 3\) apart: leave"):
         uncertainty._refuse_alike("emps", known, errors, np.array([[1.0, -0.99], [-0.99, 1.0]]))
 
 
