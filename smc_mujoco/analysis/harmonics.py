@@ -28,14 +28,13 @@ from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
-from smc_mujoco.mechanisms.hardware.drives import DCMotor
+from smc_mujoco.mechanisms.hardware.drives import DCMotor, drive_step
 from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import native
 from smc_mujoco.simulation.scenario import Scenario
 
 STEP = 1e-6  # SI units, of finite differences
-FINE = 2e-5  # s, longest step at which a model under RK4 is linearised, by Euler's method
 CHUNK = 50_000  # samples that a law is called for at once
 MAX_SAMPLES = 10**9  # of a period, for a describing function
 SAMPLES = 3  # of a drive, about: so many times the finest period's
@@ -108,9 +107,6 @@ class Loop:
             flags = mujoco.mjtDisableBit
             for flag in (flags.mjDSBL_CONTACT, flags.mjDSBL_LIMIT, flags.mjDSBL_FRICTIONLOSS):
                 made.opt.disableflags |= flag.value
-            if s.integrator == "RK4":
-                made.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
-                made.opt.timestep = s.control_period / math.ceil(s.control_period / FINE)
             gear = next((part for part in s.actuator if isinstance(part, Backlash)), None)
             if gear is not None:  # the rotor is rigid on the joint here
                 driven = dof_ids(made)[: s.plant.driven]
@@ -121,9 +117,7 @@ class Loop:
             data = mujoco.MjData(made)
             key = assembly.start(made, dataclasses.replace(ideal, x0=0.0, v0=0.0))
             data.qpos[:], data.qvel[:] = key
-            n = 2 * made.nv + made.na
-            self.a, b = np.zeros((n, n)), np.zeros((n, made.nu))
-            mujoco.mjd_transitionFD(made, data, STEP, True, self.a, b, None, None)
+            self.a, b = (_of_flow if s.integrator == "RK4" else _of_step)(made, data)
             self.b = b[:, drive_ids(made)[self.channel]] * math.prod(part.scale for part in s.actuator)
             self.rows, self.nv = dof_ids(made), made.nv
             self.gap = 0.0 if gear is None else self._gap(gear, made, data)
@@ -155,12 +149,20 @@ class Loop:
         z = np.exp(1j * (omega * self.step + math.tau * np.arange(count) / count))
         passed = sum(z**-i for i in range(count)) / count  # by the hold
         passed = passed * z ** -round(s.input_delay / self.step)
-        tandem = self.scenario.tandem
-        if tandem is not None:  # the first drive, which the callback has: see Tandem
-            passed *= 1.0 - tandem.held + tandem.held * (1.0 - tandem.left) / (z - tandem.left)
+        passed *= self._driven(z)
         answers = np.linalg.solve(z[:, None, None] * np.eye(len(self.a)) - self.a, self.b[:, None])[:, :, 0]
         late = s.sensor.delay if s.sensor else 0.0
         return passed @ answers * np.exp(-1j * omega * late)
+
+    def _driven(self, z: np.ndarray) -> np.ndarray | float:
+        """Return the gain from u to what MuJoCo gets from the drives in the callback, for u = z^k at steps k."""
+        drives = drive_step(self.scenario.actuator, self.step)
+        if drives is None:
+            return 1.0
+        first = (1.0 - drives.first_left) / (z - drives.first_left)  # the outputs of the drives
+        passed, left = drives.second_first, drives.second_left
+        second = (1.0 - passed - left + passed * first) / (z - left)
+        return 1.0 + drives.force_first * (first - 1.0) + drives.force_second * (second - 1.0)
 
     @functools.cached_property
     def count(self) -> float:
@@ -349,6 +351,40 @@ class Controller:
         if done < len(x):
             raise ScenarioError(f"the law returned {out[done, 0]:g} at x = {y[X]:g}, v = {y[V]:g}: correct the law")
         return out[:, 0], out[:, 1]
+
+
+def _of_step(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+    """Return the matrices A (n, n) and B (n, nu) of a step of MuJoCo's integrator: positions, velocities, activations.
+
+    MuJoCo has them for all integrators but RK4.
+    """
+    n = 2 * model.nv + model.na
+    a, b = np.zeros((n, n)), np.zeros((n, model.nu))
+    mujoco.mjd_transitionFD(model, data, STEP, True, a, b, None, None)
+    return a, b
+
+
+def _of_flow(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+    """Return what `_of_step` returns for an integrator without error: the exponentials of the rates' derivatives."""
+    from scipy.linalg import expm
+
+    nv, n = model.nv, 2 * model.nv + model.na
+    rest = data.qpos.copy(), data.qvel.copy(), data.act.copy(), data.ctrl.copy()
+
+    def rates(moved: np.ndarray) -> np.ndarray:
+        data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = rest
+        mujoco.mj_integratePos(model, data.qpos, moved[:nv], 1.0)
+        data.qvel[:] += moved[nv : 2 * nv]
+        data.act[:] += moved[2 * nv : n]
+        data.ctrl[:] += moved[n:]
+        mujoco.mj_forward(model, data)
+        return np.concatenate((data.qvel, data.qacc, data.act_dot))
+
+    block = np.zeros((n + model.nu, n + model.nu))
+    for i, moved in enumerate(STEP * np.eye(n + model.nu)):
+        block[:n, i] = (rates(moved) - rates(-moved)) / (2.0 * STEP)
+    stepped = expm(block * model.opt.timestep)
+    return stepped[:n, :n], stepped[:n, n:]
 
 
 def describing_function(

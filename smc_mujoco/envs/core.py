@@ -116,21 +116,21 @@ class Setting:
             raise ScenarioError(f"action is {wrong}: give finite numbers, of shape {shape}")
         return self.ctrl_limits * np.minimum(np.maximum(a, -1.0), 1.0)
 
-    def stretches(self, ctrl: np.ndarray, command: np.ndarray, first: np.ndarray) -> Iterator[int]:
+    def stretches(self, ctrl: np.ndarray, command: np.ndarray, drives: np.ndarray) -> Iterator[int]:
         """Write a command into ctrl over a control period; yield for how many physics steps each input holds.
 
         Args:
           ctrl: of one simulation, (nu,), or of several, (..., nu).
           command: the return value of `command`, (..., driven).
-          first: output of the first of two drives in series, (..., driven); updated in place.
+          drives: both states of `DriveStep`, (2, ..., driven); updated in place.
         """
-        tandem, steps = self.scenario.tandem, self.scenario.steps
-        if tandem is None:
+        effect, steps = self.scenario.drive_step, self.scenario.steps
+        if effect is None:
             ctrl[..., self.ctrl] = command
             yield steps
             return
         for _ in range(steps):
-            ctrl[..., self.ctrl], first[:] = tandem(command, first)
+            ctrl[..., self.ctrl], drives[0], drives[1] = effect(command, drives[0], drives[1])
             yield 1
 
     def rubbing(self, count: int = 1) -> Rubbing | None:
@@ -186,14 +186,14 @@ class Episode:
       setting: the plant with its task.
       episodes: number of episodes that have begun.
       sample: control samples since the episode began.
-      first: output of the first of two drives in series, (driven,).
+      drives: both states of `DriveStep`, (2, driven).
       rubbing: a friction by a formula, or None.
       x, v: positions and velocities, (n,) each.
       over: whether the plant has diverged, which ends the episode without a reward.
     """
 
     def __init__(self, setting: Setting):
-        self.setting, self.sample, self.first, self.over = setting, 0, np.zeros(setting.shape), False
+        self.setting, self.sample, self.drives, self.over = setting, 0, np.zeros((2, *setting.shape)), False
         self.episodes = 0
         self.x = self.v = np.zeros(setting.scenario.plant.n)
         self.rubbing = setting.rubbing()
@@ -203,7 +203,7 @@ class Episode:
         x, v = self.setting.draw(random, options)
         mujoco.mj_resetData(self.setting.model, data)
         self.setting.place(data.qpos, data.qvel, x, v)
-        self.episodes, self.sample, self.first[:] = self.episodes + 1, 0, 0.0
+        self.episodes, self.sample, self.drives[:] = self.episodes + 1, 0, 0.0
         if self.rubbing:
             self.rubbing.begin([0])
         self.look(data)
@@ -214,7 +214,7 @@ class Episode:
 
     def stretches(self, data: mujoco.MjData, action: Any) -> Iterator[int]:
         """Apply an action, as `Setting.stretches` does."""
-        return self.setting.stretches(data.ctrl, self.setting.command(action), self.first)
+        return self.setting.stretches(data.ctrl, self.setting.command(action), self.drives)
 
     def look(self, data: mujoco.MjData) -> None:
         """Read the state."""

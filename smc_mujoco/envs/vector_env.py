@@ -93,7 +93,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         workers, kept = min(cores(threads), self.num_envs), self.rubbing is not None
         self.batch = Batch(self.setting.model, self.num_envs, workers, persistent=kept)
         self.qpos, self.qvel, self.ctrl = (self.batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
-        self.first = np.zeros((self.num_envs, *self.setting.shape))
+        self.drives = np.zeros((2, self.num_envs, *self.setting.shape))
         self.randoms: list[np.random.Generator] = []
         self.samples, self.over = np.zeros(self.num_envs, int), np.zeros(self.num_envs, bool)
 
@@ -155,7 +155,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
             self.batch.reset(ids.astype(np.int32), stage=0)
         for i in ids:
             self.setting.place(self.qpos[i], self.qvel[i], *self.setting.draw(self.randoms[i], options))
-        self.samples[mask], self.over[mask], self.first[mask] = 0, False, 0.0
+        self.samples[mask], self.over[mask], self.drives[:, mask] = 0, False, 0.0
         if self.rubbing:
             self.rubbing.begin(ids)
             self.batch.bind("userdata")[ids] = self.rubbing.userdata[ids]
@@ -163,7 +163,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
     def advance(self, ids: np.ndarray | None, commands: np.ndarray) -> np.ndarray:
         """Step copies, None for all. Return the copies in which MuJoCo gave up, (num_envs,) of bool."""
         failed = np.zeros(self.num_envs, bool)
-        for steps in self.setting.stretches(self.ctrl, commands, self.first):
+        for steps in self.setting.stretches(self.ctrl, commands, self.drives):
             try:
                 # a Batch refuses Python callbacks, which runs of other threads may have set
                 with callback.installed() if self.rubbing else mjcb.installed(None):

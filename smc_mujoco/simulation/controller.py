@@ -4,8 +4,7 @@ At the first stage of a control sample, for each channel:
 
     sensors -> noise, encoder -> velocity estimator -> law -> saturation -> delay buffer
 
-At the first stage of a physics step, the command whose delay has passed goes to ctrl, through the first of two drives
-in series. At every stage, disturbance(t) goes to xfrc_applied. A friction by a formula follows, at the first stage.
+At the first stage of a physics step, the command whose delay has passed goes to ctrl, through lags and rate limits. At every stage, disturbance(t) goes to xfrc_applied. A friction by a formula follows, at the first stage.
 Each sample is logged with the mean forces since the last one.
 
 Time counts in calls. RK4 calls four times a step, at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h
@@ -334,15 +333,29 @@ def _actuate(sim, data, step):
         buffer = pointer(sim.delay_buffer + 8 * sim.n * (past // sim.steps % sim.delay_slots))
         for i in range(sim.n):
             state_at(sim.states, i).arrived = buffer[i]
-            if sim.tandem == 0 and i < sim.driven:
+            if sim.has_drives == 0 and i < sim.driven:
                 data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * buffer[i]
-    if sim.tandem != 0:
+    if sim.has_drives != 0:
         for i in range(sim.driven):
-            state = state_at(sim.states, i)
-            u, first = state.arrived, state.first
-            asked = sim.scale * (u + sim.tandem_held * (first - u))
-            data.ctrl[channel_at(sim.channels, i).ctrl] = asked
-            state.first = u + sim.tandem_left * (first - u)
+            data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * _drive(sim.drive_step, state_at(sim.states, i))
+
+
+@njit(error_model="numpy", inline="always")
+def _drive(factors, state):
+    """Advance a channel's drives by a physics step, see DriveStep. Return the mean force, or a motor's command."""
+    u, second = state.arrived, state.second
+    a, b = state.first - u, second - u
+    force = u + factors.force_first * a
+    state.first = u + factors.first_left * a
+    if factors.reach == 0.0:
+        state.second = u + factors.second_first * a + factors.second_left * b
+        return force + factors.force_second * b
+    reach = factors.reach
+    state.second = min(max(state.first, second - reach), second + reach)
+    if state.second != state.first:
+        return 0.5 * (second + state.second)
+    gap = min(max(u + factors.lagged * a - second, -reach), reach)
+    return force - 0.5 * gap * abs(gap) / reach
 
 
 @njit(error_model="numpy", inline="always")
@@ -486,7 +499,7 @@ def _log(sim, data, k):
         else:
             applied, limit = data.ctrl[channel.ctrl] / sim.scale, pointer(sim.limits)[i]
             # scaled and back, it may be an ulp beyond the limit
-            sample.applied = min(max(applied, -limit), limit) if sim.tandem == 0 else state.arrived
+            sample.applied = min(max(applied, -limit), limit) if sim.has_drives == 0 else state.arrived
         sample.d = _disturbance(data, channel)
         sample.force, sample.reaction = state.force / sim.steps, state.reaction / sim.steps
         state.force, state.reaction = 0.0, 0.0

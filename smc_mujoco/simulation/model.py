@@ -27,7 +27,7 @@ def parts(scenario: Scenario) -> tuple[Part, ...]:
     """Return the scenario's parts, in the order in which they are added to the model."""
     contact = () if scenario.contact.kind == "none" else (scenario.contact,)
     sensor = () if scenario.sensor is None else (scenario.sensor,)
-    actuator = scenario.actuator if scenario.tandem is None else scenario.actuator[1:]  # the callback has the first
+    actuator = tuple(part for part in scenario.actuator if not part.in_callback)
     return (*contact, *scenario.friction, *actuator, *sensor)
 
 

@@ -160,7 +160,7 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: m
     """
     s, compiled = prepared.scenario.resolved, prepared.compiled
     assert compiled is not None
-    n, sensor, tandem, buffer = s.plant.n, s.sensor or PERFECT, s.tandem, state.Buffer()
+    n, sensor, drives, buffer = s.plant.n, s.sensor or PERFECT, s.drive_step, state.Buffer()
 
     def function(made: Any, values: Any, memory: int = 0, channels: int = n) -> dict[str, int]:
         places = buffer.put(values), buffer.reserve(memory * channels)
@@ -255,9 +255,8 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: m
         "delay_buffer": buffer.address(delay_buffer),
         "limits": buffer.address(limits),
         "scale": math.prod(part.scale for part in s.actuator),
-        "tandem": tandem is not None,
-        "tandem_held": tandem.held if tandem else 0.0,
-        "tandem_left": tandem.left if tandem else 0.0,
+        "has_drives": drives is not None,
+        "drive_step": drives._asdict() if drives else {},
         "seed": s.seed,
         "sigma_x": s.noise.position,
         "sigma_v": s.noise.velocity,

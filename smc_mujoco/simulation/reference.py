@@ -90,7 +90,7 @@ class Loop:
         self.last_reading = np.zeros((n, 2))  # that was not lost
         self.forces = np.zeros((2, n))  # sums over a control period: of the drives, of friction and contacts
         self.scale = math.prod(part.scale for part in scenario.actuator)
-        self.tandem, self.first = scenario.tandem, np.zeros(n)  # two drives in series, and the output of the first
+        self.drive_step, self.first, self.second = scenario.drive_step, np.zeros(n), np.zeros(n)  # drives' states
         self.limits = np.array(scenario.limits)
         inertia, formula = self.model.dof_M0[self.channels["qvel"]], self.scenario.sliding
         self.sliding = [] if formula is None else [PythonFriction(formula, i) for i in range(n)]
@@ -135,7 +135,7 @@ class Loop:
                 self.rub(data, d)
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.channels["qpos"]], data.qvel[self.channels["qvel"]]
-                reached = self.arrived if self.tandem else data.ctrl[self.channels["ctrl"]] / self.scale
+                reached = self.arrived if self.drive_step else data.ctrl[self.channels["ctrl"]] / self.scale
                 applied = np.zeros(len(x))  # scaled and back: an ulp beyond
                 applied[self.driven] = np.clip(reached[self.driven], -self.limits, self.limits)
                 sample = (x, v, self.commands[-1], applied, self.s, d, self.r, *self.forces / self.scenario.steps)
@@ -158,8 +158,8 @@ class Loop:
         if past >= 0:
             self.arrived = self.commands[past // self.scenario.steps]
         asked = self.arrived
-        if self.tandem:
-            asked, self.first = self.tandem(asked, self.first)
+        if self.drive_step:
+            asked, self.first, self.second = self.drive_step(asked, self.first, self.second)
         data.ctrl[self.channels["ctrl"][self.driven]] = (self.scale * asked)[self.driven]
 
     def measure(self, data: mujoco.MjData, k: int) -> tuple[np.ndarray, np.ndarray]:

@@ -26,7 +26,7 @@ from smc_mujoco.control.surface import Surface
 from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import Contact
-from smc_mujoco.mechanisms.hardware.drives import DCMotor, Tandem, tandem
+from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, drive_step
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Nominal
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
@@ -40,6 +40,7 @@ MIN_TIME, MAX_TIME = 1e-9, 1e9  # s, of periods and of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
+SHORT_LAG = 0.2  # control periods: a shorter lag needs no shorter physics step, see `longest_step`
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 MAX_ANGLE = 3.0 * math.pi  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
@@ -73,7 +74,8 @@ class Scenario:
       duration: s. The run lasts as many whole control periods as fit into it.
       control_period: s; the law runs this often and its command is held in between.
       physics_step: s; must divide the control period. Default: the largest such step up to 1 ms for the plant's plain
-        equation, up to 0.25 ms with friction, contact, a mechanism or an actuator.
+        equation, also behind a Lag (half of it at most), a RateLimit or a DCMotor without inductance; up to 0.25 ms
+        with friction, contact, a mechanism or another actuator.
       u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest motor of your own model.
         A motor's own limit holds too: see `limits`. In V, with the motor's voltage as default, if u is a voltage.
       x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the plant's x0, and 0.
@@ -89,7 +91,8 @@ class Scenario:
         as kg of payload. `mass` is the plant's mass.
       jump: a change of the true plant's parameters in mid-run, or None.
       seed: of every random number of the run, 0 .. 2^53 - 1.
-      integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation, else implicitfast.
+      integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation, also behind
+        a Lag, a RateLimit or a DCMotor without inductance, else implicitfast.
       friction: of every joint, beside the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or several of them.
       contact: what the mechanism touches: a Contact or its kind, one of those the plant offers, or "none".
       mechanism: "equation", or the name of another mechanism that the plant offers.
@@ -260,6 +263,12 @@ class Scenario:
         return bool(parts or not self.plant.smooth)
 
     @property
+    def ideal(self) -> bool:
+        """Whether MuJoCo integrates the plant's plain equation, behind drives without a state of MuJoCo or none."""
+        bare = not self.friction and self.contact.kind == "none" and self.mechanism == "equation"
+        return bare and self.plant.smooth and all(part.drives and not part.stateful for part in self.actuator)
+
+    @property
     def amplifier(self) -> DCMotor | None:
         """The motor whose voltage u is; None if u is a force."""
         return next((part for part in self.actuator if isinstance(part, DCMotor) and part.unit), None)
@@ -321,9 +330,9 @@ class Scenario:
         return next((part for part in self.friction if isinstance(part, Sliding)), None)
 
     @property
-    def tandem(self) -> Tandem | None:
-        """What two drives in series do in a physics step; None for one drive or none."""
-        return tandem(self.actuator, self.resolved.physics_step)
+    def drive_step(self) -> DriveStep | None:
+        """What the drives do in a physics step; None if the actuators get the command itself."""
+        return drive_step(self.actuator, self.resolved.physics_step)
 
     @property
     def work(self) -> int:
@@ -381,19 +390,41 @@ class Resolved(Scenario):
 
 def _defaults(s: Scenario) -> dict[str, Any]:
     """Return the defaults of the fields that are None."""
-    largest = REALISTIC_STEP if s.realistic else MAX_STEP
     in_order = s.contact.kind == "bobs"  # pendulums in a row must not start across each other
     defaults = {
         "model": "nominal" if s.law.requires_model else "none",
-        "physics_step": s.control_period / math.ceil(s.control_period / largest - 1e-9),
+        "physics_step": s.control_period / _steps(s),
         "u_max": suggested_u_max(s.plant) if s.amplifier is None else s.amplifier.voltage,
         "x0": tuple(sorted(s.plant.x0)) if in_order else s.plant.x0,
         "v0": (0.0,) * s.plant.n,
         "reference": coerce.suggested_reference(s.plant),
         "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
-        "integrator": "implicitfast" if s.realistic else "RK4",
+        "integrator": "RK4" if s.ideal else "implicitfast",
     }
     return {name: value for name, value in defaults.items() if getattr(s, name) is None}
+
+
+def longest_step(s: Scenario) -> float:
+    """Return the largest default physics step, s.
+
+    A Lag that is about as short as the control period moves its force within a step, of which RK4 gets the mean. Half
+    of such a lag keeps the amplitudes of limit cycles right to 2 %; much shorter lags have no such effect.
+    """
+    if not s.ideal:
+        return REALISTIC_STEP
+    lags = [part.delay for part in s.actuator if part.delay >= SHORT_LAG * s.control_period]
+    return min(MAX_STEP, *(0.5 * lag for lag in lags)) if lags else MAX_STEP
+
+
+def _steps(s: Scenario) -> int:
+    """Return the default number of physics steps per control period.
+
+    Behind a drive it is one of which the input delay is a whole number of steps, if up to four times as many do.
+    """
+    least = math.ceil(s.control_period / longest_step(s) - 1e-9)
+    delay = s.input_delay / s.control_period
+    fitting = (n for n in range(least, 4 * least + 1) if abs(math.remainder(delay * n, 1.0)) < 1e-6)
+    return next(fitting, least) if s.actuator else least
 
 
 def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:

@@ -15,6 +15,7 @@ import numpy as np
 from smc_mujoco.common.jit import record_at
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
+from smc_mujoco.mechanisms.hardware.drives import DriveStep
 
 
 def floats(names: Iterable[str]) -> np.dtype:
@@ -32,10 +33,11 @@ MOTION, MODEL = floats(("value", "rate", "acceleration")), floats(("f", "g"))
 # A friction by a formula: speed, force of the drive and load -> what resists, and the bounds of what holds.
 RUBBING, RESISTANCE = floats(("v", "motor", "load")), floats(("f", "low", "high"))
 
-# The state of a channel between calls: the last reading that was not lost, the command after its delay, the output
-# of the first of two drives, and sums over a control period of the drive's force and of friction and contacts; whether
+# The state of a channel between calls: the last reading that was not lost, the command after its delay, the states
+# of the drives (`DriveStep`), and sums over a control period of the drive's force and of friction and contacts; whether
 # a friction by a formula sticks, where, and the speed at the step before.
-CHANNEL_STATE = floats(("held_x", "held_v", "arrived", "first", "force", "reaction", "stuck", "stuck_at", "speed"))
+CHANNEL_STATE = floats(("held_x", "held_v", "arrived", "first", "second", "force", "reaction", "stuck", "stuck_at", "speed"))
+DRIVE_STEP = floats(DriveStep._fields)
 
 # A sample of a channel: position, velocity, command, command after its delay, sliding variable, disturbance, reference,
 # the drive's force, what friction and contacts exert.
@@ -63,8 +65,8 @@ SIMULATION = np.dtype(
         ("channels", "i8"), ("states", "i8"), ("log", "i8"), ("signals", "i8"),
         # the command: delay in physics steps, a ring of (delay_slots, n) commands, bounds (n,), unit of the drive
         ("delay", "i8"), ("delay_slots", "i8"), ("delay_buffer", "i8"), ("limits", "i8"), ("scale", "f8"),
-        # two drives in series: whether there are, and the factors of Tandem
-        ("tandem", "i8"), ("tandem_held", "f8"), ("tandem_left", "f8"),
+        # drives in the callback: whether there are, and what a physics step does to them
+        ("has_drives", "i8"), ("drive_step", DRIVE_STEP),
         # the sensor: noise, encoder
         ("seed", "f8"), ("sigma_x", "f8"), ("sigma_v", "f8"), ("bias", "f8"), ("counts", "f8"), ("dropout", "f8"),
         ("read_period", "f8"), ("read_delay", "f8"),

@@ -1,19 +1,20 @@
 """Drives, which turn a law's command u, in N m (N on a slide), into force: lag, rate limit, DC motor.
 
-A scenario takes one drive, or a Lag and another drive in series (`tandem`), and a Backlash after them. The limits below
-hold for implicitfast, whose steps integrate the drives' states exactly for a held u.
+A scenario takes one drive, or a Lag and another drive in series, and a Backlash after them.
 
-Of two drives in series, MuJoCo simulates the second, and the callback the first: a lag, tau1 a' = u - a from a = 0,
-whose output a is the second's command. MuJoCo holds that command over a physics step of length h, although a moves. So
-it gets the mean of a over the step with the weights exp(-(h - t)/tau2) of the second's own lag, which has the same
-effect at the end of the step. The output of two lags is then exact at the end of each step for a held u, as is that of
-one lag.
+The callback simulates Lag and RateLimit (`DriveStep`) and gives MuJoCo the mean of their force over each physics step.
+So the velocities at the ends of the steps are those of the equations, whatever the step is, and any integrator may be
+used. A state that MuJoCo integrates would give each step the force of its end. Such a lead of half a step takes away a
+part of the delay that a limit cycle depends on: behind one lag, most of it.
+
+MuJoCo simulates a DCMotor and its current, under implicitfast. It gets such a voltage that the mean of the current over
+a step is right for a held u, see `drive_step`.
 """
 
 import dataclasses
 import math
 from collections.abc import Hashable, Iterator
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import mujoco
 import numpy as np
@@ -26,9 +27,10 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 WINDING = slice(0, 2)  # of actuator_gainprm: resistance, ohm, and torque constant, N m/A at the joint
 SUDDEN = 1e-12  # s: a winding with a shorter time constant counts as instantaneous, else MuJoCo divides by about 0
 MIN_RESISTANCE = 1e-9  # ohm: with less, the voltage of a command is lost in rounding
-MIN_LAG = 1e-15  # s: a shorter first lag of two counts as this, as in MuJoCo
+LONGEST_STEP = 1e9  # time constants: a shorter lag counts as this
+SHORT_STEP = 1e-3  # time constants: the series of `_current_weight` errs by less than 1e-12 below it
 MIN_CONSTANT = 1e-9  # N m/A at the joint, of the weakest motor
-TIME_CONSTANT, SLEW = 0, 7  # of actuator_dynprm: s, and u per s
+TIME_CONSTANT = 0  # of actuator_dynprm, s
 COMMANDS = ("torque", "voltage")
 COGGING = slice(0, 2)  # of actuator_biasprm: amplitude, N m at the joint, and periods a radian of it
 
@@ -37,18 +39,10 @@ COGGING = slice(0, 2)  # of actuator_biasprm: amplitude, N m at the joint, and p
 class Drive(Actuator):
     """Base of drives."""
 
-    @property
-    def stateful(self) -> bool:
-        """Whether it has a state that MuJoCo integrates, inaccurately under RK4."""
-        return True
-
 
 @dataclasses.dataclass(frozen=True)
 class Lag(Drive):
-    """First-order lag, tau f' = u - f, from f = 0: the force at the end of each physics step, exact for a held u.
-
-    Limits: implicitfast or Euler. Under RK4 MuJoCo's filter errs by h/(2 tau), and diverges below tau = h/2.8.
-    tau = 0 is the plant's own actuator; it is compiled into another model than tau > 0.
+    """First-order lag, tau f' = u - f, from f = 0. The mean force over each physics step is exact for a held u.
 
     Two in series, `actuator=(Lag(mu), Lag(mu))`, are the parasitic actuator of the literature, u / (mu p + 1)^2: exact
     for a held u too. A Lag may stand before a RateLimit or a DCMotor as well.
@@ -57,23 +51,12 @@ class Lag(Drive):
       tau: s, 0 (no lag) or more.
     """
 
+    in_callback: ClassVar[bool] = True
+
     tau: float
 
     def __post_init__(self) -> None:
         self.check_numbers("tau", least=0.0)
-
-    def edit(self, spec: mujoco.MjSpec) -> None:
-        for actuator in drives(spec) if self.tau else ():
-            actuator.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
-            actuator.dynprm[0] = self.tau
-            actuator.actearly = True
-
-    def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
-        if self.tau:
-            yield Field("actuator_dynprm", (drive_ids(model), 0), self.tau)
-
-    def structure(self) -> Hashable:
-        return type(self), self.tau > 0.0
 
     @property
     def delay(self) -> float:
@@ -85,29 +68,18 @@ class Lag(Drive):
 class RateLimit(Drive):
     """A force that follows u no faster than `rate`, from 0: f(t + h) = u clipped to f(t) +- rate h.
 
-    It is MuJoCo's dcmotor in torque mode, with a slew limit and a back-EMF too small to notice. Limits: implicitfast or
-    Euler; under RK4 f lags within a step, and slopes near the rate are cut.
+    The mean force over each physics step is exact for a held u.
 
     Attributes:
       rate: N m/s (N/s), greater than 0; math.inf for no limit.
     """
 
+    in_callback: ClassVar[bool] = True
+
     rate: float
 
     def __post_init__(self) -> None:
         self.check_numbers("rate", above=0.0, most=math.inf, infinite=True)
-
-    def edit(self, spec: mujoco.MjSpec) -> None:
-        for actuator in drives(spec):
-            actuator.set_to_dcmotor(
-                motorconst=(1e-6, 1e-6),
-                resistance=1e-6,
-                controller=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
-                ctrlspec=int(mujoco.mjtCtrlInput.mjINPUT_FF),
-            )
-
-    def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
-        yield Field("actuator_dynprm", (drive_ids(model), SLEW), self.rate)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -231,29 +203,83 @@ class DCMotor(Drive):
         return self.inductance / self.resistance if self.inductance > SUDDEN * self.resistance else 0.0
 
 
-class Tandem(NamedTuple):
-    """Effect of a physics step on two drives in series, with output a of the first under a command u.
+class DriveStep(NamedTuple):
+    """Effect of a physics step on the drives that the callback simulates, or whose voltage it prepares.
+
+    `first` is the output of the first lag. `second` is that of the second lag, or the force behind a RateLimit, or the
+    last step's command of a DCMotor. All start from 0. All factors are shares of a state's distance from u.
 
     Attributes:
-      held: share of a in the second drive's command, u + held (a - u); 0 .. 1.
-      left: share of a in its value at the end of the step, u + left (a - u); 0 .. 1.
+      force_first, force_second: of `first` and `second` in the mean force, or the motor's command, over the step.
+      first_left: of `first` in itself at the end of the step.
+      second_first, second_left: of `first` and `second` in `second` at the end of the step.
+      lagged: 1 with a lag, 0 without one.
+      reach: largest change of the force in a step, in the unit of u; 0 without a RateLimit.
     """
 
-    held: float
-    left: float
+    force_first: float = 0.0
+    force_second: float = 0.0
+    first_left: float = 0.0
+    second_first: float = 0.0
+    second_left: float = 0.0
+    lagged: float = 0.0
+    reach: float = 0.0
 
-    def __call__(self, u: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the second drive's command over a step, and a at its end; both have the shape of u and a."""
-        return u + self.held * (a - u), u + self.left * (a - u)
+    def __call__(self, u: np.ndarray, first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the mean force over a step, and both states at its end; all have the shape of u."""
+        a, b = first - u, second - u
+        force, first_after = u + self.force_first * a, u + self.first_left * a
+        if not self.reach:
+            return force + self.force_second * b, first_after, u + self.second_first * a + self.second_left * b
+        end = np.clip(first_after, second - self.reach, second + self.reach)
+        gap = np.clip(u + self.lagged * a - second, -self.reach, self.reach)  # closed at the limit's rate
+        passing = force - 0.5 * gap * np.abs(gap) / self.reach
+        return np.where(end == first_after, passing, 0.5 * (second + end)), first_after, end
 
 
-def tandem(actuator: tuple[Actuator, ...], step: float) -> Tandem | None:
-    """Return the effect of two drives in series in a physics step of `step` s; None without a second drive."""
-    both = [part for part in actuator if part.drives]
-    if len(both) < 2:
+def drive_step(actuator: tuple[Actuator, ...], step: float) -> DriveStep | None:
+    """Return the effect of a physics step of `step` s on drives; None if MuJoCo needs nothing but u.
+
+    MuJoCo gives a step the current of its end. The current of its mean, for a voltage V that is held over each step, is
+    the end's for the voltage w V + (1 - w) V', with V' of the step before and w of `_current_weight`. Behind a lag, V
+    is the mean of the lag's output with the winding's weights exp(-(step - t) R/L), which has the same effect at the end
+    of the step.
+    """
+    drives = [part for part in actuator if part.drives]
+    lags = [min(step / part.tau, LONGEST_STEP) for part in drives if isinstance(part, Lag) and part.tau]
+    rate = next((part.rate for part in drives if isinstance(part, RateLimit)), None)
+    windings = [step / part.delay for part in drives if isinstance(part, DCMotor) and part.delay]
+    if not lags and not windings and rate is None:
         return None
-    first, second = (step / max(drive.delay, MIN_LAG) for drive in both)  # the step, in units of each time constant
-    apart = abs(second - first)
-    mean = -math.expm1(-apart) / apart if apart else 1.0
-    held = second * math.exp(-min(first, second)) * mean / -math.expm1(-second)
-    return Tandem(held=held, left=math.exp(-first))
+    a = lags[0] if lags else math.inf
+    made = DriveStep(force_first=_mean(a), first_left=math.exp(-a), lagged=float(bool(lags)))
+    if rate is not None:
+        return made._replace(reach=rate * step)
+    if windings:
+        (b,) = windings
+        last = 1.0 - _current_weight(b)
+        held = _passed(a, b) / -math.expm1(-b) if lags else 0.0
+        return made._replace(force_first=(1.0 - last) * held, force_second=last, second_first=held)
+    if len(lags) < 2:
+        return made
+    b = lags[1]
+    passed = _passed(a, b)
+    return made._replace(
+        force_first=_mean(a) - passed / b, force_second=_mean(b), second_first=passed, second_left=math.exp(-b)
+    )
+
+
+def _mean(a: float) -> float:
+    """Return the mean of exp(-t) over 0 .. a."""
+    return -math.expm1(-a) / a
+
+
+def _passed(a: float, b: float) -> float:
+    """Return what a second lag has at the end of a step of a first lag's 1 at its start, of a and b time constants."""
+    apart = abs(b - a)
+    return b * math.exp(-min(a, b)) * (_mean(apart) if apart else 1.0)
+
+
+def _current_weight(b: float) -> float:
+    """Return (1 - mean of exp(-t) over 0 .. b) / (1 - exp(-b)): 1/2 for a short step, 1 for a long one."""
+    return 0.5 + b / 12.0 if b < SHORT_STEP else (1.0 - _mean(b)) / -math.expm1(-b)

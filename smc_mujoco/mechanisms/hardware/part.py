@@ -93,6 +93,7 @@ class Actuator(Part):
     """Base of actuators, which stand between the command u, the wanted force or a voltage, and the joint."""
 
     drives: ClassVar[bool] = True  # whether it turns u into force; else it stands after a drive
+    in_callback: ClassVar[bool] = False  # whether the callback simulates it, and MuJoCo gets its force
 
     @property
     def scale(self) -> float:
