@@ -7,6 +7,8 @@ from smc_mujoco.analysis.gains_for import gains_for as gains_for
 from smc_mujoco.analysis.harmonics import describing_function as describing_function
 from smc_mujoco.analysis.margins import margins as margins
 from smc_mujoco.analysis.region_of_attraction import basin as basin
+from smc_mujoco.analysis.step_halving import StepChange as StepChange
+from smc_mujoco.analysis.step_halving import step_halving as step_halving
 from smc_mujoco.analysis.tuning.result import Tuned as Tuned
 from smc_mujoco.analysis.tuning.search import tune as tune
 from smc_mujoco.cli.main import play as play

@@ -35,7 +35,7 @@ QUICK = {
     "mechanisms/hardware/test_drives.py",
     "mechanisms/hardware/test_encoder.py",
     "mechanisms/hardware/test_friction.py",
-    "mechanisms/hardware/test_tandem.py",
+    "mechanisms/hardware/test_drive_step.py",
     "mechanisms/test_fidelity.py",
     "mechanisms/test_models.py",
     "metrics/test_catalogue.py",

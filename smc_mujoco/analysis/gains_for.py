@@ -1,4 +1,4 @@
-"""Gains from a wanted amplitude: the largest gains whose predicted chattering stays below it.
+"""Gains from a wanted amplitude: the largest gains whose chattering stays below it, at the upper end of its range.
 
     design = smc.gains_for("super_twisting", "duffing", amplitude=1e-3, actuator=smc.Lag(0.01))
     design.law, design.chattering.frequency, design.disturbance
@@ -66,16 +66,17 @@ def gains_for(
     channel: int = 0,
     **fields: object,
 ) -> Design:
-    """Return the largest gains whose predicted chattering stays below an amplitude, a frequency or both.
+    """Return the largest gains whose chattering stays below an amplitude, a frequency or both.
 
-    The amplitude decides the size of the law. A frequency decides its speed, too: the one of 21 speeds, from a tenth of
-    its own to ten times that, that allows the largest forces. Forces among the gains stay at most u_max.
+    The amplitude decides the size of the law: the upper end of `amplitude_range` is the wanted one. A frequency decides
+    its speed, too: the one of 21 speeds, from a tenth of its own to ten times that, that allows the largest forces.
+    Forces among the gains stay at most u_max.
 
     Args:
       law: a law or its name. Its gains give the proportions.
       plant: a plant or its name.
-      amplitude: largest amplitude of s, in its unit.
-      frequency: highest frequency of the limit cycle, Hz. Default: the speed of the law stays.
+      amplitude: largest amplitude of s, in its unit, at the upper end of its range.
+      frequency: highest predicted frequency of the limit cycle, Hz. Default: the speed of the law stays.
       channel: index of a driven channel.
       fields: other fields of the Scenario, such as actuator, input_delay, control_period, u_max.
 
@@ -109,13 +110,13 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
         def cycle(size: float, speed: float) -> Chattering:
             drawn.advance(1.0)
             tried.append((size, speed))
-            return predict(scaled(size, speed), channel, ranges=False)
+            return predict(scaled(size, speed), channel)
 
         strength = _strength(base)
         speed = 1.0 if frequency is None else _speed(lambda w: cycle(1.0, w), amplitude, frequency, strength)
         size = 1.0
         if amplitude is not None:
-            size = _largest(lambda q: cycle(q, speed).amplitude, amplitude, strength / speed**2)
+            size = _largest(lambda q: cycle(q, speed).amplitude_range[1], amplitude, strength / speed**2)
         chosen = scaled(size, speed)
         found = chattering(chosen, channel)
         if frequency is not None and found.frequency > frequency:
@@ -157,7 +158,7 @@ def _speed(cycle: Callable[[float], Chattering], amplitude: float | None, freque
         )
 
     def force(speed: float) -> float:
-        allowed = math.inf if amplitude is None or not slow[speed] else amplitude / slow[speed].amplitude
+        allowed = math.inf if amplitude is None or not slow[speed] else amplitude / slow[speed].amplitude_range[1]
         size = 1.0 if amplitude is None else min(allowed, RANGE)
         return min(size * speed**2, strength)
 

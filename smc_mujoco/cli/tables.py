@@ -12,6 +12,7 @@ from rich import box
 from rich.table import Column, Table
 from rich.text import Text
 
+from smc_mujoco.analysis.step_halving import NOTE
 from smc_mujoco.analysis.tuning.result import HEADINGS, Tuned
 from smc_mujoco.common.text import number
 from smc_mujoco.control.source import in_words, kinds
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.chattering import Chattering
     from smc_mujoco.analysis.gains_for import Design
     from smc_mujoco.analysis.margins import Margin
+    from smc_mujoco.analysis.step_halving import StepChange
     from smc_mujoco.studies.advice import Advice
 
 MAX_TIP_COLUMNS = 5  # with more, the name of the joint that does most work does not fit into 80 characters
@@ -195,11 +197,15 @@ def _label(label: str, trace: Trace) -> Text:
     return Text(label, style=style.law_colour(trace.scenario.law.name))
 
 
-def trace_summary(trace: Trace) -> list[Table]:
+def trace_summary(trace: Trace, change: StepChange | None = None) -> list[Table]:
     """Return a table for each group of channels: every metric of one trace, with its unit and its meaning.
 
     Metrics of realistic parts appear only if the scenario has such parts.
+
+    Args:
+      change: what half the physics step changes in the run's chattering; None if that is not known.
     """
+    mark = change.mark if change else ""
     values, tables = metric_scores(trace), []
     for group, heading in headings(trace.scenario).items():
         value = Column("value", justify="right")
@@ -207,7 +213,10 @@ def trace_summary(trace: Trace) -> list[Table]:
         for m in metrics():
             if m.name in values[group.name] and (trace.scenario.realistic or not m.realistic):
                 table.add_row(
-                    m.name, number(values[group.name][m.name]), m.unit_for(group.unit, group.effort), Text(m.summary)
+                    m.name,
+                    number(values[group.name][m.name]) + mark * m.name.startswith("chattering"),
+                    m.unit_for(group.unit, group.effort),
+                    Text(m.summary),
                 )
         tables.append(table)
     return tables
@@ -428,6 +437,7 @@ def chattering(
     channel: int,
     cycles: Sequence[Chattering],
     measured: Sequence[tuple[float, float]],
+    changes: Sequence[StepChange],
 ) -> Table:
     """Return predicted and measured limit cycles, a line for each scenario.
 
@@ -435,17 +445,24 @@ def chattering(
       channel: the driven channel.
       cycles: the predictions.
       measured: amplitude of s in its unit, and frequency in Hz.
+      changes: what half the physics step changes in the runs.
     """
     plant = scenarios[0].plant
     last = "coupling" if plant.driven > 1 else "third"
     heads = [f"s ({plant.units[channel]}/s)", "measured", "Hz", "measured", "±", last]
     numbers = [Column(head, justify="right", no_wrap=True) for head in heads]
     table = titled(f"chattering of {plant.name}: predicted, and measured in runs", "law", *numbers)
-    for scenario, cycle, (amplitude, frequency) in zip(scenarios, cycles, measured, strict=True):
+    for scenario, cycle, (amplitude, frequency), change in zip(scenarios, cycles, measured, changes, strict=True):
         law = Text(scenario.law.name, style=style.law_colour(scenario.law.name))
-        both = map(number, (cycle.amplitude, amplitude, cycle.frequency, frequency))
+        both = [
+            text
+            for predicted, run in ((cycle.amplitude, amplitude), (cycle.frequency, frequency))
+            for text in (number(predicted), number(run) + change.mark)
+        ]
         share = cycle.coupling if plant.driven > 1 else cycle.third_harmonic
         table.add_row(law, *both, _share(cycle.uncertainty), _share(share))
+    if any(change.marked for change in changes):
+        table.caption = NOTE
     return table
 
 

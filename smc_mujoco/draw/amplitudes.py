@@ -1,5 +1,7 @@
 """Amplitude of chattering over the actuator's lag: predicted as lines, run as dots, one colour for each label.
 
+Each run is repeated with half its physics step. Where that changes its cycle by more than 10 %, the dot is hollow.
+
 amplitudes({"lag 1 ms": {"relay": trace, "super-twisting": other}, "lag 10 ms": {...}}, "chattering.svg")
 """
 
@@ -12,6 +14,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
 from smc_mujoco.analysis.chattering import predict
+from smc_mujoco.analysis.step_halving import step_halving
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
@@ -77,15 +80,17 @@ def amplitudes(
         page = pages.blank(width, height or style.points(HEIGHT), fig)
         ax = page.subplots()
         colours = style.law_colours([of[0].scenario.law for of in runs.values()])
-        handles, predicted = [], {}
+        handles, predicted, hollow = [], {}, False
         gains, shared = pages.gained([[trace.scenario.law.source for trace in of] for of in runs.values()])
         for (label, of), colour, source in zip(runs.items(), colours, gains, strict=True):
             of.sort(key=lambda trace: lag(trace.scenario))
             lags = [1e3 * lag(trace.scenario) for trace in of]
             predicted[label] = lags, [predict(trace.scenario, ranges=False).amplitude for trace in of]
             ax.plot(*predicted[label], color=colour, lw=style.points(2.0))
-            measured = [of_trace(trace)[0] for trace in of]
-            ax.plot(lags, measured, "o", color=colour, ms=style.points(7.0), mec=style.PAPER)
+            for at, trace, change in zip(lags, of, step_halving(of, 0), strict=True):
+                face, edge = (style.PAPER, colour) if change.marked else (colour, style.PAPER)
+                ax.plot(at, of_trace(trace)[0], "o", color=face, ms=style.points(7.0), mec=edge)
+                hollow |= change.marked
             handles.append(Line2D([], [], color=colour, lw=style.points(3.0), label=f"{style.label(label)}{source}"))
         if len(predicted) == 2:
             (lags, one), (_, other) = predicted.values()
@@ -96,6 +101,9 @@ def amplitudes(
                 ax.annotate(text, (equal, 0.0), xycoords=("data", "axes fraction"), **place)
         handles.append(Line2D([], [], color=style.MUTED, label="predicted"))
         handles.append(Line2D([], [], color=style.MUTED, marker="o", lw=0, label="run"))
+        if hollow:
+            label = "run that half the step changes by > 10 %"
+            handles.append(Line2D([], [], color=style.PAPER, mec=style.MUTED, marker="o", lw=0, label=label))
         handles += shared
         unit = next(iter(runs.values()))[0].scenario.plant.unit
         ax.set(xscale="log", yscale="log", xlabel="lag of the actuator (ms)", ylabel=f"amplitude of s ({unit}/s)")

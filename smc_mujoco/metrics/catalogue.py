@@ -7,7 +7,6 @@ trace that diverged or has a NaN (ScenarioError). inf means "never".
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -244,11 +243,7 @@ def chattering_frequency(trace: Trace) -> float:
     return _cycle(trace)[1]
 
 
-@kept
-def _cycle(trace: Trace) -> tuple[float, float]:
-    """Return amplitude and frequency of the largest limit cycle of a group's channels; NaN, NaN without one."""
-    found = [limit_cycle.of_trace(trace, i) for i in range(trace.s.shape[1])]
-    return max((one for one in found if not math.isnan(one[0])), default=limit_cycle.NONE)
+_cycle = kept(limit_cycle.largest)
 
 
 @metric("s", realistic=True)

@@ -118,6 +118,12 @@ def of_trace(trace: Trace, channel: int = 0) -> tuple[float, float]:
     return limit_cycle(trace.t[part], trace.s[part, channel])
 
 
+def largest(trace: Trace) -> tuple[float, float]:
+    """Return amplitude and frequency of the channel with the largest limit cycle; NaN, NaN where none has one."""
+    cycles = [of_trace(trace, i) for i in range(trace.s.shape[1])]
+    return max((one for one in cycles if not math.isnan(one[0])), default=NONE)
+
+
 def _refined(rates: np.ndarray, peak: int) -> float:
     """Return a peak of the spectrum between its whole numbers: how far its phase turns from one half to the other."""
     half = len(rates) // 2

@@ -101,7 +101,7 @@ def knows_contacts(scenario: Scenario) -> bool:
 
 def _unknown(scenario: Scenario) -> list:
     """Return the actuators with a state that a trace lacks."""
-    return [part for part in scenario.actuator if part.stateful or not part.drives]
+    return [part for part in scenario.actuator if part.stateful or part.in_callback or not part.drives]
 
 
 @kept

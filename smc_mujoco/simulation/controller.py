@@ -4,7 +4,8 @@ At the first stage of a control sample, for each channel:
 
     sensors -> noise, encoder -> velocity estimator -> law -> saturation -> delay buffer
 
-At the first stage of a physics step, the command whose delay has passed goes to ctrl, through lags and rate limits. At every stage, disturbance(t) goes to xfrc_applied. A friction by a formula follows, at the first stage.
+At the first stage of a physics step, the command whose delay has passed goes to ctrl, through lags and rate limits. At
+every stage, disturbance(t) goes to xfrc_applied. A friction by a formula follows, at the first stage.
 Each sample is logged with the mean forces since the last one.
 
 Time counts in calls. RK4 calls four times a step, at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h

@@ -36,7 +36,9 @@ RUBBING, RESISTANCE = floats(("v", "motor", "load")), floats(("f", "low", "high"
 # The state of a channel between calls: the last reading that was not lost, the command after its delay, the states
 # of the drives (`DriveStep`), and sums over a control period of the drive's force and of friction and contacts; whether
 # a friction by a formula sticks, where, and the speed at the step before.
-CHANNEL_STATE = floats(("held_x", "held_v", "arrived", "first", "second", "force", "reaction", "stuck", "stuck_at", "speed"))
+CHANNEL_STATE = floats(
+    ("held_x", "held_v", "arrived", "first", "second", "force", "reaction", "stuck", "stuck_at", "speed")
+)
 DRIVE_STEP = floats(DriveStep._fields)
 
 # A sample of a channel: position, velocity, command, command after its delay, sliding variable, disturbance, reference,

@@ -668,11 +668,6 @@ def test_a_csv_with_gaps_or_nan_is_refused_in_one_sentence(tmp_path, text):
         ({"mechanism": None}, "unknown mechanism of duffing None: choose from equation, springs"),
         ({"mechanism": ["springs"]}, "unknown mechanism of duffing"),
         ({"integrator": "RK4", "friction": LUGRE}, "integrator RK4 does not integrate the state of LuGre"),
-        ({"integrator": "RK4", "actuator": smc.Lag(0.1)}, "integrator RK4 does not integrate the state of Lag"),
-        (
-            {"integrator": "RK4", "actuator": smc.RateLimit(1.0)},
-            "integrator RK4 does not integrate the state of RateLimit",
-        ),
         ({"integrator": "RK4", "actuator": smc.DCMotor()}, "integrator RK4 does not integrate the state of DCMotor"),
         ({"integrator": "rk4"}, "unknown integrator 'rk4': did you mean 'RK4'?"),
         ({"reference": smc.Gust(1.0, 0.0, 1.0)}, "reference is a Gust"),

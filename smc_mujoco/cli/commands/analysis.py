@@ -319,8 +319,9 @@ def chatter(
     If a law switches and the actuator lags, the loop oscillates without end. Frequency and amplitude follow from the
     law's describing function N and the response L of the linearised mechanism: N L = 1. The column "±" is how far
     the predicted amplitude or frequency may be off. There are two reasons: s has harmonics, and the cycle may be locked
-    to the control samples, which shifts the instant at which the law switches. The column "third" is the share of the
-    third harmonic. If the plant has several driven channels, the column "coupling" is how far this channel's command
+    to the control samples, which shifts the instant at which the law switches. A star marks a run whose amplitude or
+    frequency changes by more than 10 % with half the physics step. The column "third" is the share of the third
+    harmonic. If the plant has several driven channels, the column "coupling" is how far this channel's command
     moves another channel, relative to its own motion. The prediction is for a single channel, so it fails if that is
     not small, because the channels then oscillate together.
 
@@ -332,6 +333,7 @@ def chatter(
     with held_back():
         from smc_mujoco.analysis.chattering import chattering, save, shared
         from smc_mujoco.analysis.gains_for import design
+        from smc_mujoco.analysis.step_halving import step_halving
         from smc_mujoco.cli import tables
         from smc_mujoco.common.files import ended, writable
         from smc_mujoco.common.progress import bar
@@ -370,8 +372,8 @@ def chatter(
             drawn.reached(done, len(cases) + 1)
             cycles.append(chattering(scenario, channel))
         traces = run(cases, threads=threads)
-    measured = [of_trace(trace, channel) for trace in traces]
-    terminal.print(tables.chattering(cases, channel, cycles, measured))
+        measured = [of_trace(trace, channel) for trace in traces]
+    terminal.print(tables.chattering(cases, channel, cycles, measured, step_halving(traces, channel, threads)))
     if designs:
         terminal.print(tables.designs([chosen for _, chosen in designs], cases[0].efforts[channel]))
     terminal.note("assumed: " + "; ".join(shared(cycles)), wrap=True)

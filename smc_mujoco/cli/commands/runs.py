@@ -15,6 +15,7 @@ from smc_mujoco.cli.terminal import Clock, Terminal, errors_as_sentences
 from smc_mujoco.common.interrupts import held_back
 
 if TYPE_CHECKING:
+    from smc_mujoco.analysis.step_halving import StepChange
     from smc_mujoco.simulation.trace import Trace
 
 
@@ -92,6 +93,7 @@ def show(
     Example: smc-mujoco show videos/duffing/nominal-classical.npz --figure classical
     """
     with held_back():
+        from smc_mujoco.analysis.step_halving import NOTE
         from smc_mujoco.cli import tables
         from smc_mujoco.simulation.trace import formats, load
 
@@ -113,9 +115,25 @@ def show(
     if loaded.failure:
         terminal.note(f"failed: {loaded.failure}", "red", wrap=True)
     else:
-        for table in tables.trace_summary(loaded):
+        change = _step_change(loaded)
+        for table in tables.trace_summary(loaded, change):
             terminal.print(table)
+        if change is None or change.marked:
+            untried = "chattering was not compared with that of half the physics step: this run's law is not here"
+            terminal.note(untried if change is None else NOTE, "dim", wrap=True)
     terminal.wrote(*written)
+
+
+def _step_change(trace: "Trace") -> "StepChange | None":
+    """Return what half the physics step changes in a trace's chattering; None if it cannot be run again."""
+    from smc_mujoco.analysis.step_halving import step_halving
+    from smc_mujoco.common.errors import ScenarioError
+
+    try:
+        (change,) = step_halving([trace])
+    except ScenarioError:  # such as a law whose code is not here
+        return None
+    return change
 
 
 def _print_curves(trace: "Trace", terminal: Terminal) -> None:

@@ -5,6 +5,7 @@ import math
 import statistics
 
 from smc_mujoco.analysis.chattering import chattering
+from smc_mujoco.analysis.step_halving import step_halving
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.evidence.report.plan import GAINS, Report, Work
@@ -26,6 +27,7 @@ class Oscillation:
       amplitude, frequency: predicted, in the unit of s and in Hz.
       measured_amplitude, measured_frequency: of a run.
       third_harmonic, uncertainty: how good the prediction is, see `Chattering`.
+      marked: whether half the physics step changes the run's numbers by more than 10 %.
     """
 
     plant: str
@@ -36,6 +38,7 @@ class Oscillation:
     measured_frequency: float
     third_harmonic: float
     uncertainty: float
+    marked: bool
 
     @property
     def error(self) -> float:
@@ -62,7 +65,9 @@ def oscillations(work: Work) -> tuple[Oscillation, ...]:
 def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) -> list[Oscillation]:
     """Return the limit cycles on a plant. Laws whose chattering cannot be predicted are left out."""
     found, cases = [], [case(plant, law, "nominal", DURATION, GAINS, changes={"actuator": Lag(LAG)}) for law in laws]
-    for done, (one, trace) in enumerate(zip(cases, run(cases, threads), strict=True)):
+    traces = run(cases, threads)
+    changes = step_halving(traces, 0, threads)
+    for done, (one, trace, change) in enumerate(zip(cases, traces, changes, strict=True)):
         report(done, len(cases))
         try:
             cycle = chattering(one)
@@ -79,6 +84,7 @@ def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) 
                 measured_frequency=frequency,
                 third_harmonic=cycle.third_harmonic,
                 uncertainty=cycle.uncertainty,
+                marked=change.marked,
             )
         )
     return found

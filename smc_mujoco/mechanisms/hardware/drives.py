@@ -242,7 +242,7 @@ def drive_step(actuator: tuple[Actuator, ...], step: float) -> DriveStep | None:
 
     MuJoCo gives a step the current of its end. The current of its mean, for a voltage V that is held over each step, is
     the end's for the voltage w V + (1 - w) V', with V' of the step before and w of `_current_weight`. Behind a lag, V
-    is the mean of the lag's output with the winding's weights exp(-(step - t) R/L), which has the same effect at the end
+    is the mean of the lag's output with the winding's weights exp(-(step - t) R/L). That has the same effect at the end
     of the step.
     """
     drives = [part for part in actuator if part.drives]

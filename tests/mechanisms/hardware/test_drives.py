@@ -1,4 +1,4 @@
-"""Actuators deliver what their equations say: lag, rate limit, DC motor; and play that is play."""
+"""Actuators deliver what their equations say: a DC motor does; and play is play. Lags: see test_drive_step."""
 
 import math
 
@@ -69,45 +69,6 @@ def locked(part):
 
 def sine(t):
     return 2.0 * math.sin(5.0 * t)
-
-
-@pytest.mark.parametrize("tau", [1e-4, 1e-3, 0.01, 0.5])
-def test_a_lag_is_first_order(tau):
-    t, _, _, force = driven(bare(Lag(tau)), lambda t: 2.0, 0.1)[:, :4].T
-    assert force == pytest.approx(2.0 * (1.0 - np.exp(-t / tau)), abs=1e-12)
-
-
-@NAMES
-@pytest.mark.parametrize("integrator", [IMPLICIT, RK4])
-def test_no_lag_is_the_plants_own_actuator_to_the_bit(name, integrator):
-    lagged, own = (build(plant(name), *parts, integrator=integrator) for parts in ([Lag(0.0)], []))
-    assert (driven(lagged, sine, 0.5, home(lagged))[:, :4] == driven(own, sine, 0.5, home(own))[:, :4]).all()
-    assert Lag(0.0).structure() != Lag(0.01).structure() == Lag(0.02).structure()
-
-
-def test_a_shorter_lag_comes_nearer_to_none():
-    own = driven(bare(), sine, 0.5)[-1, 1]
-    errors = [abs(driven(bare(Lag(tau)), sine, 0.5)[-1, 1] - own) for tau in (1e-2, 1e-3, 1e-4)]
-    assert errors[0] > 5 * errors[1] > 25 * errors[2]
-
-
-def test_a_limited_rate_is_exactly_the_rate_and_starts_at_zero():
-    t, _, _, force = driven(bare(RateLimit(10.0)), lambda t: 1.0 if t < 0.3 - H / 2 else -1.0, 0.6).T[:4]
-    assert force == pytest.approx(
-        np.where(t < 0.3 + H / 2, np.minimum(10 * t, 1), np.maximum(4 - 10 * t, -1)), abs=1e-11
-    )
-
-
-@pytest.mark.parametrize(("rate", "integrator"), [(10.0, IMPLICIT), (math.inf, IMPLICIT), (1e5, RK4), (math.inf, RK4)])
-def test_a_slower_command_passes_a_rate_limit_unchanged(rate, integrator):
-    limited = driven(build(plant("inverted_pendulum"), RateLimit(rate), integrator=integrator), sine, 1.0)
-    own = driven(build(plant("inverted_pendulum"), integrator=integrator), sine, 1.0)
-    assert limited[:, :4] == pytest.approx(own[:, :4], rel=1e-9, abs=1e-12)
-
-
-def test_an_infinite_rate_follows_a_jump():
-    force = driven(bare(RateLimit(math.inf)), lambda t: 5.0 if t > 0.1 else -5.0, 0.2)[:, 3]
-    assert set(force) == {-5.0, 5.0}
 
 
 def test_a_locked_rotors_current_rises_in_l_over_r_to_the_asked_torque():
@@ -262,12 +223,12 @@ def test_flanks_meet_without_bounce_and_without_gain(speed, inertia):
 @NAMES
 @pytest.mark.parametrize("order", [1, -1])
 def test_play_comes_after_any_drive(name, order):
-    for drive in (Lag(0.01), RateLimit(20.0), MOTOR):
+    for drive in (DCMotor(inductance=0.0), MOTOR):
         parts = (LuGre(0.05, 0.08, 0.01), *(drive, Backlash(0.02, 1e-3))[::order])
         model = build(plant(name), *parts)
         n = len(drive_ids(model))
         assert [model.joint(model.actuator_trnid[i, 0]).name[:6] for i in drive_ids(model)] == ["rotor:"] * n
-        own = MOTOR.gear**2 * MOTOR.rotor_inertia if drive is MOTOR else 0.0
+        own = MOTOR.gear**2 * MOTOR.rotor_inertia
         assert model.dof_armature[n:] == pytest.approx(1e-3 + own)
         assert (model.dof_armature[:n] == 0.0).all()
         data = home(model)
@@ -279,8 +240,6 @@ def test_play_comes_after_any_drive(name, order):
 
 
 SWEEPS = {
-    "Lag": [Lag(1e-3), Lag(0.01), Lag(0.5)],
-    "RateLimit": [RateLimit(1.0), RateLimit(30.0), RateLimit(math.inf)],
     "DCMotor": [
         MOTOR,
         DCMotor(0.5, 2e-3, 0.05, 5.0, 2e-5, 3e-3, 7.0, 12.0, 5.0),

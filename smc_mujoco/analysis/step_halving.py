@@ -1,0 +1,71 @@
+"""Whether the chattering of a run is the machine's: the same runs with half the physics step.
+
+    changes = smc.step_halving([trace])       # one StepChange for each trace
+    changes[0].marked                         # True: half the step changes amplitude or frequency by more than 10 %
+
+It costs one more run of twice the steps for each trace. Nothing is run unless this is called.
+"""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+from smc_mujoco.metrics.limit_cycle import largest, of_trace
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace
+
+TOLERANCE = 0.1  # relative change of amplitude or frequency above which a number of chattering is marked: chosen
+MARK = "*"  # behind such a number
+NOTE = f"{MARK} half the physics step changes it by more than {100.0 * TOLERANCE:g} %: give a shorter physics_step"
+
+
+@dataclasses.dataclass(frozen=True)
+class StepChange:
+    """What half the physics step changes in the limit cycle of s of a run.
+
+    Attributes:
+      amplitude, frequency: relative changes; 0 if there is no limit cycle with either step, and inf if there is one
+        with only one of them.
+    """
+
+    amplitude: float
+    frequency: float
+
+    @property
+    def marked(self) -> bool:
+        """Whether the amplitude or the frequency changes by more than 10 %."""
+        return max(self.amplitude, self.frequency) > TOLERANCE
+
+    @property
+    def mark(self) -> str:
+        """What stands behind the run's numbers of chattering in a table: "*" or nothing."""
+        return MARK if self.marked else ""
+
+
+def halved(scenario: Scenario) -> Scenario:
+    """Return the scenario with half the physics step."""
+    return dataclasses.replace(scenario, physics_step=0.5 * scenario.resolved.physics_step)
+
+
+def step_halving(traces: Sequence[Trace], channel: int | None = None, threads: int | None = None) -> list[StepChange]:
+    """Return what half the physics step changes in the limit cycles of runs.
+
+    Args:
+      traces: the runs, which are repeated with half their steps.
+      channel: whose s is compared. Default: the one with the largest limit cycle.
+      threads: as in `run`.
+    """
+    again = run([halved(trace.scenario) for trace in traces], threads=threads)
+
+    def cycle(trace: Trace) -> tuple[float, float]:
+        return largest(trace) if channel is None else of_trace(trace, channel)
+
+    return [StepChange(*map(_change, cycle(one), cycle(other))) for one, other in zip(traces, again, strict=True)]
+
+
+def _change(whole: float, half: float) -> float:
+    """Return the relative change from the whole to the half step."""
+    if math.isnan(whole) or math.isnan(half):
+        return 0.0 if math.isnan(whole) and math.isnan(half) else math.inf
+    return abs(half / whole - 1.0)
