@@ -115,7 +115,8 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
     inverse /= unit
     ax.plot(response.real, response.imag, color=style.INK, lw=style.points(1.6), label="L, over frequency")
     ax.plot(inverse.real, inverse.imag, color=colour, lw=style.points(1.6), ls=(0, (4, 2)), label="1/N, over amplitude")
-    ax.plot([-1.0], [0.0], "o", color=colour, ms=style.points(8), mec=style.PAPER)
+    cycle_label = "cycle, with harmonics of e"
+    ax.plot([-1.0], [0.0], "o", color=colour, ms=style.points(8), mec=style.PAPER, label=cycle_label)
     ax.legend(loc="upper right", fontsize=style.points(8.5), frameon=True, framealpha=0.8, handlelength=1.6)
 
 
