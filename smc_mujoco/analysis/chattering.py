@@ -41,7 +41,7 @@ NEAR, SLOWER = 1e-4, 0.93  # relative: tolerance of the slowest and the fastest 
 SECANT = 1e-3  # of the logs of amplitude and omega, for derivatives: gains jump by where samples fall; chosen
 SMALL = 0.1  # relative change in Loeb's criterion: so large that the places of the samples do not matter; chosen
 # Factors of the ranges' ends, with which the ranges hold the truth in 95 % of random loops: benchmarks/chattering.py.
-AMPLITUDE_FACTOR, FREQUENCY_FACTOR = 1.03, 1.01
+AMPLITUDE_FACTOR, FREQUENCY_FACTOR = 1.01, 1.01
 DRIFT = 0.05  # relative drift of a law's gain from which a prediction is called a snapshot: chosen
 # Distance at which resonances without damping are passed, relative to the frequency, and points on the way: chosen.
 DAMPED, FINE = 0.01, 2000

@@ -113,7 +113,7 @@ def test_a_motors_mean_torque_is_exact_for_a_held_voltage(inductance):
     late = np.count_nonzero(trace.t[1:] > 0.05 + H / 2)
     up = mean_risen(trace.t, motor.delay, INSTANT)
     down = np.concatenate((np.zeros(len(up) - late), up[:late]))
-    assert trace.force[1:, 0] == pytest.approx(up - 2.0 * down, abs=1e-6)
+    assert trace.force[1:, 0] == pytest.approx(up - 2.0 * down, abs=1e-5)
 
 
 def test_a_rate_limit_follows_the_lag():
