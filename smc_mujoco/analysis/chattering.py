@@ -381,6 +381,7 @@ def _described(loop: Loop, sine: Wave, said: tuple[str, ...], ranges: bool) -> C
         waves = [sine, *(_shifted(loop, sine, phase) for phase in loop.phases(sine.amplitude, sine.omega))]
         sizes = [one.s / sine.s * wave.s for one in waves]
         omegas = [one.omega / sine.omega * wave.omega for one in waves]
+    fastest, nyquist = max(omegas) * FREQUENCY_FACTOR / math.tau, 0.5 / loop.scenario.control_period
     return Chattering(
         amplitude=wave.s,
         amplitude_x=wave.amplitude,
@@ -390,7 +391,7 @@ def _described(loop: Loop, sine: Wave, said: tuple[str, ...], ranges: bool) -> C
         third_harmonic=wave.third,
         samples=math.tau / wave.omega / loop.scenario.control_period,
         amplitude_range=(min(sizes) / AMPLITUDE_FACTOR, max(sizes) * AMPLITUDE_FACTOR + loop.count),
-        frequency_range=(min(omegas) / FREQUENCY_FACTOR / math.tau, max(omegas) * FREQUENCY_FACTOR / math.tau),
+        frequency_range=(min(omegas) / FREQUENCY_FACTOR / math.tau, min(fastest, nyquist)),
         coupling=coupling,
         gain=wave.gain,
         response=response,

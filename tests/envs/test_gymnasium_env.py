@@ -166,7 +166,7 @@ def test_a_copy_that_mujoco_gives_up_leaves_its_neighbours_drives_alone(monkeypa
     o, _, terminated, *_ = many.step([[0.5], [0.5]])
     assert terminated.tolist() == [False, True]
     assert np.abs(o[0] - single.step([0.5])[0]).max() < 1e-12
-    assert many.batch.asked == ([0, 1],) * 3 + ([0],) * 197  # pyright: ignore[reportAttributeAccessIssue]
+    assert many.batch.asked == ([0, 1],) * 3 + ([0],) * 47  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def test_an_agent_that_joins_an_episode_late_has_no_old_memory():

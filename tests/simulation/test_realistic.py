@@ -255,7 +255,7 @@ def test_contacts_that_differ_in_numbers_are_one_batch(name, kind):
     [
         {"friction": smc.Coulomb(0.1)},
         {"friction": LUGRE},
-        {"actuator": smc.Lag(0.1)},
+        {"actuator": smc.DCMotor()},
         {"actuator": MOTOR},
         {"actuator": smc.Backlash(0.1)},
         {"contact": "stops"},
@@ -296,9 +296,9 @@ ZERO = pytest.mark.parametrize("zero", ZEROS)
 def test_without_realism_the_realistic_path_is_the_ideal_one_to_first_order(name, zero, law):
     """implicitfast errs by O(h): h, h/2, h/4 against RK4."""
     steps = (2.5e-4, 1.25e-4, 6.25e-5)
-    sensor = {"sensor": smc.Encoder(math.inf), "velocity": "measured"}
+    fields = {"sensor": smc.Encoder(math.inf), "velocity": "measured", "integrator": "implicitfast"} | ZEROS[zero]
     ideal = smc.run(scenario(name, law, duration=0.25))
-    path = smc.run([scenario(name, law, duration=0.25, physics_step=h, **ZEROS[zero], **sensor) for h in steps])
+    path = smc.run([scenario(name, law, duration=0.25, physics_step=h, **fields) for h in steps])
     errors = [np.abs(trace.x - ideal.x).max() for trace in path]
     assert errors[0] < 4e-3
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
@@ -306,7 +306,7 @@ def test_without_realism_the_realistic_path_is_the_ideal_one_to_first_order(name
 
 
 @PLANTS
-@pytest.mark.parametrize("zero", ["viscous", "coulomb"])
+@pytest.mark.parametrize("zero", ["viscous", "coulomb", "lag", "rate limit"])
 def test_without_realism_the_ideal_integrator_gives_the_ideal_trace(name, zero):
     ideal = smc.run(scenario(name, duration=0.5))
     same_but_zero = smc.run(scenario(name, duration=0.5, integrator="RK4", physics_step=1e-3, **ZEROS[zero]))
@@ -803,9 +803,28 @@ def test_defaults_follow_the_fields_that_are_given():
 
 @pytest.mark.parametrize("field", ["contact", "mechanism", "actuator", "friction"])
 def test_every_realism_brings_its_defaults(field):
-    value = {"contact": "stops", "mechanism": "springs", "actuator": smc.Lag(0.01), "friction": LUGRE}[field]
+    value = {"contact": "stops", "mechanism": "springs", "actuator": smc.DCMotor(), "friction": LUGRE}[field]
     made = dataclasses.replace(scenario(), **{field: value})
     assert (made.resolved.integrator, made.resolved.physics_step) == ("implicitfast", REALISTIC_STEP)
+
+
+@pytest.mark.parametrize(
+    ("actuator", "step"),
+    [
+        (smc.Lag(0.01), 1e-3),
+        (smc.RateLimit(50.0), 1e-3),
+        (smc.Lag(1e-3), 5e-4),  # half of the lag
+        (smc.Lag(1e-5), 1e-3),  # much shorter than the control period
+        ((smc.Lag(6e-4), smc.Lag(0.01)), 2.5e-4),
+    ],
+)
+def test_lags_and_rate_limits_keep_the_plain_integrator(actuator, step):
+    made = scenario(actuator=actuator)
+    assert (made.resolved.integrator, made.resolved.physics_step) == ("RK4", pytest.approx(step))
+
+
+def test_the_default_step_behind_a_drive_divides_the_delay():
+    assert scenario(actuator=smc.Lag(0.01), input_delay=1.5e-3).resolved.physics_step == pytest.approx(5e-4)
 
 
 def test_what_was_given_is_kept():
