@@ -395,11 +395,11 @@ def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(folder, monkeyp
     tuned = types.SimpleNamespace(before=1.0, objective=2.0, law=FAST)
     monkeypatch.setattr(adviser, "cached", lambda *rest: tuned)
     own = adviser._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None)
-    assert own == (smc.law("observer_free"), "its defaults, better than those tried")
+    assert own[:2] == (smc.law("observer_free"), "its defaults, better than those tried")
     assert own.law.source.kind == FAST.source.kind
     tuned.before = 3.0
     found = adviser._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None)
-    assert found == (FAST, "")
+    assert found[:2] == (FAST, "")
 
 
 def test_a_plant_that_cannot_be_tuned_has_default_gains_and_says_so(folder):
