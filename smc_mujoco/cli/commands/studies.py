@@ -66,6 +66,7 @@ def which(
     Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition "worn: sensor=Encoder(counts=4096)" --needs accurate
     """
     with held_back():
+        from smc_mujoco.analysis.differences import RELEVANT
         from smc_mujoco.cli import tables
         from smc_mujoco.studies.adviser import which as advise
 
@@ -84,7 +85,7 @@ def which(
         threads,
         progress=True,
         defaults=defaults,
-        **_relevant(relevant),
+        relevant=RELEVANT if relevant is None else relevant,
     )
     terminal.print(tables.advice(advice))
     for sentence in advice.answer:
@@ -155,6 +156,7 @@ def bench(
     Example: smc-mujoco bench --plants duffing --conditions noise,coulomb --out duffing
     """
     with held_back():
+        from smc_mujoco.analysis.differences import RELEVANT
         from smc_mujoco.cli import tables
         from smc_mujoco.common import annexes
         from smc_mujoco.common.errors import ScenarioError
@@ -177,7 +179,7 @@ def bench(
     else:
         scenarios = _grid(size, plants, laws, conditions, condition, count, gains, length, begin)
     table = study(scenarios, out, not fresh, executor, threads, progress=True, traces=traces)
-    boards = leaderboard(table, defaults=defaults, **_relevant(relevant))
+    boards = leaderboard(table, defaults=defaults, relevant=RELEVANT if relevant is None else relevant)
     terminal.print(tables.leaderboard(boards))
     if ensemble:
         terminal.note(ensemble.verdict(boards))
@@ -185,11 +187,6 @@ def bench(
     runs = f"{len(table)} run{'s' * (len(table) != 1)}, {failed} of them failed"
     terminal.note(f"{runs}, {terminal.seconds:.0f} s")
     terminal.wrote(out / "results.parquet")
-
-
-def _relevant(relevant: float | None) -> dict[str, float]:
-    """Return the argument relevant, if it was given."""
-    return {} if relevant is None else {"relevant": relevant}
 
 
 def _grid(

@@ -323,7 +323,7 @@ def _description(file: Path, digest: str) -> Any:
     if about.coSimulation is None:
         kind = "Model Exchange" if about.modelExchange is not None else "Scheduled Execution"
         raise ScenarioError(f"{file.name} is for {kind} only: export it for Co-Simulation")
-    if not about.coSimulation.modelIdentifier.isidentifier():
+    if not str(about.coSimulation.modelIdentifier).isidentifier():
         raise ScenarioError(
             f"{file.name} has the modelIdentifier {shown(about.coSimulation.modelIdentifier)}, which is no name in C: "
             "export it with one of letters, digits and _"
