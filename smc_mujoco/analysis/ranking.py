@@ -430,7 +430,7 @@ def ranks(comparison: Comparison) -> list[Rank]:
     lacking = comparison.without_value.sum(axis=1)
     order = [tuple(row) for row in zip(lacking.tolist(), mean.round(9).tolist(), strict=True)]
     places = [sum(other < one for other in order) + (1 + order.count(one)) / 2 for one in order]
-    best = (~comparison.beaten.any(axis=1)).tolist()
+    best = [not any(row) for row in comparison.beaten.tolist()]
     rows = [Rank(*row) for row in zip(comparison.laws, mean.tolist(), places, best, strict=True)]
     return sorted(rows, key=lambda rank: (rank.place, rank.law))
 

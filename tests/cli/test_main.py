@@ -797,10 +797,10 @@ def test_chatter_finds_the_largest_gains_of_a_wanted_amplitude(call):
     code, out, _ = call("chatter", "duffing", *words)
     assert code == 0
     predicted = re.search(r"classical +([\d.e-]+) ", out)
-    # two cycles, 0.6 % apart, balance the loop, and which of them is found differs between systems
+    # the upper end of the prediction's range is at the wanted amplitude: it is uncertain by 100 % at this period
     assert predicted
-    assert 0.99e-3 <= float(predicted[1]) <= 1e-3
-    assert re.search(r"classical +k=2\.12, c=2\.50 +2\.\d+ *\n", out)
+    assert 0.4e-3 <= float(predicted[1]) <= 1e-3
+    assert re.search(r"classical +k=0\.7\d+, c=2\.50 +0\.\d+ *\n", out)
 
 
 @pytest.mark.parametrize(

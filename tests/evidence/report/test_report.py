@@ -651,7 +651,7 @@ def test_every_chart_is_drawn(seen, findings):
     counts = seen.page.eval_on_selector_all(
         ".plot", "plots => plots.map(p => p.querySelectorAll('.trace, .hm, .contour').length)"
     )
-    assert len(counts) == 1 + 1 + 1 + len(TINY.kinds) + len(TINY.basins) + len(TINY.scenes)
+    assert len(counts) == 1 + 1 + 1 + len(TINY.accurate) + len(TINY.kinds) + len(TINY.basins) + len(TINY.scenes)
     assert min(counts) > 0
 
 
