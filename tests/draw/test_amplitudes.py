@@ -32,13 +32,13 @@ def test_predictions_are_lines_and_runs_are_dots_of_the_same_colour():
     laws = {"one": "super_twisting", "two": "twisting"}
     runs = {f"{tau:g} s": {label: trace(law, tau) for label, law in laws.items()} for tau in (0.01, 0.005)}
     figure = amplitudes(runs)
-    lines = figure.axes[0].lines[:4]
-    for label, line, dots in zip(laws, lines[::2], lines[1::2], strict=True):
+    lines = figure.axes[0].lines[:6]
+    for label, line, *dots in zip(laws, lines[::3], lines[1::3], lines[2::3], strict=True):
         measured = [chattering_amplitude(runs[name][label]) for name in ("0.005 s", "0.01 s")]
-        assert list(dots.get_ydata()) == measured
+        assert [dot.get_ydata()[0] for dot in dots] == measured
         assert list(line.get_ydata()) == pytest.approx(measured, rel=0.1)
-        assert list(line.get_xdata()) == list(dots.get_xdata()) == pytest.approx([5.0, 10.0])
-        assert line.get_color() == dots.get_color()
+        assert list(line.get_xdata()) == [dot.get_xdata()[0] for dot in dots] == pytest.approx([5.0, 10.0])
+        assert {line.get_color()} == {dot.get_color() for dot in dots}
     plt.close("all")
 
 

@@ -331,8 +331,8 @@ class Rows:
         self.rows = [(*cell, 1.0 + 0.1 * k % 0.7) for k, cell in enumerate(cells)]
 
     def column(self, name):
-        if name == "scenario":
-            raise smc.ScenarioError("it has no scenarios")
+        if name in ("scenario", "source", "search", "gains"):
+            raise smc.ScenarioError(f"it has no column {name}")
         n = len(self.rows)
         empty = {"failure": np.full(n, None, object), "diverged_at": np.full(n, np.nan)}
         if name in empty:

@@ -398,7 +398,10 @@ TWO = """<mujoco model="two"><worldbody><body>
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("bench", "--plants", "arm.xml:shoulder"), "smc-mujoco tune arm.xml:shoulder observer_free --out FILE.json"),
+        (
+            ("bench", "--plants", "arm.xml:shoulder", "--gains", "tuned"),
+            "smc-mujoco tune arm.xml:shoulder observer_free --out FILE.json",
+        ),
         (("basin", "cart_pole", "--law", "hierarchical"), "hierarchical(a=...), or take the defaults"),
         (("tune", "two.xml:shoulder", "pid", "--x0", "0.4"), "two: it has no nominal model, which tuning takes"),
         (("bench", "--laws", "pid(kp=x)"), "law 'pid(kp=x)' cannot be read: write it as pid(kp=50, ki=1)"),

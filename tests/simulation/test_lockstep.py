@@ -164,8 +164,9 @@ def test_every_parameter_of_a_plant_may_differ_and_jump_within_one_batch(plant):
     scenarios = []
     for i, (key, value) in enumerate(base.parameters.items()):
         common = {"law": "super_twisting", "duration": 0.1, "disturbance": smc.Sine(0.2, omega=5.0)}
-        jump = smc.Jump(time=5e-3 * i, factors={key: 1.7})  # the first at time 0
-        scenarios.append(smc.Scenario(plant=plant, jump=jump, mismatch={key: 0.8}, **common))
+        by = 0.3 if key == "delta" else 1.0  # a share, 0 to 1, to which these are added
+        jump = smc.Jump(time=5e-3 * i, factors={key: by * 1.7})  # the first at time 0
+        scenarios.append(smc.Scenario(plant=plant, jump=jump, mismatch={key: by * 0.8}, **common))
         scenarios.append(smc.Scenario(plant=smc.plant(plant, **{key: 1.3 * value}, **size), **common))
     for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
         assert_same(trace, reference.run(scenario))

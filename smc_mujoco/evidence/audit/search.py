@@ -37,6 +37,7 @@ class Tried(NamedTuple):
 
     @classmethod
     def of(cls, gains: Gains, evidence: Evidence) -> "Tried":
+        """Return what a claim gave with these gains: first whether all its checks hold, then the least slack."""
         checks = [one for one in evidence if isinstance(one, Check)]
         rank = all(one.holds for one in checks), min((one.slack for one in checks), default=math.inf)
         return cls(gains, evidence, rank)

@@ -189,7 +189,7 @@ QUBE_SERVO = Rig(
     reached=(
         Reached("identified", UNUSED, {"theta": 93.8, "alpha": 92.6, "u": 87.2}),
         Reached("driver_damped", UNUSED, {"theta": 75.4, "alpha": 57.4, "u": 47.3}),
-        Reached("driver", UNUSED, {"theta": 73.3, "alpha": 51.4, "u": 42.5}),
+        Reached("driver", UNUSED, {"theta": 73.1, "alpha": 50.9, "u": 41.9}),
         Reached("quanser", UNUSED, dict.fromkeys(("theta", "alpha", "u"), -math.inf)),
         Reached("identified", "11, on which the machine stands", dict.fromkeys(("theta", "alpha", "u"), -math.inf)),
         Reached("do nothing", UNUSED, {"theta": 35.9, "alpha": 2.3, "u": -5.3}),
