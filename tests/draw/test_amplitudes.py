@@ -3,6 +3,7 @@
 import math
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 
 import smc_mujoco as smc
@@ -35,9 +36,13 @@ def test_predictions_are_lines_and_runs_are_dots_of_the_same_colour():
     lines = figure.axes[0].lines[:6]
     for label, line, *dots in zip(laws, lines[::3], lines[1::3], lines[2::3], strict=True):
         measured = [chattering_amplitude(runs[name][label]) for name in ("0.005 s", "0.01 s")]
-        assert [dot.get_ydata()[0] for dot in dots] == measured
+        assert [float(np.asarray(dot.get_ydata())[0]) for dot in dots] == measured
         assert list(line.get_ydata()) == pytest.approx(measured, rel=0.1)
-        assert list(line.get_xdata()) == [dot.get_xdata()[0] for dot in dots] == pytest.approx([5.0, 10.0])
+        assert (
+            list(line.get_xdata())
+            == [float(np.asarray(dot.get_xdata())[0]) for dot in dots]
+            == pytest.approx([5.0, 10.0])
+        )
         assert {line.get_color()} == {dot.get_color() for dot in dots}
     plt.close("all")
 
