@@ -38,11 +38,8 @@ def test_predictions_are_lines_and_runs_are_dots_of_the_same_colour():
         measured = [chattering_amplitude(runs[name][label]) for name in ("0.005 s", "0.01 s")]
         assert [float(np.asarray(dot.get_ydata())[0]) for dot in dots] == measured
         assert list(line.get_ydata()) == pytest.approx(measured, rel=0.1)
-        assert (
-            list(line.get_xdata())
-            == [float(np.asarray(dot.get_xdata())[0]) for dot in dots]
-            == pytest.approx([5.0, 10.0])
-        )
+        lags = [float(np.asarray(dot.get_xdata())[0]) for dot in dots]
+        assert list(line.get_xdata()) == lags == pytest.approx([5.0, 10.0])
         assert {line.get_color()} == {dot.get_color() for dot in dots}
     plt.close("all")
 
