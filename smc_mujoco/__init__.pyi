@@ -21,10 +21,10 @@ from smc_mujoco.control.design import lqr as lqr
 from smc_mujoco.control.estimator import estimator as estimator
 from smc_mujoco.control.estimator import estimator_function as estimator_function
 from smc_mujoco.control.estimator import estimators as estimators
+from smc_mujoco.control.from_text import law as law
 from smc_mujoco.control.joint_law import joint_laws as joint_laws
 from smc_mujoco.control.law import Law as Law
 from smc_mujoco.control.law import Measurement as Measurement
-from smc_mujoco.control.law import law as law
 from smc_mujoco.control.law import law_function as law_function
 from smc_mujoco.control.law import laws as laws
 from smc_mujoco.control.policy import policy as policy

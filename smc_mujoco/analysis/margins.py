@@ -40,7 +40,7 @@ from smc_mujoco.metrics import catalogue
 from smc_mujoco.metrics.conventions import parts, refuse, scale
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import DURATION, Condition
-from smc_mujoco.simulation.grid import case, listed
+from smc_mujoco.simulation.grid import case, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.run import stream
@@ -311,7 +311,7 @@ def margins(
     bases = [
         case(plant, law, condition, duration, gains, starts=starts)
         for plant in listed("plants", plants)
-        for law in listed("laws", laws)
+        for law in listed_laws(laws)
     ]
     for base in bases:
         if not any(base.resolved.x0):

@@ -10,12 +10,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, number, shown, taken, unknown
+from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Component, Template, by_channel
-from smc_mujoco.control.estimator import Estimator, estimator
+from smc_mujoco.control.estimator import Estimator
+from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Law
-from smc_mujoco.control.law import law as find_law
 from smc_mujoco.control.surface import Surface
-from smc_mujoco.control.surface import surface as find_surface
+from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
@@ -38,8 +39,8 @@ Laws = Law | Template | str | ByChannel[Law | Template | str]
 
 
 def law(value: Law | Template | str) -> Law:
-    """Return a law, from itself, its template or its name."""
-    return component("law", find_law(value) if isinstance(value, str) else value)
+    """Return a law, from itself, its template or its text."""
+    return component("law", from_text.law(value) if isinstance(value, str) else value)
 
 
 def laws(value: Laws | None, plant: Plant) -> Law:
@@ -102,13 +103,17 @@ def bound(value: float | ByChannel[float] | None, plant: Plant) -> float | tuple
 
 
 def surface(value: Surface | Template | str | None) -> Surface | None:
-    """Return a surface, from itself, its template or its name."""
-    return None if value is None else component("surface", find_surface(value) if isinstance(value, str) else value)
+    """Return a surface, from itself, its template or its text, as "linear(c=3)"."""
+    if isinstance(value, str):
+        return from_text.component("surface", value, surfaces(), "linear(c=3)")
+    return None if value is None else component("surface", value)
 
 
 def velocity(value: Estimator | Template | str | None) -> Estimator | None:
-    """Return an estimator, from itself, its template or its name."""
-    return None if value is None else component("estimator", estimator(value) if isinstance(value, str) else value)
+    """Return an estimator, from itself, its template or its text, as "levant(L=4800)"."""
+    if isinstance(value, str):
+        return from_text.component("velocity estimator", value, estimators(), "levant(L=4800)")
+    return None if value is None else component("estimator", value)
 
 
 def component(kind: str, value: object) -> Component:

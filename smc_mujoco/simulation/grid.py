@@ -23,9 +23,10 @@ from smc_mujoco.common.errors import (
     whole,
 )
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.control import from_text
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.law import Law, checked_name
+from smc_mujoco.control.law import Law, checked_name, known_laws
 from smc_mujoco.mechanisms.plant import Plant, as_plant, catalogue
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import REST
@@ -52,7 +53,7 @@ def grid(
 
     Args:
       plants: names or Plants, one or several.
-      laws: names, which get their gains from the set `gains`, or laws with their own gains.
+      laws: names, which get their gains from the set `gains`, or laws with their own gains, also as text, see `law`.
       conditions: names, such as "noise" or "noise + coulomb", or your own conditions, see `condition`.
       seeds: a number of seeds, 0, 1, ..., or the seeds themselves. A seed is a start and a noise, the same in every
         condition and under every law; see `starts`. If a law was tuned several times, the seed also selects which of
@@ -69,7 +70,7 @@ def grid(
       ScenarioWarning: gains of a set that were tuned for other parameters of the plant.
     """
     numbers = listed("seeds", seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_ITEMS)))
-    plants, laws, conditions = listed("plants", plants), listed("laws", laws), listed("conditions", conditions)
+    plants, laws, conditions = listed("plants", plants), listed_laws(laws), listed("conditions", conditions)
     if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MAX_ITEMS:
         raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MAX_ITEMS:,} runs at most")
     conditions = [find_condition(condition) for condition in conditions]
@@ -159,7 +160,7 @@ def _check_apart(
 
 def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Component:
     """Return a law, or the law of a name with its gains for the plant."""
-    if not isinstance(law, str):
+    if not isinstance(law, str) or law not in known_laws():
         return checked_name(coerce.law(law))
     gains = "default" if law == "none" else gains
     found, known = sets.law(plant, law, gains, seed), catalogue().get(plant.name)
@@ -172,6 +173,12 @@ def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Comp
             users_frame(),
         )
     return found
+
+
+def listed_laws(laws: object) -> list[str | Law | Template]:
+    """Return one or several laws as a list: names of the library's as they are, and the laws of other texts."""
+    values = listed("laws", laws)
+    return [law for one in values for law in (from_text.laws(one) if isinstance(one, str) else [one])]
 
 
 def listed(what: str, values: object) -> list:

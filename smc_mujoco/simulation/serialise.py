@@ -2,21 +2,16 @@
 
 import dataclasses
 import functools
-import importlib
-import importlib.util
 from collections.abc import Sequence
 from importlib.metadata import version
 from typing import TypeVar
 
-from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.fingerprint import arithmetic
 from smc_mujoco.common.registry import subclasses
 from smc_mujoco.common.version import __version__
-from smc_mujoco.control import source as sources
-from smc_mujoco.control.component import Component, Template, by_channel
+from smc_mujoco.control import as_data as component
 from smc_mujoco.control.estimator import catalogue as estimators
-from smc_mujoco.control.law import known_laws
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.custom.plant_from import OwnModel, restored
 from smc_mujoco.mechanisms.hardware import backlash, drives, friction, servos  # noqa: F401  # whose parts a file may name
@@ -31,7 +26,6 @@ from smc_mujoco.simulation.signals import PerChannel, Recorded, Signal
 PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
 DEPENDENT = ("model", "physics_step", "integrator", "velocity", "u_max", "x0", "v0", "reference")  # None where left out
 PARTS = ("friction", "contact", "actuator", "sensor")
-ELSEWHERE = "smc_mujoco.evidence"  # it has laws that are not in the catalogue, such as those of rigs
 T = TypeVar("T")
 
 
@@ -43,10 +37,10 @@ def describe(scenario: Scenario) -> dict:
         | {
             "plant": _plant(scenario.plant),
             "versions": dict(_versions()),
-            "law": _component(scenario.law),
+            "law": component.describe(scenario.law),
             "source": scenario.law.source.about(),
-            "velocity": _component(scenario.velocity),
-            "surface": scenario.surface and _component(scenario.surface),
+            "velocity": component.describe(scenario.velocity),
+            "surface": scenario.surface and component.describe(scenario.surface),
             "model": scenario.model,
             "reference": _signal(scenario.reference),
             "feedforward": scenario.feedforward and _signal(scenario.feedforward),
@@ -72,18 +66,16 @@ def _versions() -> dict[str, str]:
 def restore(data: dict) -> Scenario:
     """Return the scenario that `describe` wrote. A law or signal that is not installed here loses its code.
 
-    Gains without a source, as in a file that somebody wrote, count as the user's.
     Recorded scenarios skip validation rules added after they were recorded.
     """
     fields = {name: data[name] for name in PLAIN}
     fields |= {name: _restore_parts(data[name]) for name in PARTS if name in data}  # an ideal run's file may lack them
     fields |= {name: data[name] for name in ("mechanism", "model") if name in data}
-    source = sources.restored(data["source"]) if "source" in data else sources.Source(kind=sources.YOURS)
     fields |= {
         "plant": _restore_plant(data["plant"]),
-        "law": _restore_law(data["law"]).sourced(source.kind, source.search),
-        "velocity": _find(data["velocity"], "estimator", estimators()),
-        "surface": data.get("surface") and _find(data["surface"], "surface", surfaces()),
+        "law": component.law(data["law"], data.get("source")),
+        "velocity": component.restore(data["velocity"], "estimator", estimators()),
+        "surface": data.get("surface") and component.restore(data["surface"], "surface", surfaces()),
         "reference": _restore_signal(data["reference"]),
         "feedforward": (added := data.get("feedforward")) and _restore_signal(added),
         "disturbance": tuple(_restore_signal(d) for d in data["disturbance"]),
@@ -111,46 +103,6 @@ def _restore_plant(data: dict) -> Plant:
     if module != find_plant(name).build.__module__:
         raise ScenarioError(f"plant {name!r} is not one of the library's: import {module}, which defines it, to run it")
     return find_plant(name, **plant)
-
-
-def _component(c: Component) -> dict:
-    if c.each:
-        return {"name": c.name, "each": [_component(one) for one in c.each]}
-    return {"name": c.name, "gains": dict(c.gains), "memory": c.memory} | {
-        "degree": c.relative_degree,
-        "module": getattr(c.function, "__module__", ""),
-    }
-
-
-def _restore_law(data: dict) -> Component:
-    if "each" in data:
-        return by_channel([_restore_law(one) for one in data["each"]])
-    return _find(data, "law", known_laws() | _laws_elsewhere(data["module"]))
-
-
-def _find(data: dict, kind: str, known: Catalogue[Template]) -> Component:
-    module, template = data["module"], known.get(data["name"])
-    named = known.own.values() if template is None else [template]  # one of the library may have been renamed
-    there = (one for one in named if one.function.__module__ == module and {*data["gains"]} <= {*one.gains})
-    if template := next(there, None):
-        bound = template.bind(data["gains"])
-        return bound if bound.name == data["name"] else bound.named(data["name"])
-    return Component(
-        kind=kind,
-        name=data["name"],
-        gains=dict(data["gains"]),
-        memory=data["memory"],
-        relative_degree=data.get("degree", 1),
-        function=None,
-    )
-
-
-def _laws_elsewhere(module: str) -> dict[str, Template]:
-    """Return the laws of a module of the evidence annex, by name; none of another module."""
-    if not module.startswith(ELSEWHERE) or not importlib.util.find_spec(ELSEWHERE):
-        return {}
-    values = vars(importlib.import_module(module)).values()
-    return {value.name: value for value in values if isinstance(value, Template)}
 
 
 def _signal(signal: Signal) -> dict:

@@ -51,7 +51,7 @@ from smc_mujoco.control.source import by_words, kinds
 from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.metrics.conventions import last
 from smc_mujoco.simulation.conditions import Condition, find_condition
-from smc_mujoco.simulation.grid import DURATION, case, listed
+from smc_mujoco.simulation.grid import DURATION, case, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.run import stream
@@ -229,7 +229,7 @@ def accuracy(
         _cell(as_plant(plant), find_condition(condition), law, h, numbers, gains, duration, starts)
         for plant in listed("plants", plants)
         for condition in listed("conditions", conditions)
-        for law in listed("laws", laws)
+        for law in listed_laws(laws)
     ]
     _warn_of_defaults(cells, gains)
     scenarios = [scenario for cell in cells for scenario in cell.scenarios]

@@ -42,7 +42,7 @@ from smc_mujoco.analysis.ranking import Comparison, Rank, block_ranks, compare, 
 from smc_mujoco.analysis.tuning import result, search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import fingerprint
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, number, unknown, whole
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, unknown, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
@@ -52,7 +52,7 @@ from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
-from smc_mujoco.simulation.grid import case, grid, listed
+from smc_mujoco.simulation.grid import case, grid, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.studies import run_key
 from smc_mujoco.studies.advice import NEEDS, Advice, Choice, ties
@@ -222,8 +222,8 @@ def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> list[Componen
         left_out = {"none", *gain_sets.FORMS}  # FORMS are other implementations of laws that are there already
         return _some([law for law in suitable(properties, plant=plant) if law.name not in left_out], plant, properties)
     found, wanted = [], [PROPERTIES[name] for name in properties]
-    for one in listed("laws", laws):
-        law = find("law", one, catalogue()) if isinstance(one, str) else one
+    for one in listed_laws(laws):
+        law = catalogue()[one] if isinstance(one, str) else one
         template = law if isinstance(law, Template) else coerce.law(law).template
         if template is None or all(each.holds(template) for each in wanted):
             found.append(law)

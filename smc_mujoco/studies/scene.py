@@ -10,9 +10,7 @@ import dataclasses
 import functools
 import hashlib
 import re
-import runpy
 import sys
-import traceback
 from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -22,6 +20,7 @@ from smc_mujoco.common.catalogue import Catalogue, added, source
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.errors import find as lookup
 from smc_mujoco.common.files import shipped
+from smc_mujoco.common.scripts import execute
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
@@ -171,22 +170,6 @@ def read(path: Path) -> Scene:
 def question(path: Path) -> str:
     """Return the first line of a scene file's docstring."""
     return (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n")[0]
-
-
-def execute(path: Path) -> dict:
-    """Return what a user's script defines. It can import modules beside it.
-
-    Raises:
-      ScenarioError: the script raises anything.
-    """
-    sys.path.insert(0, str(path.resolve().parent))
-    try:
-        return runpy.run_path(str(path))
-    except Exception as error:  # whatever a user's script raises
-        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
-        where = f"{path}, line {lines[-1]}" if lines else str(path)
-        what = str(error) if isinstance(error, ScenarioError) else f"{type(error).__name__}: {error}; fix the file"
-        raise ScenarioError(f"{where}: {what}") from error
 
 
 def slug(name: str, longest: int = MAX_NAME) -> str:

@@ -21,7 +21,7 @@ QUICK = {  # of `margins --quick`
 @errors_as_sentences()
 def tune(
     plant: options.PlantName,
-    law: options.LawName,
+    law: options.LawText,
     objective: Annotated[
         str, typer.Option(help="balanced: error, and variation of u; tracking: only error.")
     ] = "balanced",
@@ -138,7 +138,7 @@ def margins(
     if json:
         writable(ended(json, ".json"))
     machines = [options.plant(text) for text in plants or (QUICK["plants"] if quick else PLANTS)]
-    chosen = [options.law(text) for text in options.names(laws, QUICK["laws"] if quick else gain_sets.LAWS)]
+    chosen = options.laws(laws, QUICK["laws"] if quick else gain_sets.LAWS)
     kind = options.names(kinds, QUICK["kinds"] if quick else KINDS)
     with bar("margins") as drawn:
         start = options.starts(x0, None)
@@ -205,8 +205,7 @@ def accuracy(
     for file in (*pictures, *([ended(json, ".json")] if json else [])):
         writable(file)
     machines = [options.plant(text) for text in plants]
-    names = known(machines[0]) if laws == "all" else options.names(laws, gain_sets.LAWS)
-    chosen = [options.law(text) for text in names]
+    chosen = known(machines[0]) if laws == "all" else options.laws(laws, gain_sets.LAWS)
     try:
         h = [float(text) for text in options.names(periods)]
     except ValueError:
@@ -353,7 +352,7 @@ def chatter(
             writable(file)
     else:
         pictures = []
-    chosen = [options.law(text) for text in options.names(laws, gain_sets.LAWS)]
+    chosen = options.laws(laws, gain_sets.LAWS)
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
     cases = [case(options.plant(plant), law, condition, duration, gains, changes=fields) for law in chosen]
     designs = []

@@ -1,10 +1,9 @@
 """Options and arguments that several commands have, and functions that parse them."""
 
-import ast
 import contextlib
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +13,6 @@ from smc_mujoco.common.errors import ScenarioError, find, shown
 
 if TYPE_CHECKING:
     from smc_mujoco.cli.terminal import Terminal
-    from smc_mujoco.control.component import Component, Template
     from smc_mujoco.control.law import Law
     from smc_mujoco.mechanisms.hardware.backlash import Backlash
     from smc_mujoco.mechanisms.hardware.drives import Drive
@@ -59,10 +57,9 @@ Json = Annotated[
         metavar="FILE.json|-", help="Also write the result to a .json file; - prints it, tables go to stderr."
     ),
 ]
-LawName = Annotated[str, typer.Argument(metavar="LAW", help="A law from the table of `smc-mujoco laws`.")]
-LawOrFile = Annotated[
+LawText = Annotated[
     str,
-    typer.Argument(metavar="LAW|FILE.py", help="A law from the table of `smc-mujoco laws`, or a file with your own."),
+    typer.Argument(metavar="LAW|FILE", help="A law, as pid or pid(kp=50, ki=1), or a file with one."),
 ]
 PlantName = Annotated[
     str,
@@ -80,7 +77,7 @@ Threads = Annotated[int | None, typer.Option(min=1, help="Simulations at once; d
 X0 = Annotated[float | None, typer.Option("--x0", help="Where runs start, rad or m; default the plant's own start.")]
 
 SEPARATOR = re.compile(r",(?![^(]*\))")  # a comma outside brackets
-OWN_GAINS = "With your own gains: pid(kp=50, ki=1), or a .json file that `smc-mujoco tune` wrote."
+OWN_GAINS = "With your own gains: pid(kp=50, ki=1). Of a file: my_law.py, or gains.json of `smc-mujoco tune --out`."
 
 
 @contextlib.contextmanager
@@ -140,87 +137,31 @@ def columns(text: str | None) -> dict[str, str]:
     return pairs(text, "columns", "theta=arm_angle,t=time")
 
 
+def laws(text: str | None, default: Sequence[str] = ()) -> "list[str | Law]":
+    """Return the laws in a text such as "pid,slow: classical(k=2),gains.json,my_law.py"; see `control.from_text`."""
+    from smc_mujoco.control import from_text
+
+    return [made for one in names(text, default) for made in from_text.laws(one)]
+
+
 def law(text: str) -> "str | Law":
-    """Return a law by its name, as pid(kp=50, ki=1), or from the .json file that `tune` wrote.
-
-    A label may come first, as in "slow: classical(k=2)". The text is parsed and never evaluated.
+    """Return the one law in a text. The name of a law of the library stays a name.
 
     Raises:
-      ScenarioError: any other text, an unknown law or gain, or a file that is not a tuning.
+      ScenarioError: there are several.
     """
-    name, colon, rest = text.partition(":")
-    if colon and "(" not in name and not isinstance(labelled := law(rest.strip()), str):
-        return labelled.named(name.strip())
-    if text.endswith(".json"):
-        from smc_mujoco.analysis.tuning.result import load
+    from smc_mujoco.control import from_text
 
-        return load(text).law
-    if "(" not in text:
-        return text
-    from smc_mujoco.control.law import catalogue
-
-    return component("law", text, catalogue(), "pid(kp=50, ki=1)")
-
-
-def component(kind: str, text: str, known: "Mapping[str, Template]", example: str) -> "Component":
-    """Return a component by its name, with gains in brackets or without. The text is parsed and never evaluated.
-
-    Raises:
-      ScenarioError: any other text, an unknown name or gain.
-    """
-    try:
-        call = ast.parse(text if "(" in text else f"{text}()", mode="eval").body
-        if not isinstance(call, ast.Call) or call.args:
-            raise ValueError
-        gains = {str(word.arg): float(ast.unparse(word.value)) for word in call.keywords}
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ScenarioError(f"{kind} {shown(text)} cannot be read: write it as {example}") from None
-    return find(kind, ast.unparse(call.func), known)(**gains)
-
-
-def laws_of(text: str) -> "list[Law]":
-    """Return the laws of a Python file, made by @smc.law_function, with default gains; for other texts see `law`.
-
-    Raises:
-      ScenarioError: there is no such file, it fails, or there is no law in it.
-    """
-    from smc_mujoco.control.component import Template
-    from smc_mujoco.control.law import known_laws
-    from smc_mujoco.control.law import law as find
-
-    if not text.endswith(".py"):
-        found = law(text)
-        return [find(found) if isinstance(found, str) else found]
-    from smc_mujoco.studies.scene import execute
-
-    if not Path(text).is_file():
-        raise ScenarioError(f"no file {text!r}: give a Python file with a law in it")
-    values = execute(Path(text)).values()
-    own = {value.name: value() for value in values if isinstance(value, Template) and value.kind == "law"}
-    own = {name: made for name, made in own.items() if made.template is not known_laws().get(name)}
-    if not own:
-        raise ScenarioError(f"{text} has no law: write @smc.law_function above a function (y, gains, memory)")
-    return list(own.values())
+    found = from_text.laws(text)
+    return found[0] if len(found) == 1 else from_text.law(text)
 
 
 def law_with(text: str, gains: str) -> "Law":
-    """Return a law by its name, or the one law of a Python file, with the gains of the option --gains.
-
-    Raises:
-      ScenarioError: an unknown law, a file without a law or with several, or bad gains.
-    """
+    """Return the law in a text with the gains of the option --gains."""
+    from smc_mujoco.control import from_text
     from smc_mujoco.control.component import parsed_gains
-    from smc_mujoco.control.law import law as find
 
-    values = parsed_gains(gains, "--gains")
-    if not text.endswith(".py"):
-        return find(text, **values)
-    made, *others = laws_of(text)
-    if others:
-        names = ", ".join(one.name for one in (made, *others))
-        raise ScenarioError(f"{text} has several laws, {names}: give a file with one")
-    assert made.template is not None
-    return made.template.bind(values, warn=True)
+    return from_text.law(text, **parsed_gains(gains, "--gains"))
 
 
 def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:

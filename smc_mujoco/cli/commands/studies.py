@@ -76,7 +76,7 @@ def which(
         options.plant(plant),
         asked,
         options.names(needs),
-        None if laws is None else [options.law(text) for text in options.names(laws)],
+        None if laws is None else options.laws(laws),
         seeds,
         duration,
         options.starts(x0, spread),
@@ -172,7 +172,7 @@ def bench(
                 "--rig brings its own plant, parameter sets and gains: leave out --plants, --conditions, "
                 "--condition and --gains"
             )
-        chosen = None if laws is None else [options.law(text) for text in options.names(laws)]
+        chosen = None if laws is None else options.laws(laws)
         ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
         machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
         scenarios = ensemble.runs(machine, chosen, count, "default", length, begin)
@@ -208,8 +208,7 @@ def _grid(
 
     machines = [options.plant(text) for text in options.names(plants, size.plants)]
     usual = () if own else applicable(size.conditions, [as_plant(plant) for plant in machines], duration)
-    chosen = options.names(laws, size.laws)
-    chosen = general_laws(machines, gains or "tuned") if laws == "all" else [options.law(text) for text in chosen]
+    chosen = general_laws(machines, gains or "tuned") if laws == "all" else options.laws(laws, size.laws)
     found = options.conditions(options.names(conditions, usual), own)
     if gains is not None:
         return grid(machines, chosen, found, seeds, gains, duration, starts)

@@ -7,6 +7,7 @@ too.
 
 import functools
 import inspect
+import math
 import platform
 import re
 import textwrap
@@ -15,9 +16,9 @@ from smc_mujoco.common.errors import ScenarioError, shown, unknown, whole
 from smc_mujoco.common.jit import AtAddress
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.common.version import __version__
-from smc_mujoco.control.component import Component, Template, Value, written
+from smc_mujoco.control import from_text
+from smc_mujoco.control.component import Component, Template, Value, at, written
 from smc_mujoco.control.law import catalogue, known_laws
-from smc_mujoco.control.law import law as find_law
 from smc_mujoco.exchange.c import build, joint_translate
 from smc_mujoco.exchange.c.joint_translate import JOINTS, SLOTS
 from smc_mujoco.exchange.c.translate import MATH, Untranslatable, plain, rows, translate
@@ -32,7 +33,7 @@ def law_to_c(law: Component | Template | str, numbers: str = "double", joints: i
     """Return a law as one C99 file, with its gains as defaults. `smc.law_from_c` can load it.
 
     Args:
-      law: a Law, its Template, or its name.
+      law: a Law, its Template, or its text, see `law`.
       numbers: "double", "float", or, only for the paper's law observer_free, "q15": words of 16 bits.
       joints: for how many joints a law of many joints is written. Default: as many as it has values of a gain.
 
@@ -59,7 +60,8 @@ def with_head(law: Component, numbers: str, slots: int, code: str, joints: int, 
       measured: whether its head has the size of the compiled code, which depends on the compiler.
     """
     real = ["#define SMC_REAL float"] if numbers == "float" else []
-    body = "\n".join([*includes(code), "", *real, _facts(law, slots, joints), code, ""])
+    facts = _facts(law, slots, joints, numbers == "float")
+    body = "\n".join([*includes(facts + code), "", *real, facts, code, ""])
     return f"{_head(law, numbers, slots, joints, code, _measured(body) if measured else '')}\n{body}"
 
 
@@ -69,7 +71,7 @@ def writable(law: Component | Template | str) -> Component:
     Raises:
       ScenarioError: it is no law, is in C already, or is of one channel and has gains by channel.
     """
-    law = find_law(law) if isinstance(law, str) else law() if isinstance(law, Template) else law
+    law = from_text.law(law) if isinstance(law, str) else law() if isinstance(law, Template) else law
     if not isinstance(law, Component) or law.kind != "law" or law.function is None:
         raise ScenarioError(f"cannot write {shown(law)} in C: give smc.law(...), your own law, or a name")
     if isinstance(law.function, AtAddress):
@@ -152,14 +154,16 @@ def _fixed_point(law: Component) -> str:
     return re.sub(r"@(\w+)@", lambda found: str(words[found[1]]), text)
 
 
-def _facts(law: Component, slots: int, joints: int) -> str:
+def _facts(law: Component, slots: int, joints: int, single: bool) -> str:
     """Return the header, the names of the gains, and the constants that describe the law."""
     defaults = ",".join(f"{plain(name)}={_default(value)}" for name, value in law.gains.items())
+    values = [_literal(at(value, i), single) for value in law.gains.values() for i in range(max(joints, 1))]
     lines = [
         *([f"#define {JOINTS} {joints}", f"#define {SLOTS} {slots}"] if joints else []),
         (build.JOINT_HEADER if joints else build.HEADER).read_text(encoding="utf-8"),
         *gain_names(law),
         f'const char smc_law_gains[] = "{defaults}";',
+        *(textwrap.wrap(f"const smc_real smc_law_defaults[] = {{{', '.join(values)}}};", 112) if values else []),
         *([f'const char smc_law_shared[] = "{",".join(map(plain, law.shared))}";'] if joints else []),
         f"const int smc_law_memory = {slots};",
         "const int smc_law_real = sizeof(smc_real);",
@@ -173,6 +177,13 @@ def _facts(law: Component, slots: int, joints: int) -> str:
 def _default(value: Value) -> str:
     """Return the default of a gain, or those of all joints."""
     return " ".join(map(repr, value)) if isinstance(value, tuple) else repr(value)
+
+
+def _literal(value: float, single: bool) -> str:
+    """Return a number in C."""
+    if math.isinf(value):
+        return "-INFINITY" if value < 0.0 else "INFINITY"
+    return f"(float){value!r}" if single else repr(value)
 
 
 def _head(law: Component, numbers: str, slots: int, joints: int, code: str, size: str) -> str:

@@ -49,6 +49,7 @@ int smc_law(const smc_joint_measurement *y, const smc_real *gains, smc_real *mem
 
 /* Optional definitions: */
 extern const char smc_law_gains[];  /* names and defaults of its gains, such as "lam=6,k1=3 5" for two joints */
+extern const smc_real smc_law_defaults[]; /* those defaults, ready to be passed as gains[] */
 extern const char smc_law_shared[]; /* names of gains that are one number for all joints, such as "rho,eps" */
 extern const int smc_law_memory;    /* numbers of memory for each joint */
 extern const int smc_law_real;      /* sizeof(smc_real) */

@@ -43,6 +43,7 @@ int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, s
 
 /* Optional definitions: */
 extern const char smc_law_gains[]; /* names and defaults of its gains, such as "lam=6,k1=3" */
+extern const smc_real smc_law_defaults[]; /* those defaults, ready to be passed as gains[] */
 extern const int smc_law_memory;   /* length of memory[] */
 extern const int smc_law_real;     /* sizeof(smc_real); without it a library is assumed to use doubles */
 extern const int smc_law_degree;   /* relative degree of the sliding variable it needs: 1, 2 or 3 */

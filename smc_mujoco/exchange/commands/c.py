@@ -57,7 +57,7 @@ def check_c(
 
 @errors_as_sentences()
 def export_c(
-    law: options.LawOrFile,
+    law: options.LawText,
     gains: Annotated[
         str, typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's defaults.")
     ] = "",
@@ -73,7 +73,8 @@ def export_c(
     double precision it gives the trace of the library's own law; compile it with -ffp-contract=off to get the same
     bits.
 
-    A Python file has one law, made by @smc.law_function.
+    LAW may also be a file: my_law.py with one law, made by @smc.law_function, or gains.json that `smc-mujoco tune
+    --out` wrote.
 
     A law of many joints is written for a number of joints. Its gains may have one value for each joint, as in
     --gains "k=8 20 15,c=5".

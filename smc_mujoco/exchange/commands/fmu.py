@@ -14,7 +14,7 @@ from smc_mujoco.common.interrupts import held_back
 
 @errors_as_sentences()
 def export_fmu(
-    law: options.LawOrFile,
+    law: options.LawText,
     gains: Annotated[
         str, typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's defaults.")
     ] = "",
@@ -41,7 +41,8 @@ def export_fmu(
     The file contains C source code and a binary for this machine; it needs no Python. Its inputs are x, v (unless an
     estimator replaces it), the reference r and dr, and ddr if the law reads it. Its outputs are u and s. All gains are
     tunable parameters. The law runs every --period seconds on the inputs as they are at that time. In double precision
-    it gives the bits of `smc-mujoco run`. A Python file has one law, made by @smc.law_function.
+    it gives the bits of `smc-mujoco run`. LAW may also be a file: my_law.py with one law, made by
+    @smc.law_function, or gains.json that `smc-mujoco tune --out` wrote.
 
     A law of many joints has a variable for each element: x[1], x[2], M[1,1]. Its inputs are also those of M, h, g, the
     matrix C of Coriolis forces and the tip's Jacobian J that it reads. Its gains may have one value for each joint, as
@@ -52,13 +53,13 @@ def export_fmu(
     with held_back():
         from smc_mujoco.control import estimator
         from smc_mujoco.control import surface as surfaces
+        from smc_mujoco.control.from_text import component
         from smc_mujoco.exchange.fmu.export import export_fmu as export
 
     chosen = options.law_with(law, gains)
     parts = {
-        "surface": surface and options.component("surface", surface, surfaces.catalogue(), "linear(c=3)"),
-        "velocity": velocity
-        and options.component("velocity estimator", velocity, estimator.catalogue(), "levant(L=4800)"),
+        "surface": surface and component("surface", surface, surfaces.catalogue(), "linear(c=3)"),
+        "velocity": velocity and component("velocity estimator", velocity, estimator.catalogue(), "levant(L=4800)"),
     }
     numbers = {"control_period": period, "u_max": u_max, "joints": joints}
     with options.joints_as_option():

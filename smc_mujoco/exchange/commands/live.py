@@ -5,7 +5,6 @@ from typing import Annotated
 
 import typer
 
-from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.interrupts import held_back
 
@@ -23,7 +22,7 @@ def live(
     ] = None,
     law: Annotated[
         list[str] | None,
-        typer.Option(metavar="LAW|FILE.py", help="Your own law, in addition to the library's; may be repeated."),
+        typer.Option(metavar="LAW|FILE", help="Your own law, in addition to the library's; may be repeated."),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("live"),
     serve: Annotated[bool, typer.Option(help="Whether to serve the page on this machine, until Ctrl-C.")] = False,
@@ -36,8 +35,8 @@ def live(
     to JavaScript, with the same sampling, delay, noise and integrator. Its traces are those of `smc-mujoco run` within
     rounding. The address of the page holds all that you set, so that a link shares it.
 
-    `--law` takes a Python file with laws made by @smc.law_function, a law with gains such as "pid(kp=50, ki=1)", or a
-    .json file that `smc-mujoco tune` wrote.
+    `--law` takes a Python file with laws made by @smc.law_function, a law with gains such as "pid(kp=50, ki=1)", or
+    gains.json that `smc-mujoco tune --out` wrote.
 
     The first build fetches MuJoCo for browsers and three.js (10 MB) with npm. Node.js has npm, and so has
     `pip install 'smc-mujoco[live]'`.
@@ -50,9 +49,8 @@ def live(
         from smc_mujoco.exchange.live.build import live as build
 
     terminal = Terminal()
-    own = [made for text in law or () for made in options.laws_of(text)]
     with bar("the live page", shown=terminal.is_terminal):
-        page = build(plants or PLANTS, own, out)
+        page = build(plants or PLANTS, law or (), out)
     terminal.wrote(page)
     if serve:
         _serve(page.parent, port, terminal)

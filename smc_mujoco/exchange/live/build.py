@@ -19,6 +19,7 @@ from smc_mujoco.exchange.c.javascript import to_js
 from smc_mujoco.exchange.live import facts as known
 from smc_mujoco.exchange.live import npm
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.grid import listed_laws
 
 PAGE = Path(__file__).parent / "page"
 PLANTS = ("inverted_pendulum", "duffing", "van_der_pol")  # the paper's three plants with one joint
@@ -27,7 +28,7 @@ FACTS = "facts.json"  # a folder with this file is a live page, which may be rep
 
 def live(
     plants: Sequence[str | Plant] = PLANTS,
-    laws: Sequence[Component | Template] = (),
+    laws: Sequence[Component | Template | str] = (),
     out: str | os.PathLike[str] = "live",
 ) -> Path:
     """Build the live page: plants and laws in a browser, where MuJoCo simulates them and the reader moves the sliders.
@@ -38,7 +39,7 @@ def live(
 
     Args:
       plants: plants of the library with one motor, or their names.
-      laws: your own laws, in addition to those of the library.
+      laws: your own laws, also as text, see `law`, in addition to those of the library.
       out: the folder to write.
 
     Returns:
@@ -49,7 +50,7 @@ def live(
     """
     names = [plants] if isinstance(plants, str | Plant) else taken("plants", plants)
     chosen = known.checked(names or PLANTS)
-    own = [_own(law) for law in taken("laws", laws)]
+    own = [_own(law) for law in (listed_laws(laws) if laws else ())]
     functions = {("law", law.name): to_js(law) for law in own}
     offered = list(own)
     for one in _library(chosen):
@@ -92,7 +93,7 @@ def _script(functions: Mapping[tuple[str, str], str]) -> str:
 
 def _own(law: object) -> Component:
     """Return a user's law, with its default gains if it is a template."""
-    made = law() if isinstance(law, Template) else law
+    made = find_law(law) if isinstance(law, str) else law() if isinstance(law, Template) else law
     if not isinstance(made, Component) or made.kind != "law":
         raise ScenarioError(f"laws has {shown(law)}: give laws made by @smc.law_function")
     return checked_name(made)

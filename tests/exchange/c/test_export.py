@@ -325,6 +325,25 @@ def test_the_file_says_formula_source_gains_and_sizes(capsys):
     assert max(map(len, text.splitlines())) <= 123
 
 
+@pytest.mark.parametrize(
+    ("law", "options", "kind"),
+    [
+        (smc.law("super_twisting", k1=0.1), {}, ctypes.c_double),
+        (smc.law("super_twisting", k1=0.1), {"numbers": "float"}, ctypes.c_float),
+        (smc.law("unit_vector", c=(8.0, 20.0, 0.1)), {"joints": 3}, ctypes.c_double),
+    ],
+    ids=("double", "float", "joints"),
+)
+def test_gains_are_ready_to_be_passed(tmp_path, law, options, kind):
+    (tmp_path / "law.c").write_text(smc.law_to_c(law, **options))
+    strict = (*STRICT, "-Wfloat-conversion", "-shared", "-fPIC")
+    subprocess.run([*build.compiler(), *strict, "law.c", "-o", "law.so", "-lm"], cwd=tmp_path, check=True)
+    library = ctypes.CDLL(str(tmp_path / "law.so"))
+    n = options.get("joints", 1)
+    values = [one for gain in law.gains.values() for one in (gain if isinstance(gain, tuple) else [gain] * n)]
+    assert [*(kind * len(values)).in_dll(library, "smc_law_defaults")] == [kind(one).value for one in values]
+
+
 def test_without_a_compiler_it_is_written_all_the_same(monkeypatch):
     with_one = smc.law_to_c("twisting")
     monkeypatch.setenv("CC", "nocc")
@@ -342,7 +361,7 @@ def test_without_a_compiler_it_is_written_all_the_same(monkeypatch):
         (["twisting", "--gains", "r3=1"], "unknown gain of twisting 'r3'"),
         (["twisting", "--gains", "r1=-1"], "twisting's r1 is -1: give a number greater than 0"),
         (["twisting", "--gains", "r1"], "--gains is 'r1': give names and numbers"),
-        (["none.py"], "no file 'none.py': give a Python file with a law in it"),
+        (["none.py"], "no file 'none.py': give a file with a law in it, or a name"),
     ],
 )
 def test_a_mistake_in_the_command_is_one_sentence(capsys, words, said):

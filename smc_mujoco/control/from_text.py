@@ -1,0 +1,153 @@
+"""Laws and other components as text: `pid`, `pid(kp=50, ki=1)`, or a file with a law in it.
+
+    smc.law("gains.json")        # what `smc-mujoco tune --out gains.json` wrote
+    smc.law("my_law.py", lam=5)  # a law made by @smc.law_function
+    smc.law("slow: classical(k=2, c=3)")
+
+Files are Python (.py), tunings (.json), C (.c, .so) and FMUs (.fmu). Gains in brackets may follow a file, too. A text
+is parsed and never evaluated, but the code of a file is run. So names in data that others wrote are looked up in the
+catalogue instead.
+"""
+
+import ast
+import os
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from smc_mujoco.common import annexes
+from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.files import read_json, reading
+from smc_mujoco.common.scripts import execute
+from smc_mujoco.control import as_data
+from smc_mujoco.control.component import Component, Template, Value
+from smc_mujoco.control.law import Law, known_laws
+
+GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DOTALL)  # pid(kp=50, ki=1)
+LABEL = re.compile(r"(?P<label>[^:()]+):\s*(?P<rest>.+(?:\(.*\)|\.\w+)\s*)", re.DOTALL)  # slow: pid(kp=50)
+
+
+def law(text: str, **gains: float | Sequence[float]) -> Law:
+    """Return a law from a text, with these gains. `smc.law(...).named("slow")` gives it another name.
+
+    Args:
+      text: the name of a law of the library, such as "pid"; a name with gains, such as "pid(kp=50, ki=1)"; or a file
+        with one law: FILE.json that `smc-mujoco tune` wrote, FILE.py, FILE.c or FILE.fmu.
+      gains: one number for all channels, or a sequence with one for each driven channel.
+
+    Raises:
+      ScenarioError: an unknown law or gain, a gain out of range, or a file without a law or with several.
+    """
+    made, *others = (known_laws()[one]() if isinstance(one, str) else one for one in laws(text))
+    if others:
+        names = ", ".join(one.name for one in (made, *others))
+        raise ScenarioError(f"{text} has several laws, {names}: give a file with one")
+    return _with(made, gains)
+
+
+def laws(text: object) -> list[str | Law]:
+    """Return the laws of a text. The name of a law of the library stays a name: sets of gains go by it.
+
+    Raises:
+      ScenarioError: as `law`, but a file of Python may have several laws.
+    """
+    if not isinstance(text, str) or text in known_laws():
+        find("law", text, known_laws())
+        return [str(text)]
+    if os.path.exists(text):
+        head, gains = text, {}
+    elif labelled := LABEL.fullmatch(text):
+        return [law(labelled["rest"]).named(labelled["label"].strip())]
+    else:
+        head, gains = _parts("law", text, "pid(kp=50, ki=1)")
+    if read := _reader(head):
+        return [_with(one, gains) for one in read(head)]
+    return [find("law", head, known_laws()).bind(gains, warn=True)]
+
+
+def component(kind: str, text: str, known: Mapping[str, Template], example: str) -> Component:
+    """Return a component of a catalogue from its name, with gains in brackets or without.
+
+    Args:
+      kind, example: what it is, and a correct text, in an error.
+
+    Raises:
+      ScenarioError: any other text, an unknown name or gain.
+    """
+    head, gains = _parts(kind, text, example)
+    return find(kind, head, known).bind(gains, warn=True)
+
+
+def _parts(kind: str, text: str, example: str) -> tuple[str, dict[str, Value]]:
+    """Return what stands before the brackets of a text, and the gains in them."""
+    try:
+        found = GAINS.fullmatch(text.strip())
+        call = found and ast.parse(f"f({found['gains'] or ''})", mode="eval").body
+        if not found or not isinstance(call, ast.Call) or call.args:
+            raise ValueError
+        return found["head"], {str(word.arg): _value(word.value) for word in call.keywords}
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ScenarioError(f"{kind} {shown(text)} cannot be read: write it as {example}") from None
+
+
+def _value(node: ast.expr) -> Value:
+    """Return a gain from its text: a number, or several in brackets."""
+    if isinstance(node, ast.Tuple | ast.List):
+        return tuple(float(ast.unparse(one)) for one in node.elts)
+    return float(ast.unparse(node))
+
+
+def _with(made: Law, gains: Mapping[str, float | Sequence[float]]) -> Law:
+    """Return a law with some gains changed."""
+    if not gains:
+        return made
+    if made.template is None:
+        raise ScenarioError(f"law {made} takes no gains here: leave {', '.join(gains)} out")
+    return made.template.bind({**made.gains, **gains}, warn=True)
+
+
+def _of_python(path: str) -> list[Law]:
+    """Return the laws that a file of Python makes with @smc.law_function, with their default gains."""
+    values = execute(Path(path)).values()
+    own = {value.name: value for value in values if isinstance(value, Template) and value.kind == "law"}
+    made = [each() for name, each in own.items() if each is not known_laws().get(name)]
+    if not made:
+        raise ScenarioError(f"{path} has no law: write @smc.law_function above a function (y, gains, memory)")
+    return made
+
+
+def _of_tuning(path: str) -> list[Law]:
+    """Return the law of a tuning, whose gains have that search as their source."""
+    with reading(path, "tuning", "give a .json file that smc-mujoco tune or Tuned.save wrote") as file:
+        scenario = read_json(file)["scenario"]
+        made = as_data.law(scenario["law"], scenario["source"])
+    if any(part.function is None for part in made.parts):
+        gains = ", ".join(f"{name}={value!r}" for name, value in made.gains.items())
+        raise ScenarioError(f"the law of {path} is your own: give its file with these gains, as my_law.py({gains})")
+    return [made]
+
+
+def _of_c(path: str) -> list[Law]:
+    return [annexes.module("smc_mujoco.exchange.c.load", f"law {path}").law_from_c(path)()]
+
+
+def _of_fmu(path: str) -> list[Law]:
+    return [annexes.module("smc_mujoco.exchange.fmu.load", f"law {path}").law_from_fmu(path)()]
+
+
+READERS = {".py": _of_python, ".json": _of_tuning, ".c": _of_c, ".so": _of_c, ".fmu": _of_fmu}  # by suffix
+
+
+def _reader(text: str) -> Callable[[str], list[Any]] | None:
+    """Return the function that reads the laws of a file; None for the text of no file.
+
+    Raises:
+      ScenarioError: there is no such file, or it is of another kind.
+    """
+    suffix, exists = Path(text).suffix, os.path.exists(text)
+    if suffix in READERS and not exists:
+        raise ScenarioError(f"no file {text!r}: give a file with a law in it, or a name")
+    if suffix not in READERS and exists:
+        raise ScenarioError(f"{text} is no file of a law: give {', '.join(READERS)}, or a name")
+    return READERS.get(suffix)

@@ -1,0 +1,116 @@
+"""Laws as text: names, gains in brackets, and files, at every door that takes a law."""
+
+import json
+import re
+
+import pyarrow.parquet
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.cli import main as cli
+
+MINE = """
+import smc_mujoco as smc
+from smc_mujoco.control.units import RATE, Gain
+
+@smc.law_function(gains={"k": Gain(2.0, RATE), "c": Gain(1.0, RATE)})
+def mine(y, gains, memory):
+    s = y.de + gains.c * y.e
+    return -gains.k * s, s
+"""
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch):
+    """Files of laws, in the working folder."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(MINE)
+    (tmp_path / "two.py").write_text(MINE + MINE.replace("mine", "other"))
+    (tmp_path / "notes.txt").write_text("pid")
+    (tmp_path / "empty.json").write_text("{}")
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def tuned():
+    return smc.tune("duffing", smc.law("boundary_layer", k=0.01), budget=4)
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "gains"),
+    [
+        ("twisting", "twisting", {}),
+        ("twisting(r1=5, r2=2e0)", "twisting", {"r1": 5.0, "r2": 2.0}),
+        ("slow: twisting(r1=5)", "slow", {"r1": 5.0}),
+        ("twisting(r1=(5, 6))", "twisting", {"r1": (5.0, 6.0)}),
+        ("mine.py", "mine", {"k": 2.0}),
+        ("./mine.py(k=4)", "mine", {"k": 4.0, "c": 1.0}),
+        ("fast: mine.py(k=4)", "fast", {"k": 4.0}),
+    ],
+)
+def test_a_text_is_its_law(files, text, name, gains):
+    law = smc.law(text)
+    assert law.name == name
+    assert {each: law.gains[each] for each in gains} == gains
+    assert law.source.kind == ("yours" if "(" in text else "default")
+
+
+def test_a_tuning_is_its_law_and_keeps_its_source(files, tuned):
+    tuned.save("st.json")
+    law = smc.law("st.json")
+    assert (law, law.source) == (tuned.law, tuned.law.source)
+    assert law.source.kind == "tuned here"
+    assert smc.law("st.json", c=9.0).gains == {**tuned.law.gains, "c": 9.0}
+    assert {s.law for s in smc.grid("duffing", ["st.json"], seeds=2)} == {tuned.law}
+
+
+@pytest.mark.filterwarnings("ignore:no set of gains tried")
+def test_a_tuning_goes_through_every_door(files, tuned, capsys):
+    tuned.save("st.json")
+    assert smc.law_to_c("st.json") == smc.law_to_c(tuned.law)
+    for words in (
+        ("export-c", "st.json"),
+        ("export-fmu", "st.json", "--no-binary"),
+        ("bench", "--plants", "duffing", "--laws", "st.json,two.py", "--seeds", "1", "--duration", "0.1",
+         "--conditions", "nominal"),
+        ("margins", "duffing", "--laws", "st.json", "--kinds", "delay", "--quick"),
+        ("basin", "duffing", "--law", "st.json", "--points", "2", "--duration", "0.1"),
+        ("tune", "duffing", "st.json", "--budget", "1"),
+    ):  # fmt: skip
+        with pytest.raises(SystemExit) as end:
+            cli.main([*words])
+        assert not end.value.code, (words, capsys.readouterr().err)
+    rows = pyarrow.parquet.read_table("study/results.parquet")
+    assert {*rows["law"].to_pylist()} == {"boundary_layer", "mine", "other"}
+
+
+def test_gains_of_your_own_law_are_named_where_its_code_is_missing(files):
+    smc.tune("duffing", smc.law("mine.py"), budget=1).save("mine.json")
+    gains = json.loads((files / "mine.json").read_text())["scenario"]["law"]["gains"]
+    with pytest.raises(smc.ScenarioError, match=r"mine\.json is your own: give its file .* my_law\.py\(k=") as error:
+        smc.law("mine.json")
+    text = str(error.value).rpartition("my_law.py")[2]
+    assert smc.law(f"mine.py{text}").gains == gains
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("twistin", "unknown law 'twistin': did you mean 'twisting'"),
+        ("twisting(5)", "cannot be read: write it as"),
+        ("twisting(r1=5", "cannot be read: write it as"),
+        ("twisting(r1=__import__('os'))", "cannot be read: write it as"),
+        ("twisting(r9=5)", "unknown gain of twisting 'r9'"),
+        ("none.py", "no file 'none.py': give a file with a law in it, or a name"),
+        ("two.py", "two.py has several laws, mine, other: give a file with one"),
+        ("notes.txt", "notes.txt is no file of a law: give .py, .json, .c, .so, .fmu"),
+        ("empty.json", "empty.json is not a tuning"),
+        (".", ". is no file of a law"),
+        ("\0", "unknown law"),
+        (3, "unknown law 3"),
+    ],
+)
+def test_other_texts_are_one_sentence(files, text, said):
+    with pytest.raises(smc.ScenarioError, match=re.escape(said)) as error:
+        smc.law(text)
+    assert "\n" not in str(error.value)
