@@ -79,6 +79,7 @@ from smc_mujoco.metrics.catalogue import score as score
 from smc_mujoco.metrics.catalogue import scores as scores
 from smc_mujoco.metrics.tip import joint_scores as joint_scores
 from smc_mujoco.metrics.tip import tip_scores as tip_scores
+from smc_mujoco.simulation.clock import Clock as Clock
 from smc_mujoco.simulation.conditions import condition as condition
 from smc_mujoco.simulation.grid import grid as grid
 from smc_mujoco.simulation.initial_states import starts as starts

@@ -85,6 +85,10 @@ class Loop:
     def __init__(self, scenario: Scenario, channel: int = 0, late: float = 0.0):
         self.scenario, self.channel, self.late, s = scenario, channel, late, scenario.resolved
         plant = s.plant
+        if not s.clock.regular:
+            raise ScenarioError(
+                "chattering is predicted for samples that are on time: leave the clock out, or measure it in a run"
+            )
         for joint, low, high in plant.ranges:
             if not low <= 0.0 <= high:
                 raise ScenarioError(

@@ -1,4 +1,4 @@
-"""Margins: the largest delay, disturbance, friction, mass ratio and noise that a law tolerates on a plant.
+"""Margins: the largest delay, disturbance, friction, mass ratio, noise and jitter that a law tolerates on a plant.
 
     for margin in margins(["duffing"], ["observer_free", "classical"], ["delay"]):
         print(margin.law, margin.value, margin.unit, margin.theory)
@@ -7,9 +7,9 @@
 A run tolerates a level if it does not fail and its ultimate bound after 10 s is at most 5 % of its scale
 (`conventions`). (Then the envelope has shrunk, as the paper's claim on delay requires, because it starts at the scale.)
 The search tries up to nine levels from small to large. Then it halves the interval below the FIRST level that is not
-tolerated, until it is within one control period of delay, or 2 % of other levels. The tolerated levels may have gaps:
-there may be tolerated levels above one that is not. Noise is one realisation, seed 0, the same for every law. A
-disturbance is positive and acts on every channel.
+tolerated, until it is within one control period of delay, an eighth of one of jitter, or 2 % of other levels. The
+tolerated levels may have gaps: there may be tolerated levels above one that is not. Noise is one realisation, seed 0,
+the same for every law. A disturbance is positive and acts on every channel.
 
 Linear theory gives the delay above which rest is unstable. A smooth law then oscillates with an amplitude that grows
 from 0, so it tolerates a little more. Theory also gives the constant force, or dry friction, that holds the plant 5 %
@@ -54,7 +54,8 @@ MAX_FORCE = 6.0  # N or N m: the study's u_max; no actuator there holds a larger
 MAX_MASS_RATIO, MAX_NOISE = 64.0, 2.048  # mass ratio; rad or m: chosen, far above tolerated levels
 DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s
 FINE, COARSE = 0.02, 0.1  # of the level: resolution of a full and of a quick search
-PERIODS = {FINE: 1, COARSE: 5}  # control periods: the same for a delay
+QUANTA = {FINE: 1, COARSE: 5}  # the same for levels that are multiples of a quantum, such as control periods of delay
+JITTER_SHARES = 8  # of the control period, in which jitter is counted; chosen
 QUICK = 5.0  # s, of a quick search's runs
 HALVINGS = 6  # of an interval between two levels, about; for the progress bar
 
@@ -126,7 +127,7 @@ class Kind:
       levels: levels tried first, from small to large.
       put: function of a scenario and a level that returns the scenario with this level.
       none: level without any effect.
-      periods: whether a level is a whole number of control periods.
+      quantum: function of a scenario that returns the number of which a level is a multiple; 0: any level.
       theory: function that returns the largest level by linear theory, None if there is no theory; it may refuse the
         plant.
     """
@@ -136,7 +137,7 @@ class Kind:
     levels: tuple[float, ...]
     put: Callable[[Scenario, float], Scenario]
     none: float = 0.0
-    periods: bool = False
+    quantum: Callable[[Scenario], float] = lambda base: 0.0
     theory: Callable[[Scenario], float | None] = lambda base: None
 
     def unit_for(self, x: str) -> str:
@@ -145,13 +146,12 @@ class Kind:
 
     def search(self, base: Scenario, resolution: float) -> Search:
         """Return the search for the margin of a scenario."""
-        if self.periods:
-            h = base.control_period
+        if quantum := self.quantum(base):
 
             def rounded(level: float) -> float:
-                return max(1, round(level / h)) * h
+                return max(1, round(level / quantum)) * quantum
 
-            step = PERIODS[resolution] * h
+            step = QUANTA[resolution] * quantum
             levels = [rounded(level) for level in self.levels]
             return Search(levels=levels, resolution=lambda low: step, rounded=rounded, low=self.none)
         least = self.levels[0]
@@ -159,7 +159,8 @@ class Kind:
 
     def expected(self, base: Scenario) -> float | None:
         """Return the largest level by linear theory; None if there is none for the law, the plant or the condition."""
-        if base.disturbance or base.friction or base.mismatch or base.jump or base.sensor:  # not in the theory
+        late = not base.clock.regular
+        if late or base.disturbance or base.friction or base.mismatch or base.jump or base.sensor:  # not in the theory
             return None
         if base.feedforward or base.resolved.model == "nominal" or base.resolved.reference != REST:
             return None
@@ -208,13 +209,20 @@ def _heavier(base: Scenario, level: float) -> Scenario:
     return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level})
 
 
+def _later(base: Scenario, level: float) -> Scenario:
+    """Return the scenario whose samples are late by up to `level` control periods."""
+    steps = JITTER_SHARES * math.ceil(base.steps / JITTER_SHARES)
+    clock = dataclasses.replace(base.clock, jitter=level * base.control_period)
+    return dataclasses.replace(base, clock=clock, physics_step=base.control_period / steps)
+
+
 MARGIN_KINDS: dict[str, Kind] = {
     "delay": Kind(
         label="input delay",
         unit="s",
         levels=DELAYS,
         put=lambda base, level: dataclasses.replace(base, input_delay=level),
-        periods=True,
+        quantum=lambda base: base.control_period,
         theory=_critical_delay,
     ),
     "disturbance": Kind(
@@ -244,8 +252,21 @@ MARGIN_KINDS: dict[str, Kind] = {
         levels=_doubled(MAX_NOISE),
         put=lambda base, level: dataclasses.replace(base, noise=Noise(position=level, velocity=RATE * level)),
     ),
+    "jitter": Kind(
+        label="largest delay of a sample, of the control period",
+        unit="1",
+        levels=tuple(i / JITTER_SHARES for i in range(1, JITTER_SHARES)),
+        put=_later,
+        quantum=lambda base: 1.0 / JITTER_SHARES,
+    ),
+    "missed": Kind(
+        label="share of missed samples",
+        unit="1",
+        levels=tuple(i / 10 for i in range(1, 10)),
+        put=lambda base, level: dataclasses.replace(base, clock=dataclasses.replace(base.clock, missed=level)),
+    ),
 }
-KINDS = tuple(MARGIN_KINDS)
+KINDS = ("delay", "disturbance", "friction", "mass", "noise")  # those of the report, and the default
 
 
 # margins of laws on plants
@@ -257,7 +278,7 @@ class Margin:
 
     Attributes:
       plant, law: their names.
-      kind: one of KINDS.
+      kind: one of MARGIN_KINDS.
       value: largest tolerated level. NaN if the run without it fails already. If equal to `searched`, all are
         tolerated.
       unit: unit of value, resolution, searched and theory.
@@ -296,7 +317,8 @@ def margins(
 
     Args:
       plants, laws: names, or your own plants and laws, one or several.
-      kinds: one or several of KINDS.
+      kinds: one or several of "delay", "disturbance", "friction", "mass", "noise", "jitter" and "missed"; the last two,
+        of the controller's clock, are left out by default.
       gains: set of gains, one of `gain_sets.SETS`, or "default".
       quick: whether to make runs of 5 s and search to within 5 control periods or 10 %, for a first look.
       threads: as in `run`.
@@ -334,7 +356,7 @@ def of(
     """
     for kind in kinds:
         find("kind of margin", kind, MARGIN_KINDS)
-    find("resolution", str(resolution), {str(known): known for known in PERIODS})
+    find("resolution", str(resolution), {str(known): known for known in QUANTA})
     cells = [(base, MARGIN_KINDS[kind]) for base in bases for kind in kinds]
     searches = [kind.search(base, resolution) for base, kind in cells]
     going = dict(enumerate(searches))

@@ -22,6 +22,7 @@ from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_names
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.clock import Clock
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.perturbations import Jump, Noise, parameter_factors
 from smc_mujoco.simulation.signals import Constant, PerChannel, Signal
@@ -186,6 +187,11 @@ def instance(name: str, value: T | None, kind: type[T], example: str) -> T | Non
 def noise(value: Noise | None) -> Noise:
     """Return measurement noise, none of it from None."""
     return instance("noise", value, Noise, "smc.Noise(position=..., velocity=...)") or Noise()
+
+
+def clock(value: Clock | None) -> Clock:
+    """Return the controller's clock, a regular one from None."""
+    return instance("clock", value, Clock, "smc.Clock(jitter=..., missed=...)") or Clock()
 
 
 def mismatch(value: Mapping[str, float] | None) -> Mapping[str, float]:

@@ -11,7 +11,8 @@ and never evaluated:
 
 The levels of the suite are those of a machine of the study's size. The friction of 0.1 N m or N is u_max / 60, the gap
 is that of a worn gear, the lag that of a hydraulic valve, and the counts, per revolution or metre, are those of an
-inexpensive encoder. The pulse of "contact" is as strong as u_max, so that it moves whatever can move.
+inexpensive encoder. The pulse of "contact" is as strong as u_max, so that it moves whatever can move. Under "jitter"
+samples are late by up to half of the suite's control period, and one in ten is "missed".
 """
 
 import ast
@@ -42,6 +43,7 @@ from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation.clock import Clock
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, OrnsteinUhlenbeck, Pulse, Recorded, Signal, Sine, Step
@@ -259,7 +261,7 @@ def _keywords(node: ast.Call) -> dict[str, Any]:
 
 def _kinds() -> dict[str, Any]:
     """Return name -> class of all parts and signals, also of users'. The suite's comes before its namesakes."""
-    kinds: list[type] = [Noise, Jump, *subclasses(Part), *subclasses(Signal)]
+    kinds: list[type] = [Noise, Jump, Clock, *subclasses(Part), *subclasses(Signal)]
     kinds = [kind for kind in kinds if kind not in ABSTRACT]
     kinds.sort(key=lambda kind: kind.__module__.startswith("smc_mujoco."))
     return {kind.__name__: kind for kind in kinds}
@@ -269,7 +271,7 @@ def _text(value: Any) -> str:
     """Return a value as `parse` reads it."""
     if isinstance(value, Component):
         return f"{value.name}({', '.join(f'{gain}={number!r}' for gain, number in value.gains.items())})"
-    if isinstance(value, Part | Signal | Noise | Jump):
+    if isinstance(value, Part | Signal | Noise | Jump | Clock):
         texts = [f"{f.name}={_text(getattr(value, f.name))}" for f in dataclasses.fields(value) if f.init]
         return f"{type(value).__name__}({', '.join(texts)})"
     if isinstance(value, tuple):
@@ -353,6 +355,8 @@ REAL: dict[str, Recipe] = {
     "dc_motor": {"actuator": DCMotor()},
     "backlash": {"actuator": Backlash(0.01)},
     "encoder": {"sensor": Encoder(counts=4096)},
+    "jitter": {"clock": Clock(jitter=0.5e-3)},
+    "missed": {"clock": Clock(missed=0.1)},
     "contact": _contact,
 }
 

@@ -4,6 +4,7 @@ At the first stage of a control sample, for each channel:
 
     sensors -> noise, encoder -> velocity estimator -> law -> saturation -> delay buffer
 
+A sample may come late in its period, or be missed, see clock.py. Then its command in the log is the one that it holds.
 At the first stage of a physics step, the command whose delay has passed goes to ctrl, through lags and rate limits. At
 every stage, disturbance(t) goes to xfrc_applied. A friction by a formula follows, at the first stage.
 Each sample is logged with the mean forces since the last one.
@@ -23,7 +24,7 @@ from numba import njit
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.joint_law import HEADER, VECTORS
 from smc_mujoco.mechanisms.hardware.sliding import SLOW
-from smc_mujoco.simulation import philox
+from smc_mujoco.simulation import clock, philox
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.channels import channel_at
 from smc_mujoco.simulation.state import function_at, log_at, signal_at, state_at
@@ -76,10 +77,8 @@ def control(at, sim, data):
             failure = record.DIVERGED
         elif k >= sim.samples:  # the simulation is stepped beyond its end
             failure = record.INTERRUPTED
-        elif within == 0:
-            failure = _measure(at, sim, data, k)
-            if failure == record.FINE:
-                failure = _decide(at, sim, k) if sim.joint == 0 else _decide_together(at, sim, k)
+        else:
+            failure = _sample(at, sim, data, k, within)
         _actuate(sim, data, step)
     if sim.signal_count != 0 and failure == record.FINE:
         fraction = 0.0 if stage == 0 else (LAST_STAGE if stage == 3 else 0.5)
@@ -91,6 +90,32 @@ def control(at, sim, data):
         _release(sim, data)
     elif stage == 0 and within == 0:
         _log(sim, data, k)
+
+
+@njit(error_model="numpy", inline="always")
+def _sample(at, sim, data, k, within):
+    """Run the law at a physics step if it is that of sample k. Until then the command stays. Return a failure code."""
+    late, missed = clock.late(sim, k), clock.missed(sim, k)
+    if within == 0 and (late != 0 or missed):
+        _hold(sim, k)
+    if within != late or missed:
+        return record.FINE
+    t = k * sim.period + late * sim.step
+    failure = _measure(at, sim, data, k, t)
+    if failure == record.FINE:
+        failure = _decide(at, sim, k, t) if sim.joint == 0 else _decide_together(at, sim, k, t)
+    if failure != record.FINE and late != 0:  # some channels may have written into the log
+        _hold(sim, k)
+    return failure
+
+
+@njit(error_model="numpy")
+def _hold(sim, k):
+    """Keep the command of the sample before for sample k, with its u, s and r in the log."""
+    buffer, last = pointer(sim.delay_buffer + 8 * sim.n * (k % sim.delay_slots)), pointer(sim.u)
+    for i in range(sim.n):
+        sample, before = log_at(sim.log, k * sim.n + i), log_at(sim.log, (k - 1) * sim.n + i)
+        sample.u, sample.s, sample.r, buffer[i] = before.u, before.s, before.r, last[i]
 
 
 @njit(error_model="numpy", inline="always")
@@ -130,11 +155,14 @@ def _read(sim, state, i, x, v, j, hinge):
 
 
 @njit(error_model="numpy")
-def _measure(at, sim, data, k):
-    """Measure position, and estimate velocity and acceleration, of every channel at sample k. Return a failure code."""
+def _measure(at, sim, data, k, t):
+    """Measure position, and estimate velocity and acceleration, of every channel at sample k, at time t, s.
+
+    Return a failure code.
+    """
     j, x, v, a = k, pointer(sim.x), pointer(sim.v), pointer(sim.a)
     if sim.read_period != 0.0:
-        j = max(0, math.floor((k * sim.period - sim.read_delay) / sim.read_period + 1e-6))
+        j = max(0, math.floor((t - sim.read_delay) / sim.read_period + 1e-6))
     reading, estimate = sim.reading, sim.estimate
     reading.dt = sim.period
     for i in range(sim.n):
@@ -189,13 +217,13 @@ def _inform(at, sim, y, i, partner):
 
 
 @njit(error_model="numpy")
-def _decide(at, sim, k):
-    """Run the law of every driven channel at sample k. Return a failure code.
+def _decide(at, sim, k, t):
+    """Run the law of every driven channel at sample k, at time t, s. Return a failure code.
 
     The command goes into the delay buffer, and u, s and r into the log.
     """
     y, asked = sim.y, sim.control
-    sim.instant.t = k * sim.period
+    sim.instant.t = t
     if _call(sim.reference, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
         return record.REFERENCE_RAISED
     y.t, y.dt = sim.instant.t, sim.period
@@ -296,11 +324,11 @@ def _inform_together(at, sim, t):
 
 
 @njit(error_model="numpy")
-def _decide_together(at, sim, k):
+def _decide_together(at, sim, k, t):
     """Run a law of many joints at sample k, as `_decide` runs one of one channel. Return a failure code."""
     n, added, law = sim.n, 0.0, sim.law
-    sim.instant.t = k * sim.period
-    failure = _inform_together(at, sim, k * sim.period)
+    sim.instant.t = t
+    failure = _inform_together(at, sim, t)
     if failure != record.FINE:
         return failure
     if sim.feedforward.address != 0:
@@ -330,7 +358,7 @@ def _decide_together(at, sim, k):
 def _actuate(sim, data, step):
     """Give the command whose delay has passed at a physics step, if one arrives, to the actuators."""
     past = step - sim.delay
-    if past >= 0 and past % sim.steps == 0:
+    if past >= 0 and past % sim.steps == clock.late(sim, past // sim.steps):
         buffer = pointer(sim.delay_buffer + 8 * sim.n * (past // sim.steps % sim.delay_slots))
         for i in range(sim.n):
             state_at(sim.states, i).arrived = buffer[i]

@@ -22,7 +22,7 @@ def scenario(s: Any) -> Html:
     defaults = {one.name: one.default for one in dataclasses.fields(s)}
     given = {name: getattr(s, name) for name in defaults if name not in ("plant", "law")}
     blank = (None, (), {})
-    plain = {"noise": _nothing(s.noise), "contact": s.contact.kind == "none"}
+    plain = {"noise": _nothing(s.noise), "clock": _nothing(s.clock), "contact": s.contact.kind == "none"}
     shown = {
         name: value
         for name, value in given.items()

@@ -15,6 +15,7 @@ from numba.extending import intrinsic
 
 MEASUREMENT, PROCESS = 0, 1  # streams of sensor noise, and of the first process noise; further ones count on from it
 DROPOUT = 1 << 32  # stream that decides which readings are lost
+JITTER, MISSED = 1 << 33, 1 << 34  # streams that decide which samples are late, and which are missed
 
 _M0, _M1 = np.uint64(0xD2E7470EE14C6C93), np.uint64(0xCA5A826395121157)
 _W0, _W1 = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBB67AE8584CAA73B)

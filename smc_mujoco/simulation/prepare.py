@@ -196,7 +196,8 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: m
         for made, d in zip(compiled.disturbances, s.disturbance, strict=True)
     ]
     frictions = _frictions(compiled.friction, s.sliding, mechanism.dof_M0[channels["qvel"]], buffer)
-    slots = s.delay_steps // s.steps + 1
+    jitter = s.clock.steps(s.physics_step)
+    slots = s.delay_steps // s.steps + (2 if jitter else 1)  # late commands may arrive after the next sample began
     joints = buffer.put([0.0, float(n), *[0.0] * (4 * n)])
     states = buffer.reserve(state.CHANNEL_STATE.itemsize // 8 * n)
     limits, delay_buffer = buffer.put(s.limits), buffer.reserve(slots * n)
@@ -250,6 +251,8 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: m
         "states": buffer.address(states),
         "log": state.address(log),
         "signals": state.address(signals),
+        "jitter": jitter,
+        "missed": s.clock.missed,
         "delay": s.delay_steps,
         "delay_slots": slots,
         "delay_buffer": buffer.address(delay_buffer),

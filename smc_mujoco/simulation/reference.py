@@ -152,22 +152,40 @@ class Loop:
             raise Failure(PLANT_DIVERGED)
         k, within = divmod(step, self.scenario.steps)
         if within == 0:
-            u, self.s = self.decide(*self.measure(data, k), k)
-            self.commands.append(u)
+            self.commands.append(self.commands[-1] if k else np.zeros(self.scenario.plant.n))
+        if within == self.late(k) and not self.missed(k):
+            t = k * self.scenario.control_period + within * self.scenario.physics_step
+            self.commands[k], self.s = self.decide(*self.measure(data, k, t), t)
+            for name, values in (("u", self.commands[k]), ("s", self.s), ("r", self.r)):
+                self.log[name][k] = values
         past = step - self.scenario.delay_steps
-        if past >= 0:
+        if past >= 0 and past % self.scenario.steps >= self.late(past // self.scenario.steps):
             self.arrived = self.commands[past // self.scenario.steps]
         asked = self.arrived
         if self.drive_step:
             asked, self.first, self.second = self.drive_step(asked, self.first, self.second)
         data.ctrl[self.channels["ctrl"][self.driven]] = (self.scale * asked)[self.driven]
 
-    def measure(self, data: mujoco.MjData, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return measured positions and estimated velocities, (n,) each, at sample k."""
+    def late(self, k: int) -> int:
+        """Return by how many physics steps sample k is late."""
+        steps = self.scenario.clock.steps(self.scenario.physics_step)
+        if not steps or k in (0, self.scenario.samples):
+            return 0
+        return int(words(self.scenario.seed, 0, philox.JITTER, k)[0] * 2.0**-53 * (steps + 1))
+
+    def missed(self, k: int) -> bool:
+        """Return whether sample k does not run."""
+        share = self.scenario.clock.missed
+        if not share or k in (0, self.scenario.samples):
+            return False
+        return words(self.scenario.seed, 0, philox.MISSED, k)[0] * 2.0**-53 < share
+
+    def measure(self, data: mujoco.MjData, k: int, t: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return measured positions and estimated velocities, (n,) each, at sample k, at time t, s."""
         x, v = data.sensordata[self.channels["x_sensor"]], data.sensordata[self.channels["v_sensor"]]
         j, sensor = k, self.scenario.sensor
         if sensor is not None and sensor.period is not None:
-            j = max(0, math.floor((k * self.scenario.control_period - sensor.delay) / sensor.period + 1e-6))
+            j = max(0, math.floor((t - sensor.delay) / sensor.period + 1e-6))
         for i in range(len(x)):
             x[i], v[i] = self.read(i, x[i], v[i], j)
             v[i], self.a[i] = self.estimator(i, Reading(self.scenario.control_period, float(x[i]), float(v[i])))
@@ -189,12 +207,12 @@ class Loop:
         self.last_reading[i] = x, v
         return x, v
 
-    def decide(self, x: np.ndarray, v: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return saturated commands and sliding variables, (n,) each, for measured x and v at sample k."""
+    def decide(self, x: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return saturated commands and sliding variables, (n,) each, for measured x and v at time t, s."""
         scenario = self.scenario
         if scenario.law.joint:
-            return self.decide_together(x, v, k)
-        t, u, s = k * scenario.control_period, np.empty_like(x), np.empty_like(x)
+            return self.decide_together(x, v, t)
+        u, s = np.empty_like(x), np.empty_like(x)
         limits = scenario.limits
         known = [evaluate(signal, t) for signal in references(scenario)]  # one for all, or one for each
         added = 0.0 if scenario.feedforward is None else evaluate(scenario.feedforward, t)[0]
@@ -227,10 +245,9 @@ class Loop:
             raise Failure(f"{self.law.name} returned u = {u:g}, s = {s:g} in channel {i}")
         return self.latest[i]
 
-    def decide_together(self, x: np.ndarray, v: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
+    def decide_together(self, x: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
         """Return what `decide` returns, under a law of many joints."""
         scenario, n = self.scenario, len(x)
-        t = k * scenario.control_period
         known = [evaluate(signal, t) for signal in references(scenario)]
         r, dr, ddr = np.array([known[i % len(known)] for i in range(n)]).T.copy()
         self.r[:] = r

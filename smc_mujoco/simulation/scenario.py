@@ -32,6 +32,7 @@ from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Nominal
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import Coupled, Plant, as_plant
 from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation.clock import Clock
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.philox import PROCESS
 from smc_mujoco.simulation.signals import Impulse, OrnsteinUhlenbeck, PerChannel, Push, Signal
@@ -40,6 +41,7 @@ MIN_TIME, MAX_TIME = 1e-9, 1e9  # s, of periods and of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
+JITTER_STEPS = 4  # physics steps in the clock's jitter, at least; chosen: it takes five values or more
 SHORT_LAG = 0.2  # control periods: a shorter lag needs no shorter physics step, see `longest_step`
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
@@ -75,7 +77,7 @@ class Scenario:
       control_period: s; the law runs this often and its command is held in between.
       physics_step: s; must divide the control period. Default: the largest such step up to 1 ms for the plant's plain
         equation, also behind a Lag (half of it at most), a RateLimit or a DCMotor without inductance; up to 0.25 ms
-        with friction, contact, a mechanism or another actuator.
+        with friction, contact, a mechanism or another actuator; up to a quarter of the clock's jitter.
       u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest motor of your own model.
         A motor's own limit holds too: see `limits`. In V, with the motor's voltage as default, if u is a voltage.
       x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the plant's x0, and 0.
@@ -85,6 +87,7 @@ class Scenario:
       disturbance: d(t), one signal or several to be added, or None.
       noise: measurement noise, or None.
       input_delay: s; a whole number of physics steps. Before the first command arrives, u is 0.
+      clock: the controller's Clock, of which samples may come late or be missed; None: all are on time.
       velocity: an Estimator of the velocity that the law sees, or the name of one. Default: "measured", or
         "filtered_difference" with an encoder, which measures no velocity.
       mismatch: parameter name -> factor on the true plant's parameter, or what is added to one of `plant.added`, such
@@ -131,6 +134,7 @@ class Scenario:
     disturbance: tuple[Signal, ...] = field(converter=coerce.disturbance, default=None)
     noise: Noise = field(converter=coerce.noise, default=None)
     input_delay: float = 0.0
+    clock: Clock = field(converter=coerce.clock, default=None)
     velocity: Estimator | None = field(converter=coerce.velocity, default=None)
     mismatch: Mapping[str, float] = field(converter=coerce.mismatch, default=None)
     jump: Jump | None = field(converter=coerce.jump, default=None)
@@ -163,6 +167,7 @@ class Scenario:
             disturbance: Signal | Sequence[Signal] | None = None,
             noise: Noise | None = None,
             input_delay: float = 0.0,
+            clock: Clock | None = None,
             velocity: Estimator | Template | str | None = None,
             mismatch: Mapping[str, float] | None = None,
             jump: Jump | None = None,
@@ -410,10 +415,11 @@ def longest_step(s: Scenario) -> float:
     A Lag that is about as short as the control period moves its force within a step, of which RK4 gets the mean. Half
     of such a lag keeps the amplitudes of limit cycles right to 2 %; much shorter lags have no such effect.
     """
+    jitter = s.clock.jitter / JITTER_STEPS or MAX_STEP
     if not s.ideal:
-        return REALISTIC_STEP
-    lags = [part.delay for part in s.actuator if part.delay >= SHORT_LAG * s.control_period]
-    return min(MAX_STEP, *(0.5 * lag for lag in lags)) if lags else MAX_STEP
+        return min(REALISTIC_STEP, jitter)
+    lags = (0.5 * part.delay for part in s.actuator if part.delay >= SHORT_LAG * s.control_period)
+    return min(MAX_STEP, jitter, *lags)
 
 
 def _steps(s: Scenario) -> int:
@@ -480,6 +486,7 @@ def check_clock(s: Resolved) -> None:
         raise ScenarioError(f"jump at {s.jump.time:g} s comes after the end of the run at {s.duration:g} s")
     if s.sensor is not None:
         s.sensor.check(s.physics_step)
+    s.clock.check(s.control_period, s.physics_step)
 
 
 def check_signals(s: Resolved) -> None:

@@ -19,6 +19,7 @@ from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation import time_series, waypoints  # noqa: F401  # whose signals a file may name
+from smc_mujoco.simulation.clock import Clock
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import PerChannel, Recorded, Signal
@@ -46,6 +47,7 @@ def describe(scenario: Scenario) -> dict:
             "feedforward": scenario.feedforward and _signal(scenario.feedforward),
             "disturbance": [_signal(d) for d in scenario.disturbance],
             "noise": dataclasses.asdict(scenario.noise),
+            "clock": dataclasses.asdict(scenario.clock),
             "mismatch": dict(scenario.mismatch),
             "jump": scenario.jump and {"time": scenario.jump.time, "factors": dict(scenario.jump.factors)},
             "mechanism": scenario.mechanism,
@@ -80,6 +82,7 @@ def restore(data: dict) -> Scenario:
         "feedforward": (added := data.get("feedforward")) and _restore_signal(added),
         "disturbance": tuple(_restore_signal(d) for d in data["disturbance"]),
         "noise": Noise(**data["noise"]),
+        "clock": Clock(**data["clock"]),
         "mismatch": data["mismatch"],
         "jump": data["jump"] and Jump(**data["jump"]),
     }

@@ -67,6 +67,8 @@ SIMULATION = np.dtype(
         ("channels", "i8"), ("states", "i8"), ("log", "i8"), ("signals", "i8"),
         # the command: delay in physics steps, a ring of (delay_slots, n) commands, bounds (n,), unit of the drive
         ("delay", "i8"), ("delay_slots", "i8"), ("delay_buffer", "i8"), ("limits", "i8"), ("scale", "f8"),
+        # the controller's timer: the largest delay of a sample in physics steps, the share of samples that are missed
+        ("jitter", "i8"), ("missed", "f8"),
         # drives in the callback: whether there are, and what a physics step does to them
         ("has_drives", "i8"), ("drive_step", DRIVE_STEP),
         # the sensor: noise, encoder

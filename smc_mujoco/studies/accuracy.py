@@ -407,8 +407,8 @@ def _outside(scenario: Scenario) -> str:
     """Return why theory promises no order in the control period here; "" if it does."""
     if scenario.actuator:
         return "no promise behind a drive, which adds to the relative degree"
-    if scenario.input_delay:
-        return "no promise with an input delay"
+    if scenario.input_delay or not scenario.clock.regular:
+        return "no promise with an input delay, or samples that are late or missed"
     if scenario.noise != Noise() or scenario.sensor:
         return "no promise with noise or an encoder"
     if scenario.resolved.velocity.name != "measured":
