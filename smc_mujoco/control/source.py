@@ -2,7 +2,7 @@
 
     smc.law("classical").source                            # default
     smc.law("classical", k=3).source                       # yours
-    smc.tune("duffing", "classical").law.source            # tuned here (differential evolution best1bin, 96 ...)
+    smc.tune("duffing", "classical").law.source            # tuned here (CMA-ES and COBYQA from several starts, ...)
 
 A source is of one set of gains. A law whose gains are replaced has the source "yours", so no law keeps a wrong one.
 """
@@ -106,7 +106,7 @@ def kinds(sources: Iterable[Source]) -> str:
 
 
 def in_words(sources: Mapping[str, Iterable[Source]], short: bool = False) -> str:
-    """Return where the gains of laws come from: "gains shipped (...)", or "gains: a and b default, c yours".
+    """Return where the gains of laws come from: "gains: shipped (...)", or "gains: a and b default, c yours".
 
     Args:
       sources: law -> the sources of its gains; one that has no gains is left out.
@@ -147,5 +147,5 @@ def by_words(words: Mapping[str, str]) -> str:
         if its not in ("", NONE):
             laws.setdefault(its, []).append(law)
     if len(laws) < 2:
-        return "".join(f"gains {words}" for words in laws)
+        return "".join(f"gains: {words}" for words in laws)
     return f"gains: {', '.join(f'{joined(names)} {words}' for words, names in laws.items())}"

@@ -104,11 +104,10 @@ def amplitudes(
         if hollow:
             label = "run that half the step changes by > 10 %"
             handles.append(Line2D([], [], color=style.PAPER, mec=style.MUTED, marker="o", lw=0, label=label))
-        handles += shared
         unit = next(iter(runs.values()))[0].scenario.plant.unit
         ax.set(xscale="log", yscale="log", xlabel="lag of the actuator (ms)", ylabel=f"amplitude of s ({unit}/s)")
         ax.xaxis.set_major_formatter("{x:g}")
         ax.margins(0.04, 0.06)
-        pages.set_head(page, width, title or "Chattering", handles)
+        pages.set_head(page, width, title or "Chattering", handles, shared)
         pages.write(page, paths)
     return page

@@ -69,7 +69,6 @@ def plot(
             look = {"marker": marks[law], "ms": style.points(6), "mec": "none", "lw": style.points(1.5)}
             key.append(Line2D([], [], color=colours[law], label=style.law_name(law) + source, **look))
         key.append(Line2D([], [], color=style.MUTED, lw=style.points(1.5), label="95 % interval of the median"))
-        key += shared
         tall = [0.5 + LINE * (len(laws) + 1) * len(_there(table, plant, conditions)) for plant in plants]
         space = pages.head(width, key) + style.points(0.6)
         page = pages.blank(width, height or space + style.points(sum(tall)), fig)
@@ -90,7 +89,7 @@ def plot(
             axes[i, 0].set_title(
                 style.plant_name(shipped) if shipped else plant, y=above, parse_math=False
             )  # over "never"
-        pages.set_head(page, width, title or "Medians by condition", key)
+        pages.set_head(page, width, title or "Medians by condition", key, shared)
         pages.write(page, paths)
     return page
 

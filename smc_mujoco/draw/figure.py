@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from smc_mujoco.common.errors import ScenarioError, taken, unknown
+from smc_mujoco.common.errors import ScenarioError, find, taken
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style, ticks
@@ -19,6 +19,7 @@ from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.draw.panels import Panel
 from smc_mujoco.draw.states import HOLD
+from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.metrics.channel_groups import Group, cut
 from smc_mujoco.simulation.trace import Trace
@@ -27,12 +28,12 @@ OVER_TIME = {  # panel -> quantity
     "x": "x", "error": "e", "spread": "spread", "v": "v", "u": "u", "delivered": "force", "reaction": "reaction",
     "d": "d", "s": "s",
 }  # fmt: skip
-BESIDE = ("phase", "transient", "end")
-PANELS = (*OVER_TIME, "channels", *BESIDE)
+BESIDE = ("phase", "settling", "end")
+NAMES = {name: name for name in (*OVER_TIME, "channels", *BESIDE)}  # of panels
 ROW = 1.5  # inches on a full page, height of a panel over time
-HEIGHTS = {"phase": 1.5, "transient": 1.0, "end": 1.0}  # relative heights of the panels in BESIDE
+HEIGHTS = {"phase": 1.5, "settling": 1.0, "end": 1.0}  # relative heights of the panels in BESIDE
 Row = tuple[Axes, Panel, Sequence[str]]  # axes, the panel with the traces that they show, and the traces' colours
-LOW, FILLED = 0.32, 0.6  # relative height of a row, in a panel that has one for each trace; the part below its name
+LOW, LINES, FILLED = 0.32, 0.45, 0.6  # relative height of a row, with one line, with several; the part below its name
 
 
 def figure(
@@ -45,13 +46,14 @@ def figure(
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
 ) -> Figure | SubFigure:
-    """Draw traces of one plant: x, u and s over time, the phase portrait, close-ups of the transient and of the end.
+    """Draw traces of one plant: x, u and s over time, the phase portrait, |x - r|, and a close-up of the end of u.
 
-    A network is drawn as the mean of its channels with light single channels, and the spread max x - min x. Each driven
-    joint of your own model has two small panels, with its position and reference, and with its error. Joints without an
-    actuator, and channels in another unit, have their own panels. Realistic mechanisms have panels of the actuator's
-    force and of the reaction of friction and contacts; diamonds show where friction holds them. The end of a failed run
-    and the instant at which a plant changes are marked. Curves that coincide are dashed in turn.
+    x, u and s are drawn until all comes to rest, |x - r| over the whole run on a logarithmic axis. Each run of a
+    network has a row with a line for each channel, and there is the spread max x - min x. Each driven joint of your own
+    model has small panels of x and its reference, of the error and of u. Joints without an actuator, and channels in
+    another unit, have their own panels. Realistic mechanisms have panels of the actuator's force and of the reaction of
+    friction and contacts; diamonds show where friction holds them. The end of a failed run and the instant at which a
+    plant changes are marked. Curves that coincide are dashed in turn.
 
     Args:
       traces: one or several traces.
@@ -60,7 +62,7 @@ def figure(
       labels: one label per trace; default: the laws' labels, with the differences between runs of one law.
       title: default: the plant's label.
       panels: names among "x", "error", "spread", "v", "u", "delivered", "reaction", "d", "s", "channels" (small panels
-        of every channel), "phase", "transient" (close-up of x), "end" (close-up of u). Default: those that suit the
+        of every channel), "phase", "settling" (|x - r|), "end" (close-up of u). Default: those that suit the
         plant and the size.
       size: "ieee-column" (3.5 in wide), "ieee-page" (7.16 in), or (width, height) in inches. Default: 12.8 in wide.
       format: "svg", "png" or "pdf", of the file.
@@ -81,17 +83,19 @@ def figure(
     names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
     traces = [finite(trace) for trace in traces]
     narrow = width < pages.NARROW
-    chosen = _default(traces, width) if panels is None else taken("panels", panels)
-    for name in chosen:
-        if name not in PANELS:
-            raise unknown("panel", name, PANELS)
-    overview = _overview(traces, chosen)
-    small = _small(traces) if "channels" in chosen else []
+    chosen = (
+        _default(traces, width) if panels is None else [find("panel", name, NAMES) for name in taken("panels", panels)]
+    )
+    shown = drawing.horizon(traces)
+    early = [drawing.until(trace, shown) for trace in traces]
+    overview = _overview(early, chosen)
+    small = _small(early) if "channels" in chosen else []
     beside = [name for name in chosen if name in BESIDE]
-    places = [Panel("x", *each) for each in style.split(traces).items()]
+    groups = [Panel("x", *each) for each in style.split(traces).items()]
+    places = _parted(groups)
     rests = [drawing.rests(trace) for trace in traces] if "phase" in beside else []
     with style.page(width):
-        key = _key(traces, names, colours, [*overview, *(panel for pair in small for panel in pair)], any(rests))
+        key, gains = _key(traces, names, colours, [*overview, *(panel for row in small for panel in row)], any(rests))
         column = [name for name in beside for _ in (places if name == "phase" else "x")]
         row = style.points(ROW)
         space = pages.head(width, key)
@@ -109,14 +113,14 @@ def figure(
             cell = rest.pop(0) if small else None
             cells, others = rest[: len(overview)], rest[len(overview) :]
         else:
-            grid = page.add_gridspec(1, len(there), width_ratios=[(1.9, 1.7, 1.0)[i] for i in there])
+            grid = page.add_gridspec(1, len(there), width_ratios=[(2.6, 1.7, 1.0)[i] for i in there])
             cell = grid[0] if small else None
             cells, others = (
                 [] if not each else _column(grid[there.index(i + 1)], each) for i, each in enumerate(heights)
             )
         changes = style.marks(traces, names)
         if cell is not None:
-            _draw_small(page, cell, small, colours, changes)
+            _draw_small(page, cell, small, colours, changes, (shown, end(traces)))
         if overview:
             _draw_over_time(
                 page,
@@ -126,9 +130,10 @@ def figure(
                 names,
                 colours,
                 changes,
+                (shown, end(traces)),
             )
-        _draw_beside(page, others, column, places, names, colours, rests)
-        pages.set_head(page, width, title or style.plant_name(traces[0].scenario.plant), key)
+        _draw_beside(page, others, column, (groups[0], *places), names, colours, rests)
+        pages.set_head(page, width, title or style.plant_name(traces[0].scenario.plant), key, gains)
         ticks.space(page)
         pages.write(page, paths)
     return page
@@ -136,7 +141,11 @@ def figure(
 
 def _height(panel: Panel) -> float:
     """Return the relative height of a panel over time."""
-    return max(1.0, LOW * len(panel.traces)) if drawing.crowded(panel) else 1.0
+    return (
+        max(1.0, (LOW if len(panel.group.channels) == 1 else LINES) * len(panel.traces))
+        if drawing.crowded(panel)
+        else 1.0
+    )
 
 
 def _column(cell: SubplotSpec, heights: Sequence[float]) -> list[SubplotSpec]:
@@ -147,12 +156,14 @@ def _column(cell: SubplotSpec, heights: Sequence[float]) -> list[SubplotSpec]:
 
 def _default(traces: Sequence[Trace], width: float) -> list[str]:
     """Return the names of the panels that suit the plant and the page."""
-    several = traces[0].scenario.plant.direct and any(len(group.channels) > 1 for group in style.split(traces))
-    names = ["channels"] if several else ["x", "spread"]
-    names += ["u", "delivered", "reaction", *["s"] * any(np.nan_to_num(trace.s).any() for trace in traces)]
+    several = any(len(group.channels) > 1 for group in style.split(traces))
+    if several and traces[0].scenario.plant.direct:
+        return ["channels", "settling"]
+    names = ["x", "spread", "u", "delivered", "reaction"]
     if several:
-        return [*names, "end"] if width >= style.JOURNAL else names
-    return [*names, "transient"] if width < pages.NARROW else [*names, *BESIDE]
+        return [*names, "settling"]
+    names += ["s"] * any(np.nan_to_num(trace.s).any() for trace in traces)
+    return [*names, "settling"] if width < pages.NARROW else [*names, *BESIDE]
 
 
 def _overview(traces: Sequence[Trace], chosen: Sequence[str]) -> list[Panel]:
@@ -164,19 +175,38 @@ def _overview(traces: Sequence[Trace], chosen: Sequence[str]) -> list[Panel]:
         if name in OVER_TIME and OVER_TIME[name] not in there and name not in ("spread", "delivered", "reaction"):
             parts = style.split(traces).items()
             found += [Panel(OVER_TIME[name], *each) for each in parts if each[0].driven or name in ("v", "error")]
-    return found
+    return _parted(found)
 
 
-def _small(traces: Sequence[Trace]) -> list[tuple[Panel, Panel]]:
+def _parted(found: Sequence[Panel]) -> list[Panel]:
+    """Return the panels, divided into one for each joint of a robot: these have nothing in common."""
+    direct = any(panel.traces[0].scenario.plant.direct for panel in found)
+    return [one for panel in found for one in (drawing.by_channel(panel) if direct else [panel])]
+
+
+def _small(traces: Sequence[Trace]) -> list[tuple[Panel, ...]]:
     """Return the small panels of all groups, channel by channel."""
-    pairs = [pair for group in style.split(traces) for pair in drawing.small(traces, group)]
-    return sorted(pairs, key=lambda pair: pair[0].channel or 0)
+    rows = [row for group in style.split(traces) for row in drawing.small(traces, group)]
+    return sorted(rows, key=lambda row: row[0].channel or 0)
+
+
+def _time(span: tuple[float, float]) -> str:
+    """Return the label of a time axis: the time shown, and that of the run, s."""
+    shown, whole = span
+    return "time (s)" if shown == whole else f"time (s), the first {shown:.2g} s of {whole:g} s"
 
 
 def _draw_over_time(
-    page, cells: Sequence[SubplotSpec], overview: Sequence[Panel], words: Sequence[str], names, colours, changes
+    page,
+    cells: Sequence[SubplotSpec],
+    overview: Sequence[Panel],
+    words: Sequence[str],
+    names,
+    colours,
+    changes,
+    span: tuple[float, float],
 ) -> None:
-    """Draw panels over time in the cells of a column."""
+    """Draw panels over time in the cells of a column; `span`: the time shown, and that of the run, s."""
     frames: list[Axes] = []
     axes: list[Axes] = []
     for i, panel in enumerate(overview):
@@ -185,7 +215,7 @@ def _draw_over_time(
         frames.append(frame)
         for ax, part, own in rows:
             axes.append(ax)
-            ax.set_xlim(0.0, end(overview[0].traces))
+            ax.set_xlim(0.0, span[0])
             drawing.over_time(ax, part, own, among=panel.traces)
             drawing.mark(ax, changes, named=ax is axes[0])
             ax.tick_params(labelbottom=False)
@@ -193,7 +223,7 @@ def _draw_over_time(
             drawing.scale_ticks(ax.yaxis, panel)
         _level(frame, rows)
     axes[-1].tick_params(labelbottom=True)
-    axes[-1].set_xlabel("time (s)")
+    axes[-1].set_xlabel(_time(span))
     page.align_ylabels(frames)
 
 
@@ -231,25 +261,25 @@ def _level(frame: Axes, rows: Sequence[Row]) -> None:
     frame.tick_params(labelcolor="none", length=0)  # invisible numbers, which keep its label beside those of the rows
 
 
-def _draw_small(page, cell: SubplotSpec, small, colours, changes) -> None:
-    """Draw a row for each channel: x with its reference at the left, the error at the right."""
-    rows = cell.subgridspec(len(small), 2)
-    for i, pair in enumerate(small):
-        for k, panel in enumerate(pair):
+def _draw_small(page, cell: SubplotSpec, small, colours, changes, span: tuple[float, float]) -> None:
+    """Draw a row for each channel: x with its reference, the error, and u; `span` as of `_draw_over_time`."""
+    rows = cell.subgridspec(len(small), max(map(len, small)))
+    for i, row in enumerate(small):
+        for k, panel in enumerate(row):
             ax = page.add_subplot(rows[i, k], ylabel=panel.label)
-            ax.set_xlim(0.0, end(panel.traces))
+            ax.set_xlim(0.0, span[0])
             ax.locator_params(axis="y", nbins=3)
             drawing.over_time(ax, panel, colours)
             drawing.scale_ticks(ax.yaxis, panel)
             drawing.mark(ax, changes, named=i == k == 0)
             ax.tick_params(labelbottom=i == len(small) - 1)
             if i == len(small) - 1:
-                ax.set_xlabel("time (s)")
+                ax.set_xlabel(_time(span))
 
 
 def _draw_beside(page, cells: Sequence[SubplotSpec], column: Sequence[str], places, names, colours, rests) -> None:
-    """Draw phase portraits and close-ups in the cells of a column."""
-    portraits = iter(places)
+    """Draw phase portraits and close-ups in the cells of a column; `places`: the first group, then the portraits."""
+    portraits = iter(places[1:])
     for i, name in enumerate(column):
         if name == "end":
             _draw_end(page, cells[i], places[0]._replace(quantity="u"), names, colours)
@@ -262,11 +292,10 @@ def _draw_beside(page, cells: Sequence[SubplotSpec], column: Sequence[str], plac
                 drawing.scale_ticks(axis, part)
                 axis.set_label_text(part.label)
         else:
-            panel = drawing.transient(places[0])
+            panel = places[0]._replace(quantity="settling")
             drawing.over_time(ax, panel, colours)
-            drawing.scale_ticks(ax.yaxis, panel)
-            stop = max(trace.t[-1] for trace in panel.traces) or end(panel.traces)  # of runs that fail at once
-            ax.set(xlabel="time, transient (s)", ylabel=panel.label, xlim=(0.0, stop))
+            words = f"time (s)\nthe largest in {1e3 * drawing.peak_window(panel.traces):.3g} ms"
+            ax.set(xlabel=words, ylabel=panel.label, xlim=(0.0, end(panel.traces)))
 
 
 def _draw_end(page, cell: SubplotSpec, panel: Panel, names, colours) -> None:
@@ -276,9 +305,9 @@ def _draw_end(page, cell: SubplotSpec, panel: Panel, names, colours) -> None:
     for ax, part, own in rows:
         drawing.last_samples(ax, part.traces, own, period)
     _level(frame, rows)
-    channel = ", channel 0" if panel.traces[0].scenario.plant.driven > 1 else ""
-    letter = "u" if channel else "control u"
-    frame.set_ylabel(f"{letter} ({style.units(panel.group)['u']}){channel}")
+    plant = panel.traces[0].scenario.plant
+    letter = f"{joint_names(plant)[0]} u" if plant.driven > 1 or plant.direct else "control u"
+    frame.set_ylabel(f"{letter} ({style.units(panel.group)['u']})")
     rows[-1][0].set_xlabel("time before the end (ms)")
 
 
@@ -346,25 +375,24 @@ def signals(
         axes[0, 0].set_ylim(drawing.limits(control.traces, "u"))
         key = _meaning([control])
         if room > points(250):
-            key.append(Line2D([], [], lw=0, label="at the right: total variation per second over the last 20 %"))
-        key += shared
-        pages.set_head(page, width, title or f"{style.plant_name(traces[0].scenario.plant)}: control", key)
+            shared = "; ".join(filter(None, ["at the right: total variation per second over the last 20 %", shared]))
+        pages.set_head(page, width, title or f"{style.plant_name(traces[0].scenario.plant)}: control", key, shared)
         pages.write(page, paths)
     return page
 
 
 def _key(
     traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], shown: Sequence[Panel], rests: bool
-) -> list[Handle]:
-    """Return the entries of a legend: the traces, the reference with its band, the meaning of lines and bands."""
-    handles = pages.run_handles(traces, names, colours)
+) -> tuple[list[Handle], str]:
+    """Return the entries of a legend, for the traces, the reference and lines and bands; and where gains are from."""
+    handles, gains = pages.run_handles(traces, names, colours)
     if rests:
         diamond = {"marker": "D", "ms": style.points(5), "lw": 0, "color": style.MUTED, "mec": style.PAPER}
         handles.append(Line2D([], [], **diamond, label=f"held by friction for {HOLD:g} s or longer"))
     if any(panel.quantity == "x" and np.isfinite(trace.r).any() for panel in shown for trace in panel.traces):
         look = {"color": style.INK, "lw": style.points(0.8), "ls": (0, (4, 4))}
         handles += [Line2D([], [], **look, label="reference"), Patch(color=style.BAND, label="reference ± 2 %")]
-    return [*handles, *(_meaning(shown) if shown else [])]
+    return [*handles, *(_meaning(shown) if shown else [])], gains
 
 
 def _meaning(shown: Sequence[Panel]) -> list[Handle]:
@@ -373,7 +401,7 @@ def _meaning(shown: Sequence[Panel]) -> list[Handle]:
         "play": Patch(color=style.REACTION, alpha=drawing.PLAY),
         "band": Patch(color=style.MUTED, alpha=0.3),
         "line": Line2D([], [], color=style.MUTED, lw=style.points(drawing.LINE)),
-        "light": Line2D([], [], color=style.MUTED, alpha=0.5, lw=style.points(drawing.LIGHT_LINE)),
+        "thin lines": Line2D([], [], color=style.MUTED, lw=style.points(drawing.LIGHT_LINE)),
     }
     words = drawing.meaning(shown)
     for name, look in looks.items():

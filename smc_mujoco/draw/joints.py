@@ -76,7 +76,8 @@ def joints(
         look = panels.dotted()
         events = [Line2D([], [], **look, label=f"{what} at {time:g} s") for time, what in marks.items()]
         title = title or style.plant_name(traces[0].scenario.plant)
-        pages.set_head(page, width, title, [*pages.run_handles(traces, names, colours), *events])
+        handles, gains = pages.run_handles(traces, names, colours)
+        pages.set_head(page, width, title, [*handles, *events], gains)
         pages.write(page, paths)
     return page
 

@@ -71,14 +71,13 @@ def nyquist(
             Line2D([], [], color=colour, lw=style.points(3), label=_legend(scenario, cycle) + source)
             for scenario, cycle, colour, source in zip(scenarios, cycles, colours, gains, strict=True)
         ]
-        handles += shared
         whole = pages.head(width, handles) + style.points(ROW) * len(scenarios)
         page = pages.blank(width, height or whole, fig)
         axes = page.subplots(len(scenarios), 2, squeeze=False, width_ratios=[1.0, 2.0])
         for row, scenario, cycle, trace, colour in zip(axes, scenarios, cycles, runs, colours, strict=True):
             plane(row[0], scenario, cycle, channel, colour)
             last_periods(row[1], trace, cycle, channel, colour)
-        pages.set_head(page, width, f"Chattering of {style.plant_name(scenarios[0].plant)}", handles)
+        pages.set_head(page, width, f"Chattering of {style.plant_name(scenarios[0].plant)}", handles, shared)
         pages.write(page, paths)
     return page
 

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.text import Annotation
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.files import replacing
@@ -29,6 +30,7 @@ SIDES = (2.0, 100.0)  # inches, shortest and longest
 NARROW = 6.0  # inches: narrower pages have one column of panels
 LETTERS, TITLE = 11.0, 17.0  # points on a full page
 SAMPLE, GAPS = 1.6, 2.3  # of a legend's entry, in heights of its letters: its sample, and the space around its words
+PAD = 5.0  # points on a full page, above the title
 SHARE, WHOLE = 0.55, 0.95  # widest entry of a legend, of the page: in several columns, and in a single one
 Handle = Line2D | Patch
 Size = str | tuple[float, float] | None
@@ -82,7 +84,7 @@ def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, f
 def blank(width: float, height: float, fig: Figure | SubFigure | None = None) -> Figure | SubFigure:
     """Return a page to draw on: `fig`, or a new one of this size in inches. Its layout keeps texts apart."""
     layout = ConstrainedLayoutEngine(
-        w_pad=style.points(7.2) / 72, h_pad=style.points(5.0) / 72, wspace=0.02, hspace=0.02
+        w_pad=style.points(7.2) / 72, h_pad=style.points(PAD) / 72, wspace=0.02, hspace=0.02
     )
     if fig is None:
         return Page(figsize=(width, height), layout=layout)
@@ -123,49 +125,63 @@ def _widest(words: str, size: float) -> float:
     return max(style.width(line, size) for line in words.split("\n"))
 
 
-def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequence[Handle]) -> None:
-    """Draw the title with the legend below it: in as few rows as fit."""
+def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequence[Handle], note: str = "") -> None:
+    """Draw the title with the legend below it, in as few rows as fit, and a note at the right of the title."""
     size, big, words = style.points(LETTERS), style.points(TITLE), _wrapped(handles, width)
+    room = 72 * width - 16
+    if note:
+        note = style.cropped(note, SHARE * room, size)
+        room -= style.width(note, size) + big
+        place = {
+            "xytext": (-8, -style.points(PAD) - big),
+            "textcoords": "offset points",
+            "ha": "right",
+            "va": "baseline",
+        }
+        look = {"fontsize": size, "color": style.MUTED, "parse_math": False, "annotation_clip": False}
+        page.add_artist(Annotation(note, (1.0, 1.0), xycoords=page.transSubfigure, **place, **look)).set_in_layout(
+            False
+        )
     legend = page.legend(
-        handles=handles,
-        labels=["."] * len(words),  # matplotlib leaves out labels that begin with _
-        title=style.cropped(title, 72 * width - 16, big, bold=True),
+        handles=handles or [Line2D([], [], lw=0)],
+        labels=["."] * len(words) or [""],  # matplotlib leaves out labels that begin with _
+        title=style.cropped(title, room, big, bold=True),
         title_fontproperties={"size": big, "weight": "bold"},
         alignment="left",
         loc="outside upper left",
-        ncols=columns(words, width),
+        ncols=max(columns(words, width), 1),
         fontsize=size,
         borderpad=0.2,
         handlelength=SAMPLE,
         columnspacing=1.5,
     )
     legend.get_title().set_parse_math(False)
-    for label, text in zip(legend.get_texts(), words, strict=True):
+    for label, text in zip(legend.get_texts(), words or [""], strict=True):
         label.set_text(text)
         label.set_parse_math(False)
 
 
-def run_handles(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) -> list[Handle]:
-    """Return the entries of a legend for runs: a line and a label for each, when it failed, and whose gains it has."""
+def run_handles(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) -> tuple[list[Handle], str]:
+    """Return the entries of a legend for runs, a line and a label for each that says when it failed; and `gained`."""
     handles: list[Handle] = []
     gains, shared = gained([[trace.scenario.law.source] for trace in traces])
     for trace, name, colour, source in zip(traces, names, colours, gains, strict=True):
         how = style.ending(trace)
         words = style.cropped(name, 0.3 * 72 * style.FULL_PAGE, LETTERS) + source + (f" ({how})" if how else "")
         handles.append(Line2D([], [], color=colour, lw=style.points(3), label=words))
-    return [*handles, *shared]
+    return handles, shared
 
 
-def gained(sources: Sequence[Iterable[Source]]) -> tuple[list[str], list[Handle]]:
-    """Return where gains come from: what follows each label, such as ", gains default", or one entry for all alike.
+def gained(sources: Sequence[Iterable[Source]]) -> tuple[list[str], str]:
+    """Return where gains come from: what follows each label, such as ", gains: default", or one note for all alike.
 
     Args:
       sources: those of each label's law.
     """
-    words = [f"gains {found}" if (found := kinds(each)) not in ("", NONE) else "" for each in sources]
+    words = [f"gains: {found}" if (found := kinds(each)) not in ("", NONE) else "" for each in sources]
     if len(said := {one for one in words if one}) == 1:
-        return [""] * len(words), [Line2D([], [], lw=0, label=said.pop())]
-    return [f", {one}" if one else "" for one in words], []
+        return [""] * len(words), said.pop()
+    return [f", {one}" if one else "" for one in words], ""
 
 
 def files(path: str | os.PathLike[str], format: str | None = None) -> list[Path]:

@@ -1,13 +1,13 @@
 """Panels of figures and films: a quantity of several traces over time, a phase portrait, the last samples of u.
 
-Traces are cut to their finite samples (decimate.finite) and to a group of channels (style.split). A line over time is
-the mean of the channels; where that chatters, it is also averaged over a window of time (decimate.smooth). The band
-behind it is the range within a column of pixels; for u, s and forces, of all channels. Single channels of a network are
-drawn light.
+Traces are cut to their finite samples (decimate.finite) and to a group of channels (style.split). There is a line for
+each channel. Where that chatters, it is its mean over a window of time (decimate.smooth). The band behind the lines is
+the range of u, s or a force within a column of pixels.
 """
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -24,7 +24,7 @@ from smc_mujoco.draw.states import HOLD, at_rest, backlash_gap, has_dry_friction
 from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.metrics import tip
 from smc_mujoco.metrics.channel_groups import Group, cut
-from smc_mujoco.metrics.conventions import BAND, last_exit, scale
+from smc_mujoco.metrics.conventions import BAND, scale
 from smc_mujoco.simulation.signals import PerChannel
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 
@@ -35,26 +35,42 @@ MAX_LIGHT = 9  # channels of a network that are drawn one by one
 LASTING = 0.98  # quantile of |reaction| that a panel shows in full; larger values are impacts; chosen
 MAX_RESTS = 12  # marked in a phase portrait
 SPACING = 1 / 200  # of points in a phase portrait, as a share of its diagonal
-MAX_SMALL = 12  # channels that each have two small panels
+MAX_SMALL = 12  # channels that each have small panels
+MAX_STRIP = 3  # groups of channels, from which on a film has no panel of the error
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
 LEAVING = 0.6  # points, width of a curve that leaves its panel
 COINCIDENT = 0.02  # of a panel's height, about the width of a line: curves no farther apart are dashed in turn
 MOSTLY = 0.99  # of the samples of curves that coincide, so that controls that switch a sample apart do; chosen
 DASH = 5.0  # widths of a line
-WIDE, MAX_BANDS = 0.2, 2  # mean height of a wide band, of a panel's; more of them need a row each; chosen
+WIDE, MAX_BANDS = 0.2, 1  # mean height of a wide band, of a panel's; more of them need a row each; chosen
 VISIBLE = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
 SMALL = 0.03  # of a unit: axes with smaller values show thousandths, such as mm; chosen
-TRANSIENT = (0.02, 0.4)  # shortest and longest close-up of the transient, of the run
+FLAT = 0.02  # of a panel's height: x that stays within it rests; chosen
+ZOOM = 1.3, 0.5  # of the time until all rest: what panels over time show, if that is less than this part of the run
+ROUNDING = 1e-9  # rad or m: smaller errors are drawn at it
 JUMP = 2.0  # a reference jumps where its rate is more than this many times the 99 % quantile; chosen
-REALISM = ("force", "reaction")  # quantities of realistic mechanisms only
-OF_ARMS = {  # quantities of arms, one number a sample -> what an axis says
+ALIKE = {"spread": "x", "e": "x", "worst": "x", "joint": "x", "settling": "x", "largest": "u", "applied": "u"} | {
+    "reaction": "force", "d": "force",
+}  # quantity -> the one that has its unit  # fmt: skip
+WORDS = {
+    "force": "delivered",
+    "reaction": "reaction",
+    "spread": "max − min x",
+}  # quantity -> its words, without a letter
+KINDS = {"v": "velocity", "u": "control", "s": "sliding variable", "e": "error", "d": "disturbance"} | {
+    "applied": "control"
+}
+OF_ARMS = {  # quantities of several joints, one number a sample -> what an axis says
     "tip": "tip off its path (mm)",
     "contact": "force of contact (N)",
     "worst": "largest error of a joint",
     "joint": "error",
+    "settling": "|x − r|",
+    "largest": "largest |u| of a joint",
 }
 THOUSANDTHS = ("worst", "joint")  # of arms, in thousandths of the group's unit
-UNBANDED = ("x", "e", "spread", *OF_ARMS)  # drawn sample by sample, without a mean over time
+SINGLE = ("spread", *OF_ARMS)  # one number a sample, whatever the number of channels
+UNBANDED = ("x", "e", *SINGLE)  # drawn sample by sample, without a mean over time
 FAR_OFF = 8.0  # times the values of every other run: such a run leaves the panel instead of flattening them; chosen
 UNDIVERGED = 0.8  # of a run whose plant diverged: the part that sets the range of a panel if no run lasts; chosen
 MARGIN = 0.08  # of a panel's height, above and below its curves
@@ -77,6 +93,8 @@ QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
     "contact": lambda trace: tip.contacts(trace).force[:, None],
     "worst": lambda trace: 1e3 * np.abs(trace.x - trace.r).max(axis=1, keepdims=True),
     "joint": lambda trace: 1e3 * (trace.x - trace.r),
+    "settling": lambda trace: peaks(np.abs(trace.x - trace.r).max(axis=1), window(trace))[:, None],
+    "largest": lambda trace: np.abs(trace.u).max(axis=1, keepdims=True),
 }
 
 
@@ -102,28 +120,27 @@ class Panel(NamedTuple):
         return self.quantity == "s" and (plant.free > 0 or not rates)
 
     @property
+    def unit(self) -> str:
+        """The unit of the vertical axis in brackets; "" where the words have it, or where it depends on the law."""
+        if self.quantity in ("tip", "contact") or self.unitless:
+            return ""
+        small = self.thousandths or self.quantity in THOUSANDTHS
+        return f" ({'m' * small}{style.units(self.group)[ALIKE.get(self.quantity, self.quantity)]})"
+
+    @property
     def label(self) -> str:
-        """The label of the vertical axis, with its unit."""
+        """The label of the vertical axis, with its unit. A joint of a robot has its name in it."""
         name, group, plant = self.quantity, self.group, self.traces[0].scenario.plant
+        joint = joint_names(plant)[group.channels[0]]
         if name in OF_ARMS:
-            joint = f"{joint_names(plant)[self.channel]}, " if self.channel is not None else ""
-            return joint + OF_ARMS[name] + (f" (m{group.unit})" if name in THOUSANDTHS else "")
-        mean = "mean " * (len(group.channels) > 1)
-        alike = {"spread": "x", "e": "x", "reaction": "force", "d": "force", "applied": "u"}
-        unit = f" ({'m' * self.thousandths}{style.units(group)[alike.get(name, name)]})"
-        if self.channel is not None or name == "spread":
-            return f"{'max − min x' if name == 'spread' else f'{name}{self.channel}'}{unit}"
-        if name in REALISM:
-            return f"{mean}{'delivered' if name == 'force' else 'reaction'}{' on q' * (not group.driven)}{unit}"
-        if self.unitless:
-            return f"{mean}sliding variable s"
-        if name == "s" and plant.mixed:
-            return f"{mean}s{unit}"  # short: there are many such panels, and they are low
+            return f"{joint}, " * (self.channel is not None) + OF_ARMS[name] + self.unit
+        letter = WORDS.get(name, name) if group.driven else {"x": "q", "v": "q′"}.get(name, WORDS.get(name, name))
+        if len(group.channels) == 1 and (plant.direct or self.channel is not None):
+            return f"{joint} {letter}{self.unit}"
+        if name in WORDS or (name == "s" and plant.mixed):  # short: mixed plants have many panels, and low ones
+            return f"{letter}{' on q' * (not group.driven)}{self.unit}"
         kind = {"rad": "angle", "m": "position"}[group.unit]
-        kind = {"x": kind if group.driven else f"free {kind}", "v": "velocity", "u": "control", "s": "sliding variable"}
-        kind |= {"e": "error", "d": "disturbance", "applied": "control"}
-        letter = name if group.driven else {"x": "q", "v": "q′"}.get(name, name)
-        return f"{mean or kind[name] + ' '}{letter}{unit}"
+        return f"{KINDS.get(name, kind if group.driven else f'free {kind}')} {letter}{self.unit}"
 
 
 def _is_rate(law: Law) -> bool:
@@ -157,34 +174,55 @@ def overview(traces: Sequence[Trace]) -> list[Panel]:
     return panels + [Panel("s", group, parts) for group, parts in driven.items()]
 
 
-def small(traces: Sequence[Trace], group: Group) -> list[tuple[Panel, Panel]]:
-    """Return two small panels for each channel of a group: x with its reference, and the error."""
+def small(traces: Sequence[Trace], group: Group) -> list[tuple[Panel, ...]]:
+    """Return small panels for each channel of a group: x with its reference, the error and, of a driven one, u."""
     chosen = np.linspace(0, len(group.channels) - 1, min(len(group.channels), MAX_SMALL)).round().astype(int)
-    pairs = []
+    names, rows = ("x", "e", "u") if group.driven else ("x", "e"), []
     for i in (group.channels[k] for k in chosen):
         one = dataclasses.replace(group, channels=(i,))
         parts = [cut(trace, one) for trace in traces]
-        pairs.append((Panel("x", one, parts, i), Panel("e", one, parts, i)))
-    return pairs
+        rows.append(tuple(Panel(name, one, parts, i) for name in names))
+    return rows
+
+
+def by_channel(panel: Panel) -> list[Panel]:
+    """Return a panel for each channel of a panel's group."""
+    if len(panel.group.channels) == 1 or panel.quantity in SINGLE:
+        return [panel]
+    found = []
+    for k, i in enumerate(panel.group.channels):
+        at, one = (dataclasses.replace(panel.group, channels=(j,)) for j in (k, i))
+        found.append(Panel(panel.quantity, one, [cut(trace, at) for trace in panel.traces], i))
+    return found
 
 
 def strip(traces: Sequence[Trace]) -> list[Panel]:
-    """Return the panels below a film, from left to right: x of each group of channels, and u of the driven ones.
+    """Return the panels below a film, from left to right: x of each group of channels, the error, u of driven ones.
 
-    Of arms: how far the tip is off its path, and the force of its contact, or else the largest error of a joint.
+    Of arms: how far the tip is off its path, and the force of its contact, or else the largest error of a joint. Of a
+    network: how far its channels are apart, and the largest error. Of two joints of your own model: x and u of each; of
+    more: the largest error and the largest u of a joint.
     """
-    groups = style.split(traces).items()
+    groups, plant = list(style.split(traces).items()), traces[0].scenario.plant
+    driven = [each for each in groups if each[0].driven]
     if all(trace.scenario.plant.tip for trace in traces):
-        one, first = Panel("tip", next(iter(groups))[0], traces), next(iter(groups))[0]
+        one, first = Panel("tip", groups[0][0], traces), groups[0][0]
         if all(tip.knows_contacts(trace.scenario) for trace in traces):
             return [one, Panel("contact", first, traces)]
-        return [one, *(Panel("worst", *each) for each in groups if each[0].driven)]
-    return [Panel("x", *each) for each in groups] + [Panel("u", *each) for each in groups if each[0].driven]
+        return [one, *(Panel("worst", *each) for each in driven)]
+    if all(len(group.channels) == 1 for group, _ in groups):
+        settling = [Panel("settling", *driven[0])] * (len(groups) < MAX_STRIP)
+        return [*(Panel("x", *each) for each in groups), *settling, *(Panel("u", *each) for each in driven)]
+    if not plant.direct:
+        return [Panel(name, *each) for each in driven for name in ("spread", "settling")]
+    if plant.n == plant.driven == 2:
+        return [panel for group, _ in groups for x, _, u in small(traces, group) for panel in (x, u)]
+    return [Panel(name, *each) for each in driven for name in ("settling", "largest")]
 
 
 def meaning(panels: Sequence[Panel]) -> dict[str, str]:
-    """Return the meaning of bands and lines that need an explanation: "play", "band", "line", "light" -> words."""
-    n = max((len(panel.group.channels) for panel in panels if panel.quantity not in OF_ARMS), default=1)
+    """Return the meaning of bands and lines that need an explanation: "play", "band", "line", ... -> words."""
+    n = max((len(panel.group.channels) for panel in panels if panel.quantity not in SINGLE), default=1)
     banded = dict.fromkeys(panel.quantity for panel in panels if panel.quantity not in UNBANDED)
     windows = [mean_window(panel.traces) for panel in panels if panel.quantity == "u"]
     over, single, words = max(filter(None, windows), default=None), len(light(n)), {}
@@ -197,7 +235,9 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
     if over:
         words["line"] = f"mean over {1e3 * over:.3g} ms where it chatters"
     if n > 1:
-        words["light"] = "single channels" if single == n else f"{single} of {n} channels"
+        words["thin lines"] = f"the {n} channels" if single == n else f"{single} of {n} channels"
+    if any(panel.quantity == "settling" for panel in panels):
+        words["peaks"] = f"largest in {1e3 * peak_window(panels[0].traces):.3g} ms"
     return words
 
 
@@ -224,22 +264,69 @@ def mean_window(traces: Sequence[Trace]) -> float | None:
     low, high = limits(traces, "u")
     times = []
     for trace in traces:
-        u = trace.u.mean(axis=1)
-        if smoothed(trace) and np.abs(smooth(u, window(trace)) - u).max() > VISIBLE * (high - low):
+        if any(
+            smoothed(trace) and np.abs(smooth(u, window(trace)) - u).max() > VISIBLE * (high - low)
+            for u in trace.u.T[light(trace.u.shape[1])]
+        ):
             times.append(window(trace) * trace.scenario.control_period)
     return max(times, default=None)
 
 
+def peaks(y: np.ndarray, width: int) -> np.ndarray:
+    """Return the largest of y (K+1,) within `width` samples around each, or ROUNDING if that is more."""
+    from scipy.ndimage import maximum_filter1d
+
+    return np.maximum(maximum_filter1d(y, width, mode="nearest"), ROUNDING)
+
+
+def peak_window(traces: Sequence[Trace]) -> float:
+    """Return the longest time over which `peaks` are taken, s."""
+    return max(window(trace) * trace.scenario.control_period for trace in traces)
+
+
+def horizon(traces: Sequence[Trace]) -> float:
+    """Return the time that panels of x, u and s show, s: the whole run, or the first part if all rest after it.
+
+    Nothing changes or disturbs the plant after that part, and no reference moves.
+    """
+    whole, last = end(traces), 0.0
+    for group, parts in style.split(traces).items():
+        low, high = span(parts, "x")
+        for trace in parts:
+            moved = np.abs(trace.x - trace.x[-1]).max(axis=1) > FLAT * (high - low)
+            acted = (trace.d != 0.0).any(axis=1) | (trace.r != trace.r[-1]).any(axis=1)
+            last = max(last, *trace.t[moved | (acted & group.driven)][-1:], trace.diverged_at or 0.0)
+        last = max([last, *(trace.scenario.jump.time for trace in parts if trace.scenario.jump)])
+    return ZOOM[0] * last if 0.0 < ZOOM[0] * last < ZOOM[1] * whole else whole
+
+
+def until(trace: Trace, time: float) -> Trace:
+    """Return the trace up to a time, s, with two samples at least."""
+    count = max(2, int(np.searchsorted(trace.t, time + 1e-9)))
+    return dataclasses.replace(trace, **{name: getattr(trace, name)[:count] for name in ARRAYS})
+
+
 def over_time(
-    ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True, among: Sequence[Trace] = ()
+    ax: Axes,
+    panel: Panel,
+    colours: Sequence[str],
+    label: bool = True,
+    among: Sequence[Trace] = (),
+    bands: bool = True,
 ) -> list[Artist]:
     """Draw the panel with the first trace on top, set its vertical range, and return the artists of the traces.
 
-    The reference of x is drawn in front, its settling band behind. `label`: whether to print the size of impacts
-    outside the range. `among`: traces that set the range; default: the panel's own.
+    The reference of x is drawn in front, its settling band behind.
+
+    Args:
+      label: whether to print the size of impacts outside the range.
+      among: traces that set the range; default: the panel's own.
+      bands: whether to draw ranges behind the lines.
     """
     artists: list[Artist] = []
     name, means = panel.quantity, [QUANTITIES[panel.quantity](trace).mean(axis=1) for trace in panel.traces]
+    if name == "settling":
+        ax.set_yscale("log")
     ax.set_ylim(limits(among or panel.traces, name))
     if name == "reaction":
         clip_impacts(ax, panel, colours, label)
@@ -248,16 +335,18 @@ def over_time(
     lines = [curve(trace, mean, name) for trace, mean in zip(panel.traces, means, strict=True)]
     away = far_off(panel.traces, name)
     widths = [style.points(LEAVING if k == away else LINE) for k in range(len(lines))]
-    drawn = list(zip(panel.traces, colours, means, lines, dashes(lines, ax.get_ylim()), widths, strict=True))
+    drawn = list(zip(panel.traces, colours, means, lines, alike(panel, lines), widths, strict=True))
     for trace, colour, mean, path, dash, width in reversed(drawn):
         y, steps = QUANTITIES[name](trace), "default" if smoothed(trace) or name != "u" else "steps-post"
-        e = columns(trace.t, mean[:, None] if name in ("x", "e") else y, COLUMNS)
-        artists.append(ax.fill_between(e.t, e.low.min(axis=1), e.high.max(axis=1), color=colour, alpha=0.22, lw=0))
+        if bands and name not in UNBANDED:
+            e = columns(trace.t, y, COLUMNS)
+            artists.append(ax.fill_between(e.t, e.low.min(axis=1), e.high.max(axis=1), color=colour, alpha=0.22, lw=0))
+        look = {"color": colour, "drawstyle": steps}
         if y.shape[1] > 1:
-            look = {"color": colour, "alpha": 0.3, "lw": style.points(LIGHT_LINE), "drawstyle": steps}
             for i in light(y.shape[1]):
-                artists += ax.plot(*curve(trace, y[:, i], name), **look)
-        artists += ax.plot(*path, color=colour, lw=width, drawstyle=steps, ls=dash)
+                artists += ax.plot(*curve(trace, y[:, i], name), alpha=0.8, lw=style.points(LIGHT_LINE), **look)
+        else:
+            artists += ax.plot(*path, lw=width, ls=dash, **look)
         if ends_in_failure(trace):
             last = np.clip(mean[-1], *ax.get_ylim())
             artists += ax.plot(trace.t[-1], last, "X", color=colour, clip_on=False, zorder=5, **cross())
@@ -277,6 +366,14 @@ def cross() -> dict[str, Any]:
 def dotted() -> dict[str, Any]:
     """Return the look of the line that marks when a plant changes or an arm is hit."""
     return {"color": style.INK, "lw": style.points(0.9), "ls": (0, (2, 2))}
+
+
+def alike(panel: Panel, lines: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Any]:
+    """Return a style for each line of a panel, see `dashes`."""
+    low, high = limits(panel.traces, panel.quantity)
+    if panel.quantity == "settling":
+        return dashes([(t, np.log10(y)) for t, y in lines], (math.log10(low), math.log10(high)))
+    return dashes(lines, (low, high))
 
 
 def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], limits: tuple[float, float]) -> list[Any]:
@@ -396,12 +493,12 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Seque
     """
     drawn = list(zip(traces, colours, held, phase_dashes(traces), strict=True))
     for trace, colour, samples, dash in reversed(drawn):
-        x, v = trace.x, trace.v
-        for i in light(x.shape[1]) if x.shape[1] > 1 else ():
-            ax.plot(*thinned(x[:, i], v[:, i]), color=colour, alpha=0.3, lw=style.points(LIGHT_LINE))
-        x, v = x.mean(axis=1), v.mean(axis=1)
-        ax.plot(*thinned(x, v), color=colour, lw=style.points(LINE), ls=dash)
-        ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
+        for x, v in zip(trace.x.T[light(trace.x.shape[1])], trace.v.T[light(trace.x.shape[1])], strict=True):
+            ax.plot(
+                *thinned(x, v), color=colour, lw=style.points(LINE if trace.x.shape[1] == 1 else LIGHT_LINE), ls=dash
+            )
+            ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
+        x, v = trace.x[:, 0], trace.v[:, 0]
         for sample in samples:
             ax.plot(x[sample], 0.0, "D", color=colour, ms=style.points(5.5), mec=style.PAPER, zorder=4)
         if trace.diverged_at is not None:
@@ -443,23 +540,6 @@ def orbit(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
     return r[smooth], dr[smooth]
 
 
-def transient(panel: Panel) -> Panel:
-    """Return the panel cut to the transient: until the last run that settles has settled, and a little longer."""
-    whole = end(panel.traces)
-    times = []
-    for trace in panel.traces:
-        error = np.abs(trace.x - trace.r).max(axis=1)
-        settled = last_exit(trace.t, error, BAND * scale(trace)) if np.isfinite(error).all() else np.inf
-        times += [settled] if np.isfinite(settled) and trace.diverged_at is None else []
-    shortest, longest = (part * whole for part in TRANSIENT)
-    until = min(max(1.3 * max(times), shortest), longest) if times else 0.5 * longest
-    cut = []
-    for trace in panel.traces:
-        count = max(2, int(np.searchsorted(trace.t, until + 1e-9)))
-        cut.append(dataclasses.replace(trace, **{name: getattr(trace, name)[:count] for name in ARRAYS}))
-    return panel._replace(traces=cut)
-
-
 def last_period(traces: Sequence[Trace]) -> tuple[float, float]:
     """Return the times between which a close-up shows the last samples of u, s."""
     stop = end(traces)
@@ -488,7 +568,9 @@ def last_samples(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], peri
 
 
 def crowded(panel: Panel) -> bool:
-    """Return whether bands of u would hide each other: whether more than MAX_BANDS of them are wide."""
+    """Return whether each trace needs a row: it has several channels, or more than MAX_BANDS bands of u are wide."""
+    if len(panel.group.channels) > 1 and panel.quantity not in SINGLE:
+        return len(panel.traces) > 1
     if panel.quantity != "u":
         return False
     low, high = limits(panel.traces, "u")
@@ -555,5 +637,7 @@ def limits(traces: Sequence[Trace], name: str) -> tuple[float, float]:
         low, high = min(low, r.min(initial=low)), max(high, r.max(initial=high))
     if name == "e":
         low, high = min(low, 0.0), max(high, 0.0)
+    if name == "settling":
+        return max(low, ROUNDING) / 1.5, max(high, 2.0 * ROUNDING) * 1.5
     air = MARGIN * (high - low) or 1.0
     return low - air, high + air

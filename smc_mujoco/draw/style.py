@@ -1,7 +1,9 @@
 """Style of figures and films: colours, labels, units and fonts.
 
-Laws and plants state their labels and colours in their own files. The laws' colours are those of Okabe and Ito (Color
-Universal Design, 2008), which colour-blind readers can tell apart. A law has the same colour everywhere.
+Laws and plants state their labels in their own files. A law has one colour in all pictures: the one that its file
+states, of Okabe and Ito (Color Universal Design, 2008), which colour-blind readers can tell apart; or else its place in
+`_palette`. Matplotlib's petroff10 would be ten colours for fifty laws, of which two are the grey of failed runs and one
+the violet of friction.
 """
 
 import colorsys
@@ -20,17 +22,13 @@ from smc_mujoco.common.errors import ScenarioError, shown, taken
 from smc_mujoco.control import estimator as estimators
 from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.law import catalogue, known_laws
+from smc_mujoco.control.law import known_laws
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics.channel_groups import Group, cut, groups
 from smc_mujoco.simulation.perturbations import Jump
 from smc_mujoco.simulation.signals import Push
 from smc_mujoco.simulation.trace import Trace
 
-# Colours of laws that state none. Chosen from a grid as the farthest in CIEDE2000 from the stated ones, from each other
-# and from everything else in figures: at least 18 with normal vision, 9 without red or green cones, 7.5 without blue
-# cones. A just noticeable difference is about 1. The closest two stated ones are at 16 and 6.
-OTHERS = ("#005A3C", "#960000", "#96B469", "#78784B", "#B42D69", "#7887FF")
 INK, MUTED, GRID, PAPER, FAILED = "#1F2429", "#646C75", "#E3E6E9", "#FFFFFF", "#A9AFB6"
 DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
 # Friction and contact. Chosen from a grid as one of the farthest in CIELAB from the laws' colours, the disturbance's
@@ -38,7 +36,7 @@ DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
 REACTION = "#9018F0"
 WHITE = 0.35  # share of white in a law's colour on a dark page: chosen
 CHROMA = 0.12  # above it, colours are compared by hue and lightness only, see `distance`; chosen
-ALIKE = 0.10  # colours closer than this look alike, see `distance`; chosen
+ALIKE = 0.03  # colours closer than this are mistaken for each other, see `distance`; chosen
 OKLAB_CONES = np.array([
     [0.4122214708, 0.5363325363, 0.0514459929],
     [0.2119034982, 0.6806995451, 0.1073969566],
@@ -106,36 +104,38 @@ def points(size: float) -> float:
 
 
 def law_colour(law: Component | str) -> str:
-    """Return the colour of a law, "#RRGGBB": its own, or always the same one of OTHERS."""
+    """Return the colour of a law, "#RRGGBB": its own, or its place in the palette."""
     template, name = _template(law)
-    return (template and template.colour) or OTHERS[zlib.crc32(name.encode()) % len(OTHERS)]
+    if template and template.colour:
+        return template.colour
+    palette, own = _palette(), [name for name, known in known_laws().own.items() if not known.colour]
+    return palette[own.index(name) if name in own else zlib.crc32(name.encode()) % len(palette)]
 
 
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
     """Return one colour per law for one picture, all different.
 
-    Laws that state a colour have it. Each other law has its colour of OTHERS or, if that looks like one already in the
-    picture, such as a second green, the colour farthest from all of them.
+    Each law has its colour. Only where two would be mistaken for each other, as where a law runs twice or two of the
+    user's laws have the same place in the palette, the later one gets the colour farthest from all in the picture.
     """
-    wanted = [law_colour(law) for law in laws]
-    stated = [bool((template := _template(law)[0]) and template.colour) for law in laws]
-    colours, used = [""] * len(laws), set()
-    for i in sorted(range(len(laws)), key=lambda i: not stated[i]):
-        clear = all(distance(wanted[i], other) > ALIKE for other in used)
-        colours[i] = wanted[i] if wanted[i] not in used and (stated[i] or clear) else _free(used)
-        used.add(colours[i])
+    colours: list[str] = []
+    for wanted in map(law_colour, laws):
+        clear = all(distance(wanted, other) > ALIKE for other in colours)
+        used = [*colours, PAPER, DISTURBANCE, REACTION, FAILED]
+        free = () if clear else [colour for colour in _grid(len(colours)) if colour not in used]
+        colours.append(wanted if clear else _farthest(free, used)[0])
     return colours
 
 
-def _free(used: set[str]) -> str:
-    """Return the colour farthest from all in the picture: one of the laws', or of a grid if none is far enough."""
-    stated = [template.colour for template in catalogue().own.values() if template.colour]
-    drawn = [*used, PAPER, DISTURBANCE, REACTION, FAILED]
-    for colours in (OTHERS, stated):
-        best, apart = _farthest(colours, drawn)
-        if apart > ALIKE:
-            return best
-    return _farthest([colour for colour in _grid(len(used)) if colour not in used], drawn)[0]
+@functools.cache
+def _palette() -> tuple[str, ...]:
+    """Return colours for laws that state none, each the farthest from those before it and from all else in pictures."""
+    stated = [template.colour for template in known_laws().own.values()]
+    used = [PAPER, DISTURBANCE, REACTION, FAILED, *filter(None, stated)]
+    first = len(used)
+    for _ in range(stated.count("")):
+        used.append(_farthest([colour for colour in _grid(0) if colour not in used], used)[0])
+    return tuple(used[first:])
 
 
 def _farthest(colours: Sequence[str], others: Sequence[str]) -> tuple[str, float]:

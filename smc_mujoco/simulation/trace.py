@@ -76,7 +76,7 @@ class Trace:
     def __repr__(self) -> str:
         end = "" if self.diverged_at is None else f", {self.failure}"
         law = self.scenario.law
-        return f"Trace({self.scenario.plant.name}, {law}, gains {law.source}, {len(self.t)} samples{end})"
+        return f"Trace({self.scenario.plant.name}, {law}, gains: {law.source}, {len(self.t)} samples{end})"
 
     def _repr_html_(self) -> str:
         from smc_mujoco.simulation import notebook

@@ -58,7 +58,7 @@ class Choice:
     @property
     def gains(self) -> str:
         """Where the gains come from, in words."""
-        return f"gains {self.law.source}" + f"; {self.remark}" * bool(self.remark)
+        return f"gains: {self.law.source}" + f"; {self.remark}" * bool(self.remark)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)

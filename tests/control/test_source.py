@@ -36,7 +36,7 @@ def test_one_name_with_three_sets_of_gains_is_told_apart():
     assert settled["default"] > 3 * max(settled["shipped"], settled["study"])  # 1.61, 0.41 and 0.32 s
     for kind, trace in zip(laws, runs, strict=True):
         assert trace.scenario.law.source.kind == kind
-        assert f"gains {kind}" in repr(trace)
+        assert f"gains: {kind}" in repr(trace)
         assert kind in trace._repr_html_()
 
 
@@ -105,7 +105,7 @@ def test_laws_with_equal_gains_are_equal():
 def test_words_name_each_source_once_with_its_laws():
     laws = {"a": [sets()["default"].source], "b": [sets()["study"].source], "c": [sets()["default"].source]}
     assert source.in_words(laws) == "gains: a and c default, b study"
-    assert source.in_words({"a": laws["a"], "none": [source.Source()]}) == "gains default"
+    assert source.in_words({"a": laws["a"], "none": [source.Source()]}) == "gains: default"
     assert source.in_words({"none": [source.Source()]}) == ""
     search = source.Search(rule="CMA-ES (three starts), in logarithms", evaluations=288, converged=False)
     assert str(smc.law("pid").sourced("shipped", search).source) == "shipped (CMA-ES, 288 evaluations, not converged)"
@@ -117,8 +117,8 @@ def test_searches_of_several_laws_are_one_phrase_that_names_those_that_did_not_c
         "a": [smc.law("pid").sourced("shipped", first).source],
         "b": [smc.law("pid").sourced("shipped", other).source],
     }
-    assert source.in_words(laws) == "gains shipped (CMA-ES, 90 to 200 evaluations, not converged: b)"
-    assert source.in_words({"a": laws["a"]}) == "gains shipped (CMA-ES, 90 evaluations, converged)"
+    assert source.in_words(laws) == "gains: shipped (CMA-ES, 90 to 200 evaluations, not converged: b)"
+    assert source.in_words({"a": laws["a"]}) == "gains: shipped (CMA-ES, 90 evaluations, converged)"
 
 
 def test_an_unknown_kind_is_refused():

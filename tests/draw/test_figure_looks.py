@@ -137,7 +137,7 @@ def test_every_curve_has_one_width_and_a_colour_of_its_own(one):
 
 def test_controls_whose_bands_would_hide_each_other_have_a_row_each(one):
     three = [dataclasses.replace(trace, u=(1.0 - 0.1 * k) * trace.u) for k, trace in enumerate(ten(one)[:3])]
-    assert [len(rows(ax)) for ax in figure([calm(three[0]), *three[1:]], panels=["u", "end"]).axes] == [1, 1]
+    assert [len(rows(ax)) for ax in figure([*map(calm, three[:2]), three[2]], panels=["u", "end"]).axes] == [1, 1]
     page = figure(three, size=COLUMN, panels=["x", "u", "s", "end"])
     assert [len(rows(ax)) for ax in page.axes] == [1, 3, 1, 3]
     for ax in (page.axes[1], page.axes[3]):
@@ -182,26 +182,9 @@ def test_the_legend_of_ten_laws_and_the_title_take_less_than_a_quarter_of_a_colu
     assert "…" not in "".join(words)
 
 
-def test_ten_laws_have_colours_that_do_not_look_alike():
-    for laws in (TEN, ("super_twisting", "computed_torque"), smc.laws()[:10], smc.laws()[-10:]):
-        colours = style.law_colours(laws)
-        unstated = [c for c, law in zip(colours, laws, strict=True) if style.law_colour(law) in style.OTHERS]
-        for colour in unstated:
-            assert all(style.distance(colour, other) > 0.07 for other in colours if other != colour)
-
-
-def test_no_two_greens():
-    """computed_torque's own green is dark, super_twisting's is bright."""
-    assert style.law_colours(["computed_torque"]) == ["#005A3C"]
-    twisting, torque = style.law_colours(["super_twisting", "computed_torque"])
-    assert twisting == "#009E73"
-    assert torque != "#005A3C"
-    assert style.distance(twisting, torque) > style.ALIKE
-
-
 def test_the_reference_is_drawn_over_the_curves_and_never_clipped(one):
     far = dataclasses.replace(one, r=one.r + 100.0)
-    page = figure([far, under(one, "pid", 0.9)], size=COLUMN, panels=["x", "error", "channels", "transient"])
+    page = figure([far, under(one, "pid", 0.9)], size=COLUMN, panels=["x", "error", "channels"])
     drawn = [(ax, line) for ax in page.axes for line in ax.lines if line.get_gid() == panels.REFERENCE]
     assert drawn
     for ax, line in drawn:
@@ -244,7 +227,7 @@ def test_curves_that_coincide_are_all_seen(one):
     near = under(one, "pid", 1.01)
     same = [one, dataclasses.replace(near, u=np.where(one.t < 0.005, -3.0, 1.0)[:, None] * one.u)]
     same.append(dataclasses.replace(under(one, "adaptive", 0.3), u=0.3 * one.u))
-    for ax in figure(same, panels=["x", "u", "phase", "end"]).axes:
+    for ax in figure(same, panels=["x", "phase", "settling"]).axes:
         adaptive, pid, classical = curves(ax)  # the first is on top
         assert adaptive.get_linestyle() == "-"
         assert [line.get_linestyle() for line in (pid, classical)] == ["--", "--"]
@@ -256,14 +239,17 @@ def test_curves_that_coincide_are_all_seen(one):
 def test_each_joint_of_an_arm_has_its_reference_and_its_error(arm):
     page = figure(arm)
     labels = [ax.get_ylabel() for ax in page.axes]
-    assert labels[:4] == ["x0 (rad)", "e0 (rad)", "x1 (rad)", "e1 (rad)"]
-    assert "x6 (rad)" in labels
-    assert not [label for label in labels if "mean x" in label]
+    assert labels[:4] == ["j0 x (rad)", "j0 e (rad)", "j0 u (N·m)", "j1 x (rad)"]
+    assert labels[-1] == "|x − r| (rad)"
     x, e = page.axes[:2]
     np.testing.assert_allclose(curves(e)[-1].get_ydata(), (arm[0].x - arm[0].r)[:, 0])
     assert [line.get_gid() for line in x.lines].count(panels.REFERENCE) == 1
-    mean = [ax.get_ylabel() for ax in figure(arm, panels=["x", "spread", "phase"]).axes]
-    assert mean == ["mean x (rad)", "max − min x (rad)", "mean v (rad/s)"]
+    asked = [ax.get_ylabel() for ax in figure(arm, panels=["spread", "s", "phase"]).axes]
+    assert asked == [
+        "max − min x (rad)",
+        *(f"j{i} s (rad/s)" for i in range(7)),
+        *(f"j{i} v (rad/s)" for i in range(7)),
+    ]
 
 
 def test_blows_and_jumps_do_not_cover_curves(one):
@@ -280,13 +266,32 @@ def test_blows_and_jumps_do_not_cover_curves(one):
     assert mark.get_ydata().tolist() == [ax.get_ylim()[1]]
 
 
-def test_the_close_up_of_the_transient_ends_soon_after_it(one):
-    panel = panels.Panel("x", next(iter(style.split([one]))), [one])
-    until = panels.transient(panel).traces[0].t[-1]
-    assert 0.0 < until <= 0.4 * one.t[-1] + 1e-9
-    for at, crosses in ((1400, [True, False]), (40, [True, True])):
-        shown = figure([one, failed(under(one, "pid", 0.5), at)], panels=["x", "transient"]).axes
-        assert ["X" in [line.get_marker() for line in ax.lines] for ax in shown] == crosses
+def test_panels_over_time_end_where_all_rest_and_never_before_something_happens(one):
+    at = int(0.2 * len(one.t))
+    still = dataclasses.replace(one, x=np.where(np.arange(len(one.t)) < at, 1.0, 0.01)[:, None], d=0.0 * one.d)
+    assert panels.horizon([still]) == pytest.approx(1.3 * one.t[at - 1])
+    whole = one.t[-1]
+    late = np.where(np.arange(len(one.t)) < 0.9 * len(one.t), 0.0, 1.0)[:, None]
+    jump = dataclasses.replace(one.scenario, jump=smc.Jump(0.9 * whole, {"mass": 2.0}))
+    for change in ({"x": still.x + late}, {"d": late}, {"r": late}, {"scenario": jump}):
+        assert panels.horizon([still, dataclasses.replace(still, **change)]) == pytest.approx(whole)
+    lost = failed(under(still, "pid", 0.5), int(0.9 * len(one.t)))
+    assert panels.horizon([still, lost]) == pytest.approx(whole)
+    over_time, settling = figure([still], panels=["x", "settling"]).axes
+    assert over_time.get_xlim()[1] == pytest.approx(1.3 * one.t[at - 1])
+    assert settling.get_xlim()[1] == pytest.approx(whole)
+
+
+def test_the_error_is_the_largest_within_its_window_on_a_logarithmic_axis(one):
+    ax = figure([one], panels=["settling"]).axes[0]
+    assert ax.get_yscale() == "log"
+    t, y = curves(ax)[0].get_data()
+    half = panels.peak_window([one]) / 2
+    e = np.abs(one.x - one.r)[:, 0]
+    for time, value in zip(t[::17], y[::17], strict=True):
+        near = np.abs(one.t - time) <= half + one.scenario.control_period
+        assert value <= e[near].max() + 1e-12
+        assert value >= e[np.abs(one.t - time) <= half - one.scenario.control_period].max(initial=panels.ROUNDING)
 
 
 def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path):

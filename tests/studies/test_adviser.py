@@ -81,13 +81,13 @@ def test_wins_are_those_of_the_comparison(advice):
 
 def test_the_answer_says_what_why_and_how_sure(advice):
     use, because, second, sure = advice.answer
-    assert use == f"Use {FAST} (gains yours)."
+    assert use == f"Use {FAST} (gains: yours)."
     assert because.startswith(
         "Because it has the best mean rank of 3 finalists. It settles in 100 % of its runs. Fast: "
     )
     settling, calm = (number(advice.choices[0].medians[need].median) for need in ("fast", "calm"))
     assert f"Fast: settling time {settling} s; no finalist is better. Calm: TV rate {calm} N/s; no fin" in because
-    assert second.startswith(f"Second choice: {advice.second} (gains yours); worse on ")
+    assert second.startswith(f"Second choice: {advice.second} (gains: yours); worse on ")
     assert "calm" in second
     assert sure.startswith("How sure: it dominates slow")
     comparison = advice.comparison
@@ -128,7 +128,7 @@ def test_a_need_in_one_condition_is_named_with_it(advice):
     found = with_cells(advice, observer_free=[1, 1, 9, 9], slow=[2, 2, 9, 3], classical=[3, 3, 10, 10])
     assert found.law.name == "observer_free"
     assert "Calm: TV rate 9.00 N/s; better is slow under noise." in text(found)
-    assert f"Second choice: {SLOW} (gains yours); better on calm under noise; worse on fast." in text(found)
+    assert f"Second choice: {SLOW} (gains: yours); better on calm under noise; worse on fast." in text(found)
 
 
 def test_a_law_that_is_better_in_one_condition_and_worse_over_all_is_not_named_for_a_need(advice):
@@ -298,7 +298,7 @@ def test_one_law_is_the_only_one(folder):
     found = smc.which("duffing", laws=FAST, out=folder, **COMMON)
     assert (found.second, found.needs) == (None, adviser.USUAL)
     assert found.answer == [
-        f"Use {FAST} (gains yours).",
+        f"Use {FAST} (gains: yours).",
         "Because it is the only law here that suits. It settles in 100 % of its runs.",
         "How sure: nothing could be compared with it.",
     ]
@@ -362,7 +362,7 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(folder
     options |= {"seeds": 2, "duration": 1.0, "conditions": "nominal"}
     found = smc.which(heavy, **options)
     assert re.match(
-        r"gains tuned here \(CMA-ES and COBYQA from several starts, 1\d evaluations", found.choices[0].gains
+        r"gains: tuned here \(CMA-ES and COBYQA from several starts, 1\d evaluations", found.choices[0].gains
     )
     assert found.law.function is my_pd.function
     assert found.law.gains == tuned[0].law.gains != my_pd.defaults
@@ -408,7 +408,7 @@ def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(folder, monkeyp
 def test_a_plant_that_cannot_be_tuned_has_default_gains_and_says_so(folder):
     found = smc.which("overhead_crane", "nominal", "fast", seeds=2, duration=1.0, out=folder)
     assert found.law == smc.law("hierarchical")
-    assert found.choices[0].gains.startswith("gains default; tuning is not possible here: it has free joints")
+    assert found.choices[0].gains.startswith("gains: default; tuning is not possible here: it has free joints")
 
 
 # what is asked
@@ -469,9 +469,9 @@ def test_the_command_prints_the_table_and_the_answer(folder, capsys, monkeypatch
     printed = " ".join(capsys.readouterr().out.split())
     assert not end.value.code
     assert (
-        "Use fast(lam=6, k1=2) (gains yours). Because it has the best mean rank of 2 finalists. It settles" in printed
+        "Use fast(lam=6, k1=2) (gains: yours). Because it has the best mean rank of 2 finalists. It settles" in printed
     )
-    assert "Second choice: slow(lam=6, k1=5) (gains yours); worse on fast." in printed
+    assert "Second choice: slow(lam=6, k1=5) (gains: yours); worse on fast." in printed
     assert "How sure: it dominates slow: better somewhere, worse nowhere; fast against slow: fast" in printed
     assert math.isfinite(float(printed.partition("results.parquet; ")[2].split()[0]))
 

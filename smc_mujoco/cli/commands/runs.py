@@ -110,7 +110,7 @@ def show(
         written += drawn(figure)
     s = loaded.scenario
     plant, law, times = (s.plant.name, "bold"), (str(s.law), "bold"), f", {s.duration:g} s at {s.control_period:g} s"
-    terminal.print(Text.assemble(plant, " under ", law, times, f", gains {s.law.source}"))
+    terminal.print(Text.assemble(plant, " under ", law, times, f", gains: {s.law.source}"))
     _print_curves(loaded, terminal)
     if loaded.failure:
         terminal.note(f"failed: {loaded.failure}", "red", wrap=True)

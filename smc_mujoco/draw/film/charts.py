@@ -55,7 +55,7 @@ class Charts:
                 ax.set_xlabel("time (s)", labelpad=2)
                 ax.tick_params(length=0)
                 panels.mark(ax, style.marks(traces, names), named=False)
-                artists += panels.over_time(ax, panel, colours, label=False)
+                artists += panels.over_time(ax, panel, colours, label=False, bands=not panels.crowded(panel))
                 panels.scale_ticks(ax.yaxis, panel)
             self.full = picture(canvas)
             for artist in artists:
@@ -95,7 +95,11 @@ class Charts:
 
 def set_titles(ax: Axes, panel: Panel, names: Sequence[str], point: float) -> None:
     """Set the panel's label at the left and, at the right, as much of what its lines mean as fits; `point` in px."""
-    words = [f"{name}: {text}" for name, text in panels.meaning([panel]).items()]
+    words = [
+        f"{name}: {text}"
+        for name, text in panels.meaning([panel]).items()
+        if not (name == "band" and panels.crowded(panel))
+    ]
     if away := "".join(panels.outside(panel, names)):
         words.insert(0, away)
     room = ax.get_window_extent().width - style.width(panel.label, 11 * point, bold=True) - 15 * point
