@@ -7,6 +7,7 @@ from smc_mujoco.analysis.gains_for import gains_for as gains_for
 from smc_mujoco.analysis.harmonics import describing_function as describing_function
 from smc_mujoco.analysis.margins import margins as margins
 from smc_mujoco.analysis.region_of_attraction import basin as basin
+from smc_mujoco.analysis.state_space import state_space as state_space
 from smc_mujoco.analysis.step_halving import StepChange as StepChange
 from smc_mujoco.analysis.step_halving import step_halving as step_halving
 from smc_mujoco.analysis.tuning.result import Tuned as Tuned
@@ -27,6 +28,7 @@ from smc_mujoco.control.law import Law as Law
 from smc_mujoco.control.law import Measurement as Measurement
 from smc_mujoco.control.law import law_function as law_function
 from smc_mujoco.control.law import laws as laws
+from smc_mujoco.control.linear_law import law_from_control as law_from_control
 from smc_mujoco.control.policy import policy as policy
 from smc_mujoco.control.surface import Surface as Surface
 from smc_mujoco.control.surface import surface as surface

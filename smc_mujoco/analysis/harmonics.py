@@ -22,6 +22,7 @@ import mujoco
 import numpy as np
 from numba import njit
 
+from smc_mujoco.analysis.state_space import JUMPING, rates
 from smc_mujoco.common.errors import ScenarioError, number, whole
 from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.common.mjcb import installed
@@ -35,7 +36,6 @@ from smc_mujoco.simulation import native
 from smc_mujoco.simulation.scenario import Scenario
 
 STEP = 1e-6  # SI units, of finite differences
-INSTANT = 1e-9  # s, a physics step that is short beside all time constants
 CHUNK = 50_000  # samples that a law is called for at once
 MAX_SAMPLES = 10**9  # of a period, for a describing function
 SAMPLES = 3  # of a drive, about: so many times the finest period's
@@ -112,9 +112,7 @@ class Loop:
         with installed(None):
             compiled = assembly.model([ideal])
             made = assembly.with_values(compiled, ideal)
-            flags = mujoco.mjtDisableBit
-            for flag in (flags.mjDSBL_CONTACT, flags.mjDSBL_LIMIT, flags.mjDSBL_FRICTIONLOSS):
-                made.opt.disableflags |= flag.value
+            made.opt.disableflags |= JUMPING
             gear = next((part for part in s.actuator if isinstance(part, Backlash)), None)
             if gear is not None:  # the rotor is rigid on the joint here
                 driven = dof_ids(made)[: s.plant.driven]
@@ -369,24 +367,8 @@ def transition(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, 
     """
     from scipy.linalg import expm
 
-    nv, n, step = model.nv, 2 * model.nv + model.na, float(model.opt.timestep)
-    rest = data.qpos.copy(), data.qvel.copy(), data.act.copy(), data.ctrl.copy()
-    model.opt.timestep = INSTANT  # or drives give the force of the step's end
-
-    def rates(moved: np.ndarray) -> np.ndarray:
-        data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = rest
-        mujoco.mj_integratePos(model, data.qpos, moved[:nv], 1.0)
-        data.qvel[:] += moved[nv : 2 * nv]
-        data.act[:] += moved[2 * nv : n]
-        data.ctrl[:] += moved[n:]
-        mujoco.mj_forward(model, data)
-        return np.concatenate((data.qvel, data.qacc, data.act_dot))
-
-    block = np.zeros((n + model.nu, n + model.nu))
-    for i, moved in enumerate(STEP * np.eye(n + model.nu)):
-        block[:n, i] = (rates(moved) - rates(-moved)) / (2.0 * STEP)
-    model.opt.timestep = step
-    stepped = expm(block * step)
+    n, block = 2 * model.nv + model.na, rates(model, data)
+    stepped = expm(block * float(model.opt.timestep))
     return stepped[:n, :n], stepped[:n, n:]
 
 

@@ -193,7 +193,8 @@ def _cached(function: Callable, *arguments: object) -> tuple[str, str] | bool:
     It is False, for none, if the function has no hash, or if a global of it has changed since it was compiled first, as
     for other gains: the code has the present value.
     """
-    name = re.sub(r"\W+", "-", f"{function.__module__}.{function.__qualname__}")
+    function_name = getattr(function, "__qualname__", function.__name__)
+    name = re.sub(r"\W+", "-", f"{function.__module__}.{function_name}")
     try:
         known = fingerprint.of(function)
         return known == fingerprint.now(function) and (name, f"{magic()} {known} {arguments}")

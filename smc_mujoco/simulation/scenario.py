@@ -540,6 +540,12 @@ def check_law(s: Resolved) -> None:
     for law in s.law.parts:
         if s.surface is not None:
             check_surface(s.surface, law)
+        period = getattr(law.function, "control_period", None)  # for which a discrete controller is
+        if period is not None and abs(s.control_period - period) > 1e-9 * period:
+            raise ScenarioError(
+                f"law {law.name!r} is discretised for {period:g} s, and control_period is {s.control_period:g} s: give "
+                f"control_period={period:g}, or the controller of continuous time"
+            )
 
 
 def check_surface(surface: Surface, law: Law) -> None:

@@ -1,0 +1,109 @@
+"""The linear model of a mechanism: A and B of its rates, from MuJoCo.
+
+G = smc.state_space("cart_pole")        # a control.StateSpace, u -> positions of the channels
+gain, *_ = control.lqr(G, Q, R)
+"""
+
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.extras import package
+from smc_mujoco.common.mjcb import installed
+from smc_mujoco.control.design import STEP
+from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids, joint_names
+from smc_mujoco.mechanisms.plant import Plant, as_plant
+from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation.scenario import Scenario
+
+if TYPE_CHECKING:
+    from control import StateSpace
+
+INSTANT = 1e-9  # s: of a physics step that drives see while rates are linearised
+FLAGS = mujoco.mjtDisableBit
+JUMPING = FLAGS.mjDSBL_CONTACT.value | FLAGS.mjDSBL_LIMIT.value | FLAGS.mjDSBL_FRICTIONLOSS.value  # not linear
+UNHELD = 1e-6  # rad/s^2 or m/s^2: a larger acceleration that no command cancels is no rest
+
+
+def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
+    """Linearise a plant at rest as a `control.StateSpace`: x' = A x + B u, y = C x.
+
+    The states are the positions of its joints, then their velocities, the channels first in their order; u are the
+    commands of the driven channels, and y the positions of all channels. SI units. Drives are ideal; contacts, limits
+    and dry friction are left out. A and B are central differences of the accelerations that MuJoCo computes.
+
+    Args:
+      plant: a Plant or its name.
+      x: position of all channels, rad or m; the commands that hold the plant there are part of the operating point.
+        Default: where the plant rests.
+
+    Raises:
+      ScenarioError: no command holds the plant at rest there.
+      MissingPackageError: python-control is not installed.
+    """
+    with package("control", "smc.state_space"):
+        from control import StateSpace
+
+    plant = as_plant(plant)
+    at = Scenario(plant=plant, law="none", x0=plant.rest if x is None and plant.rest else x or 0.0, v0=0.0)
+    with installed(None):
+        made = assembly.with_values(assembly.model([at]), at)
+        made.opt.disableflags |= JUMPING
+        data = mujoco.MjData(made)
+        data.qpos[:], data.qvel[:] = assembly.start(made, at)
+        driven, dofs = drive_ids(made), dof_ids(made)
+        _hold(made, data, driven, plant.name)
+        block = rates(made, data)
+    order = [*dofs, *(i for i in range(made.nv) if i not in dofs)]
+    order += [made.nv + i for i in order]
+    n = len(order)
+    a, b = block[:n, :n][np.ix_(order, order)], block[:n, n:][np.ix_(order, driven)]
+    names = joint_names(plant)
+    labels = [made.joint(int(made.dof_jntid[i])).name for i in order[: made.nv]]
+    states = [f"{kind}[{name}]" for kind in ("x", "v") for name in labels]
+    inputs, outputs = [f"u[{name}]" for name in names[: plant.driven]], [f"x[{name}]" for name in names]
+    return StateSpace(a, b, np.eye(plant.n, n), 0.0, states=states, inputs=inputs, outputs=outputs, name=plant.name)
+
+
+def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: np.ndarray, name: str) -> None:
+    """Set the commands that hold a mechanism at rest.
+
+    Raises:
+      ScenarioError: there are none.
+    """
+    b = rates(model, data)[model.nv : 2 * model.nv, 2 * model.nv + model.na :][:, driven]
+    mujoco.mj_forward(model, data)
+    data.ctrl[driven] -= np.linalg.lstsq(b, data.qacc, rcond=None)[0]
+    mujoco.mj_forward(model, data)
+    if np.abs(data.qacc).max() > UNHELD:
+        x = ", ".join(f"{one:g}" for one in data.qpos)
+        raise ScenarioError(f"no command holds {name} at rest at x = {x}: give another x")
+
+
+def rates(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """Return the derivatives of the rates of positions, velocities and activations, linearised at `data`.
+
+    Returns:
+      Rows: those rates; columns: positions, velocities, activations, commands. Rows of the commands are 0.
+    """
+    nv, n, step = model.nv, 2 * model.nv + model.na, float(model.opt.timestep)
+    rest = data.qpos.copy(), data.qvel.copy(), data.act.copy(), data.ctrl.copy()
+    model.opt.timestep = INSTANT  # or drives give the force of the step's end
+
+    def moving(moved: np.ndarray) -> np.ndarray:
+        data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = rest
+        mujoco.mj_integratePos(model, data.qpos, moved[:nv], 1.0)
+        data.qvel[:] += moved[nv : 2 * nv]
+        data.act[:] += moved[2 * nv : n]
+        data.ctrl[:] += moved[n:]
+        mujoco.mj_forward(model, data)
+        return np.concatenate((data.qvel, data.qacc, data.act_dot))
+
+    block = np.zeros((n + model.nu, n + model.nu))
+    for i, moved in enumerate(STEP * np.eye(n + model.nu)):
+        block[:n, i] = (moving(moved) - moving(-moved)) / (2.0 * STEP)
+    model.opt.timestep = step
+    data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = rest
+    return block

@@ -1,0 +1,268 @@
+"""Linear controllers as laws: transfer functions and state-space models, of python-control or as matrices.
+
+    import control
+    lead = control.tf([40, 100], [0.01, 1])                       # u = K(s) (r - x)
+    smc.run(smc.Scenario(plant="duffing", law=smc.law_from_control(lead)))
+
+A controller of continuous time is discretised by Tustin's rule (bilinear, without prewarping) with the control period
+of the run. In real Schur form A is triangular but for 2 x 2 blocks, so each sample solves (I - A h/2) x = b from below.
+The law is written out as straight Python without loops, which is compiled and exported like any other law.
+"""
+
+import dataclasses
+import functools
+import linecache
+import warnings
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from smc_mujoco.common import errors
+from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.control.law import Law, law_function
+from smc_mujoco.control.units import Gain, Unit
+
+INPUTS = {  # what a controller may read -> of the law's measurement
+    "error": "y.r - y.x", "error_rate": "y.dr - y.v",
+    **{name: f"y.{name}" for name in ("x", "v", "q", "dq", "r", "dr", "ddr")},
+}  # fmt: skip
+USUAL = ("error", "error_rate")
+MAX_STATES = 50
+CURE = "give a TransferFunction or StateSpace of python-control, or (A, B, C, D, dt)"
+Matrix = tuple[tuple[float, ...], ...]
+
+
+class System(NamedTuple):
+    """x' = a x + b w, u = c x + d w; or x+ = a x + b w if dt is not None, with dt s (or True: of any period)."""
+
+    a: np.ndarray
+    b: np.ndarray
+    c: np.ndarray
+    d: np.ndarray
+    dt: float | bool | None
+
+
+@dataclasses.dataclass(frozen=True)
+class LinearLaw:
+    """The function of a linear controller's law. It is equal to another one with the same numbers.
+
+    Attributes:
+      a, b, c, d: its matrices; a is in real Schur form if the controller is of continuous time.
+      inputs: keys of INPUTS.
+      name: of the law.
+      discrete: whether the matrices are those of a step.
+      control_period: s, for which they are; None for any.
+    """
+
+    a: Matrix
+    b: Matrix
+    c: tuple[float, ...]
+    d: tuple[float, ...]
+    inputs: tuple[str, ...]
+    name: str
+    discrete: bool
+    control_period: float | None
+
+    @property
+    def __name__(self) -> str:
+        """The law's name."""
+        return self.name
+
+    def __call__(self, y: Any, gains: Any, memory: Any) -> tuple[float, float]:
+        """Return u, and x - r for s."""
+        return self.py_func(y, gains, memory)
+
+    def __reduce__(self) -> tuple:
+        """Pickle the numbers. The function is written out again."""
+        return type(self), tuple(getattr(self, field.name) for field in dataclasses.fields(self))
+
+    @functools.cached_property
+    def text(self) -> str:
+        """The law in Python."""
+        lines = [f"w{j} = {INPUTS[name]}" for j, name in enumerate(self.inputs)]
+        lines += self._step() if self.discrete else self._tustin()
+        return "def controller(y, gains, memory):\n" + "".join(f"    {line}\n" for line in [*lines, "return u, y.e"])
+
+    @functools.cached_property
+    def py_func(self) -> Any:
+        """The compiled text, as a plain function of Python."""
+        file, space = f"<controller {self.name} {hash(self):x}>", {"__name__": "law_from_control"}
+        linecache.cache[file] = (len(self.text), None, self.text.splitlines(keepends=True), file)  # for its translation
+        exec(compile(self.text, file, "exec"), space)
+        return space["controller"]
+
+    def _output(self) -> str:
+        return f"u = gains.scale * ({_sum([(self.c, 'x'), (self.d, 'w')])})"
+
+    def _step(self) -> list[str]:
+        n = range(len(self.a))
+        lines = [*(f"x{i} = memory[{i}]" for i in n), self._output()]
+        return lines + [f"memory[{i}] = {_sum([(self.a[i], 'x'), (self.b[i], 'w')])}" for i in n]
+
+    def _tustin(self) -> list[str]:
+        """Return the lines of x = (I - A h/2)^-1 (z + h/2 B w), u = C x + D w, z+ = 2 x - z, with z in memory."""
+        n, i, lines = len(self.a), len(self.a) - 1, ["h = 0.5 * y.dt"] if self.a else []
+        while i >= 0:
+            first = i - 1 if i > 0 and self.a[i][i - 1] else i  # of a block
+            for k in range(first, i + 1):
+                known = [0.0] * (i + 1) + list(self.a[k][i + 1 :])
+                lines.append(f"f{k} = memory[{k}] + h * ({_sum([(known, 'x'), (self.b[k], 'w')])})")
+            lines += _solved(self.a, first, i)
+            i = first - 1
+        return [*lines, self._output(), *(f"memory[{i}] = 2.0 * x{i} - memory[{i}]" for i in range(n))]
+
+
+def _solved(a: Matrix, first: int, last: int) -> list[str]:
+    """Return the lines that solve a block of (I - A h/2) x = f: one equation, or two by Cramer's rule."""
+    if first == last:
+        return [f"x{first} = f{first} / (1.0 - h * {a[first][first]!r})"]
+    i, j = first, last
+    p, t = (f"(1.0 - h * {a[k][k]!r})" for k in (i, j))
+    q, r = (f"(-h * {a[k][m]!r})" for k, m in ((i, j), (j, i)))
+    return [
+        f"det = {p} * {t} - {q} * {r}",
+        f"x{i} = (f{i} * {t} - {q} * f{j}) / det",
+        f"x{j} = ({p} * f{j} - {r} * f{i}) / det",
+    ]
+
+
+def _sum(parts: Sequence[tuple[Sequence[float], str]]) -> str:
+    """Return a sum of products as text, without those with 0."""
+    terms = [f"{value!r} * {name}{i}" for values, name in parts for i, value in enumerate(values) if value]
+    return " + ".join(terms) or "0.0"
+
+
+def law_from_control(K: Any, inputs: Sequence[str] | str | None = None, name: str = "linear_controller") -> Law:
+    """Return a linear controller as a law of one channel.
+
+    Args:
+      K: a TransferFunction or StateSpace of python-control (or scipy), with one output u, N or N m; or matrices
+        (A, B, C, D) or (A, B, C, D, dt). Without dt, or with dt = 0, it is of continuous time, and discretised by
+        Tustin's rule with the control period of the run. With dt = True it is a step of any period, with dt in s one of
+        this control period.
+      inputs: what K reads, in its order: error (r - x), error_rate (r' - v), x, v, r, dr, ddr, and q, dq of the joint
+        without actuator that this one moves. Default: error, and error_rate if K has two inputs.
+      name: of the law.
+
+    The law has one gain, `scale`, a factor of K, which `smc.tune` searches. It has no anti-windup. For another
+    discretisation give `control.sample_system(K, h, "zoh")`.
+
+    Raises:
+      ScenarioError: K is none of these, improper, not finite, of several outputs or over 50 states, or has other
+        inputs than are named.
+    """
+    errors.name("name of the controller", name)
+    system = _checked(_system(K))
+    states, given = len(system.a), system.b.shape[1]
+    chosen = USUAL[:given] if inputs is None else (inputs,) if isinstance(inputs, str) else tuple(inputs)
+    for one in chosen:
+        errors.find("input of a controller", one, INPUTS)
+    if len(chosen) != given:
+        raise ScenarioError(f"K has {given} inputs, and {len(chosen)} are named: give inputs=, such as ['r', 'x']")
+    a, b, c, discrete = system.a, system.b, system.c, system.dt is not None
+    if states and not discrete:
+        from scipy.linalg import schur
+
+        a, basis, *_ = schur(a, output="real")
+        b, c = basis.T @ b, c @ basis
+    function = LinearLaw(
+        a=_rows(a),
+        b=_rows(b),
+        c=_rows(c)[0],
+        d=_rows(system.d)[0],
+        inputs=chosen,
+        name=name,
+        discrete=discrete,
+        control_period=None if system.dt in (None, True) else float(system.dt),
+    )
+    decorate = law_function(
+        gains={"scale": Gain(1.0, Unit(), positive=True)}, memory=max(states, 1), family="linear", continuous=True
+    )
+    return decorate(function)()
+
+
+def _rows(matrix: np.ndarray) -> Matrix:
+    return tuple(tuple(row) for row in matrix.tolist())
+
+
+def _system(K: Any) -> System:
+    """Return what the user gave as matrices.
+
+    Raises:
+      ScenarioError: it is no linear system, or an improper one.
+    """
+    if isinstance(K, tuple | list) and len(K) in (4, 5):
+        return _matrices(K[0], K[1], K[2], K[3], K[4] if len(K) == 5 else None)
+    if all(hasattr(K, name) for name in "ABCD"):
+        return _matrices(K.A, K.B, K.C, K.D, getattr(K, "dt", None))
+    if all(hasattr(K, name) for name in ("num", "den")):
+        return _realised(K.num, K.den, getattr(K, "dt", None))
+    raise ScenarioError(f"K is {shown(K)}: {CURE}")
+
+
+def _matrices(a: Any, b: Any, c: Any, d: Any, dt: Any) -> System:
+    """Return matrices as arrays of two axes; a number is a matrix of 1 x 1, and a list is the column b or a row."""
+    try:
+        found = [np.asarray(each) for each in (a, b, c, d)]
+        if any(np.iscomplexobj(each) for each in found):
+            raise ValueError
+        a, b, c, d = (each.astype(float) for each in found)
+        b = b[:, None] if b.ndim == 1 else b
+        a, b, c, d = (np.atleast_2d(each) for each in (a, b, c, d))
+        if not a.size:
+            a, b, c = np.zeros((0, 0)), np.zeros((0, d.shape[1])), np.zeros((len(d), 0))
+    except (TypeError, ValueError):
+        raise ScenarioError(f"K has matrices that are not of real numbers: {CURE}") from None
+    return System(a, b, c, d, dt)
+
+
+def _realised(num: Any, den: Any, dt: Any) -> System:
+    """Return matrices of a row of transfer functions, each with its own states."""
+    from scipy.linalg import block_diag
+    from scipy.signal import BadCoefficients, tf2ss
+
+    if np.ndim(den[0]) == 0:  # one of scipy
+        num, den = [[num]], [[den]]
+    if len(num) != 1:
+        raise ScenarioError(f"K has {len(num)} outputs: give one with one output, u, such as K[0, :]")
+    forms = []
+    for above, below in zip(num[0], den[0], strict=True):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", BadCoefficients)  # leading zeros, which are cut off
+            try:
+                forms.append(tf2ss(np.atleast_1d(above), np.atleast_1d(below)))
+            except ValueError:
+                order = " over ".join(str(len(np.trim_zeros(each, "f")) - 1) for each in (above, below))
+                cure = "filter its derivative, as s / (tau s + 1)"
+                raise ScenarioError(f"K is improper, of order {order}: {cure}") from None
+    a, b = (block_diag(*(form[k] for form in forms)) for k in (0, 1))
+    c, d = (np.hstack([form[k] for form in forms]) for k in (2, 3))
+    return _matrices(a, b, c, d, dt)
+
+
+def _checked(K: System) -> System:
+    """Return a system whose sizes fit, of finite numbers, and with None for a dt of continuous time.
+
+    Raises:
+      ScenarioError: it is none.
+    """
+    n, inputs, outputs = len(K.a), K.d.shape[1], len(K.d)
+    shapes = {"A": (K.a, (n, n)), "B": (K.b, (n, inputs)), "C": (K.c, (outputs, n)), "D": (K.d, (outputs, inputs))}
+    for name, (matrix, shape) in shapes.items():
+        if matrix.shape != shape:
+            raise ScenarioError(f"K's {name} is {_size(matrix.shape)}: give {_size(shape)}, as A and D have it")
+        if not np.isfinite(matrix).all():
+            raise ScenarioError(f"K's {name} is not finite: {CURE}")
+    if outputs != 1:
+        raise ScenarioError(f"K has {outputs} outputs: give one with one output, u, such as K[0, :]")
+    if n > MAX_STATES:
+        raise ScenarioError(f"K has {n} states: give {MAX_STATES} at most, by control.balred or control.minreal")
+    if K.dt is True:
+        return K
+    dt = 0.0 if K.dt is None else errors.number("dt of K", K.dt, least=0.0)
+    return K._replace(dt=dt or None)
+
+
+def _size(shape: tuple[int, ...]) -> str:
+    return " x ".join(map(str, shape))

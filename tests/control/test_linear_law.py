@@ -1,0 +1,172 @@
+"""Linear controllers as laws, against python-control's own simulation, and linear models of plants."""
+
+import pickle
+import re
+import subprocess
+import sys
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+import scipy.signal
+from helpers.compiler import needs_compiler
+
+import smc_mujoco as smc
+from smc_mujoco.simulation.prepare import prepare
+
+H = 0.01
+tf: Any = control.tf
+LINEAR = smc.plant("duffing", beta=0.0)  # x'' = x - 0.2 x' + u
+LEAD = tf([12.0, 30.0], [0.02, 1.0])
+CONTROLLERS = {
+    "first order": LEAD,
+    "integrator": tf([12.0, 30.0, 8.0], [0.02, 1.0, 0.0]),
+    "resonant": LEAD * tf([1.0, 0.4, 30.0], [1.0, 4.0, 30.0]),
+    "two resonances": LEAD * tf([1.0, 0.4, 30.0], [1.0, 4.0, 30.0]) * tf([1, 1, 90], [1, 9, 90]),
+    "gain and rate": control.ss([], [], [], [[30.0, 6.0]]),
+}
+
+
+def text(law: Any) -> str:
+    return law.function.text
+
+
+def sampled(K: control.StateSpace) -> control.StateSpace:
+    """K by Tustin's rule, of python-control; a gain has no rule."""
+    return control.sample_system(control.ss(K), H, "tustin") if control.ss(K).nstates else K
+
+
+@pytest.mark.parametrize(
+    ("name", "discrete"), [*((name, False) for name in CONTROLLERS), ("first order", True), ("two resonances", True)]
+)
+def test_a_loop_is_that_of_python_control(name, discrete):
+    K = CONTROLLERS[name]
+    one = K.ninputs == 1
+    law = smc.law_from_control(sampled(K) if discrete else K)
+    scenario = smc.Scenario(
+        plant=LINEAR, law=law, x0=0.3, v0=-0.4, duration=3.0, control_period=H, u_max=np.inf, disturbance=()
+    )
+    trace = smc.run(scenario)
+    G = control.sample_system(smc.state_space(LINEAR), H, "zoh")
+    Kd = sampled(K)
+    x, w, found = np.array([0.3, -0.4]), np.zeros(Kd.nstates), []
+    for _ in trace.t:
+        found.append(x[0])
+        e = -x[:1] if one else -x
+        u = Kd.C @ w + Kd.D @ e
+        w, x = Kd.A @ w + Kd.B @ e, G.A @ x + G.B @ u
+    assert not prepare(scenario).why_not
+    assert np.abs(trace.x[:, 0] - found).max() < 1e-8
+
+
+def test_a_step_of_the_reference_is_the_closed_loop_of_forced_response():
+    K = CONTROLLERS["integrator"]
+    fields = {"x0": 0.0, "duration": 4.0, "control_period": H, "u_max": np.inf, "reference": smc.Constant(0.2)}
+    trace = smc.run(smc.Scenario(plant=LINEAR, law=smc.law_from_control(K), **fields))
+    G = control.sample_system(smc.state_space(LINEAR), H, "zoh")
+    loop = control.feedback(G * sampled(K))
+    answer = control.forced_response(loop, trace.t, np.full(len(trace.t), 0.2))
+    assert np.abs(trace.x[:, 0] - np.squeeze(answer.outputs)).max() < 1e-8
+    assert abs(trace.x[-1, 0] - 0.2) < 0.01
+
+
+def test_many_inputs_are_read_by_name():
+    K = control.ss([], [], [], [[5.0, -30.0, -6.0, 2.0]])
+    law = smc.law_from_control(K, ["r", "x", "v", "ddr"])
+    assert "w3 = y.ddr" in text(law)
+    trace = smc.run(smc.Scenario(plant=LINEAR, law=law, duration=0.1, reference=smc.Constant(0.5), u_max=np.inf))
+    assert np.allclose(trace.u[:, 0], 2.5 - 30.0 * trace.x[:, 0] - 6.0 * trace.v[:, 0], rtol=1e-12)
+
+
+@needs_compiler
+def test_its_c_gives_the_same_bits(tmp_path):
+    law: Any = smc.law_from_control(CONTROLLERS["two resonances"])
+    (tmp_path / "law.c").write_text(smc.law_to_c(law))
+    in_c = smc.law_from_c(tmp_path / "law.c")
+    runs = [
+        smc.Scenario(plant="duffing", law=one, duration=1.0, u_max=np.inf)
+        for one in (law, in_c(), law.template(scale=0.5))
+    ]
+    first, second, half = smc.run(runs)
+    assert np.array_equal(first.u, second.u)
+    assert half.u[0, 0] == first.u[0, 0] / 2
+
+
+def test_it_is_tuned_pickled_and_told_apart():
+    law: Any = smc.law_from_control(LEAD)
+    assert pickle.loads(pickle.dumps(law)) == law != smc.law_from_control(2 * LEAD)
+    assert text(pickle.loads(pickle.dumps(law))) == text(law)
+    assert 0.01 <= smc.tune("duffing", law.template(scale=0.02), budget=4).gains["scale"] <= 100.0
+
+
+def test_systems_of_scipy_and_matrices_are_taken():
+    texts = {
+        text(smc.law_from_control(K))
+        for K in (
+            tf([1.0, 2.0], [1.0, 3.0]), scipy.signal.TransferFunction([1.0, 2.0], [1.0, 3.0]),
+            (-3.0, 1.0, -1.0, 1.0), ([[-3.0]], [1.0], [-1.0], 1.0, None),
+        )
+    }  # fmt: skip
+    assert len(texts) == 1
+
+
+@pytest.mark.parametrize(
+    ("K", "said"),
+    [
+        (tf([1, 0], [1]), "K is improper, of order 1 over 0: filter its derivative"),
+        (control.rss(2, 2, 1), "K has 2 outputs: give one with one output"),
+        (control.rss(2, 1, 3), "K has 3 inputs, and 2 are named: give inputs="),
+        (control.rss(51, 1, 1), "K has 51 states: give 50 at most"),
+        (([[1.0, 2.0]], 1, 1, 0), "K's A is 1 x 2: give 1 x 1"),
+        ((float("nan"), 1, 1, 0), "K's A is not finite"),
+        ((1j, 1, 1, 0), "K has matrices that are not of real numbers"),
+        ((1, 1, 1, 0, -0.1), "dt of K is -0.1: give at least 0"),
+        ("pid", "K is 'pid': give a TransferFunction or StateSpace"),
+        (lambda s: s, "give a TransferFunction or StateSpace"),
+    ],
+)
+def test_what_cannot_be_a_law_is_one_sentence(K, said):
+    with pytest.raises(smc.ScenarioError, match=re.escape(said)) as error:
+        smc.law_from_control(K)
+    assert "\n" not in str(error.value)
+
+
+def test_a_discrete_one_runs_at_its_own_period_only():
+    law = smc.law_from_control(sampled(LEAD))
+    with pytest.raises(smc.ScenarioError, match=r"is discretised for 0.01 s, and control_period is 0.001 s: give"):
+        smc.Scenario(plant="duffing", law=law)
+    every = sampled(LEAD)
+    every.dt = True
+    smc.Scenario(plant="duffing", law=smc.law_from_control(every))
+
+
+def test_python_control_is_not_imported_for_matrices():
+    code = "import sys, smc_mujoco as smc; smc.law_from_control((0, 1, 1, 0)); print('control' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True) == "False\n"
+
+
+# the linear model of a plant
+
+
+@pytest.mark.parametrize("name", smc.plants())
+def test_a_and_b_are_the_derivatives_of_the_nominal_model(name):
+    """Where it has one for its channels alone, and so holds with the others at rest."""
+    plant = smc.plant(name)
+    G = smc.state_space(plant)
+    n = plant.n
+    assert (G.nstates, G.ninputs, G.noutputs) == (2 * n, plant.driven, n)
+    assert np.array_equal(G.A[:n], np.eye(n, 2 * n, n))
+    assert not G.B[:n].any()
+    rest = np.array(plant.rest or (0.0,) * n)
+    p = smc.plant(name).values({})
+    for i in range(plant.driven):
+        _, g = plant.nominal(rest, np.zeros(n), i, p)
+        assert G.B[n + i, i] == pytest.approx(g, rel=1e-6)
+
+
+def test_it_is_linearised_where_a_command_holds_it():
+    G = smc.state_space("inverted_pendulum", 0.5)
+    assert G.A[1, 0] == pytest.approx(smc.state_space("inverted_pendulum").A[1, 0] * np.cos(0.5), rel=1e-6)
+    with pytest.raises(smc.ScenarioError, match=r"no command holds cart_pole at rest at x = 0\.5, 0\.5: give another"):
+        smc.state_space("cart_pole", 0.5)
