@@ -10,7 +10,7 @@ stops, and what they cost would make the law look cheap.
 
 import time
 
-from speed import BARE, STEPS, chunk, plain_steps, ratio, stepping
+from speed import BARE, STEPS, batch_of, plain_steps, ratio, stepping
 
 import smc_mujoco as smc
 from smc_mujoco.simulation.run import cores
@@ -27,7 +27,7 @@ def main() -> None:
     for integrator in ("implicitfast", "RK4"):
         for law in LAWS:
             scenario = smc.Scenario(law=law, duration=STEPS * 5e-4 + 1.0, integrator=integrator, **machine)
-            batch = chunk(scenario, 1, 1)
+            batch = batch_of(scenario, 1, 1)
             with_law, bare = stepping(batch, STEPS), stepping(batch, STEPS, BARE)  # both before the first step
             one, other, factor = ratio(with_law, bare)
             _, _, of_plain = ratio(with_law, plain_steps(scenario, 1, STEPS))
@@ -36,7 +36,7 @@ def main() -> None:
             print(f"{integrator:13} {law:26} {microseconds}: {factors} (at most {TARGET})", flush=True)
     scenario = smc.Scenario(law="computed_torque_sliding", duration=STEPS * 5e-4, **machine)
     steps = STEPS // 20
-    alone, all_cores = (stepping(chunk(scenario, ARMS, threads), steps) for threads in (1, cores()))
+    alone, all_cores = (stepping(batch_of(scenario, ARMS, threads), steps) for threads in (1, cores()))
     _, _, speed_up = ratio(alone, all_cores, time.perf_counter)
     print(f"{ARMS} arms on {cores()} cores: {speed_up:.2f} times as fast as on one")
 

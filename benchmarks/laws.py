@@ -28,7 +28,7 @@ from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.simulation import native
-from smc_mujoco.simulation.batch import Chunk
+from smc_mujoco.simulation.batch import ScenarioBatch
 from smc_mujoco.simulation.callback import callback, installed
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.state import FINE
@@ -92,25 +92,25 @@ def sample(law: str, velocity: str = "measured") -> float:
         plant=smc.plant("pendulum_network", n=PENDULUMS), law=law, velocity=velocity, integrator="Euler", duration=1.0
     )
     with installed():
-        chunk = Chunk([prepare(scenario)], 1)  # keeps what its record points to
-        data, record = mujoco.MjData(chunk.model), chunk.records.copy()
-        numbers, userdata = chunk.packed[0].numbers.copy(), chunk.batch.bind("userdata")[0].copy()
+        batch = ScenarioBatch([prepare(scenario)], 1)  # keeps what its record points to
+        data, record = mujoco.MjData(batch.model), batch.records.copy()
+        numbers, userdata = batch.packed[0].numbers.copy(), batch.batch.bind("userdata")[0].copy()
         phase = np.linspace(0.0, 40.0, PENDULUMS)
         data.qpos[:], data.qvel[:] = 0.3 * np.sin(phase), 2.1 * np.cos(phase)
-        mujoco.mj_forward(chunk.model, data)
-    function, model, at = callback().ctypes, chunk.model._address, data._address
+        mujoco.mj_forward(batch.model, data)
+    function, model, at = callback().ctypes, batch.model._address, data._address
     moved = phase + 7e-3 * np.arange(SAMPLES)[:, None]
     seen = np.empty((SAMPLES, len(data.sensordata)))  # position and velocity, channel by channel
     seen[:, 0::2], seen[:, 1::2] = 0.3 * np.sin(moved), 2.1 * np.cos(moved)
     least = np.inf
     for _ in range(ROUNDS):
-        data.userdata[:], chunk.records[:], chunk.packed[0].numbers[:] = userdata, record, numbers
+        data.userdata[:], batch.records[:], batch.packed[0].numbers[:] = userdata, record, numbers
         start = time.perf_counter()
         for k in range(SAMPLES):
             data.sensordata[:] = seen[k]
             function(model, at)
         least = min(least, time.perf_counter() - start)
-        assert chunk.records["failure"][0] == FINE, law
+        assert batch.records["failure"][0] == FINE, law
     return 1e9 * least / (SAMPLES * PENDULUMS)
 
 

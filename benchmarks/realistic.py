@@ -15,7 +15,7 @@ import time
 import mujoco
 from rich.console import Console
 from rich.table import Table
-from speed import BARE, ROUNDS, STEPS, chunk, ratio, seconds, stepping
+from speed import BARE, ROUNDS, STEPS, batch_of, ratio, seconds, stepping
 
 import smc_mujoco as smc
 from smc_mujoco.simulation.model import parts
@@ -61,10 +61,10 @@ def cases(plant: str) -> dict[str, smc.Scenario]:
 def measure(scenario: smc.Scenario) -> tuple[float, float]:
     """Steps per second on two threads, and on one thread the time of the callback path over that of a bare mj_step."""
     steps = STEPS // 4
-    together = stepping(chunk(scenario, RUNS, THREADS), steps)
+    together = stepping(batch_of(scenario, RUNS, THREADS), steps)
     together()
     rate = RUNS * steps / statistics.median(seconds(together, time.perf_counter) for _ in range(ROUNDS))
-    alone = chunk(scenario, 4)
+    alone = batch_of(scenario, 4)
     return rate, ratio(stepping(alone, steps), stepping(alone, steps, BARE))[2]
 
 

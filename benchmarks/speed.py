@@ -29,7 +29,7 @@ from rich.table import Table
 import smc_mujoco as smc
 from smc_mujoco.common import mjcb
 from smc_mujoco.simulation import model as assembly
-from smc_mujoco.simulation.batch import Chunk
+from smc_mujoco.simulation.batch import ScenarioBatch
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.prepare import prepare
 
@@ -58,14 +58,14 @@ def ratio(
     return statistics.median(ones), statistics.median(others), statistics.median(a / b for a, b in rounds)
 
 
-def chunk(scenario: smc.Scenario, runs: int, threads: int = 1) -> Chunk:
+def batch_of(scenario: smc.Scenario, runs: int, threads: int = 1) -> ScenarioBatch:
     """A batch of equal runs, ready to step."""
     with installed():
-        return Chunk([prepare(dataclasses.replace(scenario, seed=seed)) for seed in range(runs)], threads)
+        return ScenarioBatch([prepare(dataclasses.replace(scenario, seed=seed)) for seed in range(runs)], threads)
 
 
 def stepping(
-    batch: Chunk, steps: int, within: Callable[[], contextlib.AbstractContextManager] = installed
+    batch: ScenarioBatch, steps: int, within: Callable[[], contextlib.AbstractContextManager] = installed
 ) -> Callable[[], None]:
     """Steps of a batch from its present state, with the callback or BARE."""
     start, records = batch.batch.state.copy(), batch.records.copy()
@@ -84,7 +84,7 @@ def stepping(
 def plain_batch(scenario: smc.Scenario, runs: int, threads: int = 1) -> Batch:
     """A batch of a plant's whole model, with scenery. It is stepped outside of `installed`, with MuJoCo's timers."""
     first = scenario.resolved
-    model = assembly.with_values(assembly.model([first]), first)
+    model = assembly.with_values(assembly.model(first), first)
     batch = Batch(model, runs, threads)
     batch.bind("qpos")[:], batch.bind("qvel")[:] = assembly.start(model, first)
     return batch
@@ -110,7 +110,7 @@ def callback_against_mj_step(table: Table) -> None:
             scenario = dataclasses.replace(
                 smc.paper.scenario("inverted_pendulum", "super_twisting"), integrator=integrator, **fields
             )
-            batch = chunk(scenario, 16)
+            batch = batch_of(scenario, 16)
             with_law, bare = stepping(batch, STEPS), stepping(batch, STEPS, BARE)  # both before the first step
             plain = plain_steps(scenario, 16, STEPS)
             per = 1e6 / (16 * STEPS)
@@ -122,7 +122,7 @@ def callback_against_mj_step(table: Table) -> None:
 def threads(table: Table) -> None:
     """Simulated steps per second on two threads against one."""
     scenario = smc.paper.scenario("inverted_pendulum", "super_twisting")
-    one, two = (stepping(chunk(scenario, 64, n), STEPS // 4) for n in (1, 2))
+    one, two = (stepping(batch_of(scenario, 64, n), STEPS // 4) for n in (1, 2))
     a, b, r = ratio(one, two, time.perf_counter)
     per = 1e6 / (64 * (STEPS // 4))
     row(table, "1 thread / 2 threads", a * per, b * per, r, ">= 1.8")
@@ -134,7 +134,7 @@ def networks(table: Table) -> None:
     for n in (1000, 100):
         law = smc.law("observer_free", lam=2.922, k1=6.19)
         scenario = smc.Scenario(plant=smc.plant("pendulum_network", n=n), law=law, duration=1.0)
-        actions.append(stepping(chunk(scenario, 1000 // n), STEPS // 50))
+        actions.append(stepping(batch_of(scenario, 1000 // n), STEPS // 50))
     a, b, r = ratio(*actions)
     per = 1e6 / (1000 * (STEPS // 50))
     row(table, "network n = 1000 / n = 100, per pendulum", a * per, b * per, r, "<= 1.3")
@@ -142,7 +142,7 @@ def networks(table: Table) -> None:
 
 def peers(table: Table) -> None:
     """One simulation with a controller, as each package's users write it; microseconds per simulated step."""
-    ours = chunk(smc.paper.scenario("inverted_pendulum", "super_twisting"), 1)
+    ours = batch_of(smc.paper.scenario("inverted_pendulum", "super_twisting"), 1)
     mine = stepping(ours, STEPS)
     for name, module, make in (
         ("dm_control suite pendulum", "dm_control", dm_control_steps),

@@ -110,7 +110,7 @@ class Loop:
             self.scenario, actuator=closed, contact="none", x0=None, v0=None, jump=None, integrator=s.integrator
         )
         with installed(None):
-            compiled = assembly.model([ideal])
+            compiled = assembly.model(ideal)
             made = assembly.with_values(compiled, ideal)
             made.opt.disableflags |= JUMPING
             gear = next((part for part in s.actuator if isinstance(part, Backlash)), None)

@@ -176,6 +176,10 @@ class Component:
         gains = {name: at(value, i) for name, value in self.gains.items()}
         return dataclasses.replace(self, gains=gains, source=self.source.of(gains))
 
+    def of_channels(self, n: int) -> "list[Component]":
+        """Return the component of all channels, or those of n channels if they differ or have other gains."""
+        return [self] if self.joint or self.uniform else [self.of_channel(i) for i in range(n)]
+
     def __str__(self):
         return f"{self.name}({', '.join(f'{k}={written(v)}' for k, v in self.gains.items())})"
 

@@ -21,6 +21,7 @@ from smc_mujoco.control.surface import Surface
 from smc_mujoco.envs.core import Episode
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.callback import installed
+from smc_mujoco.simulation.model import mechanism
 
 
 def agent(
@@ -50,7 +51,7 @@ def agent(
         velocity=velocity,  # pyright: ignore[reportArgumentType]
     )
     with installed():
-        return Agent(episode, reference.Loop(scenario))
+        return Agent(episode, reference.Loop(scenario, mechanism(scenario)))
 
 
 class Agent:

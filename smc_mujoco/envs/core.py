@@ -282,7 +282,7 @@ def _references(scenario: Resolved, samples: int) -> np.ndarray:
 
 def _compiled(scenario: Resolved, edit: Callable[[mujoco.MjSpec], None]) -> mujoco.MjModel:
     """Return the model of a scenario, with its mechanism edited."""
-    spec = assembly.spec([scenario])
+    spec = assembly.spec(scenario)
     edit(spec)
     model = ready(spec, 0 if scenario.sliding is None else callback.USERDATA)
     model.opt.timestep = scenario.physics_step

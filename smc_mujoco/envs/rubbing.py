@@ -1,6 +1,7 @@
 """Frictions by a formula in environments: the callback of smc.run computes them, and the agent gives all commands."""
 
 import contextlib
+import dataclasses
 from collections.abc import Iterable
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation.channels import channels
+from smc_mujoco.simulation.model import Mechanism
 from smc_mujoco.simulation.prepare import pack, prepare
 from smc_mujoco.simulation.scenario import Resolved
 
@@ -30,10 +32,12 @@ class Rubbing:
             name = type(scenario.sliding).__name__
             raise ScenarioError(f"friction {name} needs functions that compile, but {prepared.why_not}")
         self.scenario, self.model, self.count = scenario, model, count
-        self.channels, self.log = channels(model), np.zeros((1, scenario.plant.n), state.LOG)
+        mechanism = Mechanism(prepared.mechanism.model, channels(model))
+        self.prepared = dataclasses.replace(prepared, mechanism=mechanism)
+        self.log = np.zeros((1, scenario.plant.n), state.LOG)
         self.records, self.packed = np.zeros(count, state.SIMULATION), []  # the arrays whose addresses are in records
         for i in range(count):
-            self.records[i], packed = pack(prepared, self.channels, self.log, model)
+            self.records[i], packed = pack(self.prepared, self.log)
             self.packed.append(packed)
         self.records["agent"] = 1
 

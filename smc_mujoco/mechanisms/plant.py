@@ -301,11 +301,11 @@ def ready(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
 def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:
     """Write fields into a model."""
     for name, at, value, adds in fields:
-        values = array(model, name)
+        values = field_array(model, name)
         values[at] = values[at] + value if adds else value
 
 
-def array(model: mujoco.MjModel, name: str) -> np.ndarray:
+def field_array(model: mujoco.MjModel, name: str) -> np.ndarray:
     """Return the array of a model or option field that a Field names."""
     owner = model.opt if name.startswith("opt.") else model
     return getattr(owner, name.removeprefix("opt."))

@@ -1,5 +1,6 @@
 """Scenarios of one layout in one Batch: from records, through the simulation, to traces."""
 
+import copy
 from collections.abc import Callable, Sequence
 
 import mujoco
@@ -9,11 +10,9 @@ from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.mechanisms.hardware import encoder
-from smc_mujoco.mechanisms.plant import Values, array
+from smc_mujoco.mechanisms.plant import Values, field_array
 from smc_mujoco.simulation import callback, controller, reference, state
 from smc_mujoco.simulation import model as assembly
-from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.prepare import Packed, Prepared, pack
 from smc_mujoco.simulation.scenario import Resolved
 from smc_mujoco.simulation.trace import Trace, from_log
@@ -29,41 +28,35 @@ OVERFLOWED = "MuJoCo had no room for all contacts in the model's memory: give it
 Report = Callable[[int], None]  # called with the number of steps since its last call
 
 
-class Chunk:
-    """Scenarios of one layout in one Batch. Make and run it while the callback is installed."""
+class ScenarioBatch:
+    """Scenarios of one key in one Batch. Make and run it while the callback is installed."""
 
     def __init__(self, prepared: Sequence[Prepared], threads: int):
-        self.given = [one.scenario for one in prepared]
-        self.scenarios = scenarios = [one.resolved for one in self.given]
+        self.prepared = prepared
+        self.scenarios = scenarios = [one.scenario.resolved for one in prepared]
         first, count = scenarios[0], len(scenarios)
-        self.compiled = assembly.model(scenarios, nuserdata=callback.USERDATA, scenery=False)
-        self.model = assembly.with_values(self.compiled, first)
-        self.channels = channels(self.model)
+        self.compiled, self.model = prepared[0].mechanism.model, copy.copy(prepared[0].mechanism.model)
+        set_fields = assembly.put_values(self.model, self.compiled, first, 0)
+        mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
+        # Fields that the first scenario sets in the shared model, with the values for scenarios that do not set them.
+        self.untouched = {name: field_array(self.compiled, name) for name in set_fields}
         self.logs = [np.full((first.samples + 1, first.plant.n), np.nan, state.LOG) for _ in scenarios]
         self.records = np.zeros(count, state.SIMULATION)
         self.packed = []  # the arrays whose addresses are in the records
         for i, (one, log) in enumerate(zip(prepared, self.logs, strict=True)):
-            own = self.model if one.scenario.sliding is None else assembly.with_values(self.compiled, one.scenario)
-            self.records[i], packed = pack(one, self.channels, log, own)
+            self.records[i], packed = pack(one, log)
             self.packed.append(packed)
         # persistent: at a sample, mjData still holds the forces of this simulation's last step
         self.batch = Batch(self.model, count, min(threads, count), persistent=True)
         self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         addresses = state.address(self.records) + np.arange(count) * self.records.itemsize
         self.batch.bind("userdata")[:] = np.column_stack([np.full(count, callback.magic()), addresses])
-        qpos, qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
-        for i, scenario in enumerate(scenarios):
-            qpos[i], qvel[i] = assembly.start(self.model, scenario)
+        self.put_starts()
         self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
-        # Fields that the first scenario sets in the shared model, with the values for scenarios that do not set them.
-        set_fields = assembly.field_values(self.compiled, first, 0)
-        self.untouched = {name: array(self.compiled, name) for name in set_fields}
         self.errors: dict[int, str] = {}
         self.calls = 0  # of the callback that each simulation has had
         self.spare = mujoco.MjData(self.model)
         self.set_parameters(0, range(count))
-        if self.model.nhistory:
-            self.fill_histories()
 
     def run(self, report: Report) -> list[Trace]:
         """Simulate all of them to the end."""
@@ -82,7 +75,7 @@ class Chunk:
         for i in indices:
             values = self.untouched | assembly.field_values(self.compiled, self.scenarios[i], step)
             for name, value in values.items():
-                held = self.fields[name][i] if name in self.fields else array(self.model, name)
+                held = self.fields[name][i] if name in self.fields else field_array(self.model, name)
                 if np.any(held != value):
                     self.fields[name] = self.batch.expand(name)
                     self.fields[name][i] = value
@@ -90,15 +83,16 @@ class Chunk:
         if derived:
             self.batch.set_const(np.unique(derived).astype(np.int32))
 
-    def fill_histories(self) -> None:
-        """Fill the history of late sensors with the initial state."""
-        history = self.batch.bind("history")
-        model, data = assembly.with_values(self.compiled, self.scenarios[0]), mujoco.MjData(self.model)
+    def put_starts(self) -> None:
+        """Put all simulations at t = 0, with the past readings of late sensors."""
+        kept = {name: self.batch.bind(name) for name in ("qpos", "qvel", *["history"] * bool(self.model.nhistory))}
+        model, data = copy.copy(self.model), mujoco.MjData(self.model)
         for i, scenario in enumerate(self.scenarios):
-            data.qpos[:], data.qvel[:] = assembly.start(model, scenario)
-            assembly.put_values(model, self.compiled, scenario, 0)
-            encoder.remember(model, data)
-            history[i] = data.history
+            if self.model.nhistory:  # of which each scenario has its own period
+                assembly.put_values(model, self.compiled, scenario, 0)
+            assembly.put_start(model, data, scenario)
+            for name, values in kept.items():
+                values[i] = getattr(data, name)
 
     def advance(self, steps: int, report: Report) -> None:
         """Step the simulations that still run, in slices, so that the progress bar moves and Ctrl-C works."""
@@ -142,7 +136,7 @@ class Chunk:
         reason = None if failure == state.FINE else self.reason(i, failure)
         if reason is None and (self.model.npair or scenario.plant.own) and self.overflowed(i):
             reason, step = OVERFLOWED, 0
-        return from_log(self.given[i], self.logs[i], step, reason)
+        return from_log(self.prepared[i].scenario, self.logs[i], step, reason)
 
     def overflowed(self, i: int) -> bool:
         """Whether MuJoCo left out contacts of simulation i because its memory for them was full."""

@@ -23,12 +23,11 @@ from smc_mujoco.common.jit import compiled, integers, pointer
 from smc_mujoco.simulation import offsets
 from smc_mujoco.simulation.controller import Arrays
 from smc_mujoco.simulation.controller import control as run_simulation
+from smc_mujoco.simulation.model import USERDATA
 from smc_mujoco.simulation.state import simulation_at
 
 with mjcb.installed(None):  # this import compiles a model; imported later, it would wait for a run to end
     import mujoco.batch
-
-USERDATA = 2  # numbers in mjData.userdata: magic() and the address of the simulation's record
 
 
 @functools.cache

@@ -127,7 +127,7 @@ def _rests(scenario: Scenario) -> bool:
     moved = any(scenario.resolved.x0) or any(scenario.resolved.v0) or scenario.disturbance or scenario.sensor
     if moved or scenario.feedforward or scenario.noise != Noise() or scenario.resolved.reference != REST:
         return False
-    made = with_values(model([scenario]), scenario)
+    made = with_values(model(scenario), scenario)
     data = mujoco.MjData(made)
     data.qpos[:], data.qvel[:] = start(made, scenario)
     mujoco.mj_forward(made, data)

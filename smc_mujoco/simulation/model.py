@@ -1,13 +1,14 @@
 """Assembly: a scenario's plant and parts as one compiled model, and the model fields that its numbers set.
 
-Scenarios of the same `structure` can share a model. Everything else about their mechanisms is a number in some field of
-the model, and a Batch keeps those fields separately for each simulation.
+Scenarios of the same `structure` share a `Mechanism`. Everything else about their mechanisms is a number in some field
+of its model, and a Batch keeps those fields separately for each simulation.
 """
 
 import copy
 import dataclasses
 import itertools
-from collections.abc import Hashable, Sequence
+import weakref
+from collections.abc import Hashable
 
 import mujoco
 import numpy as np
@@ -16,9 +17,11 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.mechanisms.hardware import encoder
 from smc_mujoco.mechanisms.hardware.part import ROTOR, Part, initial_pose, joint_ids
-from smc_mujoco.mechanisms.plant import array, ready
+from smc_mujoco.mechanisms.plant import field_array, ready
+from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.scenario import Scenario
 
+USERDATA = 2  # numbers in mjData.userdata: callback.magic() and the address of the simulation's record
 PATH_POINTS = 400  # points that are checked on the path to a start: 1 cm apart on the longest rail
 MAX_OVERLAP = 1e-3  # m, at a start; chosen: contacts give way by less, so a deeper start begins with a blow
 
@@ -36,19 +39,65 @@ def structure(scenario: Scenario) -> Hashable:
     plant = scenario.plant
     built = tuple(part.structure() for part in parts(scenario))
     edits = plant.contacts.get(scenario.contact.kind), plant.mechanisms.get(scenario.mechanism)
-    return plant.build, plant.fields, plant.n, edits, built
+    resolved = scenario.resolved
+    clock = resolved.integrator, resolved.physics_step
+    return plant.build, plant.fields, plant.n, edits, built, scenario.readings, *clock
 
 
-def spec(scenarios: Sequence[Scenario]) -> mujoco.MjSpec:
-    """Return the mechanism that scenarios of one structure share, as an editable MjSpec."""
-    first = scenarios[0]
-    made = first.plant.spec()
-    if first.mechanism != "equation":
-        first.plant.mechanisms[first.mechanism].edit(made)
-    first.contact.edit_on(first.plant, made)
-    for part in parts(first):
+class Mechanism:
+    """What scenarios of one structure share.
+
+    Attributes:
+      model: their compiled model, without their values and without scenery.
+      channels: where their channels are in it, (n,) CHANNEL.
+    """
+
+    def __init__(self, model: mujoco.MjModel, channels: np.ndarray):
+        self.model, self.channels = model, channels
+        self._free_starts: set[Hashable] = set()
+
+    def check_start(self, scenario: Scenario) -> None:
+        """Check that a scenario starts on the free side of its obstacles.
+
+        The path from the plant's own start, or from 0 if that is not free, must cross no obstacle, because the
+        mechanism could not get to a start beyond a stop or inside it.
+
+        Raises:
+          ScenarioError: it starts inside an obstacle or beyond it.
+        """
+        if scenario.contact.kind == "none":
+            return
+        # all that the check depends on
+        place = scenario.plant, scenario.contact, scenario.resolved.x0, frozen(scenario.factors(0))
+        if place not in self._free_starts:
+            made = copy.copy(self.model)
+            put_values(made, self.model, scenario, 0)
+            _check_start(made, scenario)
+            self._free_starts.add(place)
+
+
+_mechanisms: weakref.WeakValueDictionary[Hashable, Mechanism] = weakref.WeakValueDictionary()  # by structure
+
+
+def mechanism(scenario: Scenario) -> Mechanism:
+    """Return the Mechanism of a scenario. It is compiled once, as long as any scenario that is prepared needs it."""
+    key = structure(scenario)
+    if (found := _mechanisms.get(key)) is None:
+        made = model(scenario, USERDATA, scenery=False)
+        found = _mechanisms[key] = Mechanism(made, channels(made))
+    return found
+
+
+def spec(scenario: Scenario) -> mujoco.MjSpec:
+    """Return a scenario's mechanism as an editable MjSpec."""
+    made = scenario.plant.spec()
+    if scenario.mechanism != "equation":
+        scenario.plant.mechanisms[scenario.mechanism].edit(made)
+    scenario.contact.edit_on(scenario.plant, made)
+    for part in parts(scenario):
         part.edit(made)
-    encoder.buffer(made, max(s.readings for s in scenarios))
+    for sensor in made.sensors:
+        sensor.nsample = scenario.readings
     return made
 
 
@@ -71,8 +120,8 @@ def _is_fixed(body: mujoco.MjsBody | None) -> bool:
     return body is None or (not body.joints and _is_fixed(body.parent))
 
 
-def model(scenarios: Sequence[Scenario], nuserdata: int = 0, scenery: bool = True) -> mujoco.MjModel:
-    """Return the compiled model that scenarios of one structure share, without their values and for no picture.
+def model(scenario: Scenario, nuserdata: int = 0, scenery: bool = True) -> mujoco.MjModel:
+    """Return the compiled model of a scenario's structure, without its values and for no picture.
 
     Its procedural textures have a few pixels: MuJoCo paints them at each compilation, in three quarters of its time.
 
@@ -81,15 +130,14 @@ def model(scenarios: Sequence[Scenario], nuserdata: int = 0, scenery: bool = Tru
       scenery: whether it keeps what `without_scenery` deletes. Users' own models always do: a fixed part may be a
         floor.
     """
-    shared = spec(scenarios)
-    if not (scenery or scenarios[0].plant.direct):
-        without_scenery(shared)
-    for texture in shared.textures:
+    edited, resolved = spec(scenario), scenario.resolved
+    if not (scenery or scenario.plant.direct):
+        without_scenery(edited)
+    for texture in edited.textures:
         texture.width, texture.height = 1, 6  # a skybox has six sides
-    made = ready(shared, nuserdata)
-    first = scenarios[0].resolved
-    made.opt.timestep = first.physics_step
-    made.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{first.integrator.upper()}")
+    made = ready(edited, nuserdata)
+    made.opt.timestep = resolved.physics_step
+    made.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{resolved.integrator.upper()}")
     return made
 
 
@@ -101,10 +149,15 @@ def with_values(compiled: mujoco.MjModel, scenario: Scenario, step: int = 0) -> 
     return made
 
 
-def put_values(made: mujoco.MjModel, compiled: mujoco.MjModel, scenario: Scenario, step: int) -> None:
-    """Write the field values of a scenario into a copy of the compiled model. The caller calls mj_setConst."""
-    for name, value in field_values(compiled, scenario, step).items():
-        array(made, name)[:] = value
+def put_values(made: mujoco.MjModel, compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
+    """Write the field values of a scenario into a copy of the compiled model, and return them.
+
+    The caller calls mj_setConst.
+    """
+    values = field_values(compiled, scenario, step)
+    for name, value in values.items():
+        field_array(made, name)[:] = value
+    return values
 
 
 def field_values(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
@@ -113,7 +166,7 @@ def field_values(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dic
     fields = plant.fields if scenario.mechanism == "equation" else plant.mechanisms[scenario.mechanism].fields
     of_parts = (part.fields(compiled) for part in parts(scenario))
     for name, at, value, adds in itertools.chain(fields(compiled, plant.values(scenario.factors(step))), *of_parts):
-        values = found.setdefault(name, array(compiled, name).copy())
+        values = found.setdefault(name, field_array(compiled, name).copy())
         values[at] = values[at] + value if adds else value
     return found
 
@@ -129,30 +182,16 @@ def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.
     return qpos, qvel
 
 
-def check_starts(scenarios: Sequence[Scenario]) -> None:
-    """Check that scenarios of one structure start on the free side of their obstacles.
-
-    The path from the plant's own start, or from 0 if that is not free, must cross no obstacle, because the mechanism
-    could not get to a start beyond a stop or inside it.
-
-    Raises:
-      ScenarioError: a run starts inside an obstacle or beyond it.
-    """
-    if scenarios[0].contact.kind == "none":
-        return
-    scratch, seen = model(scenarios), set()
-    compiled, data = copy.copy(scratch), mujoco.MjData(scratch)
-    for scenario in scenarios:
-        place = scenario.plant, scenario.resolved.x0, frozen(scenario.factors(0))  # all that the check depends on
-        if place not in seen:
-            seen.add(place)
-            put_values(scratch, compiled, scenario, 0)
-            check_start(scratch, data, scenario)
+def put_start(made: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario) -> None:
+    """Put a scenario's state at t = 0 into the data of its model, with the past readings of late sensors."""
+    data.qpos[:], data.qvel[:] = start(made, scenario)
+    if made.nhistory:
+        encoder.remember(made, data)
 
 
-def check_start(made: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario) -> None:
-    """Raise ScenarioError if a scenario starts inside an obstacle or beyond it."""
-    there = start(made, scenario)[0]
+def _check_start(made: mujoco.MjModel, scenario: Scenario) -> None:
+    """Raise ScenarioError if a scenario, whose values the model has, starts inside an obstacle or beyond it."""
+    data, there = mujoco.MjData(made), start(made, scenario)[0]
     inside, beyond = _overlap(made, data, there), None
     moves_around = scenario.plant.tip  # an arm: the straight line in its joints may cross what the arm goes around
     if not inside and scenario.resolved.x0 != scenario.plant.x0 and not moves_around:

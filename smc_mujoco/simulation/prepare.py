@@ -1,7 +1,7 @@
 """Preparation: what a scenario names, compiled, and which scenarios can share a Batch.
 
-    prepared = prepare(scenario)        # once a run
-    record[i] = pack(prepared, ...)     # the record that the callback reads, see state.py
+    prepared = prepare(scenario)            # functions, mechanism, key: once a run
+    record[i], arrays = pack(prepared, log) # the record that the callback reads, see state.py
 
 What does not compile runs in the reference loop; `prepared.why_not` says why.
 """
@@ -20,18 +20,19 @@ from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component, at
 from smc_mujoco.control.properties import read_by
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import Coupled, Native
-from smc_mujoco.simulation import model, native, state
+from smc_mujoco.simulation import native, state
+from smc_mujoco.simulation.model import Mechanism, mechanism, with_values
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel, Push, Recorded, Signal
 
 PERFECT = Encoder(counts=math.inf)
 DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData, measured: what it takes, and a channel more
+READING_BYTES = 67  # measured: of a delayed sensor's history, per channel and reading, in mjData and in the Batch
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
-class Compiled:
+class Functions:
     """The compiled functions of a scenario. `nominal` is None for a model that MuJoCo itself computes."""
 
     laws: tuple[Function | AtAddress, ...]  # one for all channels, or one for each driven channel
@@ -50,64 +51,70 @@ class Prepared:
 
     Attributes:
       scenario: as it was given.
-      compiled: its functions, None where one does not compile.
+      functions: compiled; None where one does not compile.
       why_not: what does not compile, in one sentence.
+      mechanism: its compiled model and channels, which scenarios of the same structure share.
       key: equal for scenarios that can share a Batch.
     """
 
     scenario: Scenario
-    compiled: Compiled | None
+    functions: Functions | None
     why_not: str
+    mechanism: Mechanism
     key: Hashable
 
     @property
     def bytes(self) -> int:
-        """Memory of its simulation: log, mjData and record, without the history of a delayed sensor."""
+        """Memory of its simulation: log, mjData, record, and the history of a delayed sensor."""
         s = self.scenario.resolved
         surface = 0 if s.surface is None else s.surface.memory
         memories = s.law.memory + surface + s.velocity.memory + sum(d.memory for d in s.disturbance)
         numbers = 200 + s.plant.n * (memories + s.input_delay / s.control_period + 20)
         numbers += joint_law.numbers(s.plant.n) if s.law.joint else 0
-        log = state.LOG.itemsize * (s.samples + 1) * s.plant.n
-        return int(log + 8 * numbers + state.SIMULATION.itemsize + DATA_BYTES + CHANNEL_BYTES * s.plant.n)
+        of_channel = state.LOG.itemsize * (s.samples + 1) + CHANNEL_BYTES + READING_BYTES * s.readings
+        return int(of_channel * s.plant.n + 8 * numbers + state.SIMULATION.itemsize + DATA_BYTES)
 
 
 def prepare(scenario: object) -> Prepared:
-    """Return a scenario with its functions compiled.
+    """Return a scenario with its functions and its mechanism compiled.
 
     Raises:
-      ScenarioError: it is not a Scenario, or it came from a file without the code of its functions.
+      ScenarioError: it is not a Scenario, it came from a file without the code of its functions, or it starts inside an
+        obstacle or beyond it.
     """
     if isinstance(scenario, Prepared):
         return scenario
     if not isinstance(scenario, Scenario):
         raise ScenarioError(f"cannot run {shown(scenario)}: give a smc.Scenario")
-    resolved = scenario.resolved
+    _check_code(scenario)
+    made = mechanism(scenario)
+    made.check_start(scenario)
+    key = made, scenario.control_period, scenario.samples
+    try:
+        return Prepared(scenario, _compile(scenario.resolved), "", made, key)
+    except NotCompilable as error:
+        return Prepared(scenario, None, str(error), made, key)
+
+
+def _check_code(scenario: Scenario) -> None:
+    """Raise ScenarioError if a function of a scenario came from a file without its code."""
     known = dict.fromkeys(scenario.references)
     known |= {} if scenario.feedforward is None else {scenario.feedforward: None}
-    for part in (*scenario.law.parts, scenario.surface, resolved.velocity):
+    for part in (*scenario.law.parts, scenario.surface, scenario.resolved.velocity):
         if part is not None and part.function is None:
             raise ScenarioError(f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}")
     for signal in (*known, *scenario.disturbance):
         if isinstance(signal, Recorded):
             raise ScenarioError(f"signal {signal.kind!r} came from a file without its code: give the signal")
-    key = (
-        model.structure(scenario), resolved.integrator, resolved.physics_step, scenario.control_period,
-        scenario.samples,
-    )  # fmt: skip
-    try:
-        return Prepared(scenario, _compile(resolved), "", key)
-    except NotCompilable as error:
-        return Prepared(scenario, None, str(error), key)
 
 
-def _compile(s: Resolved) -> Compiled:
+def _compile(s: Resolved) -> Functions:
     """Compile every function of a scenario; NotCompilable names the first that numba refuses."""
     plant = s.plant
     for signal in (*dict.fromkeys(s.references), *s.disturbance, *([] if s.feedforward is None else [s.feedforward])):
         native.values_of(signal)  # refuses data that compiled code would misread
-    return Compiled(
-        laws=tuple(native.component(law) for law in laws(s)),
+    return Functions(
+        laws=tuple(native.component(law) for law in s.law.of_channels(plant.driven)),
         surface=s.surface and native.component(s.surface),
         estimator=native.component(s.velocity),
         nominal=None if isinstance(plant.nominal, Coupled) else native.nominal(plant.nominal, tuple(plant.parameters)),
@@ -116,11 +123,6 @@ def _compile(s: Resolved) -> Compiled:
         disturbances=tuple(map(native.of_signal, s.disturbance)),
         friction=s.sliding and native.of_friction(s.sliding),
     )
-
-
-def laws(s: Resolved) -> list[Component]:
-    """Return the law of all channels, or those of the driven channels if they differ or have other gains."""
-    return [s.law] if s.law.joint or s.law.uniform else [s.law.of_channel(i) for i in range(s.plant.driven)]
 
 
 def references(s: Resolved) -> tuple[Signal, ...]:
@@ -148,17 +150,14 @@ class Packed:
     nominal: Any
 
 
-def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: mujoco.MjModel) -> tuple[tuple, Packed]:
+def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
     """Return a simulation's record, as a tuple for an array of SIMULATION, and the arrays that it points to.
 
     Args:
-      channels: (n,) CHANNEL.
-      log: (K + 1, n) LOG, written at samples.
-      mechanism: the compiled model, with the scenario's own values if it has a friction by a formula.
-
-    `channels` and `log` must outlive the run, too.
+      log: (K + 1, n) LOG, written at samples. It must outlive the run, as `prepared` must.
     """
-    s, compiled = prepared.scenario.resolved, prepared.compiled
+    s, compiled = prepared.scenario.resolved, prepared.functions
+    model, channels = prepared.mechanism.model, prepared.mechanism.channels
     assert compiled is not None
     n, sensor, drives, buffer = s.plant.n, s.sensor or PERFECT, s.drive_step, state.Buffer()
 
@@ -174,7 +173,7 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: m
     }
     law_functions = [
         function(made, joint_gains(law, n) if joint else law.gains.values())
-        for made, law in zip(compiled.laws, laws(s), strict=True)
+        for made, law in zip(compiled.laws, s.law.of_channels(s.plant.driven), strict=True)
     ]
     memory = buffer.reserve(s.law.memory * n)
     law_functions = [one | {"memory": memory, "stride": 8 * s.law.memory} for one in law_functions]
@@ -192,10 +191,11 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: m
     if s.surface is not None:
         functions["surface"] = function(compiled.surface, s.surface.gains.values(), s.surface.memory)
     disturbances = [
-        function(made, native.values_of(d), d.memory)
-        for made, d in zip(compiled.disturbances, s.disturbance, strict=True)
+        pushed(d, model)
+        | {"function": function(made, native.values_of(d), d.memory), "stream": s.stream(i), "cartesian": d.cartesian}
+        for i, (made, d) in enumerate(zip(compiled.disturbances, s.disturbance, strict=True))
     ]
-    frictions = _frictions(compiled.friction, s.sliding, mechanism.dof_M0[channels["qvel"]], buffer)
+    frictions = _frictions(prepared, buffer)
     jitter = s.clock.steps(s.physics_step)
     slots = s.delay_steps // s.steps + (2 if jitter else 1)  # late commands may arrive after the next sample began
     joints = buffer.put([0.0, float(n), *[0.0] * (4 * n)])
@@ -210,13 +210,7 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: m
         return found | {name: buffer.address(found[name]) for name in ("parameters", "memory")}
 
     signals = np.array(
-        [
-            state.as_tuple(
-                state.SIGNAL,
-                {"function": placed(one), "stream": s.stream(i), "cartesian": d.cartesian} | pushed(d, mechanism),
-            )
-            for i, (one, d) in enumerate(zip(disturbances, s.disturbance, strict=True))
-        ],
+        [state.as_tuple(state.SIGNAL, one | {"function": placed(one["function"])}) for one in disturbances],
         state.SIGNAL,
     )
     several = {
@@ -239,8 +233,8 @@ def pack(prepared: Prepared, channels: np.ndarray, log: np.ndarray, mechanism: m
     values |= {
         "n": n,
         "driven": int(np.sum(channels["ctrl"] >= 0)),
-        "nq": mechanism.nq,
-        "nv": mechanism.nv,
+        "nq": model.nq,
+        "nv": model.nv,
         "samples": len(log),
         "signal_count": len(signals),
         "steps": s.steps,
@@ -289,19 +283,20 @@ def _own(s: Resolved, nominal: Coupled) -> Native | None:
     return nominal.native_dynamics(s.plant.parameters, s.plant.tip, at_rest="g" in read_by(s.law.function))
 
 
-def pushed(disturbance: Signal, mechanism: mujoco.MjModel) -> dict[str, Any]:
+def pushed(disturbance: Signal, model: mujoco.MjModel) -> dict[str, Any]:
     """Return the fields of a SIGNAL that say where a disturbance pushes."""
     if not isinstance(disturbance, Push):
         return {"body": -1, "peak": (0.0, 0.0, 0.0)}
-    return {"body": 6 * mechanism.body(disturbance.body).id, "peak": (disturbance.x, disturbance.y, disturbance.z)}
+    return {"body": 6 * model.body(disturbance.body).id, "peak": (disturbance.x, disturbance.y, disturbance.z)}
 
 
-def _frictions(
-    made: Function | None, friction: Sliding | None, inertia: np.ndarray, buffer: state.Buffer
-) -> list[dict[str, int]]:
-    """Put the numbers of a friction by a formula into the buffer. Return the FUNCTIONs of joints of these inertias."""
+def _frictions(prepared: Prepared, buffer: state.Buffer) -> list[dict[str, int]]:
+    """Put the numbers of a friction by a formula into the buffer. Return its FUNCTIONs, one for each joint."""
+    made, friction = prepared.functions and prepared.functions.friction, prepared.scenario.sliding
     if made is None or friction is None:
         return []
+    shared = prepared.mechanism
+    inertia = with_values(shared.model, prepared.scenario).dof_M0[shared.channels["qvel"]]
     places = [(buffer.put(friction.parameters(i)), buffer.put(friction.bristle(i, a))) for i, a in enumerate(inertia)]
     return [{"address": made.address, "parameters": first, "memory": second} for first, second in places]
 

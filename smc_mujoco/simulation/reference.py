@@ -18,13 +18,11 @@ from smc_mujoco.control.component import Component, at
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.mechanisms.hardware import encoder
 from smc_mujoco.mechanisms.hardware.sliding import SLOW, Sliding
 from smc_mujoco.mechanisms.plant import Coupled, Dynamics, Plant, Values
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import philox, trace
 from smc_mujoco.simulation.callback import installed
-from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_CONTROL, MAX_STATE
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import PerChannel, Push, Signal
@@ -50,8 +48,13 @@ class Failure(Exception):
 
 def run(scenario: Scenario) -> Trace:
     """Return the trace of a scenario, simulated in the reference loop."""
+    return simulate(scenario, assembly.mechanism(scenario))
+
+
+def simulate(scenario: Scenario, mechanism: assembly.Mechanism) -> Trace:
+    """Return the trace of a scenario with its mechanism."""
     with installed():
-        loop = Loop(scenario)
+        loop = Loop(scenario, mechanism)
     with installed(loop.control), np.errstate(all="ignore"):  # the loop itself checks for NaN and inf
         for step in range(loop.total + 1):
             loop.step(step)
@@ -63,18 +66,15 @@ def run(scenario: Scenario) -> Trace:
 class Loop:
     """One simulation and its controller; `control` is the control callback."""
 
-    def __init__(self, scenario: Scenario):
+    def __init__(self, scenario: Scenario, mechanism: assembly.Mechanism):
         self.scenario, n = scenario.resolved, scenario.plant.n
-        self.compiled = assembly.model([scenario])
+        self.compiled, table = mechanism.model, mechanism.channels
         self.model = assembly.with_values(self.compiled, scenario)
         self.data = mujoco.MjData(self.model)
-        table = channels(self.model)
         self.channels = {name: table[name].copy() for name in table.dtype.names or ()}
         self.driven, self.hinged = self.channels["ctrl"] >= 0, self.channels["tip"] >= 0  # (n,) bool
         self.rubs, self.forced = self.channels["friction"] >= 0, self.channels["force"] >= 0
-        self.data.qpos[:], self.data.qvel[:] = assembly.start(self.model, scenario)
-        if self.model.nhistory:
-            encoder.remember(self.model, self.data)
+        assembly.put_start(self.model, self.data, scenario)
         self.total = scenario.samples * scenario.steps  # physics steps
         self.calls = 0
         self.law, self.estimator = (PythonComponent(c, n) for c in (scenario.law, self.scenario.velocity))
@@ -362,7 +362,8 @@ class PythonComponent:
 
     def _parts(self, c: Component) -> list[Component]:
         """Return the component of each channel; of a law of many joints itself."""
-        return [c if c.joint else c.of_channel(i) for i in range(len(self.memory))]
+        parts = c.of_channels(n := len(self.memory))
+        return parts * n if len(parts) == 1 else parts
 
     def bind(self, c: Component) -> None:
         """Take the gains of a component with the same functions."""

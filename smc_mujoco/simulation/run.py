@@ -1,4 +1,4 @@
-"""Scenarios to traces: grouped by model layout, one Batch a chunk, chunks bounded in memory.
+"""Scenarios to traces: grouped by layout, in batches that are bounded in memory.
 
 A group shares the plant, its size and the kinds of its parts (but not their numbers), the integrator, the physics step
 and the number of steps. Its scenarios may differ in parameters, friction levels, laws, gains, signals, delays and
@@ -18,15 +18,14 @@ import mujoco
 
 from smc_mujoco.common.errors import ScenarioError, shown, users_frame, whole
 from smc_mujoco.common.progress import bar
-from smc_mujoco.simulation import callback, model, reference
-from smc_mujoco.simulation.batch import Chunk, Report
+from smc_mujoco.simulation import callback, reference
+from smc_mujoco.simulation.batch import Report, ScenarioBatch
 from smc_mujoco.simulation.prepare import Prepared, prepare
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-READING_BYTES = 67  # measured: of a delayed sensor's history, per channel and reading, in mjData and in the Batch
-CHUNK_BYTES = 256 * 2**20  # of logs and records in one Batch
-MIN_TRIM_RUNS = 64  # runs of a chunk from which on returning its memory is worth the time; chosen
+BATCH_BYTES = 256 * 2**20  # of logs and records in one Batch
+MIN_TRIM_RUNS = 64  # runs of a batch from which on returning its memory is worth the time; chosen
 
 
 class PlainLoopWarning(UserWarning):
@@ -74,7 +73,7 @@ def stream(
     threads: int | None = None,
     report: Report = lambda steps: None,
 ) -> Iterator[tuple[int, Trace]]:
-    """Yield pairs (index, Trace) as soon as their chunk is done. At most one chunk is in memory."""
+    """Yield pairs (index, Trace) as soon as their batch is done. At most one batch is in memory."""
     threads = cores(threads)
     groups: dict[Hashable, list[tuple[int, Prepared]]] = {}
     slow: list[tuple[int, Prepared]] = []
@@ -84,19 +83,17 @@ def stream(
             slow.append((index, prepared))
         else:
             groups.setdefault(prepared.key, []).append((index, prepared))
-    for group in [*groups.values(), *([one] for one in slow)]:
-        model.check_starts([prepared.scenario for _, prepared in group])
     for group in groups.values():
-        for chunk in _chunks(group, threads):
-            ready = [prepared for _, prepared in chunk]
+        for batch in _batches(group, threads):
+            ready = [prepared for _, prepared in batch]
             with callback.installed(), memory_for(ready):
-                traces = Chunk(ready, threads).run(report)
-            if len(chunk) >= MIN_TRIM_RUNS:
-                give_back()
-            yield from zip((index for index, _ in chunk), traces, strict=True)
+                traces = ScenarioBatch(ready, threads).run(report)
+            if len(batch) >= MIN_TRIM_RUNS:
+                return_freed_memory()
+            yield from zip((index for index, _ in batch), traces, strict=True)
     for index, prepared in slow:
         with memory_for([prepared]):
-            trace = reference.run(prepared.scenario)
+            trace = reference.simulate(prepared.scenario, prepared.mechanism)
         yield index, trace
         report(prepared.scenario.work)
 
@@ -116,27 +113,24 @@ def memory_for(prepared: Sequence[Prepared]) -> Iterator[None]:
         ) from None
 
 
-def give_back() -> None:
+def return_freed_memory() -> None:
     """Return freed memory to the system, if the C library is glibc; 45 to 100 kB a run stay allocated without it."""
     if trim := getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None:
         trim(0)
 
 
-def _chunks(group: Sequence[tuple[int, Prepared]], threads: int) -> Iterator[list[tuple[int, Prepared]]]:
-    """Yield a group in chunks of at most CHUNK_BYTES, but of at least one run for each thread."""
-    chunk: list[tuple[int, Prepared]] = []
-    held = 0
-    scenarios = [prepared.scenario for _, prepared in group]
-    history = max(READING_BYTES * s.plant.n * s.readings for s in scenarios)  # all get the longest one
-    for one in group:
-        size = one[1].bytes + history
-        if len(chunk) >= threads and held + size > CHUNK_BYTES:
-            yield chunk
-            chunk, held = [], 0
-        chunk.append(one)
-        held += size
-    if chunk:
-        yield chunk
+def _batches(group: Sequence[tuple[int, Prepared]], threads: int) -> Iterator[list[tuple[int, Prepared]]]:
+    """Yield a group in batches of at most BATCH_BYTES, but of at least one run for each thread."""
+    batch: list[tuple[int, Prepared]] = []
+    size = 0
+    for index, prepared in group:
+        if len(batch) >= threads and size + prepared.bytes > BATCH_BYTES:
+            yield batch
+            batch, size = [], 0
+        batch.append((index, prepared))
+        size += prepared.bytes
+    if batch:
+        yield batch
 
 
 def _prepared(scenarios: object) -> Iterator[Prepared]:

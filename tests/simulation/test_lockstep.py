@@ -28,7 +28,7 @@ PLANTS = pytest.mark.parametrize("plant", smc.plants())
 STUDY = pytest.mark.parametrize("plant", smc.paper.GAINS)
 STUDIED = [*smc.paper.GAINS["duffing"], "none"]
 runner = importlib.import_module("smc_mujoco.simulation.run")  # smc.run is the function
-chunk_module = importlib.import_module("smc_mujoco.simulation.batch")
+batch_module = importlib.import_module("smc_mujoco.simulation.batch")
 
 
 def shortened(s, duration):
@@ -319,11 +319,11 @@ def test_company_changes_no_bit(together):
         assert_same(smc.run(scenario), trace)
 
 
-@pytest.mark.parametrize("chunk_bytes", [1, 300_000, 10**9])
+@pytest.mark.parametrize("batch_bytes", [1, 300_000, 10**9])
 @pytest.mark.parametrize("slice_steps", [1, 777, 10**9])
-def test_chunks_and_slices_change_no_bit(together, monkeypatch, chunk_bytes, slice_steps):
-    monkeypatch.setattr(runner, "CHUNK_BYTES", chunk_bytes)
-    monkeypatch.setattr(chunk_module, "SLICE_STEPS", slice_steps)
+def test_batches_and_slices_change_no_bit(together, monkeypatch, batch_bytes, slice_steps):
+    monkeypatch.setattr(runner, "BATCH_BYTES", batch_bytes)
+    monkeypatch.setattr(batch_module, "SLICE_STEPS", slice_steps)
     assert digest(smc.run(batch(), threads=2)) == digest(together)
 
 

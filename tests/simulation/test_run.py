@@ -92,7 +92,7 @@ def test_plants_sizes_and_durations_mix_in_one_call():
 
 def test_the_model_of_a_run_has_no_picture_to_paint():
     """MuJoCo paints textures at each compilation, in three quarters of its time."""
-    assert 0 < assembly.model([scenario()]).ntexdata < 100 < scenario().plant.load().ntexdata
+    assert 0 < assembly.model(scenario()).ntexdata < 100 < scenario().plant.load().ntexdata
 
 
 @pytest.mark.parametrize(
@@ -547,7 +547,7 @@ def test_diverging_runs_print_nothing_and_leave_no_file(tmp_path):
 MANY = """
 import resource, smc_mujoco as smc, smc_mujoco.simulation.run
 import sys
-sys.modules["smc_mujoco.simulation.run"].CHUNK_BYTES = 2**20
+sys.modules["smc_mujoco.simulation.run"].BATCH_BYTES = 2**20
 def peak():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 def play(count):
@@ -562,7 +562,7 @@ print(peak() - before)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="resource")
-def test_a_stream_of_runs_holds_one_chunk_of_them(tmp_path):
+def test_a_stream_of_runs_holds_one_batch_of_them(tmp_path):
     done = python(MANY, tmp_path)
     logs = 800 * 6 * 501 * 8
     assert done.stderr == ""

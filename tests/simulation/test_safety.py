@@ -381,7 +381,7 @@ def test_a_first_run_restores_the_callback_that_the_process_had(tmp_path):
     assert (done.stdout, done.stderr) == ("done\n", "")
 
 
-# (g) chunks
+# (g) batches
 
 
 LARGE = [
@@ -397,19 +397,19 @@ LARGE = [
 def test_the_estimated_memory_of_a_simulation_is_what_it_takes(large):
     model, prepared = large.plant.load(nuserdata=2), prepare(large)
     log = np.empty((large.samples + 1, large.plant.n), state.LOG)
-    _, packed = pack(prepared, channels(model), log, model)
+    _, packed = pack(prepared, log)
     struct = offsets.offsets().userdata  # its arrays of statistics come first, and are most of it
     takes = log.nbytes + packed.numbers.nbytes + state.SIMULATION.itemsize + struct + mujoco.MjData(model).nbuffer
     assert takes <= prepared.bytes <= 1.5 * takes
 
 
-def test_chunks_of_laws_with_large_memory_stay_bounded():
+def test_batches_of_laws_with_large_memory_stay_bounded():
     law = made(lambda y, gains, memory: (0.0, 0.0), memory=10_000)
     many = [scenario(law, plant=smc.plant("pendulum_network", n=1000), seed=seed) for seed in range(20)]
-    chunks = list(RUN._chunks(list(enumerate(map(prepare, many))), 1))
-    assert [index for chunk in chunks for index, _ in chunk] == list(range(20))
+    batches = list(RUN._batches(list(enumerate(map(prepare, many))), 1))
+    assert [index for batch in batches for index, _ in batch] == list(range(20))
     each = 8 * 10_000 * 1000
-    assert max(map(len, chunks)) * each <= max(RUN.CHUNK_BYTES, each)
+    assert max(map(len, batches)) * each <= max(RUN.BATCH_BYTES, each)
 
 
 # (h) telling failures again
@@ -544,7 +544,7 @@ class SourNoise(smc.Signal):
 def test_every_part_that_raises_is_named_without_a_second_run(fields, words, monkeypatch):
     one = scenario(plant=THREE, x0=(1.0, 3.0, 2.0), **fields)
     again = reference.run(one).failure
-    monkeypatch.setattr(reference, "run", None)
+    monkeypatch.setattr(reference, "simulate", None)
     trace = smc.run([scenario(plant=THREE), one])[1]
     assert trace.failure.startswith(words)
     assert trace.failure == again
@@ -1001,10 +1001,10 @@ def test_memory_that_runs_out_is_said_in_one_sentence(error, monkeypatch):
     def runs_out(*arguments):
         raise error
 
-    monkeypatch.setattr(RUN, "Chunk", runs_out)
+    monkeypatch.setattr(RUN, "ScenarioBatch", runs_out)
     with pytest.raises(smc.ScenarioError, match=r"no memory for 2 runs at once, about \d+ MiB"):
         smc.run([scenario(), scenario(seed=1)])
-    monkeypatch.setattr(reference, "run", runs_out)
+    monkeypatch.setattr(reference, "simulate", runs_out)
     with pytest.raises(smc.ScenarioError, match="no memory for 1 run at once"):
         plainly(scenario(made(lambda y, gains, memory: (json.dumps(y.t), 0.0))))
 
@@ -1017,7 +1017,7 @@ def test_another_error_is_not_taken_for_memory_that_ran_out(error):
 
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="not glibc")
 def test_many_runs_leave_no_memory_behind():
-    """They leave 8 to 12 kB each, once, as more of them are in one chunk; without giving it back 45 to 100 kB."""
+    """They leave 8 to 12 kB each, once, as more of them are in one batch; without giving it back 45 to 100 kB."""
 
     def resident() -> int:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")

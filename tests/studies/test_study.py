@@ -19,7 +19,7 @@ from smc_mujoco.control.gain_sets import LAWS
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.simulation.model import check_starts
+from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.studies import executors, run_key, saved_traces, store
 from smc_mujoco.studies.study import condition, study
 from smc_mujoco.studies.table import Table
@@ -87,8 +87,8 @@ def test_no_start_lies_beyond_a_stop():
     single = [s for s in made if s.plant.n == 1]
     assert all(0.8 <= s.resolved.x0[0] / s.plant.x0[0] <= 1.0 for s in single)
     assert len({(s.plant.name, s.resolved.x0) for s in made}) == len(paper.PLANTS) * 6
-    for plant in paper.PLANTS:
-        check_starts([s for s in made if s.plant.name == plant])
+    for scenario in made:
+        prepare(scenario)  # checks the start
 
 
 def test_laws_may_come_with_gains_of_their_own():

@@ -3,7 +3,7 @@
 import numpy as np
 
 from smc_mujoco.simulation import callback, state
-from smc_mujoco.simulation.batch import Chunk
+from smc_mujoco.simulation.batch import ScenarioBatch
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.trace import Trace
 
@@ -23,15 +23,15 @@ def poses(trace: Trace, times: np.ndarray) -> np.ndarray | None:
     ends: list[int] = sorted({*wanted, *([jump] if 0 < jump < total else [])})
     step = 0
     with callback.installed():
-        chunk = Chunk([prepared], threads=1)
-        qpos = chunk.batch.bind("qpos")
+        batch = ScenarioBatch([prepared], threads=1)
+        qpos = batch.batch.bind("qpos")
         last = qpos[0].copy()
         for end in ends:
-            chunk.advance(end - step, lambda steps: None)
+            batch.advance(end - step, lambda steps: None)
             step = end
             if step == jump:
-                chunk.set_parameters(step, [0])
-            if chunk.records["failure"][0] == state.FINE:
+                batch.set_parameters(step, [0])
+            if batch.records["failure"][0] == state.FINE:
                 last = qpos[0].copy()
             found[end] = last
     return np.array([found[end] for end in wanted])

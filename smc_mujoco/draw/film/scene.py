@@ -52,7 +52,7 @@ def compose(scenarios: Sequence[Scenario], places: np.ndarray, size: tuple[int, 
     spec.visual.global_.offwidth, spec.visual.global_.offheight = size
     lit = False
     for k, (scenario, place) in enumerate(zip(scenarios, places, strict=True)):
-        machine = assembly.spec([scenario])
+        machine = assembly.spec(scenario)
         if k == 0 and not scenario.plant.on_stage and (lit := bool(machine.lights)):
             take(spec.visual.headlight, machine.visual.headlight)
             for light in list(spec.lights):
@@ -151,7 +151,7 @@ def turn(scenario: Scenario, chosen: Camera | None = None) -> np.ndarray:
     if chosen is not None:
         return camera.turn(*chosen[:2])
     if not scenario.plant.on_stage:
-        right, up = np.reshape(view(assembly.model([scenario])), (2, 3))
+        right, up = np.reshape(view(assembly.model(scenario)), (2, 3))
         right, back = right / np.linalg.norm(right), np.cross(right, up) / np.linalg.norm(np.cross(right, up))
         return np.column_stack([right, np.cross(back, right), back])
     return named(scenario, LOOK)
@@ -159,7 +159,7 @@ def turn(scenario: Scenario, chosen: Camera | None = None) -> np.ndarray:
 
 def named(scenario: Scenario, name: str) -> np.ndarray:
     """Return the frame of a camera of the scenario's model, (3, 3), at the start of its run."""
-    model = assembly.model([scenario])
+    model = assembly.model(scenario)
     names = {model.camera(i).name: i for i in range(model.ncam) if model.camera(i).name}
     which = find(f"camera of {scenario.plant.name}", name, names)
     data = mujoco.MjData(model)
@@ -220,7 +220,7 @@ def lane(scenarios: Sequence[Scenario], reaches: Sequence[np.ndarray], turn: np.
         return (wide + gap * max(wide, tall)) * right
     if not any(scenario.realistic for scenario in scenarios):
         return step
-    things = [fixed_boxes(assembly.model([scenario])) for scenario in scenarios]
+    things = [fixed_boxes(assembly.model(scenario)) for scenario in scenarios]
     low, high = [corners.min(axis=1)[:, :2] for corners in things], [corners.max(axis=1)[:, :2] for corners in things]
     for stretch in np.arange(1.0, 20.0, 0.05):
         gaps = []

@@ -76,7 +76,7 @@ class Stage:
             for each, first in zip(self.puppets, bodies, strict=False)
         ]
         self.paint = self.model.geom_rgba.copy()
-        names = [[joint.name for joint in joints(assembly.spec([scenario]))] for scenario in scenarios]
+        names = [[joint.name for joint in joints(assembly.spec(scenario))] for scenario in scenarios]
         self.joints = [[self.model.joint(f"m{k}/{name}").id for name in each] for k, each in enumerate(names)]
         self.shape, self.colours, self.changed = [-1] * len(scenarios), [""] * len(scenarios), True
         for k, colour in enumerate(colours):

@@ -28,7 +28,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.film import arrows
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
-from smc_mujoco.mechanisms.plant import Field, Plant, array, as_plant, catalogue, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, as_plant, catalogue, field_array, model_path
 from smc_mujoco.simulation import controller
 from smc_mujoco.simulation import scenario as defaults
 from smc_mujoco.simulation.conditions import SENSOR_NOISE, SINE
@@ -240,7 +240,7 @@ def _written(model: mujoco.MjModel, plant: Plant, factor: float) -> dict[str, np
     """Return field -> its values if the plant's mass is multiplied by a factor."""
     found: dict[str, np.ndarray] = {}
     for name, at, value, adds in plant.fields(model, plant.values({"mass": factor})):
-        values = found.setdefault(name, array(model, name).astype(float).copy())
+        values = found.setdefault(name, field_array(model, name).astype(float).copy())
         values[at] = values[at] + value if adds else value
     return found
 
@@ -280,7 +280,7 @@ def _skins(plant: Plant) -> list[dict[str, Any]]:
 
 def _part(model: mujoco.MjModel, field: Field) -> dict[str, Any]:
     """Return what a part writes into a field of the model: the places in the flat field, and a value for each."""
-    values = array(model, field.name)
+    values = field_array(model, field.name)
     places = np.arange(values.size).reshape(values.shape)[field.at]
     return {
         "name": field.name,

@@ -22,6 +22,7 @@ from smc_mujoco.mechanisms.plant import Field
 # Share of a physics step by which readings are taken early, because MuJoCo compares times, which have rounding errors.
 EARLY = 0.5
 MAX_READINGS = 100_000  # under way in a delay: chosen, 6 MB per channel
+READINGS_STEP = 64  # readings in a history are a multiple of this, so that runs with other delays share a model; chosen
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,7 +62,8 @@ class Encoder(Part):
         """Return how many readings MuJoCo must keep at physics steps of `step` s; 0 without delay and period."""
         if not self.delay and not self.period:
             return 0
-        return math.ceil(self.delay / (self.period or step) - 1e-9) + 2
+        needed = math.ceil(self.delay / (self.period or step) - 1e-9) + 2
+        return READINGS_STEP * math.ceil(needed / READINGS_STEP)
 
     def check(self, step: float) -> None:
         """Raise ScenarioError for a time that is not a whole number of physics steps, or too many delayed readings."""
@@ -84,12 +86,6 @@ class Encoder(Part):
             at = sensor_ids(model)
             yield Field("sensor_delay", at, max(0.0, self.delay - EARLY * model.opt.timestep))
             yield Field("sensor_interval", (at, 0), self.period or 0.0)
-
-
-def buffer(spec: mujoco.MjSpec, readings: int) -> None:
-    """Give every position and velocity sensor a history of that many readings."""
-    for sensor in spec.sensors:
-        sensor.nsample = readings
 
 
 def sensor_ids(model: mujoco.MjModel) -> np.ndarray:

@@ -22,5 +22,5 @@ def test_every_condition_fits_a_plant_or_is_refused(name):
     for condition in NAMED:
         with contextlib.suppress(smc.ScenarioError):
             (scenario,) = smc.grid(machine, "none", condition, starts=starts, gains="default", duration=0.1)
-            compiled += isinstance(model([scenario]), mujoco.MjModel)
+            compiled += isinstance(model(scenario), mujoco.MjModel)
     assert compiled > len(NAMED) / 2

@@ -9,7 +9,7 @@ import pytest
 from smc_mujoco.common import mjcb
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.contact import Contact, damping_ratio
-from smc_mujoco.mechanisms.plant import array, catalogue, plant, write
+from smc_mujoco.mechanisms.plant import catalogue, field_array, plant, write
 
 with mjcb.installed(None):  # this import compiles a model
     from mujoco.batch import Batch
@@ -349,7 +349,7 @@ def test_what_a_part_writes_is_an_array_of_the_model():
         "pair_friction",
         "pair_solref",
     }
-    assert np.all(array(model, "pair_friction")[model.pair_dim > 1, :2] == 0.2)
+    assert np.all(field_array(model, "pair_friction")[model.pair_dim > 1, :2] == 0.2)
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,9 @@ from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag, RateLimit
 from smc_mujoco.mechanisms.hardware.friction import LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import ROTOR, dof_ids, drive_ids
-from smc_mujoco.mechanisms.plant import array, plant, plants, write
+from smc_mujoco.mechanisms.plant import field_array, plant, plants, write
 from smc_mujoco.simulation import reference
+from smc_mujoco.simulation.model import mechanism
 
 H = 2.5e-4  # s
 IMPLICIT, RK4 = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtIntegrator.mjINT_RK4
@@ -39,7 +40,7 @@ def bare(*parts, name="duffing", h=H):
     """The plant's inertia, 1 kg or 0.125 kg m^2, with nothing on it but the parts."""
     model = build(plant(name), *parts, h=h)
     for field in ("opt.gravity", "jnt_stiffness", "jnt_stiffnesspoly", "dof_damping"):
-        array(model, field)[:] = 0.0
+        field_array(model, field)[:] = 0.0
     return model
 
 
@@ -257,7 +258,7 @@ def test_every_number_is_per_simulation(name, parts):
     assert len({part.structure() for part in parts}) == 1
     batch = Batch(models[0], nsim=len(parts), nthread=1)
     for field in {field.name for part, model in zip(parts, models, strict=True) for field in part.fields(model)}:
-        batch.expand(field)[:] = [array(model, field) for model in models]
+        batch.expand(field)[:] = [field_array(model, field) for model in models]
     batch.set_const()
     qpos, ctrl = batch.bind("qpos"), batch.bind("ctrl")
     singles = [mujoco.MjData(model) for model in models]
@@ -336,7 +337,7 @@ def test_the_nominal_model_per_volt_is_what_the_joints_do(name):
         data.qpos[:], data.qvel[:], data.ctrl[:] = x, v, u
         mujoco.mj_forward(model, data)
         for i in range(kind.n):
-            f, g = reference.Loop(scenario).model_at(x, v, i, 0)
+            f, g = reference.Loop(scenario, mechanism(scenario)).model_at(x, v, i, 0)
             assert data.qacc[i] == pytest.approx(f + g * u, rel=1e-9, abs=1e-9)
 
 

@@ -11,7 +11,7 @@ from mujoco.batch import Batch
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import drive_ids
-from smc_mujoco.mechanisms.plant import array, plant, write
+from smc_mujoco.mechanisms.plant import field_array, plant, write
 
 IMPLICIT, RK4 = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtIntegrator.mjINT_RK4
 INERTIA = {"inverted_pendulum": 0.125, "duffing": 1.0}  # kg m^2, kg
@@ -41,7 +41,7 @@ def bare(name, *parts, h=2.5e-4, integrator=IMPLICIT):
     model = build(plant(name), *parts, h=h, integrator=integrator)
     model.dof_damping[:] -= build(plant(name)).dof_damping
     for field in ("opt.gravity", "jnt_stiffness", "jnt_stiffnesspoly"):
-        array(model, field)[:] = 0.0
+        field_array(model, field)[:] = 0.0
     return model
 
 
@@ -185,7 +185,7 @@ def test_every_number_is_per_simulation(name, parts):
     assert len({part.structure() for part in parts}) == 1
     batch = Batch(models[0], nsim=len(parts), nthread=1)
     for field in {field.name for part, model in zip(parts, models, strict=True) for field in part.fields(model)}:
-        batch.expand(field)[:] = [array(model, field) for model in models]
+        batch.expand(field)[:] = [field_array(model, field) for model in models]
     batch.set_const()
     qpos, ctrl = batch.bind("qpos"), batch.bind("ctrl")
     singles = [mujoco.MjData(model) for model in models]
