@@ -817,7 +817,7 @@ def test_equal_scenarios_hash_alike_in_any_order_of_their_factors():
 
 MECHANISM = """
 <mujoco>
-  <worldbody><body><joint name="j" type="{joint}" axis="{axis}"/><geom size="0.1"/></body></worldbody>
+  <worldbody><body><joint name="j" type="{joint}" axis="{axis}"/><geom size="0.1" pos="0.3 0.4 0.5"/></body></worldbody>
   <tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon>
   <actuator><motor name="u" {drive}/></actuator>
   <sensor><jointpos joint="j"/><jointvel joint="j"/></sensor>
@@ -832,6 +832,26 @@ def mechanism(drive: str, joint: str = "slide", axis: str = "1 0 0") -> mujoco.M
 @pytest.mark.parametrize("joint", ["slide", "hinge"])
 def test_a_motor_of_gear_1_on_a_joint_makes_a_channel(joint):
     assert channels(mechanism('joint="j"', joint)).shape == (1,)
+
+
+@pytest.mark.parametrize(
+    ("joint", "axis"),
+    [("hinge", axis) for axis in ("1 0 0", "0 1 0", "0 0 1", "0 0 -1")] + [("slide", "0 1 0"), ("slide", "-1 0 0")],
+)
+def test_the_generalised_force_of_a_horizontal_force_is_that_of_the_jacobian(joint, axis):
+    """J' F by MuJoCo's Jacobian of the body's centre of mass, in place of the lever arm that both loops read."""
+    model = mechanism('joint="j"', joint, axis)
+    data, jacobian, (channel,) = mujoco.MjData(model), np.zeros((3, 1)), channels(model)
+    data.qpos[:] = 0.7
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_jacBodyCom(model, data, jacobian, None, 1)
+    force = channel["push_sign"]
+    if joint == "hinge":
+        force = force * (data.xipos.ravel()[channel["tip"]] - data.xanchor.ravel()[channel["anchor"]])
+    direction = channel["push"] - 6
+    assert 0 <= direction < 2
+    assert force == pytest.approx(jacobian[direction, 0], rel=1e-9)
 
 
 @pytest.mark.parametrize(

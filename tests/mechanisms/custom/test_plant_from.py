@@ -622,8 +622,9 @@ def test_a_start_outside_a_joint_s_range_is_refused(bounded):
     other = bounded({"shoulder": smc.Channel(partner="elbow")})
     with pytest.raises(smc.ScenarioError, match=REFUSED):
         smc.Scenario(plant=other, law="none", x0=(0.0, 1.2))
-    free = bounded({"elbow": smc.Channel(x0=1.2)}, '<option><flag limit="disable"/></option>')
-    assert smc.Scenario(plant=free, law="none").resolved.x0 == (1.2,)
+    for flag in ("limit", "constraint"):
+        free = bounded({"elbow": smc.Channel(x0=1.2)}, f'<option><flag {flag}="disable"/></option>')
+        assert smc.Scenario(plant=free, law="none").resolved.x0 == (1.2,)
 
 
 def test_a_start_may_be_as_far_beyond_a_range_as_a_limit_gives_way(bounded):
