@@ -769,7 +769,7 @@ def test_the_plain_loop_refuses_a_start_inside_too():
         return float(str(y.x)), 0.0  # numba makes no number of a text
 
     inside = smc.Scenario(plant="duffing", law=slow(), duration=0.01, contact="stops", x0=1.9)
-    with pytest.warns(smc.PlainLoopWarning), pytest.raises(smc.ScenarioError, match="inside"):
+    with pytest.raises(smc.ScenarioError, match="inside"):
         smc.run(inside)
 
 
