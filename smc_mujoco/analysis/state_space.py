@@ -49,7 +49,7 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     plant = as_plant(plant)
     at = Scenario(plant=plant, law="none", x0=plant.rest if x is None and plant.rest else x or 0.0, v0=0.0)
     with installed(None):
-        made = assembly.with_values(assembly.model([at]), at)
+        made = assembly.with_values(assembly.model(at), at)
         made.opt.disableflags |= JUMPING
         data = mujoco.MjData(made)
         data.qpos[:], data.qvel[:] = assembly.start(made, at)
