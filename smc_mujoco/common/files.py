@@ -57,6 +57,29 @@ def _writing(path: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def no_room() -> Iterator[None]:
+    """Turn an OSError in the block, which writes temporary files, into a ScenarioError."""
+    try:
+        yield
+    except OSError as error:
+        why = error.strerror or error
+        raise ScenarioError(f"no temporary file can be written ({why}): make room, or set TMPDIR") from error
+
+
+@contextlib.contextmanager
+def scratch() -> Iterator[Path]:
+    """Yield a temporary folder, which is removed after the block.
+
+    Raises:
+      ScenarioError: it cannot be made.
+    """
+    with no_room():
+        folder = tempfile.TemporaryDirectory(prefix="smc_mujoco-", ignore_cleanup_errors=True)
+    with folder as name:
+        yield Path(name)
+
+
+@contextlib.contextmanager
 def reading(path: str | os.PathLike[str], kind: str, cure: str) -> Iterator[Path]:
     """Turn an exception in the with block, which reads a file, into one sentence. Yield the path.
 

@@ -4,7 +4,7 @@
 
 A policy observes the same positions and velocities as in an environment. On a plant of several channels it is called
 once per channel, with that channel's observation. It must be a function only of the observation, because all channels
-and runs share it. A policy is Python, so its runs take the reference loop.
+and runs share it. A policy is Python, so its runs take the reference loop. A file is first read in another process.
 """
 
 import copy
@@ -17,7 +17,7 @@ import math
 import os
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, one_line, shown
+from smc_mujoco.common.guard import ALTERS, Arithmetic, Failed, Fault, tried
 from smc_mujoco.common.jit import Uncompiled
 from smc_mujoco.control.law import Law, Measurement, law_function
 
@@ -38,6 +39,7 @@ FORMATS = {  # suffix of a file -> library that reads it, cure if it does not
     ".ts": ("torch", SCRIPT),
     ".pt2": ("torch", "give what torch.export.save writes"),
 }
+TIMEOUT = 120.0  # s in which a library must read a file; chosen
 ONNX = {"tensor(float)": np.float32, "tensor(double)": np.float64, "tensor(float16)": np.float16}
 
 
@@ -68,7 +70,10 @@ class Policy(Uncompiled):
             raise ValueError("its action is a fraction of u_max, and u_max is inf")
         state = [y.x, y.q, y.v, y.dq] if any((y.q, y.dq, y.fq, y.gq)) else [y.x, y.v]
         observation = np.array([*state, y.r, y.dr, y.ddr] if self.reference else state)
+        arithmetic = _arithmetic()
         u = np.asarray(self.act(observation), float).ravel()
+        if arithmetic.changed():
+            raise ArithmeticError(f"{self.name} {ALTERS}")
         if len(u) != 1:
             raise ValueError(f"{self.name} gave an action of {len(u)} numbers; a law gives one a channel")
         return float(u[0]) * y.limit, 0.0
@@ -84,6 +89,20 @@ class File:
     def __call__(self, observation: np.ndarray) -> Any:
         """Return the action."""
         return opened(self)(observation)
+
+
+@functools.cache
+def _arithmetic() -> Arithmetic:
+    return Arithmetic()
+
+
+def attempt(order: Mapping[str, Any], say: Callable) -> None:
+    """Read the network in a file, in the process of a trial."""
+    say("reading it")
+    try:
+        opened(File(**order))
+    except ScenarioError as error:
+        raise Fault(str(error)) from None
 
 
 @functools.lru_cache(maxsize=8)
@@ -199,7 +218,10 @@ def _callable(act: Any) -> tuple[Act, str]:
         if not path.is_file():
             raise ScenarioError(f"no policy {str(path)!r}: give the path of a file")
         file = File(str(path.resolve()), _digest(path))
-        opened(file)  # so that errors show now, not in the run
+        try:
+            tried(__name__, dataclasses.asdict(file), TIMEOUT)
+        except Failed as failed:
+            raise ScenarioError(failed.fault or f"policy {path.name!r}: {failed}") from None
         return file, path.stem
     torch, name = sys.modules.get("torch"), type(act).__name__
     predicts = callable(getattr(act, "predict", None))

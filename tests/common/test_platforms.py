@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.common import gl, process
-from smc_mujoco.mechanisms.custom import mjcf, mjcf_trial
+from smc_mujoco.common import gl, guard, process
+from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.simulation import run
 from smc_mujoco.testing import golden
 
@@ -115,16 +115,17 @@ def test_without_an_affinity_all_processors_count(monkeypatch):
 
 def test_without_limits_of_memory_a_model_is_tried_all_the_same(monkeypatch):
     without_module("resource", monkeypatch)
-    mjcf_trial.limit(1)
+    guard.limit()
 
 
 def test_without_sigkill_a_model_s_error_is_not_one_of_memory(monkeypatch):
     """Windows has no SIGKILL; a trial that ends well has exit code 0."""
     monkeypatch.delattr(mjcf.signal, "SIGKILL")
     monkeypatch.setattr(mjcf.signal, "Signals", [one for one in mjcf.signal.Signals if one.name != "SIGKILL"])
-    error = mjcf._complaint(mjcf.Source("arm.xml", ""), "error unrecognized element, line 3", 0, 1.0)
+    source = mjcf.Source("arm.xml", "")
+    error = mjcf._complaint(source, guard.Failed("reading", "unrecognized element, line 3", 0, 1.0), 1.0)
     assert str(error) == "MuJoCo cannot read arm.xml (unrecognized element, line 3): fix the file"
-    crashed = mjcf._complaint(mjcf.Source("arm.xml", ""), "compiling", 0xC0000005, 1.0)
+    crashed = mjcf._complaint(source, guard.Failed("compiling", "", 0xC0000005, 1.0), 1.0)
     assert "ends MuJoCo with exit code 3221225477" in str(crashed)
 
 

@@ -5,6 +5,7 @@ The libraries themselves are no dependency: where they are installed, the last t
 
 import contextlib
 import pickle
+import platform
 import sys
 import types
 import warnings
@@ -15,6 +16,7 @@ import pytest
 from helpers.episodes import columns, dm_control_suite, driven_by_dm, flat, run_of
 
 import smc_mujoco as smc
+from smc_mujoco.common import guard
 from smc_mujoco.control import policy
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.studies import run_key
@@ -124,6 +126,37 @@ def test_a_policy_may_look_ahead_in_runs_of_its_own():
 
 
 # files and modules, with stand-ins for their libraries
+
+
+@pytest.fixture(autouse=True)
+def here(monkeypatch):
+    """Files are tried in this process, where the stand-ins are."""
+    monkeypatch.setattr(policy, "tried", lambda module, order, timeout: policy.opened(policy.File(**order)))
+
+
+def test_a_library_that_a_file_crashes_is_one_sentence(tmp_path, monkeypatch):
+    monkeypatch.setattr(policy, "tried", guard.tried)
+    (tmp_path / "onnxruntime.py").write_text("import os\nSessionOptions = os.abort\n")
+    (tmp_path / "net.onnx").write_bytes(b"x")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(smc.ScenarioError, match=r"^policy 'net\.onnx': reading it died of SIGABRT"):
+        smc.policy(tmp_path / "net.onnx")
+    (tmp_path / "onnxruntime.py").write_text("raise ImportError('no library')\n")
+    with pytest.raises(smc.ScenarioError, match=r"^policy 'net\.onnx' needs onnxruntime \(no library\): pip install"):
+        smc.policy(tmp_path / "net.onnx")
+
+
+def test_a_policy_that_changes_the_rounding_fails_and_harms_no_other():
+    library = guard.Arithmetic().library
+
+    def act(observation):
+        library.fesetround(0x800 if platform.machine() == "x86_64" else 0x400000)
+        return [0.0]
+
+    alone = briefly("pid")
+    trace = briefly(smc.policy(act))
+    assert f"raised ArithmeticError (act {guard.ALTERS})" in str(trace.failure)
+    np.testing.assert_array_equal(briefly("pid").x, alone.x)
 
 
 def onnx(monkeypatch, kind="tensor(float)", shape=("batch", 2), more=()):

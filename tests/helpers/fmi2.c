@@ -1,6 +1,6 @@
 /* A controller as another tool would export it, for FMI 2.0: torque = -k (theta - setpoint) - 2 omega - sum, with a sum
  * of its own over the errors of its steps. The input mode makes it fail: 1 crashes, 2 never ends, 3 gives NaN, 4 says why,
- * 5 rounds upwards ever after. */
+ * 5 rounds upwards ever after, 6 starts processes that never end and crashes. A gain above 100 fails too. */
 #include <fenv.h>
 #include <math.h>
 #include <stdlib.h>
@@ -91,6 +91,12 @@ fmi2Status fmi2DoStep(fmi2Component instance, fmi2Real t, fmi2Real h, fmi2Boolea
     }
     c->value[TORQUE] = -c->value[K] * e - 2.0 * c->value[OMEGA] - c->sum;
     if (mode == 3.0) c->value[TORQUE] = NAN;
+    if (mode == 6.0) {
+        for (int i = 0; i < 20; i++)
+            if (!fork()) pause();
+        abort();
+    }
+    if (c->value[K] > 100.0) return fmi2Error;
     if (mode == 5.0) fesetround(FE_UPWARD);
     c->sum += 0.01 * e;
     return fmi2OK;

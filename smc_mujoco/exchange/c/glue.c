@@ -13,7 +13,7 @@ typedef smc_measurement smc_seen;
 typedef char smc_measurement_as_in_smc_law_h[sizeof(smc_measurement) == SMC_INPUTS * sizeof(smc_real) ? 1 : -1];
 #endif
 
-#define SMC_BEYOND (1LL << 40) /* sandbox.py: wrote beyond its memory; one more: beyond out; two: changed arithmetic */
+#define SMC_BEYOND (1LL << 40) /* sandbox.py: wrote beyond its memory; one more: beyond out; FAULTS */
 
 extern int smc_mujoco_gains, smc_mujoco_memory; /* set when the library is loaded */
 extern const int smc_mujoco_joints;
@@ -81,11 +81,15 @@ const int smc_mujoco_joints = SMC_JOINTS;
 
 static long long smc_mujoco_call(const double *smc_in, const double *smc_gains, double *smc_memory, double *smc_out)
 {
-    smc_seen smc_y;
+    union { smc_seen smc_y; unsigned char smc_byte[sizeof(smc_seen)]; } smc_given, smc_before;
     smc_mujoco_plant smc_plant;
     long long smc_code;
-    smc_mujoco_see(smc_in, &smc_plant, &smc_y);
-    smc_code = smc_mujoco_with(&smc_y, smc_gains, smc_memory, smc_out);
+    unsigned smc_i;
+    smc_mujoco_see(smc_in, &smc_plant, &smc_given.smc_y);
+    smc_before = smc_given;
+    smc_code = smc_mujoco_with(&smc_given.smc_y, smc_gains, smc_memory, smc_out);
+    for (smc_i = 0; smc_i < sizeof(smc_seen); smc_i++)
+        if (smc_given.smc_byte[smc_i] != smc_before.smc_byte[smc_i]) return SMC_BEYOND + 4;
     return smc_plant.without_tip ? SMC_BEYOND + 3 : smc_code;
 }
 #else

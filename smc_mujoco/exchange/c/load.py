@@ -21,10 +21,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import carray
+from numba import carray, njit
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, shown, whole
+from smc_mujoco.common.guard import Arithmetic, computed
 from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
 from smc_mujoco.control.component import Template, as_gains, parsed_gains, template, written
 from smc_mujoco.control.joint_law import ARRAYS
@@ -53,10 +54,11 @@ class CLaw(AtAddress):
         self.digest = hashlib.sha256(symbol.encode() + b"\0" + self.code).hexdigest()
         self._function, self.library = sandbox.entry(str(file), symbol)
         self.address: int = ctypes.cast(self._function, ctypes.c_void_p).value or 0
-        glued = hasattr(self.library, "smc_mujoco_entry")
+        glued, self._arithmetic = hasattr(self.library, "smc_mujoco_entry"), None
         self.joints = ctypes.c_int.in_dll(self.library, "smc_mujoco_joints").value if glued else 0
         if not glued:
-            self._trampoline = _trampoline(self.address)
+            self._arithmetic = Arithmetic()
+            self._trampoline = _trampoline(self.address, self._arithmetic)
             self.address = self._trampoline.address
         self.sizes = 0, 1
         self.__name__ = re.sub(r"\W", "_", path.stem)
@@ -86,6 +88,8 @@ class CLaw(AtAddress):
         """Call the C function, and return the numbers of its out[]."""
         out = sandbox.doubles([math.nan] * count)
         code = self._function(sandbox.doubles(y), sandbox.doubles(gains), memory.ctypes.data_as(sandbox.DOUBLES), out)
+        if self._arithmetic is not None and self._arithmetic.changed():
+            code = sandbox.ALTERED
         if code != 0:
             what, _ = sandbox.FAULTS.get(code, (f"returned {code}", ""))
             raise ArithmeticError(f"{self.symbol} {what.format(self.sizes[1])}")
@@ -132,13 +136,23 @@ def _unpickled(file: str, symbol: str, code: bytes, sizes: tuple[int, int], name
     return law
 
 
-def _trampoline(address: int) -> Function:
-    """Return a function of the callback's type that calls a C function which returns an int."""
+def _trampoline(address: int, arithmetic: Arithmetic) -> Function:
+    """Return a function of the callback's type that calls a C function which returns an int.
+
+    It restores the arithmetic of its thread, and returns ALTERED if the C function has changed it.
+    """
+    numbers, environment = ctypes.addressof(arithmetic.numbers), ctypes.addressof(arithmetic.environment)
+    restore = ctypes.cast(arithmetic.library.fesetenv, ctypes.c_void_p).value or 0
+    results, altered, compute = arithmetic.results, sandbox.ALTERED, njit(computed, error_model="numpy")
 
     def native(y: Any, g: Any, m: Any, out: Any):
         output = carray(pointer(out), (2,))
         output[0], output[1] = math.nan, math.nan  # a result that the law does not set ends its run
-        return call_int(address, y, g, m, out)
+        code = call_int(address, y, g, m, out)
+        if compute(pointer(numbers)) == results:
+            return code
+        call_int(restore, environment, 0, 0, 0)
+        return altered
 
     return Function(native)
 

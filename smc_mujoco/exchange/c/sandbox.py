@@ -1,24 +1,21 @@
 """Try a law's library in a separate process, which may crash, and report the result in one sentence.
 
-The process runs this file as a script: it loads the library, sets it up, calls the law on request, and unloads it. It
-writes its progress to a file. The last line names the step in which the process died, or the result. The script must
-start quickly, so the functions that start it, and only they, import smc_mujoco.
+`attempt`, in the process of `common.guard`, loads the library, sets it up, calls the law on request, and unloads it.
+The process must start quickly, so the functions that start it, and only they, import more of smc_mujoco.
 """
 
-import contextlib
 import ctypes
 import itertools
-import json
 import math
 import os
 import random
 import re
-import signal
 import struct
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
+
+from smc_mujoco.common.guard import ALTERS, Arithmetic, Failed, Fault, tried
 
 STEPS, LONG_STEPS = 500, 10_000  # samples of 1 ms per run, and in the longest run
 LATER_STEPS, GROWTH = 200, 1.06  # samples after those, and the ratio of successive times: up to 15 hours
@@ -28,10 +25,10 @@ COUPLING = 0.1  # elements of M off its diagonal
 MORE_GAINS = 16  # additional gains, which detect a law that reads them
 BEYOND = 2**40  # code of glue.c: a law of floats wrote beyond its memory; one more: beyond out
 ALTERED = BEYOND + 2  # code of glue.c: a law changed the arithmetic of its thread
-ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps), by which other simulations compute too"
 FAULTS = {  # code -> fault, formatted with the size of memory, and cure
     BEYOND: ("writes beyond the {} numbers of its memory", "say more in smc_law_memory, or give memory="),
     BEYOND + 1: ("writes beyond the numbers of out", "write only u and s, which are out[0] and out[1] for one channel"),
+    BEYOND + 4: ("changes its measurement", "keep what changes in memory"),
     BEYOND + 3: ("asks for the Jacobian of a tip, and there is none", "give the plant a tip, and the law the model"),
     ALTERED: (ALTERS, "let it restore that, and leave out -Ofast and -ffast-math"),
 }
@@ -41,8 +38,6 @@ TEXTS = ("smc_law_gains", "smc_law_shared")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 ON_REQUEST = ctypes.CFUNCTYPE(ctypes.c_int64, *[DOUBLES] * 4)  # C(x, v) w, or the Jacobian of the tip
 
-# Signal -> its usual cause in a law. The causes of other signals are reads, writes and divisions.
-SIGNALS = {int(signal.SIGABRT): "aborts", int(signal.SIGFPE): "divides, or traps floating-point exceptions"}
 # Output of the sanitizers: undefined behaviour; a bad access, and the stack frames it happened in.
 UNDEFINED = re.compile(r"^(?P<file>.+?):(?P<line>\d+):\d+: runtime error: (?P<what>.*)$", re.MULTILINE)
 ACCESS = re.compile(r"AddressSanitizer: (?P<what>[\w-]+).*(?:\n(?P<size>(?:READ|WRITE) of size \d+))?")
@@ -115,43 +110,18 @@ def call(
 
 
 def _run(library: Library, trial: dict | None) -> dict[str, Any]:
-    """Run this file as a script, and return the constants that it prints at its end."""
+    """Make `attempt` in a separate process, and return the constants of the library."""
     from smc_mujoco.common.errors import ScenarioError
-    from smc_mujoco.common.process import TimedOut, timed
     from smc_mujoco.exchange.c import build
 
-    progress, order = build.fresh(".txt"), build.fresh(".json")
-    words = {"library": str(library.file), "symbol": library.symbol, "progress": str(progress), "trial": trial}
-    order.write_text(json.dumps(words), encoding="utf-8")
-    command = [sys.executable, "-I", "-S", __file__, str(order)]
+    words = {"library": str(library.file), "symbol": library.symbol, "trial": trial}
     try:
-        code = timed(command, library.timeout, output=False).returncode
-    except TimedOut:
-        code = None
-    lines = (progress.read_text(encoding="utf-8") if progress.exists() else "").splitlines() or ["loading"]
-    if lines[-1] == "unloading" and code == 0:
-        return json.loads(lines[-2])
-    file, last = library.path.name, lines[-1].replace(str(library.file), library.path.name)
-    kind, _, why = last.partition(" ")
-    if kind == Fault.__name__:
-        raise ScenarioError(f"{file}: {why}")
-    if library.symbol in why and ("undefined symbol" in why or "not found" in why):
-        raise ScenarioError(build.undefined(library.path, library.symbol))
-    if why:
-        why = " ".join(why.split())
-        raise ScenarioError(f"{file} cannot be loaded ({why}): build it for this machine, with all it needs")
-    raise ScenarioError(f"{file}: {last} {ended(code, library.timeout)}")
-
-
-def ended(code: int | None, timeout: float) -> str:
-    """Return in words how a process ended: by an exit code, a signal or the timeout."""
-    if code is None:
-        return f"did not end within {timeout:g} s: fix what it waits for, or give timeout="
-    if code >= 0:
-        return f"ended the process with exit code {code}: let it return"
-    names = {known.value: known.name for known in signal.Signals}  # without most real-time signals
-    name, does = names.get(-code, f"signal {-code}"), SIGNALS.get(-code, "reads, writes or divides")
-    return f"died of {name} ({signal.strsignal(-code)}): fix where it {does}"
+        return tried(__name__, words, library.timeout)
+    except Failed as failed:
+        why, file = str(failed).replace(str(library.file), library.path.name), library.path.name
+        if library.symbol in why and failed.stage == "loading" and re.search("undefined symbol|not found", why):
+            raise ScenarioError(build.undefined(library.path, library.symbol)) from None
+        raise ScenarioError(f"{file} {why}" if why.startswith("cannot") else f"{file}: {why}") from None
 
 
 def _sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
@@ -270,22 +240,7 @@ def stored(head, requests: Requests, arrays) -> list[float]:
     return [*head, float(requests.address), requests.joints, *itertools.chain.from_iterable(arrays)]
 
 
-# the script
-
-
-class Fault(Exception):
-    """A fault of a law, in words."""
-
-
-def arithmetic() -> bytes:
-    """Return results that depend on rounding and flush-to-zero. An enabled trap ends the process."""
-    one, half, big, inf, zero, ulp, normal, tiny = 1.0, 0.5, 1e308, math.inf, 0.0, 2.0**-52, 2.0**-1022, 2.0**-1074
-    with contextlib.suppress(ValueError):
-        math.pow(zero, -one)  # divides by zero
-    return struct.pack("6d", big * big, inf - inf, one + 0.3 * ulp, one + 0.7 * ulp, normal * half, tiny + tiny)
-
-
-STANDARD = arithmetic()
+# in the separate process
 
 
 class Fenced:
@@ -329,7 +284,7 @@ class Trial:
         self.gains = Fenced(order["gains"], math.nan)  # u is NaN if the law reads more gains than it has
         self.gains_before = bytes(self.gains.whole)
         calls.write(bytes(self.gains.own))
-        self.random = random.Random(0)
+        self.random, self.arithmetic = random.Random(0), Arithmetic()
 
     def all(self) -> None:
         """Make every kind of run, and calls at very large errors, at which a law may return an error."""
@@ -407,7 +362,7 @@ class Trial:
             code = BEYOND
         elif self.out.crossed():
             code = BEYOND + 1
-        elif arithmetic() != STANDARD:
+        elif self.arithmetic.changed():
             code = ALTERED
         if code in FAULTS:
             what, cure = FAULTS[code]
@@ -440,42 +395,30 @@ class Trial:
             )
 
 
-def attempt(order, progress) -> None:
-    """Load, set up and on request call a law. Write the progress, and at the end the library's constants."""
+def attempt(order: Mapping[str, Any], say: Callable) -> dict[str, str | int]:
+    """Load, set up and on request call a law. Return the library's constants."""
+    arithmetic, symbol = Arithmetic(), order["symbol"]
 
     def done(step: str) -> None:
-        if arithmetic() != STANDARD:
+        if arithmetic.changed():
             raise Fault(f"{step} {ALTERS}: {FAULTS[ALTERED][1]}")
 
-    symbol = order["symbol"]
-    print("loading", file=progress)
-    law, library = entry(order["library"], symbol)
+    say("loading")
+    try:
+        law, library = entry(order["library"], symbol)
+    except (OSError, AttributeError) as error:
+        raise Fault(f"cannot be loaded ({error}): build it for this machine, with all it needs") from None
     done("loading it")
-    print("smc_setup", file=progress)
+    say("smc_setup")
     if code := set_up(library):
         raise Fault(f"smc_setup returned {code}: fix it")
     done("smc_setup")
     if trial := order["trial"]:
-        print(symbol, file=progress)
+        say(symbol)
         set_sizes(library, len(trial["gains"]) // trial["each"], trial["memory"])
         with Path(trial["calls"]).open("wb") as calls:
             try:
                 Trial(law, library, trial, calls).all()
             except Fault as fault:
                 raise Fault(f"{symbol} {fault}") from None
-    print(json.dumps(facts(library)), file=progress)
-    print("unloading", file=progress)
-
-
-def main(file: str) -> None:
-    """Carry out the order in a JSON file."""
-    order = json.loads(Path(file).read_text(encoding="utf-8"))
-    with Path(order["progress"]).open("w", buffering=1, encoding="utf-8") as progress:
-        try:
-            attempt(order, progress)
-        except (Fault, OSError, AttributeError) as error:
-            print(f"{type(error).__name__} {error}", file=progress)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1])
+    return facts(library)

@@ -10,11 +10,9 @@ import functools
 import gc
 import hashlib
 import itertools
-import json
 import math
 import os
 import re
-import sys
 import weakref
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -26,15 +24,15 @@ import numpy as np
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, one_line, shown, unknown
 from smc_mujoco.common.extras import extra
+from smc_mujoco.common.guard import Failed, tried
 from smc_mujoco.common.jit import Uncompiled
-from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Measurement, law_function
 from smc_mujoco.control.units import Gain
-from smc_mujoco.exchange.c import build, sandbox
+from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.fmu import slave
 from smc_mujoco.exchange.fmu.controller import OUTPUTS, UNBOUNDED
-from smc_mujoco.exchange.fmu.slave import HELD, REAL, Fault, Slave
+from smc_mujoco.exchange.fmu.slave import HELD, REAL, Slave
 
 # Our name -> names of an FMU's variables with that meaning; case is ignored.
 NAMES = {
@@ -114,17 +112,20 @@ class FmuLaw(Uncompiled):
                 running.last[: len(self.outputs)] = running.slave.step(values, y.t + i * length, length)
         return running.last[0], running.last[1]
 
+    def fixed(self, gains: Iterable[float]) -> dict[str, float]:
+        """Return the FMU's name -> the value of each constant and parameter."""
+        values = (max(-UNBOUNDED, min(float(gain), UNBOUNDED)) for gain in gains)
+        return dict(self.constants) | dict(zip(self.parameters, values, strict=False))
+
     def _begin(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> int:
         """Start an instance, which ends when the memory of the run is freed. Return its number."""
         place = next(_numbers)
-        values = (max(-UNBOUNDED, min(float(gain), UNBOUNDED)) for gain in gains)
-        fixed = dict(self.constants) | dict(zip(self.parameters, values, strict=False))
         names = [theirs for _, theirs in self.inputs]
         address = memory.__array_interface__["data"][0]
         _end(_begun.get(address, 0))  # the instance of a run whose memory was set to 0, to begin again
         if self.once:
             self._make_room()
-        made = Slave(str(extracted(self)), names, self.outputs, fixed, y.t)
+        made = Slave(str(extracted(self)), names, self.outputs, self.fixed(gains), y.t)
         _running[place], _begun[address] = Running(self, made, y.t, [0.0, 0.0]), place
         owner: Any = memory if memory.base is None else memory.base
         weakref.finalize(owner, _end, place)
@@ -250,7 +251,7 @@ def law_from_fmu(
         period=_period(about) if period is None else number("period", period, above=0.0),
     )
     if isolate:
-        _try(law, timeout)
+        _try(law, [gain.default for _, gain in gains.values()], timeout)
     return law_function(gains={ours: gain for ours, (_, gain) in gains.items()}, memory=1)(law)
 
 
@@ -451,23 +452,14 @@ def _period(about: Any) -> float | None:
     return None
 
 
-def _try(law: FmuLaw, timeout: float) -> None:
-    """Try an FMU in a separate process.
+def _try(law: FmuLaw, gains: Iterable[float], timeout: float) -> None:
+    """Try an FMU in a separate process, with these gains.
 
     Raises:
       ScenarioError: it failed, crashed or did not end.
     """
-    progress, order, file = build.fresh(".txt"), build.fresh(".json"), Path(law.path).name
-    words = {"folder": str(extracted(law)), "inputs": dict(law.inputs), "outputs": law.outputs, "step": law.period}
-    order.write_text(json.dumps(words | {"fixed": dict(law.constants), "progress": str(progress)}), encoding="utf-8")
+    order = {"folder": str(extracted(law)), "inputs": dict(law.inputs), "outputs": law.outputs, "step": law.period}
     try:
-        code = timed([sys.executable, "-P", slave.__file__, str(order)], timeout, output=False).returncode
-    except TimedOut:
-        code = None
-    lines = (progress.read_text(encoding="utf-8") if progress.exists() else "").splitlines() or ["loading"]
-    last, _, why = lines[-1].partition(" ")
-    if last == "passed" and code == 0:
-        return
-    if last == Fault.__name__:
-        raise ScenarioError(f"{file}: {why}: fix the FMU, or its inputs and parameters")
-    raise ScenarioError(f"{file}: {lines[-1]} {sandbox.ended(code, timeout)}")
+        tried(slave.__name__, order | {"fixed": law.fixed(gains)}, timeout)
+    except Failed as failed:
+        raise ScenarioError(f"{Path(law.path).name}: {failed}") from None

@@ -1,17 +1,10 @@
-"""One instance of an FMU, through FMPy. As a script: a trial of an FMU in a process that may crash.
+"""One instance of an FMU, through FMPy, and its trial in another process (`common.guard`), which must start quickly."""
 
-The script must start quickly, so this file imports nothing of smc_mujoco. It writes its progress to a file, whose last
-line names the step in which the process died, or the fault.
-"""
-
-import ctypes
-import json
 import math
-import os
-import sys
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
+
+from smc_mujoco.common.guard import ALTERS, Arithmetic, Fault
 
 REAL = ("Real", "Float64", "Float32")  # types of variables that are real numbers, as in the names of FMPy's functions
 WHOLE = ("Integer", "Enumeration", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)))
@@ -21,10 +14,6 @@ MAX_POSITION = 3.0  # where the double integrator of a trial stops, because a la
 MAX_COMMAND = 6.0  # bound on u in a trial; chosen
 
 
-class Fault(Exception):
-    """What is wrong with an FMU, in words."""
-
-
 class Group(NamedTuple):
     """Variables of one type: their names, value references, and places among the values that are set or read."""
 
@@ -32,30 +21,6 @@ class Group(NamedTuple):
     names: list[str]
     references: list[int]
     places: list[int]
-
-
-class Arithmetic:
-    """How this thread rounds and flushes, which foreign code may change for all that computes after it."""
-
-    NUMBERS = (1.0, 2.0, 3.0, 2.0**-53, 1e-310)
-
-    def __init__(self) -> None:
-        self.environment = ctypes.create_string_buffer(256)  # C's fenv_t has 8 to 32 bytes
-        self.library = ctypes.CDLL(None if os.name == "posix" else "ucrtbase")
-        self.library.fegetenv(self.environment)
-        self.results = self._computed()
-
-    def changed(self) -> bool:
-        """Return whether this thread computes differently from before, and restore it if it does."""
-        if self._computed() == self.results:
-            return False
-        self.library.fesetenv(self.environment)
-        return True
-
-    def _computed(self) -> tuple[float, ...]:
-        """Return results that differ between the directions of rounding, and where small numbers are flushed to 0."""
-        one, two, three, half_digit, small = self.NUMBERS
-        return one / three, two / three, -one / three, -two / three, one + half_digit, small / two, small + 0.0
 
 
 class Slave:
@@ -104,6 +69,7 @@ class Slave:
             self.fmu.terminate()
         finally:
             self.fmu.freeInstance()
+            self.arithmetic.changed()
 
     def _by_type(self, names: Sequence[str]) -> list[Group]:
         """Return groups of variables of the same type, which one call sets or reads."""
@@ -141,7 +107,7 @@ class Slave:
         finally:
             changed = self.arithmetic.changed()
         if changed:
-            raise Fault(f"{what} changes how this process rounds, by which other simulations compute too")
+            raise Fault(f"{what} {ALTERS}")
         return result
 
     def _fault(self, what: str, error: Exception) -> Fault:
@@ -160,18 +126,25 @@ def _of_type(kind: str, value: float) -> float:
     return round(value) if kind in WHOLE else value != 0.0 if kind == "Boolean" else value
 
 
-def attempt(order: dict[str, Any], progress: Any) -> None:
+def attempt(order: Mapping[str, Any], say: Callable) -> None:
     """Run an FMU on a double integrator x'' = u.
 
     Args:
-      order: what `load` wrote: folder, names of variables, fixed values and step, s.
-      progress: the file for the progress.
+      order: what `load` gave: folder, names of variables, fixed values and step, s.
+      say: reports a stage.
     """
-    print("instantiation", file=progress)
+    try:
+        _run(order, say)
+    except Fault as fault:
+        raise Fault(f"{fault}: fix the FMU, or its inputs and parameters") from None
+
+
+def _run(order: Mapping[str, Any], say: Callable) -> None:
+    say("instantiation")
     slave = Slave(order["folder"], list(order["inputs"].values()), order["outputs"], order["fixed"])
     length, x, v = order["step"] or PERIOD, 0.5, 0.0
     for k in range(STEPS):
-        print(f"the step from t = {k * length:g} s", file=progress)
+        say(f"the step from t = {k * length:g} s")
         r, dr = 0.1 * math.sin(k * length), 0.1 * math.cos(k * length)
         seen = {"t": k * length, "dt": length, "x": x, "v": v, "r": r, "dr": dr, "ddr": -r, "e": x - r, "de": v - dr}
         seen |= {"a": -r, "g": 1.0, "gq": 1.0, "limit": MAX_COMMAND, "model": 1.0}
@@ -182,21 +155,5 @@ def attempt(order: dict[str, Any], progress: Any) -> None:
         x += length * v
         if abs(x) > MAX_POSITION:
             x, v = math.copysign(MAX_POSITION, x), 0.0
-    print("termination", file=progress)
+    say("termination")
     slave.close()
-    print("passed", file=progress)
-
-
-def main(file: str) -> None:
-    """Carry out the order in a JSON file."""
-    order = json.loads(Path(file).read_text(encoding="utf-8"))
-    with Path(order["progress"]).open("w", buffering=1, encoding="utf-8") as progress:
-        try:
-            attempt(order, progress)
-        except Exception as error:
-            kind = "Fault" if isinstance(error, Fault) else f"Fault {type(error).__name__}:"
-            print(f"{kind} {' '.join(str(error).split())}", file=progress)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1])

@@ -7,12 +7,10 @@ process, with bounds on time and memory. That takes some hundredths of a second.
 import dataclasses
 import functools
 import hashlib
-import json
 import os
 import re
 import signal
 import sys
-import tempfile
 import threading
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,15 +19,15 @@ from pathlib import Path, PurePosixPath
 import mujoco
 import numpy as np
 
-from smc_mujoco.common import libmujoco, mjcb, process
+from smc_mujoco.common import guard, libmujoco, mjcb, process
 from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.files import no_room, scratch
 from smc_mujoco.mechanisms.custom import mjcf_trial
 from smc_mujoco.mechanisms.hardware.part import PLAY, ROTOR
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 
 FOLDERS = ("meshdir", "texturedir", "assetdir")  # where a <compiler> may say that assets lie
 XML = (".xml", ".mjcf", ".urdf")
-MEMORY = 4 * 2**30  # bytes of address space of the child process that tries a model: chosen
 DIGITS = 17  # of numbers in the XML of an MjSpec: enough for any float64
 SAME = 1e-12  # relative and absolute: change of a model's numbers when it is written and read, which is rounding
 
@@ -229,47 +227,38 @@ def tried(source: Source, timeout: float) -> None:
     """
     if source.sha256 in _tried:
         return
-    with tempfile.TemporaryDirectory(prefix="smc_mujoco-") as temporary:
-        folder, copies = Path(temporary), {}
-        text, report, order = folder / "text", folder / "report", folder / "order"
-        text.write_text(source.text, encoding="utf-8", errors="surrogatepass")
-        for i, (name, content) in enumerate(source.assets):
-            copies[name] = str(folder / str(i))
+    with scratch() as folder, no_room():
+        copies = {name: str(folder / str(i)) for i, (name, _) in enumerate(source.assets)}
+        for name, content in source.assets:
             Path(copies[name]).write_bytes(content)
-        files = {"path": source.path, "text": str(text), "assets": copies, "report": str(report), "memory": MEMORY}
-        plugins = [*map(str, libmujoco.plugins())]
-        order.write_text(json.dumps(files | {"library": str(libmujoco.path()), "plugins": plugins}), encoding="utf-8")
-        command = [sys.executable, "-I", "-S", mjcf_trial.__file__, str(order)]
+        (folder / "text").write_text(source.text, encoding="utf-8", errors="surrogatepass")
+        order = {"path": source.path, "text": str(folder / "text"), "assets": copies}
+        order |= {"library": str(libmujoco.path()), "plugins": [*map(str, libmujoco.plugins())]}
         try:
-            code = process.timed(command, timeout, output=False).returncode
-        except process.TimedOut:
-            code = None
+            guard.tried(mjcf_trial.__name__, order, timeout)
         except OSError:  # this process may not start others
             return
-        last = (report.read_text(encoding="utf-8", errors="replace") if report.exists() else "").splitlines() or [
-            "loading"
-        ]
-    if last[-1].startswith("error") and "plugin" in last[-1]:  # the user may have loaded this plugin here
-        return
-    if last[-1] not in ("fine", "loading"):  # "loading": MuJoCo did not load, which is not the model's fault
-        raise _complaint(source, last[-1], code, timeout)
+        except guard.Failed as failed:
+            if failed.stage == "loading" or (failed.stage == "reading" and "plugin" in failed.fault):
+                return  # MuJoCo did not load, which is not the model's fault, or the user has loaded this plugin here
+            raise _complaint(source, failed, timeout) from None
     _tried.add(source.sha256)
 
 
-def _complaint(source: Source, last: str, code: int | None, timeout: float) -> ScenarioError:
-    """Return the error for a model, from the last line of its trial and the exit code, None if it was stopped."""
-    stage, _, words = last.partition(" ")
+def _complaint(source: Source, failed: guard.Failed, timeout: float) -> ScenarioError:
+    """Return the error for a model, from its trial."""
     names = {known.value: known.name for known in signal.Signals}
-    how = "" if code is None else names.get(-code, f"exit code {code}")
-    if how == "SIGKILL" or re.search(r"unknown exception|bad_alloc|memory|allocat", words):
-        return ScenarioError(f"{source.label} takes MuJoCo more than {MEMORY / 2**30:g} GiB of memory: make it smaller")
-    if stage == "error":
-        return broken(source.path or source.label, words)
-    if code is None:
+    how = "" if failed.code is None else names.get(-failed.code, f"exit code {failed.code}")
+    much = f"more than {guard.MEMORY / 2**30:g} GiB of memory"
+    if how == "SIGKILL" or re.search(r"unknown exception|bad_alloc|memory|allocat", failed.fault):
+        return ScenarioError(f"{source.label} takes MuJoCo {much}: make it smaller")
+    if failed.fault:
+        return broken(source.path or source.label, failed.fault)
+    if failed.code is None:
         return ScenarioError(
             f"{source.label} takes MuJoCo more than {timeout:g} s to compile: make it smaller, or give timeout="
         )
-    hint = f"more than {MEMORY / 2**30:g} GiB of memory" if how == "SIGABRT" else "a model that attaches itself"
+    hint = much if how == "SIGABRT" else "a model that attaches itself"
     return ScenarioError(f"{source.label} ends MuJoCo with {how}, as does {hint}: fix the model")
 
 

@@ -1,40 +1,27 @@
-"""Script that reads and compiles a model, and computes its first accelerations, in a process that it may crash.
+"""Reading and compiling a model, and its first accelerations, in the process of `common.guard`, which it may crash.
 
-It imports only the standard library and calls MuJoCo through ctypes, so that it takes some hundredths of a second. It
-reports its progress as lines in a file. The last line is the stage at which the process died, or "fine", or "error" and
-MuJoCo's message.
+It calls MuJoCo through ctypes, so that it takes some hundredths of a second.
 """
 
-import contextlib
 import ctypes
-import json
 import os
-import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
+
+from smc_mujoco.common.guard import FAULT
 
 MESSAGE = 4000  # bytes of MuJoCo's error message, at most
 VFS = 1024  # bytes, more than any version's mjVFS has
 HANDLER = ctypes.CFUNCTYPE(None, ctypes.c_char_p)
 
 
-def limit(memory: int) -> None:
-    """Bound this process's memory, where the system can, and write no core dumps."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return
-    for kind, most in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CORE, 0)):
-        with contextlib.suppress(OSError, ValueError):  # the system sets a lower bound already
-            resource.setrlimit(kind, (most, resource.getrlimit(kind)[1]))
-
-
 class Trial:
-    """MuJoCo in this process, and its report file."""
+    """MuJoCo in this process. `say` reports a stage."""
 
-    def __init__(self, order: dict[str, Any], report: TextIO):
-        self.report = report
-        self.say("loading")
+    def __init__(self, order: Mapping[str, Any], say: Callable):
+        self.say = say
+        say("loading")
         self.library = ctypes.CDLL(order["library"])
         for name in ("mj_parseXML", "mj_parseXMLString", "mj_compile", "mj_makeData"):
             getattr(self.library, name).restype = ctypes.c_void_p
@@ -45,13 +32,9 @@ class Trial:
         for plugin in order["plugins"]:
             self.library.mj_loadPluginLibrary(plugin.encode())
 
-    def say(self, line: str) -> None:
-        """Write a line to the report file."""
-        print(line, file=self.report, flush=True)
-
     def fail(self, message: bytes | None) -> None:
         """Report an error, and end the process."""
-        self.say("error " + " ".join((message or b"").decode(errors="replace").split()))
+        self.say(FAULT, *(message or b"").decode(errors="replace").split())
         os._exit(0)
 
     def warned(self, message: bytes) -> None:
@@ -59,7 +42,7 @@ class Trial:
         if b"NaN" in message and b"XML" in message:
             self.fail(b"it holds a NaN")
 
-    def run(self, order: dict[str, Any]) -> None:
+    def run(self, order: Mapping[str, Any]) -> None:
         """Read the model, compile it, make its data, and compute its first accelerations."""
         self.say("reading")
         error, files = ctypes.create_string_buffer(MESSAGE), None
@@ -84,17 +67,8 @@ class Trial:
         if not data:
             self.fail(b"no memory for its data")
         self.library.mj_forward(ctypes.c_void_p(model), ctypes.c_void_p(data))
-        self.say("fine")
 
 
-def main(place: str) -> None:
-    """Try the model that a JSON file describes: libraries, plugins, path or text with assets, memory, report file."""
-    order = json.loads(Path(place).read_text(encoding="utf-8"))
-    limit(order["memory"])
-    with Path(order["report"]).open("w", encoding="utf-8") as report:
-        Trial(order, report).run(order)
-        os._exit(0)  # without freeing what it has built
-
-
-if __name__ == "__main__":
-    main(sys.argv[1])
+def attempt(order: Mapping[str, Any], say: Callable) -> None:
+    """Try the model that an order describes: library, plugins, path or text with assets."""
+    Trial(order, say).run(order)

@@ -255,6 +255,7 @@ MISTAKES = {
     "less": (own("", head=TYPE.replace(", smc_real *out", "").replace("{", "{ smc_real out[4];")), f"must be {TYPE}"),
     "memory": (own("memory[16] = 1.0;"), "smc_law writes beyond the 8 numbers of its memory"),
     "out": (own("out[4] = 1.0;"), "smc_law writes beyond the numbers of out"),
+    "measurement": (own("((double *)y->x)[1] = 0.0;"), "smc_law changes its measurement: keep what changes in memory"),
     "nan": (own("out[1] = gains[0] / memory[0];"), "smc_law returned u = inf, s = 0.0 of joint 1 at t = 0"),
     "gains": (
         own("", joints='#define SMC_JOINTS 2\nconst char smc_law_gains[] = "k=1 2 3";'),
@@ -274,7 +275,7 @@ def test_a_mistake_in_the_file_is_one_sentence(tmp_path, case):
     (path := tmp_path / "mine.c").write_text(text)
     gains = {"k": 1.0} if case == "nan" else None
     with pytest.raises(smc.ScenarioError, match=re.escape(said)) as error:
-        smc.law_from_c(path, isolate=case in ("memory", "out", "nan"), gains=gains)
+        smc.law_from_c(path, isolate=case in ("memory", "out", "measurement", "nan"), gains=gains)
     assert "\n" not in str(error.value)
 
 

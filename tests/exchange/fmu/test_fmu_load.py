@@ -1,9 +1,11 @@
 """Controllers in FMUs as laws: those of this library come back with the same bits, and others' keep their own steps."""
 
 import gc
+import os
 import pickle
 import shutil
 import sys
+import time
 import zipfile
 from pathlib import Path
 
@@ -211,13 +213,44 @@ def test_periods_that_do_not_fit_are_said(foreign):
         (2.0, r"the step from t = 0 s did not end within 6 s: fix what it waits for, or give timeout="),
         (3.0, r"torque is nan after 1 steps: fix the FMU"),
         (4.0, r"the step from t = 0 s fails \(the licence has ended\)"),
-        (5.0, r"the step from t = 0 s changes how this process rounds, by which other simulations compute too"),
+        (
+            5.0,
+            r"the step from t = 0 s changes the arithmetic of its thread \(rounding, flush-to-zero, ",
+        ),
     ],
 )
 def test_a_trial_says_how_an_fmu_fails(foreign, mode, said):
     with pytest.raises(smc.ScenarioError, match=rf"^controller\.fmu: {said}") as error:
         smc.law_from_fmu(foreign, constants={"mode": mode}, timeout=6.0 if mode == 2.0 else 60.0)
     assert "\n" not in str(error.value)
+
+
+def test_processes_that_an_fmu_starts_end_with_its_trial(foreign):
+    def children() -> int:
+        listed = [Path(f"/proc/{name}/maps") for name in os.listdir("/proc") if name.isdecimal()]
+        return sum("controller.so" in read(path) for path in listed)
+
+    def read(path: Path) -> str:
+        try:
+            return path.read_text()
+        except OSError:
+            return ""
+
+    before = children()
+    with pytest.raises(smc.ScenarioError, match=r"the step from t = 0 s died of SIGABRT"):
+        smc.law_from_fmu(foreign, constants={"mode": 6.0})
+    for _ in range(500):
+        if children() <= before:
+            return
+        time.sleep(0.01)
+    pytest.fail("they still run")
+
+
+def test_a_trial_has_the_parameters_of_the_run(foreign, tmp_path):
+    """The value that stands in the description, which the FMU itself does not have."""
+    path = changed(foreign, tmp_path, ('<Real start="8" min="0"/>', '<Real start="200"/>'))
+    with pytest.raises(smc.ScenarioError, match=r"changed\.fmu: the step from t = 0 s fails"):
+        smc.law_from_fmu(path, **RENAMED)
 
 
 def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
@@ -231,7 +264,7 @@ def test_an_fmu_that_changes_the_rounding_fails_and_other_runs_keep_their_bits(f
     one, alone = 1.0, smc.run(scenario("pid"))
     law = smc.law_from_fmu(foreign, constants={"mode": 5.0}, isolate=False)()
     trace, fine = smc.run([scenario(law), scenario("pid")])
-    assert "changes how this process rounds" in str(trace.failure)
+    assert "changes the arithmetic of its thread" in str(trace.failure)
     assert one / 3.0 == float.fromhex("0x1.5555555555555p-2")
     np.testing.assert_array_equal(fine.x, alone.x)
 

@@ -1,0 +1,97 @@
+"""What foreign machine code may do in its trial, and to the arithmetic of a run: found, in one sentence, and ended."""
+
+import ctypes
+import ctypes.util
+import os
+import signal
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from smc_mujoco.common import guard
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="the code of these trials is for POSIX")
+
+
+def attempt(order: Mapping[str, Any], say: Callable) -> Any:
+    """What a test orders, in the process of its trial."""
+    say("working")
+    kind = order["kind"]
+    if kind == "fill":
+        return len([bytearray(2**26) for _ in range(1000)])
+    if kind == "write":
+        with Path(order["file"]).open("wb") as file:
+            file.truncate(guard.DISK + 1)
+    if kind == "forks":
+        children = []
+        while len(children) < 20:
+            if (child := os.fork()) == 0:
+                signal.pause()
+            children.append(child)
+        return children
+    if kind == "deep":
+        raise guard.Fault(f"is wrong:\n {order['kind']}")
+    return order
+
+
+def test_what_a_trial_returns_comes_back():
+    assert guard.tried(__name__, {"kind": "none", "more": [1.5, None]}, 60.0) == {"kind": "none", "more": [1.5, None]}
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        ("fill", "takes more than 4 GiB of memory: make it smaller"),
+        ("write", r"OSError: \[Errno 27\] File too large"),
+        ("deep", "is wrong: deep"),
+    ],
+)
+def test_a_trial_has_limits(kind, said, tmp_path):
+    with pytest.raises(guard.Failed, match=f"^{said}") as failed:
+        guard.tried(__name__, {"kind": kind, "file": str(tmp_path / "large")}, 60.0)
+    assert (failed.value.stage, failed.value.code) == ("working", 0)
+    assert not [path for path in tmp_path.iterdir() if path.stat().st_size > 0]
+
+
+def test_what_a_trial_starts_ends_with_it():
+    running = guard.tried(__name__, {"kind": "forks"}, 60.0)
+    for _ in range(500):  # until the process that inherits orphans has noticed
+        running = [one for one in running if alive(one)]
+        if not running:
+            return
+        time.sleep(0.01)
+    pytest.fail(f"{running} still run")
+
+
+def alive(process: int) -> bool:
+    state = Path(f"/proc/{process}/stat")
+    return state.exists() and state.read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+FLUSH = 0x8040  # of SSE's register: small results are 0, and small operands
+
+
+@pytest.mark.parametrize("mode", ["FE_DOWNWARD", "FE_UPWARD", "FE_TOWARDZERO", "flush", "trap"])
+def test_a_change_of_the_arithmetic_is_seen_and_undone(mode):
+    if os.uname().machine != "x86_64" or ctypes.util.find_library("c") is None:
+        pytest.skip("the numbers of the modes are those of x86 and of the GNU C library")
+    modes = {"FE_DOWNWARD": 0x400, "FE_UPWARD": 0x800, "FE_TOWARDZERO": 0xC00}
+    arithmetic, three, ten, least = guard.Arithmetic(), 3.0, 10.0, 2.0**-1022
+    library, environment = arithmetic.library, ctypes.create_string_buffer(bytes(arithmetic.environment), 256)
+    assert not arithmetic.changed()
+    if mode in modes:
+        library.fesetround(modes[mode])
+    elif mode == "trap":
+        library.feenableexcept(4)
+    else:
+        state = ctypes.c_uint32.from_buffer(environment, 28)
+        state.value |= FLUSH
+        library.fesetenv(environment)
+    assert arithmetic.changed()
+    assert not arithmetic.changed()
+    assert library.fegetround() == library.fegetexcept() == 0
+    assert (1.0 / three, 1.0 / ten) == (float.fromhex("0x1.5555555555555p-2"), float.fromhex("0x1.999999999999ap-4"))
+    assert least / ten * 2.0**1000 > 0.0
