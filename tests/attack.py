@@ -222,7 +222,7 @@ class World:
                 for inner, function in vars(value).items():
                     if inspect.isfunction(function) and not inner.startswith("_") and hasattr(function, "explains"):
                         yield f"{name}.{inner}", function
-            elif callable(value) and not (isinstance(value, type) and issubclass(value, BaseException)):
+            elif callable(value) and not (isinstance(value, type) and issubclass(value, BaseException | list)):
                 yield name, value
             for method, there in vars(value).items() if isinstance(value, type) else ():
                 function = there.__func__ if isinstance(there, classmethod | staticmethod) else there

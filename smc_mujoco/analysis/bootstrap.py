@@ -92,7 +92,7 @@ def median_of(
     n, centre = values.shape[1] if samples is None else max(samples) + 1, float(middle(middle(values)))
     if n < 2:
         return Interval(centre, math.nan, math.nan, n)
-    at, drawn = outermost(n, level, resamples), draws(n, resamples, seed)
+    drawn, at = draws(n, resamples, seed), outermost(n, level, resamples)
     drawn = drawn if samples is None else drawn[list(samples)]
     lower, upper = (np.sort(middle(ends)) for ends in drawn_medians(values, drawn))
     return Interval(centre, float(lower[at - 1]), float(upper[resamples - at]), n)

@@ -219,7 +219,7 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
     if given is not None:
         if isinstance(given, str) or len(given) != len(traces):
             raise ScenarioError(f"labels are {shown(given)} for {len(traces)} traces: give one string a trace")
-        return [str(label) for label in given]
+        return [label if isinstance(label, str) else shown(label) for label in given]
     names = [law_name(trace.scenario.law) for trace in traces]
     alike = [[trace for trace, other in zip(traces, names, strict=True) if other == name] for name in names]
     words = [differences(trace, others) for trace, others in zip(traces, alike, strict=True)]

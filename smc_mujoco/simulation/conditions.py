@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common import errors
-from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
+from smc_mujoco.common.errors import ScenarioError, find, number, shown, unknown
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.registry import subclasses
@@ -94,7 +94,8 @@ class Condition:
         Raises:
           ScenarioError: the condition has no numbers for the plant.
         """
-        return dict(self.fields(plant, duration) if callable(self.fields) else self.fields)
+        length = number("duration", duration, above=0.0)
+        return dict(self.fields(plant, length) if callable(self.fields) else self.fields)
 
     def __add__(self, other: "Condition | str") -> "Condition":
         """Return both at once. Disturbances, frictions and actuators add up; only one may set any other field."""
@@ -208,11 +209,11 @@ def from_file(path: Path) -> list[Condition]:
     with reading(path, "file of conditions", "give a text file, a condition a line") as file:
         lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
     found = []
-    for number, line in enumerate(lines, 1):
+    for count, line in enumerate(lines, 1):
         try:
             found += [find_condition(line)] if line and not line.startswith("#") else []
         except ScenarioError as error:
-            raise ScenarioError(f"line {number} of {str(path)!r}: {error}") from None
+            raise ScenarioError(f"line {count} of {str(path)!r}: {error}") from None
     return found
 
 

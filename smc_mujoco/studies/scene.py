@@ -58,6 +58,7 @@ class Scene:
     camera: Camera | None = None
 
     def __post_init__(self):
+        errors.name("title", self.title)
         if not isinstance(self.conditions, Mapping) or not self.conditions:
             raise ScenarioError(f"scene {self.title!r} has conditions {shown(self.conditions)}: give names with runs")
         for condition, runs in self.conditions.items():

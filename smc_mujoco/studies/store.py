@@ -57,8 +57,10 @@ class Store:
             parts = [path for path in sorted(self.parts.iterdir()) if PART.fullmatch(path.name)]
             for path in () if resume else (*parts, self.results):
                 path.unlink(missing_ok=True)
-        except OSError as error:
-            raise ScenarioError(f"cannot use {self.parts}: {error.strerror}; choose another folder") from error
+        except (OSError, ValueError) as error:  # ValueError: a name with a null character
+            raise ScenarioError(
+                f"cannot use {self.parts}: {getattr(error, 'strerror', None) or error}; choose another folder"
+            ) from error
         for path in parts if resume else ():
             if (part := self._read(path)) is not None:
                 for i, name in enumerate(part["hash"].to_pylist()):

@@ -8,14 +8,14 @@ and written one by one, so that memory does not grow with a film's length.
 import contextlib
 import os
 import warnings
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
-from smc_mujoco.common import extras, gl
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, users_frame
+from smc_mujoco.common import errors, extras, gl
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, taken, users_frame
 from smc_mujoco.common.files import replacing
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import finite, windows
@@ -105,10 +105,13 @@ def clip(
     path = Path(path)
     if path.suffix != ".webp":
         raise ScenarioError(f"cannot write a clip to {path.name!r}: end the name in .webp")
-    shown = clock(traces, fps, speed).part(*span)
+    if len(ends := taken("span", span)) != 2:
+        raise ScenarioError(f"span is {errors.shown(span)}: give two times, in s")
+    start, stop = (number("span", end) for end in ends)
+    shown = clock(traces, fps, speed).part(start, stop)
     count = len(shown.times)
     if not 0 < count <= 600:
-        raise ScenarioError(f"a clip of {span[0]:g} .. {span[1]:g} s has {count} frames: give a span with 1 to 600")
+        raise ScenarioError(f"a clip of {start:g} .. {stop:g} s has {count} frames: give a span with 1 to 600")
     pictures = []
     for picture in frames(traces, shown, labels, title, size, camera):
         pictures.append(Image.fromarray(picture))
@@ -144,6 +147,18 @@ def clock(traces: Trace | Sequence[Trace], fps: float, speed: float | None = Non
     return pace.clock(style.same_plant(traces), fps, speed)
 
 
+def _pixels(size: Iterable[int]) -> tuple[int, int]:
+    """Return width and height of a film; refuse odd ones, and those out of range."""
+    sides = taken("size", size)
+    fit = [
+        isinstance(side, int | np.integer) and low <= side <= high and side % 2 == 0
+        for side, low, high in zip(sides, MIN_SIZE, MAX_SIZE, strict=False)
+    ]
+    if fit != [True, True] or len(sides) != 2:
+        raise ScenarioError(f"a film of {errors.shown(size)} px: give two even numbers from {MIN_SIZE} to {MAX_SIZE}")
+    return int(sides[0]), int(sides[1])
+
+
 def frames(
     traces: Trace | Sequence[Trace],
     shown: Clock,
@@ -157,8 +172,7 @@ def frames(
     names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
     if len(traces) > MAX_MACHINES:
         raise ScenarioError(f"{len(traces)} machines in one film: show at most {MAX_MACHINES}")
-    if any(side % 2 or not low <= side <= high for side, low, high in zip(size, MIN_SIZE, MAX_SIZE, strict=True)):
-        raise ScenarioError(f"a film of {size} px: give two even numbers from {MIN_SIZE} to {MAX_SIZE}")
+    size = _pixels(size)
     if why := gl.missing():
         raise ScenarioError(why)
     scale = (size[0] / FULL_WIDTH) ** 0.6  # letters shrink less than pictures

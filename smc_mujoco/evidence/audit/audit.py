@@ -155,7 +155,7 @@ def wanted(paper: Paper, only: Iterable[str | int] | None) -> list[Entry]:
     known = paper.claims
     if only is None:
         return list(known.values())
-    ids = {str(id) for id in taken("only", only)}
+    ids = {str(id) if isinstance(id, int) else id if isinstance(id, str) else shown(id) for id in taken("only", only)}
     for id in sorted(ids - set(known)):
         raise unknown("claim", id, known)
     return [entry for entry in known.values() if entry.id in ids]

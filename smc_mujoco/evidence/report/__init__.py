@@ -49,7 +49,7 @@ def report(
     """
     from smc_mujoco.analysis.differences import share_that_matters
     from smc_mujoco.common import extras
-    from smc_mujoco.common.errors import whole
+    from smc_mujoco.common.errors import taken, whole
     from smc_mujoco.common.files import replacing
     from smc_mujoco.evidence.report import page, stages
     from smc_mujoco.evidence.report.plan import FULL, QUICK, Bars
@@ -62,7 +62,7 @@ def report(
     if relevant is not None:
         plan = dataclasses.replace(plan, relevant=share_that_matters(relevant))
     if laws:
-        plan = dataclasses.replace(plan, laws=tuple(dict.fromkeys((*plan.laws, *laws))))
+        plan = dataclasses.replace(plan, laws=tuple(dict.fromkeys((*plan.laws, *taken("laws", laws)))))
     folder = Path(out)
     html = page.page(stages.find(plan, folder, threads, Bars(progress), None if records is None else Path(records)))
     with replacing(folder / "report.html") as part:

@@ -124,6 +124,8 @@ class Sliding(Friction):
         Args:
           inertia: of the joint, kg m^2 (kg).
         """
+        if not inertia > 0.0:
+            raise ScenarioError(f"the inertia of joint {i} is {inertia:g}, and friction needs one above 0: give others")
         stiffness = _of(self.stiffness, i)
         stiffness = inertia * BRISTLE**2 if stiffness is None else stiffness
         return stiffness, 2.0 * math.sqrt(stiffness * inertia)
