@@ -47,6 +47,8 @@ from smc_mujoco.evidence.audit.audit import Audit as Audit
 from smc_mujoco.evidence.audit.audit import audit as audit
 from smc_mujoco.evidence.audit.audit import claims as claims
 from smc_mujoco.evidence.audit.verdict import Claim as Claim
+from smc_mujoco.evidence.certificates.certificate import Certificate as Certificate
+from smc_mujoco.evidence.certificates.maker import certify as certify
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.report import report as report
 from smc_mujoco.evidence.rigs.identify import Identified as Identified

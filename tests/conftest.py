@@ -72,6 +72,7 @@ LONG = {
     "simulation/test_realistic.py",
     "simulation/test_run.py",
     "evidence/audit/test_claims.py",
+    "evidence/certificates/test_certify.py",
     "evidence/papers/test_shipped_papers.py",
     "evidence/report/test_report.py",
     "studies/test_executors.py",

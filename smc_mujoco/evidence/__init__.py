@@ -1,1 +1,1 @@
-"""Audits of papers, published boards, real machines, and the report. An annex: nothing in the core imports it."""
+"""Audits, published boards, certificates, real machines, the report. An annex: nothing in the core imports it."""

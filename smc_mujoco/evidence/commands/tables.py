@@ -15,6 +15,7 @@ from smc_mujoco.common.text import number
 from smc_mujoco.evidence.audit import verdict as verdicts
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.boards.published import RobustnessRow, Row
+from smc_mujoco.evidence.certificates.certificate import Certificate
 from smc_mujoco.evidence.rigs.identify import Identified
 
 BOARDS = {  # board of RealAIGym -> title and headings of columns
@@ -46,6 +47,18 @@ def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], own: Collec
         digits = (1,) * 6 + (3,) if tests else (2, 2, 2, 3, 1, 3)
         cells = [f"{value:.{places}f}" for value, places in zip(values, digits, strict=True)]
         table.add_row(row.name, *cells, style="bold" if row.name in own else None)
+    return table
+
+
+def certificate(made: Certificate) -> Table:
+    """Return a certificate's conditions with their margins."""
+    columns = [Column("condition", no_wrap=True), Column("holds"), Column("margin", justify="right"), Column("")]
+    table = titled(f"{made.law} on {made.plant}", Column("theorem", no_wrap=True), *columns, pad_edge=False)
+    seen = ""
+    for one in made.conditions:
+        theorem, seen = one.theorem if one.theorem != seen else "", one.theorem
+        mark = Text("yes", style="blue") if one.holds else Text("no", style="red")
+        table.add_row(theorem, one.name, mark, f"{number(one.margin)} {one.unit}".strip(), one.words)
     return table
 
 

@@ -1,0 +1,288 @@
+"""What is proven of a law on a plant, as data: theorems, their conditions with margins, regions and bounds."""
+
+import copy
+import dataclasses
+import functools
+import html
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.extras import extra
+from smc_mujoco.common.files import ended, read_json, reading, to_json, write_json
+from smc_mujoco.common.text import number
+from smc_mujoco.evidence.certificates import loops
+from smc_mujoco.mechanisms.plant import EFFORT
+
+if TYPE_CHECKING:
+    from smc_mujoco.simulation.trace import Trace
+
+# Condition -> unit of its margin (x: unit of position, F: of force), what it asks, and what it means where it fails.
+CONDITIONS = {
+    "damping": ("F s/x", "D(x) >= 0 for every x", "the plant itself feeds the motion"),
+    "restoring": ("", "sigma(c x) > phi(x) for every x > 0", "the plant pulls harder than the law pushes"),
+    "actuator": ("F", "|u| <= u_max", "the law asks for more than the actuator gives"),
+    "coupling": ("F/x", "the coupling is a spring that pulls together", "the coupling can push apart"),
+    "local": ("F/x", "sigma'(0) c > phi'(0)", "the law is too soft near 0"),
+    "start": ("", "the scenario's start lies in the region", "the start lies outside of it"),
+    "reaching": ("F", "k > |phi + (M c - D) v| + d0", "d and the plant together exceed k"),
+    "integral": ("F/s", "k2 > d'", "the integral is slower than d"),
+    "slope": ("F/s", "|delta'| <= L", "what the integral must follow is too fast"),
+}
+THEOREMS = {  # theorem -> what it says
+    "saturated PD": "V = M v²/2 + ∫ σ(c y) − φ(y) dy never rises, and only rest keeps it (LaSalle)",
+    "level sets": "W falls between two of its levels, whatever d does within its bound",
+    "reaching": "s = 0 is reached and kept, and x decays on it",
+    "super-twisting": "a quadratic form of (√|s| sgn s, w + δ) falls until s = s' = 0 (Moreno and Osorio 2012)",
+}
+
+
+class Condition(NamedTuple):
+    """A condition of a theorem.
+
+    Attributes:
+      theorem, name: of a part of the certificate, and of the condition, as in its data.
+      margin: by how much it holds, negative where it fails.
+      unit: of the margin; "" for a share.
+      words: what it asks, or what it means that it fails.
+    """
+
+    theorem: str
+    name: str
+    margin: float
+    unit: str
+    words: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether the margin is not negative."""
+        return self.margin >= 0.0
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Certificate:
+    """What is proven of a law on a plant. `smc.certify` makes it, and a checker apart has accepted it.
+
+    Attributes:
+      data: all of it, as in its file: plant, law, bounds of the disturbance, theorems with their conditions and what
+        proves them (polynomials, boxes, numbers), what is left out, and a seal.
+    """
+
+    data: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        return f"<Certificate of {self.law} on {self.plant}: {self.sentences[0]}>"
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{html.escape(one.theorem)}</td><td>{html.escape(one.name)}</td><td>{'yes' if one.holds else 'no'}"
+            f"</td><td>{html.escape(f'{number(one.margin)} {one.unit}')}</td><td>{html.escape(one.words)}</td></tr>"
+            for one in self.conditions
+        )
+        head = "<tr><th>theorem</th><th>condition</th><th>holds</th><th>margin</th><th></th></tr>"
+        return "".join(f"<p>{html.escape(one)}</p>" for one in self.sentences) + f"<table>{head}{rows}</table>"
+
+    @property
+    def plant(self) -> str:
+        """Name of the plant."""
+        return self.data["plant"]["name"]
+
+    @property
+    def law(self) -> str:
+        """Name of the law."""
+        return self.data["law"]["name"]
+
+    @property
+    def theorems(self) -> tuple[str, ...]:
+        """The theorems that were tried."""
+        return tuple(part["theorem"] for part in self.data["parts"])
+
+    @property
+    def theorem(self) -> str:
+        """The first theorem that holds, or the first that was tried."""
+        return next((part["theorem"] for part in self.data["parts"] if part["holds"]), self.theorems[0])
+
+    @property
+    def holds(self) -> bool:
+        """Whether the scenario's own start surely comes to rest or into the bound."""
+        return self.bound is not None
+
+    @property
+    def stable(self) -> bool:
+        """Whether every start surely comes to rest without a disturbance."""
+        return self._part("saturated PD", holding=True) is not None
+
+    @property
+    def bound(self) -> float | None:
+        """The largest |x| in the end of runs from the scenario's start, m or rad, under every d within its bound."""
+        if not self.data["disturbance"] and self.stable:
+            return 0.0
+        part = self._part("level sets", holding=True)
+        if part is None:
+            return None
+        return 0.0 if "P" in part else part["bound"]
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """All conditions of the theorems."""
+        x, F = self.data["unit"], EFFORT[self.data["unit"]]
+        made = []
+        for part in self.data["parts"]:
+            for one in part["conditions"]:
+                unit, asks, fails = CONDITIONS[one["name"]]
+                unit = unit.replace("x", x).replace("F", F)
+                made.append(
+                    Condition(
+                        part["theorem"], one["name"], one["margin"], unit, asks if one["margin"] >= 0.0 else fails
+                    )
+                )
+        return tuple(made)
+
+    @property
+    def leaves_out(self) -> Mapping[str, str]:
+        """What no theorem here is about -> what the scenario has of it, in words."""
+        return dict(self.data["leaves_out"])
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What is proven, and what is not, a sentence for each theorem."""
+        return tuple(self._sentence(part) for part in self.data["parts"])
+
+    def _sentence(self, part: Mapping[str, Any]) -> str:
+        """Return what a theorem says of this plant, or which of its conditions fail, by how much."""
+        theorem, x, d0 = part["theorem"], self.data["unit"], self.data["disturbance"]
+        under = f"under every |d| <= {d0:g} {EFFORT[x]}" if d0 else "without d"
+        failing = [one for one in self.conditions if one.theorem == theorem and not one.holds]
+        if theorem == "level sets":
+            wide = f"starts up to |x| = {number(self._widest(part))} {x} at rest"
+            ends = f"end in |x| <= {number(part['bound'])} {x} {under}" if d0 else "come to rest"
+            outside = "; the scenario's start is not among them" * bool(failing)
+            return f"proven by level sets: {wide} {ends}{outside}"
+        if failing:
+            why = ", ".join(
+                f"{one.name} {number(one.margin)} {one.unit}".strip() + f" ({one.words})" for one in failing
+            )
+            return f"not proven by {theorem}: {why}"
+        if theorem == "saturated PD":
+            near = ", exponentially in the end" * any(one.name == "local" for one in self.conditions)
+            return f"proven by saturated PD: without d every start comes to rest at 0{near}"
+        if theorem == "reaching":
+            where = f"|x| <= {number(part['X'])} {x}"
+            if part["S"]:
+                where += f" with |s| <= {number(part['S'])} {x}/s"
+                return f"proven by reaching: from {where} s = 0 is reached and kept, and x decays, {under}"
+            gains = self.data["law"]["gains"]
+            after = part["X"] ** (1.0 - gains["p"]) / (gains["b"] * (1.0 - gains["p"]))
+            return f"proven by reaching: on s = 0 in {where} x is 0 after {number(after)} s, {under}"
+        rate = f" and |d'| <= {self.data['slope']:g} {EFFORT[x]}/s"
+        where = f"|x| <= {number(part['X'])} {x}"
+        return f"proven by super-twisting: from a set in {where} s = 0 is reached, {under}{rate}"
+
+    def _widest(self, part: Mapping[str, Any]) -> float:
+        """Return the largest x at rest up to which all lie in the region."""
+        x = np.linspace(0.0, part["x"][-1], 2001)
+        outside = ~self.contains(x, np.zeros_like(x), part)
+        return float(x[max(int(np.argmax(outside)) - 1, 0)]) if outside.any() else float(x[-1])
+
+    def contains(self, x: Any, v: Any, part: Mapping[str, Any] | None = None) -> np.ndarray:
+        """Return which states lie in the region from which all come to rest or into the bound.
+
+        Args:
+          x, v: positions and velocities, arrays of one shape, rad or m and per second; w of super_twisting is 0.
+          part: one of the theorems' data; by default all theorems that speak of d within its bound.
+        """
+        x, v = np.asarray(x, float), np.asarray(v, float)
+        if part is None:
+            each = [self.contains(x, v, one) for one in self.data["parts"] if one["theorem"] != "saturated PD"]
+            everywhere = np.full(x.shape, self.stable and not self.data["disturbance"])
+            return functools.reduce(np.logical_or, each, everywhere)
+        if part["theorem"] == "level sets":
+            return self.level(x, v) <= part["outer"]
+        if part["theorem"] == "reaching" and part["holds"] and part["S"]:
+            return (np.abs(x) <= part["X"]) & (np.abs(v + self.data["law"]["gains"]["c"] * x) <= part["S"])
+        return np.zeros(x.shape, bool)
+
+    def level(self, x: Any, v: Any) -> np.ndarray:
+        """Return W of "level sets" at states, 1 outside of its grid; see `contains` for the arguments."""
+        part = self._part("level sets")
+        if part is None:
+            raise ScenarioError(f"the certificate of {self.law} on {self.plant} has no level sets")
+        x, v, c = np.asarray(x, float), np.asarray(v, float), self.surface
+        xs, ss, W = (np.array(part[key]) for key in ("x", "s", "W"))
+        sign = np.where(x >= 0.0, 1.0, -1.0)
+        px, ps = x * sign, (v + c * x) * sign
+        i = np.clip(np.searchsorted(xs, px, side="right") - 1, 0, xs.size - 2)
+        j = np.clip(np.searchsorted(ss, ps, side="right") - 1, 0, ss.size - 2)
+        f, g = (px - xs[i]) / (xs[i + 1] - xs[i]), (ps - ss[j]) / (ss[j + 1] - ss[j])
+        W = (1 - f) * ((1 - g) * W[i, j] + g * W[i, j + 1]) + f * ((1 - g) * W[i + 1, j] + g * W[i + 1, j + 1])
+        return np.where((px < xs[-1]) & (np.abs(ps) < ss[-1]), W, 1.0)
+
+    @property
+    def surface(self) -> float:
+        """The slope c of the law's surface s = v + c x, 1/s."""
+        return loops.slope(self.data)
+
+    def _part(self, theorem: str, holding: bool = False) -> Mapping[str, Any] | None:
+        return next(
+            (one for one in self.data["parts"] if one["theorem"] == theorem and (one["holds"] or not holding)), None
+        )
+
+    def check(self) -> None:
+        """Prove it again by the checker, in ball arithmetic.
+
+        Raises:
+          ScenarioError: a statement that is not proven.
+          MissingPackageError: python-flint is not installed.
+        """
+        with extra("proof", "a check"):
+            import flint  # noqa: F401
+        from smc_mujoco.evidence.certificates import checker
+
+        try:
+            checker.check(copy.deepcopy(dict(self.data)))
+        except checker.Refused as why:
+            raise ScenarioError(f"the certificate is refused: not proven is {why}") from None
+
+    def to_json(self) -> str:
+        """Return it as JSON, the text of its file."""
+        return to_json(self.data)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write a .json file that `Certificate.load` and the checker read."""
+        return write_json(ended(path, ".json"), self.data, indent=None)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> "Certificate":
+        """Read a file of `save`. It is not checked: call `check`.
+
+        Raises:
+          ScenarioError: no such file, or no certificate.
+        """
+        with reading(path, "certificate", "give a .json file that Certificate.save wrote") as file:
+            made = cls(data=read_json(file))
+            made.sentences  # noqa: B018  # of what is no certificate it cannot be made
+            return made
+
+    def figure(self, path: str | os.PathLike[str] | None = None, traces: "Sequence[Trace]" = ()):
+        """Draw the state plane: region, level sets, bound, and runs, such as the worst found.
+
+        Args:
+          path: of a .svg, .png or .pdf file; None: nothing is written.
+          traces: runs of the same plant.
+
+        Raises:
+          ScenarioError: an unknown kind of file, or a network, whose states do not fit into a plane.
+        """
+        from smc_mujoco.evidence.certificates.figure import draw
+
+        return draw(self, traces, path)
+
+
+def finite(value: float) -> float | None:
+    """Return a number, or None for an infinite one, which JSON lacks."""
+    return float(value) if math.isfinite(value) else None

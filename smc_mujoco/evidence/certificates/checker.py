@@ -1,0 +1,296 @@
+"""Check a certificate in ball arithmetic, without trusting the code that made it: python checker.py FILE.json
+
+This file imports neither the maker of certificates nor the simulator. It has the equations of plants and laws itself,
+derives each theorem's conditions from them, and encloses every number in a ball (python-flint's arb). A plant obeys
+
+    M x'' = A sin x + B x + C x^3 - (E + F x^2) x' + u + d + springs,    |d| <= d0,    |d'| <= slope
+
+where springs of stiffness kc join the neighbours of a network. A law is u = -sigma(s), s = x' + c x, where sigma(s) is
+lam tanh(s), K sat(a s / K) or k sgn(s), or one of the laws "terminal" and "super_twisting". All are odd: x >= 0 is all.
+"""
+
+import hashlib
+import json
+import sys
+from itertools import pairwise
+from types import SimpleNamespace as Space
+
+try:
+    from flint import arb
+except ImportError:
+    sys.exit("the checker needs python-flint: pip install python-flint")
+
+FORMAT = "smc-certificate/1"
+LEAVES_OUT = {"sampling", "delay", "noise", "dry friction", "contact", "drive", "other parameters", "rounding"}
+TIGHT, DEPTH = 3e-4, 6  # share by which a margin may be below the true one; halvings of a box in both directions
+
+
+class Refused(Exception):
+    """A statement of the certificate that is not proven."""
+
+
+def need(holds, statement):
+    """Raise Refused unless a statement is certainly true."""
+    if holds is not True:
+        raise Refused(statement)
+
+
+def hull(a, b):
+    """Return the ball around two numbers."""
+    return arb(a).union(arb(b))
+
+
+def equal(stated, derived, what):
+    """Refuse a number that differs from the derived one by more than 1e-9 of it."""
+    need(abs(arb(stated) - derived) <= abs(derived) * 1e-9 + 1e-12, f"{what} is {stated}")
+
+
+def margins(part, derived):
+    """Refuse conditions other than these, with other margins (None: checked elsewhere), or a wrong `holds`."""
+    told = {one["name"]: one["margin"] for one in part["conditions"]}
+    need(list(told) == list(derived), f"the conditions of {part['theorem']}")
+    for name in (name for name, value in derived.items() if value is not None):
+        equal(told[name], derived[name], f"the margin of {name}")
+    need(part["holds"] is all(margin >= 0 for margin in told.values()), f"whether {part['theorem']} holds")
+
+
+def equation(plant):
+    """Return the coefficients of a plant's equation."""
+    p, n = Space(**{name: arb(value) for name, value in plant["parameters"].items()}), plant["n"]
+    zero, name, network = arb(0), plant["name"], "network" in plant["name"]
+    need(n >= 2 if network else n == 1 and plant["mechanism"] == "equation", f"{name} with {n} channels")
+    if name in ("inverted_pendulum", "pendulum_network", "inverted_pendulum_network"):
+        A = p.m * p.grav * p.l * (-1 if name == "pendulum_network" else 1)
+        return Space(M=p.m * p.l * p.l, A=A, B=zero, C=zero, E=p.b, F=zero, kc=p.kc if network else zero, n=n)
+    if name == "duffing":
+        return Space(M=p.M, A=zero, B=-p.alpha, C=-p.beta, E=p.delta, F=zero, kc=zero, n=n)
+    need(name == "van_der_pol", f"plant {name}")
+    return Space(M=p.M, A=zero, B=-p.k, C=zero, E=-p.mu, F=p.mu, kc=zero, n=n)
+
+
+def feedback(law, u_max):
+    """Return sigma: its kind, largest value K (None: unbounded), slope a at 0, slope c of s; gains; and u_max - K."""
+    g, name = Space(**{key: arb(value) for key, value in law["gains"].items() if value is not None}), law["name"]
+    room = lambda top: arb(0) if u_max is None else u_max - top  # noqa: E731
+    if name == "observer_free":
+        return Space(kind="tanh", K=g.lam, a=g.lam, c=g.k1, g=g, room=room(g.lam), theorems=(0, 2))
+    if name == "boundary_layer":
+        return Space(kind="sat", K=g.k, a=g.k / g.phi, c=g.c, g=g, room=room(g.k), theorems=(0, 2))
+    if name in ("classical", "terminal"):
+        c, rest, first = (g.c, 0, 0) if name == "classical" else (arb(1), g.bound, 1)  # the first of its theorems
+        return Space(kind="sgn", K=g.k, a=None, c=c, g=g, room=room(g.k + rest), theorems=(first, 3))
+    if name == "super_twisting":
+        return Space(kind=None, c=g.c, g=g, theorems=(3, 4))
+    if name == "lqr":
+        k1 = (g.a1 + (g.a1 * g.a1 + g.b * g.b * g.q1 / g.r).sqrt()) / g.b
+        k2 = (g.a2 + (g.a2 * g.a2 + 2 * g.b * k1 + g.b * g.b * g.q2 / g.r).sqrt()) / g.b
+    else:
+        need(name == "pid" and g.ki == 0, f"law {name}")
+        k1, k2 = g.kp, g.kd
+    need(k2 > 0, "a linear law without damping")  # its bound is part of the law
+    return Space(kind="sat", K=u_max and arb(u_max), a=k2, c=k1 / k2, g=g, room=arb(0), theorems=(0, 2))
+
+
+def phi(e, x):
+    """Return the force A sin x + B x + C x^3."""
+    return e.A * x.sin() + x * (e.B + e.C * x * x)
+
+
+def sigma(f, s):
+    """Return sigma over a ball; of sgn where s has one sign, and its limit at an end that is 0."""
+    if f.kind == "tanh":
+        return f.K * s.tanh()
+    if f.kind == "sat":
+        return f.a * s if f.K is None else (f.a * s).min(f.K).max(-f.K)
+    return f.K if s.mid() > 0 else -f.K
+
+
+def slope(f, s):
+    """Return sigma' over a ball, away from 0 for sgn."""
+    if f.kind == "tanh":
+        return f.K / (s.cosh() * s.cosh())
+    if f.kind == "sgn" or (f.K is not None and f.a * abs(s) > f.K):
+        return arb(0)
+    return f.a if f.K is None or f.a * abs(s) < f.K else hull(0, f.a)
+
+
+def saturated(doc, part, e, f):
+    """Check: V = M v^2/2 + int_0^x (sigma(c y) - phi(y)) dy + springs has V' <= 0, so that 0 attracts every state.
+
+    V' = -D v^2 - v (sigma(v + c x) - sigma(c x)), sigma never falls, and LaSalle's theorem leaves the origin alone if
+    (1 - m) sigma(c x) >= phi(x) for x > 0, m > 0. On s = v + b [x]^p the same holds with sgn(x) for sigma(c x).
+    """
+    weakest = e.kc if doc["plant"]["mechanism"] == "equation" else -abs(e.kc) * arb("0.2172336282112216")
+    V = {"v^2": e.M / 2, "sigma": 1 / f.c, "cos x - 1": e.A, "x^2": -e.B / 2, "x^4": -e.C / 4, "springs": e.kc / 2}
+    need(part["V"].keys() == V.keys(), "the terms of V")
+    for name, value in V.items():
+        equal(part["V"][name], value, f"the coefficient of {name} in V")
+    restoring(part["conditions"][1], e, f)
+    derived = {"damping": -abs(e.F) if e.F != 0 else e.E, "restoring": None, "actuator": f.room}
+    derived |= {"coupling": weakest} if e.n > 1 else {}
+    return derived if f.kind == "sgn" else derived | {"local": f.a * f.c - e.A - e.B}
+
+
+def restoring(told, e, f):
+    """Check that (1 - m) sigma(c x) >= phi(x) for x > 0, by boxes without a gap, and that m <= 1 is tight."""
+    m, c, smooth = arb(told["margin"]), f.c, f.kind != "sgn"
+    if "at" in told:
+        need(told["at"] > 0 and m < 0, "the place where the law is too weak")
+        return equal(m, 1 - phi(e, arb(told["at"])) / sigma(f, c * told["at"]), "the margin of restoring")
+    boxes, best = told["boxes"], (1 - (e.A + e.B) / (f.a * c)).min(arb(1)) if smooth else arb(1)
+    joined = all(one[1] == two[0] for one, two in pairwise(boxes))
+    need(joined and boxes[0][0] == 0 and boxes[-1][1] is None, "boxes from 0 to infinity, without a gap")
+    for a, b in boxes[:-1]:
+        x, mid = hull(a, b), arb(a) / 2 + arb(b) / 2
+        rate = (1 - m) * c * slope(f, c * x) - e.A * x.cos() - e.B - 3 * e.C * x * x
+        q = rate if a == 0 and (smooth or m == 1) else (1 - m) * sigma(f, c * mid) - phi(e, mid) + rate * (x - mid)
+        need(bool(a < b) and q >= 0, f"x from {a} to {b}")
+        best = best.min(1 - phi(e, arb(b)) / sigma(f, c * b))
+    last = arb(boxes[-1][0])  # beyond it x (B + C x^2) <= 0, and sigma has grown
+    held = e.C <= 0 and e.B + e.C * last**2 <= 0 and 0 < m <= 1 and (1 - m) * sigma(f, c * last) >= abs(e.A)
+    need(held, f"x beyond {last}")
+    return need(best - m <= TIGHT * abs(m).max(arb(0.1)), "a tight margin")
+
+
+def levels(doc, part, e, f):
+    """Check a bilinear W on a grid of (x, s): |d| <= d0 cannot keep W from falling between two of its levels.
+
+    Then what starts where W <= outer ends where W <= inner, in |x| <= bound. If d0 = 0 and sigma is continuous, a form
+    z' P z of z = (x, s) also falls where it is at most 1, which is around that set: then x ends at 0.
+    """
+    d0, xs, ss, W, inner, outer = arb(doc["disturbance"]), *(part[key] for key in ("x", "s", "W", "inner", "outer"))
+    middle, border = ss.index(0), min([*W[-1], *(row[0] for row in W), *(row[-1] for row in W)])
+    rising = all(a < b for edges in (xs, ss) for a, b in pairwise(edges))
+    need(rising and xs[0] == 0 and [-s for s in reversed(ss)] == ss and W[0] == W[0][::-1], "a symmetric, rising grid")
+    need(len(W) == len(xs) and all(len(row) == len(ss) for row in W) and e.n == 1, "the size of the grid")
+    need(f.room >= 0 and 0 < inner < outer < border and all(0 <= w <= 1 for row in W for w in row), "the levels")
+    held, (x, v) = [], part["start"]
+    for i, (x0, x1) in enumerate(pairwise(xs)):
+        for j, (s0, s1) in enumerate(pairwise(ss)):
+            corners = W[i][j], W[i + 1][j], W[i][j + 1], W[i + 1][j + 1]
+            if min(corners) <= inner:
+                held += [(x0, s0), (x1, s0), (x0, s1), (x1, s1)]
+            if max(corners) >= inner and min(corners) <= outer:
+                need(falls(e, f, d0, (x0, x1, s0, s1), corners), f"W at x {x0} to {x1}, s {s0} to {s1}")
+        a, b = W[i][middle], W[i + 1][middle]
+        if f.kind == "sgn" and max(a, b) >= inner and min(a, b) <= outer:
+            need(b > a, f"sliding at x {x0} to {x1}")  # where s stays 0, x' = -c x
+    need(part["bound"] == max(x for x, _ in held), "the bound")
+    x, s = (1 if x >= 0 else -1) * arb(x), (1 if x >= 0 else -1) * (v + f.c * x)
+    i, j = (sum(bool(z >= edge) for edge in edges) - 1 for z, edges in ((x, xs), (s, ss)))
+    at = max(*W[i][j : j + 2], *W[i + 1][j : j + 2]) if x < xs[-1] and abs(s) < ss[-1] else 1
+    if d0 == 0 and f.kind != "sgn":
+        quadratic(part["P"], e, f, held)
+    return {"actuator": f.room, "start": arb(outer) - at}
+
+
+def falls(e, f, d0, box, corners, depth=DEPTH):
+    """Return whether W' < 0 in a box for every |d| <= d0, in quarters of it where that is not certain."""
+    (x0, x1, s0, s1), (w00, w10, w01, w11) = map(arb, box), map(arb, corners)
+    x, s, edge = hull(x0, x1), hull(s0, s1), x1 - x0
+    v, D = s - f.c * x, e.E + e.F * x * x
+    Wx, Ws = hull((w10 - w00) / edge, (w11 - w01) / edge), hull(w01 - w00, w11 - w10) / (s1 - s0)
+    if (Wx + f.c * Ws - D * Ws / e.M) * v + (Ws * (phi(e, x) - sigma(f, s)) + d0 * abs(Ws)) / e.M < 0:
+        return True
+    w = [[w00, (w00 + w01) / 2, w01], [], [w10, (w10 + w11) / 2, w11]]
+    w[1] = [(a + b) / 2 for a, b in zip(w[0], w[2], strict=True)]
+    X, S, quarters = (x0, (x0 + x1) / 2, x1), (s0, (s0 + s1) / 2, s1), ((0, 0), (0, 1), (1, 0), (1, 1))
+    parts = (((*X[i : i + 2], *S[j : j + 2]), (*w[i][j : j + 2], *w[i + 1][j : j + 2])) for i, j in quarters)
+    return depth > 0 and all(falls(e, f, d0, one, (a, c, b, d), depth - 1) for one, (a, b, c, d) in parts)
+
+
+def quadratic(P, e, f, corners):
+    """Check that z' P z, P = [[p, q], [q, r]], falls where it is at most 1, and that these corners are there."""
+    p, q, r = map(arb, P)
+    det = p * r - q * q
+    x, s = (r / det).sqrt(), (p / det).sqrt()  # the largest where it is at most 1
+    push = e.A * hull(x.sin() / x, 1) + e.B + e.C * hull(0, x * x)  # phi(x) / x for x < pi
+    D, gain = hull(e.E, e.E + e.F * x * x), hull(sigma(f, s) / s, f.a)
+    low, high = (push + D * f.c) / e.M - f.c * f.c, f.c - (D + gain) / e.M  # x' = s - c x, s' = low x + high s
+    a, b, d = 2 * (q * low - p * f.c), p + q * (high - f.c) + r * low, 2 * (q + r * high)
+    need(p > 0 and det > 0 and x < 3 and a < 0 and a * d - b * b > 0, "a positive form that falls")
+    need(all(p * x * x + 2 * q * x * s + r * s * s <= 1 for x, s in corners), "a form around the inner set")
+
+
+def reaching(doc, part, e, f):
+    """Check that k > |phi + (M c - D) v| + d0 for |x| <= X and |s| <= S <= c X, so that s = 0 is reached and kept.
+
+    Then x' = -c x. On a terminal surface the same is checked at s = 0, where x = 0 after X^(1 - p) / (b (1 - p)).
+    """
+    d0, X, S = arb(doc["disturbance"]), arb(part["X"]), arb(part["S"])
+    g, terminal = f.g, doc["law"]["name"] != "classical"
+    need(e.n == 1 and X >= 0 and (S == 0 if terminal else bool(S >= 0 and f.c * X >= S)), "|s| <= c X")
+
+    def push(a, b, s):
+        x = hull(a, b)
+        D = e.E + e.F * x * x
+        if not terminal:
+            return abs(phi(e, x) + (e.M * f.c - D) * (s - f.c * x)) + d0
+        v, vs = (g.b * hull(a**power if a > 0 else 0, b**power) for power in (g.p, 2 * g.p - 1))
+        return abs(phi(e, x) + D * v + (g.b * g.p * vs).min(g.bound) - e.M * g.b * g.p * vs) + d0
+
+    edges, strips = [X * i / 64 for i in range(65)], [hull(S * j / 8, S * (j + 1) / 8) for j in range(-8, 8)]
+    need(X == 0 or all(push(a, b, s) < g.k for a, b in pairwise(edges) for s in strips), "reaching")
+    return {"reaching": g.k - push(X, X, -S), "actuator": f.room}
+
+
+def super_twisting(doc, part, e, f):
+    """Check Moreno & Osorio's form: z' P z with z = ([s]^(1/2), w + delta) falls where z' P z <= q and |x| <= X.
+
+    M s' = -k1 z1 + z2, z2' = -k2 sgn(s) + delta', delta = phi + (M c - D) v + d, and |delta'| <= L there. The form
+    falls if A' P + P A < 0 at both ends of L, A = [[-k1 / 2M, 1 / 2M], [-k2 +- L, 0]].
+    """
+    g, (p, q, r), (L, size, X) = f.g, map(arb, part["P"]), (arb(part[key]) for key in ("L", "q", "X"))
+    det = p * r - q * q
+    for end in (L, -L):
+        a, b, low = -g.k1 / (2 * e.M), 1 / (2 * e.M), end - g.k2
+        n11, n12, n22 = 2 * (a * p + low * q), b * p + a * q + low * r, 2 * b * q
+        need(n11 < 0 and n11 * n22 - n12 * n12 > 0, f"a falling form at L = {end}")
+    z1, z2 = (size * r / det).sqrt(), (size * p / det).sqrt()
+    need(z1 * z1 <= g.c * X and p > 0 and det > 0 and size > 0 and L > 0 and e.n == 1, "a positive form, |s| <= c X")
+    v, x, D = z1 * z1 + g.c * X, hull(-X, X), hull(e.E, e.E + e.F * X * X)
+    rate = e.A * x.cos() + e.B + 3 * e.C * x * x - g.c * (e.M * g.c - D)
+    fast = abs(e.M * g.c - D) * (g.k1 * z1 + z2) / e.M + 2 * abs(e.F) * X * v * v
+    w = z2 + abs(phi(e, x)) + abs(e.M * g.c - D) * v + doc["disturbance"]
+    top = arb(0) if doc["u_max"] is None else (doc["u_max"] - w - g.k1 * z1).lower()
+    top = top.min((g.w_max - w).lower()) if "w_max" in vars(g) else top
+    slack = (L - abs(rate) * v - fast - doc["slope"]).lower()
+    return {"integral": g.k2 - doc["slope"], "slope": slack, "actuator": top}
+
+
+def seal(doc):
+    """Return the hash of a certificate without its seal."""
+    text = json.dumps({key: value for key, value in doc.items() if key != "seal"}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+THEOREMS = {"level sets": levels, "saturated PD": saturated, "reaching": reaching, "super-twisting": super_twisting}
+
+
+def check(doc):
+    """Check a certificate, the dict of its JSON. Raise Refused with the first statement that is not proven."""
+    try:
+        need(doc["format"] == FORMAT and doc["seal"] == seal(doc) and set(doc["leaves_out"]) >= LEAVES_OUT, "the seal")
+        e, f = equation(doc["plant"]), feedback(doc["law"], doc["u_max"])
+        need(e.M > 0 and f.c > 0 and doc["disturbance"] >= 0, "the plant and the law")
+        theorems, known = [part["theorem"] for part in doc["parts"]], list(THEOREMS)[slice(*f.theorems)]
+        need(0 < len(theorems) == len(set(theorems)) and set(theorems) <= set(known), "a theorem of this law")
+        for part in doc["parts"]:
+            margins(part, THEOREMS[part["theorem"]](doc, part, e, f))
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, ZeroDivisionError) as error:
+        raise Refused(f"its form, {error!r}") from None
+
+
+def main(paths):
+    """Check files. End with exit code 1 at the first that is refused."""
+    for path in paths:
+        try:
+            with open(path, encoding="utf-8") as file:
+                check(json.load(file))
+            print(f"{path} is accepted: every statement is proven")
+        except Refused as why:
+            sys.exit(f"{path} is refused: not proven is {why}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

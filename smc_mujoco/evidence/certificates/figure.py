@@ -1,0 +1,117 @@
+"""The state plane of a certificate: region, level sets, bound and runs."""
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import style
+from smc_mujoco.draw.region import BLUES, checked
+from smc_mujoco.evidence.certificates import loops
+from smc_mujoco.mechanisms.plant import EFFORT, as_plant
+from smc_mujoco.simulation.trace import Trace
+
+SIZE = (11.0, 5.6)  # inches
+ZOOM = 2.5  # the second panel shows so many bounds: chosen
+POINTS = 801  # of the plane in each direction
+LEVELS = 7  # lines between the inner and the outer level, or of V: chosen
+
+
+def draw(certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike[str] | None = None) -> Any:
+    """Draw a certificate's state plane; see `Certificate.figure`."""
+    data = certificate.data
+    if data["plant"]["n"] > 1:
+        raise ScenarioError(f"the states of {data['plant']['n']} pendulums do not fit into a plane: draw a single one")
+    part = next((one for one in data["parts"] if one["theorem"] == "level sets"), None)
+    if part is None and not certificate.stable:
+        raise ScenarioError(f"the certificate of {certificate.law} on {certificate.plant} has no region to draw")
+    paths = [] if path is None else [checked(path)]
+    with style.page(SIZE[0]):
+        bounded = part is not None and data["disturbance"] > 0.0
+        page = pages.blank(SIZE[0] if bounded else 0.62 * SIZE[0], SIZE[1], None)
+        axes = page.subplots(1, 2 if bounded else 1, squeeze=False).ravel()
+        x, v = _plane(certificate, part, traces)
+        for ax, zoom in zip(axes, (1.0, ZOOM * part["bound"] / x[-1] if bounded else 1.0), strict=False):
+            _panel(ax, certificate, part, x * zoom, v * zoom ** (0.5 if zoom < 1.0 else 1.0), traces)
+        unit, d0 = data["unit"], data["disturbance"]
+        under = f"|d| ≤ {d0:g} {EFFORT[unit]}" if d0 else "no disturbance"
+        plant = style.plant_name(as_plant(certificate.plant))
+        axes[0].set_title(f"{style.law_name(certificate.law)} on {plant}, {under}")
+        if bounded:
+            axes[1].set_title("around the bound")
+        _legend(page, certificate, part, bool(traces))
+        pages.write(page, paths)
+    return page
+
+
+def _panel(ax: Any, certificate: Any, part: Any, x: np.ndarray, v: np.ndarray, traces: Sequence[Trace]) -> None:
+    """Draw the region or V, and the runs, in a part of the plane."""
+    X, V = np.meshgrid(x, v)
+    if part is not None:
+        _region(ax, certificate, part, X, V)
+    else:
+        _energy(ax, certificate, X, V)
+    for trace in traces:
+        ax.plot(trace.x[:, 0], trace.v[:, 0], color=style.REACTION, linewidth=style.points(1.2))
+        ax.plot(trace.x[0, 0], trace.v[0, 0], "o", color=style.INK, markersize=style.points(5))
+    unit = certificate.data["unit"]
+    ax.set_xlim(x[0], x[-1])
+    ax.set_ylim(v[0], v[-1])
+    ax.set_xlabel(f"position ({unit})")
+    ax.set_ylabel(f"velocity ({unit}/s)")
+
+
+def _plane(certificate: Any, part: Any, traces: Sequence[Trace]) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions and velocities around the region, or around the runs."""
+    ends = [(np.abs(one.x).max(), np.abs(one.v).max()) for one in traces if np.isfinite(one.x).all()]
+    far_x, far_v = np.max([(1e-3, 1e-3), *ends], axis=0)
+    if part is not None:
+        X, S = np.meshgrid(np.array(part["x"]), np.array(part["s"]), indexing="ij")
+        inside = np.array(part["W"]) <= part["outer"]
+        far_x = max(far_x, np.abs(X[inside]).max())
+        far_v = max(far_v, np.abs(S - certificate.surface * X)[inside].max())
+    elif not ends:
+        far_x, far_v = 2.0, 6.0
+    return np.linspace(-1.08 * far_x, 1.08 * far_x, POINTS), np.linspace(-1.08 * far_v, 1.08 * far_v, POINTS)
+
+
+def _region(ax: Any, certificate: Any, part: Any, X: np.ndarray, V: np.ndarray) -> None:
+    """Fill the region, and draw its levels and the bound."""
+    W = certificate.level(X, V)
+    levels = np.linspace(part["inner"], part["outer"], LEVELS)
+    ax.contourf(X, V, W, [-1.0, part["outer"]], colors=[BLUES[2]], alpha=0.25)
+    ax.contour(X, V, W, levels[1:-1], colors=[BLUES[2]], linewidths=style.points(0.7))
+    ax.contour(X, V, W, levels[-1:], colors=[BLUES[0]], linewidths=style.points(1.6))
+    ax.contourf(X, V, W, [-1.0, part["inner"]], colors=[BLUES[0]], alpha=0.8)
+    for side in (-1.0, 1.0) if certificate.data["disturbance"] else ():
+        ax.axvline(side * part["bound"], color=style.INK, linewidth=style.points(0.8), linestyle=(0, (4, 3)))
+
+
+def _energy(ax: Any, certificate: Any, X: np.ndarray, V: np.ndarray) -> None:
+    """Draw level sets of V."""
+    value = loops.energy(certificate.data, X, V)
+    top = float(loops.energy(certificate.data, X[:1, -1:], 0.0 * X[:1, -1:])[0, 0])  # the energy at rest at the edge
+    ax.contour(X, V, value, top * np.linspace(0.15, 1.0, LEVELS) ** 2, colors=[BLUES[1]], linewidths=style.points(0.9))
+
+
+def _legend(page: Any, certificate: Any, part: Any, runs: bool) -> None:
+    """Say what the lines are, below the panels."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    unit, d0 = certificate.data["unit"], certificate.data["disturbance"]
+    handles: list[Any] = [Line2D([], [], color=BLUES[1], label="level sets of V, which never rises")]
+    if part is not None:
+        told = f"certified: ends in |x| ≤ {part['bound']:.3g} {unit}" if d0 else "certified: comes to rest"
+        handles = [
+            Patch(facecolor=BLUES[2], edgecolor=BLUES[0], alpha=0.5, label=told),
+            Line2D([], [], color=BLUES[2], label="level sets of W, which falls"),
+            Patch(facecolor=BLUES[0], label="innermost level"),
+        ]
+        handles += [Line2D([], [], color=style.INK, linestyle=(0, (4, 3)), label="bound")] if d0 else []
+    if runs:
+        handles.append(Line2D([], [], color=style.REACTION, label="runs under d = ±d0" if d0 else "run"))
+    page.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=style.points(9.5))

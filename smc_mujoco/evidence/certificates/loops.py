@@ -1,0 +1,110 @@
+"""Loops of a law and a plant of one channel, as functions of position x and of s = v + c x.
+
+M x'' = A sin x + B x + C x^3 - (E + F x^2) x' - sigma(s) + d
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+Function = Callable[[np.ndarray], np.ndarray]
+# The plant's parameters -> M, and A, B, C, E, F of phi = A sin x + B x + C x^3 and D = E + F x^2.
+SINGLE: dict[str, Callable[[Any], tuple[float, ...]]] = {
+    "inverted_pendulum": lambda p: (p.m * p.l**2, p.m * p.grav * p.l, 0.0, 0.0, p.b, 0.0),
+    "pendulum_network": lambda p: (p.m * p.l**2, -p.m * p.grav * p.l, 0.0, 0.0, p.b, 0.0),
+    "inverted_pendulum_network": lambda p: (p.m * p.l**2, p.m * p.grav * p.l, 0.0, 0.0, p.b, 0.0),
+    "duffing": lambda p: (p.M, 0.0, -p.alpha, -p.beta, p.delta, 0.0),
+    "van_der_pol": lambda p: (p.M, 0.0, -p.k, 0.0, -p.mu, p.mu),
+}
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Loop:
+    """A loop of one channel, as functions of arrays in SI units.
+
+    Attributes:
+      M: mass; c: slope of the surface, 1/s; d0: bound of |d|.
+      phi, D, sigma: force of the plant, its damping, and the law's force.
+      steep: sigma'(0); infinite for a law that switches.
+    """
+
+    M: float
+    c: float
+    d0: float
+    phi: Function
+    D: Function
+    sigma: Function
+    steep: float
+
+    @property
+    def switches(self) -> bool:
+        """Whether the law switches at s = 0."""
+        return bool(np.isinf(self.steep))
+
+    def fall(self, x, s, d):
+        """Return s' at states, with sigma at s = 0 what keeps s = 0 if the law can."""
+        v = s - self.c * x
+        force = self.phi(x) - self.D(x) * v + self.M * self.c * v + d
+        law = self.sigma(s)
+        if self.switches:
+            law = np.where(s == 0.0, np.clip(force, -self.sigma(np.ones(())), self.sigma(np.ones(()))), law)
+        return (force - law) / self.M
+
+
+def loop_of(data: Mapping[str, Any]) -> tuple[Loop, list[float], SimpleNamespace]:
+    """Return the loop of a certificate's data, A, B, C, E, F of its plant, and the law's name and gains."""
+    law = SimpleNamespace(name=data["law"]["name"], **data["law"]["gains"])
+    M, *terms = SINGLE[data["plant"]["name"]](SimpleNamespace(**data["plant"]["parameters"]))
+    return _loop(M, terms, law, data["u_max"], data["disturbance"]), terms, law
+
+
+def slope(data: Mapping[str, Any]) -> float:
+    """Return c of the surface s = v + c x, 1/s."""
+    return loop_of(data)[0].c
+
+
+def energy(data: Mapping[str, Any], x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Return V of "saturated PD" at states of one pendulum or cart: M v^2 / 2 + int_0^x (sigma(c y) - phi(y)) dy."""
+    loop, _, _ = loop_of(data)
+    y = np.linspace(0.0, float(np.abs(x).max()), 20001)
+    push = loop.sigma(loop.c * np.maximum(y, 1e-12)) - loop.phi(y)
+    W = np.concatenate([[0.0], np.cumsum(0.5 * (push[1:] + push[:-1]) * np.diff(y))])
+    return 0.5 * loop.M * v * v + np.interp(np.abs(x), y, W)
+
+
+def _loop(M: float, terms: list[float], law: SimpleNamespace, u_max: float | None, d0: float) -> Loop:
+    """Return a loop as functions of arrays."""
+    A, B, C, E, F = terms
+    top = math.inf if u_max is None else u_max
+    if law.name == "observer_free":
+        sigma, steep, c = (lambda s: law.lam * np.tanh(s)), law.lam, law.k1
+    elif law.name in ("classical", "terminal", "super_twisting"):
+        k = getattr(law, "k", 0.0)
+        sigma, steep, c = (lambda s: k * np.sign(s)), math.inf, getattr(law, "c", 1.0)
+    else:
+        kp, kd = linear_gains(law)
+        top = law.k if law.name == "boundary_layer" else top
+        sigma, steep, c = (lambda s: np.clip(kd * s, -top, top)), kd, kp / kd
+    return Loop(
+        M=M,
+        c=c,
+        d0=d0,
+        phi=lambda x: A * np.sin(x) + x * (B + C * x * x),
+        D=lambda x: E + F * x * x,
+        sigma=sigma,
+        steep=steep,
+    )
+
+
+def linear_gains(law: SimpleNamespace) -> tuple[float, float]:
+    """Return kp and kd of a law that is -(kp x + kd x') within its bound."""
+    if law.name == "boundary_layer":
+        return law.k * law.c / law.phi, law.k / law.phi
+    if law.name == "pid":
+        return law.kp, law.kd
+    kp = (law.a1 + math.sqrt(law.a1**2 + law.b**2 * law.q1 / law.r)) / law.b
+    return kp, (law.a2 + math.sqrt(law.a2**2 + 2.0 * law.b * kp + law.b**2 * law.q2 / law.r)) / law.b

@@ -1,0 +1,304 @@
+"""Search for a function W whose levels the loop cannot leave: worst-case times to a set around rest, on a grid.
+
+The loop is M x'' = phi(x) - D(x) x' - sigma(s) + d with |d| <= d0 and s = x' + c x, in the coordinates x and s, which
+separate its fast from its slow motion. W = 1 - exp(-T), where T is the time until a target around rest is reached while
+d delays it as long as it can: the value of a game of pursuit and evasion. It is computed by a semi-Lagrangian scheme
+and swept in four orders until it stays. W is bilinear between the nodes. The search proves nothing: the checker does.
+
+Source: M. Bardi and I. Capuzzo-Dolcetta, Optimal Control and Viscosity Solutions of Hamilton-Jacobi-Bellman Equations,
+Birkhauser 1997 (the game, and 1 - exp(-T)); P. Giesl and S. Hafstein, "Review on computational methods for Lyapunov
+functions", Discrete Contin. Dyn. Syst. B 20(8):2291, 2015 (functions on grids that a computer verifies).
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit
+from scipy.linalg import solve_continuous_lyapunov
+from scipy.optimize import brentq
+
+from smc_mujoco.evidence.certificates.loops import Loop
+
+Proven = Callable[[tuple[float, ...], tuple[float, ...]], bool]
+CELLS, FINE = 110, 8.0  # on each side of 0, in x and in s, and in half a target: chosen
+SWEEPS, SETTLED = 500, 1e-9  # of a solution
+SMOOTHINGS = (2, 8, 24)  # of W, which blunt its edges: chosen
+PACE = 3.0  # 1/s, largest velocity of the grid over its largest position: chosen, as of a map of `basin`
+SLACK = 0.01  # least fall in a cell, as a share of the range of W' in it: chosen
+LEAST = 0.02  # range of levels that is worth a certificate: chosen
+RAMP = 0.5  # of the target's size, over which the cost of time rises from 0 to 1: chosen
+SAMPLES = 5  # of a cell, in both directions
+SCALES = (1.0, 1.05, 1.1, 1.2, 1.35)  # of the target around the linear loop's worst case: chosen
+
+
+def rest(loop: Loop, reach: float) -> float:
+    """Return where the loop rests under d = d0, the first such |x|; NaN if there is none up to `reach`."""
+    x = np.linspace(0.0, reach, 4001)[1:]
+    left = loop.sigma(loop.c * x) - loop.phi(x) - loop.d0
+    if not (left > 0.0).any():
+        return float("nan")
+    i = int(np.argmax(left > 0.0))
+    low = 0.0 if i == 0 else x[i - 1]
+    at = lambda z: float(loop.sigma(np.array(loop.c * z)) - loop.phi(np.array(z)) - loop.d0)  # noqa: E731
+    found: Any = low if at(low) >= 0.0 else brentq(at, low, x[i])
+    return float(found)
+
+
+def form(loop: Loop, reach: float) -> np.ndarray | None:
+    """Return P of a set z' P z <= 1, z = (x, s), around all worst cases of the loop that is linear between its rests.
+
+    None if there are none. Without a disturbance it is a set where the form falls.
+    """
+    if loop.switches:
+        return None
+    if not loop.d0:
+        return _attracted(loop, reach)
+    at = rest(loop, reach)
+    if not 0.0 < at < reach:
+        return None
+    K = loop.d0 / at
+    gain = float(loop.sigma(np.array(loop.c * at))) / (loop.c * at)
+    A = np.array([[-loop.c, 1.0], [0.0, 0.0]])
+    A[1] = [loop.c * (gain + float(loop.D(np.zeros(())))) / loop.M - K / loop.M - loop.c**2, 0.0]
+    A[1, 1] = loop.c - (gain + float(loop.D(np.zeros(())))) / loop.M
+    slow, best, push = -max(np.linalg.eigvals(A).real), None, np.array([0.0, loop.d0 / loop.M])
+    for rate in np.linspace(0.02, 1.98, 99) * slow if slow > 0.0 else ():
+        Q = solve_continuous_lyapunov(A + rate / 2.0 * np.eye(2), -np.outer(push, push) / rate)
+        if np.linalg.eigvalsh(Q).min() > 0.0 and (best is None or Q[0, 0] < best[0, 0]):
+            best = Q
+    return None if best is None else np.linalg.inv(best)
+
+
+def _attracted(loop: Loop, reach: float) -> np.ndarray | None:
+    """Return P of the largest set z' P z <= 1 on which the form of the loop's linearisation surely falls; or None."""
+    h = 1e-6 * reach
+    push, D0 = float(loop.phi(np.array(h))) / h, float(loop.D(np.zeros(())))
+    A = np.array([[-loop.c, 1.0], [0.0, loop.c - (D0 + loop.steep) / loop.M]])
+    A[1, 0] = (push + D0 * loop.c) / loop.M - loop.c**2
+    if max(np.linalg.eigvals(A).real) >= 0.0:
+        return None
+    P = solve_continuous_lyapunov(A.T, -np.diag([1.0, 1.0 / max(1.0, loop.c) ** 2]))
+    low, high = 1e-9, (0.9 * reach) ** 2
+    for _ in range(60):
+        middle = (low * high) ** 0.5
+        low, high = (middle, high) if _falls(loop, P / middle, push, D0) else (low, middle)
+    return P / (0.9 * low) if _falls(loop, P / (0.9 * low), push, D0) else None
+
+
+def _falls(loop: Loop, P: np.ndarray, push: float, D0: float) -> bool:
+    """Return whether a form falls where it is at most 1, whatever phi / x, D and sigma / s are there at once."""
+    Q = np.linalg.inv(P)
+    x, s = np.sqrt(np.diag(Q))
+    far = float(loop.phi(np.array(x))) / x
+    pushes = (min(push, far) - abs(push - far), max(push, far) + abs(push - far))
+    for one in pushes:
+        for D in (D0, float(loop.D(np.array(x)))):
+            for gain in (float(loop.sigma(np.array(s))) / s, loop.steep):
+                A = np.array([[-loop.c, 1.0], [0.0, loop.c - (D + gain) / loop.M]])
+                A[1, 0] = (one + D * loop.c) / loop.M - loop.c**2
+                if np.linalg.eigvalsh(A.T @ P + P @ A).max() >= 0.0:
+                    return False
+    return True
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Levels:
+    """A bilinear W on nodes (x, s), x >= 0: W(-x, -s) = W(x, s). It falls between its levels inner and outer.
+
+    Attributes:
+      x, s: nodes, (n,) and (2 n - 1,); W: its values there, (n, 2 n - 1).
+      inner, outer: the levels; bound: the largest |x| in cells that the inner level reaches.
+      P: of the form on the inner set without disturbance, (3,): z' P z = P0 x^2 + 2 P1 x s + P2 s^2; or None.
+    """
+
+    x: np.ndarray
+    s: np.ndarray
+    W: np.ndarray
+    inner: float
+    outer: float
+    bound: float
+    P: tuple[float, float, float] | None
+
+
+def levels(
+    loop: Loop, reach: float, start: tuple[float, float], proven: Proven, target: tuple[float, float] | None = None
+) -> Levels | None:
+    """Return the levels with the smallest bound, or the largest region without disturbance; None if the search fails.
+
+    Args:
+      reach: largest |x| of the grid.
+      start: (x, s); levels that contain it are preferred.
+      proven: says of a cell, (x0, x1, s0, s1), and of W at its corners 00, 10, 01, 11, whether W surely falls there.
+      target: half-widths in x and s of a box to reach, for a law that switches.
+    """
+    P = form(loop, reach)
+    if P is None and (target is None or not min(target)):
+        return None
+    small = np.array(target) if P is None else np.sqrt(np.diag(np.linalg.inv(P)))
+    x, s = axis(reach, small[0] / FINE), axis((loop.c + PACE) * reach, small[1] / FINE)
+    X, S = np.meshgrid(x, s, indexing="ij")
+    size = np.maximum(np.abs(X) / small[0], np.abs(S) / small[1])
+    if P is not None:
+        size = np.sqrt(P[0, 0] * X * X + 2.0 * P[0, 1] * X * S + P[1, 1] * S * S)
+    tried = []
+    for scale in SCALES if loop.d0 and P is not None else (0.5,):
+        W = times(loop, x, s, np.clip((size / scale - 1.0) / RAMP, 0.0, 1.0))
+        for count in SMOOTHINGS:
+            smooth = np.round(_smooth(W, count, loop.switches), 7)
+            grid = _Grid(loop, x, s, smooth, size if not loop.d0 and P is not None else None)
+            tried.append((grid, grid.window()))
+    for grid, window in sorted(tried, key=lambda one: one[0].worth(one[1], start)):
+        if window and grid.bound(window) and (window := grid.surely(window, proven)):
+            told = None if loop.d0 or P is None else (float(P[0, 0]), float(P[0, 1]), float(P[1, 1]))
+            inner, outer = (float(f"{level:.6f}") for level in (window[0] + 2e-6, window[1] - 2e-6))
+            return Levels(x=grid.x, s=s, W=grid.W, inner=inner, outer=outer, bound=grid.bound(window), P=told)
+    return None
+
+
+class _Grid:
+    """W on the nodes with x >= 0, and the cells where it does not fall."""
+
+    def __init__(self, loop: Loop, x: np.ndarray, s: np.ndarray, W: np.ndarray, size: np.ndarray | None):
+        n, self.loop = x.size // 2, loop
+        self.x, self.s, self.W = x[n:], s, W[n:]
+        self.W[0] = np.maximum(self.W[0], self.W[0, ::-1])
+        self.corners = np.stack([self.W[:-1, :-1], self.W[1:, :-1], self.W[:-1, 1:], self.W[1:, 1:]])
+        self.low, self.high = self.corners.min(0), self.corners.max(0)
+        least, most = falls(loop, self.x, s, self.corners)
+        self.bad = most >= -SLACK * (most - least) - 1e-7
+        self.sure = np.zeros_like(self.bad)
+        self.border = min(self.W[-1].min(), self.W[:, 0].min(), self.W[:, -1].min())
+        self.limit = 1.0
+        if size is not None:  # the inner set must lie where the form falls
+            beyond = size[n:] > 0.99
+            hit = beyond[:-1, :-1] | beyond[1:, :-1] | beyond[:-1, 1:] | beyond[1:, 1:]
+            self.limit = float(self.low[hit].min())
+
+    def window(self) -> tuple[float, float] | None:
+        """Return the widest range of levels that no cell spoils, or None."""
+        spans = sorted([*zip(self.low[self.bad], self.high[self.bad], strict=True), (self.border, 2.0)])
+        covered, widest = 0.0, (0.0, LEAST)
+        for low, high in spans:
+            if covered < self.limit - 1e-5 and low - covered > widest[1] - widest[0]:
+                widest = covered, low
+            covered = max(covered, high)
+        return widest if widest[0] > 0.0 or widest[1] > LEAST else None
+
+    def bound(self, window: tuple[float, float] | None) -> float:
+        """Return the largest |x| of the cells that reach the inner level."""
+        if window is None:
+            return np.inf
+        return float(np.broadcast_to(self.x[1:, None], self.low.shape)[self.low <= window[0] + 3e-6].max(initial=0.0))
+
+    def worth(self, window: tuple[float, float] | None, start: tuple[float, float]) -> tuple[bool, float]:
+        """Return a key that is smaller for better levels."""
+        if window is None or not self.bound(window):
+            return True, np.inf
+        x, s = start if start[0] >= 0.0 else (-start[0], -start[1])
+        i, j = np.searchsorted(self.x, x, side="right") - 1, np.searchsorted(self.s, s, side="right") - 1
+        within = i < self.high.shape[0] and 0 <= j < self.high.shape[1] and self.high[i, j] < window[1]
+        area = float((np.diff(self.x)[:, None] * np.diff(self.s))[self.high < window[1]].sum())
+        return not within, self.bound(window) if self.loop.d0 else -area
+
+    def surely(self, window: tuple[float, float], proven: Proven) -> tuple[float, float] | None:
+        """Return a range of levels between which W surely falls in each cell, or None."""
+        found: tuple[float, float] | None = window
+        while found is not None:
+            inside = (self.high >= found[0]) & (self.low <= found[1]) & ~self.sure & ~self.bad
+            for i, j in zip(*np.nonzero(inside), strict=True):
+                box = (self.x[i], self.x[i + 1], self.s[j], self.s[j + 1])
+                ok = proven(tuple(map(float, box)), tuple(map(float, self.corners[:, i, j])))
+                self.sure[i, j], self.bad[i, j] = ok, not ok
+            if not (self.bad & inside).any():
+                return found
+            found = self.window()
+        return None
+
+
+def axis(reach: float, step: float) -> np.ndarray:
+    """Return 2 CELLS + 1 nodes from -reach to reach, the closest `step` apart around 0, ever wider outwards."""
+    step = min(step, reach / CELLS * 0.999)
+    wide: Any = brentq(lambda a: reach / np.sinh(a) * np.sinh(a / CELLS) - step, 1e-6, 60.0)
+    half = reach / np.sinh(wide) * np.sinh(wide * np.arange(CELLS + 1) / CELLS)
+    half = np.array([float(f"{value:.6g}") for value in half])
+    return np.concatenate([-half[:0:-1], half])
+
+
+def times(loop: Loop, x: np.ndarray, s: np.ndarray, cost: np.ndarray) -> np.ndarray:
+    """Return 1 - exp(-T) on the nodes, T the largest integral of the cost under |d| <= d0; 1 where the grid is left."""
+    X, S = np.meshgrid(x, s, indexing="ij")
+    hx, hs, cells, shares = np.gradient(x)[:, None], np.gradient(s)[None, :], [], []
+    ends = (-loop.d0, loop.d0)
+    fastest = [np.maximum(np.abs(S - loop.c * X) / hx, np.abs(loop.fall(X, S, d)) / hs) for d in ends]
+    step = 1.0 / (0.1 + np.maximum.reduce(fastest))
+    for d in ends:  # midpoint rule
+        mx, ms = X + 0.5 * step * (S - loop.c * X), S + 0.5 * step * loop.fall(X, S, d)
+        px, ps = X + step * (ms - loop.c * mx), S + step * loop.fall(mx, ms, d)
+        if loop.switches:
+            px, ps = (
+                np.where(S == 0.0, X - step * loop.c * X, px),
+                np.where(S == 0.0, S + step * loop.fall(X, S, d), ps),
+            )
+        i, j = (np.clip(np.searchsorted(a, p) - 1, 0, a.size - 2) for a, p in ((x, px), (s, ps)))
+        out = (np.abs(px) > x[-1]) | (np.abs(ps) > s[-1])
+        cells.append((np.where(out, -1, i), j))
+        shares.append(((px - x[i]) / (x[i + 1] - x[i]), (ps - s[j]) / (s[j + 1] - s[j])))
+    W, cells, shares = np.where(cost > 0.0, 1.0, 0.0), np.array(cells), np.array(shares)
+    decay = np.exp(-step * cost)
+    for _ in range(SWEEPS):
+        if _sweep(W, cost > 0.0, cells, shares, decay) < SETTLED:
+            break
+    return W
+
+
+def _smooth(W: np.ndarray, count: int, switches: bool) -> np.ndarray:
+    """Return W averaged over neighbours; W' at a node is convex in the gradient of W, so it falls nearly as before."""
+    for _ in range(count):
+        padded = np.pad(W, 1, mode="edge")
+        W = (padded[:-2] + 2.0 * padded[1:-1] + padded[2:]) / 4.0
+        W = W[:, 1:-1] if switches else (W[:, :-2] + 2.0 * W[:, 1:-1] + W[:, 2:]) / 4.0
+    return W
+
+
+@njit(error_model="numpy")
+def _sweep(W, open_, cells, shares, decay):
+    """Update W in four orders of its nodes, and return its largest change."""
+    nx, ns = W.shape
+    most = 0.0
+    for order in range(4):
+        for a in range(nx):
+            i = a if order % 2 == 0 else nx - 1 - a
+            for b in range(ns):
+                j = b if order < 2 else ns - 1 - b
+                if not open_[i, j]:
+                    continue
+                worst = 0.0
+                for k in range(cells.shape[0]):
+                    p, q = cells[k, 0, i, j], cells[k, 1, i, j]
+                    value = 1.0
+                    if p >= 0:
+                        f, g = shares[k, 0, i, j], shares[k, 1, i, j]
+                        low = (1.0 - g) * W[p, q] + g * W[p, q + 1]
+                        value = (1.0 - f) * low + f * ((1.0 - g) * W[p + 1, q] + g * W[p + 1, q + 1])
+                    worst = max(worst, value)
+                new = 1.0 - decay[i, j] * (1.0 - worst)
+                most = max(most, abs(new - W[i, j]))
+                W[i, j] = new
+    return most
+
+
+def falls(loop: Loop, x: np.ndarray, s: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and the largest W' at samples of each cell under the worst d, two arrays of (n, 2 n)."""
+    hx, hs, values = np.diff(x)[:, None], np.diff(s)[None, :], []
+    w00, w10, w01, w11 = corners
+    for a in np.linspace(0.0, 1.0, SAMPLES):
+        for b in np.linspace(0.0, 1.0, SAMPLES):
+            X, S = x[:-1, None] + a * hx, s[None, :-1] + b * hs
+            Wx = ((1.0 - b) * (w10 - w00) + b * (w11 - w01)) / hx
+            Ws = ((1.0 - a) * (w01 - w00) + a * (w11 - w10)) / hs
+            v, law = S - loop.c * X, loop.sigma(s[None, :-1] + 0.5 * hs if loop.switches else S)
+            force = loop.phi(X) - loop.D(X) * v - law
+            values.append(Wx * v + (Ws * force + loop.d0 * np.abs(Ws)) / loop.M + Ws * loop.c * v)
+    return np.min(values, axis=0), np.max(values, axis=0)

@@ -1,0 +1,104 @@
+"""smc-mujoco certify: what is proven of a law on a plant."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.terminal import errors_as_sentences
+from smc_mujoco.common.interrupts import held_back
+
+
+@errors_as_sentences()
+def certify(
+    plant: Annotated[
+        str | None,
+        typer.Argument(metavar="PLANT", help="A plant from `smc-mujoco list`.", show_default=False),
+    ] = None,
+    law: Annotated[
+        str, typer.Option(metavar="LAW", help="A law, as pid or boundary_layer(k=5, c=2, phi=0.5).")
+    ] = "observer_free",
+    disturbance: Annotated[
+        float | None, typer.Option(min=0.0, help="Bound of |d|, N or N m; default that of the condition.")
+    ] = None,
+    slope: Annotated[
+        float | None, typer.Option(min=0.0, help="Bound of |d'|, per second, for super_twisting; default: d may jump.")
+    ] = None,
+    condition: options.Condition = "nominal",
+    gains: options.Gains = "tuned",
+    out: Annotated[Path | None, typer.Option(metavar="FILE.json", help="Also write the certificate to a file.")] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Also draw the state plane, with runs under d and -d, as .svg, .png or .pdf."
+        ),
+    ] = None,
+    check: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.json", help="Instead, prove the certificate in a file again. Exit code 2 if not."),
+    ] = None,
+    json: options.Json = None,
+) -> None:
+    """Prove what a law does on a plant: from where it comes to rest, and how far a bounded disturbance pushes it.
+
+    The plant is its equation, integrated exactly, and the law acts at every instant. The command prints each theorem
+    with its conditions and their margins, also where they fail, and what the theorem leaves out of your machine: the
+    sampling, delay, noise, dry friction. A checker of its own, which shares no code with what made the certificate,
+    has proven it in ball arithmetic before it is shown; `--check FILE.json` runs that checker again.
+
+    Example: smc-mujoco certify duffing --law observer_free --disturbance 2 --out duffing.json --figure duffing.png
+
+    Example: smc-mujoco certify --check duffing.json
+    """
+    with held_back():
+        from smc_mujoco.common.errors import ScenarioError
+        from smc_mujoco.common.files import ended, writable, write_json
+        from smc_mujoco.draw.region import checked
+        from smc_mujoco.evidence.certificates.certificate import Certificate
+        from smc_mujoco.evidence.certificates.maker import certify as make
+        from smc_mujoco.evidence.commands import tables
+        from smc_mujoco.simulation.grid import case
+
+    json, terminal = options.json_file(json)
+    for file in (out and ended(out, ".json"), figure and checked(figure), json):
+        if file:
+            writable(file)
+    scenario = None
+    if check:
+        if plant:
+            raise ScenarioError("--check proves what is in a file: leave out the plant")
+        made = Certificate.load(check)
+        made.check()
+        terminal.note(f"{check}: every statement is proven", "bold")
+    elif plant:
+        scenario = case(options.plant(plant), options.law(law), condition, gains=gains)
+        made = make(scenario, disturbance, slope)
+    else:
+        raise ScenarioError("give a plant, such as duffing, or --check FILE.json")
+    terminal.print(tables.certificate(made))
+    for sentence in made.sentences:
+        terminal.note(f"{sentence[0].upper()}{sentence[1:]}.", "bold", wrap=True)
+    left_out = "; ".join(f"{name} ({what})" for name, what in made.leaves_out.items())
+    terminal.note(f"No theorem here is about: {left_out}.", wrap=True)
+    if out:
+        terminal.wrote(made.save(out))
+    if json:
+        write_json(json, made.data)
+    if figure:
+        terminal.wrote(_drawn(made, scenario, figure))
+
+
+def _drawn(certificate, scenario, path: Path) -> Path:
+    """Draw a certificate, with runs of its scenario under constant d and -d."""
+    import dataclasses
+
+    from smc_mujoco.simulation.run import run
+    from smc_mujoco.simulation.signals import Constant
+
+    d0, traces = certificate.data["disturbance"], []
+    if scenario is not None and scenario.plant.n == 1:
+        signals = [Constant(d0), Constant(-d0)] if d0 else [None]
+        traces = run([dataclasses.replace(scenario, disturbance=one) for one in signals])
+    certificate.figure(path, traces)
+    return path

@@ -1,0 +1,423 @@
+"""Certificates: margins by hand, mutants that the checker refuses, starts that never leave, bounds that hold.
+
+As a script it starts 1e5 runs in each certified set: python tests/evidence/certificates/test_certify.py
+"""
+
+import ast
+import copy
+import dataclasses
+import functools
+import json
+import math
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.control import gain_sets
+
+pytest.importorskip("flint", reason="python-flint is not installed: the extra proof does")
+from smc_mujoco.evidence.certificates import checker, loops
+
+FORCE = {"duffing": 2.0, "inverted_pendulum": 1.0, "van_der_pol": 0.0}
+
+
+def scenario(plant, law="observer_free", gains="tuned", **changes):
+    return smc.Scenario(plant=plant, law=gain_sets.law(plant, law, gains), duration=8.0, **changes)
+
+
+@functools.cache
+def certificate(plant, law="observer_free", disturbance=0.0, slope=None, gains="tuned"):
+    return smc.certify(scenario(plant, law, gains), disturbance, slope)
+
+
+def refused(data):
+    """Whether the checker refuses data, though their seal is that of these data."""
+    data["seal"] = checker.seal(data)
+    try:
+        checker.check(data)
+    except checker.Refused:
+        return True
+    return False
+
+
+def part(data, theorem):
+    return next(one for one in data["parts"] if one["theorem"] == theorem)
+
+
+def margins(made, theorem="saturated PD"):
+    return {one.name: one.margin for one in made.conditions if one.theorem == theorem}
+
+
+# conditions
+
+
+def test_margins_are_those_of_the_formulas():
+    told = margins(certificate("inverted_pendulum"))
+    p, gains = smc.plant("inverted_pendulum").parameters, gain_sets.law("inverted_pendulum", "observer_free").gains
+    weight = p["m"] * p["grav"] * p["l"]
+    assert told["damping"] == p["b"]
+    assert told["actuator"] == pytest.approx(6.0 - gains["lam"])
+    assert told["local"] == pytest.approx(gains["lam"] * gains["k1"] - weight)
+    x = np.linspace(1e-3, 20.0, 100_000)
+    exact = (1.0 - weight * np.sin(x) / (gains["lam"] * np.tanh(gains["k1"] * x))).min()
+    assert exact - 2e-4 < told["restoring"] < exact
+
+
+def test_van_der_pol_has_no_global_theorem_but_a_region():
+    made = certificate("van_der_pol")
+    assert not made.stable
+    assert margins(made)["damping"] == -smc.plant("van_der_pol").parameters["mu"]
+    assert "damping" in made.sentences[0]
+    assert made.theorem == "level sets"
+    assert made.bound == 0.0
+
+
+def test_a_coupling_that_is_no_spring_fails_by_its_margin():
+    network = smc.plant("inverted_pendulum_network", kc=-0.3)
+    made = smc.certify(smc.Scenario(plant=network, law=gain_sets.law(network, "observer_free")))
+    assert (made.stable, margins(made)["coupling"]) == (False, -0.3)
+    real = scenario("pendulum_network", mechanism="springs")  # its torque is kc sin(x_j - x_i)
+    z = np.linspace(0.1, 20.0, 1_000_001)
+    assert margins(smc.certify(real))["coupling"] == pytest.approx(0.5 * (np.sin(z) / z).min(), rel=1e-8)
+    assert certificate("pendulum_network").stable
+
+
+def test_hanging_pendulums_need_more_than_their_weight_to_be_stable_from_everywhere():
+    """Not every lam > 0 does: with less than the weight they rest a turn away, too."""
+    plant = smc.plant("pendulum_network")
+    weight = math.prod(plant.parameters[name] for name in ("m", "grav", "l"))
+    for lam, stable in ((0.9 * weight, False), (1.1 * weight, True)):
+        made = smc.certify(smc.Scenario(plant=plant, law=smc.law("observer_free", lam=lam, k1=5.0)))
+        assert made.stable is stable
+        assert (margins(made)["restoring"] < 0.0) is not stable
+
+
+@pytest.mark.parametrize("plant", loops.SINGLE)
+def test_the_equations_of_maker_and_checker_are_those_of_the_plant(plant):
+    made, rng = smc.plant(plant), np.random.default_rng(1)
+    e = checker.equation({"name": plant, "n": made.n, "parameters": dict(made.parameters), "mechanism": "equation"})
+    M, A, B, C, E, F = loops.SINGLE[plant](made.values({}))
+    for x, v in rng.uniform(-3.0, 3.0, (20, 2)):
+        f, g = made.nominal(np.full(made.n, x), np.full(made.n, v), 0, made.values({}))
+        force = A * math.sin(x) + B * x + C * x**3 - (E + F * x * x) * v
+        assert f / g == pytest.approx(force, rel=1e-12)
+        assert 1.0 / g == pytest.approx(M)
+        assert float(checker.phi(e, checker.arb(x)) - (e.E + e.F * x * x) * v) == pytest.approx(force, rel=1e-12)
+
+
+@pytest.mark.parametrize("law", ["boundary_layer", "lqr", "classical", "terminal", "super_twisting"])
+@pytest.mark.parametrize("plant", ["duffing", "van_der_pol"])
+def test_other_laws_have_their_theorems(plant, law):
+    made = certificate(plant, law)
+    made.check()
+    assert made.theorems[0] == ("super-twisting" if law == "super_twisting" else "saturated PD")
+    assert made.stable == (plant == "duffing" and law != "super_twisting")
+
+
+def test_super_twisting_needs_an_integral_faster_than_the_disturbance():
+    with pytest.raises(smc.ScenarioError, match="bound of d'"):
+        smc.certify(scenario("inverted_pendulum", "super_twisting"), disturbance=0.5)
+    with pytest.raises(smc.ScenarioError, match="no quadratic form"):
+        smc.certify(scenario("inverted_pendulum", "super_twisting"), disturbance=0.5, slope=9.0)
+    made = certificate("inverted_pendulum", "super_twisting", 0.5, 1.0)
+    assert min(margins(made, "super-twisting").values()) > 0.0
+
+
+def test_what_is_left_out_is_said_with_what_the_scenario_has():
+    machine = scenario("duffing", friction=smc.Coulomb(0.3), input_delay=0.004, noise=smc.Noise(position=0.01))
+    left_out = smc.certify(machine).leaves_out
+    assert left_out.keys() >= checker.LEAVES_OUT
+    assert "0.3" in left_out["dry friction"]
+    assert left_out["delay"] == "4 ms"
+    assert "position 0.01" in left_out["noise"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"law": smc.law("twisting")}, "twisting on duffing"),
+        ({"plant": "cart_pole", "law": smc.law("observer_free")}, "cart_pole"),
+        ({"law": smc.law("pid")}, "integral"),
+        ({"model": "nominal"}, "nominal"),
+        ({"reference": smc.Constant(0.5)}, "reference"),
+        ({"mechanism": "springs"}, "springs"),
+        ({"disturbance": smc.OrnsteinUhlenbeck(1.0, 1.0)}, "bound"),
+    ],
+)
+def test_what_has_no_theorem_is_one_sentence(changes, word):
+    fields = {"plant": "duffing", "law": smc.law("observer_free", lam=6.0, k1=3.0)} | changes
+    with pytest.raises(smc.ScenarioError, match=word) as said:
+        smc.certify(smc.Scenario(**fields))
+    assert "\n" not in str(said.value)
+
+
+# the checker
+
+
+def set_margin(theorem, name, change):
+    def mutate(data):
+        (one,) = (one for one in part(data, theorem)["conditions"] if one["name"] == name)
+        one["margin"] = change(one["margin"])
+
+    return mutate
+
+
+def put(*path, change):
+    """A mutant that changes the value at a path; a text stands for the theorem of a part."""
+
+    def mutate(data):
+        at = data
+        for key in path[:-1]:
+            at = part(data, key) if at is data.get("parts") else at[key]
+        at[path[-1]] = change(at[path[-1]])
+
+    return mutate
+
+
+def times(factor):
+    return lambda value: value * factor
+
+
+def without(i):
+    return lambda items: items[:i] + items[i + 1 :]
+
+
+def raised(W):
+    W[30][110] += 0.05
+    return W
+
+
+SATURATED, LEVELS = "saturated PD", "level sets"
+MUTANTS = {
+    "sign of damping": set_margin(SATURATED, "damping", times(-1)),
+    "sign of restoring": set_margin(SATURATED, "restoring", times(-1)),
+    "restoring a little larger": set_margin(SATURATED, "restoring", times(1.001)),
+    "restoring a little smaller": set_margin(SATURATED, "restoring", times(0.999)),
+    "sign of local": set_margin(SATURATED, "local", times(-1)),
+    "local a little larger": set_margin(SATURATED, "local", times(1.001)),
+    "start": set_margin(LEVELS, "start", times(1.001)),
+    "a box left out": put("parts", SATURATED, "conditions", 1, "boxes", change=without(7)),
+    "the box to infinity left out": put("parts", SATURATED, "conditions", 1, "boxes", change=without(-1)),
+    "a box shifted": put("parts", SATURATED, "conditions", 1, "boxes", 9, 0, change=times(1.001)),
+    "mass in V": put("parts", SATURATED, "V", "v^2", change=times(1.001)),
+    "spring in V": put("parts", SATURATED, "V", "x^2", change=times(1.001)),
+    "another theorem": put("parts", LEVELS, "theorem", change=lambda _: "reaching"),
+    "mass of the plant": put("plant", "parameters", "M", change=times(1.001)),
+    "spring of the plant": put("plant", "parameters", "alpha", change=times(1.001)),
+    "another plant": put("plant", "name", change=lambda _: "van_der_pol"),
+    "lam": put("law", "gains", "lam", change=times(1.001)),
+    "k1": put("law", "gains", "k1", change=times(0.999)),
+    "another law": put("law", "name", change=lambda _: "boundary_layer"),
+    "a weaker actuator": put("u_max", change=lambda _: 5.9),
+    "a smaller bound": put("parts", LEVELS, "bound", change=times(0.999)),
+    "a smaller inner level": put("parts", LEVELS, "inner", change=times(0.1)),
+    "an outer level beyond the grid": put("parts", LEVELS, "outer", change=lambda _: 0.9999),
+    "a hill in W": put("parts", LEVELS, "W", change=raised),
+    "a row of W left out": put("parts", LEVELS, "W", change=without(20)),
+    "a larger disturbance": put("disturbance", change=times(1.5)),
+    "another start": put("parts", LEVELS, "start", change=lambda _: [2.9, 5.0]),
+    "sampling not left out": put("leaves_out", change=lambda told: {k: v for k, v in told.items() if k != "sampling"}),
+    "another mechanism": put("plant", "mechanism", change=lambda _: "springs"),
+    "two carts": put("plant", "n", change=lambda _: 2),
+}
+
+
+@pytest.mark.parametrize("name", MUTANTS)
+def test_the_checker_refuses_a_mutant_with_a_new_seal(name):
+    data = copy.deepcopy(certificate("duffing", disturbance=2.0).data)
+    assert not refused(data)
+    MUTANTS[name](data)
+    assert refused(data)
+
+
+TWISTING = "super-twisting"
+OTHERS = {
+    "no damping that is told as damping": ("van_der_pol", "observer_free", set_margin(SATURATED, "damping", abs)),
+    "a form that is too narrow": ("van_der_pol", "observer_free", put("parts", LEVELS, "P", 0, change=times(9))),
+    "a form that does not fall": ("van_der_pol", "observer_free", put("parts", LEVELS, "P", 1, change=times(-9))),
+    "a set that is too large": ("duffing", "classical", put("parts", "reaching", "X", change=times(1.3))),
+    "a higher strip": ("duffing", "classical", put("parts", "reaching", "S", change=times(1.001))),
+    "a longer surface": ("duffing", "terminal", put("parts", "reaching", "X", change=times(1.001))),
+    "a larger form": ("duffing", "super_twisting", put("parts", TWISTING, "q", change=times(2.0))),
+    "another L": ("duffing", "super_twisting", put("parts", TWISTING, "L", change=times(1.2))),
+    "k2": ("duffing", "super_twisting", put("law", "gains", "k2", change=times(0.999))),
+    "a spring that pushes": ("pendulum_network", "observer_free", put("plant", "parameters", "kc", change=times(-1))),
+    "inverted pendulums": (
+        "pendulum_network", "observer_free", put("plant", "name", change=lambda _: "inverted_pendulum_network"),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_the_checker_refuses_mutants_of_other_theorems(name):
+    plant, law, mutate = OTHERS[name]
+    data = copy.deepcopy(certificate(plant, law).data)
+    mutate(data)
+    if "told as" in name:
+        part(data, SATURATED)["holds"] = True
+    assert refused(data)
+
+
+def test_any_number_that_changes_breaks_the_seal():
+    text = certificate("duffing").to_json()
+    data = json.loads(text)
+    data["parts"][0]["conditions"][1]["boxes"][3][1] *= 1.0 + 1e-9
+    with pytest.raises(checker.Refused, match="seal"):
+        checker.check(data)
+
+
+def test_the_checker_stands_alone(tmp_path):
+    """It is below 300 lines, imports nothing of ours, and runs as a file by itself."""
+    source = Path(checker.__file__).read_text()
+    tree = ast.walk(ast.parse(source))
+    names = {alias.name for node in tree if isinstance(node, ast.Import) for alias in node.names}
+    names |= {node.module for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom)}
+    assert names == {"hashlib", "json", "sys", "itertools", "types", "flint"}
+    assert len(source.splitlines()) < 300
+    shutil.copy(checker.__file__, tmp_path / "apart.py")
+    made = certificate("duffing", disturbance=2.0)
+    file = made.save(tmp_path / "duffing.json")
+    assert smc.Certificate.load(file).data == made.data
+    run = functools.partial(subprocess.run, capture_output=True, text=True, check=False, cwd=tmp_path)
+    done = run([sys.executable, "-I", "apart.py", "duffing.json"])
+    assert (done.returncode, done.stdout) == (0, "duffing.json is accepted: every statement is proven\n")
+    file.write_text(file.read_text().replace('"bound": 0.', '"bound": 0.0'))
+    done = run([sys.executable, "-I", "apart.py", "duffing.json"])
+    assert (done.returncode, done.stderr) == (1, "duffing.json is refused: not proven is the seal\n")
+
+
+# runs
+
+
+def steps(made, x, v, d, duration, dt=1e-3):
+    """States of the exact loop under a force that is held for each step, by the Runge-Kutta method of order 4."""
+    loop, _, _ = loops.loop_of(made.data)
+
+    def rates(x, v, d):
+        return v, (loop.phi(x) - loop.D(x) * v - loop.sigma(v + loop.c * x) + d) / loop.M
+
+    for k in range(round(duration / dt)):
+        force = d(k * dt, x, v)
+        a = rates(x, v, force)
+        b = rates(x + dt / 2 * a[0], v + dt / 2 * a[1], force)
+        c = rates(x + dt / 2 * b[0], v + dt / 2 * b[1], force)
+        e = rates(x + dt * c[0], v + dt * c[1], force)
+        x = x + dt / 6 * (a[0] + 2 * b[0] + 2 * c[0] + e[0])
+        v = v + dt / 6 * (a[1] + 2 * b[1] + 2 * c[1] + e[1])
+        yield x, v
+
+
+def starts(made, count, rng):
+    """Random states of the certified set."""
+    (levels,) = (one for one in made.data["parts"] if one["theorem"] == LEVELS)
+    x, s = rng.uniform(-1, 1, (2, 40 * count)) * np.array([[levels["x"][-1]], [levels["s"][-1]]])
+    v = s - made.surface * x
+    inside = made.contains(x, v)
+    assert inside.sum() >= count
+    return x[inside][:count], v[inside][:count]
+
+
+def forces(count, d0, rng):
+    """The force on each run: constant, with the velocity's sign, against it, and switching at random times."""
+    kind, period = np.arange(count) % 4, rng.uniform(0.05, 1.0, count)
+    sign, phase = rng.choice([-1.0, 1.0], count), rng.uniform(0.0, 1.0, count)
+
+    def d(t, x, v):
+        switching = np.sign(np.sin(np.pi * (t / period + phase)))
+        return d0 * np.choose(kind, [sign, np.sign(v), -np.sign(v), switching])
+
+    return d
+
+
+def escapes(plant, count, duration):
+    """Runs that leave the certified set, and those that are not within the bound in the end."""
+    d0, rng = FORCE[plant], np.random.default_rng(3)
+    made = certificate(plant, disturbance=d0)
+    x, v = starts(made, count, rng)
+    left = np.zeros(count, bool)
+    for k, (x, v) in enumerate(steps(made, x, v, forces(count, d0, rng), duration)):  # noqa: B020
+        if k % 10 == 0:
+            left |= ~made.contains(x, v)
+    bound = part(made.data, LEVELS)["bound"] if d0 else 1e-3
+    return int(left.sum()), int((np.abs(x) > bound).sum())
+
+
+@pytest.mark.parametrize("plant", FORCE)
+def test_no_start_leaves_its_certified_set_and_all_end_within_the_bound(plant):
+    assert escapes(plant, 400, 6.0) == (0, 0)
+
+
+@pytest.mark.parametrize(("plant", "d0"), [("duffing", 1.0), ("duffing", 2.0), ("inverted_pendulum", 1.0)])
+@pytest.mark.parametrize("gains", ["tuned", "study"])
+def test_the_bound_contains_the_worst_found_and_is_below_twice_as_large(plant, d0, gains):
+    """The worst found: the sampled machine in MuJoCo under constants, pulses of changing width, and sines."""
+    made = certificate(plant, disturbance=d0, gains=gains)
+    signals = [smc.Constant(sign * d0) for sign in (-1.0, 1.0)]
+    signals += [smc.Sine(d0, omega) for omega in (0.3, 1.0, 3.0, 10.0)]
+    rng, knots = np.random.default_rng(0), np.linspace(0.0, 8.0, 17)
+    for _ in range(10):
+        signals.append(smc.TimeSeries(knots, d0 * rng.choice([-1.0, 1.0], knots.size)))
+    traces = smc.run([dataclasses.replace(scenario(plant, gains=gains), disturbance=one) for one in signals])
+    late = [np.abs(trace.x[trace.t >= 6.0]).max() for trace in traces]
+    assert made.bound is not None
+    assert max(late) <= made.bound <= 2.0 * max(late)
+
+
+def test_region_of_van_der_pol_as_a_share_of_the_true_one():
+    made = certificate("van_der_pol")
+    found = smc.basin("van_der_pol", "observer_free", points=(8, 8))
+    x, v = np.meshgrid(found.x, found.v)
+    inside = made.contains(x, v)
+    assert inside.any()
+    assert (found.outcome[inside] == 1).all()
+
+
+def test_a_certificate_draws_its_state_plane(tmp_path):
+    for plant in ("duffing", "van_der_pol"):
+        made = certificate(plant, disturbance=FORCE[plant])
+        trace = smc.run(scenario(plant))
+        made.figure(tmp_path / f"{plant}.png", [trace])
+        assert (tmp_path / f"{plant}.png").stat().st_size > 20_000
+    with pytest.raises(smc.ScenarioError, match="plane"):
+        certificate("pendulum_network").figure(tmp_path / "n.png")
+    assert "saturated PD" in certificate("duffing")._repr_html_()
+
+
+def test_the_command_proves_writes_and_checks(tmp_path, monkeypatch, capsys):
+    from smc_mujoco.cli.main import main
+
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["certify", "duffing", "--out", "d.json", "--figure", "d.png"])
+    assert ended.value.code in (0, None)
+    said = capsys.readouterr().out
+    assert "every start comes to rest" in said
+    assert "sampling" in said
+    assert (tmp_path / "d.png").exists()
+    with pytest.raises(SystemExit) as ended:
+        main(["certify", "--check", "d.json"])
+    assert ended.value.code in (0, None)
+    data = json.loads((tmp_path / "d.json").read_text())
+    data["plant"]["parameters"]["M"] = 1.1
+    (tmp_path / "d.json").write_text(json.dumps(data))
+    with pytest.raises(SystemExit) as ended:
+        main(["certify", "--check", "d.json"])
+    assert ended.value.code == 2
+    assert "refused" in capsys.readouterr().err
+
+
+def test_without_python_flint_one_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "flint", None)
+    with pytest.raises(smc.ScenarioError, match=r"smc.certify needs .*smc-mujoco\[proof\]"):
+        smc.certify(scenario("duffing"))
+
+
+if __name__ == "__main__":
+    for name in FORCE:
+        left, outside = escapes(name, 100_000, 8.0)
+        print(f"{name}: of 100000 starts {left} left the certified set, {outside} did not end within the bound")
