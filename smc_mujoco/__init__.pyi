@@ -114,6 +114,7 @@ from smc_mujoco.studies.accuracy import AccuracyTable as AccuracyTable
 from smc_mujoco.studies.accuracy import accuracy as accuracy
 from smc_mujoco.studies.advice import Advice as Advice
 from smc_mujoco.studies.adviser import which as which
+from smc_mujoco.studies.compare import compare as compare
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard
 from smc_mujoco.studies.outcome import Outcome as Outcome
 from smc_mujoco.studies.scene import Scene as Scene

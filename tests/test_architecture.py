@@ -127,7 +127,7 @@ for name in "law_to_c law_from_c export_fmu law_from_fmu live audit claims rig i
         assert f"smc.{name} needs smc_mujoco.e" in str(error), error
     else:
         raise AssertionError(name)
-main(["bench", "--plants", "duffing", "--laws", "pid", "--seeds", "1", "--duration", "0.1", "--out", "bench"])
+main(["compare", "duffing", "--law", "pid", "--seeds", "1", "--duration", "0.1", "--out", "compared"])
 """
     run_without = python(code, folder=tmp_path, path=tmp_path)
     assert "pid" in run_without

@@ -1,9 +1,8 @@
-"""Tables of the command line: scores, leaderboards, boards, advice, margins, chattering, tunings, claims, rigs."""
+"""Tables of the command line: scores, advice, margins, chattering, tunings."""
 
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +13,9 @@ from rich.text import Text
 
 from smc_mujoco.analysis.step_halving import NOTE
 from smc_mujoco.analysis.tuning.result import HEADINGS, Tuned
+from smc_mujoco.common.tabular import folded
 from smc_mujoco.common.text import number
-from smc_mujoco.control.source import in_words, kinds
+from smc_mujoco.control.source import in_words
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.metrics.catalogue import metrics
@@ -26,8 +26,6 @@ from smc_mujoco.metrics.tip import tip_scores, worst_joint
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.accuracy import AccuracyTable, heads, lines, remarks
-from smc_mujoco.studies.board_tables import relevance, size, sources, spread
-from smc_mujoco.studies.leaderboard import Block, Board
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.chattering import Chattering
@@ -60,17 +58,6 @@ SHOWN = {
 FAILED = Text("failed", style="red")
 MAX_NAMED_JOINTS = 4  # in the heading of a group
 SPARKS = "▁▂▃▄▅▆▇█"
-INTERVAL_WIDTH = 13  # characters of a line: four metrics fit in 80 columns
-BOARD_KEY = (
-    "median, #place, {level:.3g} % interval over the samples: runs, or sets of gains that several runs share. Laws "
-    "with fewer failed runs come first. * no law is better in any condition, and no run failed. A winner is better "
-    "than every other law by more than the least relevant difference, in a paired test that is corrected for all "
-    "plants and conditions of the table ({family}); below its name, how much less it has than the closest other law, "
-    "with the interval. Over several conditions: median of their medians; a winner wins in each. {relevance}. "
-    "No winner is named over laws with default gains, unless with --defaults. x, u of driven joints, in rad or m, and "
-    "N m, N or V"
-)
-MIN_INTERVAL_RUNS = 6  # with fewer runs no interval of a median covers 95 %, see `analysis.bootstrap`
 
 
 def titled(title: str, *columns: Column | str, **options: Any) -> Table:
@@ -245,141 +232,7 @@ def with_package(line: str, package: str) -> str:
     return f"{line} [{package}]" if package else line
 
 
-# leaderboards
-
-
-def leaderboard(boards: Sequence[Board]) -> Table:
-    """Return a table of boards: a part for each group, a line for each law, a column for each metric."""
-    metrics = {board.metric: board.unit for board in boards}
-    table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False, show_edge=False)  # the box keeps columns apart
-    lines = max((metric.count("_") for metric in metrics), default=0)
-    table.add_column("law", no_wrap=True, min_width=0 if boards else 30)
-    for metric, unit in metrics.items():
-        head = Text("\n" * (lines - metric.count("_")) + metric.replace("_", "\n"))
-        head.append(f"\n{unit.format(x='x', u='u') or '%'}", "dim not bold")
-        table.add_column(head, justify="right", overflow="fold")  # so that no digit is cut off
-    by_group: dict[tuple, dict[str, Board]] = {}
-    for board in boards:
-        by_group.setdefault(tuple(board.group.items()), {})[board.metric] = board
-    for group, own in by_group.items():
-        name = "\n".join(_folded(value) for _, value in group) or "all"
-        for line in _group_lines(name, own, [own.get(metric) for metric in metrics]):
-            table.add_row(*line)
-        table.add_section()
-    table.caption = "no boards: no metric applies"
-    if boards:
-        family = max(board.family for board in boards)
-        said = relevance(boards)
-        table.caption = BOARD_KEY.format(
-            level=100 * boards[0].level, family=family, relevance=said[0].upper() + said[1:]
-        )
-    if any(block.runs < MIN_INTERVAL_RUNS for board in boards for block in board.blocks):
-        table.caption += f"; with fewer than {MIN_INTERVAL_RUNS} runs an interval is their range, and covers less"
-    if gains := in_words(sources(boards)):
-        table.caption += f". {gains[:1].upper()}{gains[1:]}"
-    table.caption_justify = "left"
-    return table
-
-
-def _group_lines(name: str, own: Mapping[str, Board], shown: Sequence[Board | None]) -> Iterator[list[Text]]:
-    """Yield a group's lines: the winner in each block if there are several, then every law, and the overall winner."""
-    largest = max(own.values(), key=lambda board: len(board.blocks))
-    several = len(largest.blocks) > 1
-    only = "" if several else _folded(largest.name(largest.blocks[0])) + "\n"
-    runs = f"{largest.cells} run{'s' * (largest.cells != 1)},\n{_sample(largest.blocks)}"
-    yield [Text(f"{name}\n", "bold").append(only, "italic not bold").append(runs, "dim not bold")]
-    for block in largest.blocks if several else ():
-        size = f"\n{_folded(block.sample, 15)}" if block.runs < block.seeds else ""
-        head = Text(_folded(largest.name(block)), "italic").append(size, "dim not italic")
-        yield [head, *(_block_cell(board, block) for board in shown)]
-    if several:
-        yield [Text(f"\nall {len(largest.blocks)}\n{largest.kind}", "dim")]
-    for law, its in sources(own.values()).items():
-        head = Text(_folded(law), style.law_colour(law)).append(f"\n{kinds(its)}" * bool(its), "dim")
-        yield [head, *(_law_cell(board, law) for board in shown)]
-    yield [Text(""), *(_winner_cell(board) for board in shown)]
-
-
-def _sample(blocks: Sequence[Block]) -> str:
-    """Return the sample of the blocks in words, or the largest number of seeds if the samples differ."""
-    samples = {_folded(block.sample, 15) for block in blocks}
-    return samples.pop() if len(samples) == 1 else f"{max(block.seeds for block in blocks)} seeds"
-
-
-def _block_cell(board: Board | None, like: Block) -> Text:
-    """Return the winner of a block with how much less it has than the closest other law, or how many laws are level.
-
-    Args:
-      board: None if the metric has no board.
-      like: a block of the plant and condition that are meant.
-    """
-    blocks = {(block.plant, block.condition): block for block in board.blocks} if board else {}
-    block = blocks.get((like.plant, like.condition))
-    if board is None or block is None:
-        return Text("")
-    if block.barred:
-        return Text("rivals at\ndefaults", "dim")
-    if block.winner is None:
-        some = "all fail" if all(block.lacking.values()) else f"{len(block.best)} level"
-        return Text("too few" if board.too_few else some, "dim")
-    return Text(_folded(block.winner, 12), style.law_colour(block.winner)).append(f"\n{_how_much(block)}", "dim")
-
-
-def _how_much(block: Block) -> str:
-    """Return how much less the winner of a block has than the closest other law, on two lines; shares for "settles"."""
-    if block.lead is None:
-        first, second = sorted(block.medians.values())[:2]
-        return f"{100 * (1 - first):.0f}>{100 * (1 - second):.0f}"
-    less, _, interval = block.lead.size.partition(" (")
-    return f"{less}\n{interval.removesuffix(')').replace(' to ', '–')}"
-
-
-def _folded(name: str, width: int = 13) -> str:
-    """Return a name on several lines, broken after underscores."""
-    return "\n".join(line.replace("_ ", "_") for line in textwrap.wrap(name.replace("_", "_ "), width))
-
-
-def _law_cell(board: Board | None, law: str) -> Text:
-    """Return a law's median, place and interval."""
-    entry = next((e for e in board.entries if e.law == law), None) if board else None
-    if board is None or entry is None:
-        return Text("")
-    middle = size(entry.interval.median, board.metric)
-    ends = spread(entry.interval, board.metric)
-    if len(ends) > INTERVAL_WIDTH:
-        ends = ends.replace("–", "–\n")
-    best = entry.rank.best and not board.barred
-    text = Text(f"{middle} " if middle else "", "bold" if best else "")
-    text.append(f"#{entry.rank.place:g}").append("*" if best else " ")
-    text.append(f"\n{ends}" if ends else "", "dim not bold")
-    failures = board.failures(entry)
-    return text.append(f"\n{_folded(failures)}" if failures else "", "red not bold")
-
-
-def _winner_cell(board: Board | None) -> Text:
-    """Return the winner of a board, or what each law has won and lost."""
-    if board is None:
-        return Text("")
-    if board.winner:
-        text = Text("winner\n").append(_folded(board.winner, 12), f"bold {style.law_colour(board.winner)}")
-        return text.append(f"\n{_how_much(board.blocks[0])}" if len(board.blocks) == 1 else "", "dim")
-    text = Text("no winner\n", "dim")
-    if board.barred:
-        return text.append("rivals at\ndefaults")
-    wins = {entry.law: len(board.wins(entry.law)) for entry in board.entries}
-    if not any(wins.values()):
-        if len(board.best) == 1 and not board.why:
-            return text.append("undefeated:\n").append(_folded(board.best[0], 12), style.law_colour(board.best[0]))
-        return text.append(board.why or f"{len(board.best)} of {len(board.entries)}*")
-    for law, won in wins.items():
-        if won:
-            lost = len(board.losses(law))
-            text.append(f"{_folded(law, 12)}\n", style.law_colour(law)).append(f"{won} won {lost} lost\n")
-    text.right_crop(1)
-    return text
-
-
-# boards and advice
+# advice
 
 
 def advice(found: Advice) -> Table:
@@ -388,7 +241,7 @@ def advice(found: Advice) -> Table:
     columns = [Column(head.replace(": ", "\n").replace(", ", "\n"), justify="right") for head in others]
     table = titled(found.title, Column(law, no_wrap=True), *columns, pad_edge=False)  # 80 columns hold three needs
     for name, *cells in found.rows:
-        table.add_row(Text(_folded(name, 15), style=style.law_colour(name)), *map(_two_lines, cells))
+        table.add_row(Text(folded(name, 15), style=style.law_colour(name)), *map(_two_lines, cells))
     table.caption, table.caption_justify = found.key, "left"
     return table
 

@@ -50,7 +50,7 @@ class Gain:
     Attributes:
       default: value if none is given. A law of many joints in C may have a tuple, with one for each joint.
       unit: a function of all gains, read by attribute, if an exponent among them decides the unit. None: a number
-        without a unit, or an unknown unit; tuning refuses to search it.
+        without a unit, or an unknown unit; tuning searches it about its default.
       positive: whether it must be greater than 0.
       nonnegative: whether it must be at least 0.
       held: whether tuning leaves it at its default, such as an initial value, an exponent or the size of a table.

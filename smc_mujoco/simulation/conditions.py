@@ -9,10 +9,11 @@ and never evaluated:
 
     worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)
 
-The levels of the suite are those of a machine of the study's size. The friction of 0.1 N m or N is u_max / 60, the gap
-is that of a worn gear, the lag that of a hydraulic valve, and the counts, per revolution or metre, are those of an
-inexpensive encoder. The pulse of "contact" is as strong as u_max, so that it moves whatever can move. Under "jitter"
-samples are late by up to half of the suite's control period, and one in ten is "missed".
+The levels of the suite are those of a machine of the study's size. The dry friction of 0.1 N m or N is u_max / 60, the
+viscous one of "friction" half as much at 1 rad/s or m/s. The gap is that of a worn gear, the lag that of a hydraulic
+valve, and the counts, per revolution or metre, are those of an inexpensive encoder. The pulse of "contact" is as strong
+as u_max, so that it moves whatever can move. Under "jitter" samples are late by up to half of the suite's control
+period, and one in ten is "missed".
 """
 
 import ast
@@ -38,7 +39,7 @@ from smc_mujoco.control.estimator import estimator
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Drive, Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre
+from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
@@ -350,6 +351,7 @@ IDEAL: dict[str, Recipe] = {
     "differenced_5ms_noise": {"velocity": DIFFERENCED, "noise": Noise(position=0.01)},
 }
 REAL: dict[str, Recipe] = {
+    "friction": {"friction": (Coulomb(0.1), Viscous(0.05))},
     "coulomb": {"friction": Coulomb(0.1)},
     "lugre": {"friction": LuGre(coulomb=0.05, static=0.1, stribeck=0.05)},
     "lag_20ms": {"actuator": Lag(0.02)},

@@ -6,7 +6,7 @@ Plants, laws and conditions are names of the suite's, or your own objects.
 """
 
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import mujoco
@@ -36,6 +36,7 @@ from smc_mujoco.simulation.model import model, start, with_values
 from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.scenario import U_MAX, Scenario
 
+Turns = Callable[[int], Law]  # seed -> the law of that run
 NOTHING: Mapping[str, Any] = frozen({})
 MAX_REST_ACCELERATION = 1e-9  # rad/s^2 or m/s^2; chosen: rounding stays below
 
@@ -74,16 +75,36 @@ def grid(
     if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MAX_ITEMS:
         raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MAX_ITEMS:,} runs at most")
     conditions = [find_condition(condition) for condition in conditions]
-    _check_apart(plants, laws, conditions)
-    made = [
-        case(plant, law, condition, duration, gains, seed, starts)
-        for plant in plants
-        for condition in conditions
-        for law in laws
-        for seed in numbers
-    ]
-    for first in range(0, len(made), len(laws) * len(numbers)):
-        check_moving(made[first : first + len(numbers)])
+    check_apart(plants, laws, conditions)
+
+    def of(plant: Plant) -> list[Turns]:
+        return [lambda seed, law=law: _law(plant, law, gains, seed) for law in laws]
+
+    return crossed([as_plant(plant) for plant in plants], of, conditions, numbers, duration, starts)
+
+
+def crossed(
+    plants: Sequence[Plant],
+    laws: Callable[[Plant], Sequence[Turns]],
+    conditions: Sequence[Condition],
+    seeds: Sequence[int],
+    duration: float,
+    starts: Starts | None = None,
+) -> list[Scenario]:
+    """Return scenarios of every plant, condition, law and seed, as `grid`.
+
+    Args:
+      laws: function of a plant that returns for each law a function of the seed, which returns the law of that run.
+    """
+    made = []
+    for plant in plants:
+        its = laws(plant)
+        for condition in conditions:
+            runs = [
+                [case(plant, law(seed), condition, duration, seed=seed, starts=starts) for seed in seeds] for law in its
+            ]
+            check_moving(runs[0])
+            made += [scenario for one in runs for scenario in one]
     return made
 
 
@@ -134,7 +155,7 @@ def _rests(scenario: Scenario) -> bool:
     return bool(np.abs(data.qacc).max() < MAX_REST_ACCELERATION)
 
 
-def _check_apart(
+def check_apart(
     plants: Sequence[str | Plant], laws: Sequence[str | Law | Template], conditions: Sequence[Condition]
 ) -> None:
     """Raise ScenarioError if two different plants, laws or conditions have the same name, as tables show only names."""
@@ -145,7 +166,7 @@ def _check_apart(
         ("plants", "give each its own grid", [(p.name, p, (p.build, p.parameters, p.n)) for p in chosen_plants]),
         (
             "laws",
-            "name one of them, as smc.law(...).named('slow') or --laws \"slow: classical(k=2)\"",
+            "name one of them, as smc.law(...).named('slow') or --law \"slow: classical(k=2)\"",
             [(law if isinstance(law, str) else law.name, law, law) for law in chosen_laws],
         ),
         ("conditions", "give each its own name", [(c.name, c, str(c)) for c in conditions]),

@@ -25,9 +25,7 @@ A law dominates another if it is better in some block and worse in none. Laws wi
 laws by mean rank, but none before a law that dominates it. Laws that tie with the one whose turn it is are ordered
 among themselves: less overshoot first, then less energy of u. The first law is advised, unless all are level."""
 
-import dataclasses
 import math
-import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -39,24 +37,18 @@ from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.analysis.differences import RELEVANT, share_that_matters
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.ranking import Comparison, Rank, block_ranks, compare, ranked, ranks, samples_of
-from smc_mujoco.analysis.tuning import result, search
-from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.common import fingerprint
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, unknown, whole
-from smc_mujoco.common.progress import bar
+from smc_mujoco.common.errors import ScenarioError, number, unknown, whole
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import PROPERTIES, suitable
 from smc_mujoco.mechanisms.plant import Plant, as_plant
-from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
-from smc_mujoco.simulation.grid import case, grid, listed, listed_laws
+from smc_mujoco.simulation.grid import case, crossed, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
-from smc_mujoco.studies import run_key
 from smc_mujoco.studies.advice import NEEDS, Advice, Choice, ties
-from smc_mujoco.studies.cache import cached
+from smc_mujoco.studies.fair_gains import Candidate, fair_gains
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
 
@@ -79,19 +71,6 @@ class Extent(NamedTuple):
 
 FULL = Extent(screening=8, seeds=24, finalists=6, duration=5.0, budget=96)
 QUICK = Extent(screening=4, seeds=24, finalists=4, duration=3.0, budget=32)
-
-
-class Candidate(NamedTuple):
-    """A law with its gains for the plant, and what is to be said of them, in words."""
-
-    law: Component
-    remark: str = ""
-    shipped: bool = False  # runs with all sets of gains of the package in turn, as `grid` does with a name
-
-    @property
-    def runs_as(self) -> str | Component:
-        """The law as `grid` takes it: by its name if its gains differ from run to run."""
-        return self.law.name if self.shipped else self.law
 
 
 def which(
@@ -142,14 +121,14 @@ def which(
     # refuses what the plant cannot have before gains are searched
     efforts = {case(machine, "none", one, duration, starts=starts).efforts[0] for one in asked}
     chosen = _suited(machine, [name for name in properties if name != NO_VELOCITY], laws)
-    found = _with_gains(machine, chosen, extent.budget, starts, folder / "gains", threads, progress)
+    found = fair_gains(machine, chosen, folder / "gains", extent.budget, starts, threads, progress)
     candidates = {candidate.law.name: candidate for candidate in found}
     if len(candidates) < len(found):
         raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")
 
     def ran(names: Sequence[str], numbers: range, part: str) -> Contest:
-        laws = [candidates[name].runs_as for name in names]
-        runs = grid(machine, laws, asked, numbers, "tuned", duration, starts)
+        laws = [candidates[name] for name in names]
+        runs = crossed([machine], lambda _: laws, asked, numbers, duration, starts)
         return _contest(study(runs, folder / part, threads=threads, progress=progress), machine, compared, relevant)
 
     names, others = list(candidates), []
@@ -238,78 +217,6 @@ def _some(found: list, plant: Plant, properties: Sequence[str]) -> list[Componen
         said = " and ".join(PROPERTIES[name].words for name in properties) or "suit"
         raise ScenarioError(f"no law for {plant.name} is among those that {said}: ask for less")
     return found
-
-
-# gains
-
-
-def _with_gains(
-    plant: Plant,
-    laws: Sequence[Component | Template],
-    budget: int,
-    starts: Starts | None,
-    folder: Path,
-    threads: int | None,
-    progress: bool,
-) -> list[Candidate]:
-    """Return the laws with gains for the plant: given, shipped, tuned or default ones, in this order of preference.
-
-    Laws that are tuned beside shipped gains are tuned as these were: the same starts, the same budget.
-    """
-    found = [_known(plant, law) for law in laws]
-    if any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in found):
-        budget, starts = search.BUDGET, None
-    missing = [k for k, candidate in enumerate(found) if candidate is None]
-    with bar("gains", len(missing), shown=progress and bool(missing), counted=True) as drawn:
-        for k in missing:
-            drawn.says(f"gains of {laws[k].name}")
-            found[k] = _tuned(plant, laws[k], budget, starts, folder, threads)
-            drawn.advance(1)
-    return [candidate for candidate in found if candidate is not None]
-
-
-def _known(plant: Plant, law: Component | Template) -> Candidate | None:
-    """Return a law whose gains need no search; None for one that must be tuned."""
-    if isinstance(law, Component):
-        return Candidate(law)
-    if plant.unscaled:
-        return Candidate(law.bind({}), f"tuning is not possible here: {plant.unscaled.partition(':')[0]}")
-    own = plants_known().get(plant.name)
-    if own is None or own.parameters != plant.parameters or catalogue().get(law.name) is not law:
-        return None
-    if not gain_sets.has(plant, law.name):
-        return None
-    return Candidate(gain_sets.law(plant, law.name, "tuned"), shipped=True)
-
-
-def _tuned(
-    plant: Plant, law: Component | Template, budget: int, starts: Starts | None, folder: Path, threads: int | None
-) -> Candidate:
-    """Return a law with gains from `tune`, or from the file of an earlier call."""
-    usual = Objective()
-    conditions = tuple(one for one in usual.conditions if applicable([one.name], [plant], usual.duration))
-    goal = dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
-    (first, *_) = goal.scenarios(plant, coerce.law(law), 0)
-    template = law if isinstance(law, Template) else coerce.law(law).template
-    searched = template and (dict(template.gains), dict(template.conditions))  # which gains, and where
-    depends = [run_key.key(first), goal.describe(), fingerprint.of((coerce.law(law).function, searched))]
-
-    def tuned_now() -> result.Tuned:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)  # the remark says so
-            return search.tune(plant, law, budget, objective=goal, threads=threads)
-
-    tuned = cached(
-        folder / f"{plant.name}-{law.name}-{budget}.json",
-        depends,
-        tuned_now,
-        lambda made, path: made.save(path),
-        result.load,
-    )
-    its, chosen = tuned.law.source, coerce.law(law)
-    if tuned.before < tuned.objective:
-        return Candidate(chosen.sourced(its.kind, its.search), "its defaults, better than those tried")
-    return Candidate(dataclasses.replace(chosen, gains=tuned.law.gains, source=its))
 
 
 # the comparison

@@ -11,7 +11,7 @@ A cluster takes `pip install 'smc-mujoco[cluster]'` on every machine, with the s
 
     dask scheduler                                         # prints its address
     dask worker tcp://HOST:PORT                            # on every machine
-    smc-mujoco bench --executor dask://HOST:PORT
+    smc-mujoco compare --executor dask://HOST:PORT
 
 A batch whose worker dies is run by another one. Four deaths over one batch end the study, which can be started again.
 """

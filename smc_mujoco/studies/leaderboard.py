@@ -3,7 +3,7 @@
     boards = leaderboard(table)                        # a Board for each plant and metric
     boards[0].winner                                   # a law's name, or None if no law is significantly better
     print(boards[0].verdict)                           # the winner, and how much it has less than the next law
-    rich.print(tables.leaderboard(boards))             # of `cli.tables`
+    print(boards)                                      # tables, with all verdicts
 
 `analysis.ranking` defines samples, tests, winners and the correction, `analysis.bootstrap` the intervals of medians. A
 board is one metric in one group of runs. Laws are compared in each of its blocks, a plant in a condition. The tests are
@@ -15,8 +15,8 @@ would hold in other conditions.
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -38,12 +38,17 @@ from smc_mujoco.analysis.ranking import (
 )
 from smc_mujoco.analysis.signed_rank import least_p
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
+from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies import board_tables
 
+if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions, RenderableType
+
 FEW_TIMES = 0.5  # ratio below which values are called so many times less, not so many percent; chosen
+MAX_NAMES = 4  # of plants or conditions in a verdict
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 
 
@@ -138,7 +143,7 @@ class Block:
         return ", ".join(parts + [f"{self.sets} sets of gains"] * (self.sets > 1))
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@dataclasses.dataclass(frozen=True, kw_only=True, repr=False)
 class Board:
     """Laws compared in one metric within one group of runs.
 
@@ -183,6 +188,9 @@ class Board:
         winners = {block.winner for block in self.blocks}
         return winners.pop() if len(winners) == 1 else None
 
+    def __repr__(self) -> str:
+        return repr(Boards([self]))
+
     def _repr_html_(self) -> str:
         return Boards([self])._repr_html_()
 
@@ -214,14 +222,30 @@ class Board:
         return {"plant": "conditions", "condition": "plants"}.get("".join(self.group), "cells")
 
     @property
+    def label(self) -> str:
+        """The metric in words, such as "ultimate bound"."""
+        return "share that settles" if self.metric == SETTLES else CATALOGUE[self.metric].label
+
+    @property
+    def where(self) -> str:
+        """The plants and conditions in words, such as " on duffing under noise"."""
+        parts = {"on": [block.plant for block in self.blocks], "under": [block.condition for block in self.blocks]}
+        return "".join(f" {preposition} {_counted(names)}" for preposition, names in parts.items())
+
+    @property
     def verdict(self) -> str:
+        """The metric, the plants, the conditions and the `result`."""
+        return f"{self.label}{self.where}: {self.result}"
+
+    @property
+    def result(self) -> str:
         """The result in words: the winner, else where laws win and lose, why there is no winner, or the best laws."""
         if self.winner:
             leads = [block.lead for block in self.blocks if block.lead]
             least = min(leads, key=_shown_lead, default=None)
-            several = f", in all {len(self.blocks)} {self.kind}" * (len(self.blocks) > 1)
-            how = f"{', at least' * (len(leads) > 1)} {least.words}" if least else ""
-            return f"winner: {self.winner}{several}{':' * bool(least and len(leads) == 1)}{how}{self.gains}"
+            several = f" in all {len(self.blocks)} {self.kind}" * (len(self.blocks) > 1)
+            how = f": {'at least ' * (len(leads) > 1)}{least.words}" if least else ""
+            return f"{self.winner} wins{several}{how}{self.gains}"
         results = []
         for law in (entry.law for entry in self.entries):
             if wins := self.wins(law):
@@ -300,6 +324,12 @@ def _percent(share: float) -> str:
     return "-inf" if math.isinf(share) else f"{100 * share:.2g}" if abs(share) < 0.0995 else f"{100 * share:.0f}"
 
 
+def _counted(names: Sequence[str]) -> str:
+    """Return different names in words; if they are many, the first and the last."""
+    several = list(dict.fromkeys(names))
+    return joined(several) if len(several) <= MAX_NAMES else f"{several[0]} ... {several[-1]} ({len(several)})"
+
+
 def _shown_lead(lead: Lead) -> float:
     """Return the key by which the closest of several leads is chosen: ratios by their size, then differences."""
     return -lead.effect.high if lead.effect.relative else math.inf
@@ -310,18 +340,31 @@ def _distinct(runs: int) -> str:
 
 
 class Boards(list[Board]):
-    """Boards, a list that notebooks show as tables."""
+    """Boards: a list that terminals, notebooks and `print` show as tables, with a verdict on each board."""
+
+    @property
+    def tables(self) -> list[Tabular]:
+        """A table for each group of runs: a line for each law, a column for each metric.
+
+        A cell has a median with its interval. The median is marked if no law is better in any block, no run failed, and
+        there are enough runs for a winner.
+        """
+        return board_tables.tables(self)
+
+    def __repr__(self) -> str:
+        return "\n\n".join(map(str, self.tables))
+
+    def __rich_console__(self, console: "Console", options: "ConsoleOptions") -> "Iterator[RenderableType]":
+        for table in self.tables:
+            yield table
+            yield ""
 
     def _repr_html_(self) -> str:
-        return board_tables.as_html(self)
+        return "<br>".join(table._repr_html_() for table in self.tables)
 
     def to_latex(self) -> str:
-        """Return a LaTeX tabular for each group of runs: a line for each law, a column for each metric.
-
-        It needs the package booktabs. A cell has a median with its interval. The median is bold if no law is better in
-        any block and there are enough runs for a winner. Comments above it say what it is of.
-        """
-        return board_tables.as_latex(self)
+        """Return a LaTeX tabular for each of the `tables`, below comments that say what it is of; needs booktabs."""
+        return "\n".join(table.to_latex() for table in self.tables) if self else ""
 
 
 def _listed(names: Sequence[str]) -> str:

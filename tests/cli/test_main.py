@@ -766,7 +766,7 @@ def test_json_to_a_file_leaves_tables_where_they_are(capsys):
 
 
 def test_chatter_prints_predictions_and_measurements_and_writes_files(call, folder):
-    words = ["--laws", "super_twisting,observer_free", "--actuator", "lag:0.01", "--gains", "default", "--duration", 3]
+    words = ["--law", "super_twisting,observer_free", "--actuator", "lag:0.01", "--gains", "default", "--duration", 3]
     code, out, _ = call("chatter", "duffing", *words, "--json", "cycles.json", "--out", "chatter.pdf")
     assert code == 0
     assert max(map(len, out.splitlines())) <= 80
@@ -783,7 +783,7 @@ def test_chatter_prints_predictions_and_measurements_and_writes_files(call, fold
 
 def test_chatter_finds_the_largest_gains_of_a_wanted_amplitude(call):
     words = [
-        "--laws",
+        "--law",
         "classical",
         "--actuator",
         "lag:0.01",
@@ -806,13 +806,13 @@ def test_chatter_finds_the_largest_gains_of_a_wanted_amplitude(call):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--frequency", "5", "--actuator", "lag:0.01", "--laws", "classical"], "no law has such gains"),
-        (["--laws", ","], "',' holds no name"),
+        (["--frequency", "5", "--actuator", "lag:0.01", "--law", "classical"], "no law has such gains"),
+        (["--law", ","], "',' holds no name"),
         (["--actuator", "lagg:0.01"], "lag"),
         (["--actuator", "lag"], "lag:0.01"),
         (["--actuator", "lag:-1"], "-1"),
         (["--channel", "3"], "give 0 to 0"),
-        (["--laws", "clasical"], "classical"),
+        (["--law", "clasical"], "classical"),
         (["--out", "chatter.gif"], "chatter.gif"),
     ],
 )

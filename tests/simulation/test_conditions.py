@@ -370,22 +370,22 @@ def test_commands_take_conditions_as_text_and_models_as_files(file, tmp_path, mo
     monkeypatch.chdir(tmp_path)
     own = "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)"
     plants = f"duffing,{file}:shoulder"
-    arguments = ["--laws", "observer_free", "--gains", "default", "--seeds", "1", "--duration", "0.5", "--x0", "0.4"]
-    done = CliRunner().invoke(app, ["bench", "--plants", plants, "--condition", own, *arguments])
+    arguments = ["--law", "observer_free", "--gains", "default", "--seeds", "1", "--duration", "0.5", "--x0", "0.4"]
+    done = CliRunner().invoke(app, ["compare", plants, "--condition", own, *arguments])
     assert done.exit_code == 0, done.output
-    table = smc.Table.read(tmp_path / "study" / "results.parquet")
+    table = smc.Table.read(tmp_path / "compared" / "results.parquet")
     assert set(zip(table.column("plant"), table.column("condition"), strict=True)) == {
         ("duffing", "worn gear"),
         ("arm", "worn gear"),
     }
 
 
-def test_bench_has_conditions_for_a_model_of_ones_own_without_being_told_any(file, tmp_path, monkeypatch):
+def test_compare_has_conditions_for_a_model_of_ones_own_without_being_told_any(file, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    arguments = ["--laws", "pid", "--gains", "default", "--seeds", "1", "--duration", "0.05", "--x0", "0.4"]
-    done = CliRunner().invoke(app, ["bench", "--quick", "--plants", f"{file}:shoulder", *arguments])
+    arguments = ["--law", "pid", "--gains", "default", "--seeds", "1", "--duration", "0.05", "--x0", "0.4"]
+    done = CliRunner().invoke(app, ["compare", "--quick", f"{file}:shoulder", *arguments])
     assert done.exit_code == 0, done.output
-    done = CliRunner().invoke(app, ["bench", "--plants", f"{file}:shoulder", *arguments])
+    done = CliRunner().invoke(app, ["compare", f"{file}:shoulder", *arguments])
     assert done.exit_code == 0, done.output
 
 
@@ -399,15 +399,15 @@ TWO = """<mujoco model="two"><worldbody><body>
     ("arguments", "words"),
     [
         (
-            ("bench", "--plants", "arm.xml:shoulder", "--gains", "tuned"),
+            ("margins", "arm.xml:shoulder", "--x0", "0.4"),
             "smc-mujoco tune arm.xml:shoulder observer_free --out FILE.json",
         ),
         (("basin", "cart_pole", "--law", "hierarchical"), "hierarchical(a=...), or take the defaults"),
         (("tune", "two.xml:shoulder", "pid", "--x0", "0.4"), "two: it has no nominal model, which tuning takes"),
-        (("bench", "--laws", "pid(kp=x)"), "law 'pid(kp=x)' cannot be read: write it as pid(kp=50, ki=1)"),
-        (("bench", "--laws", "pid(50)"), "cannot be read"),
-        (("bench", "--laws", "classical,pdi(kp=5, ki=1)"), "did you mean 'pid'"),
-        (("margins", "--laws", "pid(kq=5)"), "unknown gain of pid"),
+        (("compare", "--law", "pid(kp=x)"), "law 'pid(kp=x)' cannot be read: write it as pid(kp=50, ki=1)"),
+        (("compare", "--law", "pid(50)"), "cannot be read"),
+        (("compare", "--law", "classical,pdi(kp=5, ki=1)"), "did you mean 'pid'"),
+        (("margins", "--law", "pid(kq=5)"), "unknown gain of pid"),
     ],
 )
 def test_commands_name_what_has_no_gains(arguments, words, file, tmp_path, monkeypatch, capsys):
@@ -425,11 +425,11 @@ def test_commands_take_laws_with_gains_of_their_own(file, tmp_path, monkeypatch)
     tuned = ["tune", "arm.xml:shoulder", "pid", "--budget", "2", "--out", "arm_pid.json"]
     assert runner.invoke(app, [*tuned, *common]).exit_code == 0
     laws = "arm_pid.json,classical(k=5, c=2e0),quick: classical(k=9)"
-    bench = ["bench", "--plants", "arm.xml:shoulder", "--laws", laws, "--seeds", "1", "--duration", "0.1", *common]
-    done = runner.invoke(app, bench)
+    words = ["compare", "arm.xml:shoulder", "--law", laws, "--seeds", "1", "--duration", "0.1", *common]
+    done = runner.invoke(app, words)
     assert done.exit_code == 0, done.output
     assert "Gains: classical and quick yours, pid tuned here (" in " ".join(done.output.split())
-    table = smc.Table.read(tmp_path / "study")
+    table = smc.Table.read(tmp_path / "compared")
     laws = {s.law.name: s.law for s in map(table.scenario, range(len(table)))}
     assert laws["pid"] == load(tmp_path / "arm_pid.json").law
     assert laws["classical"].gains == {"k": 5.0, "c": 2.0}
@@ -439,14 +439,14 @@ def test_commands_take_laws_with_gains_of_their_own(file, tmp_path, monkeypatch)
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("bench", "--condition", "worn: friction=Colomb(0.05)"), "did you mean 'Coulomb'"),
+        (("compare", "--condition", "worn: friction=Colomb(0.05)"), "did you mean 'Coulomb'"),
         (("margins", "duffing", "--condition", "noisy"), "did you mean 'noise'"),
         (("basin", "duffing", "--condition", "a: b=1"), "unknown field"),
-        (("bench", "--plants", "arm.xml"), "names no joints"),
-        (("bench", "--plants", "arm.xml:"), "names no joints"),
-        (("bench", "--condition", "worn.txt"), "no file 'worn.txt': give a file of conditions"),
+        (("compare", "arm.xml"), "names no joints"),
+        (("compare", "arm.xml:"), "names no joints"),
+        (("compare", "--condition", "worn.txt"), "no file 'worn.txt': give a file of conditions"),
         (("claims", "99"), "choose from T, 1, 3, 4, 5, 7, 10, 11"),
-        (("tune", "duffing", "classical", "--conditions", "noisy"), "did you mean 'noise'"),
+        (("tune", "duffing", "classical", "--condition", "noisy"), "did you mean 'noise'"),
     ],
 )
 def test_commands_refuse_in_one_sentence(arguments, words, tmp_path, monkeypatch, capsys):

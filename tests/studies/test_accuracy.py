@@ -148,7 +148,7 @@ def test_what_cannot_be_measured_is_one_sentence(options, message):
 def test_the_command_prints_a_table_that_fits_and_writes_what_was_asked(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
-    options = "--laws classical,pid(kp=20) --periods 0.004,0.002 --seeds 1 --duration 1 --json a.json --out a.pdf"
+    options = "--law classical,pid(kp=20) --periods 0.004,0.002 --seeds 1 --duration 1 --json a.json --out a.pdf"
     with pytest.raises(SystemExit) as end:
         main(["accuracy", "duffing", *options.split()])
     printed = capsys.readouterr()

@@ -5,6 +5,7 @@ import io
 import math
 import re
 import types
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -21,7 +22,7 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.law import catalogue, law_function
 from smc_mujoco.control.properties import searched
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
-from smc_mujoco.studies import adviser
+from smc_mujoco.studies import adviser, fair_gains
 from smc_mujoco.studies.advice import NEEDS
 
 FAST, SLOW = smc.law("observer_free", lam=6.0, k1=2.0), smc.law("observer_free", lam=6.0, k1=5.0).named("slow")
@@ -334,11 +335,12 @@ def test_the_best_law_on_each_need_is_a_finalist(folder, monkeypatch):
 
 def test_laws_are_tuned_as_the_packages_own_gains_were_where_these_are_compared(monkeypatch):
     asked = []
-    monkeypatch.setattr(adviser, "_tuned", lambda plant, law, budget, starts, *rest: asked.append((budget, starts)))
+    monkeypatch.setattr(fair_gains, "_tuned", lambda plant, law, budget, starts, *rest: asked.append((budget, starts)))
     known, other = adviser.QUICK.budget, smc.starts(x0=0.5)
-    laws = [catalogue()["classical"], catalogue()["observer_free_q15"]]
+    mine = law_function(gains={"k": 2.0})(lambda y, gains, memory: (-gains.k * y.e, y.e))
+    laws = [catalogue()["classical"], mine]
     for plant in (smc.plant("duffing"), smc.plant("duffing", M=2.0)):
-        adviser._with_gains(plant, laws, known, other, "gains", None, False)
+        fair_gains.fair_gains(plant, laws, Path("gains"), known, other)
     assert asked == [(search.BUDGET, None), (known, other), (known, other)]
 
 
@@ -380,7 +382,7 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
         return mujoco.MjSpec.from_string("<mujoco/>")
 
     asked, tuned = [], types.SimpleNamespace(before=1.0, objective=2.0, law=FAST)
-    monkeypatch.setattr(adviser, "cached", lambda path, depends, *rest: asked.append(depends) or tuned)
+    monkeypatch.setattr(fair_gains, "cached", lambda path, depends, *rest: asked.append(depends) or tuned)
     held = dataclasses.replace(my_spring, gains={**my_spring.gains, "kd": Gain(1.0, FORCE_PER_SPEED, held=True)})
     duffing = smc.plant("duffing")
     for plant, law in (
@@ -389,20 +391,22 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
         (duffing, held),
         (dataclasses.replace(duffing, build=build), my_spring),
     ):
-        adviser._tuned(plant, law, 4, None, folder, None)
+        fair_gains._tuned(plant, law, 4, None, folder, None)
     assert asked[0] == asked[1]
     assert len({str(depends) for depends in asked}) == 3
 
 
 def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(folder, monkeypatch):
     tuned = types.SimpleNamespace(before=1.0, objective=2.0, law=FAST)
-    monkeypatch.setattr(adviser, "cached", lambda *rest: tuned)
-    own = adviser._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None)
-    assert own[:2] == (smc.law("observer_free"), "its defaults, better than those tried")
+    monkeypatch.setattr(fair_gains, "cached", lambda *rest: tuned)
+    own = fair_gains._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None)
+    assert (own.law, own.remark) == (smc.law("observer_free"), "its defaults, better than those tried")
     assert own.law.source.kind == FAST.source.kind
-    tuned.before = 3.0
-    found = adviser._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None)
-    assert found[:2] == (FAST, "")
+    tuned.before, tuned.bounds = 3.0, FAST.gains
+    tuned.sets = [types.SimpleNamespace(gains=tuple(FAST.gains.values())), types.SimpleNamespace(gains=(5.0, 2.5))]
+    found = fair_gains._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None)
+    assert (found.law, found.remark) == (FAST, "")
+    assert [found(seed).gains["k1"] for seed in range(3)] == [2.0, 2.5, 2.0]
 
 
 def test_a_plant_that_cannot_be_tuned_has_default_gains_and_says_so(folder):
@@ -463,9 +467,9 @@ def test_what_cannot_be_is_one_sentence_before_anything_is_searched(arguments, s
 def test_the_command_prints_the_table_and_the_answer(folder, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     laws = "fast: observer_free(lam=6,k1=2),slow: observer_free(lam=6,k1=5)"
-    options = ("--needs", "fast", "--conditions", "nominal", "--seeds", "16", "--duration", "2.5", "--out", str(folder))
+    options = ("--needs", "fast", "--condition", "nominal", "--seeds", "16", "--duration", "2.5", "--out", str(folder))
     with pytest.raises(SystemExit) as end:
-        main.main(["which", "duffing", "--laws", laws, *options])
+        main.main(["which", "duffing", "--law", laws, *options])
     printed = " ".join(capsys.readouterr().out.split())
     assert not end.value.code
     assert (

@@ -101,7 +101,7 @@ print(json.dumps({"ends": ends, "wrote": wrote, "undisturbed": undisturbed, "sam
 """
 FULL = """
 import resource
-from smc_mujoco.cli.commands.studies import bench
+from smc_mujoco.cli.commands.studies import compare
 
 def filling(self, rows, add=store.Store.add, parts=[]):
     parts.append(rows)
@@ -110,7 +110,7 @@ def filling(self, rows, add=store.Store.add, parts=[]):
     add(self, rows)
 
 store.Store.add = filling
-bench(plants="duffing", laws="classical", conditions="noise", seeds=20, gains="study", duration=0.05, out=out)
+compare(["duffing"], ["classical"], ["noise"], seeds=20, gains="study", duration=0.05, out=out)
 """
 
 

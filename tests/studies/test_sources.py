@@ -1,12 +1,9 @@
 """Whose gains: a study keeps their sources, boards and pictures show them, and no winner is named over defaults."""
 
-import io
-
 import pytest
-from rich.console import Console
 
 import smc_mujoco as smc
-from smc_mujoco.cli import main, tables
+from smc_mujoco.cli import main
 from smc_mujoco.control import gain_sets
 from smc_mujoco.studies import run_key
 
@@ -29,21 +26,15 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("study")
 
 
-def text(table) -> str:
-    console = Console(width=100, file=io.StringIO())
-    console.print(table)
-    return " ".join(console.file.getvalue().split())
-
-
 def test_a_winner_is_named_over_rivals_at_their_defaults_only_where_it_is_asked_for(folder):
     (fair,) = ranked([FAST, SLOW], folder)
     assert fair.winner == "fast"
     boards = ranked([FAST, at_default(SLOW)], folder)
     (unfair,) = boards
     assert (unfair.winner, unfair.blocks[0].winner, unfair.wins("fast")) == (None, None, [])
-    assert unfair.verdict == "no winner: none is named over slow with default gains"
+    assert unfair.result == "no winner: none is named over slow with default gains"
     assert "textbf" not in boards.to_latex()
-    assert "rivals at defaults" in text(tables.leaderboard(boards))
+    assert unfair.verdict in " ".join(repr(boards).split())
     (asked,) = ranked([FAST, at_default(SLOW)], folder, defaults=True)
     assert asked.winner == "fast"
 
@@ -55,7 +46,7 @@ def test_a_law_at_its_own_defaults_may_win_over_others(folder):
 
 def test_boards_print_the_sources(folder):
     boards = ranked([FAST, at_default(SLOW)], folder)
-    for printed in (text(tables.leaderboard(boards)), boards._repr_html_(), boards.to_latex()):
+    for printed in (repr(boards), boards._repr_html_(), boards.to_latex()):
         assert "slow default" in printed
         assert "fast yours" in printed
     assert "slow & default &" in boards.to_latex()
@@ -92,14 +83,25 @@ def test_an_adviser_names_no_law_over_rivals_at_their_defaults(tmp_path):
     assert "No law is advised over" not in asked.answer[0]
 
 
-def test_bench_names_a_winner_over_defaults_with_an_option(tmp_path, capsys):
-    laws = "fast: observer_free(lam=6, k1=2), adaptive()"
-    options = ["--conditions", "nominal", "--seeds", "16", "--duration", "2", "--out", str(tmp_path)]
+def test_compare_names_a_winner_over_defaults_with_an_option(tmp_path, capsys):
+    laws = "fast: observer_free(lam=6, k1=2), adaptive"
+    options = [
+        "--condition",
+        "nominal",
+        "--seeds",
+        "16",
+        "--duration",
+        "2",
+        "--gains",
+        "default",
+        "--out",
+        str(tmp_path),
+    ]
     for extra in ([], ["--defaults"]):
         with pytest.raises(SystemExit):
-            main.main(["bench", "--plants", "duffing", "--laws", laws, *options, *extra])
+            main.main(["compare", "duffing", "--law", laws, *options, "--out", str(tmp_path), *extra])
         printed = " ".join(capsys.readouterr().out.split())
-        assert ("rivals at" in printed) == (not extra)
+        assert ("none is named over adaptive with default gains" in printed) == (not extra)
         assert "adaptive default" in printed
 
 

@@ -8,14 +8,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import typer
 from helpers import runs
 from helpers.runs import fails_late
-from typer.testing import CliRunner
 
 import smc_mujoco as smc
-from smc_mujoco.cli.commands.studies import bench
-from smc_mujoco.control.gain_sets import LAWS
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
@@ -139,12 +135,6 @@ def test_what_cannot_be_studied_is_refused_before_anything_runs(tmp_path):
     with pytest.raises(smc.ScenarioError, match="cannot use"):
         study(small(), tmp_path / "file")
     assert not (tmp_path / "a").exists()
-
-
-def test_the_command_takes_no_names_for_none(tmp_path, capsys):
-    with pytest.raises(SystemExit):
-        bench(laws=",", out=tmp_path / "a")
-    assert "',' holds no name: give names" in capsys.readouterr().err
 
 
 # failures
@@ -325,12 +315,3 @@ def test_all_traces_are_saved_and_none_twice(tmp_path, none_runs):
     file = saved_traces.path(tmp_path / "a" / "traces", row)
     assert file.name == f"duffing-nominal-observer_free-0-{row['hash'][:8]}.npz"
     assert dataclasses.replace(smc.load(file).scenario) == small()[0]
-
-
-def test_bench_on_a_plant_without_tuned_gains_takes_the_laws_defaults_and_says_so(tmp_path):
-    app = typer.Typer()
-    app.command()(bench)
-    options = ["--plants", "furuta", "--conditions", "nominal", "--seeds", "1", "--duration", "0.02"]
-    with pytest.warns(UserWarning, match="on furuta these laws have their default gains, .*: observer_free, "):
-        assert CliRunner().invoke(app, [*options, "--out", str(tmp_path)]).exit_code == 0
-    assert Table.read(tmp_path).column("plant").tolist() == ["furuta"] * len(LAWS)

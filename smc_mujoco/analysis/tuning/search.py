@@ -50,6 +50,7 @@ from smc_mujoco.analysis.tuning.result import (
 from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.common.errors import ScenarioWarning, find, users_frame, whole
 from smc_mujoco.common.progress import bar
+from smc_mujoco.common.text import joined
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
@@ -106,10 +107,12 @@ def tune(
         condition.
 
     Raises:
-      ScenarioError: a law with gains of unknown unit, a plant without scales, or an argument out of range.
+      ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales, or an argument out
+        of range.
 
     Warns:
-      ScenarioWarning: the law's own gains are better than any that were tried, or all chatter more than is wanted.
+      ScenarioWarning: a gain of unknown unit, which is searched about its default; the law's own gains are better than
+        any that were tried, or all chatter more than is wanted.
     """
     goal = objective if isinstance(objective, Objective) else find("objective", objective, OBJECTIVES)
     if conditions is not None:
@@ -127,6 +130,14 @@ def tune(
     reach = goal.starts.reach(dataclasses.replace(cases[0], x0=None))
     scales = search_space.scales(plant, bound, cases[0].model == "nominal", reach)
     start = search_space.box(law, scales)
+    if about := list(search_space.without_unit(law)):
+        warnings.warn(
+            f"{law.name}'s {joined(about)} {'have' if len(about) > 1 else 'has'} no unit, and so a search about "
+            f"{'their defaults' if len(about) > 1 else 'its default'} in place of the rule of all laws: write the unit,"
+            f' as in gains={{"{about[0]}": Gain({law.gains[about[0]]:g}, RATE)}}, see smc_mujoco.control.units',
+            ScenarioWarning,
+            users_frame(),
+        )
     tracking, variation = goal.terms(run(cases, threads))
     before = tracking + goal.weight * variation + goal.excess(cases[0])
     with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as drawn:

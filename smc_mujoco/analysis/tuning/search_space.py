@@ -15,7 +15,8 @@ way: k is at most u_max b, for the b of each candidate. The law declares this wi
 A law that has the model divides by the plant's g instead: its k is declared as a force and searched up to F = u_max /
 M. Gains k and b are tuned without the model. With the model, if g is less than b, the force k / g may be larger.
 
-A law declares the unit of each gain with the gain, and which gains are held at the law's own value:
+A law declares the unit of each gain with the gain, and which gains are held at the law's own value. A gain whose unit
+is not known is searched over as many decades about its default:
 
     @smc.law_function(gains={"lam": Gain(6.0, FORCE), "k1": Gain(2.5, RATE), "order": Gain(2.0, held=True)})
 
@@ -69,6 +70,12 @@ def unit(law: Component, name: str) -> Unit | None:
     return gain.unit  # pyright: ignore[reportReturnType]
 
 
+def without_unit(law: Component) -> dict[str, float]:
+    """Return gain -> default of a law's gains of unknown unit that are not held."""
+    gains = {name: _gain(law, name) for name in law.gains}
+    return {name: gain.default for name, gain in gains.items() if gain.unit is None and not gain.held}
+
+
 def size(law: Component, name: str, scales: Mapping[str, float]) -> float:
     """Return the size of a gain's unit for these sizes of F, X and T; 1 for a gain that is held."""
     its = unit(law, name)
@@ -102,13 +109,18 @@ def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[fl
     """Return gain -> lowest and highest value of the search, for all gains of a law that are not held.
 
     Raises:
-      ScenarioError: a gain without a known unit, or no gain to tune.
+      ScenarioError: a gain of unknown unit whose default is not positive, or no gain to tune.
     """
     bounds = {}
     if not law.uniform:
         raise ScenarioError(f"tuning needs gains that all channels share, not {law}: give one number for each gain")
+    about = without_unit(law)
     for name in law.gains:
-        if (its := unit(law, name)) is not None and not _gain(law, name).held:
+        if name in about:
+            if not about[name] > 0.0:
+                unit(law, name)  # raises: there is neither a unit nor a size
+            bounds[name] = (about[name] * 10**-DECADES, about[name] * 10**DECADES)
+        elif (its := unit(law, name)) is not None and not _gain(law, name).held:
             scale = its.of(plant_scales)
             bounds[name] = (scale * 10**-DECADES, scale if its == FORCE else scale * 10**DECADES)
     if not bounds:
@@ -133,4 +145,6 @@ def largest(law: Component, gains: Mapping[str, float], u_max: float) -> dict[st
 def widened(law: Component, bounds: Box) -> dict[str, tuple[float, float]]:
     """Return bounds a decade wider on either side, except above the actuator's limit."""
     by = 10**WIDENING
-    return {name: (low / by, high if unit(law, name) == FORCE else high * by) for name, (low, high) in bounds.items()}
+    return {
+        name: (low / by, high * (1 if _gain(law, name).unit == FORCE else by)) for name, (low, high) in bounds.items()
+    }

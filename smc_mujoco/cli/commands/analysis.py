@@ -34,7 +34,6 @@ def tune(
     chattering: Annotated[
         float | None, typer.Option(help="Largest predicted amplitude of s, in its unit, in the first condition.")
     ] = None,
-    conditions: Annotated[str | None, typer.Option(help="Conditions, as a,b, in place of those seven.")] = None,
     condition: options.Conditions = None,
     x0: options.X0 = None,
     spread: options.Spread = None,
@@ -66,7 +65,7 @@ def tune(
         objective,
         threads,
         progress=True,
-        conditions=options.conditions(options.names(conditions), condition) or None,
+        conditions=options.conditions(condition) or None,
         starts=options.starts(x0, spread),
         chattering=chattering,
     )
@@ -89,17 +88,8 @@ def tune(
 
 @errors_as_sentences()
 def margins(
-    plants: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="PLANT",
-            help="Plants from `smc-mujoco list`, or FILE.xml:joint+joint; default the paper's five.",
-            show_default=False,
-        ),
-    ] = None,
-    laws: Annotated[
-        str | None, typer.Option(help=f"Laws, as a,b; default those of the report's first page. {options.OWN_GAINS}")
-    ] = None,
+    plants: options.Plants = None,
+    law: options.Laws = None,
     kinds: Annotated[
         str | None, typer.Option(help="Any of delay, disturbance, friction, mass and noise, as a,b; default all.")
     ] = None,
@@ -121,7 +111,7 @@ def margins(
     rest becomes unstable; not every law can be linearised. A law may tolerate more, with a small steady oscillation.
     The module smc_mujoco.analysis.margins describes the search and its limits.
 
-    Example: smc-mujoco margins duffing --laws observer_free,classical --kinds delay
+    Example: smc-mujoco margins duffing --law observer_free,classical --kinds delay
     """
     with held_back():
         from smc_mujoco.analysis.margins import KINDS, save, save_csv
@@ -137,8 +127,8 @@ def margins(
         writable(ended(out, ".csv"))
     if json:
         writable(ended(json, ".json"))
-    machines = [options.plant(text) for text in plants or (QUICK["plants"] if quick else PLANTS)]
-    chosen = options.laws(laws, QUICK["laws"] if quick else gain_sets.LAWS)
+    machines = [options.plant(text) for text in options.names(plants, QUICK["plants"] if quick else PLANTS)]
+    chosen = options.laws(law, QUICK["laws"] if quick else gain_sets.LAWS)
     kind = options.names(kinds, QUICK["kinds"] if quick else KINDS)
     with bar("margins") as drawn:
         start = options.starts(x0, None)
@@ -158,10 +148,7 @@ def accuracy(
     plants: Annotated[
         list[str], typer.Argument(metavar="PLANT", help="Plants from `smc-mujoco list`, or FILE.xml:joint+joint.")
     ],
-    laws: Annotated[
-        str | None,
-        typer.Option(help=f"Laws, as a,b, or all; default those of the report's first page. {options.OWN_GAINS}"),
-    ] = None,
+    law: options.Laws = None,
     condition: options.Condition = "constant",
     periods: Annotated[str, typer.Option(help="Control periods, s, as a,b.")] = "0.004,0.002,0.001,0.0005,0.00025",
     seeds: Annotated[int, typer.Option(min=1, help="Initial states of each law at each period.")] = 3,
@@ -188,7 +175,7 @@ def accuracy(
     The default disturbance is a constant force of 0.2 N or N m. --condition coulomb asks the same of dry friction, and
     --condition "constant + sine" of a force that changes, against which laws need gains for its rate.
 
-    Example: smc-mujoco accuracy duffing --condition coulomb --laws classical,twisting,super_twisting,observer_free
+    Example: smc-mujoco accuracy duffing --condition coulomb --law classical,twisting,super_twisting,observer_free
     """
     with held_back():
         from smc_mujoco.cli import tables
@@ -204,8 +191,8 @@ def accuracy(
     pictures = files(out) if out else []
     for file in (*pictures, *([ended(json, ".json")] if json else [])):
         writable(file)
-    machines = [options.plant(text) for text in plants]
-    chosen = known(machines[0]) if laws == "all" else options.laws(laws, gain_sets.LAWS)
+    machines = [options.plant(text) for text in options.names(plants)]
+    chosen = known(machines[0]) if law == ["all"] else options.laws(law, gain_sets.LAWS)
     try:
         h = [float(text) for text in options.names(periods)]
     except ValueError:
@@ -288,9 +275,7 @@ def basin(
 @errors_as_sentences()
 def chatter(
     plant: options.PlantName,
-    laws: Annotated[
-        str | None, typer.Option(help=f"Laws, as a,b; default those of the report's first page. {options.OWN_GAINS}")
-    ] = None,
+    law: options.Laws = None,
     actuator: Annotated[
         str | None,
         typer.Option(metavar="PART:NUMBERS", help="What drives the joints, as lag:0.01, ratelimit:200 or dcmotor."),
@@ -327,7 +312,7 @@ def chatter(
     With --amplitude or --frequency, the gains of each law are scaled in proportion until the prediction is what you ask
     for. Then the constant disturbance that they tolerate is measured.
 
-    Example: smc-mujoco chatter duffing --laws classical,super_twisting --actuator lag:0.01 --out chatter
+    Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --out chatter
     """
     with held_back():
         from smc_mujoco.analysis.chattering import chattering, save, shared
@@ -352,7 +337,7 @@ def chatter(
             writable(file)
     else:
         pictures = []
-    chosen = options.laws(laws, gain_sets.LAWS)
+    chosen = options.laws(law, gain_sets.LAWS)
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
     cases = [case(options.plant(plant), law, condition, duration, gains, changes=fields) for law in chosen]
     designs = []

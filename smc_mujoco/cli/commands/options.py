@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation import conditions as named
     from smc_mujoco.simulation.initial_states import Starts
 
+SEPARATOR = re.compile(r",(?![^(]*\))")  # a comma outside brackets
+FIELD = re.compile(r"\w+\s*=")  # of a scenario, in a condition
+OWN_GAINS = "With your own gains: pid(kp=50, ki=1). Of a file: my_law.py, or gains.json of `smc-mujoco tune --out`."
+
 Columns = Annotated[
     str | None,
     typer.Option(
@@ -31,9 +35,10 @@ Conditions = Annotated[
     list[str] | None,
     typer.Option(
         "--condition",
-        metavar="TEXT|FILE",
-        help='Your own condition, as "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)", or a file'
-        " with one on each line; may be repeated.",
+        metavar="NAME|TEXT|FILE",
+        help='Conditions of `smc-mujoco list`, as a,b; noise+encoder for both at once; your own, as "worn gear: '
+        'friction=Coulomb(0.05)", or a file with one on each line. May be repeated.',
+        show_default=False,
     ),
 ]
 Condition = Annotated[
@@ -61,6 +66,24 @@ LawText = Annotated[
     str,
     typer.Argument(metavar="LAW|FILE", help="A law, as pid or pid(kp=50, ki=1), or a file with one."),
 ]
+Laws = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--law",
+        metavar="LAW|FILE",
+        help=f"Laws of `smc-mujoco laws`, as a,b. {OWN_GAINS} May be repeated.",
+        show_default=False,
+    ),
+]
+Plants = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="[PLANT...]",
+        help="Plants of `smc-mujoco list`, as a,b or a b, or FILE.xml:joint+joint; default the paper's five.",
+        show_default=False,
+    ),
+]
+Quick = Annotated[bool, typer.Option("--quick", help="Less of everything: a first answer in a minute or two.")]
 PlantName = Annotated[
     str,
     typer.Argument(metavar="PLANT", help="A plant from `smc-mujoco list`, or FILE.xml:joint+joint for your own model."),
@@ -76,9 +99,6 @@ Spread = Annotated[
 Threads = Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")]
 X0 = Annotated[float | None, typer.Option("--x0", help="Where runs start, rad or m; default the plant's own start.")]
 
-SEPARATOR = re.compile(r",(?![^(]*\))")  # a comma outside brackets
-OWN_GAINS = "With your own gains: pid(kp=50, ki=1). Of a file: my_law.py, or gains.json of `smc-mujoco tune --out`."
-
 
 @contextlib.contextmanager
 def joints_as_option() -> Iterator[None]:
@@ -89,17 +109,19 @@ def joints_as_option() -> Iterator[None]:
         raise ScenarioError(re.sub(r"\bjoints=", "--joints ", str(error))) from None
 
 
-def names(text: str | None, default: Sequence[str] = ()) -> Sequence[str]:
-    """Return the names in a text such as "a,b", or the default if there is no text.
+def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> list[str]:
+    """Return the names in a text such as "a,b", or in several, or the default if there is none.
 
     Raises:
       ScenarioError: a text without a name.
     """
-    if text is None:
-        return default
-    found = [name.strip() for name in SEPARATOR.split(text) if name.strip()]
-    if not found:
-        raise ScenarioError(f"{text!r} holds no name: give names, as a,b")
+    if texts is None:
+        return list(default)
+    found = []
+    for text in [texts] if isinstance(texts, str) else texts:
+        found += (own := [name.strip() for name in SEPARATOR.split(text) if name.strip()])
+        if not own:
+            raise ScenarioError(f"{text!r} holds no name: give names, as a,b")
     return found
 
 
@@ -137,11 +159,11 @@ def columns(text: str | None) -> dict[str, str]:
     return pairs(text, "columns", "theta=arm_angle,t=time")
 
 
-def laws(text: str | None, default: Sequence[str] = ()) -> "list[str | Law]":
+def laws(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> "list[str | Law]":
     """Return the laws in a text such as "pid,slow: classical(k=2),gains.json,my_law.py"; see `control.from_text`."""
     from smc_mujoco.control import from_text
 
-    return [made for one in names(text, default) for made in from_text.laws(one)]
+    return [made for one in names(texts, default) for made in from_text.laws(one)]
 
 
 def law(text: str) -> "str | Law":
@@ -190,20 +212,48 @@ def plant(text: str) -> "str | Plant":
     return plant_from(path, chosen)
 
 
-def conditions(known: Sequence[str], own: Sequence[str] | None) -> "list[named.Condition]":
-    """Return conditions by name, then those of the option --condition.
+def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
+    """Return the conditions of the option --condition: names, as a,b, texts and files.
 
     Raises:
       ScenarioError: an unknown name, or a text or file that cannot be read.
     """
     from smc_mujoco.simulation.conditions import find_condition, from_file
 
-    chosen = [find_condition(name) for name in known]
-    for text in own or ():
+    chosen = []
+    for text in _conditions_apart(texts or ()):
         if ":" not in text and (Path(text).name != text or Path(text).suffix) and not os.path.exists(text):
             raise ScenarioError(f"no file {text!r}: give a file of conditions, or one as worn: friction=Coulomb(0.05)")
         chosen += from_file(Path(text)) if os.path.exists(text) else [find_condition(text)]
     return chosen
+
+
+def _conditions_apart(texts: Sequence[str]) -> list[str]:
+    """Return the conditions in texts such as "noise,worn: friction=Coulomb(0.05), x0=0.3", each by itself."""
+    found: list[str] = []
+    for text in texts:
+        first = len(found)
+        for part in names(text):
+            if len(found) > first and ":" in found[-1] and ":" not in part and FIELD.match(part):
+                found[-1] += f", {part}"
+            else:
+                found.append(part)
+    return found
+
+
+def compared_laws(
+    texts: Sequence[str] | None, plants: "Sequence[str | Plant]", gains: str
+) -> "Sequence[str | Law] | None":
+    """Return the laws of the option --law of `compare`; None if it is not given; all general ones for "all"."""
+    from smc_mujoco.control import gain_sets
+    from smc_mujoco.simulation.conditions import PLANTS
+
+    if texts is None:
+        return None
+    if list(texts) == ["all"]:
+        every = gain_sets.general() if gains == "tuned" else gain_sets.general_laws(plants or PLANTS, gains)
+        return every
+    return laws(texts)
 
 
 def starts(x0: float | None, spread: float | None) -> "Starts | None":

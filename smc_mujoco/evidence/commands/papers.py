@@ -26,7 +26,7 @@ def claims(
         typer.Option(metavar="NAME|FOLDER", help="A paper of `smc-mujoco papers`, or a folder; default Gaber's."),
     ] = None,
     table: Annotated[
-        Path | None, typer.Option(help="results.parquet of `smc-mujoco bench`; its runs are not repeated.")
+        Path | None, typer.Option(help="results.parquet of `smc-mujoco compare`; its runs are not repeated.")
     ] = None,
     json: Annotated[
         bool, typer.Option("--json", help="Print one JSON document instead of tables, like --json - elsewhere.")

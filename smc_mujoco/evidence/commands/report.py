@@ -22,8 +22,8 @@ def report(
         Path | None,
         typer.Option(help="Folder with records of rigs, CSV or npz, which are shown beside their twins; see identify."),
     ] = None,
-    laws: Annotated[
-        str | None,
+    law: Annotated[
+        list[str] | None,
         typer.Option(help="Further laws, as a,b, beside the study's; each needs tuned gains on the study's plants."),
     ] = None,
     paper: Annotated[
@@ -51,14 +51,12 @@ def report(
         from smc_mujoco.evidence.report import paper as of_paper
         from smc_mujoco.evidence.report import report as make
 
-    if paper and (seeds or records or laws or relevant is not None):
-        raise ScenarioError(
-            "--seeds, --laws, --records and --relevant belong to the study: leave them out with --paper"
-        )
+    if paper and (seeds or records or law or relevant is not None):
+        raise ScenarioError("--seeds, --law, --records and --relevant belong to the study: leave them out with --paper")
     if paper:
         path = of_paper.report(paper, out, quick, threads, progress=True)
     else:
         path = make(
-            out, quick, seeds, threads, progress=True, records=records, laws=options.names(laws), relevant=relevant
+            out, quick, seeds, threads, progress=True, records=records, laws=options.names(law), relevant=relevant
         )
     print(f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")

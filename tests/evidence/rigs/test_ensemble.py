@@ -67,13 +67,13 @@ def test_a_board_of_a_voltage_is_in_volts(tmp_path):
 
 
 def test_the_command_compares_laws_on_every_set(tmp_path):
-    words = ["bench", "--rig", PENDULUM.name, "--laws", "pid(kp=30, kd=6),super_twisting", "--seeds", "1"]
+    words = ["compare", "--rig", PENDULUM.name, "--law", "pid(kp=30, kd=6),super_twisting", "--seeds", "1"]
     done = CliRunner().invoke(app, [*words, "--duration", "0.1", "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert "tv_rate: no law wins on all 5 parameter sets (none on any)" in done.output
     assert "10 runs, 0 of them failed, " in done.output
     own = ["--condition", "noise=0.1"]
-    for given in (["--plants", "duffing"], ["--conditions", "noise"], own, ["--gains", "study"]):
+    for given in (["duffing"], ["--condition", "noise"], own, ["--gains", "study"]):
         refused = CliRunner().invoke(app, [*words, *given])
         assert refused.exit_code == 2
         assert "--rig brings its own plant, parameter sets and gains: leave out" in refused.output

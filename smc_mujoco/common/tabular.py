@@ -1,0 +1,230 @@
+"""Tables of text, with writers for a terminal, for plain text of 80 columns, for notebooks and for LaTeX.
+
+    table = Tabular(headings=["law", "ITAE (m s^2)"], rows=[["pid", Cell("1.2", "1.1–1.3", strong=True)]])
+    print(table); rich.print(table); table.to_latex()
+
+A table that is wider than the terminal is shown in several parts, each with the columns at the left.
+"""
+
+import dataclasses
+import io
+import re
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from smc_mujoco.common import html
+
+if TYPE_CHECKING:
+    from rich.console import Console, ConsoleOptions, RenderableType
+    from rich.text import Text
+
+PLAIN_WIDTH = 80  # characters of a line of plain text
+NAME_WIDTH, HEADING_WIDTH = 20, 8  # characters: of names before they are broken, and of headings at least
+MAX_HTML_ROWS = 40
+NO_BREAK = "\N{NO-BREAK SPACE}"
+FIT = r"too wide for a column: \resizebox{\textwidth}{!}{...}, of graphicx, or fewer metrics"
+# A character -> as LaTeX writes it, with any engine.
+TEX = {c: f"\\{c}" for c in "&%$#_{}"} | {c: f"${c}$" for c in "<>|"}
+TEX |= {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+TEX |= {"–": "--", "·": r"$\cdot$", "×": r"$\times$", "±": r"$\pm$", "−": "$-$", "′": "$'$", "″": "$''$"}
+LETTERS = "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΦΨΩ"
+NAMES = (
+    "alpha beta gamma delta varepsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon varphi chi"
+)
+NAMES += " psi omega Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega"
+TEX |= {letter: f"$\\{name}$" for letter, name in zip(LETTERS, NAMES.split(), strict=True)}
+TEX |= {c: f"$_{i}$" for i, c in enumerate("₀₁₂₃₄₅₆₇₈₉")} | {c: f"$^{i}$" for i, c in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")}
+
+
+class Cell(NamedTuple):
+    """A text with a smaller one below it, such as a median and its interval.
+
+    Attributes:
+      text: the first line.
+      below: further lines.
+      strong: whether it is marked: bold, and with a star where letters have no weight.
+      colour: of the text in a terminal, as rich names it; "" for its own.
+      alarm: a last line, such as how many runs failed.
+    """
+
+    text: str
+    below: str = ""
+    strong: bool = False
+    colour: str = ""
+    alarm: str = ""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Tabular:
+    """A table.
+
+    Attributes:
+      headings: one for each column.
+      rows: a text or a Cell for each column.
+      title: above the table.
+      notes: paragraphs below it.
+      left: number of columns of names, which are aligned to the left.
+      stacked: whether a terminal shows these in one column, below each other.
+    """
+
+    headings: Sequence[str]
+    rows: Sequence[Sequence[Cell | str]]
+    title: str = ""
+    notes: Sequence[str] = ()
+    left: int = 1
+    stacked: bool = False
+
+    def __str__(self) -> str:
+        return plain(self)
+
+    def __rich_console__(self, console: "Console", options: "ConsoleOptions") -> "Iterator[RenderableType]":
+        from rich import box
+        from rich.table import Table
+        from rich.text import Text
+
+        columns = self._columns(options.max_width)
+        names = 1 if self.stacked else self.left
+        if self.title:
+            yield Text(self.title, "bold")
+        for part in _parts([_widest(column) for column in columns], options.max_width, names):
+            table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False, show_edge=False)
+            lines = max(columns[i][0].plain.count("\n") for i in part)
+            for i in part:
+                head = Text("\n" * (lines - columns[i][0].plain.count("\n"))).append_text(columns[i][0])
+                table.add_column(head, justify="left" if i < names else "right", overflow="fold")
+            for row in zip(*(columns[i][1:] for i in part), strict=True):
+                table.add_row(*row)
+            yield table
+        for note in self.notes:
+            yield Text(note)
+
+    def _columns(self, width: int) -> "list[list[Text]]":
+        """Return the columns of names, then those of numbers, with wide intervals on two lines where space is short."""
+        names = [self._stacked()] if self.stacked else [self._names(i) for i in range(self.left)]
+        numbers = range(self.left, len(self.headings))
+        columns, narrow = [self._column(i) for i in numbers], [self._column(i, narrow=True) for i in numbers]
+        while sum(_widest(column) + 1 for column in [*names, *columns]) - 1 > width:
+            gains = [_widest(wide) - _widest(other) for wide, other in zip(columns, narrow, strict=True)]
+            if max(gains, default=0) <= 0:
+                break
+            at = gains.index(max(gains))
+            columns[at] = narrow[at]
+        return [*names, *columns]
+
+    def _names(self, i: int) -> "list[Text]":
+        """Return a column of names."""
+        from rich.text import Text
+
+        cells = [_cell(row[i]) for row in self.rows]
+        return [Text(self.headings[i]), *(Text(folded(cell.text, NAME_WIDTH), cell.colour) for cell in cells)]
+
+    def _stacked(self) -> "list[Text]":
+        """Return the columns of names as one: the heading, then the first name, and below it the others."""
+        from rich.text import Text
+
+        texts = [Text(self.headings[0])]
+        for first, *others in (map(_cell, row[: self.left]) for row in self.rows):
+            name = Text(folded(first.text, NAME_WIDTH), first.colour)
+            texts.append(name.append("".join(f"\n{other.text}" for other in others if other.text), "dim"))
+        return texts
+
+    def _column(self, i: int, narrow: bool = False) -> "list[Text]":
+        """Return the heading and the cells of a column of numbers. If `narrow`, intervals are on two lines."""
+        from rich.text import Text
+
+        cells = [_cell(row[i]) for row in self.rows]
+        cells = [cell._replace(below=cell.below.replace("–", "–\n")) for cell in cells] if narrow else cells
+        star = any(cell.strong for cell in cells)
+        texts = []
+        for cell in cells:
+            mark = "*" if cell.strong else " " * star
+            text = Text(cell.text + mark, f"{'bold ' * cell.strong}{cell.colour}".strip())
+            for lines, style in ((cell.below, "dim not bold"), (cell.alarm, "red not bold")):
+                text.append("".join(f"\n{line}{' ' * star}" for line in lines.splitlines()), style)
+            texts.append(text)
+        width = max([HEADING_WIDTH, *map(_width, texts)])
+        whole = re.sub(r"\(.*\)", lambda unit: unit[0].replace(" ", NO_BREAK), self.headings[i])
+        heading = "\n".join(textwrap.wrap(whole, width, break_long_words=False)).replace(NO_BREAK, " ")
+        return [Text(heading), *texts]
+
+    def _repr_html_(self) -> html.Html:
+        lines = [[_html(_cell(cell)) for cell in row] for row in self.rows]
+        note = html.Html("<br>".join(map(html.text, self.notes)))
+        numbers = range(self.left, len(self.headings))
+        heads = [heading.replace("^2", "²") for heading in self.headings]
+        return html.table(heads, lines, self.title, note, numbers, most=MAX_HTML_ROWS)
+
+    def to_latex(self) -> str:
+        """Return a tabular, which needs the package booktabs, below comments with the title and the notes."""
+        lines = [f"% {text}" for text in (self.title, *self.notes, "needs booktabs", FIT) if text]
+        lines += [f"\\begin{{tabular}}{{{'l' * self.left}{'r' * (len(self.headings) - self.left)}}}", "\\toprule"]
+        lines += [_tex_line(map(tex, self.headings)), "\\midrule"]
+        lines += [_tex_line(_tex_cell(_cell(cell)) for cell in row) for row in self.rows]
+        return "\n".join([*lines, "\\bottomrule", "\\end{tabular}\n"])
+
+
+def plain(shown: "RenderableType", width: int = PLAIN_WIDTH) -> str:
+    """Return what rich prints, as text without colours."""
+    from rich.console import Console
+
+    console = Console(
+        file=io.StringIO(), width=width, markup=False, emoji=False, highlight=False, color_system=None,
+        force_terminal=False, force_jupyter=False,
+    )  # fmt: skip
+    console.print(shown)
+    return "\n".join(line.rstrip() for line in console.file.getvalue().splitlines())  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def folded(name: str, width: int) -> str:
+    """Return a name on several lines, broken at spaces and after underscores."""
+    return "\n".join(line.replace("_ ", "_") for line in textwrap.wrap(name.replace("_", "_ "), width))
+
+
+def _cell(cell: Cell | str) -> Cell:
+    return cell if isinstance(cell, Cell) else Cell(cell)
+
+
+def _width(text: "Text") -> int:
+    """Return the width of the longest line."""
+    return max((line.cell_len for line in text.split("\n")), default=0)
+
+
+def _widest(column: "Sequence[Text]") -> int:
+    return max(map(_width, column))
+
+
+def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
+    """Return the columns of each part of a table that fits into a width; each part begins with the names."""
+    left = list(range(names))
+    parts = [left]
+    for i, own in enumerate(widths[names:], names):
+        if len(parts[-1]) > names and sum(widths[k] + 1 for k in parts[-1]) + own > width:
+            parts.append(left)
+        parts[-1] = [*parts[-1], i]
+    return parts
+
+
+def _html(cell: Cell) -> html.Html:
+    """Return a cell as HTML, with the lines below in smaller letters."""
+    text = html.strong(cell.text) if cell.strong else html.text(cell.text)
+    below = "<br>".join(html.text(line) for line in (cell.below, cell.alarm) if line)
+    return html.Html(f'{text}<br><small style="white-space:nowrap">{below}</small>') if below else text
+
+
+def _tex_line(cells: Iterable[str]) -> str:
+    return f"{' & '.join(cells)} \\\\"
+
+
+def _tex_cell(cell: Cell) -> str:
+    """Return a cell as LaTeX, with the line below in brackets beside it."""
+    text, below = (re.sub(r"([\d.]+)e(-?\d+)", r"\1·10^\2", line) for line in (cell.text, cell.below))
+    strong = f"\\textbf{{{tex(text)}}}" if cell.strong else tex(text)
+    return (f"{strong} [{tex(below)}]" if below else strong) + (f", {tex(cell.alarm)}" if cell.alarm else "")
+
+
+def tex(text: str) -> str:
+    """Return text with LaTeX's own characters escaped, and powers, Greek letters and dashes as LaTeX writes them."""
+    return re.sub(
+        r"\^(-?\d+)|(.)", lambda found: TEX.get(found[2], found[2]) if found[2] else f"$^{{{found[1]}}}$", text
+    )

@@ -1,0 +1,313 @@
+"""Comparison of laws on plants in conditions, in one call: gains, runs, tables, verdicts, figures.
+
+    found = smc.compare([my_law, "classical"], ["duffing", "inverted_pendulum"], ["friction", "encoder"])
+    print(found)                                   # tables of at most 80 columns, and a verdict on every metric
+    found.plot("compared.pdf")
+    open("compared.tex", "w").write(found.to_latex())
+
+It is made of parts that can be used alone: `fair_gains`, `smc.grid`, `smc.study` and `smc.leaderboard`.
+"""
+
+import dataclasses
+import functools
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from smc_mujoco.analysis.differences import RELEVANT, share_that_matters
+from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.analysis.tuning import search
+from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, taken, whole
+from smc_mujoco.common.errors import number as checked
+from smc_mujoco.common.extras import package
+from smc_mujoco.common.tabular import Tabular, plain
+from smc_mujoco.common.text import joined
+from smc_mujoco.control import gain_sets, source
+from smc_mujoco.control.component import Component, Template, written
+from smc_mujoco.control.law import Law, catalogue, fits, known_laws
+from smc_mujoco.control.properties import suitable
+from smc_mujoco.mechanisms.plant import Plant, as_plant
+from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation.conditions import Condition, applicable, find_condition
+from smc_mujoco.simulation.grid import check_apart, crossed, listed, listed_laws
+from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies import executors
+from smc_mujoco.studies.fair_gains import Candidate, fair_gains
+from smc_mujoco.studies.leaderboard import METRICS, Boards, leaderboard
+from smc_mujoco.studies.study import FULL, QUICK, study
+from smc_mujoco.studies.table import Table
+
+if TYPE_CHECKING:
+    import pandas  # pyright: ignore[reportMissingImports]
+    from matplotlib.figure import Figure, SubFigure
+    from rich.console import Console, ConsoleOptions, RenderableType
+
+    from smc_mujoco.draw.page import Size
+
+MAX_BLOCKS = 12  # plants times conditions that have a table each; of more, each plant has one over its conditions
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Compared:
+    """Laws compared on plants in conditions. `print` and notebooks show its tables and verdicts.
+
+    Attributes:
+      table: a row for each run, with all its scores, as `smc.study` returns it.
+      gains: plant -> law -> the law with its gains, `gains["duffing"]["classical"].source` tells where they come from.
+      candidates: plant -> the laws with all sets of gains that their runs used, and remarks on them.
+      metrics: names of the metrics that are compared.
+      defaults: whether a winner may be named over laws with default gains.
+      relevant: the least relevant difference, as a share of the larger value.
+      out: the folder with the gains and the runs.
+    """
+
+    table: Table
+    candidates: Mapping[str, Sequence[Candidate]]
+    metrics: tuple[str, ...]
+    defaults: bool
+    relevant: float
+    out: Path
+
+    @property
+    def gains(self) -> dict[str, dict[str, Law]]:
+        """Plant -> law -> the law with its best gains."""
+        return {plant: {one.law.name: one.law for one in its} for plant, its in self.candidates.items()}
+
+    @functools.cached_property
+    def leaderboard(self) -> Boards:
+        """A board for each metric on each plant in each condition, or on each plant if these are more than 12."""
+        blocks = set(zip(self.table.column("plant").tolist(), self.table.column("condition").tolist(), strict=True))
+        by = ("plant", "condition") if len(blocks) <= MAX_BLOCKS else ("plant",)
+        return leaderboard(self.table, self.metrics, by, defaults=self.defaults, relevant=self.relevant)
+
+    @functools.cached_property
+    def traces(self) -> list[Trace]:
+        """The traces of the first seed: of each plant, in each condition, of each law; computed when first used."""
+        first = min(self.table.column("seed").tolist())
+        rows = [i for i, seed in enumerate(self.table.column("seed").tolist()) if seed == first]
+        return run([self.table.scenario(i) for i in rows])
+
+    @property
+    def verdicts(self) -> list[str]:
+        """A sentence for each metric on each plant in each condition: the winner, or why there is none."""
+        return [board.verdict for board in self.leaderboard]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What is to be known of the gains: the laws with defaults, and why."""
+        found: dict[str, list[str]] = {}
+        for plant, its in self.candidates.items():
+            for one in its:
+                default = "default gains" * (one.law.source.kind == source.DEFAULT)
+                if words := "; ".join(filter(None, (default, one.remark))):
+                    found.setdefault(f"{one.law.name}: {words}", []).append(plant)
+        return [f"{words} (on {joined(plants)})" for words, plants in found.items()]
+
+    @property
+    def tables(self) -> list[Tabular]:
+        """The tables of the `leaderboard`, then one of the gains with their sources."""
+        lines = [
+            (plant, one.law.name, one.law.source.kind, f"{len(one.sets)}", _gains(one.law))
+            for plant, its in self.candidates.items()
+            for one in its
+        ]
+        heads = ["plant", "law", "gains", "sets", "best set"]
+        return [
+            *self.leaderboard.tables,
+            Tabular(headings=heads, rows=lines, title="Gains", notes=self.remarks, left=5),
+        ]
+
+    def __repr__(self) -> str:
+        return plain(self)
+
+    def __rich_console__(self, console: "Console", options: "ConsoleOptions") -> "Iterator[RenderableType]":
+        for table in self.tables:
+            yield table
+            yield ""
+
+    def _repr_html_(self) -> str:
+        return "<br>".join(table._repr_html_() for table in self.tables)
+
+    def to_latex(self) -> str:
+        """Return a LaTeX tabular for each plant in each condition, below comments with the verdicts; needs booktabs."""
+        return self.leaderboard.to_latex()
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return a pandas DataFrame with a row for each law, plant, condition and metric.
+
+        Its columns are plant, condition, law, gains (their source), metric, unit, median, low and high (the interval),
+        failed (runs without a value), runs, best (whether no law is better) and winner. All runs are in
+        `table.data.to_pandas()`.
+
+        Raises:
+          MissingPackageError: pandas is not installed.
+        """
+        with package("pandas", "Compared.to_pandas"):
+            import pandas  # pyright: ignore[reportMissingImports]
+
+        return pandas.DataFrame(list(self._rows()))
+
+    def _rows(self) -> Iterator[dict[str, Any]]:
+        """Yield the rows of `to_pandas`."""
+        for board in self.leaderboard:
+            for entry in board.entries:
+                low, high = entry.interval.low, entry.interval.high
+                yield {
+                    **{"plant": "", "condition": ""} | dict(board.group),
+                    "law": entry.law,
+                    "gains": ", ".join(dict.fromkeys(one.kind for one in entry.sources)),
+                    "metric": board.metric,
+                    "unit": board.unit,
+                    "median": entry.interval.median,
+                    "low": low,
+                    "high": high,
+                    "failed": entry.failed,
+                    "runs": entry.runs,
+                    "best": entry.rank.best,
+                    "winner": board.winner == entry.law,
+                }
+
+    def plot(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        metrics: Sequence[str] = (),
+        title: str | None = None,
+        size: "Size" = None,
+        format: str | None = None,
+        fig: "Figure | SubFigure | None" = None,
+    ) -> "Figure | SubFigure":
+        """Draw the medians with their intervals by condition, as `smc.plot` does with a table.
+
+        Args:
+          path, title, size, format, fig: as in `smc.figure`.
+          metrics: names of metrics. Default: settling time, ultimate bound and variation of u.
+        """
+        from smc_mujoco.draw import board
+
+        return board.plot(self.table, path, metrics or board.METRICS, title, size, format, fig)
+
+
+def compare(
+    laws: str | Law | Template | Sequence[str | Law | Template] | None = None,
+    plants: str | Plant | Sequence[str | Plant] | None = None,
+    conditions: str | Condition | Sequence[str | Condition] | None = None,
+    seeds: int = 16,
+    tune: bool = True,
+    worst: bool = False,
+    executor: str | Executor | None = None,
+    *,
+    out: str | os.PathLike[str] = "compared",
+    metrics: Sequence[str] = METRICS,
+    duration: float | None = None,
+    starts: Starts | None = None,
+    gains: str = "tuned",
+    budget: int | None = None,
+    quick: bool = False,
+    defaults: bool = False,
+    relevant: float = RELEVANT,
+    traces: str = "none",
+    fresh: bool = False,
+    threads: int | None = None,
+    progress: bool = True,
+) -> Compared:
+    """Compare laws on plants in conditions, with gains by one rule for all, and say which is better and how sure it is.
+
+    A law whose gains you gave keeps them. Any other law, yours too, has those that come with the package for the plant,
+    or is tuned by the same rule, which takes some seconds for each law on each plant. Gains and runs are kept in the
+    folder: after a kill, the same call goes on from there. A winner is not named over laws with default gains.
+
+    Args:
+      laws: names, or your own laws. Default: those of the report's first page that are for the plant, or else all that
+        suit it.
+      plants: names, or Plants, such as one from your own MJCF. Default: the paper's five.
+      conditions: names, such as "friction" or "noise + coulomb", texts, or your own, see `condition`. Default: one of
+        each kind that suits the plants.
+      seeds: runs of a law on each plant in each condition; each has another start and other noise, the same for every
+        law, and the next of the law's sets of gains.
+      tune: whether to tune laws without gains for a plant; otherwise they run with their defaults.
+      worst: whether to search the worst case of each law too.
+      executor: where runs are computed, as in `study`; None for this machine.
+      out: folder for gains and runs.
+      metrics: names of metrics, for which lower is better, or "settles".
+      duration: of a run, s. Default: 10, or 3 if quick.
+      starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
+      gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
+      budget: largest number of sets of gains that a tuning tries. Default: 768, or a third of it if quick and no law
+        has gains of the package.
+      quick: shorter runs and searches; by default three plants and three conditions.
+      defaults: whether a winner may be named over laws whose gains are their defaults.
+      relevant: the least relevant difference, as a share of the larger value.
+      traces: traces to save in the folder: "none", "all" or "worst".
+      fresh: whether to remove the runs that are in the folder first.
+      threads: simulations at once; None for one per available core.
+      progress: whether to show progress.
+
+    Raises:
+      ScenarioError: an unknown name, or arguments that `grid`, `study` or `leaderboard` refuse.
+    """
+    extent = QUICK if quick else FULL
+    count, relevant = whole("seeds", seeds, 1, MAX_ITEMS), share_that_matters(relevant)
+    duration = extent.duration if duration is None else checked("duration", duration, above=0.0)
+    tries = search.BUDGET // (3 if quick else 1) if budget is None else whole("budget", budget, 1, MAX_ITEMS)
+    where = executors.checked("local" if executor is None else executor)
+    for name in taken("metrics", metrics):
+        find("metric", name, dict.fromkeys((SETTLES, *CATALOGUE)))
+    find("set of gains", gains, dict.fromkeys((*gain_sets.SETS, "default")))
+    if not isinstance(out, str | os.PathLike):
+        raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
+    machines = [as_plant(plant) for plant in (extent.plants if plants is None else listed("plants", plants))]
+    names = (
+        applicable(extent.conditions, machines, duration) if conditions is None else listed("conditions", conditions)
+    )
+    asked = [find_condition(one) for one in names]
+    compared = {plant.name: [_asking(law) for law in _chosen(laws, plant)] for plant in machines}
+    every = {id(law): law for its in compared.values() for law in its}.values()
+    check_apart(machines, [coerce.law(law) for law in every], asked)
+    crossed(machines, lambda _: [lambda _: coerce.law("none")], asked, [0], duration, starts)  # refused before tuning
+    folder = Path(out)
+    options = {"tune": tune and gains == "tuned", "gains": gains, "alike": budget is None}
+    candidates = {
+        plant.name: fair_gains(
+            plant, compared[plant.name], folder / "gains", tries, starts, threads, progress, **options
+        )
+        for plant in machines
+    }
+    runs = crossed(machines, lambda plant: candidates[plant.name], asked, range(count), duration, starts)
+    table = study(runs, folder, not fresh, where, threads, progress, traces)
+    return Compared(
+        table=table,
+        candidates=candidates,
+        metrics=tuple(metrics),
+        defaults=defaults,
+        relevant=relevant,
+        out=folder,
+    )
+
+
+def _chosen(laws: Any, plant: Plant) -> list[Any]:
+    """Return the laws to compare on a plant."""
+    if laws is not None:
+        return listed_laws(laws)
+    known = [name for name in gain_sets.LAWS if fits(catalogue()[name], plant)]
+    left_out = {"none", *gain_sets.FORMS}  # FORMS are other implementations of laws that are there already
+    return known or [law for law in suitable(plant=plant) if law.name not in left_out]
+
+
+def _asking(law: object) -> Component | Template:
+    """Return a law as a template if its gains were not given by the user."""
+    if isinstance(law, str):
+        return known_laws()[law]
+    if isinstance(law, Template):
+        return law
+    given = coerce.law(law)  # pyright: ignore[reportArgumentType]
+    return given.template if given.template and given.source.kind == source.DEFAULT else given
+
+
+def _gains(law: Law) -> str:
+    """Return gains as text, such as "k1=3, c=2"."""
+    return ", ".join(f"{name}={written(value)}" for name, value in law.gains.items())

@@ -1,0 +1,155 @@
+"""Gains for laws that are compared on a plant, all by one rule.
+
+    for candidate in fair_gains("duffing", ["classical", my_law], Path("folder")):
+        print(candidate.law.name, candidate.law.source, candidate.remark)
+
+A law has the gains that the user gave it, or else those that come with the package for the plant, or else those of a
+search by the same rule: the same bound on u, the same starts and as many evaluations as those of the package. A law
+that cannot be tuned keeps its defaults, and its remark says why. A law whose gains were searched has several sets of
+near-optimal gains. Run s uses set s modulo their number, so that a comparison holds over the gains that a tuning may
+end with.
+"""
+
+import dataclasses
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from smc_mujoco.analysis.tuning import result, search, search_space
+from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.common import fingerprint
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
+from smc_mujoco.common.progress import bar
+from smc_mujoco.common.text import joined
+from smc_mujoco.control import gain_sets, source
+from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.law import catalogue
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import catalogue as plants_known
+from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation.conditions import applicable
+from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.studies import run_key
+from smc_mujoco.studies.cache import cached
+
+
+class Candidate(NamedTuple):
+    """A law with its gains for a plant.
+
+    Attributes:
+      law: with the best gains.
+      sets: the law with each set of gains that its runs use in turn.
+      remark: what is to be said of the gains besides their source.
+    """
+
+    law: Component
+    sets: tuple[Component, ...]
+    remark: str = ""
+
+    def __call__(self, seed: int) -> Component:
+        """Return the law with the gains of a run."""
+        return self.sets[seed % len(self.sets)]
+
+
+def fair_gains(
+    plant: Plant,
+    laws: Sequence[Component | Template],
+    folder: Path,
+    budget: int = search.BUDGET,
+    starts: Starts | None = None,
+    threads: int | None = None,
+    progress: bool = False,
+    tune: bool = True,
+    gains: str = "tuned",
+    alike: bool = True,
+) -> list[Candidate]:
+    """Return laws with gains for a plant: given, shipped, tuned or default ones, in this order of preference.
+
+    Laws that are tuned beside shipped gains are tuned as these were: from the same starts, with the same budget.
+
+    Args:
+      laws: those without given gains as templates.
+      folder: for the results of searches; another call takes from there what it needs again.
+      budget, starts: of searches, see `smc.tune`.
+      threads, progress: as in `smc.run`.
+      tune: whether to search gains; otherwise laws without shipped ones keep their defaults.
+      gains: the set of shipped gains.
+      alike: whether laws that are tuned beside shipped gains have the budget of these.
+    """
+    found = [_known(plant, law, gains) for law in laws]
+    if any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in found):
+        starts = None
+        budget = search.BUDGET if alike else budget
+    missing = [k for k, candidate in enumerate(found) if candidate is None]
+    with bar(f"gains on {plant.name}", len(missing), shown=progress and tune and bool(missing), counted=True) as drawn:
+        for k in missing:
+            drawn.says(f"gains of {laws[k].name} on {plant.name}")
+            found[k] = _tuned(plant, laws[k], budget, starts, folder, threads) if tune else _default(laws[k])
+            drawn.advance(1)
+    return [candidate for candidate in found if candidate is not None]
+
+
+def _known(plant: Plant, law: Component | Template, gains: str) -> Candidate | None:
+    """Return a law whose gains need no search; None for one that must be tuned."""
+    if isinstance(law, Component):
+        return Candidate(law, (law,))
+    if not law.gains or gains == "default":
+        return _default(law)
+    own = plants_known().get(plant.name)
+    alike = own is not None and own.parameters == plant.parameters and catalogue().get(law.name) is law
+    if alike and not plant.unscaled and _there(plant, law.name, gains):
+        count = 1 if gains == "study" else len(gain_sets.tuned(plant, law.name, gains).sets)
+        sets = tuple(gain_sets.law(plant, law.name, gains, seed) for seed in range(count))
+        return Candidate(sets[0], sets)
+    return _default(law, f"tuning is not possible here: {plant.unscaled.partition(':')[0]}") if plant.unscaled else None
+
+
+def _there(plant: Plant, name: str, gains: str) -> bool:
+    """Return whether a set has gains for a law on a plant."""
+    try:
+        gain_sets.law(plant, name, gains)
+    except ScenarioError:
+        return False
+    return True
+
+
+def _default(law: Component | Template, remark: str = "") -> Candidate:
+    """Return a law with its defaults."""
+    made = coerce.law(law)
+    return Candidate(made, (made,), remark)
+
+
+def _tuned(
+    plant: Plant, law: Component | Template, budget: int, starts: Starts | None, folder: Path, threads: int | None
+) -> Candidate:
+    """Return a law with gains from `tune`, or from the file of an earlier call; its defaults if it cannot be tuned."""
+    usual, chosen = Objective(), coerce.law(law)
+    conditions = tuple(one for one in usual.conditions if applicable([one.name], [plant], usual.duration))
+    goal = dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
+    try:
+        (first, *_) = goal.scenarios(plant, chosen, 0)
+        template = law if isinstance(law, Template) else chosen.template
+        searched = template and (dict(template.gains), dict(template.conditions))  # which gains, and where
+        depends = [run_key.key(first), goal.describe(), fingerprint.of((chosen.function, searched))]
+        with warnings.catch_warnings():
+            for words in ("no set of gains tried", ".* no unit, and so a search"):  # the remark says so
+                warnings.filterwarnings("ignore", words, ScenarioWarning)
+            tuned = cached(
+                folder / f"{plant.name}-{law.name}-{budget}.json",
+                depends,
+                lambda: search.tune(plant, law, budget, objective=goal, threads=threads),
+                lambda made, path: made.save(path),
+                result.load,
+            )
+    except ScenarioError as error:
+        return _default(law, f"not tuned: {error}")
+    its = tuned.law.source
+    if tuned.before < tuned.objective:
+        chosen = chosen.sourced(its.kind, its.search)
+        return Candidate(chosen, (chosen,), "its defaults, better than those tried")
+    every = [dict(zip(tuned.bounds, one.gains, strict=True)) for one in tuned.sets]
+    found = (dataclasses.replace(chosen, gains=dict(chosen.gains) | own) for own in every)
+    sets = tuple(one.sourced(its.kind, its.search) for one in found)
+    about = joined(search_space.without_unit(chosen))
+    return Candidate(sets[0], sets, f"{about} searched about the defaults, as no unit is known" * bool(about))

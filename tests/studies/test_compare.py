@@ -1,0 +1,155 @@
+"""One call that compares laws: gains by one rule, their sources, verdicts that say where, resumed from its folder."""
+
+import math
+import re
+import warnings
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.tuning import search
+from smc_mujoco.cli import main
+from smc_mujoco.control import gain_sets
+from smc_mujoco.control.units import FORCE, RATE, Gain
+from smc_mujoco.studies import executors, fair_gains
+
+SHORT = {"duration": 1.0, "budget": 48, "progress": False}
+
+
+@smc.law_function(gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(3.0, RATE, positive=True)})
+def my_law(y, gains, memory):
+    s = y.de + gains.k1 * y.e
+    return -gains.lam * math.tanh(s), s
+
+
+@smc.law_function(gains={"lam": 4.0, "k1": 3.0})
+def plain_law(y, gains, memory):
+    s = y.de + gains.k1 * y.e
+    return -gains.lam * math.tanh(s), s
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    laws = [my_law, "classical", smc.law("pid", kp=20.0)]
+    out = tmp_path_factory.mktemp("compared")
+    return smc.compare(laws, ["duffing", "inverted_pendulum"], ["friction", "encoder"], 8, out=out, **SHORT)
+
+
+def kinds(found, plant="duffing"):
+    return {law: made.source.kind for law, made in found.gains[plant].items()}
+
+
+def test_every_law_has_given_shipped_or_tuned_gains_and_its_table_says_which(found):
+    assert kinds(found) == {"my_law": "tuned here", "classical": "shipped", "pid": "yours"}
+    assert found.gains["duffing"]["my_law"].gains != found.gains["inverted_pendulum"]["my_law"].gains
+    text = repr(found)
+    for words in (r"my_law +tuned here +\d", r"classical +shipped +24", r"pid +yours +1 +kp=20"):
+        assert re.search(words, text)
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_runs_use_every_set_of_gains_in_turn(found):
+    one = next(candidate for candidate in found.candidates["duffing"] if candidate.law.name == "my_law")
+    assert len(one.sets) > 1
+    rows = found.table.select(plant="duffing", law="my_law", condition="encoder")
+    used = [rows.scenario(i).law.gains for i in range(len(rows))]
+    assert used == [one.sets[seed % len(one.sets)].gains for seed in range(8)]
+    shipped = found.table.select(plant="duffing", law="classical", condition="encoder")
+    known = gain_sets.tuned("duffing", "classical").sets
+    assert [shipped.scenario(i).law.gains["k"] for i in range(8)] == [known[seed]["k"] for seed in range(8)]
+
+
+def test_a_verdict_names_its_metric_plant_and_condition(found):
+    assert len(found.verdicts) == len(found.metrics) * 4
+    for board, verdict in zip(found.leaderboard, found.verdicts, strict=True):
+        assert verdict.startswith(f"{board.label} on {board.group['plant']} under {board.group['condition']}: ")
+        assert board.result in " ".join(repr(found).split())
+
+
+def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
+    frame = found.to_pandas()
+    assert len(frame) == len(found.verdicts) * 3
+    frame = frame[(frame["metric"] == "itae") & (frame["law"] == "pid")]
+    (row,) = frame.query("plant == 'duffing' and condition == 'encoder'").itertuples()
+    entry = next(
+        entry
+        for board in found.leaderboard
+        if board.metric == "itae" and board.about == "duffing, encoder"
+        for entry in board.entries
+        if entry.law == "pid"
+    )
+    assert (row.median, row.low, row.high, row.gains) == (*entry.interval[:3], "yours")
+    assert found.to_latex().count(r"\begin{tabular}") == 4
+    assert found._repr_html_().count("<table") == 5
+    assert len(found.plot().axes) == 6
+
+
+def test_traces_are_those_of_the_first_seed(found):
+    assert len(found.traces) == 12
+    assert {trace.scenario.seed for trace in found.traces} == {0}
+    assert smc.score(found.traces[0])["itae"] == found.table.column("itae")[0]
+
+
+def test_the_same_call_goes_on_from_its_folder(found, monkeypatch):
+    monkeypatch.setattr(search, "tune", None)  # would raise
+    monkeypatch.setattr(executors, "compute_here", lambda batches, *rest: [*batches].index(0))
+    laws = [my_law, "classical", smc.law("pid", kp=20.0)]
+    with pytest.raises(ValueError, match="0 is not in list"):  # no run is missing, so no batch
+        smc.compare(laws, ["duffing", "inverted_pendulum"], ["friction", "encoder"], 8, out=found.out, **SHORT)
+
+
+def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        made = smc.compare([plain_law, "classical"], "duffing", "nominal", 2, out=tmp_path, **SHORT)
+    assert kinds(made)["plain_law"] == "tuned here"
+    assert "plain_law: lam and k1 searched about the defaults, as no unit is known (on duffing)" in made.remarks
+    with pytest.warns(smc.ScenarioWarning, match="plain_law's lam and k1 have no unit, and so a search about"):
+        tuned = smc.tune("duffing", plain_law, budget=4)
+    assert tuned.bounds["lam"] == pytest.approx((4.0 * 10**-1.5, 4.0 * 10**1.5))
+
+
+def test_without_tuning_laws_have_their_defaults_and_no_winner_is_named_over_them(tmp_path):
+    made = smc.compare([my_law, smc.law("classical")], "duffing", "nominal", 8, False, out=tmp_path, **SHORT)
+    assert kinds(made) == {"my_law": "default", "classical": "shipped"}
+    assert made.remarks == ["my_law: default gains (on duffing)"]
+    assert not any(board.winner == "classical" for board in made.leaderboard)
+
+
+def test_a_plant_on_which_laws_cannot_be_tuned_says_so(tmp_path):
+    made = smc.compare(None, "overhead_crane", "nominal", 1, out=tmp_path, **SHORT)
+    assert set(kinds(made, "overhead_crane").values()) == {"default"}
+    assert all("tuning is not possible here: " in remark for remark in made.remarks)
+
+
+def test_what_cannot_run_is_refused_before_any_gains_are_searched(tmp_path, monkeypatch):
+    monkeypatch.setattr(fair_gains, "_tuned", None)
+    for arguments, words in (
+        (([my_law], "duffing", "noisy"), "did you mean 'noise'"),
+        (([my_law], "duffing", "nominal", 0), "seeds is 0"),
+        (([my_law, my_law(lam=2.0)], "duffing"), "two laws have the name 'my_law'"),
+        (([my_law], "duffing", "nominal", 1, True, False, "ray"), "executor is 'ray'"),
+    ):
+        with pytest.raises(smc.ScenarioError, match=words):
+            smc.compare(*arguments, out=tmp_path, progress=False)
+
+
+def test_one_command_tunes_runs_tables_and_draws(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.py").write_text(
+        "import smc_mujoco as smc\n\n@smc.law_function(gains={'k': 20.0, 'd': 5.0})\n"
+        "def mine(y, gains, memory):\n    return -gains.k * y.e - gains.d * y.de, y.e\n"
+    )
+    words = ["compare", "inverted_pendulum,duffing", "--law", "classical,mine.py", "--condition", "friction,encoder"]
+    words += ["--condition", "worn: friction=Coulomb(0.05), sensor=Encoder(counts=4096)", "--no-tune"]
+    words += ["--seeds", "2", "--duration", "0.5", "--out", "results", "--latex", "table.tex", "--figure", "fig"]
+    with pytest.raises(SystemExit) as end:
+        main.main(words)
+    assert end.value.code in (0, None)
+    printed = capsys.readouterr().out
+    table = smc.Table.read("results")
+    assert set(table.column("condition")) == {"friction", "encoder", "worn"}
+    assert "mine: default gains (on inverted_pendulum and duffing)" in " ".join(printed.split())
+    assert max(map(len, printed.splitlines())) <= 80
+    assert (tmp_path / "fig.svg").exists()
+    assert (tmp_path / "table.tex").read_text().count(r"\toprule") == 6
