@@ -15,6 +15,7 @@ from helpers.episodes import dm_control_suite
 from helpers.pages import PAGES, ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.tuning import search
 from smc_mujoco.cli import main
 from smc_mujoco.cli import scene as show
 from smc_mujoco.common import gl
@@ -72,6 +73,7 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
         warnings.simplefilter("ignore", smc.PlainLoopWarning)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+    monkeypatch.setattr(search, "BUDGET", 64)  # of the tunings in `smc.compare`
     monkeypatch.setattr(sys, "argv", ["block.py", "--no-video"])  # read by a scene that plays itself
     Path("block.py").write_text(block)
     played = pytest.raises(SystemExit) if "smc.play(" in block else contextlib.nullcontext()
@@ -81,8 +83,8 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
     said.seek(0)
     assert end is None or not end.value.code
     assert ("print(" in block or end is not None) == (said.read().strip() != "")
-    wanted = set(re.findall(r'"([\w-]+\.(?:npz|csv|mat|svg|png|c|fmu))"', block))
-    wanted |= set(re.findall(r'study\(.*"(\w+)"', block))
+    wanted = set(re.findall(r'"([\w-]+\.(?:npz|csv|mat|svg|png|tex|c|fmu))"', block))
+    wanted |= set(re.findall(r'study\(.*"(\w+)"', block)) | ({"compared"} if "smc.compare(" in block else set())
     written = {path.name for path in tmp_path.iterdir()} - {"block.py", *titled(page)}
     assert wanted <= written
     assert bool(written) == bool(wanted or end)

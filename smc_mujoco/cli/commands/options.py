@@ -251,8 +251,7 @@ def compared_laws(
     if texts is None:
         return None
     if list(texts) == ["all"]:
-        every = gain_sets.general() if gains == "tuned" else gain_sets.general_laws(plants or PLANTS, gains)
-        return every
+        return gain_sets.general() if gains == "tuned" else gain_sets.general_laws(plants or PLANTS, gains)
     return laws(texts)
 
 
