@@ -3,7 +3,7 @@
     found = smc.compare([my_law, "classical"], ["duffing", "inverted_pendulum"], ["friction", "encoder"])
     print(found)                                   # tables of at most 80 columns, and a verdict on every metric
     found.plot("compared.pdf")
-    open("compared.tex", "w").write(found.to_latex())
+    found.to_latex("compared.tex")
 
 It is made of parts that can be used alone: `fair_gains`, `smc.grid`, `smc.study` and `smc.leaderboard`.
 """
@@ -22,6 +22,7 @@ from smc_mujoco.analysis.tuning import search
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, taken, whole
 from smc_mujoco.common.errors import number as checked
 from smc_mujoco.common.extras import package
+from smc_mujoco.common.files import replacing
 from smc_mujoco.common.tabular import Tabular, plain
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
@@ -133,9 +134,17 @@ class Compared:
     def _repr_html_(self) -> str:
         return "<br>".join(table._repr_html_() for table in self.tables)
 
-    def to_latex(self) -> str:
-        """Return a LaTeX tabular for each plant in each condition, below comments with the verdicts; needs booktabs."""
-        return self.leaderboard.to_latex()
+    def to_latex(self, path: str | os.PathLike[str] | None = None) -> str:
+        """Return a LaTeX tabular for each plant in each condition, below comments with the verdicts; needs booktabs.
+
+        Args:
+          path: of a file to which it is written too.
+        """
+        text = self.leaderboard.to_latex()
+        if path is not None:
+            with replacing(Path(path)) as file:
+                file.write_text(text, encoding="utf-8")
+        return text
 
     def to_pandas(self) -> "pandas.DataFrame":
         """Return a pandas DataFrame with a row for each law, plant, condition and metric.

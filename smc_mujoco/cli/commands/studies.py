@@ -179,7 +179,7 @@ def compare(
     )
     terminal.print(found)
     if latex:
-        latex.write_text(found.to_latex(), encoding="utf-8")
+        found.to_latex(latex)
         terminal.wrote(latex)
     if pictures:
         found.plot(figure)
