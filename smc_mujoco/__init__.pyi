@@ -12,6 +12,7 @@ from smc_mujoco.analysis.step_halving import StepChange as StepChange
 from smc_mujoco.analysis.step_halving import step_halving as step_halving
 from smc_mujoco.analysis.tuning.result import Tuned as Tuned
 from smc_mujoco.analysis.tuning.search import tune as tune
+from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty as Uncertainty
 from smc_mujoco.cli.main import play as play
 from smc_mujoco.common.catalogue import PackageWarning as PackageWarning
 from smc_mujoco.common.errors import ScenarioError as ScenarioError
@@ -102,9 +103,11 @@ from smc_mujoco.simulation.signals import OrnsteinUhlenbeck as OrnsteinUhlenbeck
 from smc_mujoco.simulation.signals import Pulse as Pulse
 from smc_mujoco.simulation.signals import Push as Push
 from smc_mujoco.simulation.signals import Ramp as Ramp
+from smc_mujoco.simulation.signals import Relay as Relay
 from smc_mujoco.simulation.signals import Signal as Signal
 from smc_mujoco.simulation.signals import Sine as Sine
 from smc_mujoco.simulation.signals import Step as Step
+from smc_mujoco.simulation.time_series import Held as Held
 from smc_mujoco.simulation.time_series import TimeSeries as TimeSeries
 from smc_mujoco.simulation.trace import Trace as Trace
 from smc_mujoco.simulation.trace import load as load
@@ -120,6 +123,8 @@ from smc_mujoco.studies.outcome import Outcome as Outcome
 from smc_mujoco.studies.scene import Scene as Scene
 from smc_mujoco.studies.study import study as study
 from smc_mujoco.studies.table import Table as Table
+from smc_mujoco.studies.worst_case import WorstCase as WorstCase
+from smc_mujoco.studies.worst_case import worst_case as worst_case
 
 __version__: str
 arms = smc_mujoco.studies.arms

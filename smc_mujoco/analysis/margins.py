@@ -28,13 +28,13 @@ import numpy as np
 
 from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis import linearisation
+from smc_mujoco.analysis.worst_case.uncertainty import JITTER_SHARES, later, rougher
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.files import ended, read_json, reading, replacing, write_json
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
-from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.metrics.conventions import parts, refuse, scale
@@ -55,7 +55,6 @@ MAX_MASS_RATIO, MAX_NOISE = 64.0, 2.048  # mass ratio; rad or m: chosen, far abo
 DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s
 FINE, COARSE = 0.02, 0.1  # of the level: resolution of a full and of a quick search
 QUANTA = {FINE: 1, COARSE: 5}  # the same for levels that are multiples of a quantum, such as control periods of delay
-JITTER_SHARES = 8  # of the control period, in which jitter is counted; chosen
 QUICK = 5.0  # s, of a quick search's runs
 HALVINGS = 6  # of an interval between two levels, about; for the progress bar
 
@@ -196,24 +195,10 @@ def _at_rest(base: Scenario) -> float | None:
     return theory.tolerated_force(base.plant, base.law, most, min(base.limits))
 
 
-def _rougher(base: Scenario, level: float) -> Scenario:
-    """Return the scenario with `level` added to its dry friction."""
-    others = tuple(part for part in base.friction if not isinstance(part, Coulomb))
-    before = sum(part.level for part in base.friction if isinstance(part, Coulomb))
-    return dataclasses.replace(base, friction=(*others, Coulomb(before + level)))
-
-
 def _heavier(base: Scenario, level: float) -> Scenario:
     """Return the scenario with `level` times the nominal mass; the mismatch may call it "mass" or by its own name."""
     mass = base.plant.mass if base.plant.mass in base.mismatch else "mass"
     return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level})
-
-
-def _later(base: Scenario, level: float) -> Scenario:
-    """Return the scenario whose samples are late by up to `level` control periods."""
-    steps = JITTER_SHARES * math.ceil(base.steps / JITTER_SHARES)
-    clock = dataclasses.replace(base.clock, jitter=level * base.control_period)
-    return dataclasses.replace(base, clock=clock, physics_step=base.control_period / steps)
 
 
 MARGIN_KINDS: dict[str, Kind] = {
@@ -236,7 +221,7 @@ MARGIN_KINDS: dict[str, Kind] = {
         label="dry friction",
         unit="{u}",
         levels=_doubled(MAX_FORCE),
-        put=_rougher,
+        put=rougher,
         theory=_at_rest,
     ),
     "mass": Kind(
@@ -256,7 +241,7 @@ MARGIN_KINDS: dict[str, Kind] = {
         label="largest delay of a sample, of the control period",
         unit="1",
         levels=tuple(i / JITTER_SHARES for i in range(1, JITTER_SHARES)),
-        put=_later,
+        put=later,
         quantum=lambda base: 1.0 / JITTER_SHARES,
     ),
     "missed": Kind(

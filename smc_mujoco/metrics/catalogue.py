@@ -15,6 +15,7 @@ from smc_mujoco.metrics import conventions, limit_cycle
 from smc_mujoco.metrics.conventions import (
     BAND,
     CATALOGUE,
+    ROUNDING,
     Metric,
     approaches,
     error,
@@ -29,6 +30,7 @@ from smc_mujoco.metrics.kept import kept
 if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
 
+TRANSIENT = 0.25  # of the run, which rms_error leaves out
 RISE = (0.1, 0.9)  # of the way from the start of the approach to the reference
 HIGH_PASS = 50.0  # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
 CONSTANT = 1e-12  # of max |u|: a smaller range of u is rounding
@@ -132,6 +134,16 @@ def ultimate_bound(trace: Trace) -> float:
 def ripple(trace: Trace) -> float:
     """Peak-to-peak e in the last part, worst channel; what is left of a transient counts."""
     return np.ptp(error(trace)[last(trace)], axis=0).max()
+
+
+@metric("{x}", label="rms error")
+def rms_error(trace: Trace) -> float:
+    """Root mean square of e from a quarter of the run on, worst channel.
+
+    Samples t >= t0 + 0.25 (tK - t0), each with the same weight: what an adversary maximises, as its square is smooth.
+    """
+    late = trace.t >= trace.t[0] + TRANSIENT * (1.0 - ROUNDING) * (trace.t[-1] - trace.t[0])
+    return np.sqrt((error(trace)[late] ** 2).mean(axis=0)).max()
 
 
 @metric("({x})^2 s", label="ISE")

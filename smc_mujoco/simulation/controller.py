@@ -82,7 +82,8 @@ def control(at, sim, data):
         _actuate(sim, data, step)
     if sim.signal_count != 0 and failure == record.FINE:
         fraction = 0.0 if stage == 0 else (LAST_STAGE if stage == 3 else 0.5)
-        failure = _disturb(at, sim, data, k * sim.period + (within + fraction) * sim.step)
+        sample = k if stage + within == 0 else -1
+        failure = _disturb(at, sim, data, k * sim.period + (within + fraction) * sim.step, sample)
     if sim.frictions != 0 and failure == record.FINE:  # an integrator of one stage
         failure = _rub(at, sim, data)
     if failure != record.FINE:
@@ -426,9 +427,38 @@ def _push(at, sim, data):
     return record.FINE
 
 
+@njit(error_model="numpy", inline="always")
+def _add(data, channel, force, cartesian):
+    """Add a force to a channel: a horizontal one on its body, or one on its joint, if that has an actuator."""
+    if cartesian:
+        data.xfrc_applied[channel.push] += force
+    elif channel.ctrl >= 0 and channel.direct >= 0:
+        data.qfrc_applied[channel.direct] += force
+    elif channel.ctrl >= 0:
+        data.xfrc_applied[channel.xfrc] += channel.sign * force
+
+
 @njit(error_model="numpy")
-def _disturb(at, sim, data, t):
+def _look(at, sim, data, signal, i, k):
+    """Write into the record the force of a disturbance that sees the loop, decided at sample k. k < 0: the last force.
+
+    Return 0, or 1 if it raised.
+    """
+    if i > 0 or k < 0:
+        sim.motion.value = pointer(signal.function.memory)[0]
+        return 0
+    channel, sample, instant = channel_at(sim.channels, 0), log_at(sim.log, k * sim.n), sim.instant
+    before = sample.r if k == 0 else log_at(sim.log, (k - 1) * sim.n).r
+    instant.e = data.qpos[channel.qpos] - sample.r
+    instant.de, instant.s = data.qvel[channel.qvel] - (sample.r - before) / sim.period, sample.s
+    return _call(signal.function, 0, at + record.INSTANT_AT, at + record.MOTION_AT)
+
+
+@njit(error_model="numpy")
+def _disturb(at, sim, data, t, k):
     """Apply the sum of the disturbances at time t, s, to the body of each channel, or to its joint in a user's model.
+
+    `k` is the control sample whose first stage it is, else -1.
 
     Return a failure code.
     """
@@ -443,16 +473,16 @@ def _disturb(at, sim, data, t):
             continue
         for i in range(sim.n):
             channel = channel_at(sim.channels, i)
-            if signal.stream != 0.0 or i == 0:  # without random numbers it is the same in every channel
+            if signal.sees != 0:
+                raised = _look(at, sim, data, signal, i, k)
+            elif signal.stream != 0.0 or i == 0:  # without random numbers it is the same in every channel
                 instant.channel = i
-                if _call(signal.function, i, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
-                    return record.DISTURBANCE_RAISED
-            if signal.cartesian != 0:
-                data.xfrc_applied[channel.push] += motion.value
-            elif channel.ctrl >= 0 and channel.direct >= 0:
-                data.qfrc_applied[channel.direct] += motion.value
-            elif channel.ctrl >= 0:  # only where there is an actuator
-                data.xfrc_applied[channel.xfrc] += channel.sign * motion.value
+                raised = _call(signal.function, i, at + record.INSTANT_AT, at + record.MOTION_AT)
+            else:
+                raised = 0
+            if raised != 0:
+                return record.DISTURBANCE_RAISED
+            _add(data, channel, motion.value, signal.cartesian != 0)
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
         if not (math.isfinite(data.xfrc_applied[channel.xfrc]) and math.isfinite(data.xfrc_applied[channel.push])):

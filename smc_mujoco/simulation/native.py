@@ -119,18 +119,20 @@ def with_acceleration(typingctx, result):
 
 @functools.cache
 def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
-    """Compile t, seed, channel, stream -> value, first and second derivative.
+    """Compile t, seed, channel, stream, e, e', s -> value, first and second derivative.
 
     The parameters of a series are followed by the address and the number of its data.
     """
     body, values = jit(kind.value), loader(named(names))
     random, series, memory, behind = kind.random, kind.series, max(kind.memory, 1), 8 * len(names)
-    rows = kind.rows
+    rows, sees = kind.rows, kind.sees
 
     def native(y, p, m, out):
-        i = carray(pointer(y), (4,))
+        i = carray(pointer(y), (7,))
         if random:
             ok, result = attempt(body, (i[0], values(p), carray(pointer(m), (memory,)), i[1], i[2], i[3]))
+        elif sees:
+            ok, result = attempt(body, (i[0], values(p), carray(pointer(m), (memory,)), i[4], i[5], i[6]))
         elif series:
             data = carray(pointer(p + behind), (2,))
             ok, result = attempt(body, (i[0], values(p), carray(pointer(int(data[0])), (rows, int(data[1])))))
@@ -142,7 +144,7 @@ def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
             output[0], output[1], output[2] = r, dr, ddr
         return not ok
 
-    made = Function(native, _cached(kind.value, names, random, series, memory, rows))
+    made = Function(native, _cached(kind.value, names, random, series, memory, rows, sees))
     fingerprint.hold(kind)
     return made
 

@@ -192,7 +192,8 @@ def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
         functions["surface"] = function(compiled.surface, s.surface.gains.values(), s.surface.memory)
     disturbances = [
         pushed(d, model)
-        | {"function": function(made, native.values_of(d), d.memory), "stream": s.stream(i), "cartesian": d.cartesian}
+        | {"function": function(made, native.values_of(d), d.memory)}
+        | {"stream": s.stream(i), "cartesian": d.cartesian, "sees": d.sees}
         for i, (made, d) in enumerate(zip(compiled.disturbances, s.disturbance, strict=True))
     ]
     frictions = _frictions(prepared, buffer)

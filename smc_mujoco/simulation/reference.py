@@ -277,6 +277,8 @@ class Loop:
                 continue
             if signal.random:
                 d = [evaluate(signal, t, own, self.scenario.seed, i, stream)[0] for i, own in enumerate(memory)]
+            elif signal.sees:
+                d = self.look(signal, data, t, memory[0])
             else:
                 d = evaluate(signal, t)[0]  # the same in all channels
             matched = at["sign"] * d * self.driven  # only where there is an actuator
@@ -291,6 +293,15 @@ class Loop:
         if not np.isfinite(d).all():
             raise Failure("the disturbance became NaN or inf")
         return d
+
+    def look(self, signal: Signal, data: mujoco.MjData, t: float, memory: np.ndarray) -> float:
+        """Return the force of a disturbance that sees the loop: decided at the first stage of a sample, then held."""
+        k, rest = divmod(self.calls - 1, self.scenario.stages * self.scenario.steps)
+        if rest == 0:
+            dr = (self.r[0] - self.log["r"][k - 1, 0]) / self.scenario.control_period if k else 0.0
+            at, v = self.channels["qpos"][0], data.qvel[self.channels["qvel"][0]]
+            evaluate(signal, t, memory, float(data.qpos[at] - self.r[0]), float(v - dr), float(self.s[0]))
+        return memory[0]
 
     def add_pushes(self, data: mujoco.MjData, t: float) -> None:
         """Apply the disturbances that push one body each, at time t, s."""
@@ -478,14 +489,16 @@ def evaluate(signal: Signal, t: float, *state: Any) -> list[float]:
     """Return a signal and its two derivatives at time t, s.
 
     Args:
-      state: memory, seed, channel and stream, which only process noise reads.
+      state: memory, seed, channel and stream, which only process noise reads; or memory, e, e' and s, which only a
+        disturbance reads that sees the loop.
 
     Raises:
       Failure: it raised an exception, or did not return three numbers.
     """
     name = type(signal).__name__
     try:
-        out = type(signal).value(t, signal, *(state if signal.random else (signal.data,) if signal.series else ()))
+        inputs = state if signal.random or signal.sees else (signal.data,) if signal.series else ()
+        out = type(signal).value(t, signal, *inputs)
     except RAISES as error:
         raise raised(name, error) from error
     return numbers(name, out, "a value and two derivatives", 3)

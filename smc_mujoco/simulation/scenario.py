@@ -515,8 +515,11 @@ def check_signals(s: Resolved) -> None:
             raise ScenarioError(f"reference is a {type(reference).__name__}, which is a force: give a signal")
         if reference.random:
             raise ScenarioError(f"reference is {type(reference).__name__}, which is noise: give a smooth signal")
-    if s.feedforward is not None and (s.feedforward.cartesian or s.feedforward.random):
-        kind = "noise" if s.feedforward.random else "a force on a body"
+        if reference.sees:
+            raise ScenarioError(f"reference is {type(reference).__name__}, which sees the loop: give a known signal")
+    if s.feedforward is not None and (s.feedforward.cartesian or s.feedforward.random or s.feedforward.sees):
+        kinds = {"noise": s.feedforward.random, "a disturbance that sees the loop": s.feedforward.sees}
+        kind = next((kind for kind, holds in kinds.items() if holds), "a force on a body")
         raise ScenarioError(f"feedforward is {type(s.feedforward).__name__}, which is {kind}: give a known signal of u")
 
 

@@ -1,10 +1,11 @@
 """References r(t) and disturbances d(t): frozen dataclasses, each with one pure function of time.
 
-The float fields of a signal are its parameters p. Its function `value` is compiled, and has one of three forms:
+The float fields of a signal are its parameters p. Its function `value` is compiled, and has one of four forms:
 
     value(t, p) -> (r, r', r'')                       deterministic; a disturbance uses only the first number
     value(t, p, memory, seed, channel, stream)        process noise
     value(t, p, data)                                 a series, which holds an array
+    value(t, p, memory, e, de, s)                     a disturbance that sees the loop
 
 The memory of process noise is its state in one channel. The stream number separates it from the other noises of a run.
 Times are in seconds. Values have the unit of what the signal is added to: m or rad for a reference, N or N m for a
@@ -36,6 +37,7 @@ class Signal:
       positive, natural: names of parameters that must be > 0, and >= 0.
       random: whether `value` takes memory, seed, channel and stream.
       series: whether `value` takes data.
+      sees: whether `value` takes e, its rate and s. It is called once a control sample, and its force is then held.
       rows: of the data of a series.
       cartesian: whether it is a force on a body, N, instead of a force on the joint: a horizontal one on the body of
         each channel, or that of a `Push`.
@@ -48,6 +50,7 @@ class Signal:
     natural: ClassVar[tuple[str, ...]] = ()
     random: ClassVar[bool] = False
     series: ClassVar[bool] = False
+    sees: ClassVar[bool] = False
     rows: ClassVar[int] = 2
     cartesian: ClassVar[bool] = False
     data: ClassVar[np.ndarray]
@@ -257,6 +260,38 @@ class Push(Signal):
         if not 0.0 <= part <= 1.0:
             return 0.0, 0.0, 0.0
         return math.sin(math.pi * part), 0.0, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Relay(Signal):
+    """A disturbance that sees the loop: it tends to `amplitude` where s + rate e' + error e > 0, else to -amplitude.
+
+    It sees the true error e, its rate and the law's s at a control sample, and is held until the next one. A positive
+    `rate` alone pushes along the motion, which feeds the loop as much energy as |d| <= amplitude can. With a `slope`
+    above 0 it changes by at most this from sample to sample. All channels get what channel 0 gets.
+
+    Attributes:
+      amplitude: N or N m.
+      s, rate, error: weights of the law's s, of e' and of e.
+      slope: most change between two control samples, N or N m; 0: no limit.
+    """
+
+    amplitude: float
+    s: float = 0.0
+    rate: float = 0.0
+    error: float = 0.0
+    slope: float = 0.0
+
+    memory = 1  # its force now
+    natural = ("slope",)
+    sees = True
+
+    @staticmethod
+    def value(t, p, memory, e, de, s):
+        goal = p.amplitude if p.s * s + p.rate * de + p.error * e > 0.0 else -p.amplitude
+        step = goal - memory[0]
+        memory[0] = goal if p.slope == 0.0 else memory[0] + min(max(step, -p.slope), p.slope)
+        return memory[0], 0.0, 0.0
 
 
 @dataclasses.dataclass(frozen=True)

@@ -26,7 +26,7 @@ def floats(names: Iterable[str]) -> np.dtype:
 # Inputs and outputs of functions. Law: MEASUREMENT -> CONTROL. Surface: MEASUREMENT -> SLIDING. Estimator: READING ->
 # ESTIMATE. Reference and disturbance: INSTANT -> MOTION. Nominal model: -> MODEL.
 MEASUREMENT, READING = floats(Measurement._fields), floats(Reading._fields)
-INSTANT = floats(("t", "seed", "channel", "stream"))
+INSTANT = floats(("t", "seed", "channel", "stream", "e", "de", "s"))
 CONTROL, SLIDING, ESTIMATE = floats(("u", "s")), floats(("s", "v_eq")), floats(("v", "a"))
 MOTION, MODEL = floats(("value", "rate", "acceleration")), floats(("f", "g"))
 
@@ -48,12 +48,16 @@ LOG = floats(LOGGED)
 
 # A compiled function: its address, those of its parameters and of its memory, and the bytes of memory a channel has.
 FUNCTION = np.dtype([(name, "i8") for name in ("address", "parameters", "memory", "stride")], align=True)
-# A disturbance: its stream of random numbers (0: none, and then the same in every channel), and whether it is a
-# horizontal force on the body instead of a force on the joint. A `Push` has the index of its body's force in
-# xfrc_applied, else -1, and its peak.
+# A disturbance: its stream of random numbers (0: none, and then the same in every channel), whether it is a horizontal
+# force on the body instead of a force on the joint, and whether it sees the loop. A `Push` has the index of its body's
+# force in xfrc_applied, else -1, and its peak.
 SIGNAL = np.dtype(
-    [("function", FUNCTION), ("stream", "f8"), ("cartesian", "i8"), ("body", "i8"), ("peak", "f8", (3,))], align=True
-)
+    [
+        ("function", FUNCTION), ("stream", "f8"), ("cartesian", "i8"), ("sees", "i8"), ("body", "i8"),
+        ("peak", "f8", (3,)),
+    ],
+    align=True,
+)  # fmt: skip
 
 SIMULATION = np.dtype(
     [

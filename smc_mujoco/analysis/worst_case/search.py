@@ -1,0 +1,197 @@
+"""The search for the worst member of a class around a scenario.
+
+A search tries the same in the same order, whatever its budget:
+
+1. constant forces, and relays that switch with the sign of s, of e and of e': an adversary who sees the loop;
+2. relays of blends of these, sines and square waves about the frequency at which the loop swings;
+3. the corners of the constants of the class, at most 16, each with both constant forces and a relay of e';
+4. in turns, changes of the worst members of different origin: a piece of a force turned round, a switch shifted,
+   constants moved; and an evolution of the worst member by separable CMA-ES (R. Ros & N. Hansen, PPSN X, 2008; package
+   cmaes), which adds straight lines between knots to its force and cuts the sum off at the bound.
+
+A larger budget only continues a search, so it is never less bad. A search also ends when a run fails, because nothing
+is worse. The force of a relay is recorded and replayed, so every member is an ordinary scenario.
+"""
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from smc_mujoco.analysis.worst_case import strategies
+from smc_mujoco.analysis.worst_case.uncertainty import Member, Members
+from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.metrics.conventions import Metric, parts
+from smc_mujoco.simulation.run import stream
+from smc_mujoco.simulation.signals import Relay
+from smc_mujoco.simulation.trace import Trace
+
+BATCH = 16  # members that are run at once; chosen
+PARENTS = (7, 4, 3, 2)  # of a batch of changes: of the worst member, the worst of another origin, ...; chosen
+CORNERS = 16
+KNOTS = 32  # of the evolution of a force; chosen
+STEP = 0.5  # first standard deviation of a knot, over the bound; chosen
+GENERATIONS = 4  # of an evolution, before the next one begins with the worst member so far; chosen
+FAILED = math.inf, math.inf
+
+
+class Case(NamedTuple):
+    """A member to run, the relay that makes its force if it has none yet, and where it comes from.
+
+    `origin` is the number of the member that it is a change of, directly or through others; -1: it is new.
+    """
+
+    member: Member
+    relay: Relay | None = None
+    origin: int = -1
+
+
+class Tried(NamedTuple):
+    """A member that was run. Its key is its metric, then its rms error, which decides between equal metrics."""
+
+    member: Member
+    key: tuple[float, float]
+    origin: int
+
+
+class Search:
+    """A search among the members of a class.
+
+    Attributes:
+      tried: every member that was run, in order.
+      runs: number of runs so far.
+      swing: the first run under a relay of e', of which the loop's frequency is read.
+    """
+
+    def __init__(
+        self, members: Members, metric: Metric, budget: int, threads: int | None, report: Callable[[int], None]
+    ):
+        self.members, self.metric, self.budget, self.threads, self.report = members, metric, budget, threads, report
+        self.tried: list[Tried] = []
+        self.runs = 0
+        self.swing: Trace | None = None
+
+    @property
+    def worst(self) -> Tried:
+        """The worst member so far, the first of several."""
+        return max(self.tried, key=lambda one: one.key)
+
+    def draw(self, rng: np.random.Generator) -> None:
+        """Run random members only, a whole budget of them."""
+        for left in range(self.budget, 0, -BATCH):
+            self.run([Case(self.members.random(rng)) for _ in range(min(left, BATCH))])
+
+    def search(self, rng: np.random.Generator, known: Sequence[Tried]) -> None:
+        """Try the strategies of the module, beginning with members that were run before."""
+        self.tried += [one._replace(origin=-1 - i) for i, one in enumerate(known)]
+        for batch in itertools.chain(self._known(), self._corners(), self._changed(rng)):
+            self.run(batch)
+            if self.runs >= self.budget or self.worst.key == FAILED:
+                return
+
+    def run(self, cases: Sequence[Case]) -> list[Tried]:
+        """Run cases, as many as the budget allows, and return them as tried."""
+        cases = list(cases[: self.budget - self.runs])
+        first, again = self.runs, []
+        self.runs += len(cases)
+        found: list[Tried | None] = [None] * len(cases)
+        scenarios = [self.members.scenario_of(case.member, case.relay) for case in cases]
+        for i, trace in stream(scenarios, self.threads, self.report):
+            member, relay, origin = cases[i]
+            if relay:
+                member = dataclasses.replace(member, force=strategies.recorded(trace, relay))
+                self.swing = trace if self.swing is None and relay.rate > 0.0 else self.swing
+            found[i] = Tried(member, self._key(trace), first + i if origin < 0 else origin)
+            if relay and (relay.slope or trace.scenario.clock.jitter):  # it did not see, or do, quite what is recorded
+                again.append(Case(member))
+                found[i] = None
+        done = [one for one in found if one]
+        self.tried += done
+        return done + (self.run(again) if again else [])
+
+    def _key(self, trace: Trace) -> tuple[float, float]:
+        """Return the key of a run."""
+        if trace.failure is not None:
+            return FAILED
+        groups = parts(trace)
+        value, error = self.metric.worst(groups), CATALOGUE["rms_error"].worst(groups)
+        return (self.metric.absent if math.isnan(value) else value), error
+
+    def _known(self) -> Iterator[list[Case]]:
+        """Yield what is known to be bad, with the constants of the class in the middle of their ranges."""
+        within, slope, bare = self.members.within, self.members.slope, self.members.bare
+        if self.members.forced:
+            steady = [self._forced(*one) for one in strategies.constants(self.members.samples)]
+            relays = [*strategies.relays(within.disturbance, slope)]
+            yield [*steady, *(Case(bare.named(kind), relay) for kind, relay in relays)]
+        if self.members.forced and self.swing:
+            relays = [*strategies.blends(self.swing, within.disturbance, slope)]
+            waves = [self._forced(*one) for one in strategies.waves(self.swing)]
+            yield [*(Case(bare.named(kind), relay) for kind, relay in relays), *waves]
+
+    def _forced(self, kind: str, force: np.ndarray) -> Case:
+        """Return a member with a force, or one of the class that is near to it."""
+        bare = self.members.bare.named(kind)
+        return Case(dataclasses.replace(bare, force=self.members.limited(force)))
+
+    def _corners(self) -> Iterator[list[Case]]:
+        """Yield the corners of the constants, spread evenly over all of them if there are more than CORNERS."""
+        m = len(self.members.constants)
+        if not m:
+            return
+        count = min(2**m, CORNERS)
+        numbers = [round(i * (2**m - 1) / (count - 1)) for i in range(count)]
+        for number in numbers:
+            shares = np.array([float(number >> i & 1) for i in range(m)])
+            corner = dataclasses.replace(self.members.bare, shares=shares, kind="corner")
+            if not self.members.forced:
+                yield [Case(corner)]
+                continue
+            steady = [dataclasses.replace(corner, force=f) for _, f in strategies.constants(self.members.samples)]
+            relay = Relay(self.members.within.disturbance, rate=1.0, slope=self.members.slope)
+            yield [*map(Case, steady), Case(corner, relay)]
+
+    def _changed(self, rng: np.random.Generator) -> Iterator[list[Case]]:
+        """Yield changes of the worst members, and evolutions of the worst, in turns."""
+        while True:
+            for _ in range(GENERATIONS):
+                yield self._changes(rng)
+            yield from self._evolution(rng)
+
+    def _changes(self, rng: np.random.Generator) -> list[Case]:
+        """Return changes of the worst members, one for each origin."""
+        best: dict[int, Tried] = {}
+        for one in sorted(self.tried, key=lambda one: one.key, reverse=True):
+            best.setdefault(one.origin, one)
+        parents = list(best.values())[: len(PARENTS)]
+        counts = [*PARENTS[1 : len(parents)]]
+        counts = [BATCH - sum(counts), *counts]
+        return [
+            Case(self.members.changed(parent.member, rng), origin=parent.origin)
+            for parent, count in zip(parents, counts, strict=True)
+            for _ in range(count)
+        ]
+
+    def _evolution(self, rng: np.random.Generator) -> Iterator[list[Case]]:
+        """Yield the generations of an evolution that begins with the worst member so far."""
+        from cmaes import SepCMA
+
+        start = self.worst
+        evolution = SepCMA(
+            mean=np.zeros(max(2, self.members.size(KNOTS))),
+            sigma=STEP,
+            seed=int(rng.integers(2**31)),
+            population_size=BATCH,
+        )
+        for _ in range(GENERATIONS):
+            points = [evolution.ask() for _ in range(BATCH)]
+            before = len(self.tried)
+            yield [Case(self.members.moved(start.member, z, KNOTS), origin=start.origin) for z in points]
+            keys = [one.key for one in self.tried[before:]]
+            order = sorted(range(len(keys)), key=keys.__getitem__, reverse=True)
+            ranks = {i: float(rank) for rank, i in enumerate(order)}
+            if len(keys) == BATCH:
+                evolution.tell([(points[i], ranks[i]) for i in range(BATCH)])

@@ -1,0 +1,317 @@
+"""Classes of uncertainty: all that an adversary may do to a scenario, as bounds that are fixed before anything is run.
+
+    within = smc.Uncertainty(disturbance=2.0, mass=(0.7, 1.3), delay=(0.0, 0.005))
+
+A member of a class is one choice within all of its bounds. `Members` makes scenarios of members. A member has
+
+    shares      one number in [0, 1] for each constant that may differ: delay, mass, parameters, friction, x0
+    force       |force_k| <= 1, a number for each control sample: the disturbance over its bound
+    noise       |noise_jk| <= 1, numbers for each time that an error of measurement is held: position, velocity
+"""
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, number, shown
+from smc_mujoco.common.frozen import frozen
+from smc_mujoco.mechanisms.hardware.friction import Coulomb
+from smc_mujoco.mechanisms.plant import EFFORT, Plant
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Relay, Signal
+from smc_mujoco.simulation.time_series import Held, TimeSeries
+
+KNOT = 0.5  # s between the knots of a random disturbance, straight lines in between; chosen
+LEAST_KNOTS = 8  # of a random disturbance in a run; chosen
+LONGEST = 0.4  # of a run: the longest change of a force; chosen
+SHIFTED = 0.5  # of all changes of a force shift a switch, if there is one; the others turn a piece round; chosen
+MOVED = 0.5  # of the constants move in a change of constants; chosen
+DRIFT = 0.3  # standard deviation by which a constant moves, of its range; chosen
+JITTER_SHARES = 8  # of the control period, in which jitter is counted; chosen
+ROUNDING = 1e-12  # of the largest force: a smaller change of slope is none
+
+Range = tuple[float, float]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Uncertainty:
+    """What may happen: bounds on disturbance, noise, delay and parameters. Everything left out is as in the scenario.
+
+    Attributes:
+      disturbance: |d| <= this, N or N m, the same force on every driven joint, beside the scenario's own disturbances.
+      slope: |d'| <= this, N/s or N m/s; None: d may jump.
+      position_noise, velocity_noise: bounds on errors of measurement, rad or m, and per second, beside the scenario's
+        own noise. The adversary chooses the errors, the same in every channel.
+      hold: s, for which each error of measurement lasts.
+      delay: lowest and highest input delay, s, beside the scenario's own.
+      jitter: largest delay of a sample, s, at most 7/8 of the control period, see `smc.Clock`. Which samples are late
+        is as the scenario's seed says.
+      mass: lowest and highest factor on the plant's mass.
+      parameters: name -> lowest and highest factor on other parameters of the plant, or what is added to one of
+        `plant.added`: {"payload": (0.0, 2.0)}.
+      friction: lowest and highest dry friction, N or N m, beside the scenario's own.
+      x0: how far each channel may start from the scenario's x0, as a share of it.
+
+    Raises:
+      ScenarioError: a bound that is no number, or out of order.
+    """
+
+    disturbance: float = 0.0
+    slope: float | None = None
+    position_noise: float = 0.0
+    velocity_noise: float = 0.0
+    hold: float = 0.05
+    delay: Range = (0.0, 0.0)
+    jitter: float = 0.0
+    mass: Range = (1.0, 1.0)
+    parameters: Mapping[str, Range] = frozen({})
+    friction: Range = (0.0, 0.0)
+    x0: float = 0.0
+
+    def __post_init__(self):
+        put = vars(self).update  # the class is frozen
+        for name in ("disturbance", "position_noise", "velocity_noise", "jitter", "x0"):
+            put({name: number(f"Uncertainty's {name}", getattr(self, name), least=0.0)})
+        put(hold=number("Uncertainty's hold", self.hold, above=0.0))
+        if self.slope is not None:
+            put(slope=number("Uncertainty's slope", self.slope, above=0.0))
+        for name in ("position_noise", "velocity_noise"):
+            if getattr(self, name):
+                raise ScenarioError(f"Uncertainty's {name} is not available yet: leave it out")
+        put(delay=_range("delay", self.delay, 0.0), friction=_range("friction", self.friction, 0.0))
+        put(mass=_range("mass", self.mass, 0.0, strict=True))
+        if not isinstance(self.parameters, Mapping):
+            raise ScenarioError(f"Uncertainty's parameters are {shown(self.parameters)}: give a range for each name")
+        ranges = {str(name): _range(name, value, -math.inf) for name, value in self.parameters.items()}
+        put(parameters=frozen(ranges))
+        if not self.free:
+            cure = "give a bound, such as disturbance=2.0"
+            raise ScenarioError(f"Uncertainty allows nothing but the scenario itself: {cure}")
+
+    @property
+    def free(self) -> bool:
+        """Whether the class has more than one member."""
+        bounds = self.disturbance, self.position_noise, self.velocity_noise, self.jitter, self.x0
+        ranges = self.delay, self.mass, self.friction, *self.parameters.values()
+        return any(bounds) or any(low < high for low, high in ranges)
+
+    def words(self, plant: Plant) -> str:
+        """Return the class as a line of text, such as "|d| <= 2 N, mass x 0.7 to 1.3"."""
+        x, u = plant.units[0], EFFORT[plant.units[0]]
+        parts = [f"|d| <= {self.disturbance:g} {u}"] if self.disturbance else []
+        parts += [f"|d'| <= {self.slope:g} {u}/s"] if self.disturbance and self.slope is not None else []
+        held = f" held for {self.hold:g} s"
+        parts += [f"position errors <= {self.position_noise:g} {x}{held}"] if self.position_noise else []
+        parts += [f"velocity errors <= {self.velocity_noise:g} {x}/s{held}"] if self.velocity_noise else []
+        ranges = {"delay (s)": self.delay, f"friction ({u})": self.friction, "mass x": self.mass, **self.parameters}
+        parts += [f"{name} {low:g} to {high:g}" for name, (low, high) in ranges.items() if low < high]
+        parts += [f"jitter <= {self.jitter:g} s"] if self.jitter else []
+        parts += [f"x0 within {100 * self.x0:g} %"] if self.x0 else []
+        return ", ".join(parts)
+
+
+def _range(name: str, value: object, least: float, strict: bool = False) -> Range:
+    """Return lowest and highest value, from a pair."""
+    if not isinstance(value, tuple | list) or len(value) != 2:
+        raise ScenarioError(f"Uncertainty's {name} is {shown(value)}: give the lowest and the highest, as (0.7, 1.3)")
+    low, high = (number(f"Uncertainty's {name}", one, least=least) for one in value)
+    if strict and low <= 0.0:
+        raise ScenarioError(f"Uncertainty's {name} begins at {low:g}: give factors greater than 0")
+    if low > high:
+        raise ScenarioError(f"Uncertainty's {name} is from {low:g} to {high:g}: give the lowest first")
+    return low, high
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Member:
+    """One choice within the bounds of a class, see the module.
+
+    Attributes:
+      shares: (constants,).
+      force: (samples + 1,), or (0,) without a disturbance.
+      noise: (2, times); times is 0 without noise.
+      kind: the strategy that made it.
+    """
+
+    shares: np.ndarray
+    force: np.ndarray
+    noise: np.ndarray
+    kind: str = ""
+
+    def named(self, kind: str) -> "Member":
+        """Return this member as one of another strategy."""
+        return dataclasses.replace(self, kind=kind)
+
+
+class Members:
+    """The members of a class around one scenario.
+
+    Attributes:
+      constants: name -> function of a scenario and a share in [0, 1] that returns the scenario with this constant.
+      slope: most change of the disturbance between two samples, N or N m; 0: it may jump.
+      bare: the member without force or noise, with its constants in the middle.
+
+    Raises:
+      ScenarioError: the plant does not have what the class changes.
+    """
+
+    def __init__(self, scenario: Scenario, within: Uncertainty):
+        self.scenario, self.within, self.h = scenario, within, scenario.control_period
+        self.samples = scenario.samples
+        self.forced = within.disturbance > 0.0
+        self.slope = 0.0 if within.slope is None else within.slope * self.h
+        self.constants = dict(_constants(scenario, within))
+        self.held = max(1, round(within.hold / self.h))  # samples for which an error of measurement is held
+        self.times = -(-self.samples // self.held) if within.position_noise or within.velocity_noise else 0
+        self.bare = Member(np.full(len(self.constants), 0.5), np.zeros(0), np.zeros((2, self.times)))
+        for share in (0.0, 1.0):
+            self.placed(np.full(len(self.constants), share))
+
+    def placed(self, shares: np.ndarray) -> Scenario:
+        """Return the scenario with constants of the class."""
+        made = self.scenario
+        for put, share in zip(self.constants.values(), shares.tolist(), strict=True):
+            made = put(made, share)
+        return made
+
+    def scenario_of(self, member: Member, relay: Relay | None = None) -> Scenario:
+        """Return the scenario of a member, an ordinary one; or of a relay in place of the member's force."""
+        made = self.placed(member.shares)
+        if relay or len(member.force):
+            signal = relay or self.signal(self.within.disturbance * member.force)
+            made = dataclasses.replace(made, disturbance=(*made.disturbance, signal))
+        return made
+
+    def signal(self, values: np.ndarray) -> Signal:
+        """Return values at the control samples as a signal: steps if they mostly rest and may jump, else lines."""
+        change = np.diff(values)
+        steps = not self.slope and 2 * np.count_nonzero(change) < len(change)
+        bends = change != 0.0 if steps else np.abs(np.diff(change, append=math.inf)) > ROUNDING * np.abs(values).max()
+        at = np.unique(np.concatenate([[0], np.flatnonzero(bends) + 1, [len(values) - 1]]))
+        return (Held if steps else TimeSeries)((at * self.h).tolist(), values[at].tolist())
+
+    def limited(self, force: np.ndarray) -> np.ndarray:
+        """Return a force of the class that is near to one: within -1 .. 1, and not too steep."""
+        force, most = np.clip(force, -1.0, 1.0), self.slope / self.within.disturbance
+        if not most or np.abs(np.diff(force)).max(initial=0.0) <= most:
+            return force
+        made = [before := float(force[0])]
+        made += [before := min(max(value, before - most), before + most) for value in force[1:].tolist()]
+        return np.array(made)
+
+    def random(self, rng: np.random.Generator) -> Member:
+        """Return a member drawn at random: uniform constants, knots and errors."""
+        knot = min(KNOT, self.samples * self.h / LEAST_KNOTS)
+        knots = np.arange(math.ceil(self.samples * self.h / knot) + 1) * knot
+        values = np.interp(np.arange(self.samples + 1) * self.h, knots, rng.uniform(-1.0, 1.0, len(knots)))
+        return Member(
+            rng.uniform(size=len(self.constants)),
+            self.limited(values) if self.forced else np.zeros(0),
+            rng.uniform(-1.0, 1.0, (2, self.times)),
+            "random",
+        )
+
+    def changed(self, member: Member, rng: np.random.Generator) -> Member:
+        """Return a member that differs from one in its force, its noise or its constants."""
+        weights = np.array([3.0 * self.forced, 2.0 * (self.times > 0), len(self.constants) > 0], float)
+        what = rng.choice(3, p=weights / weights.sum())
+        if what == 0:
+            return dataclasses.replace(member, force=self.limited(turned(member.force, rng)))
+        if what == 1:
+            return dataclasses.replace(member, noise=np.array([turned(row, rng) for row in member.noise]))
+        moves = rng.normal(0.0, DRIFT, len(self.constants)) * (rng.random(len(self.constants)) < MOVED)
+        return dataclasses.replace(member, shares=np.clip(member.shares + moves, 0.0, 1.0))
+
+    def size(self, knots: int) -> int:
+        """Return how many numbers `moved` takes."""
+        return len(self.constants) + knots * (self.forced + 2 * (self.times > 0))
+
+    def moved(self, member: Member, z: np.ndarray, knots: int) -> Member:
+        """Return the member that is moved by numbers, (size,): constants, and straight lines added between knots."""
+        m, rows = len(self.constants), np.reshape(z[len(self.constants) : self.size(knots)], (-1, knots))
+        shares, at = np.clip(member.shares + DRIFT * z[:m], 0.0, 1.0), np.linspace(0.0, 1.0, knots)
+
+        def added(row: np.ndarray, more: np.ndarray) -> np.ndarray:
+            return np.clip(row + 2.0 * np.interp(np.linspace(0.0, 1.0, len(row)), at, more), -1.0, 1.0)
+
+        force = self.limited(added(member.force, rows[0])) if self.forced else member.force
+        noise = [added(*pair) for pair in zip(member.noise, rows[-2:], strict=True)] if self.times else member.noise
+        return Member(shares, force, np.array(noise), member.kind)
+
+
+def turned(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return values, (K,), of which a random piece is turned round, or a switch comes earlier or later."""
+    made, last = values.copy(), len(values) - 1
+    length = round(math.exp(rng.uniform(0.0, math.log(max(2.0, LONGEST * last)))))
+    switches = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1])) + 1
+    if len(switches) and rng.random() < SHIFTED:
+        at = int(rng.choice(switches))
+        piece = slice(max(0, at - length), at) if rng.random() < 0.5 else slice(at, at + length)
+    else:
+        at = int(rng.integers(1 - length, max(last, 2 - length)))
+        piece = slice(max(0, at), at + length)
+    made[piece] *= -1.0
+    return made
+
+
+Put = Callable[[Scenario, float], Scenario]
+
+
+def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[tuple[str, Put]]:
+    """Yield the name of each constant that may differ, and the function that puts a share of its range."""
+    if within.delay != (0.0, 0.0):
+        yield "delay", _of_range(within.delay, _delayed)
+    if within.jitter:
+        yield "jitter", _of_range((0.0, within.jitter / scenario.control_period), later)
+    for name, bounds in {"mass": within.mass, **within.parameters}.items():
+        if bounds != (1.0, 1.0):
+            yield name, _of_range(bounds, functools.partial(_changed, name=name))
+    if within.friction != (0.0, 0.0):
+        yield "friction", _of_range(within.friction, rougher)
+    for i in range(scenario.plant.n if within.x0 else 0):
+        yield f"x0[{i}]", _of_range((-within.x0, within.x0), functools.partial(_started, i=i))
+
+
+def _of_range(bounds: Range, put: Put) -> Put:
+    """Return a function that puts the value at a share of a range."""
+    low, high = bounds
+    return lambda scenario, share: put(scenario, low + share * (high - low))
+
+
+def _delayed(scenario: Scenario, delay: float) -> Scenario:
+    """Return the scenario with a longer input delay, to the nearest physics step."""
+    step = scenario.resolved.physics_step
+    return dataclasses.replace(scenario, input_delay=(scenario.delay_steps + round(delay / step)) * step)
+
+
+def _changed(scenario: Scenario, value: float, name: str) -> Scenario:
+    """Return the scenario with a factor on a parameter of the plant, or with more of what is added to it."""
+    plant, own = scenario.plant, dict(scenario.mismatch)
+    name = plant.mass if name == "mass" and plant.mass in own else name
+    own[name] = own.get(name, 0.0) + value if name in plant.added else own.get(name, 1.0) * value
+    return dataclasses.replace(scenario, mismatch=own)
+
+
+def _started(scenario: Scenario, share: float, i: int) -> Scenario:
+    """Return the scenario with another start of one channel."""
+    x0 = list(scenario.resolved.x0)
+    x0[i] *= 1.0 + share
+    return dataclasses.replace(scenario, x0=x0)
+
+
+def rougher(scenario: Scenario, level: float) -> Scenario:
+    """Return the scenario with `level` added to its dry friction, N or N m."""
+    others = tuple(part for part in scenario.friction if not isinstance(part, Coulomb))
+    before = sum(part.level for part in scenario.friction if isinstance(part, Coulomb))
+    return dataclasses.replace(scenario, friction=(*others, Coulomb(before + level)))
+
+
+def later(scenario: Scenario, level: float) -> Scenario:
+    """Return the scenario whose samples are late by up to `level` control periods, counted in eighths of one."""
+    steps = JITTER_SHARES * math.ceil(scenario.steps / JITTER_SHARES)
+    jitter = round(level * JITTER_SHARES) / JITTER_SHARES * scenario.control_period
+    clock = dataclasses.replace(scenario.clock, jitter=jitter)
+    return dataclasses.replace(scenario, clock=clock, physics_step=scenario.control_period / steps)

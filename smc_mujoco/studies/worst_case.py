@@ -1,0 +1,180 @@
+"""The worst that an adversary finds for a law within a class of uncertainty, beside the median of random members.
+
+    worst = smc.worst_case(scenario, within=smc.Uncertainty(disturbance=2.0))
+    worst.value, worst.median                # rms errors, in the unit of x
+    smc.run(worst.scenario)                  # the worst run, to the last bit
+
+Sliding mode promises that the error stays small whatever a disturbance does within its bound. A median over random
+seeds does not test this. The class is the user's, and the search has no parameters, so that no law gets a milder
+adversary than another: `analysis.worst_case` describes both. What it finds is a lower bound of the worst case.
+"""
+
+import dataclasses
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from smc_mujoco.analysis.worst_case.search import Search
+from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty
+from smc_mujoco.common import html
+from smc_mujoco.common.errors import ScenarioError, find, shown, whole
+from smc_mujoco.common.progress import bar
+from smc_mujoco.common.text import number
+from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
+    from smc_mujoco.draw.page import Size
+
+METRIC = "rms_error"
+STEPS = 1_250_000  # physics steps times channels of the search in the default budget: 5 s of a core for a plain plant
+MIN_RUNS, MAX_RUNS = 32, 1024  # of the default budget
+MOST_RUNS = 1_000_000
+BEGIN = 2  # random members that the search also changes, the worst of them
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class WorstCase:
+    """The worst member of a class that was found for a scenario.
+
+    Attributes:
+      value: the metric of the worst run; inf if it failed.
+      median: the metric's median over as many random members as the search had runs.
+      unit: of both.
+      scenario: the worst run, an ordinary scenario that gives this value to the last bit.
+      found_by: the strategy that found it, or from which its changes began.
+      tried: number of runs, half of them of random members.
+      strategies: strategy -> largest value among the members that it made, also by changes.
+      nominal: the scenario that was attacked.
+      within: the class.
+      metric: its name.
+      outside: why the theorem of the law does not cover the class; "" if nothing is known against it.
+      seed: of the search.
+    """
+
+    value: float
+    median: float
+    unit: str
+    scenario: Scenario
+    found_by: str
+    tried: int
+    strategies: Mapping[str, float]
+    nominal: Scenario
+    within: Uncertainty
+    metric: str
+    outside: str
+    seed: int
+
+    def __repr__(self) -> str:
+        return f"WorstCase({self})"
+
+    def __str__(self) -> str:
+        s = self.nominal
+        label = CATALOGUE[self.metric].label
+        return (
+            f"{s.law.name} on {s.plant.name}: {label} {self.words}, median of random members "
+            f"{number(self.median)}; {self.within.words(s.plant)}"
+        )
+
+    @property
+    def words(self) -> str:
+        """The value with its unit, such as "0.98 m"."""
+        return f"{number(self.value)} {self.unit}".strip()
+
+    def _repr_html_(self) -> str:
+        rows = sorted(self.strategies.items(), key=lambda pair: -pair[1])
+        return html.table(
+            ["strategy", f"largest {CATALOGUE[self.metric].label}" + f" ({self.unit})" * bool(self.unit)],
+            [(kind, number(value)) for kind, value in rows],
+            str(self),
+            "; ".join(filter(None, [f"{self.tried} runs, half of them random", self.outside])),
+            range(1, 2),
+            len(rows),
+        )
+
+    def figure(
+        self,
+        path: str | os.PathLike | None = None,
+        title: str | None = None,
+        size: "Size" = None,
+        format: str | None = None,
+        fig: "Figure | SubFigure | None" = None,
+    ) -> "Figure | SubFigure":
+        """Draw the worst run beside the scenario as it was given; arguments as in `smc.figure`."""
+        from smc_mujoco.draw.figure import figure
+
+        traces = run([self.nominal, self.scenario])
+        title = title or f"{traces[0].scenario.plant.name}: the worst of {self.within.words(self.nominal.plant)}"
+        labels = "as given", f"worst found, {CATALOGUE[self.metric].label} {self.words}"
+        return figure(traces, path, labels, title, ("error", "d", "u", "s", "phase"), size, format, fig)
+
+    plot = figure
+
+
+def worst_case(
+    scenario: Scenario,
+    metric: str = METRIC,
+    within: Uncertainty | None = None,
+    budget: int | None = None,
+    seed: int = 0,
+    threads: int | None = None,
+    progress: bool = False,
+) -> WorstCase:
+    """Search for the worst that may happen to a scenario within a class of uncertainty.
+
+    Args:
+      scenario: its plant, law and conditions. The class adds to its disturbances, noise, delay and parameters.
+      metric: name of any metric; more is worse. Default: the rms error from a quarter of the run on.
+      within: the class, such as smc.Uncertainty(disturbance=2.0, mass=(0.7, 1.3)).
+      budget: number of runs of the search; random members get as many. A larger budget continues the same search.
+        Default: as many as take about 10 s of one core together, by the number of physics steps.
+      seed: of the random members and of the search.
+      threads, progress: as in `run`. The result does not depend on threads.
+
+    Raises:
+      ScenarioError: no class, or one that the plant cannot have; an unknown metric, or one that the plant has not.
+    """
+    if not isinstance(scenario, Scenario):
+        raise ScenarioError(f"worst_case attacks a Scenario, not {shown(scenario)}: give smc.Scenario(...)")
+    if not isinstance(within, Uncertainty):
+        raise ScenarioError(f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)")
+    entry = find("metric", metric, CATALOGUE)
+    if why := entry.refusal(scenario.plant):
+        raise ScenarioError(why)
+    budget = default_budget(scenario) if budget is None else whole("budget", budget, 1, MOST_RUNS)
+    seed = whole("seed", seed, 0, 2**53 - 1)
+    members = Members(scenario, within)
+    work = 2 * budget * scenario.work
+    with bar(f"worst case of {scenario.law.name} on {scenario.plant.name}", work, shown=progress) as drawn:
+        drawing, search = (Search(members, entry, budget, threads, drawn.advance) for _ in range(2))
+        drawing.draw(np.random.default_rng([seed, 0]))
+        early = sorted(drawing.tried[:MIN_RUNS], key=lambda one: one.key, reverse=True)
+        search.search(np.random.default_rng([seed, 1]), early[:BEGIN])
+    worst = max(search.worst, drawing.worst, key=lambda one: one.key)
+    strategies: dict[str, float] = {}
+    for one in (*drawing.tried, *search.tried):
+        strategies[one.member.kind] = max(strategies.get(one.member.kind, -np.inf), one.key[0])
+    return WorstCase(
+        value=float(worst.key[0]),
+        median=float(np.median([one.key[0] for one in drawing.tried])),
+        unit=entry.unit_for(scenario.plant.units[0], scenario.efforts[0]),
+        scenario=members.scenario_of(worst.member),
+        found_by=worst.member.kind,
+        tried=drawing.runs + search.runs,
+        strategies=strategies,
+        nominal=scenario,
+        within=within,
+        metric=metric,
+        outside="",
+        seed=seed,
+    )
+
+
+def default_budget(scenario: Scenario) -> int:
+    """Return how many runs a search has if no budget is given."""
+    return min(max(MIN_RUNS, STEPS // scenario.work), MAX_RUNS)

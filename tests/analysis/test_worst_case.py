@@ -1,0 +1,108 @@
+"""The adversary: it stays within the class, replays, depends on nothing else, and finds what is known to be worst."""
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.worst_case.strategies import recorded
+from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation.signals import Relay
+
+CLASSICAL = smc.law("classical", k=1.826, c=2.874)
+
+
+def scenario(**fields):
+    return smc.Scenario(**{"plant": "duffing", "law": CLASSICAL, "duration": 2.0} | fields)
+
+
+CLASSES = {
+    "force": smc.Uncertainty(disturbance=2.0),
+    "slope": smc.Uncertainty(disturbance=2.0, slope=8.0),
+    "constants": smc.Uncertainty(mass=(0.7, 1.3), delay=(0.0, 0.01), friction=(0.0, 0.1), x0=0.2),
+    "all": smc.Uncertainty(disturbance=1.0, jitter=5e-4, mass=(0.7, 1.3), parameters={"alpha": (0.8, 1.2)}),
+}
+
+
+@pytest.mark.parametrize("within", CLASSES.values(), ids=CLASSES)
+def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(within):
+    base = scenario()
+    worst = smc.worst_case(base, within=within, budget=48)
+    again = smc.worst_case(base, within=within, budget=48, threads=1)
+    assert (again.value, again.median, again.scenario) == (worst.value, worst.median, worst.scenario)
+    trace = smc.run(serialise.restore(serialise.describe(worst.scenario)))
+    assert smc.score(trace)["rms_error"] == worst.value >= worst.median
+    assert worst.tried == 96
+    assert np.abs(trace.d).max() <= within.disturbance
+    if within.slope:
+        assert np.abs(np.diff(trace.d[:, 0])).max() <= within.slope * base.control_period * (1 + 1e-9)
+    made = worst.scenario
+    assert 0.0 <= made.input_delay <= within.delay[1]
+    for name, factor in made.mismatch.items():
+        low, high = {"mass": within.mass, **within.parameters}[name]
+        assert low <= factor <= high
+    assert np.abs(np.array(made.resolved.x0) - 1.5).max() <= 1.5 * within.x0 * (1 + 1e-12)
+
+
+def test_a_larger_budget_continues_the_search():
+    values = [smc.worst_case(scenario(), within=CLASSES["all"], budget=n).value for n in (1, 7, 20, 40, 90)]
+    assert all(a <= b for a, b in itertools.pairwise(values))
+    assert values[0] < values[-1]
+
+
+def test_a_relay_replays_from_its_record_to_the_last_bit():
+    relay = Relay(2.0, s=0.3, rate=1.0, error=-0.2)
+    base = scenario(plant=smc.plant("pendulum_network", n=2), law="super_twisting")
+    run = smc.run(dataclasses.replace(base, disturbance=relay))
+    force = 2.0 * recorded(run, relay)
+    np.testing.assert_array_equal(run.d, np.column_stack([force, force]))
+    replay = smc.run(dataclasses.replace(base, disturbance=smc.Held(run.t, force)))
+    for name in ("x", "v", "u", "s", "d"):
+        np.testing.assert_array_equal(getattr(replay, name), getattr(run, name))
+
+
+def test_it_finds_the_worst_of_a_linear_loop():
+    """For M x'' = -k x - c v + d, |d| <= D, at rest at first, the largest x(T) is D times the integral of |h|."""
+    k, c, T = 20.0, 1.0, 4.0
+
+    @smc.law_function(gains={"k": k, "c": c})
+    def linear(y, gains, memory):
+        return -gains.k * y.x - gains.c * y.v, 0.0
+
+    t = np.linspace(0.0, T, 40001)
+    w, a = np.sqrt(k - c * c / 4), c / 2
+    gain = np.trapezoid(np.abs(np.exp(-a * t) * np.sin(w * t) / w), t)
+    still = {"alpha": 0.0, "beta": 0.0, "delta": 0.0}
+    base = smc.Scenario(plant=smc.plant("duffing", M=1.0, **still), law=linear, duration=T, x0=0.0, u_max=1e3)
+    worst = smc.worst_case(base, "peak", smc.Uncertainty(disturbance=0.5), budget=96)
+    assert worst.value <= 0.5 * gain * 1.001
+    assert worst.value >= 0.5 * gain * 0.95  # the 5 % that a second searcher may find more
+
+
+def test_a_failed_run_is_the_worst():
+    @smc.law_function
+    def fragile(y, gains, memory):
+        return (-10.0 * y.x - 5.0 * y.v) / (0.0 if y.v > 3.0 else 1.0), 0.0
+
+    worst = smc.worst_case(scenario(law=fragile, u_max=50.0), within=smc.Uncertainty(disturbance=20.0), budget=32)
+    assert worst.value == np.inf
+    assert smc.run(worst.scenario).failure
+
+
+@pytest.mark.parametrize(
+    ("make", "part"),
+    [
+        (smc.Uncertainty, "nothing but the scenario"),
+        (lambda: smc.Uncertainty(mass=(1.3, 0.7)), "lowest first"),
+        (lambda: smc.Uncertainty(disturbance=-1.0), "disturbance is -1"),
+        (lambda: smc.worst_case(scenario(), within=smc.Uncertainty(parameters={"zz": (1, 2)})), "zz"),
+        (lambda: smc.worst_case(scenario(), "speed", CLASSES["force"]), "unknown metric"),
+        (lambda: smc.worst_case(scenario()), "within is None"),
+        (lambda: smc.worst_case("duffing", within=CLASSES["force"]), "attacks a Scenario"),
+    ],
+)
+def test_bad_values_get_a_sentence(make, part):
+    with pytest.raises(smc.ScenarioError, match=part):
+        make()
