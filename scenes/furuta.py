@@ -30,9 +30,10 @@ def rocking(trace):
 
 def answer(runs):
     rubs = runs["arm rubs"]
+    up = rubs.those(lambda trace: abs(trace.x[-1, 1]) < 0.1)
     return (
-        f"where the arm rubs it stands with {rubs.those(lambda trace: abs(trace.x[-1, 1]) < 0.1).named}; the arm rocks "
-        f"least, in degrees, with {rubs.least(rocking)}, most with {rubs.most(rocking)}"
+        f"with friction in the arm, the pendulum stays up under {up.named}; the arm rocks least, in degrees, with "
+        f"{rubs.least(rocking)}, most with {rubs.most(rocking)}"
     )
 
 

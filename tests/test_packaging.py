@@ -158,7 +158,7 @@ def test_models_are_found_from_the_wheel(binaries, tmp_path):
 
 def test_a_scene_runs_from_the_wheel_in_any_folder(binaries, tmp_path):
     program, out = binaries / "smc-mujoco", tmp_path / "out"
-    done = run(program, "run", "inverted_pendulum", "--no-video", "--out", out, cwd=tmp_path)
+    done = run(program, "run", "inverted_pendulum", "--no-film", "--out", out, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert list(tmp_path.iterdir()) == [out]
     assert any(path.is_file() for path in out.rglob("*"))

@@ -74,7 +74,7 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
     monkeypatch.setattr(search, "BUDGET", 64)  # of the tunings in `smc.compare`
-    monkeypatch.setattr(sys, "argv", ["block.py", "--no-video"])  # read by a scene that plays itself
+    monkeypatch.setattr(sys, "argv", ["block.py", "--no-film"])  # read by a scene that plays itself
     Path("block.py").write_text(block)
     played = pytest.raises(SystemExit) if "smc.play(" in block else contextlib.nullcontext()
     out = io.TextIOWrapper(io.BytesIO(), "utf-8")

@@ -20,24 +20,25 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
 )
-COMMANDS = {
-    "list": catalogue.list_,
-    "laws": catalogue.laws,
-    "run": runs.run,
-    "show": runs.show,
-    "compare": studies.compare,
-    "which": studies.which,
-    "tune": analysis.tune,
-    "margins": analysis.margins,
-    "accuracy": analysis.accuracy,
-    "basin": analysis.basin,
-    "chatter": analysis.chatter,
-    "view": runs.view,
-}
-for annex in filter(annexes.installed, annexes.ANNEXES):
-    COMMANDS |= annexes.module(f"smc_mujoco.{annex}.commands", "the command line").COMMANDS
-for name, command in COMMANDS.items():
-    app.command(name)(command)
+GROUPS = {  # heading in the help -> name -> command; the annexes add theirs
+    "Run and look": {
+        "list": catalogue.list_, "laws": catalogue.laws, "run": runs.run, "show": runs.show, "view": runs.view,
+    },
+    "Compare": {"compare": studies.compare, "which": studies.which},
+    "Tune and analyse": {
+        "tune": analysis.tune,
+        "margins": analysis.margins,
+        "accuracy": analysis.accuracy,
+        "basin": analysis.basin,
+        "chatter": analysis.chatter,
+    },
+}  # fmt: skip
+for annex in sorted(filter(annexes.installed, annexes.ANNEXES)):
+    for group, commands in annexes.module(f"smc_mujoco.{annex}.commands", "the command line").GROUPS.items():
+        GROUPS[group] = GROUPS.get(group, {}) | commands
+for group, commands in GROUPS.items():
+    for name, command in commands.items():
+        app.command(name, rich_help_panel=group)(command)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -23,7 +23,7 @@ Timer = Callable[[str], AbstractContextManager[None]]
 def perform(
     scene: Scene,
     out: Path,
-    video: bool,
+    filming: bool,
     threads: int | None,
     clock: Timer,
     terminal: Terminal,
@@ -34,7 +34,7 @@ def perform(
     """Run a scene: print its question, scores and answer; write its traces, figures and film to the folder `out`.
 
     Args:
-      video: whether to film the scene.
+      filming: whether to film the scene.
       threads: simulations at once; None for one per core.
       clock: measures the time of each part.
       export: formats in which traces are written besides .npz.
@@ -66,7 +66,7 @@ def perform(
         written = save(traces, out, export)
     with clock("figures"):
         written += figures(scene, traces, out)
-    if video:
+    if filming:
         with clock("film"):
             written += film(scene, traces, out, terminal, speed)
     terminal.print("wrote", style="dim")

@@ -28,7 +28,7 @@ def errors_as_sentences() -> Iterator[None]:
     except MemoryError:
         _fail("out of memory: give fewer or shorter runs")
     except KeyboardInterrupt:
-        _fail("stopped; files already written are complete", 130)
+        _fail("stopped. Run the same command again to go on.", 130)
 
 
 def _fail(sentence: str, code: int = 2) -> None:

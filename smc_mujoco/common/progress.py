@@ -1,8 +1,9 @@
-"""Progress bars for work that may take more than two seconds: on stderr, and in a notebook's cell."""
+"""Progress of work that takes more than two seconds: a bar on a terminal and in a notebook, lines in a log."""
 
 import contextlib
 import html
 import math
+import sys
 import time
 from collections.abc import Callable, Iterator
 
@@ -10,7 +11,7 @@ from smc_mujoco.common.html import in_notebook
 
 Report = Callable[[float, float], None]  # called with the work done and the whole work, which may be an estimate
 SPEED_WINDOW = 120.0  # s over which the terminal's bar averages its speed, for the time left: chosen
-DRAWING_PERIOD = 0.2  # s between two drawings of a notebook's bar: chosen
+DRAWING_PERIOD, LINE_PERIOD = 0.2, 10.0  # s between two drawings of a notebook's bar, and two lines of a log: chosen
 
 
 class Bar:
@@ -28,7 +29,7 @@ class Bar:
 
 @contextlib.contextmanager
 def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool = False) -> Iterator[Bar]:
-    """Show a bar while the block lasts.
+    """Show a bar while the block lasts; where stderr is no terminal, such as a file, a line each ten seconds.
 
     Args:
       what: the text beside it.
@@ -54,12 +55,12 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
         with contextlib.closing(NotebookBar(what, whole, counted)) as cell:
             yield cell
         return
+    if not console.is_terminal:
+        yield LogBar(what, whole, counted)
+        return
     share = MofNCompleteColumn() if counted else TaskProgressColumn()
     columns = TextColumn("{task.description}", markup=False), BarColumn(), share, TimeRemainingColumn()
-    hidden = not console.is_terminal  # a log file gets no empty lines
-    with Progress(
-        *columns, transient=True, console=console, speed_estimate_period=SPEED_WINDOW, disable=hidden
-    ) as progress:
+    with Progress(*columns, transient=True, console=console, speed_estimate_period=SPEED_WINDOW) as progress:
         task, drawn = progress.add_task(what, total=whole), Bar()
         drawn.advance = lambda work: progress.advance(task, work)
         drawn.reached = lambda done, whole: progress.update(task, completed=done, total=whole)
@@ -67,15 +68,15 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
         yield drawn
 
 
-class NotebookBar(Bar):
-    """A bar in a notebook's cell, which vanishes in the end. It is HTML, because rich warns without ipywidgets."""
+class LogBar(Bar):
+    """A bar as lines on stderr, the first after LINE_PERIOD."""
+
+    period = LINE_PERIOD
 
     def __init__(self, what: str, whole: float | None, counted: bool):
-        from IPython.display import HTML, display
-
-        self.what, self.whole, self.counted, self.html = what, whole, counted, HTML
-        self.done, self.start, self.drawn = 0.0, time.monotonic(), -math.inf
-        self.cell = display(HTML(""), display_id=True)
+        self.what, self.whole, self.counted = what, whole, counted
+        self.done, self.start = 0.0, time.monotonic()
+        self.drawn = self.start
 
     def advance(self, work: float) -> None:
         """Add work that is done."""
@@ -91,26 +92,52 @@ class NotebookBar(Bar):
         self.what = text
         self._draw()
 
+    def _draw(self) -> None:
+        """Show the bar as it is, unless it was shown less than a period ago."""
+        now = time.monotonic()
+        if now - self.drawn >= self.period:
+            self.drawn = now
+            self.show()
+
+    def show(self) -> None:
+        """Print a line."""
+        print(self, file=sys.stderr, flush=True)
+
+    @property
+    def share(self) -> float:
+        """The share of the work that is done."""
+        return min(1.0, self.done / self.whole) if self.whole else 0.0
+
+    def __str__(self) -> str:
+        if not self.whole:
+            return self.what
+        size = f"{self.done:g}/{self.whole:g}" if self.counted else f"{100 * self.share:.0f} %"
+        left = (time.monotonic() - self.start) * (1.0 / self.share - 1.0) if self.share else math.inf
+        return f"{self.what} {size}" + (f", {left:.0f} s left" if left < math.inf else "")
+
+
+class NotebookBar(LogBar):
+    """A bar in a notebook's cell, which vanishes in the end. It is HTML, because rich warns without ipywidgets."""
+
+    period = DRAWING_PERIOD
+
+    def __init__(self, what: str, whole: float | None, counted: bool):
+        from IPython.display import HTML, display
+
+        super().__init__(what, whole, counted)
+        self.drawn, self.html = -math.inf, HTML
+        self.cell = display(HTML(""), display_id=True)
+
     def close(self) -> None:
         """Take the bar away."""
         if self.cell is not None:
             self.cell.update(self.html(""))
 
-    def _draw(self) -> None:
-        """Draw the bar as it is, unless it was drawn less than DRAWING_PERIOD ago."""
-        now = time.monotonic()
-        if self.cell is not None and now - self.drawn >= DRAWING_PERIOD:
-            self.drawn = now
-            self.cell.update(self.html(str(self)))
-
-    def __str__(self) -> str:
-        if not self.whole:
-            return f"<progress></progress> {html.escape(self.what)}"
-        share = min(1.0, self.done / self.whole)
-        size = f"{self.done:g}/{self.whole:g}" if self.counted else f"{100 * share:.0f} %"
-        left = (time.monotonic() - self.start) * (1.0 / share - 1.0) if share else math.inf
-        rest = f", {left:.0f} s left" if left < math.inf else ""
-        return f'<progress value="{share:.3f}" max="1"></progress> {html.escape(self.what)} {size}{rest}'
+    def show(self) -> None:
+        """Draw the bar."""
+        if self.cell is not None:
+            value = f' value="{self.share:.3f}" max="1"' if self.whole else ""
+            self.cell.update(self.html(f"<progress{value}></progress> {html.escape(str(self))}"))
 
 
 def summed(report: Report, done: float, whole: float) -> Callable[[float], None]:
@@ -131,11 +158,11 @@ def summed(report: Report, done: float, whole: float) -> Callable[[float], None]
 
 
 class Counter:
-    """Count of a study's runs and steps. Its text, beside a bar, has the runs done and the runs a second."""
+    """Count of a study's simulated steps. Its text, beside a bar, has the same in runs, and the runs a second."""
 
     def __init__(self, runs: int, steps: int, bar: Bar):
         self.total, self.all_steps, self.bar = runs, steps, bar
-        self.runs = self.steps = 0
+        self.steps = 0
         self.start = time.monotonic()
 
     def stepped(self, steps: int) -> None:
@@ -144,15 +171,10 @@ class Counter:
         self.bar.advance(steps)
         self.bar.says(str(self))
 
-    def finished(self, runs: int) -> None:
-        """Add runs that are scored and written."""
-        self.runs += runs
-        self.bar.says(str(self))
-
     def __str__(self) -> str:
         spent = time.monotonic() - self.start
-        rate = self.total * self.steps / self.all_steps / spent if self.all_steps and spent else 0.0
-        return f"{self.runs} of {self.total} runs, {rate:.3g} a second"
+        runs = self.total * self.steps / self.all_steps if self.all_steps else 0.0
+        return f"{math.floor(runs + 1e-9)} of {self.total} runs, {runs / spent if spent else 0.0:.3g} a second"
 
 
 @contextlib.contextmanager

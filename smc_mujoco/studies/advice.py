@@ -350,7 +350,7 @@ class Advice:
 
     def _sure(self) -> str:
         if len(self.compared) < 2:
-            return "How sure: nothing could be compared with it."
+            return "Not sure: there was no second law."
         first, *others = self.compared
         if self._too_few:
             return f"How sure: not at all, with {self.samples}."

@@ -20,7 +20,6 @@ from smc_mujoco.analysis.tuning import result, search, search_space
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
-from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
@@ -82,11 +81,8 @@ def fair_gains(
         starts = None
         budget = search.BUDGET if alike else budget
     missing = [k for k, candidate in enumerate(found) if candidate is None]
-    with bar(f"gains on {plant.name}", len(missing), shown=progress and tune and bool(missing), counted=True) as drawn:
-        for k in missing:
-            drawn.says(f"gains of {laws[k].name} on {plant.name}")
-            found[k] = _tuned(plant, laws[k], budget, starts, folder, threads) if tune else _default(laws[k])
-            drawn.advance(1)
+    for k in missing:
+        found[k] = _tuned(plant, laws[k], budget, starts, folder, threads, progress) if tune else _default(laws[k])
     return [candidate for candidate in found if candidate is not None]
 
 
@@ -121,7 +117,13 @@ def _default(law: Component | Template, remark: str = "") -> Candidate:
 
 
 def _tuned(
-    plant: Plant, law: Component | Template, budget: int, starts: Starts | None, folder: Path, threads: int | None
+    plant: Plant,
+    law: Component | Template,
+    budget: int,
+    starts: Starts | None,
+    folder: Path,
+    threads: int | None,
+    progress: bool = False,
 ) -> Candidate:
     """Return a law with gains from `tune`, or from the file of an earlier call; its defaults if it cannot be tuned."""
     usual, chosen = Objective(), coerce.law(law)
@@ -138,7 +140,7 @@ def _tuned(
             tuned = cached(
                 folder / f"{plant.name}-{law.name}-{budget}.json",
                 depends,
-                lambda: search.tune(plant, law, budget, objective=goal, threads=threads),
+                lambda: search.tune(plant, law, budget, objective=goal, threads=threads, progress=progress),
                 lambda made, path: made.save(path),
                 result.load,
             )

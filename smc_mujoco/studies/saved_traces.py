@@ -54,4 +54,3 @@ def save(table: Table, choice: str, folder: Path, threads: int, progress: bool) 
         for batch in batches(files, threads):
             for i, trace in stream(batch, threads, counts.stepped):
                 trace.save(files[batch[i].scenario])
-                counts.finished(1)

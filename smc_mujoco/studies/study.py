@@ -103,7 +103,6 @@ def study(
 
         def finish(batch: Batch, outcomes: Sequence[Outcome]) -> None:
             store.add([run_key.row(one.scenario, plants) | its for one, its in zip(batch, outcomes, strict=True)])
-            counts.finished(len(batch))
 
         def finish_here(batch: Batch, found: Sequence[Trace]) -> None:
             for trace in found if traces == "all" else ():

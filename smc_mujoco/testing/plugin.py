@@ -37,7 +37,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options of this plugin."""
     group = parser.getgroup("smc_mujoco", "step responses of control laws (smc_mujoco)")
     group.addoption("--smc-update", action="store_true", help="record golden metrics instead of comparing with them")
-    group.addoption("--smc-video", action="store_true", help="film the step responses of failing tests too")
+    group.addoption("--smc-film", action="store_true", help="film the step responses of failing tests too")
     group.addoption("--smc-out", metavar="DIR", help="folder for figures and films; default: a temporary one")
 
 
@@ -136,7 +136,7 @@ def pytest_runtest_makereport(
         config, out = item.config, item.config.getoption("smc_out")
         folder = config.invocation_params.dir / out if out else ledger.temporary / "smc_mujoco"
         report.sections.append(
-            ("step responses", tell(item.nodeid, responses, folder, bool(config.getoption("smc_video"))))
+            ("step responses", tell(item.nodeid, responses, folder, bool(config.getoption("smc_film"))))
         )
     return report
 

@@ -1,4 +1,4 @@
-"""The report of a failing test: tables of its step responses, a figure and, with --smc-video, a film."""
+"""The report of a failing test: tables of its step responses, a figure and, with --smc-film, a film."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path

@@ -114,8 +114,7 @@ def refused(answer: tuple[int, str, str], *words: object) -> None:
     """Exit code 2, one sentence on stderr with these words in it, no traceback."""
     code, out, err = answer
     assert code == 2
-    assert err.startswith("smc-mujoco: ")
-    assert len(err.splitlines()) == 1
+    assert [line for line in err.splitlines() if line.startswith("smc-mujoco: ")] == err.splitlines()[-1:]
     assert "Traceback" not in out + err
     for word in words:
         assert str(word) in err
@@ -163,7 +162,7 @@ def test_with_its_output_closed_a_command_does_its_work(trace, folder):
 
 
 def test_run_prints_scores_of_a_scene_file_and_writes_its_files(call, scene, folder):
-    code, out, err = call("run", scene, "--no-video", "--out", "results")
+    code, out, err = call("run", scene, "--no-film", "--out", "results")
     assert (code, err) == (0, "")
     assert {path.name for path in (folder / "results").iterdir()} == FILES
     said = out.partition("wrote\n")[2].split()
@@ -181,7 +180,7 @@ import smc_mujoco as smc
 run = smc.Scenario(plant="duffing", law="none", duration=0.01)
 scene = smc.Scene(title="Asked [/s]", conditions={"calm": {"only": run}}, answer=lambda runs: runs.who("rests", "rest"))
 ''')
-    code, out, _ = call("run", "asks.py", "--no-video", "--out", "out")
+    code, out, _ = call("run", "asks.py", "--no-film", "--out", "out")
     assert code == 0
     assert [line.strip() for line in out.splitlines() if line][:2] == ["Does it settle?", "Asked [/s]"]
     assert re.search(r"^only .*\n\nonly does not rest\.\n\nwrote$", out, re.MULTILINE)
@@ -199,7 +198,7 @@ def test_run_hands_the_speed_and_the_camera_to_the_film(call, undrawn, scene, fo
 
 
 def test_results_go_to_videos_and_the_scene_s_name_by_default(call, scene, folder):
-    assert call("run", scene, "--no-video")[0] == 0
+    assert call("run", scene, "--no-film")[0] == 0
     assert {path.name for path in (folder / "videos" / "mine").iterdir()} == FILES
 
 
@@ -219,7 +218,7 @@ def test_no_number_and_no_heading_of_a_score_table_is_cut_at_80_columns(plant, f
         "scene = smc.Scene(title='Wide', conditions={'nominal': runs})",
     ]
     (folder / "wide.py").write_text("\n".join(lines))
-    code, out, _ = call("run", "wide.py", "--no-video", "--out", "out")
+    code, out, _ = call("run", "wide.py", "--no-film", "--out", "out")
     assert code == 0
     table = out.partition("Wide")[2].partition("\n\n")[0].splitlines()
     assert max(map(len, table)) <= 80
@@ -245,7 +244,7 @@ def test_a_failing_law_is_named_and_others_keep_their_scores(call, undrawn, fold
         "runs = {'bad': smc.Scenario(law=sour(), **common), 'good': smc.Scenario(law='classical', **common)}\n"
         "scene = smc.Scene(title='Sour', conditions={'nominal': runs})\n"
     )
-    code, out, err = call("run", "sour.py", "--no-video", "--out", "out")
+    code, out, err = call("run", "sour.py", "--no-film", "--out", "out")
     assert (code, err) == (0, "")
     told = " ".join(out.split())
     assert "bad: law 'sour' raised ValueError (sour grapes) in channel 0, at t = 0.051 s" in told
@@ -255,7 +254,7 @@ def test_a_failing_law_is_named_and_others_keep_their_scores(call, undrawn, fold
 
 def test_another_seed_changes_random_numbers_and_the_same_seed_nothing(call, undrawn, scene):
     for out, seed in (("a", 1), ("b", 1), ("c", 2)):
-        assert call("run", scene, "--no-video", "--out", out, "--seed", seed)[0] == 0
+        assert call("run", scene, "--no-film", "--out", out, "--seed", seed)[0] == 0
     a, b, c = (smc.load(f"{out}/noisy-rough.npz") for out in "abc")
     assert (a.scenario.seed, c.scenario.seed) == (1, 2)
     np.testing.assert_array_equal(a.x, b.x)
@@ -272,13 +271,13 @@ def test_threads_are_as_many_as_asked_for_and_change_no_bit(call, undrawn, scene
 
     monkeypatch.setattr(show, "run", noted)
     for threads in (1, 2):
-        assert call("run", scene, "--no-video", "--out", str(threads), "--threads", threads)[0] == 0
+        assert call("run", scene, "--no-film", "--out", str(threads), "--threads", threads)[0] == 0
     assert asked == [1, 2]
     np.testing.assert_array_equal(smc.load("1/noisy-rough.npz").x, smc.load("2/noisy-rough.npz").x)
 
 
 def test_timing_names_the_stretches_and_they_add_up(call, scene):
-    _, out, _ = call("run", scene, "--no-video", "--out", "out", "--timing")
+    _, out, _ = call("run", scene, "--no-film", "--out", "out", "--timing")
     spent = {name: float(seconds) for name, seconds in re.findall(r"([a-z ]+?) (\d+\.\d\d) s", out.splitlines()[-1])}
     total = spent.pop(" in all")
     assert [name.strip() for name in spent] == ["loading", "compiling", "simulating", "traces", "figures"]
@@ -358,7 +357,7 @@ def test_a_scene_of_carts_with_poles_has_a_table_of_each(call, undrawn, folder):
         "run = smc.Scenario(plant='cart_pole', law='hierarchical', model='nominal', duration=0.3)\n"
         "scene = smc.Scene(title='Poles', conditions={'nominal': {'k = 2': run, 'k = -2': run}})\n"
     )
-    code, out, err = call("run", "poles.py", "--no-video", "--out", "out")
+    code, out, err = call("run", "poles.py", "--no-film", "--out", "out")
     assert (code, err) == (0, "")
     cart, pole = out.split("Poles, driven: slide (m)")[1].split("Poles, free: hinge (rad)")
     assert "TV rate" in cart
@@ -388,7 +387,7 @@ scene = smc.Scene(
 
 def test_answers_have_a_table_per_metric_with_labels_by_conditions(call, undrawn, folder):
     (folder / "blocks.py").write_text(ANSWERS)
-    code, out, err = call("run", "blocks.py", "--no-video", "--out", "out")
+    code, out, err = call("run", "blocks.py", "--no-film", "--out", "out")
     assert (code, err) == (0, "")
     after = out[out.index("stick_time (s)") :]
     assert re.search(r"law +dry +wet *\n", after)
@@ -404,7 +403,7 @@ def test_answers_have_a_table_per_metric_with_labels_by_conditions(call, undrawn
 
 def test_answers_of_one_condition_are_one_table(call, undrawn, folder):
     (folder / "blocks.py").write_text(ANSWERS.replace(', "wet": {"light": block(0.0)}', ""))
-    code, out, err = call("run", "blocks.py", "--no-video", "--out", "out")
+    code, out, err = call("run", "blocks.py", "--no-film", "--out", "out")
     assert (code, err) == (0, "")
     assert re.search(r"law +stick_time \(s\) +peak_reaction \(N\)", out)
     assert re.search(r"heavy +0\.300 +\d", out)
@@ -514,7 +513,7 @@ def test_a_mistake_in_a_scene_file_names_the_file_and_the_line(mistake, call, fo
         "\n"
         f"scene = {expression}\n"
     )
-    answer = call("run", "wrong.py", "--no-video")
+    answer = call("run", "wrong.py", "--no-film")
     refused(answer, "wrong.py", "line 2" if "ok(plant='dufing')" in expression or "-1.0" in expression else "line 4")
     assert word in answer[2]
     assert not (folder / "videos").exists()
@@ -533,13 +532,13 @@ def test_a_file_that_imports_what_is_not_there_is_named(call, folder):
 def test_a_folder_that_cannot_be_made_is_named_before_anything_runs(call, scene, folder, monkeypatch):
     monkeypatch.setattr(show, "run", lambda *_, **__: pytest.fail("it ran"))
     (folder / "taken").write_text("")
-    refused(call("run", scene, "--no-video", "--out", "taken"), "taken", "--out")
-    refused(call("run", scene, "--no-video", "--out", "taken/below"), "taken", "--out")
+    refused(call("run", scene, "--no-film", "--out", "taken"), "taken", "--out")
+    refused(call("run", scene, "--no-film", "--out", "taken/below"), "taken", "--out")
 
 
 def test_a_file_that_cannot_be_written_is_named(call, scene, folder):
     (folder / "out" / "noisy-rough.npz").mkdir(parents=True)
-    refused(call("run", scene, "--no-video", "--out", "out"), "noisy-rough.npz")
+    refused(call("run", scene, "--no-film", "--out", "out"), "noisy-rough.npz")
 
 
 @pytest.mark.parametrize("content", [b"", b"x = 1\n", b"PK\x03\x04"])
@@ -562,7 +561,7 @@ def test_an_export_with_another_ending_is_refused_and_writes_nothing(name, call,
 
 
 def test_a_seed_too_large_is_refused(call, scene):
-    refused(call("run", scene, "--no-video", "--seed", 10**20), "seed")
+    refused(call("run", scene, "--no-film", "--seed", 10**20), "seed")
 
 
 @pytest.mark.parametrize(
@@ -647,7 +646,7 @@ def script(tmp_path_factory):
     (folder / "scenes").mkdir()
     (folder / "scenes" / "once.py").write_text(SCRIPT)
     (folder / "scenes" / "beside_it.py").write_text("LEVEL = 2.0\n")
-    return folder, python("scenes/once.py", "--no-video", cwd=folder)
+    return folder, python("scenes/once.py", "--no-film", cwd=folder)
 
 
 def test_a_scene_run_as_a_script_is_executed_once(script):
@@ -669,7 +668,7 @@ def test_a_module_beside_a_scene_is_found_by_the_command_too(script, call):
     folder, _ = script
     path = folder / "scenes" / "nested.py"
     path.write_text(SCRIPT.replace("json.dumps(LEVEL)", "LEVEL").replace("import json\n", ""))
-    code, out, err = call("run", path, "--no-video", "--out", "out")
+    code, out, err = call("run", path, "--no-film", "--out", "out")
     assert (code, err) == (0, "")
     assert out.count("the file runs") == 1
 
@@ -687,7 +686,7 @@ def test_a_terminal_that_knows_ascii_only_gets_all_there_is(scene, folder, trace
             "from smc_mujoco.cli import scene",
             "from smc_mujoco.cli.main import main",
             "scene.figures = lambda *_: []",
-            "for words in (['list'], ['run', 'mine.py', '--no-video', '--out', 'out'], ['show', 'one.npz']):",
+            "for words in (['list'], ['run', 'mine.py', '--no-film', '--out', 'out'], ['show', 'one.npz']):",
             "    try: main(words)",
             "    except SystemExit as end: assert not end.code, words",
         ]
@@ -720,7 +719,7 @@ if __name__ == "__main__":
 def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(tmp_path):
     (tmp_path / "long.py").write_text(LONG)
     process = subprocess.Popen(
-        [sys.executable, "long.py", "--no-video"],
+        [sys.executable, "long.py", "--no-film"],
         cwd=tmp_path,
         env=environment(),
         stdout=subprocess.PIPE,
@@ -736,7 +735,7 @@ def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(tmp_path):
         finally:
             process.kill()
     assert process.returncode == 130
-    assert err == "smc-mujoco: stopped; files already written are complete\n"
+    assert err == "smc-mujoco: stopped. Run the same command again to go on.\n"
     assert "Traceback" not in out
     assert list((tmp_path / "videos" / "long").iterdir()) == []
 

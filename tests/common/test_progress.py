@@ -73,3 +73,23 @@ def test_a_terminal_gets_no_html(capsys):
     with progress.bar("runs", 2.0) as bar:
         bar.advance(1.0)
     assert "<progress" not in "".join(capsys.readouterr())
+
+
+def test_a_log_gets_a_line_each_ten_seconds(monkeypatch, capsys):
+    now = [0.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    with progress.bar("duffing", 40.0) as bar:
+        for _ in range(40):
+            now[0] += 1.0
+            bar.advance(1.0)
+    out, err = capsys.readouterr()
+    assert (out, err.splitlines()[:2]) == ("", ["duffing 25 %, 30 s left", "duffing 50 %, 20 s left"])
+    assert len(err.splitlines()) == 4
+
+
+def test_the_count_of_a_study_is_that_of_its_bar():
+    counts = progress.Counter(8, 800, progress.Bar())
+    counts.stepped(799)
+    assert str(counts).startswith("7 of 8 runs, ")
+    counts.stepped(1)
+    assert str(counts).startswith("8 of 8 runs, ")

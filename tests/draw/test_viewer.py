@@ -388,7 +388,7 @@ def short(tmp_path, monkeypatch):
 
 
 def test_run_exports_each_trace_beside_its_npz(call, short):
-    code, out, _ = call("run", "short.py", "--no-video", "--out", "out", "--export", "csv, mat,parquet")
+    code, out, _ = call("run", "short.py", "--no-film", "--out", "out", "--export", "csv, mat,parquet")
     assert code == 0
     files = {f"calm-one.{ending}" for ending in ("npz", "csv", "mat", "parquet")}
     assert {path.name for path in (short / "out").iterdir()} == files
@@ -397,7 +397,7 @@ def test_run_exports_each_trace_beside_its_npz(call, short):
 
 @pytest.mark.parametrize("formats", ["xlsx", "csv,xlsx", "", "csv,,mat"])
 def test_another_format_is_refused_before_the_run(formats, call, short):
-    code, _, err = call("run", "short.py", "--no-video", "--out", "out", "--export", formats)
+    code, _, err = call("run", "short.py", "--no-film", "--out", "out", "--export", formats)
     assert (code, err.count("\n")) == (2, 1)
     assert "csv, mat, parquet" in err
     assert not (short / "out").exists()

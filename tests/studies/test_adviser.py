@@ -301,7 +301,7 @@ def test_one_law_is_the_only_one(folder):
     assert found.answer == [
         f"Use {FAST} (gains: yours).",
         "Because it is the only law here that suits. It settles in 100 % of its runs.",
-        "How sure: nothing could be compared with it.",
+        "Not sure: there was no second law.",
     ]
     assert found.code == "smc.law('observer_free', lam=6, k1=2)"
     assert dataclasses.replace(found, choices=(dataclasses.replace(found.choices[0], law=SLOW),)).code == ""

@@ -292,11 +292,11 @@ def test_metrics_are_plain_floats(step_response):
 # figure and film
 
 
-def test_a_failing_test_attaches_its_figure_and_with_smc_video_its_film(pytester, monkeypatch):
+def test_a_failing_test_attaches_its_figure_and_with_smc_film_its_film(pytester, monkeypatch):
     pytester.makepyfile(test_my_laws=HEAD + BAD.replace("phi=2.0", "phi=2.0, duration=0.1"))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), *sys.path]))
     # in a separate process: a renderer that this one forgets would be opened twice
-    said = pytester.runpytest_subprocess(*PLUGIN, "--smc-video").stdout.str()
+    said = pytester.runpytest_subprocess(*PLUGIN, "--smc-film").stdout.str()
     (figure,) = re.findall(r"^figure: (.*)$", said, re.MULTILINE)
     assert Path(figure).read_bytes().startswith(b"\x89PNG")
     assert "smc_mujoco" in Path(figure).parts  # a folder in pytest's temporary one
@@ -328,9 +328,9 @@ def test_a_figure_that_cannot_be_drawn_hides_nothing(session, monkeypatch):
     assert "assert (inf < 0.6" in said
 
 
-def test_without_a_renderer_smc_video_is_one_sentence(session, monkeypatch):
+def test_without_a_renderer_smc_film_is_one_sentence(session, monkeypatch):
     monkeypatch.setattr(gl, "missing", lambda: "no film: nothing renders here")
-    said = session(BAD, "--smc-video", failed=1)
+    said = session(BAD, "--smc-film", failed=1)
     assert re.findall(r"^(?:no )?film.*$", said, re.MULTILINE) == ["no film: nothing renders here"]
 
 

@@ -78,7 +78,7 @@ Laws = Annotated[
 Plants = Annotated[
     list[str] | None,
     typer.Argument(
-        metavar="[PLANT...]",
+        metavar="PLANT",
         help="Plants of `smc-mujoco list`, as a,b or a b, or FILE.xml:joint+joint; default the paper's five.",
         show_default=False,
     ),

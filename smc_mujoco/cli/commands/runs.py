@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 def run(
     name: options.SceneName,
     out: Annotated[Path | None, typer.Option(help="Folder for the results; default videos/SCENE.")] = None,
-    video: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
+    film: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
     speed: Annotated[
         float | None,
         typer.Option(
@@ -54,7 +54,7 @@ def run(
     Exported traces have every number to the last bit, and its unit. Units are in the first line of csv ("t [s],x
     [m],..."), in the struct units of mat, and in the metadata of each column of parquet, as "unit".
 
-    Example: smc-mujoco run duffing --no-video --out results --export csv,parquet
+    Example: smc-mujoco run duffing --no-film --out results --export csv,parquet
     """
     clock = Clock()
     with clock("loading"), held_back():
@@ -71,7 +71,7 @@ def run(
     if camera is not None:
         scene = dataclasses.replace(scene, camera=from_text(camera))
     terminal, folder = Terminal(), out or Path("videos") / path.stem
-    perform(scene, folder, video, threads, clock, terminal, endings, scenes.question(path), speed)
+    perform(scene, folder, film, threads, clock, terminal, endings, scenes.question(path), speed)
     if timing:
         terminal.note(str(clock), "dim")
 

@@ -2,12 +2,13 @@
 
 from smc_mujoco.evidence.commands import boards, certificates, papers, report, rigs
 
-COMMANDS = {
-    "board": boards.board,
-    "identify": rigs.identify,
-    "replay": rigs.replay,
-    "certify": certificates.certify,
-    "claims": papers.claims,
-    "papers": papers.papers,
-    "report": report.report,
+GROUPS = {  # heading in the help -> name -> command
+    "Compare": {"board": boards.board},
+    "Audit": {
+        "claims": papers.claims,
+        "papers": papers.papers,
+        "certify": certificates.certify,
+        "report": report.report,
+    },
+    "Machines": {"identify": rigs.identify, "replay": rigs.replay},
 }

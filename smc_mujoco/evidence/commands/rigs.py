@@ -33,7 +33,7 @@ def identify(
     ] = None,
     json: options.Json = None,
 ) -> None:
-    """Find the quantities of a machine from records of it.
+    """Fit a machine's parameters (mass, friction, motor) to measured data.
 
     The rig's references, controller, encoder and delay are replayed, and the quantities are chosen that give the least
     sum of squared residuals. The command prints them with their standard errors, says what the records cannot tell, and

@@ -2,10 +2,12 @@
 
 from smc_mujoco.exchange.commands import c, fmu, live
 
-COMMANDS = {
-    "live": live.live,
-    "check-c": c.check_c,
-    "export-c": c.export_c,
-    "check-fmu": fmu.check_fmu,
-    "export-fmu": fmu.export_fmu,
+GROUPS = {  # heading in the help -> name -> command
+    "Run and look": {"live": live.live},
+    "Exchange": {
+        "export-c": c.export_c,
+        "check-c": c.check_c,
+        "export-fmu": fmu.export_fmu,
+        "check-fmu": fmu.check_fmu,
+    },
 }
