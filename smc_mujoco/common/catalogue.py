@@ -23,7 +23,7 @@ from importlib.machinery import ModuleSpec
 from importlib.metadata import EntryPoint
 from typing import Any, Generic, TypeVar, overload
 
-from smc_mujoco.common.errors import ScenarioError, one_line, shown, unknown, users_frame
+from smc_mujoco.common.errors import ScenarioError, shown, unknown, users_frame, words
 
 NAME = operator.attrgetter("name")
 PREFIX = "smc_mujoco."
@@ -90,8 +90,7 @@ class Added(Generic[T_co]):
         except ScenarioError as error:
             return ScenarioError(f"{self}: {error}")
         except (Exception, SystemExit) as error:  # whatever another package raises
-            why = one_line(f"{type(error).__name__}: {error}")
-            failed = ScenarioError(f"{self} cannot be loaded ({why}): fix, update or uninstall that package")
+            failed = ScenarioError(f"{self} cannot be loaded ({words(error)}): fix, update or uninstall that package")
             failed.__cause__ = error
             return failed
 

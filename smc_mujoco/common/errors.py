@@ -145,6 +145,14 @@ def taken(what: str, values: Iterable[T]) -> list[T]:
     return first
 
 
+def words(error: BaseException) -> str:
+    """Return type and message of an exception, of which another package may be the author, on one line."""
+    try:
+        return one_line(f"{type(error).__name__}: {error}")
+    except Exception:
+        return f"{type(error).__name__}, whose message cannot be read"
+
+
 def attribute(value: object, name: str) -> Any:
     """Return an attribute of a user's object; None if there is none, or if reading it raises."""
     try:

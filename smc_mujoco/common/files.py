@@ -1,17 +1,23 @@
 """Files: the package's folders, atomic writing, reading of files that may be damaged, JSON with NaN and infinity."""
 
 import contextlib
+import csv
 import json
 import math
 import os
+import re
 import tempfile
 import uuid
+import zipfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, shown
 
+MAX_SIZE = 2 * 10**9  # bytes of a file that is read: chosen
+MAX_UNPACKED, MAX_RATIO, MAX_MEMBERS = 500_000_000, 20, 10_000  # of an archive: bytes, per byte packed, files; chosen
+ARCHIVES = (".npz", ".fmu", ".pt", ".pt2", ".pth", ".ts")  # suffixes
 WORDS = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}  # numbers that JSON lacks
 
 
@@ -84,7 +90,8 @@ def reading(path: str | os.PathLike[str], kind: str, cure: str) -> Iterator[Path
     """Turn an exception in the with block, which reads a file, into one sentence. Yield the path.
 
     Args:
-      path: of a regular file. A pipe or a device is refused, because it may never end.
+      path: of a regular file. A pipe or a device is refused, because it may never end, and so is one that is too large,
+        or an archive that unpacks to too much.
       kind: what the file should be, such as "trace".
       cure: what to give instead.
 
@@ -96,13 +103,51 @@ def reading(path: str | os.PathLike[str], kind: str, cure: str) -> Iterator[Path
     try:
         if (file := Path(path)).exists() and not file.is_file():
             raise ScenarioError("it is not a regular file")
+        _bounded(file)
         yield file
     except FileNotFoundError:
         raise ScenarioError(f"no {kind} at {path}: {cure}") from None
+    except UnicodeError:
+        raise ScenarioError(f"{path} is not a {kind} (it is not text): {cure}") from None
     except Exception as error:  # damaged bytes raise any exception there is
         own = isinstance(error, ScenarioError)
         why = str(error) if own else ", ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
         raise ScenarioError(f"{path} is not a {kind} ({why}): {cure}") from None
+
+
+def _bounded(file: Path) -> None:
+    """Raise ScenarioError for a file that is too large, or an archive that unpacks to too much."""
+    size = file.stat().st_size
+    if size > MAX_SIZE:
+        raise ScenarioError(f"it has {size / 1e6:,.0f} MB, more than {MAX_SIZE / 1e6:,.0f} MB")
+    if file.suffix not in ARCHIVES or not zipfile.is_zipfile(file):
+        return
+    with zipfile.ZipFile(file) as archive:
+        members = archive.infolist()
+    unpacked = sum(member.file_size for member in members)
+    if unpacked > max(MAX_UNPACKED, MAX_RATIO * size) or len(members) > MAX_MEMBERS:
+        raise ScenarioError(
+            f"it unpacks from {size / 1e6:,.0f} MB to {len(members):,} files of {unpacked / 1e6:,.0f} MB in all, and "
+            f"{MAX_MEMBERS:,} files and {MAX_UNPACKED / 1e6:,.0f} MB are allowed"
+        )
+
+
+def csv_rows(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
+    """Return the line number and the cells of each row of a CSV file that is not blank.
+
+    Where the first line has semicolons, they separate the cells, and a comma in a cell is a decimal point.
+    """
+    with reading(path, "CSV file", "give one of cells between commas or semicolons, a CSV file") as file:
+        with file.open(newline="", encoding="utf-8-sig") as text:
+            semicolons = ";" in re.sub('"[^"]*"', "", text.readline())
+            text.seek(0)
+            reader = csv.reader(text, strict=True, delimiter=";" if semicolons else ",")
+            rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if len(row) > 1 or any(row)]
+        if any("\0" in cell for _, row in rows for cell in row):
+            raise ScenarioError("it is not text")
+    if semicolons:
+        rows = [(line, [cell.replace(",", ".") for cell in row]) for line, row in rows]
+    return rows
 
 
 def plain(data: Any) -> Any:

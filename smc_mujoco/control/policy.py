@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, one_line, shown
+from smc_mujoco.common.files import reading
 from smc_mujoco.common.guard import ALTERS, Arithmetic, Failed, Fault, tried
 from smc_mujoco.common.jit import Uncompiled
 from smc_mujoco.control.law import Law, Measurement, law_function
@@ -215,15 +216,16 @@ def _callable(act: Any) -> tuple[Act, str]:
         path = Path(act)
         if path.suffix not in FORMATS:
             raise ScenarioError(f"policy is {path.name!r}: give a callable, or a file of {', '.join(FORMATS)}")
-        if not path.is_file():
-            raise ScenarioError(f"no policy {str(path)!r}: give the path of a file")
-        file = File(str(path.resolve()), _digest(path))
+        with reading(path, "policy", "give the path of a file that a library wrote"):
+            file = File(str(path.resolve()), _digest(path))
         try:
             tried(__name__, dataclasses.asdict(file), TIMEOUT)
         except Failed as failed:
             raise ScenarioError(failed.fault or f"policy {path.name!r}: {failed}") from None
         return file, path.stem
-    torch, name = sys.modules.get("torch"), type(act).__name__
+    torch, control, name = sys.modules.get("torch"), sys.modules.get("control"), type(act).__name__
+    if control is not None and isinstance(act, control.InputOutputSystem):
+        raise ScenarioError(f"policy is a {name} of python-control: give smc.law_from_control(...) as the law")
     predicts = callable(getattr(act, "predict", None))
     if predicts and not callable(act):  # a model of stable-baselines3 predicts by its policy
         act = getattr(act, "policy", act)

@@ -4,7 +4,7 @@ Each raises ScenarioError, one sentence with the field, the value and the cure, 
 """
 
 import itertools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from typing import Any, TypeVar
 
 import numpy as np
@@ -134,6 +134,8 @@ def state(name: str) -> Callable[[float | Sequence[float] | None], tuple[float, 
             return None
         if isinstance(value, np.ndarray):
             value = value.tolist()
+        if isinstance(value, Mapping | Set):
+            raise ScenarioError(f"{name} is {shown(value)}: give one number, or a list of one for each channel")
         if isinstance(value, Iterable) and not isinstance(value, str | bytes):
             return tuple(taken(name, value))
         return (value,)  # type: ignore[return-value]

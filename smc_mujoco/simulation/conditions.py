@@ -52,6 +52,7 @@ from smc_mujoco.simulation.signals import Constant, OrnsteinUhlenbeck, Pulse, Re
 Fields = Mapping[str, Any]
 Recipe = Fields | Callable[[Plant, float], Fields]  # fields, or a function of plant and duration that returns them
 
+MAX_PARTS = 20  # conditions that a name joins: chosen
 OTHERS = ("plant", "law", "model", "surface", "seed", "duration")  # fields that belong to no condition
 FIELDS = [name for name in Scenario.fields() if name not in OTHERS]
 SEVERAL = ("disturbance", "friction", "actuator")  # fields that add up when conditions are joined
@@ -152,6 +153,8 @@ def find_condition(value: Condition | str) -> Condition:
         return parse(value)
     if set("=(") & set(value):
         raise ScenarioError(f"condition {shown(value)} has no colon: write a name, a colon and fields, as worn: x0=0.3")
+    if (count := value.count("+") + 1) > MAX_PARTS:
+        raise ScenarioError(f"condition {shown(value)} joins {count:,} conditions: give at most {MAX_PARTS}")
     first, *others = [find("condition", part.strip(), NAMED) for part in value.split("+")]
     return sum(others, start=first)
 

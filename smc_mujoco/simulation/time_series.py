@@ -1,16 +1,15 @@
 """A user's time series as a signal, from numbers or from a CSV file, which is checked cell by cell."""
 
-import csv
 import dataclasses
 import math
 import os
 import re
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
 
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
+from smc_mujoco.common.files import csv_rows
 from smc_mujoco.simulation.signals import EARLY, Signal
 
 MAX_GAP = 1.5  # median steps; chosen: a logger's jitter stays below, a missing row is above
@@ -64,7 +63,9 @@ class TimeSeries(Signal):
 
     @classmethod
     def from_csv(cls, path: str | os.PathLike[str], column: str | None = None, time: str | None = None) -> "TimeSeries":
-        """Return the series in a CSV file: numbers separated by commas, a row per time, at a nearly constant rate.
+        """Return the series in a CSV file: a row per time, at a nearly constant rate.
+
+        Commas separate the cells, or semicolons, beside which a comma is a decimal point.
 
         Args:
           path: the file. Its first row may name the columns; otherwise they are time and value. A name may have a unit,
@@ -76,7 +77,7 @@ class TimeSeries(Signal):
           ScenarioError: there is no such file or column, times are not in s or do not increase, a cell is empty or not
             a finite number, or a step of time is longer than 1.5 median steps. The error names the line.
         """
-        rows = _rows(path)
+        rows = csv_rows(path)
         if not rows:
             raise ScenarioError(f"{path} is empty: give a CSV file with the columns t and a value")
         places, body = _columns(path, rows, column, time)
@@ -161,31 +162,13 @@ def _check(what: str, times: Sequence[float], values: Sequence[float], where: Ca
         )
 
 
-def _rows(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
-    """Return the line number and the cells of each row of a CSV file that is not blank."""
-    if not isinstance(path, str | os.PathLike):
-        raise ScenarioError(f"cannot read a series from {shown(path)}: give the path of a CSV file")
-    try:
-        with Path(path).open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file, strict=True)
-            rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if len(row) > 1 or any(row)]
-    except FileNotFoundError:
-        raise ScenarioError(f"no file at {path}: give the path of a CSV file") from None
-    except (OSError, ValueError, csv.Error) as error:
-        why = "it is not text" if isinstance(error, UnicodeError) else getattr(error, "strerror", None) or error
-        raise ScenarioError(f"cannot read {str(path)!r} as CSV ({why}): give a file of cells between commas") from None
-    if any("\0" in cell for _, row in rows for cell in row):
-        raise ScenarioError(f"cannot read {str(path)!r} as CSV (it is not text): give a file of cells between commas")
-    return rows
-
-
 def _columns(
     path: str | os.PathLike[str], rows: list[tuple[int, list[str]]], column: str | None, time: str | None
 ) -> tuple[tuple[int, int], list[tuple[int, list[str]]]]:
     """Return the indices of the columns of times and values, and the rows below the header."""
     names = rows[0][1]
     if len(names) < 2:
-        raise ScenarioError(f"{path} has one column in its first line: give two, time and value, separated by commas")
+        raise ScenarioError(f"{path} has one column in its first line: give two, time and value, with commas between")
     for line, row in rows:
         if len(row) != len(names):
             raise ScenarioError(f"{path}, line {line}: {len(row)} cells for {len(names)} columns: give one for each")

@@ -3,12 +3,14 @@
 import contextlib
 import hashlib
 import json
+import uuid
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
 from smc_mujoco.analysis.tuning import result
 from smc_mujoco.common import fingerprint
+from smc_mujoco.common.files import reading
 
 T = TypeVar("T")
 
@@ -18,20 +20,30 @@ def cached(
 ) -> T:
     """Return what `make` returns, from its file if there is one.
 
-    The file's name ends in a hash of what the result depends on: `depends`, the package's code, models and gains, and
-    the versions of the packages below. Files with other hashes are removed when a new one is written.
+    The file's name ends in two hashes: of what the result depends on (`depends`, the package's code, models and gains,
+    and the versions of the packages below), and of its content, so that a file that was changed is not read. Files with
+    other hashes are removed when a new one is written.
 
     Args:
       path: of the file, without the hash.
       depends: what the result depends on besides the code, as JSON data.
     """
     text = json.dumps([depends, fingerprint.package(), result.versions()], sort_keys=True, default=str)
-    file = path.with_stem(f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}")
-    if file.exists():
+    stem = f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
+    for file in path.parent.glob(f"{stem}-{'?' * 12}{path.suffix}"):
         with contextlib.suppress(Exception):  # damaged bytes raise any exception there is; compute it again
-            return load(file)
+            if file.stem.endswith(_seal(file)):
+                return load(file)
     made = make()
-    for old in path.parent.glob(f"{path.stem}-{'?' * 12}.*"):
+    save(made, new := path.with_stem(f".{stem}-{uuid.uuid4().hex[:12]}"))
+    kept = path.with_stem(f"{stem}-{_seal(new)}")
+    for old in path.parent.glob(f"{path.stem}-{'?' * 12}-{'?' * 12}{path.suffix}"):
         old.unlink()
-    save(made, file)
-    return load(file)
+    new.replace(kept)
+    return load(kept)
+
+
+def _seal(file: Path) -> str:
+    """Return a hash of a file's content."""
+    with reading(file, "result", "start it again"):
+        return hashlib.sha256(file.read_bytes()).hexdigest()[:12]

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, taken
-from smc_mujoco.common.files import from_json, reading, replacing, to_json
+from smc_mujoco.common.files import MAX_RATIO, MAX_UNPACKED, from_json, reading, replacing, to_json
 from smc_mujoco.common.html import table
 from smc_mujoco.common.text import number
 from smc_mujoco.metrics.catalogue import metrics
@@ -99,6 +99,9 @@ def read(path: Path, sealed: bool = False) -> "pa.Table":
     import pyarrow.parquet as pq
 
     with pq.ParquetFile(path, page_checksum_verification=True) as file:
+        size = sum(file.metadata.row_group(i).total_byte_size for i in range(file.num_row_groups))
+        if size > max(MAX_UNPACKED, MAX_RATIO * Path(path).stat().st_size):
+            raise ScenarioError(f"it unpacks to {size / 1e6:,.0f} MB, and {MAX_UNPACKED / 1e6:,.0f} MB are allowed")
         groups = [file.read_row_group(i) for i in range(file.num_row_groups)]
         rows = pa.concat_tables(groups) if groups else file.read()
         metadata = dict(file.metadata.metadata or {})

@@ -5,10 +5,15 @@ import dataclasses
 import json
 import math
 import os
+import tempfile
+import zipfile
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
+import wild
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -23,6 +28,7 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common.files import from_json, plain, reading, replacing, to_json
 from smc_mujoco.evidence.audit.audit import document
 from smc_mujoco.evidence.audit.verdict import Claim
+from smc_mujoco.evidence.rigs import records
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies.cache import cached
 from smc_mujoco.testing import golden
@@ -151,12 +157,53 @@ def test_whatever_reading_raises_is_one_sentence(error, tmp_path):
         raise error
 
 
-def test_what_is_no_regular_file_is_not_opened(tmp_path):
-    os.mkfifo(tmp_path / "a.json")
-    for load in (load_margins, load_map, result.load):
-        for path in (tmp_path / "a.json", tmp_path, "/dev/zero"):
+LOADERS = {
+    ".json": (load_margins, load_map, result.load),
+    ".npz": (records.load, smc.load),
+    ".csv": (records.load, smc.TimeSeries.from_csv),
+    ".onnx": (smc.policy,),
+}
+
+
+@pytest.mark.parametrize("ending", LOADERS)
+def test_what_is_no_regular_file_is_not_opened(ending, tmp_path):
+    os.mkfifo(tmp_path / f"a{ending}")
+    (tmp_path / "folder").mkdir()
+    (folder := tmp_path / f"b{ending}").symlink_to(tmp_path / "folder")
+    (zero := tmp_path / f"c{ending}").symlink_to("/dev/zero")
+    for load in LOADERS[ending]:
+        for path in (tmp_path / f"a{ending}", folder, zero):
             with pytest.raises(smc.ScenarioError, match="it is not a regular file"):
                 load(path)
+        with pytest.raises(smc.ScenarioError, match=r"File name too long|no .* at"):
+            load(tmp_path / f"{'a' * 300}{ending}")
+
+
+@pytest.mark.parametrize("load", [smc.load, records.load])
+def test_an_archive_that_unpacks_to_too_much_is_refused_before(load, tmp_path):
+    file = tmp_path / "bomb.npz"
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("x.npy", "w") as stream:
+        for _ in range(51):
+            stream.write(bytes(10_000_000))
+    with pytest.raises(smc.ScenarioError, match=r"it unpacks from \d MB to 1 files of 510 MB in all, and 10,000 files"):
+        load(file)
+
+
+def test_a_table_that_unpacks_to_too_much_is_refused_before(tmp_path):
+    many = pa.table({"x": pa.array(np.zeros(70_000_000))})
+    pq.write_table(many, tmp_path / "results.parquet", use_dictionary=False, compression="zstd")
+    with pytest.raises(smc.ScenarioError, match="it unpacks to 560 MB, and 500 MB are allowed"):
+        smc.Table.read(tmp_path / "results.parquet")
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: smc.export_fmu("pid", "a.fmu"), lambda: smc.plant_from(f"<!-- -->{wild.ARM}", ["shoulder"])]
+)
+def test_without_room_for_temporary_files_there_is_one_sentence(make, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
+    with pytest.raises(smc.ScenarioError, match=r"no temporary file can be written \(.*\): make room, or set TMPDIR"):
+        make()
 
 
 @pytest.mark.parametrize("damage", ["", "[", "5", "[[]]", "[" * 10**5, '[{"plant": 1}]'])
@@ -176,6 +223,12 @@ def test_a_damaged_part_of_a_kept_report_is_computed_again(damage, tmp_path):
     path.write_text(damage)
     assert get() == get() == [odd]
     assert len(made) == 2
+    (path,) = tmp_path.iterdir()
+    text = path.read_text()
+    path.write_text(text.replace("0.1", "0.3"))
+    assert path.read_text() != text
+    assert get() == get() == [odd]
+    assert len(made) == 3
 
 
 def test_a_file_is_replaced_as_a_whole(tmp_path):

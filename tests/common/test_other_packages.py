@@ -270,6 +270,7 @@ BROKEN = {
     "missing": ("bad_law:missing", "AttributeError"),
     "raises": ("bad_raises:raises", "ZeroDivisionError: division by zero"),
     "exits": ("bad_exits:exits", "SystemExit: 3"),
+    "shy": ("bad_shy:shy", "Shy, whose message cannot be read"),
     "nowhere": ("bad_nowhere:nowhere", "ModuleNotFoundError: No module named 'bad_nowhere'"),
     "number": ("bad_law:number", "it is 3: give a function decorated with smc.law_function"),
     "other": ("bad_law:renamed", "its own name is 'renamed': give the entry point the same name"),
@@ -285,6 +286,7 @@ def broken(install):
         bad_law=LAW.replace("NAME", "renamed")
         + "number = 3\nflat = smc.surface_function(lambda y, gains, memory: (y.e, 0.0))",
         bad_raises="1 / 0",
+        bad_shy="class Shy(Exception):\n    def __str__(self):\n        raise self\nraise Shy",
         bad_exits="raise SystemExit(3)",
         bad_good=LAW.replace("NAME", "good"),
     )

@@ -329,7 +329,7 @@ def test_the_policy_of_a_model_is_taken_as_it_is_now(torch):
 
 
 @pytest.mark.parametrize(
-    ("act", "words"), [(3, "policy is 3"), ("net.h5", "file of .onnx"), ("net.onnx", "no policy 'net.onnx'")]
+    ("act", "words"), [(3, "policy is 3"), ("net.h5", "file of .onnx"), ("net.onnx", "no policy at net.onnx")]
 )
 def test_what_is_no_policy_is_one_sentence(act, words):
     with pytest.raises(smc.ScenarioError, match=words) as raised:
@@ -342,6 +342,12 @@ class Broken:
 
     def __getattr__(self, name):
         raise ZeroDivisionError(name)
+
+
+def test_a_controller_of_python_control_is_told_its_own_door():
+    control = pytest.importorskip("control", reason="python-control is not installed")
+    with pytest.raises(smc.ScenarioError, match=r"policy is a StateSpace of python-control: give smc.law_from_control"):
+        smc.policy(control.ss([[0.0]], [[1.0]], [[1.0]], [[0.0]]))
 
 
 def test_what_does_not_say_whether_it_can_be_called_is_no_policy():

@@ -147,6 +147,13 @@ def test_a_text_that_is_none_is_one_sentence(text, words):
     assert "\n" not in str(error.value)
 
 
+def test_a_name_of_thousands_is_one_sentence():
+    with pytest.raises(smc.ScenarioError, match=r"joins 3,001 conditions: give at most 20"):
+        smc.grid(["duffing"], ["classical"], ["noise+" * 3000 + "noise"], 1)
+    with pytest.raises(smc.ScenarioError, match=r"x0 is \{1: 2\}: give one number, or a list of one for each channel"):
+        smc.Scenario(plant="duffing", law="classical", x0={1: 2})  # pyright: ignore[reportArgumentType]
+
+
 def test_a_file_holds_a_condition_a_line(tmp_path):
     path = tmp_path / "conditions.txt"
     path.write_text(f"# of the workshop\n\n{WORN}\nnoise + coulomb\n")

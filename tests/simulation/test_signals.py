@@ -429,6 +429,7 @@ def file(tmp_path):
         (GOOD.partition("\n")[2], {}, (1.0, 2.0, 3.0, 4.0)),
         (GOOD.replace("\n", "\r\n"), {}, (1.0, 2.0, 3.0, 4.0)),
         ("\ufeff" + GOOD, {}, (1.0, 2.0, 3.0, 4.0)),
+        ("\ufeff" + GOOD.replace(",", ";").replace(".", ","), {}, (1.0, 2.0, 3.0, 4.0)),
         (GOOD.replace(",", " , ") + "\n\n", {}, (1.0, 2.0, 3.0, 4.0)),
         (GOOD.replace("t,d,e", "t [s],d [N m],e"), {"column": "d"}, (1.0, 2.0, 3.0, 4.0)),
         (GOOD.replace("t,d,e", "time [s],d [N],e [m]"), {"column": "e [m]"}, (5.0, 6.0, 7.0, 8.0)),
@@ -443,6 +444,7 @@ def file(tmp_path):
         "no header",
         "CRLF",
         "BOM",
+        "semicolons",
         "spaces",
         "units",
         "with units",
@@ -480,7 +482,7 @@ def test_a_csv_file_is_read(content, asked, values, file):
         ("0,1\n0.1,2\n", {"time": "s"}, ("no header", "'s'")),
         ("t,d\n", {}, ("0 points", "two")),
         ("t,d\n0,1\n", {}, ("1 points", "two")),
-        ("t;d\n0;1\n0,1;2\n", {}, ("one column", "commas")),
+        ("t d\n0 1\n0.1 2\n", {}, ("one column", "commas")),
         ("", {}, ("empty",)),
         ("\n\n", {}, ("empty",)),
         (b"\x89PNG\r\n\x1a\n\0\0", {}, ("not text", "commas")),
@@ -499,8 +501,8 @@ def test_what_is_no_path_is_refused(wrong):
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
-    refused(lambda: TimeSeries.from_csv(tmp_path / "none.csv"), "none.csv", "no file")
-    refused(lambda: TimeSeries.from_csv(tmp_path), tmp_path.name, "directory")
+    refused(lambda: TimeSeries.from_csv(tmp_path / "none.csv"), "none.csv", "no CSV file")
+    refused(lambda: TimeSeries.from_csv(tmp_path), tmp_path.name, "regular file")
     refused(lambda: TimeSeries.from_csv("a\0b.csv"), "CSV")
 
 

@@ -3,7 +3,6 @@
 A record is a mapping from names of columns to arrays, with one value for each control period of the rig.
 """
 
-import csv
 import dataclasses
 import math
 import os
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.files import csv_rows, reading
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import trace as traces
 from smc_mujoco.simulation.reference import evaluate
@@ -86,19 +86,12 @@ def load(path: str | os.PathLike[str], names: Mapping[str, str] | None = None) -
     Raises:
       ScenarioError: no such file, not a file of columns, or an unknown column.
     """
-    file = Path(path)
-    if not file.exists():
-        raise ScenarioError(f"no file at {path}: give the path of a CSV or npz file")
-    if file.suffix == ".npz":
-        try:
-            with file.open("rb") as opened, np.load(opened) as held:
-                found = {} if "about" in held else {name: held[name] for name in held}
-        except Exception as error:  # damaged bytes raise any exception there is
-            raise ScenarioError(f"cannot read {str(path)!r} as npz ({error}): give arrays by column") from None
-        if not found:
-            return traces.load(file)
-    else:
+    with reading(path, "record", "give the path of a CSV file, or of an npz file with arrays by column") as file:
+        found = _npz(file) if file.suffix == ".npz" else None
+    if found is None:
         found = _csv(file)
+    elif not found:
+        return traces.load(file)
     for ours, theirs in (names or {}).items():
         if theirs not in found:
             raise ScenarioError(f"{path} has no column {theirs!r} (it has {', '.join(found)}): give one that it has")
@@ -106,13 +99,15 @@ def load(path: str | os.PathLike[str], names: Mapping[str, str] | None = None) -
     return found
 
 
+def _npz(file: Path) -> Record:
+    """Return the columns of an npz file; none if it is a saved trace."""
+    with file.open("rb") as opened, np.load(opened) as held:
+        return {} if "about" in held else {name: held[name] for name in held}
+
+
 def _csv(file: Path) -> Record:
     """Return the columns of a CSV file. A cell that is empty, or not a number, is NaN."""
-    try:
-        with file.open(newline="", encoding="utf-8-sig") as text:
-            rows = [row for row in csv.reader(text) if row]
-    except (OSError, ValueError, csv.Error) as error:
-        raise ScenarioError(f"cannot read {str(file)!r} as CSV ({error}): give cells between commas") from None
+    rows = [row for _, row in csv_rows(file)]
     if len(rows) < 2:
         found = "no lines" if not rows else "only 1 line"
         raise ScenarioError(f"{file} has {found}: give a first line with the columns' names, and samples")

@@ -10,7 +10,6 @@ import os
 import platform
 import re
 import sys
-import tempfile
 import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -20,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
-from smc_mujoco.common.files import ended, replacing
+from smc_mujoco.common.files import ended, no_room, replacing, scratch
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
@@ -218,11 +217,12 @@ def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
       ScenarioError: there is no compiler, or it fails.
     """
     (machine, suffix), command = platform_tuple(), build.compiler()
-    with tempfile.TemporaryDirectory(prefix="smc_mujoco-") as folder:
-        sources, target = {Path(n).name: t for n, t in files.items() if n.startswith("sources/")}, Path(folder, "out")
-        for name, text in sources.items():
-            Path(folder, name).write_text(text, encoding="utf-8")
-        compiled = [str(Path(folder, name)) for name in sources if name.endswith(".c")]
+    with scratch() as folder:
+        sources, target = {Path(n).name: t for n, t in files.items() if n.startswith("sources/")}, folder / "out"
+        with no_room():
+            for name, text in sources.items():
+                (folder / name).write_text(text, encoding="utf-8")
+        compiled = [str(folder / name) for name in sources if name.endswith(".c")]
         try:
             done = timed([*command, *build.FLAGS, *HIDDEN, *compiled, "-o", str(target), "-lm"], 120.0)
         except (OSError, TimedOut):

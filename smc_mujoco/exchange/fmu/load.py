@@ -24,6 +24,7 @@ import numpy as np
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, one_line, shown, unknown
 from smc_mujoco.common.extras import extra
+from smc_mujoco.common.files import reading
 from smc_mujoco.common.guard import Failed, tried
 from smc_mujoco.common.jit import Uncompiled
 from smc_mujoco.control.component import Template
@@ -49,7 +50,6 @@ NAMES = {
 INPUTS = tuple(n for n in Measurement._fields if n not in ("has_surface", "s", "v_eq"))
 CLOSE = 1e-6  # relative difference below which two periods are equal
 MAX_TIMEOUT = 86_400.0  # s: a day
-MAX_SIZE, MAX_FILES = 500_000_000, 10_000  # unpacked bytes and files of an FMU; chosen
 CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
 
 _running: dict[int, "Running"] = {}  # number of an instance, which its law's memory holds -> the instance
@@ -284,11 +284,9 @@ def _pace(law: FmuLaw) -> str:
 
 def _file(path: str | os.PathLike[str]) -> Path:
     """Return the path of an existing file."""
-    if not isinstance(path, str | os.PathLike):
-        raise ScenarioError(f"cannot take a law from {shown(path)}: give the path of an .fmu file")
-    if not Path(path).is_file():
-        raise ScenarioError(f"there is no file {str(path)!r}: give the path of an .fmu file")
-    return Path(path)
+    with reading(path, "functional mock-up unit", "give the path of an .fmu file") as file:
+        file.open("rb").close()
+        return file
 
 
 def _description(file: Path, digest: str) -> Any:
@@ -305,12 +303,6 @@ def _description(file: Path, digest: str) -> Any:
         with zipfile.ZipFile(file) as archive:
             if (wanted := "modelDescription.xml") not in archive.namelist():
                 raise ScenarioError(f"{file.name} is not an FMU, as there is no {wanted} in it: {CURE}")
-            members = archive.infolist()
-            if (size := sum(member.file_size for member in members)) > MAX_SIZE or len(members) > MAX_FILES:
-                raise ScenarioError(
-                    f"{file.name} unpacks to {len(members):,} files of {size / 1e6:,.0f} MB in all: give one of at "
-                    f"most {MAX_FILES:,} files and {MAX_SIZE / 1e6:,.0f} MB"
-                )
         folder = _extracted(str(file.resolve()), digest)
         about = fmpy.read_model_description(str(folder), validate=False)
     except ScenarioError:

@@ -302,7 +302,7 @@ def test_a_damaged_npz_file_is_one_sentence(tmp_path, cut):
     np.savez(file, t=np.arange(99.0)) if cut >= 0 else np.save(file.with_suffix(".npy"), np.arange(3))
     content = file.read_bytes()[:cut] if cut >= 0 else file.with_suffix(".npy").read_bytes()
     file.write_bytes(content)
-    with pytest.raises(smc.ScenarioError, match="as npz"):
+    with pytest.raises(smc.ScenarioError, match="is not a record"):
         records.load(file)
 
 
@@ -319,7 +319,7 @@ def test_files_that_are_no_columns_get_one_sentence(content, sentence, tmp_path)
     with pytest.raises(smc.ScenarioError) as error:
         records.load(tmp_path / "a.csv")
     assert sentence in str(error.value)
-    with pytest.raises(smc.ScenarioError, match="no file at"):
+    with pytest.raises(smc.ScenarioError, match="no record at"):
         records.load(tmp_path / "b.csv")
 
 
