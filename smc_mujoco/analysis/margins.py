@@ -314,6 +314,9 @@ def margins(
     Raises:
       ScenarioError: an unknown plant, law, kind, set or condition, or a plant that starts at 0.
     """
+    if isinstance(plants, Scenario):
+        words = f"[{plants.plant.name!r}], [{plants.law.name!r}]"
+        raise ScenarioError(f"margins are of plants and laws, not of a scenario: call smc.margins({words})")
     duration = QUICK if quick else DURATION
     bases = [
         case(plant, law, condition, duration, gains, starts=starts)

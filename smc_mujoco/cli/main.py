@@ -1,7 +1,9 @@
 """The command line: smc-mujoco, whose commands are those of `commands`."""
 
 import os
+import signal
 import sys
+import threading
 import warnings
 from collections.abc import Sequence
 from typing import Annotated
@@ -50,6 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         stream.reconfigure(errors="replace")  # a character that the terminal lacks is shown as ?
     if not os.environ.get("COLUMNS", "80").strip("0"):
         del os.environ["COLUMNS"]  # a terminal without a width sets it to 0
+    if threading.current_thread() is threading.main_thread():  # ends as Ctrl-C does, and leaves no half-written files
+        signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
     choose_gl()  # before a command imports mujoco, which fails if MUJOCO_GL does not name a backend
     warnings.showwarning = lambda message, *_, **__: print(f"smc-mujoco: {printable(str(message))}", file=sys.stderr)
     app(arguments, prog_name="smc-mujoco")

@@ -4,6 +4,7 @@ import difflib
 import itertools
 import math
 import numbers
+import re
 import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
@@ -61,16 +62,31 @@ def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
     names = sorted(known, key=lambda one: (int(one) if one.isdecimal() else -1, one))  # claims have numbers
     near = _nearest(name, names) if isinstance(name, str) else []
     listed = one_line(", ".join(names), MAX_LISTED)
-    hint = f"did you mean {near[0]!r}?" if near else f"choose from {listed}" if names else "there are none"
+    hint = (
+        f"did you mean {' or '.join(map(repr, near))}?"
+        if near
+        else f"choose from {listed}"
+        if names
+        else "there are none"
+    )
     return ScenarioError(f"unknown {kind} {shown(name)}: {hint}")
 
 
 def _nearest(name: str, names: list[str]) -> list[str]:
-    """Return the name nearest in spelling, ignoring case, or the first that contains the name; [] for none."""
+    """Return the names that an abbreviation may mean, else the nearest in spelling, else the first that contains it."""
     plain = {known.casefold(): known for known in names}
     wanted = name.casefold()
+    if name.isupper() and (found := [known for known in names if _abbreviates(wanted, known.split("_"))]):
+        return found
     close = difflib.get_close_matches(wanted, list(plain), n=1)
     return [plain[near] for near in close or [known for known in plain if wanted and wanted in known]][:1]
+
+
+def _abbreviates(short: str, words: list[str]) -> bool:
+    """Return whether `short` is a usual abbreviation of a name's words, as sta, stc and stsmc of super_twisting."""
+    initials = "".join(word[:1] for word in words)
+    ending = "smc?" if len(words) == 1 else "(a|c|sm|smc)?"
+    return re.fullmatch(re.escape(initials) + ending, short) is not None
 
 
 def one_line(text: str, most: int = 200) -> str:

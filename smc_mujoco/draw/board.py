@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from smc_mujoco.analysis.bootstrap import Interval, median_interval, share_interval
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns, sources, values
-from smc_mujoco.common.errors import ScenarioError, taken, unknown
+from smc_mujoco.common.errors import ScenarioError, shown, taken, unknown
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style
@@ -19,6 +19,7 @@ from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.draw.pareto import MARKS
 from smc_mujoco.mechanisms.plant import catalogue as plants_catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.simulation.trace import Trace
 
 METRICS = ("settling_time", "ultimate_bound", "tv_rate")
 ROUNDING = 1e-9  # a size below it is printed as "<1e-9"
@@ -50,6 +51,8 @@ def plot(
     Raises:
       ScenarioError: no runs, an unknown metric, or as `figure`.
     """
+    if isinstance(table, Trace):
+        raise ScenarioError(f"table is {shown(table)}: smc.figure draws traces, and this draws the table of a study")
     paths = [] if path is None else pages.files(path, format)
     width, height = pages.measure(size, fig)
     names = taken("metrics", metrics)

@@ -357,6 +357,8 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     Raises:
       ScenarioError: no traces, or traces that cannot share axes.
     """
+    if hasattr(traces, "column"):
+        raise ScenarioError(f"traces is {shown(traces)}: smc.plot draws a table, and this draws traces of smc.run")
     traces = [traces] if isinstance(traces, Trace) else taken("traces", traces)
     if not traces:
         raise ScenarioError("no traces to draw: give at least one, from smc.run(...) or smc.load(...)")

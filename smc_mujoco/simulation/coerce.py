@@ -227,7 +227,8 @@ def reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
     items: list[Any] = each("reference", listed, plant) if isinstance(listed, Mapping | list | tuple) else [listed]
     for item in items:
         if not isinstance(item, Signal):
-            raise ScenarioError(f"reference is {shown(item)}: give one signal, such as smc.Constant(0.0)")
+            at = shown(item) if isinstance(item, int | float) else "0.0"
+            raise ScenarioError(f"reference is {shown(item)}: give one signal, such as smc.Constant({at})")
     return items[0] if all(item == items[0] for item in items) else PerChannel(tuple(items))
 
 

@@ -147,6 +147,11 @@ class Scenario:
     sensor: Encoder | None = field(converter=coerce.sensor, default=None)
     condition: str | None = dataclasses.field(default=None, init=False, repr=False)
 
+    def __new__(cls, *_: Any, **given: Any) -> "Scenario":
+        if "controller" in given:  # Python itself would suggest control_period
+            raise TypeError("Scenario has no field 'controller': give the law as law=")
+        return object.__new__(cls)
+
     if TYPE_CHECKING:  # what the converters take, which a type checker cannot see
 
         def __init__(

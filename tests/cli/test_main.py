@@ -716,7 +716,8 @@ if __name__ == "__main__":
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for a process")
-def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(number, tmp_path):
     (tmp_path / "long.py").write_text(LONG)
     process = subprocess.Popen(
         [sys.executable, "long.py", "--no-film"],
@@ -729,7 +730,7 @@ def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(tmp_path):
     with process:
         assert process.stdout is not None
         assert process.stdout.readline() == "simulating\n"
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         try:
             out, err = process.communicate(timeout=60)
         finally:

@@ -591,3 +591,30 @@ def test_a_missed_condition_warns_once_where_it_was_written():
     assert [w.filename for w in caught] == [__file__]
     again = pickle.loads(pickle.dumps(law))  # and not again
     assert again == law
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"law": "STA"}, "unknown law 'STA': did you mean 'super_twisting'?"),
+        ({"law": "CTA"}, "unknown law 'CTA': did you mean 'computed_torque' or 'continuous_twisting'?"),
+        ({"law": "ISMC"}, "unknown law 'ISMC': did you mean 'integral'?"),
+        ({"law": "pid", "reference": 0.5}, "reference is 0.5: give one signal, such as smc.Constant(0.5)"),
+    ],
+)
+def test_the_field_s_usual_words_are_understood(fields, said):
+    with pytest.raises(smc.ScenarioError) as error:
+        smc.Scenario(plant="duffing", **fields)
+    assert str(error.value) == said
+
+
+def test_what_belongs_elsewhere_is_sent_there(tmp_path):
+    scenario = smc.Scenario(plant="duffing", law="pid", duration=0.01)
+    with pytest.raises(TypeError, match="Scenario has no field 'controller': give the law as law="):
+        smc.Scenario(plant="duffing", controller="pid")  # pyright: ignore[reportCallIssue]
+    with pytest.raises(smc.ScenarioError, match=r"call smc\.margins\(\['duffing'\], \['pid'\]\)"):
+        smc.margins(scenario)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(smc.ScenarioError, match=r"table is Trace.*: smc\.figure draws traces"):
+        smc.plot(smc.run(scenario))  # pyright: ignore[reportArgumentType]
+    with pytest.raises(smc.ScenarioError, match=r"traces is Table.*: smc\.plot draws a table"):
+        smc.figure(smc.study([scenario], tmp_path))  # pyright: ignore[reportArgumentType]

@@ -49,6 +49,10 @@ SYMBOLS = (  # names that the linker sees
 )  # fmt: skip
 
 
+# In C, the rest of a function that returns where there is no model.
+UNREACHED = re.compile(r"(if \(\w+->model == 0\.0\) \{\s*return [^;]*;\s*\}).*?^\}", re.MULTILINE | re.DOTALL)
+
+
 class Variable(NamedTuple):
     """A variable of the FMU.
 
@@ -111,7 +115,8 @@ class Controller:
 
 def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> list[Variable]:
     """Return the variables in the order of their value references. `code` is `controller.code()`."""
-    wanted = {*ALWAYS, *_needed(controller, code, reads(code.values()))}
+    reached = code.values() if controller.modelled else [(n, UNREACHED.sub(r"\1", text)) for n, text in code.values()]
+    wanted = {*ALWAYS, *_needed(controller, code, reads(reached))}
     inputs = [
         Variable(name, "SMC_INPUT", words, unit, STARTS.get(name, 0.0))
         for name, (unit, words) in INPUTS.items()

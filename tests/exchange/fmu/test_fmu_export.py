@@ -478,7 +478,7 @@ def test_the_command_writes_what_it_is_told(tmp_path, capsys):
         (["super_twisting", "--velocity", "levan"], "unknown velocity estimator 'levan': did you mean 'levant'?"),
         (["super_twisting", "--velocity", "levant(3)"], "velocity estimator 'levant(3)' cannot be read: write it as "),
         (["super_twisting", "--gains", "k1"], "--gains is 'k1': give names and numbers"),
-        (["none.py"], "no file 'none.py': give a Python file with a law in it"),
+        (["none.py"], "no file 'none.py': give a file with a law in it"),
     ],
 )
 def test_a_mistake_in_the_command_is_one_sentence(words, said, capsys):

@@ -3,6 +3,7 @@
 import gc
 import os
 import pickle
+import re
 import shutil
 import sys
 import time
@@ -82,6 +83,14 @@ def test_gains_are_the_fmu_s_parameters(folder):
         [scenario(smc.law("observer_free", lam=3.0, k1=1.5)), scenario(template(law_lam=3.0, law_k1=1.5))]
     )
     np.testing.assert_array_equal(first.u, second.u)
+
+
+def test_an_input_that_only_the_model_needs_is_listed_with_the_model(folder):
+    for model, more in (("none", set()), ("nominal", {"ddr", "f", "g"})):
+        path = smc.export_fmu("classical", folder / f"{model}.fmu", model=model, binary=False)
+        with zipfile.ZipFile(path) as archive:
+            text = archive.read("modelDescription.xml").decode()
+        assert set(re.findall(r'name="(\w+)"[^>]*causality="input"', text)) == {"x", "v", "r", "dr"} | more
 
 
 def test_an_unbounded_parameter_is_infinite_and_comes_back(folder):
