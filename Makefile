@@ -6,7 +6,7 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo test quick attack check docs build report live gains gallery bench lock setup
+.PHONY: help demo test quick attack check docs tagged build report live gains gallery bench lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -42,6 +42,10 @@ docs: ## the documentation as a site, site/index.html
 	@./setup.sh requirements-docs.lock
 	@# this variable leaves out the theme's notice that it is maintained until May 2027; --quiet would hide warnings from --strict
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict -f docs/site/mkdocs.yml
+
+tagged: ## whether TAG, such as v0.1.0, is the tag of this version
+	@version=v$$(sed -n 's/^__version__ = "\(.*\)"$$/\1/p' smc_mujoco/common/version.py); test "$$TAG" = "$$version" || \
+		{ echo "the tag is '$$TAG', and the version $$version: release the tag of the version" >&2; exit 1; }
 
 build: setup ## the wheel and the source archive, in dist/
 	$(BIN)/python -m hatchling build

@@ -1,10 +1,15 @@
 """The workflows run what the Makefile and the pages say, and nothing else, so that neither can go stale alone."""
 
+import os
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 import yaml
+
+import smc_mujoco
 
 ROOT = Path(__file__).parents[1]
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
@@ -36,7 +41,8 @@ def written_out(command: str, workflow: str) -> list[str]:
     """A command for each package of the matrix that it names."""
     if "${{" not in command:
         return [command]
-    found = [job["strategy"]["matrix"]["package"] for job in jobs(ROOT / ".github/workflows" / workflow).values()]
+    every = [job.get("strategy", {}) for job in jobs(ROOT / ".github/workflows" / workflow).values()]
+    found = [one["matrix"]["package"] for one in every if one]
     return [command.replace("${{ matrix.package }}", one) for packages in found for one in packages]
 
 
@@ -60,9 +66,20 @@ def test_a_workflow_may_read_and_no_more_and_pins_what_it_uses(workflow):
     data = yaml.safe_load(workflow.read_text(encoding="utf-8"))
     assert data["permissions"] == {"contents": "read"}
     for job in data["jobs"].values():
-        assert {*job.get("permissions", {})} <= {"pages", "id-token"}
+        assert {*job.get("permissions", {})} <= {"pages", "id-token", "attestations"}
         for used in [step["uses"] for step in job["steps"] if "uses" in step]:
-            assert re.fullmatch(r"[\w-]+/[\w-]+@(v\d+|release/v1)", used)
+            assert re.fullmatch(r"[\w-]+/[\w-]+@(v\d+|[0-9a-f]{40})", used)
+            assert used.startswith("actions/") or len(used.partition("@")[2]) == 40  # of others, the very commit
         for step in job["steps"]:
             if step.get("uses", "").startswith("actions/checkout"):
                 assert step["with"] == {"persist-credentials": False}
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+def test_a_release_has_the_tag_of_its_version():
+    for tag, code in ((f"v{smc_mujoco.__version__}", 0), (smc_mujoco.__version__, 2), ("v9", 2), ("v0' || true '", 2)):
+        environment = os.environ | {"TAG": tag}
+        done = subprocess.run(
+            ["make", "tagged"], check=False, cwd=ROOT, env=environment, capture_output=True, text=True
+        )
+        assert (done.returncode, f"the tag is '{tag}'" in done.stderr) == (code, code != 0)
