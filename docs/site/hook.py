@@ -24,9 +24,9 @@ PAGES: list[catalogue.Page] = []  # of this build
 
 def on_config(config):
     """Put the notebooks and the pages of laws and plants into the contents."""
-    overview = next(entry["Overview"] for entry in config.nav if "Overview" in entry)
+    start = next(entry["Start"] for entry in config.nav if "Start" in entry)
     below = [f"notebooks/{name}.md" for name in notebooks.names()]
-    overview[overview.index(notebooks.LISTED)] = {"Notebooks": [notebooks.LISTED, *below]}
+    start[start.index(notebooks.LISTED)] = {"Notebooks": [notebooks.LISTED, *below]}
     place = next(entry[GROUP] for entry in config.nav if GROUP in entry)
     PAGES.clear()
     for section, groups in catalogue.pages().items():
