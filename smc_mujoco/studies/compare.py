@@ -16,32 +16,39 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from smc_mujoco.analysis.differences import RELEVANT, share_that_matters
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.tuning import search
+from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, taken, whole
 from smc_mujoco.common.errors import number as checked
 from smc_mujoco.common.extras import package
-from smc_mujoco.common.files import replacing
+from smc_mujoco.common.files import read_json, replacing, write_json
+from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Tabular, plain
-from smc_mujoco.common.text import joined
+from smc_mujoco.common.text import joined, number
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template, written
 from smc_mujoco.control.law import Law, catalogue, fits, known_laws
 from smc_mujoco.control.properties import suitable
 from smc_mujoco.mechanisms.plant import Plant, as_plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation import coerce, serialise
 from smc_mujoco.simulation.conditions import Condition, applicable, find_condition
-from smc_mujoco.simulation.grid import check_apart, crossed, listed, listed_laws
+from smc_mujoco.simulation.grid import case, check_apart, crossed, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies import executors
+from smc_mujoco.studies import executors, run_key
+from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.fair_gains import Candidate, fair_gains
 from smc_mujoco.studies.leaderboard import METRICS, Boards, leaderboard
 from smc_mujoco.studies.study import FULL, QUICK, study
 from smc_mujoco.studies.table import Table
+from smc_mujoco.studies.worst_case import WorstCase, worst_case
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
@@ -50,6 +57,8 @@ if TYPE_CHECKING:
 
     from smc_mujoco.draw.page import Size
 
+WORST_SHARE = 1 / 6  # of the bound on u: the disturbance of the worst case, if no class is given; chosen
+KEPT = ("value", "median", "unit", "found_by", "tried", "metric", "outside", "seed")  # of a worst case, in its file
 MAX_BLOCKS = 12  # plants times conditions that have a table each; of more, each plant has one over its conditions
 
 
@@ -65,6 +74,7 @@ class Compared:
       defaults: whether a winner may be named over laws with default gains.
       relevant: the least relevant difference, as a share of the larger value.
       out: the folder with the gains and the runs.
+      worst: plant -> law -> the worst case that was found; empty if it was not searched.
     """
 
     table: Table
@@ -73,6 +83,7 @@ class Compared:
     defaults: bool
     relevant: float
     out: Path
+    worst: Mapping[str, Mapping[str, WorstCase]] = frozen({})
 
     @property
     def gains(self) -> dict[str, dict[str, Law]]:
@@ -118,10 +129,26 @@ class Compared:
             for one in its
         ]
         heads = ["plant", "law", "gains", "sets", "best set"]
-        return [
-            *self.leaderboard.tables,
-            Tabular(headings=heads, rows=lines, title="Gains", notes=self.remarks, left=5),
-        ]
+        gains = Tabular(headings=heads, rows=lines, title="Gains", notes=self.remarks, left=len(heads))
+        return [*self.leaderboard.tables, *self._worst_tables(), gains]
+
+    def _worst_tables(self) -> Iterator[Tabular]:
+        """Yield a table of the worst cases for each plant, the law with the least of them first."""
+        for plant, its in self.worst.items():
+            ordered = sorted(its.items(), key=lambda pair: pair[1].value)
+            first = ordered[0][1]
+            what = f"{CATALOGUE[first.metric].label} ({first.unit})"
+            yield Tabular(
+                headings=["law", "gains", f"worst found, {what}", f"median, {what}", "found by"],
+                rows=[
+                    (law, each.nominal.law.source.kind, number(each.value), number(each.median), each.found_by)
+                    for law, each in ordered
+                ],
+                title=f"{plant}: the worst of {first.tried} runs within {first.within.words(first.nominal.plant)}",
+                notes=["The median is that of random members of the class. The true worst case may be worse."],
+                left=2,
+                stacked=True,
+            )
 
     def __repr__(self) -> str:
         return plain(self)
@@ -140,7 +167,8 @@ class Compared:
         Args:
           path: of a file to which it is written too.
         """
-        text = self.leaderboard.to_latex()
+        worst = [table.to_latex() for table in self._worst_tables()]
+        text = "\n".join([self.leaderboard.to_latex(), *worst])
         if path is not None:
             with replacing(Path(path)) as file:
                 file.write_text(text, encoding="utf-8")
@@ -207,7 +235,7 @@ def compare(
     conditions: str | Condition | Sequence[str | Condition] | None = None,
     seeds: int = 16,
     tune: bool = True,
-    worst: bool = False,
+    worst: bool | Uncertainty = False,
     executor: str | Executor | None = None,
     *,
     out: str | os.PathLike[str] = "compared",
@@ -239,7 +267,8 @@ def compare(
       seeds: runs of a law on each plant in each condition; each has another start and other noise, the same for every
         law, and the next of the law's sets of gains.
       tune: whether to tune laws without gains for a plant; otherwise they run with their defaults.
-      worst: whether to search the worst case of each law too.
+      worst: whether to search the worst case of each law on each plant too, see `worst_case`: a class, or True for
+        disturbances up to a sixth of the bound on u.
       executor: where runs are computed, as in `study`; None for this machine.
       out: folder for gains and runs.
       metrics: names of metrics, for which lower is better, or "settles".
@@ -288,6 +317,15 @@ def compare(
     }
     runs = crossed(machines, lambda plant: candidates[plant.name], asked, range(count), duration, starts)
     table = study(runs, folder, not fresh, where, threads, progress, traces)
+
+    def attacked(plant: Plant, law: Law) -> WorstCase:
+        scenario = case(plant, law, "nominal", duration, starts=starts)
+        return _attacked(scenario, worst, folder, threads, progress)
+
+    worst_cases = {
+        plant.name: {one.law.name: attacked(plant, one.law) for one in candidates[plant.name]}
+        for plant in (machines if worst else ())
+    }
     return Compared(
         table=table,
         candidates=candidates,
@@ -295,6 +333,32 @@ def compare(
         defaults=defaults,
         relevant=relevant,
         out=folder,
+        worst=worst_cases,
+    )
+
+
+def _attacked(
+    scenario: Scenario, worst: bool | Uncertainty, folder: Path, threads: int | None, progress: bool
+) -> WorstCase:
+    """Return the worst case of a scenario, from the file of an earlier call if there is one."""
+    bound = WORST_SHARE * float(np.max(scenario.resolved.u_max))
+    within = worst if isinstance(worst, Uncertainty) else Uncertainty(disturbance=bound)
+
+    def load(path: Path) -> WorstCase:
+        data = read_json(path)
+        known = serialise.restore(data.pop("scenario"))
+        return WorstCase(**data, scenario=dataclasses.replace(known, law=scenario.law), nominal=scenario, within=within)
+
+    def save(found: WorstCase, path: Path) -> None:
+        kept = {name: getattr(found, name) for name in KEPT}
+        write_json(path, kept | {"strategies": dict(found.strategies), "scenario": serialise.describe(found.scenario)})
+
+    return cached(
+        folder / "worst" / f"{scenario.plant.name}-{scenario.law.name}.json",
+        [run_key.key(scenario), dataclasses.asdict(within)],
+        lambda: worst_case(scenario, within=within, threads=threads, progress=progress),
+        save,
+        load,
     )
 
 
