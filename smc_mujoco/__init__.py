@@ -6,8 +6,28 @@
     trace = smc.run(scenario)
     print(smc.score(trace))
 
-`__init__.pyi` lists the public names and their modules. A name is loaded when it is first used, so that importing the
-package costs nothing.
+The names by task, those of a first script first; `help(smc.run)` tells what a name does:
+
+    Run and look: Scenario, run, Trace, load, score, figure, plot, film, still, show
+    Laws: law, laws, law_function, Measurement
+    Plants: plant, plants, plant_from, Channel
+    Conditions: condition, starts, Noise, Constant, Step, Sine, Pulse, Coulomb, Viscous, Encoder, Backlash, DCMotor,
+        Lag
+    Compare: compare, which, tune, margins, grid, study, leaderboard, Table
+    More to run and to look at: stream, scores, joint_scores, tip_scores, Scene, Outcome, play, clip, frames, live,
+        choose_gl, ScenarioError, ScenarioWarning, GainWarning, PackageWarning, PlainLoopWarning
+    Surfaces, estimators, design: surface, surfaces, surface_function, Surface, estimator, estimators,
+        estimator_function, Law, joint_laws, lqr, policy, law_from_control, state_space, gains_for
+    Machines: Plant, deviation, rig, rigs, Rig, identify, arms
+    References, disturbances, time: Signal, Push, Ramp, MinimumJerk, Impulse, Gust, BandLimited, OrnsteinUhlenbeck,
+        Relay, Waypoints, cartesian_path, TimeSeries, Held, Jump, Clock
+    Real mechanisms: LuGre, Sigmoid, ServoFriction, servo, Contact, RateLimit
+    Analyse: accuracy, basin, chattering, describing_function, step_halving, worst_case, Uncertainty
+    Audit: audit, claims, certify, Certificate, report, boards, paper
+    Exchange: law_to_c, law_from_c, export_fmu, law_from_fmu, agent, gym, suite, vector
+
+`__init__.pyi` has the modules of the names. A name is loaded when it is first used, so that importing the package costs
+nothing. Types that are only returned are in their modules, such as smc_mujoco.analysis.tuning.result.Tuned.
 """
 
 import re

@@ -1,16 +1,12 @@
 import smc_mujoco.evidence.boards
 import smc_mujoco.studies.arms
-from smc_mujoco.analysis.chattering import Chattering as Chattering
 from smc_mujoco.analysis.chattering import chattering as chattering
-from smc_mujoco.analysis.gains_for import Design as Design
 from smc_mujoco.analysis.gains_for import gains_for as gains_for
 from smc_mujoco.analysis.harmonics import describing_function as describing_function
 from smc_mujoco.analysis.margins import margins as margins
 from smc_mujoco.analysis.region_of_attraction import basin as basin
 from smc_mujoco.analysis.state_space import state_space as state_space
-from smc_mujoco.analysis.step_halving import StepChange as StepChange
 from smc_mujoco.analysis.step_halving import step_halving as step_halving
-from smc_mujoco.analysis.tuning.result import Tuned as Tuned
 from smc_mujoco.analysis.tuning.search import tune as tune
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty as Uncertainty
 from smc_mujoco.cli.main import play as play
@@ -44,15 +40,12 @@ from smc_mujoco.draw.notebook import frames as frames
 from smc_mujoco.draw.notebook import show as show
 from smc_mujoco.envs import dm_control_env, gymnasium_env, vector_env
 from smc_mujoco.envs.agent import agent as agent
-from smc_mujoco.evidence.audit.audit import Audit as Audit
 from smc_mujoco.evidence.audit.audit import audit as audit
 from smc_mujoco.evidence.audit.audit import claims as claims
-from smc_mujoco.evidence.audit.verdict import Claim as Claim
 from smc_mujoco.evidence.certificates.certificate import Certificate as Certificate
 from smc_mujoco.evidence.certificates.maker import certify as certify
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.report import report as report
-from smc_mujoco.evidence.rigs.identify import Identified as Identified
 from smc_mujoco.evidence.rigs.identify import identify as identify
 from smc_mujoco.evidence.rigs.rig import Rig as Rig
 from smc_mujoco.evidence.rigs.rig import rig as rig
@@ -113,9 +106,7 @@ from smc_mujoco.simulation.trace import Trace as Trace
 from smc_mujoco.simulation.trace import load as load
 from smc_mujoco.simulation.waypoints import Waypoints as Waypoints
 from smc_mujoco.simulation.waypoints import cartesian_path as cartesian_path
-from smc_mujoco.studies.accuracy import AccuracyTable as AccuracyTable
 from smc_mujoco.studies.accuracy import accuracy as accuracy
-from smc_mujoco.studies.advice import Advice as Advice
 from smc_mujoco.studies.adviser import which as which
 from smc_mujoco.studies.compare import compare as compare
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard
@@ -123,7 +114,6 @@ from smc_mujoco.studies.outcome import Outcome as Outcome
 from smc_mujoco.studies.scene import Scene as Scene
 from smc_mujoco.studies.study import study as study
 from smc_mujoco.studies.table import Table as Table
-from smc_mujoco.studies.worst_case import WorstCase as WorstCase
 from smc_mujoco.studies.worst_case import worst_case as worst_case
 
 __version__: str

@@ -40,7 +40,23 @@ def test_the_reference_names_every_public_name_where_it_is_defined():
     assert public <= set(named)
     assert len(named) == len(set(named))
     of_modules = ("pytest_plugin.", "testing.", "studies.arms.", "evidence.boards.", "evidence.audit.mutants.")
-    assert {name for name in set(named) - public if not name.startswith(of_modules)} == set()
+    returned = {name for name in set(named) - public if not name.startswith(of_modules)}
+    for module, _, name in (f"smc_mujoco.{name}".rpartition(".") for name in returned):
+        assert isinstance(getattr(importlib.import_module(module), name), type)
+
+
+def test_help_and_the_reference_list_every_public_name_once_by_the_same_tasks():
+    told = re.findall(r"^    ([A-Z][a-z ,]+): ((?:.|\n {8})+)$", smc.__doc__ or "", re.MULTILINE)
+    tasks = {task: re.findall(r"\w+", names) for task, names in told}
+    listed = [name for names in tasks.values() for name in names]
+    assert sorted(listed) == sorted([*smc._ORIGINS, *smc._MODULES])
+    assert sum(len(names) for names in list(tasks.values())[:5]) in range(35, 45)  # those of a first script
+    page = (DOCS / "api.md").read_text()
+    assert re.findall(r"^## (.+)$", page, re.MULTILINE)[:-1] == list(tasks)
+    for task, names in tasks.items():
+        (section,) = re.findall(rf"^## {task}$(.*?)^## ", page, re.MULTILINE | re.DOTALL)
+        for name in set(names) & set(smc._ORIGINS):
+            assert f"::: {smc._ORIGINS[name]}.{name}\n" in section
 
 
 def test_the_mathematics_define_every_metric_in_the_order_of_tables():

@@ -137,14 +137,14 @@ class Compared:
         for plant, its in self.worst.items():
             ordered = sorted(its.items(), key=lambda pair: pair[1].value)
             first = ordered[0][1]
-            what = f"{CATALOGUE[first.metric].label} ({first.unit})"
+            what = CATALOGUE[first.metric].label
             yield Tabular(
-                headings=["law", "gains", f"worst found, {what}", f"median, {what}", "found by"],
+                headings=["law", "gains", f"worst found ({first.unit})", f"median ({first.unit})", "found by"],
                 rows=[
                     (law, each.nominal.law.source.kind, number(each.value), number(each.median), each.found_by)
                     for law, each in ordered
                 ],
-                title=f"{plant}: the worst of {first.tried} runs within {first.within.words(first.nominal.plant)}",
+                title=f"{plant}: {what}, worst of {first.tried} runs within {first.within.words(first.nominal.plant)}",
                 notes=["The median is that of random members of the class. The true worst case may be worse."],
                 left=2,
                 stacked=True,
