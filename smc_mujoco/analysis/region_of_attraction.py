@@ -37,7 +37,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, shown, whole
+from smc_mujoco.common.errors import ScenarioError, shown, taken, whole
 from smc_mujoco.common.files import ended, read_json, reading, write_json
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control.component import Template
@@ -135,7 +135,9 @@ def basin(
     reach = TURN[base.plant.unit](base.plant)
     if not reach and (x is None or v is None):
         raise ScenarioError(f"{base.plant.name} starts at 0, which tells no reach: give positions x and velocities v")
-    nx, nv = (whole(f"points in {axis}", n, 2, 1000) for axis, n in zip("xv", points, strict=True))
+    if len(counts := taken("points", points)) != 2:
+        raise ScenarioError(f"points is {shown(points)}: give two numbers of points, in x and v")
+    nx, nv = (whole(f"points in {axis}", n, 2, 1000) for axis, n in zip("xv", counts, strict=True))
     xs = np.linspace(-reach, reach, nx) if x is None else x
     return of(base, xs, np.linspace(-PACE * reach, PACE * reach, nv) if v is None else v, threads, report)
 
