@@ -3,14 +3,14 @@
 import contextlib
 import hashlib
 import json
-import uuid
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TypeVar
 
 from smc_mujoco.analysis.tuning import result
 from smc_mujoco.common import fingerprint
-from smc_mujoco.common.files import reading
+from smc_mujoco.common.files import reading, writable
 
 T = TypeVar("T")
 
@@ -32,18 +32,25 @@ def cached(
     stem = f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
     for file in path.parent.glob(f"{stem}-{'?' * 12}{path.suffix}"):
         with contextlib.suppress(Exception):  # damaged bytes raise any exception there is; compute it again
-            if file.stem.endswith(_seal(file)):
+            if file.stem.endswith(_seal(path.parent.glob(f"{file.stem}.*"))):
                 return load(file)
+    writable(path)
     made = make()
-    save(made, new := path.with_stem(f".{stem}-{uuid.uuid4().hex[:12]}"))
-    kept = path.with_stem(f"{stem}-{_seal(new)}")
-    for old in path.parent.glob(f"{path.stem}-{'?' * 12}-{'?' * 12}{path.suffix}"):
-        old.unlink()
-    new.replace(kept)
+    with tempfile.TemporaryDirectory(prefix=f".{path.stem}-", dir=path.parent) as scratch:
+        save(made, Path(scratch, path.name))
+        written = sorted(Path(scratch).iterdir(), key=lambda file: file.suffix == path.suffix)  # beside it, then itself
+        kept = path.with_stem(f"{stem}-{_seal(written)}")
+        for old in path.parent.glob(f"{path.stem}-{'?' * 12}-{'?' * 12}.*"):
+            old.unlink()
+        for file in written:
+            file.replace(kept.with_suffix(file.suffix))
     return load(kept)
 
 
-def _seal(file: Path) -> str:
-    """Return a hash of a file's content."""
-    with reading(file, "result", "start it again"):
-        return hashlib.sha256(file.read_bytes()).hexdigest()[:12]
+def _seal(files: Iterable[Path]) -> str:
+    """Return a hash of the content of files."""
+    digest = hashlib.sha256()
+    for file in sorted(files, key=lambda file: file.suffix):
+        with reading(file, "result", "start it again"):
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]
