@@ -28,7 +28,8 @@ class Identified:
       before: the rig with the values before.
       values, errors: quantity -> value found, and its standard error.
       correlations: of the errors, (p, p), in the order of `values`.
-      fits, fits_before: `Rig.fit` of each record after and before; for `fits` the states at the starts are found too.
+      fits, fits_before: `Rig.fit` of each record after and before, in an open loop with short steps; for `fits` the
+        states at the starts are found too.
       predictions: of each record, the predicted columns, the measured columns and their times.
       evaluations: how many sets of values were simulated.
     """

@@ -27,7 +27,6 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-EXACT_STEPS = 4  # largest number of steps with extrapolated replays, at the end of a search; chosen
 # Fields of a run's scenario that a rig made from its plant takes over.
 OF_RUN = ("control_period", "friction", "contact", "actuator", "sensor", "u_max", "input_delay", "velocity", "model")
 # Frictions and inertias of the library's plants, which are 0 or more.
@@ -74,15 +73,16 @@ def identify(
     for record, fit in zip(data, fits_before, strict=True):
         twin.refuse_degrees(record, fit)
     with bar(f"identify {twin.name}", most * (2 * len(names) + 1), shown=progress) as drawn:
-        replays, slopes = _solved(twin, names, data, starts, seed, most, drawn.advance)
-        errors, correlations = statistics(replays, slopes)
+        replays, slopes, by_steps = _solved(twin, names, data, starts, seed, most, drawn.advance)
+        errors, correlations = statistics(replays, slopes, by_steps)
     values = replays.values(slopes.point)
     found = twin.with_values(values, "identified from records")
-    states = _starting_states(found, data, replays, slopes.point)
+    states, steps = _starting_states(found, data, replays, slopes.point), replays.short_steps
     return Identified(
         rig=found, before=twin, values=values, errors=errors, correlations=correlations,
-        fits=tuple(found.fits(data, states=states)), fits_before=fits_before,
-        predictions=tuple(found.predictions(data, states=states)), evaluations=replays.evaluations,
+        fits=tuple(found.fits(data, states=states, **steps)),
+        fits_before=tuple(twin.fits(data, **steps)) if steps else fits_before,
+        predictions=tuple(found.predictions(data, states=states, **steps)), evaluations=replays.evaluations,
     )  # fmt: skip
 
 
@@ -100,20 +100,21 @@ def _checked_names(twin: Rig, quantities: Sequence[str] | None) -> list[str]:
 
 def _solved(
     twin: Rig, names: list[str], data: Sequence[Mapping[str, Any]], starts: int, seed: int, most: int, report: Any
-) -> tuple[Replays, Slopes]:
-    """Return the replays that are compared in the end, and their slopes at the solution."""
+) -> tuple[Replays, Slopes, np.ndarray]:
+    """Return the replays that are compared in the end, their slopes at the solution, and its error by steps, (p,)."""
     pieces = Replays(twin, names, data, False, report)
     reached = search.search(pieces, starts, seed, most)
     if twin.controller is None:
         _refuse_swapped(twin, names, data, reached)
-        return pieces, search.not_worse(pieces, search.refine(pieces, reached.point, EXACT_STEPS, exact=True))
+        slopes, moved = search.accurate(pieces, reached)
+        return pieces, search.not_worse(pieces, slopes), moved
     closed = Replays(twin, names, data, True, report)
     points = [closed.start, Point(reached.point.values, closed.start.states)]
     if len(closed.free):  # a record may begin at rest with a jump of the command
         points += [closed.at_rest(point) for point in points]
     slopes = search.refine(closed, search.better(closed, *points), most)
     closed.evaluations += pieces.evaluations
-    return closed, slopes
+    return closed, slopes, np.zeros(len(names))
 
 
 def _refuse_swapped(twin: Rig, names: list[str], data: Sequence[Mapping[str, Any]], reached: Slopes) -> None:
@@ -146,6 +147,7 @@ def _starting_states(
     if replays.closed:
         return [replays.state(point, k) for k in range(len(data))]
     whole_records = Replays(found, [], data, False, _ignore, whole=True)
+    whole_records.steps = replays.short_steps
     firsts = [next(k for k, piece in enumerate(replays.pieces) if piece.record == i) for i in range(len(data))]
     candidates = [whole_records.start, Point(np.zeros(0), point.states[firsts])]
     for each in tuple(candidates):

@@ -35,7 +35,7 @@ class Filter:
 
         t = data[columns.time]
         self.data, self.step = data, step_of(data, columns)
-        if t[-1] - t[0] < MIN_DURATION or self.step > MAX_STEP:
+        if not long_enough(data, columns):
             raise ScenarioError(
                 f"the record lasts {t[-1] - t[0]:.3g} s, with a sample every {self.step:.3g} s: for its torques give "
                 f"at least {MIN_DURATION:g} s, with a sample every {MAX_STEP:g} s or more often"
@@ -73,6 +73,12 @@ def measured(data: Record, columns: Columns) -> Record:
     """Return the recorded torque of each joint, below CUTOFF, N m."""
     own = Filter(data, columns)
     return {name: own.low(own.cubic(name)) for name in columns.torque}
+
+
+def long_enough(data: Record, columns: Columns) -> bool:
+    """Return whether a record's torques can be compared."""
+    t = data[columns.time]
+    return bool(t[-1] - t[0] >= MIN_DURATION and step_of(data, columns) <= MAX_STEP)
 
 
 def torques(plant: Plant, data: Record, columns: Columns) -> Record:

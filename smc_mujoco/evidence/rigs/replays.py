@@ -5,9 +5,10 @@ set for each piece (multiple shooting), because no few samples give them well en
 each step of the search moves them by linear least squares, and only the quantities remain.
 Source: H. G. Bock, "Recent advances in parameter identification techniques for ODE", 1983.
 
-MuJoCo's steps are of first order where there is dry friction or a motor. Their error may exceed the noise of an
-encoder, and bias the quantities. So `exact` residuals of open loops are extrapolated from two runs, with steps h and
-h/2: 2 x(h/2) - x(h).
+MuJoCo's steps are of first order where there is dry friction or a motor, and their error biases the quantities by many
+standard errors. So replays of measured open loops are corrected by what short steps change, which is extrapolated from
+two runs with steps h and h/2: 2 x(h/2) - x(h). The correction hardly depends on the quantities. So a search keeps that
+of one point, and simulates its other points with longer steps.
 """
 
 import dataclasses
@@ -29,7 +30,8 @@ from smc_mujoco.simulation.scenario import Scenario
 
 DIFFERENCE = 2e-3  # of a quantity's scale, for central differences; chosen: dry friction makes shorter ones rough
 STATE_SCALE = 0.05  # scale of a state at the start, relative to the standard deviation of its column or rate; chosen
-LARGEST_STEP = 5e-4  # s, of RK4 in exact replays; chosen: half of it changes an axis' mass by less than its error
+LARGEST_STEP = 2.5e-4  # s, of RK4 in corrected replays; chosen
+SLOPE_HALVINGS = 2  # of that step, for slopes: with dry friction they err by 5 % then, and by up to 45 % before; chosen
 WORST = 1.0  # largest residual of a sample, relative to the norm of the record; that of a run that fails
 DEPENDENT = 1e-6  # ratio of singular values below which states at the start have no effect of their own
 
@@ -67,8 +69,8 @@ class Point:
 class Slopes:
     """Residuals of each piece at a point, (N,), and their derivatives by quantities (N, p) and by its states (N, s).
 
-    The rows of a piece are its samples in the order of time, each with all columns. All records have `columns` columns
-    that are compared.
+    The rows of a piece are its samples in the order of time, each with all `columns` that are compared. The pieces are
+    of `records` records.
     """
 
     point: Point
@@ -76,6 +78,7 @@ class Slopes:
     by_values: list[np.ndarray]
     by_states: list[np.ndarray]
     columns: int
+    records: int
 
     def freed(self, rows: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return rows of each piece, (N,) or (N, p), without the part that states at its start can cause."""
@@ -89,6 +92,21 @@ class Slopes:
         pieces = zip(self.residuals, self.by_values, self.by_states, strict=True)
         return np.array([-np.linalg.lstsq(S, r + J @ step, rcond=DEPENDENT)[0] for r, J, S in pieces])
 
+    def stepped(self, step: np.ndarray) -> "Slopes":
+        """Return the slopes after a small step of the quantities (p,), with residuals that follow from derivatives.
+
+        States that the noise hides, as a velocity at a start in dry friction, do not move.
+        """
+        noise = math.sqrt(self.cost / sum(map(len, self.residuals)))
+        rows, moves = [], []
+        for r, J, S in zip(self.residuals, self.by_values, self.by_states, strict=True):
+            left, sizes, right = np.linalg.svd(S, full_matrices=False)
+            kept = sizes > noise
+            moves.append(-right[kept].T @ ((left[:, kept].T @ (r + J @ step)) / sizes[kept]))
+            rows.append(r + J @ step + S @ moves[-1])
+        point = Point(self.point.values + step, self.point.states + np.array(moves))
+        return dataclasses.replace(self, point=point, residuals=rows)
+
     @functools.cached_property
     def cost(self) -> float:
         """Sum of the squared residuals."""
@@ -97,7 +115,7 @@ class Slopes:
     @property
     def fit(self) -> float:
         """Fit of all pieces together, percent: 100 (1 - rms of the columns' relative residuals)."""
-        return 100.0 * (1.0 - math.sqrt(self.cost / self.columns))
+        return 100.0 * (1.0 - math.sqrt(self.cost / (self.columns * self.records)))
 
 
 def cost(rows: Sequence[np.ndarray]) -> float:
@@ -134,6 +152,8 @@ class Replays:
         # a controller reads the first positions as they were measured
         self.free = np.zeros(0, int) if known_start else np.arange(2 * n)[n if closed else 0 :]
         self.evaluations = 0
+        self.steps: dict[str, Any] = {}  # integrator and step of replays; none for the scenario's own
+        self.corrections: list[Record] | None = None  # of each piece; None for none
         self.pieces = [piece for i in range(len(data)) for piece in self._pieces(i)]
 
     @property
@@ -173,63 +193,97 @@ class Replays:
             states[k, -n:] = -self._part(k).state[n:] / piece.scales[-n:]
         return Point(point.values, states)
 
-    def residuals(self, points: Sequence[Point], exact: bool = False) -> list[list[np.ndarray]]:
-        """Return the residuals of each piece, (N,), at each point. All replays are one batch.
-
-        Args:
-          exact: whether to extrapolate from two steps, where MuJoCo is of first order.
-        """
+    def residuals(self, points: Sequence[Point]) -> list[list[np.ndarray]]:
+        """Return the residuals of each piece, (N,), at each point. All replays are one batch."""
         return [
             [self.relative(piece, each) for piece, each in zip(self.pieces, one, strict=True)]
-            for one in self.predicted(points, exact)
+            for one in self.predicted(points)
         ]
 
-    def predicted(self, points: Sequence[Point], exact: bool = False) -> list[list[Record]]:
-        """Return the predicted columns of each piece at each point. Arguments are those of `residuals`."""
+    def predicted(self, points: Sequence[Point]) -> list[list[Record]]:
+        """Return the predicted columns of each piece at each point."""
         self.evaluations += len(points)
         rigs = [self.rig(point) for point in points]
         if self.twin.dynamics is not None:
             found = [[each[0] for each in rig.predictions(list(self.data))] for rig in rigs]
         else:
-            found = self._replayed(rigs, points, exact)
+            found = self._replayed(rigs, points, self.steps)
         self.report(len(points))
-        return found
+        if not self.corrections:
+            return found
+        return [
+            [
+                {name: values + added[name] for name, values in each.items()}
+                for each, added in zip(one, self.corrections, strict=True)
+            ]
+            for one in found
+        ]
 
-    def _replayed(self, rigs: Sequence[Rig], points: Sequence[Point], exact: bool) -> list[list[Record]]:
-        """Return `predicted` by replays."""
+    def correct(self, point: Point, halvings: int) -> bool:
+        """Correct all replays by what shorter steps change at a point. Return whether steps err at all.
+
+        Args:
+          halvings: of LARGEST_STEP, 1 or more.
+        """
+        if self.closed or self.twin.columns.state or self.twin.dynamics is not None:
+            return False  # simulated runs have the errors of the scenario's own steps, too
+        rig = self.rig(point)
+        if not (plain := rig.repeated(self._part(0), rounded=False)).realistic:
+            return False
+        self.steps = _steps(plain, 0)
+        own, coarse, fine = (self._replayed([rig], [point], _steps(plain, k))[0] for k in (0, halvings - 1, halvings))
+        self.corrections = [
+            {name: 2.0 * b[name] - a[name] - values for name, values in each.items()}
+            for each, a, b in zip(own, coarse, fine, strict=True)
+        ]
+        return True
+
+    def again(self, slopes: Slopes, point: Point) -> Slopes:
+        """Return the residuals at a point with derivatives that are already known, from nearby."""
+        (residuals,) = self.residuals([point])
+        return dataclasses.replace(slopes, point=point, residuals=residuals)
+
+    @property
+    def short_steps(self) -> dict[str, Any]:
+        """Integrator and step of exact replays without corrections; none for the scenario's own."""
+        if not self.corrections:
+            return {}
+        return self.steps | {"physics_step": self.steps["physics_step"] / 2**SLOPE_HALVINGS}
+
+    def sharpened(self, slopes: Slopes) -> Slopes:
+        """Return slopes with derivatives from shorter steps, if replays are corrected."""
+        if not self.corrections:
+            return slopes
+        steps, self.steps = self.steps, self.short_steps
+        sharp = self.slopes(slopes.point)
+        self.steps = steps
+        return dataclasses.replace(sharp, residuals=slopes.residuals)
+
+    def _replayed(self, rigs: Sequence[Rig], points: Sequence[Point], fields: dict[str, Any]) -> list[list[Record]]:
+        """Return `predicted` by replays without corrections, whose scenarios have other `fields`."""
         with warnings.catch_warnings():  # about values that are only tried
             warnings.simplefilter("ignore", ScenarioWarning)
-            steps = [{}]
-            simulated = self.closed or self.twin.columns.state  # runs of this package have its errors, too
-            if exact and not simulated and (first := rigs[0].repeated(self._part(0), rounded=False)).realistic:
-                steps = [(large := _large_steps(first)), large | {"physics_step": large["physics_step"] / 2}]
             scenarios = [
                 rig.repeated(self._part(k), rounded=False, state=self.state(point, k), **fields)
-                for fields in steps
                 for rig, point in zip(rigs, points, strict=True)
                 for k in range(len(self.pieces))
             ]
-            traces = run(scenarios)
-        size = len(self.pieces)
-        total = size * len(points)
-        columns = []
-        for i in range(total):
-            skipped = self.pieces[i % size].skipped
-            coarse, fine = (rigs[i // size].predicted(trace) for trace in (traces[i], traces[i - total]))
-            columns.append({name: (2.0 * fine[name] - coarse[name])[skipped:] for name in fine})
-        return [columns[i * size : (i + 1) * size] for i in range(len(points))]
+            traces = iter(run(scenarios))
+        return [
+            [
+                {name: values[piece.skipped :] for name, values in rig.predicted(trace).items()}
+                for piece, trace in zip(self.pieces, traces, strict=False)
+            ]
+            for rig in rigs
+        ]
 
     def relative(self, piece: Piece, predicted: Record) -> np.ndarray:
         """Return the residuals of a piece, sample by sample with all columns, (N,), as parts of the columns' spread."""
         rows = np.column_stack([(piece.measured[name] - predicted[name]) / piece.spread[name] for name in predicted])
         return np.clip(np.nan_to_num(rows, nan=WORST, posinf=WORST, neginf=-WORST), -WORST, WORST).ravel()
 
-    def slopes(self, point: Point, exact: bool = False) -> Slopes:
-        """Return residuals and their derivatives at a point, by central differences that stay within the ranges.
-
-        Args:
-          exact: of the residuals; derivatives need not be.
-        """
+    def slopes(self, point: Point) -> Slopes:
+        """Return residuals and their derivatives at a point, by central differences that stay within the ranges."""
         p, s = len(self.names), len(self.free)
         moved = []
         for sign in (1.0, -1.0):
@@ -238,19 +292,15 @@ class Replays:
                 moved.append(Point(values, point.states))
             for e in np.eye(s):
                 moved.append(Point(point.values, point.states + sign * DIFFERENCE * e))
-        if exact:
-            (residuals,), rows = self.residuals([point], exact=True), self.residuals(moved)
-        else:
-            residuals, *rows = self.residuals([point, *moved])
+        residuals, *rows = self.residuals([point, *moved])
         ahead, back = rows[: p + s], rows[p + s :]
         gaps = [moved[j].values[j] - moved[p + s + j].values[j] for j in range(p)] + [2.0 * DIFFERENCE] * s
         columns = [
             np.column_stack([(ahead[j][k] - back[j][k]) / gap for j, gap in enumerate(gaps)])
             for k in range(len(self.pieces))
         ]
-        compared = len(self.data) * len(self.pieces[0].measured)
         by_values, by_states = ([each[:, part] for each in columns] for part in (slice(p), slice(p, None)))
-        return Slopes(point, residuals, by_values, by_states, compared)
+        return Slopes(point, residuals, by_values, by_states, len(self.pieces[0].measured), len(self.data))
 
     def _pieces(self, i: int) -> list[Piece]:
         """Return the pieces of record i."""
@@ -283,15 +333,15 @@ def _norm(values: np.ndarray) -> float:
     return float(np.linalg.norm(values - values.mean())) or 1.0
 
 
-def _large_steps(scenario: Scenario) -> dict[str, Any]:
-    """Return integrator and step of a scenario, the largest whose error halves with the step.
+def _steps(scenario: Scenario, halvings: int) -> dict[str, Any]:
+    """Return integrator and step of a corrected replay.
 
     RK4 has errors of first order only where dry friction changes its direction. It cannot integrate drives with states.
     """
+    integrator, step = "RK4", scenario.control_period / math.ceil(scenario.control_period / LARGEST_STEP - 1e-9)
     if scenario.input_delay or any(part.stateful for part in (*scenario.friction, *scenario.actuator)):
-        return {"integrator": scenario.resolved.integrator, "physics_step": scenario.resolved.physics_step}
-    step = scenario.control_period / math.ceil(scenario.control_period / LARGEST_STEP - 1e-9)
-    return {"integrator": "RK4", "physics_step": step}
+        integrator, step = scenario.resolved.integrator, scenario.resolved.physics_step
+    return {"integrator": integrator, "physics_step": step / 2**halvings}
 
 
 def _scale(quantity: Quantity) -> float:

@@ -430,14 +430,19 @@ class Rig:
             )
 
     def fits(
-        self, many: list[Mapping[str, Any]], rounded: bool = False, states: Sequence[np.ndarray | None] | None = None
+        self,
+        many: list[Mapping[str, Any]],
+        rounded: bool = False,
+        states: Sequence[np.ndarray | None] | None = None,
+        **changes: Any,
     ) -> list[dict[str, float]]:
         """Return `fit` of several records, simulated in one batch, without the check for degrees.
 
         Args:
           states: positions and velocities at the start of each, as in `replay`; None: those measured.
-        """
-        predictions = self.predictions(many, rounded, states)
+          changes: fields of the replays that differ, such as their physics step.
+        """  # fmt: skip
+        predictions = self.predictions(many, rounded, states, **changes)
         found = [percentages(*each[:2]) for each in predictions]
         if self.controller is not None:
             for fit, (predicted, measured, t) in zip(found, predictions, strict=True):
@@ -446,7 +451,11 @@ class Rig:
         return [{"u" if name == self.columns.u else name: value for name, value in fit.items()} for fit in found]
 
     def predictions(
-        self, many: list[Mapping[str, Any]], rounded: bool = False, states: Sequence[np.ndarray | None] | None = None
+        self,
+        many: list[Mapping[str, Any]],
+        rounded: bool = False,
+        states: Sequence[np.ndarray | None] | None = None,
+        **changes: Any,
     ) -> list[tuple[Record, Record, np.ndarray]]:
         """Return the predicted columns, the measured columns and their times of each record, from `score_from` on.
 
@@ -459,7 +468,7 @@ class Rig:
                 for one, each in zip(many, data, strict=True)
             ]
         pairs = zip(many, states or [None] * len(many), strict=True)
-        traces = run([self.replay(one, rounded=rounded, state=state) for one, state in pairs])
+        traces = run([self.repeated(self.part(one), rounded, state, **changes) for one, state in pairs])
         found = []
         for each, trace in zip(data, traces, strict=True):
             period = trace.scenario.control_period

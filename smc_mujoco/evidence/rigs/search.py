@@ -1,12 +1,21 @@
-"""The search of identification: starts over decades, and damped Gauss-Newton steps from the best of them.
+"""The search of identification: starts by torques and over decades, and damped Gauss-Newton steps from the best.
+
+Where the joints have the recorded command as their force, a first least squares compares that force with the inverse
+dynamics of the measured motion. It is nearly linear in masses and frictions, so any values may start it; but the noise
+of accelerations biases it, so it is only a start itself.
 
 Quantities that cannot be negative, as masses and frictions, differ between machines by powers of ten. So further starts
 are drawn evenly in their logarithms, and no step changes such a quantity by more than a factor of ten.
 """
 
+import dataclasses
+
 import numpy as np
 
+from smc_mujoco.evidence.rigs import inverse
 from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes, cost
+from smc_mujoco.evidence.rigs.rig import Values
+from smc_mujoco.evidence.rigs.uncertainty import jackknife
 
 DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
 CANDIDATES = 8  # further starts that are drawn for each one that is refined; chosen
@@ -17,6 +26,9 @@ FACTOR = 10.0  # by which a step may change a quantity that cannot be negative; 
 NEGLIGIBLE = 1e-4  # of its scale: below it such a quantity may become 0; chosen
 ENDING = 1e-5  # relative change of the cost at which the search ends; chosen
 ROUGH_STEPS = 8  # steps from each start before the best is chosen; chosen
+CORRECTED_STEPS = 3  # steps after the first halving of the physics step; chosen
+MOST_HALVINGS = 5  # of the physics step in corrected replays; chosen
+NEGLIGIBLE_MOVE = 0.5  # of a standard error, by which a halving may move a quantity; chosen
 GOOD = 97.0  # percent: fit of the pieces beyond which a start needs no rival; chosen
 
 
@@ -29,12 +41,40 @@ def search(replays: Replays, starts: int, seed: int, most: int) -> Slopes:
       most: largest number of steps from the best start.
     """
     reached = [refine(replays, replays.start, min(most, ROUGH_STEPS))]
-    if reached[0].fit < GOOD and starts > 1:
+    if reached[0].fit < GOOD and (point := _by_torques(replays)):
+        reached.append(refine(replays, point, min(most, ROUGH_STEPS)))
+    if reached[-1].fit < GOOD and starts > 1:
         for point in _random(replays, starts - 1, seed):
             reached.append(refine(replays, point, min(most, ROUGH_STEPS)))
             if reached[-1].fit > GOOD:
                 break
     return refine(replays, min(reached, key=lambda slopes: slopes.cost).point, most)
+
+
+def _by_torques(replays: Replays) -> Point | None:
+    """Return the point at which inverse dynamics give the recorded command; None where u is not the joints' force."""
+    from scipy.optimize import least_squares
+
+    twin, start = replays.twin, replays.start
+    data = [twin.checked(record) for record in replays.data]
+    direct = replays.pieces[0].part is not None and twin.scenario("none").actuator == ()
+    columns = dataclasses.replace(twin.columns, torque=tuple(f"torque of {name}" for name in twin.columns.x))
+    if not direct or not all(inverse.long_enough(each, columns) for each in data):
+        return None
+    for each in data:
+        u = each[twin.columns.u]
+        each.update(zip(columns.torque, (u, *(0.0 * u for _ in columns.torque[1:])), strict=True))
+    measured = [inverse.measured(each, columns) for each in data]
+
+    def differences(values: np.ndarray) -> np.ndarray:
+        fields = twin.machine(Values(**twin.values | replays.values(Point(values, start.states))))
+        pairs = zip((inverse.torques(fields["plant"], each, columns) for each in data), measured, strict=True)
+        each = [ours[name] - theirs[name] for ours, theirs in pairs for name in columns.torque]
+        return np.nan_to_num(np.concatenate(each))
+
+    inside = np.clip(start.values, replays.low, replays.high)
+    solved = least_squares(differences, inside, bounds=(replays.low, replays.high), x_scale="jac")
+    return Point(solved.x, start.states)
 
 
 def _random(replays: Replays, count: int, seed: int) -> list[Point]:
@@ -56,27 +96,47 @@ def better(replays: Replays, *points: Point) -> Point:
     return points[costs.index(min(costs))]
 
 
+def accurate(replays: Replays, slopes: Slopes) -> tuple[Slopes, np.ndarray]:
+    """Return what a search reaches when its replays are corrected, and how far the last halving moved it, (p,).
+
+    The step is halved until that is a small part of the standard errors. Residuals are corrected at each point, as the
+    moments at which dry friction changes its direction move; the derivatives stay those of the first step.
+    """
+    moved = np.zeros(len(replays.names))
+    if not replays.correct(slopes.point, 1):
+        return slopes, moved
+    slopes = replays.sharpened(refine(replays, slopes.point, CORRECTED_STEPS))
+    for halvings in range(2, MOST_HALVINGS + 1):
+        before = slopes
+        replays.correct(before.point, halvings)
+        slopes = replays.again(before, before.point)
+        slopes = slopes.stepped(_moved(replays, slopes, 0.0) - slopes.point.values)
+        moved = np.abs(slopes.point.values - before.point.values)
+        if np.all(moved <= NEGLIGIBLE_MOVE * np.sqrt(np.diag(jackknife(slopes)))):
+            break
+    return slopes, moved
+
+
 def not_worse(replays: Replays, reached: Slopes) -> Slopes:
-    """Return what a search reached, or what the rig's own values lead to if these fit better, both exactly."""
-    first = replays.slopes(replays.start, exact=True)
+    """Return what a search reached, or what the rig's own values lead to if these fit better."""
+    first = replays.slopes(replays.start)
     if reached.cost <= cost(first.freed(first.residuals)):
         return reached
-    return min(reached, refine(replays, first.point, ROUGH_STEPS, exact=True), key=lambda slopes: slopes.cost)
+    return min(reached, refine(replays, first.point, ROUGH_STEPS), key=lambda slopes: slopes.cost)
 
 
-def refine(replays: Replays, point: Point, most: int, exact: bool = False) -> Slopes:
+def refine(replays: Replays, point: Point, most: int) -> Slopes:
     """Return the slopes at the least squares near a point, whose cost is not above that of the point.
 
     Args:
       most: largest number of steps.
-      exact: see `Replays.residuals`.
     """
-    best = replays.slopes(point, exact)
+    best = replays.slopes(point)
     for _ in range(most):
-        chosen, reached = _best_step(replays, best, exact)
+        chosen, reached = _best_step(replays, best)
         if not reached < best.cost:
             break
-        after = replays.slopes(chosen, exact)
+        after = replays.slopes(chosen)
         gain = best.cost - after.cost
         best = after
         if gain < ENDING * best.cost:
@@ -84,15 +144,14 @@ def refine(replays: Replays, point: Point, most: int, exact: bool = False) -> Sl
     return best
 
 
-def _best_step(replays: Replays, slopes: Slopes, exact: bool) -> tuple[Point, float]:
+def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
     """Return the best point of several damped steps, and its cost. Each piece moves its own states as far as it gains.
 
-    All steps are simulated in one batch. Exact ones are slow, begin near the solution, and need little damping.
+    All steps are simulated in one batch.
     """
-    dampings = DAMPINGS[:2] if exact else DAMPINGS
-    groups = [_variants(replays, slopes, _moved(replays, slopes, damping)) for damping in dampings]
+    groups = [_variants(replays, slopes, _moved(replays, slopes, damping)) for damping in DAMPINGS]
     trials, size = [point for group in groups for point in group], len(groups[0])
-    costs = np.array([[cost([rows]) for rows in one] for one in replays.residuals(trials, exact)])
+    costs = np.array([[cost([rows]) for rows in one] for one in replays.residuals(trials)])
     reached = []
     for i, group in enumerate(groups):
         own = costs[i * size : (i + 1) * size]

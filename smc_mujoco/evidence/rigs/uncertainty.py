@@ -22,12 +22,18 @@ from smc_mujoco.simulation.run import run
 
 MAX_CORRELATION = 0.98  # beyond this correlation records cannot tell two quantities apart; chosen
 REPEATS = 24  # simulated repetitions of the records of a closed loop, for standard errors; chosen
-BLOCKS = 60  # blocks of time in all pieces together, at least, for standard errors; chosen
+# Of the jackknife, chosen: blocks of time in all pieces together, and the length of a block in correlation times of the
+# residuals.
+BLOCKS, CORRELATION_TIMES = (60, 400), 10.0
+TINY = 1e-300  # no residual at all
 DEPENDENT = 1e-6  # ratio of the slopes' singular values below which quantities cannot be told apart; chosen
 
 
-def statistics(replays: Replays, slopes: Slopes) -> tuple[dict[str, float], np.ndarray]:
+def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[dict[str, float], np.ndarray]:
     """Return the standard error of each quantity, and their correlations (p, p), at the solution.
+
+    Args:
+      by_steps: errors of the quantities by the steps of their simulation, in their scales, (p,).
 
     Raises:
       ScenarioError: records that cannot tell the quantities apart.
@@ -41,12 +47,13 @@ def statistics(replays: Replays, slopes: Slopes) -> tuple[dict[str, float], np.n
     _, singular, rows = np.linalg.svd(J / sizes, full_matrices=False)
     if singular[-1] < DEPENDENT * singular[0]:
         raise _alike(twin.name, (names[i] for i in np.argsort(-np.abs(rows[-1]))[:2]))
-    covariance = _jackknife(slopes)
+    covariance = jackknife(slopes)
     deviation = np.sqrt(np.diag(covariance))
     with np.errstate(all="ignore"):
         correlations = np.nan_to_num(covariance / np.outer(deviation, deviation))
     if replays.closed:
         deviation = np.maximum(deviation, _fed_back(replays, slopes.point, J))
+    deviation = np.hypot(deviation, by_steps)
     errors = dict(zip(names, (deviation * replays.scales).tolist(), strict=True))
     _refuse_alike(twin.name, replays.values(slopes.point), errors, correlations)
     return errors, correlations
@@ -71,10 +78,10 @@ def _alike(rig: str, quantities: Iterable[str]) -> ScenarioError:
     )
 
 
-def _jackknife(slopes: Slopes) -> np.ndarray:
+def jackknife(slopes: Slopes) -> np.ndarray:
     """Return the covariance of the solution, (p, p), from leaving out one block of time after the other."""
     pieces = list(zip(slopes.residuals, slopes.by_values, slopes.by_states, strict=True))
-    parts = -(-BLOCKS // len(pieces))
+    parts = -(-_blocks(slopes) // len(pieces))
     normal = [_normal(*piece) for piece in pieces]
     A, g = (np.sum([one[i] for one in normal], axis=0) for i in range(2))
     moves = []
@@ -86,6 +93,22 @@ def _jackknife(slopes: Slopes) -> np.ndarray:
             moves.append(np.linalg.lstsq(A - own_A + left_A, g - own_g + left_g, rcond=None)[0])
     moved = np.array(moves) - np.linalg.lstsq(A, g, rcond=None)[0]
     return (len(moved) - 1) / len(moved) * moved.T @ moved
+
+
+def _blocks(slopes: Slopes) -> int:
+    """Return the number of blocks: as many as are independent of each other, within BLOCKS.
+
+    A correlation time is 1 + 2 (sum of the autocorrelations up to the first one below 0), in samples.
+    """
+    times = []
+    for r in slopes.residuals:
+        rows = r.reshape(-1, slopes.columns)
+        power = np.abs(np.fft.rfft(rows, 2 * len(rows), axis=0)) ** 2
+        for each in np.fft.irfft(power, axis=0)[: len(rows)].T:
+            end = int(np.argmax(each < 0.0)) or len(each)
+            times.append(1.0 + 2.0 * float(each[1:end].sum() / max(each[0], TINY)))
+    samples = sum(map(len, slopes.residuals)) / slopes.columns
+    return int(np.clip(samples / (CORRELATION_TIMES * np.median(times)), *BLOCKS))
 
 
 def _normal(r: np.ndarray, J: np.ndarray, S: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

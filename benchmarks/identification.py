@@ -1,6 +1,6 @@
 """Coverage of identification: errors of the quantities over their stated standard errors, on three exact machines.
 
-    python benchmarks/coverage.py [SEEDS]
+    python benchmarks/identification.py [SEEDS]
 
 An axis with dry friction (noise, counts), a pendulum (counts) and a cart on a spring (noise) move under four sines of
 random frequencies. Their motions come from integrators that share nothing with the suite: closed forms between stops,
