@@ -12,7 +12,6 @@ import dataclasses
 import functools
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -236,7 +235,7 @@ def compare(
     seeds: int = 16,
     tune: bool = True,
     worst: bool | Uncertainty = False,
-    executor: str | Executor | None = None,
+    executor: "executors.Workers | None" = None,
     *,
     out: str | os.PathLike[str] = "compared",
     metrics: Sequence[str] = METRICS,

@@ -25,7 +25,7 @@ import sys
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from concurrent import futures
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.extras import extra
@@ -41,9 +41,14 @@ from smc_mujoco.studies import run_key
 STEPS, LOG_STEPS, RUNS = 500_000, 1_000_000, 1000
 LOOP_SLOWDOWN = 40  # of the reference loop against compiled laws, roughly
 UNDER_WAY = 1000  # most batches sent to workers and not finished; chosen
-ADDRESS = "dask://"
+ADDRESS, DASKS_OWN = "dask://", "tcp://"  # two ways to write the address of a scheduler
 LOGGERS = "distributed", "distributed.client", "tornado.application"  # those of dask that set their own level
 WAIT = 10.0  # s, for a scheduler, and for its first worker; chosen
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+    Workers = str | Executor | Client  # where a study is computed, see `checked`
 
 Outcome = dict[str, Any]
 Batch = Sequence[Prepared]
@@ -193,16 +198,21 @@ def _threads() -> int:
 
 
 def checked(executor: object) -> str | Executor:
-    """Return the executor if it is "local", an address or an Executor."""
+    """Return "local", an address that begins with ADDRESS, or an Executor, also for a dask Client."""
+    dask = sys.modules.get("distributed")
+    if dask is not None and isinstance(executor, dask.Client):
+        return _DaskExecutor(executor)
     if isinstance(executor, Executor):
         return executor
     if isinstance(executor, str):
-        host, _, port = executor.removeprefix(ADDRESS).rpartition(":")
-        remote = executor.startswith(ADDRESS) and host and port.isdecimal() and int(port) < 2**16
+        address = executor.replace(DASKS_OWN, ADDRESS, 1)
+        host, _, port = address.removeprefix(ADDRESS).rpartition(":")
+        remote = address.startswith(ADDRESS) and host and port.isdecimal() and int(port) < 2**16
         if remote or executor == "local":
-            return executor
+            return address
     raise ScenarioError(
-        f"executor is {shown(executor)}: give 'local', 'dask://HOST:PORT' or a concurrent.futures.Executor"
+        f"executor is {shown(executor)}: give 'local', 'dask://HOST:PORT', a dask Client or a "
+        "concurrent.futures.Executor"
     )
 
 

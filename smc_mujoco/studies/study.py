@@ -13,7 +13,6 @@ import dataclasses
 import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import Executor
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, find, printable, shown
@@ -61,7 +60,7 @@ def study(
     scenarios: Iterable[Scenario],
     out: str | os.PathLike[str],
     resume: bool = True,
-    executor: str | Executor = "local",
+    executor: "executors.Workers" = "local",
     threads: int | None = None,
     progress: bool = False,
     traces: str = "none",
@@ -76,8 +75,8 @@ def study(
       scenarios: any number of Scenarios, such as those of `smc.grid`.
       out: folder of the study; it may contain the parts of other studies.
       resume: whether to keep the finished runs in the folder; False removes them first.
-      executor: "local", "dask://HOST:PORT" for the workers of that scheduler, or any concurrent.futures.Executor, whose
-        workers run one simulation each. It stays open.
+      executor: "local", "dask://HOST:PORT" (or "tcp://HOST:PORT") for the workers of that scheduler, a dask Client, or
+        any concurrent.futures.Executor, whose workers run one simulation each. It stays open.
       threads: number of simulations at a time, if local; None for one per available core.
       progress: whether to show a progress bar.
       traces: traces to save in out/traces: "none", "all", or "worst", one for every plant and condition: a failed run,

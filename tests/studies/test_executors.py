@@ -89,7 +89,7 @@ def test_a_batch_is_finished_while_the_next_one_runs_and_what_that_raises_is_hea
     "name", ["ray", "dask", "dask://", "dask://host", "dask://host:port", "dask://a:99999", None, 3, np.zeros(2)]
 )
 def test_an_executor_that_there_is_not_is_one_sentence(name):
-    with pytest.raises(smc.ScenarioError, match=r"give 'local', 'dask://HOST:PORT' or a concurrent.futures.Executor"):
+    with pytest.raises(smc.ScenarioError, match=r"give 'local', 'dask://HOST:PORT', a dask Client or a"):
         executors.checked(name)
 
 
@@ -290,6 +290,28 @@ def half_done(dask, tmp_path) -> Iterator[subprocess.Popen[str]]:
     finally:
         client.kill()
         client.communicate()
+
+
+OWN_CLIENT = """
+import sys
+from pathlib import Path
+from distributed import Client
+import smc_mujoco as smc
+folder, address = sys.argv[1:]
+runs = smc.grid(["duffing"], ["classical"], ["noise"], 2, duration=0.1)
+smc.study(runs, f"{folder}/here")
+smc.study(runs, f"{folder}/there", executor=address)
+with Client(address) as client:
+    smc.study(runs, f"{folder}/client", executor=client)
+print(len({file.read_bytes() for file in Path(folder).glob("*/results.parquet")}))
+"""
+
+
+def test_a_client_of_ones_own_and_its_address_give_the_same_table(dask, tmp_path):
+    address = dask[0].replace("dask://", "tcp://")
+    client = start("-c", OWN_CLIENT, str(tmp_path), address, log=tmp_path / "client.log")
+    said, _ = client.communicate(timeout=300)
+    assert (said, client.returncode) == ("1\n", 0), (tmp_path / "client.log").read_text()
 
 
 def test_a_worker_that_is_killed_in_mid_run_changes_nothing(dask, half_done, tmp_path):
