@@ -9,9 +9,11 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.cli import main
+from smc_mujoco.cli.commands import options
+from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.units import FORCE, RATE, Gain
-from smc_mujoco.studies import executors, fair_gains
+from smc_mujoco.studies import compare, executors, fair_gains, worst_case
 
 SHORT = {"duration": 1.0, "budget": 48, "progress": False}
 
@@ -153,3 +155,30 @@ def test_one_command_tunes_runs_tables_and_draws(tmp_path, monkeypatch, capsys):
     assert max(map(len, printed.splitlines())) <= 80
     assert (tmp_path / "fig.svg").exists()
     assert (tmp_path / "table.tex").read_text().count(r"\toprule") == 6
+
+
+def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(worst_case, "default_budget", lambda scenario: 8)
+    within, laws = smc.Uncertainty(disturbance=0.5), [smc.law("classical", k=5.0), smc.law("pid", kp=20.0)]
+    made = smc.compare(laws, "duffing", "nominal", 1, worst=within, out=tmp_path, **SHORT)
+    for found in made.worst["duffing"].values():
+        assert smc.score(smc.run(found.scenario))["rms_error"] == found.value >= found.median
+    text = repr(made)
+    assert "duffing: rms error, worst of 16 runs within |d| <= 0.5 N" in text
+    assert all(number(each.value) in text for each in made.worst["duffing"].values())
+    assert "worst found (m)" in made.to_latex()
+    monkeypatch.setattr(compare, "worst_case", None)
+    again = smc.compare(laws, "duffing", "nominal", 1, worst=within, out=tmp_path, **SHORT)
+    assert again.worst["duffing"]["pid"].scenario == made.worst["duffing"]["pid"].scenario
+
+
+def test_shells_complete_the_last_name():
+    assert options.PLANTS("duffing,inverted_pendulum_") == ["duffing,inverted_pendulum_network"]
+    assert options.CONDITIONS("enc") == ["encoder"]
+    assert options.LAWS("pid,super_twisting_u") == ["pid,super_twisting_unclamped"]
+    assert "furuta" in options.SCENES("fur")
+
+
+def test_conditions_are_taken_apart_at_commas_between_them():
+    texts = ["noise,worn: friction=Coulomb(0.05), x0=0.3,sine", "encoder"]
+    assert [one.name for one in options.conditions(texts)] == ["noise", "worn", "sine", "encoder"]

@@ -3,7 +3,7 @@
 import contextlib
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,6 +24,43 @@ SEPARATOR = re.compile(r",(?![^(]*\))")  # a comma outside brackets
 FIELD = re.compile(r"\w+\s*=")  # of a scenario, in a condition
 OWN_GAINS = "With your own gains: pid(kp=50, ki=1). Of a file: my_law.py, or gains.json of `smc-mujoco tune --out`."
 
+
+def _completing(list_known: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+    """Return a function that completes the last name of a text such as "a,b" for a shell."""
+
+    def complete(incomplete: str) -> list[str]:
+        before, comma, last = incomplete.rpartition(",")
+        return [f"{before}{comma}{name}" for name in list_known() if name.startswith(last)]
+
+    return complete
+
+
+def _known_plants() -> Iterable[str]:
+    from smc_mujoco.mechanisms.plant import plants
+
+    return plants()
+
+
+def _known_laws() -> Iterable[str]:
+    from smc_mujoco.control.law import known_laws
+
+    return known_laws()
+
+
+def _known_conditions() -> Iterable[str]:
+    from smc_mujoco.simulation.conditions import NAMED
+
+    return NAMED
+
+
+def _known_scenes() -> Iterable[str]:
+    from smc_mujoco.studies.scene import scenes
+
+    return scenes()
+
+
+PLANTS, LAWS, CONDITIONS, SCENES = map(_completing, (_known_plants, _known_laws, _known_conditions, _known_scenes))
+
 Columns = Annotated[
     str | None,
     typer.Option(
@@ -36,6 +73,7 @@ Conditions = Annotated[
     typer.Option(
         "--condition",
         metavar="NAME|TEXT|FILE",
+        autocompletion=CONDITIONS,
         help='Conditions of `smc-mujoco list`, as a,b; noise+encoder for both at once; your own, as "worn gear: '
         'friction=Coulomb(0.05)", or a file with one on each line. May be repeated.',
         show_default=False,
@@ -46,6 +84,7 @@ Condition = Annotated[
     typer.Option(
         "--condition",
         metavar="NAME|TEXT",
+        autocompletion=CONDITIONS,
         help='The condition of all runs, as encoder, noise+encoder or "worn gear: friction=Coulomb(0.05)".',
     ),
 ]
@@ -64,13 +103,16 @@ Json = Annotated[
 ]
 LawText = Annotated[
     str,
-    typer.Argument(metavar="LAW|FILE", help="A law, as pid or pid(kp=50, ki=1), or a file with one."),
+    typer.Argument(
+        metavar="LAW|FILE", autocompletion=LAWS, help="A law, as pid or pid(kp=50, ki=1), or a file with one."
+    ),
 ]
 Laws = Annotated[
     list[str] | None,
     typer.Option(
         "--law",
         metavar="LAW|FILE",
+        autocompletion=LAWS,
         help=f"Laws of `smc-mujoco laws`, as a,b. {OWN_GAINS} May be repeated.",
         show_default=False,
     ),
@@ -79,6 +121,7 @@ Plants = Annotated[
     list[str] | None,
     typer.Argument(
         metavar="PLANT",
+        autocompletion=PLANTS,
         help="Plants of `smc-mujoco list`, as a,b or a b, or FILE.xml:joint+joint; default the paper's five.",
         show_default=False,
     ),
@@ -86,13 +129,19 @@ Plants = Annotated[
 Quick = Annotated[bool, typer.Option("--quick", help="Less of everything: a first answer in a minute or two.")]
 PlantName = Annotated[
     str,
-    typer.Argument(metavar="PLANT", help="A plant from `smc-mujoco list`, or FILE.xml:joint+joint for your own model."),
+    typer.Argument(
+        metavar="PLANT",
+        autocompletion=PLANTS,
+        help="A plant from `smc-mujoco list`, or FILE.xml:joint+joint for your own model.",
+    ),
 ]
 Relevant = Annotated[
     float | None,
     typer.Option("--relevant", help="Least relevant difference, as a share of the larger value; default 0.03."),
 ]
-SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A scene from `smc-mujoco list`, or a scene file.")]
+SceneName = Annotated[
+    str, typer.Argument(metavar="SCENE", autocompletion=SCENES, help="A scene from `smc-mujoco list`, or a scene file.")
+]
 Spread = Annotated[
     float | None, typer.Option("--spread", help="How far starts vary about x0, as a fraction of it; default 0.2.")
 ]
