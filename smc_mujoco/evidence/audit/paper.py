@@ -62,6 +62,8 @@ OF_CLAIM = {  # field of a claim -> its type and what to write; the first six ar
     "words": (str, "a text: holds_if in words"),
     "measured": (str, "a text"),
     "note": (str, "a text"),
+    "instead": (str, "a sentence: what the author may claim instead"),
+    "shown_by": (str, "the command that shows it"),
     "quantifier": (str, "universal, existential or named"),
     "quick": (str, "a text"),
     "late": (bool, "true or false"),

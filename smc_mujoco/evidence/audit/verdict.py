@@ -117,6 +117,8 @@ class Statement:
       how: how it was derived, or why it is asked.
       read: what was read of the place where it stands, one of `paper.READ`.
       over: "all" or "some" gains that the paper allows; "" if the paper's gains are known, or none matter.
+      instead: what the author may claim instead, where the claim does not hold: a theorem or a measured bound.
+      shown_by: the command that shows it.
     """
 
     id: str
@@ -130,6 +132,8 @@ class Statement:
     how: str = ""
     read: str = ""
     over: str = ""
+    instead: str = ""
+    shown_by: str = ""
 
     @property
     def source(self) -> str:

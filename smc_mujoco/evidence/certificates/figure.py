@@ -34,7 +34,7 @@ def draw(certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike
         page = pages.blank(SIZE[0] if bounded else 0.62 * SIZE[0], SIZE[1], None)
         axes = page.subplots(1, 2 if bounded else 1, squeeze=False).ravel()
         x, v = _plane(certificate, part, traces)
-        for ax, zoom in zip(axes, (1.0, ZOOM * part["bound"] / x[-1] if bounded else 1.0), strict=False):
+        for ax, zoom in zip(axes, (1.0, ZOOM * (part["bound"] if part else 0.0) / x[-1]), strict=False):
             _panel(ax, certificate, part, x * zoom, v * zoom ** (0.5 if zoom < 1.0 else 1.0), traces)
         unit, d0 = data["unit"], data["disturbance"]
         under = f"|d| ≤ {d0:g} {EFFORT[unit]}" if d0 else "no disturbance"

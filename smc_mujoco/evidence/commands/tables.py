@@ -103,7 +103,7 @@ def _claims_overview(claims: Sequence[Claim]) -> Table:
 def _print_claim(claim: Claim, console: Console) -> None:
     """Print one claim in full, then a table for each set of gains: its checks, and the numbers beside them."""
     console.print(Text.assemble((claim.id, "bold cyan"), f"  {claim.text}", (f"  {claim.where}", "dim")))
-    about = plain(Column(style="dim", no_wrap=True), "")
+    about, lost = plain(Column(style="dim", no_wrap=True), ""), claim.verdict != verdicts.SUPPORTED
     parts = {
         "whose": claim.source + (f": {claim.how}" if claim.how else ""),
         "kind": claim.quantifier,
@@ -111,6 +111,7 @@ def _print_claim(claim: Claim, console: Console) -> None:
         "measured": claim.measured,
         "holds if": claim.holds_if,
         "note": claim.note,
+        "instead": f"{claim.instead} ({claim.shown_by})" if lost and claim.instead else "",
         "verdict": Text(f"{claim.verdict}{', flips with the gains' * claim.flips}", f"bold {COLOURS[claim.verdict]}"),
     }
     for label, text in parts.items():
