@@ -113,5 +113,5 @@ def _legend(page: Any, certificate: Any, part: Any, runs: bool) -> None:
         ]
         handles += [Line2D([], [], color=style.INK, linestyle=(0, (4, 3)), label="bound")] if d0 else []
     if runs:
-        handles.append(Line2D([], [], color=style.REACTION, label="runs under d = ±d0" if d0 else "run"))
+        handles.append(Line2D([], [], color=style.REACTION, label="run"))
     page.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=style.points(9.5))

@@ -1,6 +1,7 @@
 """Certificates of laws on plants: which theorem holds, by which margins, from where, and how far d can push.
 
-    certificate = smc.certify(smc.Scenario(plant="duffing", law="observer_free", disturbance=smc.Constant(1.0)))
+    scenario = smc.Scenario(plant="duffing", law="observer_free")
+    certificate = smc.certify(scenario, within=smc.Uncertainty(disturbance=1.0))
     certificate.bound                               # |x| in the end, m, under every |d| <= 1 N
     certificate.save("duffing.json")                # smc-mujoco certify --check duffing.json proves it again
 
@@ -18,7 +19,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.extras import extra
 from smc_mujoco.evidence.certificates import search
 from smc_mujoco.evidence.certificates.certificate import Certificate, finite
@@ -35,7 +37,7 @@ LAWS = ("observer_free", "boundary_layer", *LINEAR, "classical", "terminal", "su
 PLANTS = ("inverted_pendulum", "duffing", "van_der_pol", "pendulum_network", "inverted_pendulum_network")
 
 
-def certify(scenario: Scenario, disturbance: float | None = None, slope: float | None = None) -> Certificate:
+def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificate:
     """Return what is proven of a scenario's law on its plant, checked in ball arithmetic.
 
     Laws: observer_free, boundary_layer, lqr and pid (without an integral), classical, terminal, super_twisting; all
@@ -43,23 +45,23 @@ def certify(scenario: Scenario, disturbance: float | None = None, slope: float |
     van_der_pol, with any parameters and mismatch, at rest at 0.
 
     Args:
-      disturbance: bound of |d|, N or N m; by default that of the scenario's disturbance.
-      slope: bound of |d'|, per second, which only super_twisting needs; by default that of the scenario's.
+      within: the class of disturbances, as of `worst_case`, beside those of the scenario: bounds of |d| and, for
+        super_twisting, of |d'|. None: the scenario's own disturbance and no other.
 
     Raises:
-      ScenarioError: a pair for which there is no theorem, or a disturbance without a bound.
+      ScenarioError: a pair for which there is no theorem, a disturbance without a bound, or a class with more than
+        disturbances.
       MissingPackageError: python-flint is not installed.
     """
     with extra("proof", "smc.certify"):
         import flint  # noqa: F401
 
         from smc_mujoco.evidence.certificates import checker
+    if not isinstance(scenario, Scenario):
+        raise ScenarioError(f"certify is about a Scenario, not {shown(scenario)}: give smc.Scenario(...)")
     _check(scenario)
     plant, law = scenario.plant, scenario.law
-    own = _bounds(scenario)
-    d0 = own[0] if disturbance is None else number("disturbance", disturbance, least=0.0)
-    rate = own[1] if slope is None and disturbance is None else math.inf if slope is None else slope
-    rate = number("slope", 0.0 if d0 == 0.0 else rate, least=0.0, infinite=True)
+    d0, rate = (own + more for own, more in zip(_bounds(scenario), _class(within), strict=True))
     u_max = scenario.limits[0]
     values = {name: float(value) for name, value in vars(plant.values(scenario.mismatch)).items()}
     document: dict[str, Any] = {
@@ -126,11 +128,24 @@ def _bounds(scenario: Scenario) -> tuple[float, float]:
     bound = slope = 0.0
     for signal in scenario.disturbance:
         if not isinstance(signal, Constant | Sine | Step | Pulse):
-            raise ScenarioError(f"{type(signal).__name__} has no bound that holds for certain: give disturbance=...")
+            raise ScenarioError(
+                f"{type(signal).__name__} has no bound: leave it out, and give within=smc.Uncertainty(disturbance=...)"
+            )
         bound += abs(signal.amplitude)
         if not isinstance(signal, Constant):
             slope += abs(signal.amplitude * signal.omega) if isinstance(signal, Sine) else math.inf
     return bound, slope
+
+
+def _class(within: Uncertainty | None) -> tuple[float, float]:
+    """Return the bounds of |d| and |d'| of a class."""
+    if within is None:
+        return 0.0, 0.0
+    if not isinstance(within, Uncertainty):
+        raise ScenarioError(f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)")
+    if within != Uncertainty(disturbance=within.disturbance, slope=within.slope):
+        raise ScenarioError("a certificate is about disturbances alone: give a class with disturbance and slope only")
+    return within.disturbance, math.inf if within.slope is None else within.slope
 
 
 def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
@@ -284,7 +299,9 @@ def _super_twisting(document: dict, loop: Loop, terms: list[float], law: SimpleN
     """Return the largest set that Moreno & Osorio's quadratic form proves."""
     d0, slope, M, c = document["disturbance"], document["slope"], loop.M, loop.c
     if slope is None:
-        raise ScenarioError("super_twisting needs a bound of d': give slope=... in N/s or N m/s")
+        raise ScenarioError(
+            "super_twisting needs a bound of d': give one, as in smc.Uncertainty(disturbance=1.0, slope=2.0)"
+        )
     A, B, C, E, F = terms
     u_max = math.inf if document["u_max"] is None else document["u_max"]
     w_max = math.inf if law.w_max is None else law.w_max

@@ -9,6 +9,8 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import errors_as_sentences
 from smc_mujoco.common.interrupts import held_back
 
+METRIC = "ultimate_bound"  # largest |x| in the last fifth of a run
+
 
 @errors_as_sentences()
 def certify(
@@ -30,10 +32,11 @@ def certify(
     out: Annotated[Path | None, typer.Option(metavar="FILE.json", help="Also write the certificate to a file.")] = None,
     figure: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="Also draw the state plane, with runs under d and -d, as .svg, .png or .pdf."
-        ),
+        typer.Option(metavar="FILE", help="Also draw the state plane, with a run, as .svg, .png or .pdf."),
     ] = None,
+    worst: Annotated[
+        bool, typer.Option("--worst", help="Also search for the worst d within its bound, some 10 s, and draw its run.")
+    ] = False,
     check: Annotated[
         Path | None,
         typer.Option(metavar="FILE.json", help="Instead, prove the certificate in a file again. Exit code 2 if not."),
@@ -52,6 +55,7 @@ def certify(
     Example: smc-mujoco certify --check duffing.json
     """
     with held_back():
+        from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
         from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import ended, writable, write_json
         from smc_mujoco.draw.region import checked
@@ -59,12 +63,14 @@ def certify(
         from smc_mujoco.evidence.certificates.maker import certify as make
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.simulation.grid import case
+        from smc_mujoco.simulation.run import run
+        from smc_mujoco.studies.worst_case import worst_case
 
     json, terminal = options.json_file(json)
     for file in (out and ended(out, ".json"), figure and checked(figure), json):
         if file:
             writable(file)
-    scenario = None
+    scenario = found = None
     if check:
         if plant:
             raise ScenarioError("--check proves what is in a file: leave out the plant")
@@ -73,7 +79,11 @@ def certify(
         terminal.note(f"{check}: every statement is proven", "bold")
     elif plant:
         scenario = case(options.plant(plant), options.law(law), condition, gains=gains)
-        made = make(scenario, disturbance, slope)
+        within = Uncertainty(disturbance=disturbance, slope=slope) if disturbance else None
+        made = make(scenario, within)
+        if worst and within is None:
+            raise ScenarioError("--worst needs a bound to search within: give --disturbance")
+        found = worst_case(scenario, METRIC, within, progress=True) if worst else None
     else:
         raise ScenarioError("give a plant, such as duffing, or --check FILE.json")
     terminal.print(tables.certificate(made))
@@ -81,24 +91,15 @@ def certify(
         terminal.note(f"{sentence[0].upper()}{sentence[1:]}.", "bold", wrap=True)
     left_out = "; ".join(f"{name} ({what})" for name, what in made.leaves_out.items())
     terminal.note(f"No theorem here is about: {left_out}.", wrap=True)
+    if found:
+        unit = made.data["unit"]
+        terminal.note(
+            f"Worst found in {found.tried} runs of this machine: it ends in |x| = {found.value:.3g} {unit}.", "bold"
+        )
     if out:
         terminal.wrote(made.save(out))
     if json:
         write_json(json, made.data)
     if figure:
-        terminal.wrote(_drawn(made, scenario, figure))
-
-
-def _drawn(certificate, scenario, path: Path) -> Path:
-    """Draw a certificate, with runs of its scenario under constant d and -d."""
-    import dataclasses
-
-    from smc_mujoco.simulation.run import run
-    from smc_mujoco.simulation.signals import Constant
-
-    d0, traces = certificate.data["disturbance"], []
-    if scenario is not None and scenario.plant.n == 1:
-        signals = [Constant(d0), Constant(-d0)] if d0 else [None]
-        traces = run([dataclasses.replace(scenario, disturbance=one) for one in signals])
-    certificate.figure(path, traces)
-    return path
+        shown = found.scenario if found else scenario
+        terminal.wrote(made.figure(figure, run([shown]) if shown and shown.plant.n == 1 else ()) and figure)

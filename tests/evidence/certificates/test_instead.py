@@ -1,0 +1,66 @@
+"""What the author may claim instead: the paper's file, the page and the certificates say the same."""
+
+import functools
+import json
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.pages import ROOT
+
+import smc_mujoco as smc
+from smc_mujoco.common.text import number
+from smc_mujoco.control import gain_sets
+from smc_mujoco.evidence.audit.paper import paper
+
+CLAIMS = paper("gaber").claims
+PAGE = (ROOT / "docs" / "what_the_author_may_claim.md").read_text(encoding="utf-8")
+COMMANDS = sorted({claim.shown_by for claim in CLAIMS.values() if "certify" in claim.shown_by})
+DECIMALS = r"-?\d+\.\d+"
+
+
+@functools.cache
+def told(command):
+    """The numbers that a command prints."""
+    pytest.importorskip("flint")
+    plant, *options = shlex.split(command)[2:]
+    given = dict(zip(options[::2], options[1::2], strict=True))
+    d0 = float(given.get("--disturbance", 0.0))
+    law = gain_sets.law(plant, given.get("--law", "observer_free"))
+    within = smc.Uncertainty(disturbance=d0) if d0 else None
+    made = smc.certify(smc.Scenario(plant=plant, law=law), within)
+    return {number(one.margin) for one in made.conditions} | set(re.findall(DECIMALS, " ".join(made.sentences)))
+
+
+def test_each_claim_that_does_not_hold_has_a_sentence_and_a_command():
+    verdicts = json.loads((Path(__file__).parents[1] / "papers" / "quick_verdicts.json").read_text())["gaber"]
+    lost = [id for id, its in verdicts.items() if its["paper"] != "supported"]
+    assert len(lost) > 20
+    assert [id for id in lost if not (CLAIMS[id].instead and CLAIMS[id].shown_by)] == []
+
+
+def test_the_page_has_the_sentences_of_the_paper_s_file():
+    rows = [line.split(" | ") for line in PAGE.partition("| claim |")[2].splitlines()[2:]]
+    plain = [(a.removeprefix("| "), b.replace("\\", ""), c.rstrip(" |").strip("`")) for a, b, c in rows]
+    assert plain == [(f"{c.id}: {c.text}", c.instead, c.shown_by) for c in CLAIMS.values() if c.instead]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_numbers_of_sentences_are_those_of_their_certificates(command):
+    for claim in (one for one in CLAIMS.values() if one.shown_by == command):
+        assert set(re.findall(DECIMALS, claim.instead)) <= told(command), claim.id
+
+
+def test_numbers_of_the_page_are_those_of_certificates():
+    shown = set().union(*map(told, [*COMMANDS, "smc-mujoco certify inverted_pendulum --disturbance 1"]))
+    shown |= told("smc-mujoco certify inverted_pendulum_network")
+    tables = "\n".join(line for line in PAGE.partition("## Claim by claim")[0].splitlines() if line.startswith("|"))
+    assert set(re.findall(DECIMALS, tables)) - {"0.2"} <= shown
+
+
+def test_the_series_of_order_7_falls_where_claim_55_says():
+    roots = np.roots([-17 / 45, 0.0, 2 / 3, 0.0, -1.0, 0.0, 1.0])  # of the derivative of tanh's series
+    (falls,) = (root.real for root in roots if abs(root.imag) < 1e-12 and root.real > 0.0)
+    assert f"{falls:.2f}" in CLAIMS["55"].instead
