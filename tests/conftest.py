@@ -122,3 +122,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         first = set({item.nodeid.split("[")[0]: item for item in reversed(items)}.values())
         config.hook.pytest_deselected(items=[item for item in items if item not in first])
         items[:] = [item for item in items if item in first]
+
+
+@pytest.fixture(autouse=True, scope="session")
+def fixed_noise_key():
+    """Draw the same noise key for every study, so that tests have the same numbers each time."""
+    from smc_mujoco.studies import noise_key
+
+    noise_key.draw = lambda: 20_090_531

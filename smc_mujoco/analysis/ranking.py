@@ -178,11 +178,16 @@ class Comparison:
 
     @functools.cached_property
     def tied(self) -> np.ndarray:
-        """Whether two laws tie, (laws, laws): neither is better in any block, and no median is relevantly lower."""
+        """Whether two laws tie, (laws, laws).
+
+        Neither is better in any block, or fails less often there, and no median is relevantly lower.
+        """
         least = least_difference(self.centres, self.floors, self.relevant).T
         centre = self.centres.T
         lower = centre[:, None, :] - least[:, None, :] > centre[:, :, None]
-        differs = np.any(lower | self.better, axis=0)
+        lacking = self.without_value.T
+        fails_less = lacking[:, :, None] < lacking[:, None, :]
+        differs = np.any(lower | self.better | fails_less, axis=0)
         return ~np.logical_or(differs, differs.T)
 
     @property

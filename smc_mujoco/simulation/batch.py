@@ -208,7 +208,7 @@ def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
                 for j, signal in enumerate(s.disturbance):
                     memories = memory(packed.signals[j]["function"], signal.memory)
                     for channel in range(n if signal.random else 1):
-                        reference.evaluate(signal, t, memories[channel], s.seed, channel, s.stream(j))
+                        reference.evaluate(signal, t, memories[channel], s.noise_seed, channel, s.stream(j))
     except reference.Failure as failure:
         return str(failure)
     return None

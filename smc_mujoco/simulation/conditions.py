@@ -53,7 +53,7 @@ Fields = Mapping[str, Any]
 Recipe = Fields | Callable[[Plant, float], Fields]  # fields, or a function of plant and duration that returns them
 
 MAX_PARTS = 20  # conditions that a name joins: chosen
-OTHERS = ("plant", "law", "model", "surface", "seed", "duration")  # fields that belong to no condition
+OTHERS = ("plant", "law", "model", "surface", "seed", "noise_key", "duration")  # fields that belong to no condition
 FIELDS = [name for name in Scenario.fields() if name not in OTHERS]
 SEVERAL = ("disturbance", "friction", "actuator")  # fields that add up when conditions are joined
 ABSTRACT = (Part, Friction, Actuator, Drive, Signal, Recorded)  # classes that a text cannot name

@@ -255,7 +255,7 @@ def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
         "scale": math.prod(part.scale for part in s.actuator),
         "has_drives": drives is not None,
         "drive_step": drives._asdict() if drives else {},
-        "seed": s.seed,
+        "seed": s.noise_seed,
         "sigma_x": s.noise.position,
         "sigma_v": s.noise.velocity,
         "bias": sensor.bias,

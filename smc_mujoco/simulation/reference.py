@@ -171,14 +171,14 @@ class Loop:
         steps = self.scenario.clock.steps(self.scenario.physics_step)
         if not steps or k in (0, self.scenario.samples):
             return 0
-        return int(words(self.scenario.seed, 0, philox.JITTER, k)[0] * 2.0**-53 * (steps + 1))
+        return int(words(self.scenario.noise_seed, 0, philox.JITTER, k)[0] * 2.0**-53 * (steps + 1))
 
     def missed(self, k: int) -> bool:
         """Return whether sample k does not run."""
         share = self.scenario.clock.missed
         if not share or k in (0, self.scenario.samples):
             return False
-        return words(self.scenario.seed, 0, philox.MISSED, k)[0] * 2.0**-53 < share
+        return words(self.scenario.noise_seed, 0, philox.MISSED, k)[0] * 2.0**-53 < share
 
     def measure(self, data: mujoco.MjData, k: int, t: float) -> tuple[np.ndarray, np.ndarray]:
         """Return measured positions and estimated velocities, (n,) each, at sample k, at time t, s."""
@@ -193,7 +193,7 @@ class Loop:
 
     def read(self, i: int, x: float, v: float, j: int) -> tuple[float, float]:
         """Return reading j of channel i: position and velocity after noise, bias, rounding and loss."""
-        sigma, sensor, seed = self.scenario.noise, self.scenario.sensor, self.scenario.seed
+        sigma, sensor, seed = self.scenario.noise, self.scenario.sensor, self.scenario.noise_seed
         if sigma.position or sigma.velocity:
             z = normals(seed, i, philox.MEASUREMENT, j)
             x, v = x + sigma.position * z[0], v + sigma.velocity * z[1]
@@ -276,7 +276,7 @@ class Loop:
             if isinstance(signal, Push):
                 continue
             if signal.random:
-                d = [evaluate(signal, t, own, self.scenario.seed, i, stream)[0] for i, own in enumerate(memory)]
+                d = [evaluate(signal, t, own, self.scenario.noise_seed, i, stream)[0] for i, own in enumerate(memory)]
             elif signal.sees:
                 d = self.look(signal, data, t, memory[0])
             else:

@@ -8,6 +8,7 @@ knows at most the plant's nominal parameters.
 import copy
 import dataclasses
 import functools
+import hashlib
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -43,6 +44,7 @@ MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 
 REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
 JITTER_STEPS = 4  # physics steps in the clock's jitter, at least; chosen: it takes five values or more
 SHORT_LAG = 0.2  # control periods: a shorter lag needs no shorter physics step, see `longest_step`
+MAX_SEED = 2**53 - 1  # the largest whole number that every float64 below it has
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 MAX_ANGLE = 3.0 * math.pi  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
@@ -94,6 +96,8 @@ class Scenario:
         as kg of payload. `mass` is the plant's mass.
       jump: a change of the true plant's parameters in mid-run, or None.
       seed: of every random number of the run, 0 .. 2^53 - 1.
+      noise_key: a number with which the random numbers of all seeds are keyed. Comparisons draw one after the laws are
+        fixed, so that no law can know its noise. 0: the seed alone.
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation, also behind
         a Lag, a RateLimit or a DCMotor without inductance, else implicitfast.
       friction: of every joint, beside the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or several of them.
@@ -139,6 +143,7 @@ class Scenario:
     mismatch: Mapping[str, float] = field(converter=coerce.mismatch, default=None)
     jump: Jump | None = field(converter=coerce.jump, default=None)
     seed: int = 0
+    noise_key: int = 0
     integrator: str | None = None
     friction: tuple[Friction, ...] = field(converter=coerce.friction, default=None)
     contact: Contact = field(converter=coerce.contact, default=None)
@@ -177,6 +182,7 @@ class Scenario:
             mismatch: Mapping[str, float] | None = None,
             jump: Jump | None = None,
             seed: int = 0,
+            noise_key: int = 0,
             integrator: str | None = None,
             friction: Friction | Sequence[Friction] | None = None,
             contact: Contact | str | None = None,
@@ -223,12 +229,19 @@ class Scenario:
         put(mechanism=coerce.mechanism(self.mechanism, self.plant))
         put(duration=number("duration", self.duration, above=0.0, most=MAX_TIME))
         put(control_period=number("control_period", self.control_period, above=0.0, least=MIN_TIME))
-        put(seed=whole("seed", self.seed, 0, 2**53 - 1))
+        put(seed=whole("seed", self.seed, 0, MAX_SEED), noise_key=whole("noise_key", self.noise_key, 0, MAX_SEED))
         put(x0=coerce.per_channel("x0", self.x0, self.plant.n))
         put(v0=coerce.per_channel("v0", self.v0, self.plant.n))
         put(physics_step=coerce.physics_step(self.physics_step, self.control_period, MIN_TIME))
         put(u_max=coerce.bound(self.u_max, self.plant))
         put(input_delay=number("input_delay", self.input_delay, least=0.0, most=self.duration))
+
+    @functools.cached_property
+    def noise_seed(self) -> int:
+        """The seed of the generator: `seed`, or a hash of it and of the noise key."""
+        if not self.noise_key:
+            return self.seed
+        return int.from_bytes(hashlib.sha256(f"{self.noise_key} {self.seed}".encode()).digest()[:7]) % (MAX_SEED + 1)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scenario) and self.resolved._values() == other.resolved._values()

@@ -55,6 +55,7 @@ def describe(scenario: Scenario) -> dict:
             "left_out": [name for name in DEPENDENT if getattr(given, name) is None],
         }
         | {name: _parts(getattr(scenario, name)) for name in PARTS}
+        | ({"noise_key": scenario.noise_key} if scenario.noise_key else {})
     )
 
 
@@ -72,7 +73,7 @@ def restore(data: dict) -> Scenario:
     """
     fields = {name: data[name] for name in PLAIN}
     fields |= {name: _restore_parts(data[name]) for name in PARTS if name in data}  # an ideal run's file may lack them
-    fields |= {name: data[name] for name in ("mechanism", "model") if name in data}
+    fields |= {name: data[name] for name in ("mechanism", "model", "noise_key") if name in data}
     fields |= {
         "plant": _restore_plant(data["plant"]),
         "law": component.law(data["law"], data.get("source")),

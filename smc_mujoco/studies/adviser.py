@@ -49,6 +49,7 @@ from smc_mujoco.simulation.grid import case, crossed, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.studies.advice import NEEDS, Advice, Choice, ties
 from smc_mujoco.studies.fair_gains import Candidate, fair_gains
+from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
 
@@ -87,6 +88,7 @@ def which(
     progress: bool = False,
     defaults: bool = False,
     relevant: float = RELEVANT,
+    noise_key: int | str = DRAWN,
 ) -> Advice:
     """Advise a law for a plant: compare all laws that suit, with gains for the plant, and say how sure the answer is.
 
@@ -106,6 +108,7 @@ def which(
       progress: whether to show progress bars.
       defaults: whether a law may be advised over rivals whose gains are their defaults.
       relevant: the least relevant difference, as a share of the larger value, see `leaderboard`.
+      noise_key: as in `compare`.
 
     Raises:
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
@@ -129,7 +132,9 @@ def which(
     def ran(names: Sequence[str], numbers: range, part: str) -> Contest:
         laws = [candidates[name] for name in names]
         runs = crossed([machine], lambda _: laws, asked, numbers, duration, starts)
-        return _contest(study(runs, folder / part, threads=threads, progress=progress), machine, compared, relevant)
+        fair: dict[str, Any] = {"noise_key": noise_key, "replay": True}
+        table = study(runs, folder / part, threads=threads, progress=progress, **fair)
+        return _contest(table, machine, compared, relevant)
 
     names, others = list(candidates), []
     if len(names) > extent.finalists:

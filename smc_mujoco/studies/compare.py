@@ -45,6 +45,7 @@ from smc_mujoco.studies import executors, run_key
 from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.fair_gains import Candidate, fair_gains
 from smc_mujoco.studies.leaderboard import METRICS, Boards, leaderboard
+from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, study
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import WorstCase, worst_case
@@ -248,6 +249,7 @@ def compare(
     relevant: float = RELEVANT,
     traces: str = "none",
     fresh: bool = False,
+    noise_key: int | str = DRAWN,
     threads: int | None = None,
     progress: bool = True,
 ) -> Compared:
@@ -281,6 +283,8 @@ def compare(
       relevant: the least relevant difference, as a share of the larger value.
       traces: traces to save in the folder: "none", "all" or "worst".
       fresh: whether to remove the runs that are in the folder first.
+      noise_key: as in `study`: drawn after the laws are fixed, so that none can know its noise. One run of each of
+        your laws on each plant in each condition is replayed, too.
       threads: simulations at once; None for one per available core.
       progress: whether to show progress.
 
@@ -315,7 +319,7 @@ def compare(
         for plant in machines
     }
     runs = crossed(machines, lambda plant: candidates[plant.name], asked, range(count), duration, starts)
-    table = study(runs, folder, not fresh, where, threads, progress, traces)
+    table = study(runs, folder, not fresh, where, threads, progress, traces, noise_key, replay=True)
 
     def attacked(plant: Plant, law: Law) -> WorstCase:
         scenario = case(plant, law, "nominal", duration, starts=starts)

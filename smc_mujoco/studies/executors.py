@@ -36,6 +36,7 @@ from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import run_key
+from smc_mujoco.studies.parcel import packed
 
 # Limits of a batch: `Scenario.work` per thread, 2 to 5 s of a core; work in all, which bounds the memory; runs.
 STEPS, LOG_STEPS, RUNS = 500_000, 1_000_000, 1000
@@ -138,7 +139,7 @@ def compute_elsewhere(
         for batch in batches:
             collect(UNDER_WAY - 1)
             scenarios = [one.scenario for one in batch]
-            task = _packed(scenarios), [run_key.key(s, plants=plants) for s in scenarios]
+            task = packed(scenarios), [run_key.key(s, plants=plants) for s in scenarios]
             try:
                 sent[pool.submit(work, *task)] = batch
             except RuntimeError as error:  # it was shut down, or its workers died
@@ -154,16 +155,6 @@ def compute_elsewhere(
             future.cancel()
 
 
-def _packed(scenarios: Sequence[Scenario]) -> bytes:
-    """Return scenarios as bytes. A worker that cannot read a message dies; one that gets bytes can say why."""
-    try:
-        return pickle.dumps(scenarios)
-    except (pickle.PicklingError, AttributeError, TypeError) as error:
-        raise ScenarioError(
-            f"cannot send {scenarios[0].law} to workers ({error}): define it at the top of a module"
-        ) from None
-
-
 def work(packed: bytes, keys: Sequence[str]) -> list[Outcome]:
     """Run and score scenarios, on a worker.
 
@@ -177,7 +168,7 @@ def work(packed: bytes, keys: Sequence[str]) -> list[Outcome]:
     try:
         scenarios: list[Scenario] = pickle.loads(packed)
     except (ImportError, AttributeError) as error:
-        raise ScenarioError(f"a worker says {error}: put your laws in a module that workers can import") from None
+        raise ScenarioError(f"a worker says {error}: install there what your laws import") from None
     plants: run_key.Hashes = {}
     for scenario, sent in zip(scenarios, keys, strict=True):
         if run_key.key(scenario, plants=plants) != sent:

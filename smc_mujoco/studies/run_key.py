@@ -17,7 +17,7 @@ from smc_mujoco.simulation.scenario import U_MAX, Scenario
 
 PACKAGE = "smc_mujoco."
 # Fields of a description that do not belong to the condition, but to the plant, the law or the run.
-NO_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions", "condition")
+NO_CONDITION = ("plant", "law", "model", "surface", "seed", "noise_key", "x0", "duration", "versions", "condition")
 Hashes = dict[Plant, list[str]]  # of the code and the files of other packages' plants, for runs that are keyed together
 UNRELATED = (  # folders that do not affect runs
     "evidence/audit", "evidence/boards", "evidence/papers", "exchange/live", "draw", "testing", "control/tuned_gains",
@@ -68,6 +68,7 @@ def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
         **source(scenario),
         "condition": condition(scenario, data),
         "seed": scenario.seed,
+        "noise_key": scenario.noise_key,
         "duration": scenario.duration,
         "versions": to_json(data["versions"]),
         "scenario": to_json(data),

@@ -86,12 +86,18 @@ class Store:
         table.write(path, self.schema, [pa.Table.from_pylist(list(rows), schema=self.schema)])
         self.where.update((name, (path, i)) for i, name in enumerate(hashes))
 
-    def collect(self, hashes: Sequence[str], sources: Mapping[str, Mapping[str, str | None]] = NOTHING) -> None:
+    def row(self, name: str) -> dict[str, Any]:
+        """Return a finished run as it is in its part."""
+        path, i = self.where[name]
+        part = self._read(path)
+        return {} if part is None else part.slice(i, 1).to_pylist()[0]
+
+    def collect(self, hashes: Sequence[str], changes: Mapping[str, Mapping[str, Any]] = NOTHING) -> None:
         """Write the table of these finished runs, in this order.
 
         Args:
-          sources: hash -> the columns of `run_key.source`; default: those of the parts, which an earlier study may
-            have written, as runs with equal gains have one hash.
+          changes: hash -> columns with other values than in the parts: of `run_key.source`, as an earlier study may
+            have written these runs, and of replays.
 
         Raises:
           ScenarioError: the folder cannot be written, or a part has been removed.
@@ -111,8 +117,11 @@ class Store:
                 found.append(part.take([self.where[names[i]][1] for i in indices]))
             order = np.argsort(np.concatenate(list(places.values())))
             data = pa.concat_tables(found).take(order).combine_chunks()
-            for name in ("source", "search") if sources else ():
-                column = pa.array([sources[one][name] for one in names], pa.string())
+            for name in sorted({column for one in names for column in changes.get(one, ())}):
+                pairs = zip(names, data[name].to_pylist(), strict=True)
+                column = pa.array(
+                    [changes.get(one, {}).get(name, value) for one, value in pairs], data.field(name).type
+                )
                 data = data.set_column(data.column_names.index(name), data.field(name), column)
             return data
 

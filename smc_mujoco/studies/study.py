@@ -12,7 +12,7 @@ edited.
 import dataclasses
 import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, find, printable, shown
@@ -23,7 +23,8 @@ from smc_mujoco.simulation.conditions import DURATION, PLANTS
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies import executors, run_key, saved_traces
+from smc_mujoco.studies import executors, run_key, saved_traces, seals
+from smc_mujoco.studies import noise_key as noise
 from smc_mujoco.studies.executors import Batch, Outcome
 from smc_mujoco.studies.store import Store
 from smc_mujoco.studies.table import Table
@@ -64,6 +65,8 @@ def study(
     threads: int | None = None,
     progress: bool = False,
     traces: str = "none",
+    noise_key: int | str = 0,
+    replay: bool = False,
 ) -> Table:
     """Run scenarios, score them, and write the table out/results.parquet with a row for each.
 
@@ -81,6 +84,10 @@ def study(
       progress: whether to show a progress bar.
       traces: traces to save in out/traces: "none", "all", or "worst", one for every plant and condition: a failed run,
         else one that never settles, else the one with the largest ultimate bound.
+      noise_key: of all runs, see `Scenario`. "drawn": a new one, that is drawn now and kept in the folder, unless the
+        study goes on; so no law can know its noise.
+      replay: whether to replay one run of each of your laws on each plant in each condition, see `smc.replay`. A run
+        whose commands do not follow from its measurements counts as failed.
 
     Raises:
       ScenarioError: scenarios that cannot be run, a folder that cannot be written, or workers that are missing or die.
@@ -93,15 +100,18 @@ def study(
     threads = cores(threads)
     store, folder = Store(Path(out)), Path(out) / "traces"
     plants: run_key.Hashes = {}
-    by_key = _by_key(scenarios, plants)
+    by_key = _by_key(scenarios, plants, lambda given: noise.keyed(given, noise_key, Path(out), resume))
     store.open(resume)
+    names = {id(scenario): name for name, scenario in by_key.items()}
     missing = [scenario for name, scenario in by_key.items() if name not in store.where]
     if progress and (done := len(by_key) - len(missing)):
         print(f"{done} of {len(by_key)} runs are in {printable(str(store.parts))}", file=sys.stderr)
     with counter(len(missing), sum(s.work for s in missing), progress) as counts:
 
         def finish(batch: Batch, outcomes: Sequence[Outcome]) -> None:
-            store.add([run_key.row(one.scenario, plants) | its for one, its in zip(batch, outcomes, strict=True)])
+            hashes = ({"hash": names[id(one.scenario)]} for one in batch)  # as they were: a law may change its globals
+            rows = (run_key.row(one.scenario, plants) for one in batch)
+            store.add([row | name | its for row, name, its in zip(rows, hashes, outcomes, strict=True)])
 
         def finish_here(batch: Batch, found: Sequence[Trace]) -> None:
             for trace in found if traces == "all" else ():
@@ -113,17 +123,24 @@ def study(
         else:
             with executors.opened(where) as pool:
                 executors.compute_elsewhere(executors.batches(missing, 1), pool, finish, counts.stepped)
-    store.collect(list(by_key), {name: run_key.source(scenario) for name, scenario in by_key.items()})
+    changes = {name: run_key.source(scenario) for name, scenario in by_key.items()}
+    for name, its in (seals.replayed(by_key, store, Path(out), threads, progress) if replay else {}).items():
+        changes[name] = changes[name] | its
+    store.collect(list(by_key), changes)
     table = dataclasses.replace(Table.read(store.results), known=by_key)
     saved_traces.save(table, traces, folder, threads, progress)
     return table
 
 
-def _by_key(scenarios: Iterable[Scenario], plants: run_key.Hashes) -> dict[str, Scenario]:
-    """Return key -> scenario, in order, with the first of equal ones."""
+def _by_key(
+    scenarios: Iterable[Scenario],
+    plants: run_key.Hashes,
+    keyed: Callable[[Iterable[Scenario]], Iterable[Scenario]],
+) -> dict[str, Scenario]:
+    """Return key -> scenario, in order, with the first of equal ones, and with their noise `keyed`."""
     found: dict[str, Scenario] = {}
     several = isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
-    for scenario in scenarios if several else ():  # one by one, so that a wrong item in an endless generator is found
+    for scenario in keyed(scenarios) if several else ():  # one by one: a wrong item of an endless generator is found
         if not isinstance(scenario, Scenario):
             raise ScenarioError(f"cannot study {shown(scenario)}: give scenarios, such as those of smc.grid")
         checked_name(scenario.law)

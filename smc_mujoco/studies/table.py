@@ -4,10 +4,12 @@
     best = table.select(plant="duffing", condition=["noise", "coulomb"]).column("ultimate_bound")
     table.scenario(0), table.trace(0)          # the scenario of a row, and its trace, by repeating the run
 
-Columns: the run (`hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `duration` in s); where its gains come
+Columns: the run (`hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `noise_key`, which is 0 for the noise of
+the seed alone, `duration` in s); where its gains come
 from (`source`, a kind of `control.source`, and `search` as JSON, null if no search found them); every metric of
 `smc.score`, null if the run failed or the metric does not apply, inf for "never"; how the run failed (`diverged_at` in
-s, `failure`); and the data to repeat it (`versions`, `scenario`, both JSON).
+s, `failure`); `replayed`, whether its commands follow from its measurements alone, null if that was not tried, see
+`smc.replay`; and the data to repeat it (`versions`, `scenario`, both JSON).
 """
 
 import dataclasses
@@ -35,8 +37,8 @@ if TYPE_CHECKING:
 
 # Column -> its type, before and after the metrics.
 BEFORE = dict.fromkeys(("hash", "plant", "law", "gains", "source", "search", "condition"), "string")
-BEFORE |= {"seed": "int64", "duration": "float64"}
-AFTER = {"diverged_at": "float64", "failure": "string", "versions": "string", "scenario": "string"}
+BEFORE |= {"seed": "int64", "noise_key": "int64", "duration": "float64"}
+AFTER = {"diverged_at": "float64", "failure": "string", "replayed": "bool", "versions": "string", "scenario": "string"}
 SHOWN = ("plant", "law", "source", "condition", "seed", "settling_time", "ultimate_bound", "itae", "tv_rate", "failure")
 MAX_ROWS = 8  # of a table in a notebook
 DIGEST = b"digest"  # in a file's metadata
@@ -46,7 +48,7 @@ def schema(metadata: Mapping[str, str]) -> "pa.Schema":
     """Return the schema of a study's files."""
     import pyarrow as pa
 
-    kinds = {"string": pa.string(), "int64": pa.int64(), "float64": pa.float64()}
+    kinds = {"bool": pa.bool_(), "string": pa.string(), "int64": pa.int64(), "float64": pa.float64()}
     columns = BEFORE | {m.name: "float64" for m in metrics()} | AFTER
     return pa.schema([(name, kinds[kind]) for name, kind in columns.items()], metadata=dict(metadata))
 

@@ -829,3 +829,10 @@ def test_a_real_scenario_without_randomness_is_one_run_from_any_seed(tmp_path):
     ]
     board = leaderboard(run_study(scenarios, tmp_path), ["itae"])[0]
     assert board.result == "no winner: 20 seeds, 1 distinct run"
+
+
+def test_a_law_that_fails_more_often_does_not_tie():
+    failing = np.r_[np.full(7, np.inf), np.full(9, 0.5)]
+    assert compare({"fails": failing, "works": np.linspace(0.9, 1.1, 16)}).best == [("works",)]
+    found = compare({"fails": np.where(np.isinf(failing), np.inf, 1.0), "works": np.ones(16)})
+    assert not found.tied[0, 1]

@@ -19,7 +19,7 @@ import smc_mujoco as smc
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.prepare import prepare
-from smc_mujoco.studies import executors, run_key
+from smc_mujoco.studies import executors, parcel, run_key
 from smc_mujoco.studies.study import study
 
 ROOT = Path(__file__).parents[2]
@@ -189,7 +189,7 @@ def test_finished_parts_are_kept_before_an_error_is_raised(monkeypatch):
             ("smc_mujoco.studies.run_key.key", lambda scenario, plants=None: "other"),
             "a worker has other code for .*: install the same",
         ),
-        (("pickle.loads", lambda data: smc.nowhere), "a worker says .*: put your laws in a module"),
+        (("pickle.loads", lambda data: smc.nowhere), "a worker says .*: install there what your laws import"),
     ],
 )
 def test_a_worker_that_would_run_something_else_is_one_sentence(change, said, monkeypatch):
@@ -201,16 +201,21 @@ def test_a_worker_that_would_run_something_else_is_one_sentence(change, said, mo
         executors.work(packed, keys)
 
 
-def test_a_law_without_a_module_cannot_be_sent():
-    scenario = smc.Scenario(plant="duffing", law=smc.law_function(lambda y, gains, memory: (0.0, y.e))())
-    with Elsewhere(1) as pool, pytest.raises(smc.ScenarioError, match="define it at the top of a module"):
-        executors.compute_elsewhere([[prepare(scenario)]], pool, lambda *found: None)
+def test_a_law_without_a_module_is_sent_by_value(monkeypatch):
+    scenario = smc.Scenario(plant="duffing", duration=0.1, law=smc.law_function(lambda y, gains, memory: (-y.e, y.e))())
+    found = []
+    with Elsewhere(1) as pool:
+        executors.compute_elsewhere([[prepare(scenario)]], pool, lambda batch, its: found.extend(its))
+    assert found == [executors.outcome(smc.run(scenario))]
+    monkeypatch.setitem(sys.modules, "cloudpickle", None)
+    with pytest.raises(smc.ScenarioError, match="put it into a module, or pip install cloudpickle"):
+        parcel.packed(scenario)
 
 
 # a cluster
 
 CLIENT = """
-import sys, time
+import math, sys, time
 from pathlib import Path
 import smc_mujoco as smc
 from smc_mujoco.studies import executors
@@ -220,7 +225,14 @@ from smc_mujoco.studies.study import study
 
 out, address, executors.STEPS, executors.WAIT = Path(sys.argv[1]), sys.argv[2], 400, float(sys.argv[3])
 executors.UNDER_WAY = 4  # few, so that most of the work is not even sent when the third part is written
-scenarios = grid(["duffing"], ["classical"], ["nominal", "noise"], 60, "study", 0.2)
+SLOPE = 3.0
+
+@smc.law_function(gains={"k": 4.0}, conditions={"k > 0": lambda g: g.k > 0.0})
+def of_this_script(y, gains, memory):  # which is __main__, and another one in a worker
+    s = y.de + SLOPE * y.e
+    return -gains.k * math.tanh(s), s
+
+scenarios = grid(["duffing"], ["classical", of_this_script], ["nominal", "noise"], 30, "study", 0.2)
 add = Store.add
 
 def add_and_wait(store, rows):  # at the third part for the file "go", so that there is work left until then

@@ -127,6 +127,10 @@ Plants = Annotated[
     ),
 ]
 Quick = Annotated[bool, typer.Option("--quick", help="Less of everything: a first answer in a minute or two.")]
+NoiseKey = Annotated[
+    int | None,
+    typer.Option(min=0, help="Key of the noise, to repeat a table; 0: public seeds; default: a number drawn now."),
+]
 PlantName = Annotated[
     str,
     typer.Argument(
@@ -201,6 +205,11 @@ def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
             raise ScenarioError(f"{option} {pair!r} cannot be read: write it as {example}")
         found[name] = value
     return found
+
+
+def key(given: int | None) -> int | str:
+    """Return the noise key of a study from the option --noise-key."""
+    return "drawn" if given is None else given
 
 
 def columns(text: str | None) -> dict[str, str]:

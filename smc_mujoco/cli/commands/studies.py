@@ -39,6 +39,7 @@ def which(
     relevant: options.Relevant = None,
     out: Annotated[Path, typer.Option(help="Folder for gains and runs; a later call reuses them.")] = Path("which"),
     defaults: options.Defaults = False,
+    noise_key: options.NoiseKey = None,
     threads: options.Threads = None,
 ) -> None:
     """Advise a law for a plant: which to use, with which gains, why, the second choice, and how sure that is.
@@ -74,6 +75,7 @@ def which(
         progress=True,
         defaults=defaults,
         relevant=RELEVANT if relevant is None else relevant,
+        noise_key=options.key(noise_key),
     )
     terminal.print(tables.advice(advice))
     for sentence in advice.answer:
@@ -120,6 +122,7 @@ def compare(
         str | None,
         typer.Option(help="A real machine, with its parameter sets, in place of plants, conditions and gains."),
     ] = None,
+    noise_key: options.NoiseKey = None,
     threads: options.Threads = None,
 ) -> None:
     """Compare laws on plants in conditions: tune what has no gains, run, and say which law is better, and how sure.
@@ -130,6 +133,9 @@ def compare(
 
     Gains and runs are kept in the folder: you can stop the command at any time, and continue by starting it again. The
     table results.parquet has only the runs of the last command, so give each comparison its own --out.
+
+    The noise is keyed with a number that is drawn when the runs begin, so that no law can know it, and one run of each
+    of your laws on each plant in each condition is replayed: a law must get its commands from its measurements alone.
 
     --law all compares every general law. With --rig the machine's parameter sets take the place of the conditions, and
     a line for each metric says if one law wins on all of them.
@@ -155,7 +161,8 @@ def compare(
                 "--worst, --figure and --latex"
             )
         begin = options.starts(x0, spread)
-        _compare_on(rig, law, seeds, duration, begin, out, fresh, executor, threads, defaults, least)
+        key = options.key(noise_key)
+        _compare_on(rig, law, seeds, duration, begin, out, fresh, executor, threads, defaults, least, key)
         return
     machines = [options.plant(text) for text in options.names(plants)]
     found = run(
@@ -175,6 +182,7 @@ def compare(
         relevant=least,
         traces=traces,
         fresh=fresh,
+        noise_key=options.key(noise_key),
         threads=threads,
     )
     terminal.print(found)
@@ -199,6 +207,7 @@ def _compare_on(
     threads: int | None,
     defaults: bool,
     relevant: float,
+    noise_key: int | str,
 ) -> None:
     """Compare laws over the parameter sets of a rig."""
     from smc_mujoco.common import annexes
@@ -210,7 +219,7 @@ def _compare_on(
     chosen = options.laws(law) or None
     length = FULL.duration if duration is None else duration
     scenarios = ensemble.runs(machine, chosen, seeds, "default", length, starts)
-    table = study(scenarios, out, not fresh, executor, threads, progress=True)
+    table = study(scenarios, out, not fresh, executor, threads, progress=True, noise_key=noise_key, replay=True)
     boards = leaderboard(table, defaults=defaults, relevant=relevant)
     terminal.print(boards)
     terminal.note(ensemble.verdict(boards))
@@ -221,5 +230,6 @@ def _finish(table: "Table", out: Path, terminal: Terminal) -> None:
     """Print the number of runs and the file with all of them."""
     failed = len(table) - table.data["failure"].null_count
     runs = f"{len(table)} run{'s' * (len(table) != 1)}, {failed} of them failed"
-    terminal.note(f"{runs}, {terminal.seconds:.0f} s")
+    key = table.column("noise_key")[0]
+    terminal.note(f"{runs}, {f'noise key {key}' if key else 'noise of public seeds'}, {terminal.seconds:.0f} s")
     terminal.wrote(out / "results.parquet")

@@ -32,6 +32,7 @@ from smc_mujoco.simulation.grid import grid as make_grid
 from smc_mujoco.simulation.run import run
 from smc_mujoco.studies.accuracy import AccuracyTable
 from smc_mujoco.studies.cache import cached
+from smc_mujoco.studies.noise_key import DRAWN, own
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
 
@@ -142,7 +143,10 @@ def grid(work: Work) -> Table:
     plan = work.plan
     runs = make_grid(plan.plants, plan.laws, plan.conditions, plan.seeds, GAINS, plan.duration)
     with work.bars.stage("grid", f"{len(runs)} runs", bar=False):
-        return study(runs, work.folder / "study", threads=work.threads, progress=work.bars.shown)
+        key = DRAWN if any(map(own, runs)) else 0  # the claims of the paper share the runs of the package's own laws
+        return study(
+            runs, work.folder / "study", threads=work.threads, progress=work.bars.shown, noise_key=key, replay=True
+        )
 
 
 def judged_claims(work: Work, table: Table) -> tuple[Claim, ...]:

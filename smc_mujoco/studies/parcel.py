@@ -1,0 +1,56 @@
+"""Scenarios and laws as bytes for another process, with the code that it cannot import.
+
+Pickle names a function by its module. A script or notebook is the module `__main__`, which in a worker is another one,
+and a law in a function or an executed file has no module at all. Their code is sent by value, with cloudpickle.
+"""
+
+import copyreg
+import io
+import pickle
+from typing import Any
+
+from smc_mujoco.common.errors import ScenarioError, one_line
+from smc_mujoco.control.component import Component
+
+SCRIPTS = ("__main__", "__mp_main__")  # modules that are others in another process
+
+
+def packed(thing: Any) -> bytes:
+    """Return a thing as bytes for `pickle.loads` in any process with this package, and with cloudpickle if needed.
+
+    Raises:
+      ScenarioError: it cannot be sent, or needs cloudpickle, which is not installed.
+    """
+    try:
+        data = pickle.dumps(thing)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        return _by_value(thing, one_line(str(error)))
+    return _by_value(thing, "it is of a script") if any(name.encode() in data for name in SCRIPTS) else data
+
+
+def _by_value(thing: Any, why: str) -> bytes:
+    """Return a thing with the code of scripts and of functions in functions."""
+    try:
+        import cloudpickle
+    except ImportError:
+        cure = "put it into a module, or pip install cloudpickle"
+        raise ScenarioError(f"a law, signal or part cannot be sent to another process ({why}): {cure}") from None
+
+    class Pickler(cloudpickle.Pickler):
+        """Pickler that writes the fields of a component of a script, not its name."""
+
+        def reducer_override(self, obj: Any) -> Any:
+            """Return how an object is written."""
+            if isinstance(obj, Component) and getattr(obj.function, "__module__", "") in SCRIPTS:
+                return copyreg.__newobj__, (Component,), vars(obj)  # type: ignore[attr-defined]
+            return super().reducer_override(obj)
+
+    buffer = io.BytesIO()
+    try:
+        Pickler(buffer).dump(thing)
+    except Exception as error:  # whatever an object's own methods raise
+        raise ScenarioError(
+            f"a law, signal or part cannot be sent to another process ({one_line(str(error))}): use plain functions "
+            "and numbers"
+        ) from None
+    return buffer.getvalue()

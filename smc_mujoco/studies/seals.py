@@ -1,0 +1,83 @@
+"""Replays in a study: of one run of each of the user's laws on each plant in each condition, which nobody foresees."""
+
+import hashlib
+import json
+import sys
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import write_json
+from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.simulation.run import PlainLoopWarning, run
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.studies import run_key
+from smc_mujoco.studies.executors import outcome
+from smc_mujoco.studies.noise_key import own
+from smc_mujoco.studies.replay import replays
+from smc_mujoco.studies.store import Store
+
+FILE = "replays.json"
+OTHER_SCORES = "run again, it has other scores: the law keeps a state of its own, or reads a clock"
+
+
+def replayed(
+    runs: Mapping[str, Scenario], store: Store, folder: Path, threads: int | None, progress: bool
+) -> dict[str, dict[str, Any]]:
+    """Return hash -> the columns that a replay changes, of the runs that are chosen.
+
+    Results are kept in the folder, so that a study which goes on replays nothing twice. A law that cannot be sent to
+    another process is not replayed, and a note says so.
+    """
+    chosen, known = _chosen(runs), _known(folder / FILE)
+    if missing := [name for name in chosen if name not in known]:
+        if progress:
+            print(f"replaying {len(missing)} run{'s' * (len(missing) > 1)} of your laws", file=sys.stderr)
+        try:
+            known |= _results({name: runs[name] for name in missing}, store, threads)
+            write_json(folder / FILE, known)
+        except ScenarioError as error:
+            print(f"not replayed: {error}", file=sys.stderr)
+    nothing = dict.fromkeys((*(metric.name for metric in metrics()), "diverged_at"))
+    return {
+        name: {"replayed": True} if known[name] == "" else {**nothing, "replayed": False, "failure": known[name]}
+        for name in chosen
+        if known.get(name) is not None
+    }
+
+
+def _chosen(runs: Mapping[str, Scenario]) -> list[str]:
+    """Return the hash of one run for each law of the user's, plant and condition.
+
+    It is the one with the least hash of hashes, which follow from the noise key.
+    """
+    groups: dict[tuple, list[str]] = {}
+    for name, scenario in runs.items():
+        if own(scenario):
+            group = scenario.law.name, scenario.plant.name, run_key.condition(scenario)
+            groups.setdefault(group, []).append(name)
+    return [min(names, key=lambda name: hashlib.sha256(name.encode()).digest()) for names in groups.values()]
+
+
+def _known(file: Path) -> dict[str, str | None]:
+    """Return the results in a file: hash -> what differs, "" for nothing, None for a run that cannot be replayed."""
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _results(runs: Mapping[str, Scenario], store: Store, threads: int | None) -> dict[str, str | None]:
+    """Return the results of runs, which are run again."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PlainLoopWarning)  # the study itself has warned
+        traces = run(list(runs.values()), threads=threads)
+    found: dict[str, str | None] = {}
+    for name, trace, its in zip(runs, traces, replays(traces), strict=True):
+        row, scores = store.row(name), outcome(trace)
+        same = all(row.get(column) == value for column, value in scores.items())
+        found[name] = OTHER_SCORES if not same else its.why if its.same is False else "" if its.same else None
+    return found
