@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
+from statistics import median_low
 
 from rich import box
 from rich.console import Console
@@ -139,8 +141,16 @@ def fits(title: str, found: Mapping[str, Mapping[str, float]]) -> Table:
     return table
 
 
+def _to_error(value: float, error: float) -> str:
+    """Return a value to the second digit of its standard error, with four digits or more: "3.19981" for 2.1e-4."""
+    digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2 if value and error else 4
+    return f"{value:#.{min(max(digits, 4), 12)}g}"
+
+
 def identified(found: Identified, names: Sequence[str]) -> list[Table]:
     """Return a table of the quantities found, with standard errors and values before, and one of each record's fit.
+
+    Of three records or more, median and worst fit are added; a fall is the worst.
 
     Args:
       names: of the records.
@@ -151,9 +161,15 @@ def identified(found: Identified, names: Sequence[str]) -> list[Table]:
     for name, value in found.values.items():
         quantity = found.rig.quantities[name]
         before = number(found.before.values[name])
-        values.add_row(name, number(value), number(found.errors[name]), before, Text(quantity.unit, "dim"))
+        error = found.errors[name]
+        values.add_row(name, _to_error(value, error), f"{error:.2g}", before, Text(quantity.unit, "dim"))
     heads = [Column(head, justify="right") for head in found.fits[0]]
     fits = titled("fit, % (before)", "record", *heads)
     for name, fit, before in zip(names, found.fits, found.fits_before, strict=True):
         fits.add_row(name, *(f"{value:.1f} ({before[key]:.1f})" for key, value in fit.items()))
+    for word, chosen in (("median", median_low), ("worst", min)) if len(names) > 2 else ():
+        after, before = (
+            {key: chosen([fit[key] for fit in each]) for key in each[0]} for each in (found.fits, found.fits_before)
+        )
+        fits.add_row(word, *(f"{after[key]:.1f} ({before[key]:.1f})" for key in after))
     return [values, fits]

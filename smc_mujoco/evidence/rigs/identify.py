@@ -72,7 +72,7 @@ def identify(
     fits_before = tuple(twin.fits(data))  # also refuses records that are too short
     for record, fit in zip(data, fits_before, strict=True):
         twin.refuse_degrees(record, fit)
-    with bar(f"identify {twin.name}", most * (2 * len(names) + 1), shown=progress) as drawn:
+    with bar(f"identify {twin.name}", 2 * most * (2 * len(names) + 1), shown=progress) as drawn:
         replays, slopes, by_steps = _solved(twin, names, data, starts, seed, most, drawn.advance)
         errors, correlations = statistics(replays, slopes, by_steps)
     values = replays.values(slopes.point)
