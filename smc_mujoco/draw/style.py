@@ -403,9 +403,15 @@ def lighter(colour: str) -> str:
 
 
 def letters_on(colour: str) -> str:
-    """Return the colour of letters that are easier to read on a colour, white or ink (luma of ITU-R BT.601)."""
-    red, green, blue = rgb(colour)
-    return INK if 0.299 * red + 0.587 * green + 0.114 * blue > 140 else PAPER
+    """Return the colour of letters that have more contrast with a colour, white or ink (WCAG 2.2)."""
+    on, ink, paper = (_luminance(one) + 0.05 for one in (colour, INK, PAPER))
+    return INK if on / ink > paper / on else PAPER
+
+
+def _luminance(colour: str) -> float:
+    """Return the relative luminance of WCAG 2.2, 0 for black and 1 for white."""
+    red, green, blue = (((part / 255 + 0.055) / 1.055) ** 2.4 for part in rgb(colour))
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
 def short(value: float, digits: int = 2) -> str:

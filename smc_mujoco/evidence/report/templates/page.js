@@ -88,7 +88,7 @@
     if (box.scrollHeight <= box.clientHeight + 1 && box.scrollWidth <= box.clientWidth + 1) continue;
     const name = box.querySelector("caption, figcaption");
     box.tabIndex = 0;
-    box.setAttribute("role", "region");
+    if (!box.matches("figure")) box.setAttribute("role", "region");
     if (name) box.setAttribute("aria-label", name.textContent.trim());
   }
 
