@@ -14,10 +14,11 @@ import secrets
 import sys
 import warnings
 from collections import namedtuple
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
+import numpy as np
 from llvmlite import ir
 from numba import from_dtype, njit, types
 from numba.core.bytecode import FunctionIdentity
@@ -84,6 +85,11 @@ def _at(kind: types.Type) -> Callable:
 
 pointer = _at(types.CPointer(types.float64))  # an address as a pointer to float64
 integers = _at(types.CPointer(types.int64))  # an address as a pointer to int64
+
+
+def floats(names: Iterable[str]) -> np.dtype:
+    """Return the dtype of a record of float64."""
+    return np.dtype([(name, "f8") for name in names], align=True)
 
 
 def record_at(dtype: Any) -> Callable:

@@ -24,7 +24,7 @@ from numba import carray, njit
 from numba.extending import overload
 
 from smc_mujoco.common.catalogue import Catalogue
-from smc_mujoco.common.jit import call, pointer
+from smc_mujoco.common.jit import call, floats, pointer, record_at
 from smc_mujoco.common.registry import catalogue_of
 from smc_mujoco.control.component import Template
 
@@ -51,53 +51,53 @@ class JointMeasurement(NamedTuple):
 
 
 ARRAYS = JointMeasurement._fields[4:]  # the vectors, M, h and g, in the order in which they are stored
-VECTORS = ARRAYS.index("M")  # fields of a measurement from x to limit
-HEADER = 5  # numbers before the vectors of a stored measurement: t, dt, model, dynamics, n
+# What is stored before the arrays. `dynamics` is 0, or the address of a record REQUESTS.
+HEAD = floats(("t", "dt", "model", "dynamics", "n"))
+# Of C(x, v) w and of the tip's Jacobian: addresses of both functions and of their parameters; force per unit of u.
+REQUESTS = floats(("coriolis", "jacobian", "parameters", "unit"))
+head_at, requests_at, HEAD_BYTES = record_at(HEAD), record_at(REQUESTS), HEAD.itemsize
 
 
-def numbers(n: int) -> int:
-    """Return how many numbers a stored measurement of n channels has."""
-    return HEADER + (VECTORS + 2) * n + n * n
+def stored_dtype(n: int) -> np.dtype:
+    """Return the dtype of a stored measurement of n channels."""
+    arrays = [(name, "f8", (n, n) if name == "M" else (n,)) for name in ARRAYS]
+    return np.dtype([*((name, "f8") for name in HEAD.names or ()), *arrays])
+
+
+def measurement_of(stored: np.void, dynamics: Any) -> JointMeasurement:
+    """Return the measurement in a record of `stored_dtype`, for the reference loop.
+
+    Args:
+      dynamics: an object with the methods `coriolis` and `jacobian`.
+    """
+    t, dt, model = (float(stored[name]) for name in ("t", "dt", "model"))
+    return JointMeasurement(t, dt, model, dynamics, *(stored[name] for name in ARRAYS))
+
+
+@njit
+def _behind(array, shape):
+    """Return the array of a shape that is stored behind another one."""
+    return carray(pointer(array.ctypes.data + 8 * array.size), shape)
 
 
 @njit
 def measurement_at(address):
-    """Return the measurement that is stored at an address: HEADER numbers, the vectors, M, h and g."""
-    head = carray(pointer(address), (HEADER,))
-    n, at = int(head[HEADER - 1]), address + 8 * HEADER
-    step = 8 * n
-    end = at + VECTORS * step
-    return JointMeasurement(
-        head[0],
-        head[1],
-        head[2],
-        int(head[3]),
-        carray(pointer(at), (n,)),
-        carray(pointer(at + step), (n,)),
-        carray(pointer(at + 2 * step), (n,)),
-        carray(pointer(at + 3 * step), (n,)),
-        carray(pointer(at + 4 * step), (n,)),
-        carray(pointer(at + 5 * step), (n,)),
-        carray(pointer(at + 6 * step), (n,)),
-        carray(pointer(at + 7 * step), (n,)),
-        carray(pointer(at + 8 * step), (n,)),
-        carray(pointer(end), (n, n)),
-        carray(pointer(end + n * step), (n,)),
-        carray(pointer(end + (n + 1) * step), (n,)),
-    )
-
-
-def stored_measurement(numbers: np.ndarray, dynamics: Any) -> JointMeasurement:
-    """Return the measurement that is stored in an array, for the reference loop.
-
-    Args:
-      numbers: as `measurement_at` reads them, (numbers(n),).
-      dynamics: an object with the methods `coriolis` and `jacobian`.
-    """
-    n = int(numbers[HEADER - 1])
-    vectors, end = numbers[HEADER:], VECTORS * n
-    M, rest = vectors[end : end + n * n].reshape(n, n), vectors[end + n * n :].reshape(2, n)
-    return JointMeasurement(*numbers[:3].tolist(), dynamics, *vectors[:end].reshape(VECTORS, n), M, *rest)
+    """Return the measurement that is stored at an address. Its arrays are views."""
+    head = head_at(address, 0)
+    n = int(head.n)
+    x = carray(pointer(address + HEAD_BYTES), (n,))
+    v = _behind(x, (n,))
+    e = _behind(v, (n,))
+    de = _behind(e, (n,))
+    r = _behind(de, (n,))
+    dr = _behind(r, (n,))
+    ddr = _behind(dr, (n,))
+    a = _behind(ddr, (n,))
+    limit = _behind(a, (n,))
+    M = _behind(limit, (n, n))
+    h = _behind(M, (n,))
+    g = _behind(h, (n,))
+    return JointMeasurement(head.t, head.dt, head.model, int(head.dynamics), x, v, e, de, r, dr, ddr, a, limit, M, h, g)
 
 
 def coriolis(y, w):
@@ -117,11 +117,10 @@ def _coriolis(y, w):
         for i in range(n):
             given[i] = w[i]
         if y.dynamics != 0:
-            # addresses of the functions for coriolis and jacobian, address of their parameters, force per unit of u
-            own = carray(pointer(y.dynamics), (4,))
-            call(int(own[0]), given.ctypes.data, int(own[2]), 0, found.ctypes.data)
+            asked = requests_at(y.dynamics, 0)
+            call(int(asked.coriolis), given.ctypes.data, int(asked.parameters), 0, found.ctypes.data)
             for i in range(n):
-                found[i] /= own[3]
+                found[i] /= asked.unit
         return found
 
     return compiled
@@ -144,8 +143,8 @@ def _jacobian(y):
         found = np.zeros((3, len(y.x)))
         if y.dynamics == 0:
             raise ValueError
-        own = carray(pointer(y.dynamics), (4,))
-        if call(int(own[1]), 0, int(own[2]), 0, found.ctypes.data) != 0:
+        asked = requests_at(y.dynamics, 0)
+        if call(int(asked.jacobian), 0, int(asked.parameters), 0, found.ctypes.data) != 0:
             raise ValueError
         return found
 

@@ -53,6 +53,10 @@ class Nominal(Protocol):
     def __call__(self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /) -> tuple[float, float]: ...
 
 
+# What a nominal model reads: a channel i, their number n, the addresses of measured x, v and of the last u, (n,) each.
+SEEN = np.dtype([(name, "i8") for name in ("i", "n", "x", "v", "u")])
+
+
 class Native(NamedTuple):
     """A nominal model as a C function. `kept` holds the objects whose addresses are among its values."""
 

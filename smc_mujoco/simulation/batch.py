@@ -174,9 +174,8 @@ def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
     The function that failed is called again, in Python, with the inputs in its record, so the text depends only on
     the run. Return None if it does not fail again, because it had already changed its memory.
     """
-    n = s.plant.n
-    joints = state.view(packed.numbers, int(record["joints"]), (2 + 4 * n,))
-    i, t = int(joints[0]), float(record["instant"]["t"])
+    n, seen = s.plant.n, record["seen"]
+    i, t = int(seen["i"]), float(record["instant"]["t"])
 
     def memory(function: np.ndarray, size: int) -> np.ndarray:
         return state.view(packed.numbers, int(function["memory"]), (n, size)).copy()
@@ -202,7 +201,7 @@ def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
             case state.FEEDFORWARD_RAISED if s.feedforward is not None:
                 reference.evaluate(s.feedforward, t)
             case state.NOMINAL_RAISED:
-                x, v, _, u = joints[2:].reshape(4, n).copy()
+                x, v, u = (state.view(packed.numbers, int(seen[name]), (n,)).copy() for name in ("x", "v", "u"))
                 reference.nominal(s.plant, x, v, i, Values(**s.plant.parameters), u)
             case state.DISTURBANCE_RAISED | state.DISTURBANCE_NOT_FINITE:
                 for j, signal in enumerate(s.disturbance):
@@ -216,14 +215,14 @@ def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
 
 def call_law(s: Resolved, record: np.ndarray, packed: Packed, memory: np.ndarray) -> tuple[float, float]:
     """Call the law that failed again. Return the u and s that it returned before."""
-    n, i = s.plant.n, int(state.view(packed.numbers, int(record["joints"]), (1,))[0])
+    n, i, width = s.plant.n, int(record["seen"]["i"]), int(record["width"])
     function = reference.PythonComponent(s.law, n)
     function.memory = memory
-    if not s.law.joint:
+    if s.law.joint:
+        dtype = joint_law.stored_dtype(n)
+        stored = state.view(packed.numbers, int(record["joint"]["head"]), (dtype.itemsize // 8,)).copy().view(dtype)[0]
+        function.together(joint_law.measurement_of(stored, reference.OnRequest(s, stored["x"], stored["v"])))
+    else:
         function(i, Measurement(*record["y"].tolist()))
-        return record["control"].tolist()
-    stored = state.view(packed.numbers, int(record["joint"]), (joint_law.numbers(n),)).copy()
-    y = joint_law.stored_measurement(stored, None)
-    function.together(y._replace(dynamics=reference.OnRequest(s, y.x, y.v)))
-    u, sliding = state.view(packed.numbers, int(record["torques"]), (2, n))[:, i].tolist()
+    u, sliding = state.view(packed.numbers, int(record["commands"]), (2, width))[:, i % width].tolist()
     return u, sliding

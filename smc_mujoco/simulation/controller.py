@@ -22,7 +22,7 @@ from typing import NamedTuple
 from numba import njit
 
 from smc_mujoco.common.jit import call, pointer
-from smc_mujoco.control.joint_law import HEADER, VECTORS
+from smc_mujoco.control.joint_law import head_at
 from smc_mujoco.mechanisms.hardware.sliding import SLOW
 from smc_mujoco.simulation import clock, philox
 from smc_mujoco.simulation import state as record
@@ -104,7 +104,7 @@ def _sample(at, sim, data, k, within):
     t = k * sim.period + late * sim.step
     failure = _measure(at, sim, data, k, t)
     if failure == record.FINE:
-        failure = _decide(at, sim, k, t) if sim.joint == 0 else _decide_together(at, sim, k, t)
+        failure = update_law(at, sim, k, t)
     if failure != record.FINE and late != 0:  # some channels may have written into the log
         _hold(sim, k)
     return failure
@@ -113,7 +113,7 @@ def _sample(at, sim, data, k, within):
 @njit(error_model="numpy")
 def _hold(sim, k):
     """Keep the command of the sample before for sample k, with its u, s and r in the log."""
-    buffer, last = pointer(sim.delay_buffer + 8 * sim.n * (k % sim.delay_slots)), pointer(sim.u)
+    buffer, last = pointer(sim.delay_buffer + 8 * sim.n * (k % sim.delay_slots)), pointer(sim.seen.u)
     for i in range(sim.n):
         sample, before = log_at(sim.log, k * sim.n + i), log_at(sim.log, (k - 1) * sim.n + i)
         sample.u, sample.s, sample.r, buffer[i] = before.u, before.s, before.r, last[i]
@@ -161,7 +161,7 @@ def _measure(at, sim, data, k, t):
 
     Return a failure code.
     """
-    j, x, v, a = k, pointer(sim.x), pointer(sim.v), pointer(sim.a)
+    j, x, v, a = k, pointer(sim.seen.x), pointer(sim.seen.v), pointer(sim.a)
     if sim.read_period != 0.0:
         j = max(0, math.floor((t - sim.read_delay) / sim.read_period + 1e-6))
     reading, estimate = sim.reading, sim.estimate
@@ -170,7 +170,7 @@ def _measure(at, sim, data, k, t):
         channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
         position, velocity = data.sensordata[channel.x_sensor], data.sensordata[channel.v_sensor]
         reading.x, reading.v = _read(sim, state, i, position, velocity, j, channel.tip >= 0)
-        pointer(sim.joints)[0] = i
+        sim.seen.i = i
         if _call(sim.estimator, i, at + record.READING_AT, at + record.ESTIMATE_AT) != 0:
             return record.ESTIMATOR_RAISED
         x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
@@ -180,31 +180,79 @@ def _measure(at, sim, data, k, t):
 @njit(error_model="numpy", inline="always")
 def _evaluate_model(at, sim, i):
     """Write nominal f and g of channel i into the record. Return 0, or 1 if the model raised."""
-    pointer(sim.joints)[0] = i
-    return _call(sim.nominal, 0, sim.joints, at + record.MODEL_AT)
+    sim.seen.i = i
+    return _call(sim.nominal, 0, at + record.SEEN_AT, at + record.MODEL_AT)
+
+
+@njit(error_model="numpy")
+def update_law(at, sim, k, t):
+    """Run the law at sample k, at time t, s: once for each driven channel, or once for all. Return a failure code.
+
+    The commands go into the delay buffer, and u, s and r into the log. A channel's nominal model may depend on the new
+    commands of the channels before it.
+    """
+    n, width, last, limits, added = sim.n, sim.width, pointer(sim.seen.u), pointer(sim.limits), 0.0
+    joint, commands = sim.joint.head != 0, pointer(sim.commands)
+    y = sim.joint.head if joint else at + record.MEASUREMENT_AT
+    buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
+    sim.instant.t = t
+    if sim.feedforward.address != 0:
+        if _call(sim.feedforward, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+            return record.FEEDFORWARD_RAISED
+        added = sim.motion.value
+    for first in range(0, sim.driven, width):
+        failure = _measure_joints(at, sim, k, t) if joint else _measure_channel(at, sim, k, t, first)
+        if failure != record.FINE:
+            return failure
+        law = sim.law if sim.laws == 0 else function_at(sim.laws, first)
+        if _call(law, first, y, sim.commands) != 0:
+            return record.LAW_RAISED
+        for j in range(width):
+            i = first + j
+            wanted, s, limit, sample = commands[j] + added, commands[width + j], limits[i], log_at(sim.log, k * n + i)
+            u = min(max(wanted, -limit), limit)
+            if not (math.isfinite(wanted) and math.isfinite(s) and abs(u) * max(1.0, sim.scale) < MAX_CONTROL):
+                sim.seen.i = i
+                return record.NOT_FINITE
+            buffer[i], sample.u, sample.s, last[i] = u, u, s, u
+    for i in range(sim.driven, n):  # only measured
+        sample = log_at(sim.log, k * n + i)
+        buffer[i], sample.u, sample.s, sample.r = 0.0, 0.0, 0.0, 0.0
+    return record.FINE
 
 
 @njit(error_model="numpy", inline="always")
-def _inform(at, sim, y, i, partner):
-    """Write into y what the law of channel i reads. Return a failure code.
-
-    Channel `partner` moves with channel i and has no actuator; 0 for none. The nominal model has the force of channel
-    i's drive, gain u - drag v, in place of u.
-    """
+def _evaluate_reference(at, sim, k, i):
+    """Write the reference of channel i into the record and the log. Return 0, or 1 if it raised."""
     if sim.references != 0:
         if _call(function_at(sim.references, i), 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
-            return record.REFERENCE_RAISED
-        y.r, y.dr, y.ddr = sim.motion.value, sim.motion.rate, sim.motion.acceleration
-    x, v, a = pointer(sim.x), pointer(sim.v), pointer(sim.a)
+            return 1
+    elif i == 0 and _call(sim.reference, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+        return 1
+    log_at(sim.log, k * sim.n + i).r = sim.motion.value
+    return 0
+
+
+@njit(error_model="numpy")
+def _measure_channel(at, sim, k, t, i):
+    """Write into the record what the law of channel i reads at sample k, at time t, s. Return a failure code.
+
+    The nominal model has the force of channel i's drive, gain u - drag v, in place of u.
+    """
+    if _evaluate_reference(at, sim, k, i) != 0:
+        return record.REFERENCE_RAISED
+    y, x, v, a, motion, model = sim.y, pointer(sim.seen.x), pointer(sim.seen.v), pointer(sim.a), sim.motion, sim.model
+    y.t, y.dt, y.r, y.dr, y.ddr = t, sim.period, motion.value, motion.rate, motion.acceleration
     y.q, y.dq, y.fq, y.gq = 0.0, 0.0, 0.0, 0.0
-    if partner > 0:
+    partner = i + sim.driven  # moves with channel i and has no actuator
+    if partner < sim.n:
         if _evaluate_model(at, sim, partner) != 0:
             return record.NOMINAL_RAISED
         y.q, y.dq = x[partner], v[partner]
-        y.fq, y.gq = sim.model.f - sim.drive_drag * v[i] * sim.model.g, sim.drive_gain * sim.model.g
+        y.fq, y.gq = model.f - sim.drive_drag * v[i] * model.g, sim.drive_gain * model.g
     if _evaluate_model(at, sim, i) != 0:
         return record.NOMINAL_RAISED
-    y.f, y.g = sim.model.f - sim.drive_drag * v[i] * sim.model.g, sim.drive_gain * sim.model.g
+    y.f, y.g = model.f - sim.drive_drag * v[i] * model.g, sim.drive_gain * model.g
     y.x, y.v = x[i], v[i]
     y.e, y.de = y.x - y.r, y.v - y.dr
     y.a = y.ddr if math.isnan(a[i]) else a[i]  # NaN: the estimator gives none
@@ -218,140 +266,64 @@ def _inform(at, sim, y, i, partner):
 
 
 @njit(error_model="numpy")
-def _decide(at, sim, k, t):
-    """Run the law of every driven channel at sample k, at time t, s. Return a failure code.
-
-    The command goes into the delay buffer, and u, s and r into the log.
-    """
-    y, asked = sim.y, sim.control
-    sim.instant.t = t
-    if _call(sim.reference, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
-        return record.REFERENCE_RAISED
-    y.t, y.dt = sim.instant.t, sim.period
-    y.r, y.dr, y.ddr = sim.motion.value, sim.motion.rate, sim.motion.acceleration
-    added = 0.0
-    if sim.feedforward.address != 0:
-        if _call(sim.feedforward, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
-            return record.FEEDFORWARD_RAISED
-        added = sim.motion.value
-    n, driven, last = sim.n, sim.driven, pointer(sim.u)
-    buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
+def _measure_joints(at, sim, k, t):
+    """Write what a law of many joints reads at sample k, at time t, s. Return a failure code."""
+    y, n, motion, seen = sim.joint, sim.n, sim.motion, sim.seen
+    head = head_at(y.head, 0)
+    head.t, head.dt, head.model, head.n = t, sim.period, sim.uses_model, n
+    head.dynamics = at + record.REQUESTS_AT if sim.requests.coriolis != 0.0 else 0
     for i in range(n):
-        sample = log_at(sim.log, k * n + i)
-        if i >= driven:  # only measured
-            buffer[i], sample.u, sample.s, sample.r = 0.0, 0.0, 0.0, 0.0
-            continue
-        failure = _inform(at, sim, y, i, i + driven if i + driven < n else 0)
-        if failure != record.FINE:
-            return failure
-        if sim.laws == 0:
-            raised = _call(sim.law, i, at + record.MEASUREMENT_AT, at + record.CONTROL_AT)
-        else:
-            raised = _call(function_at(sim.laws, i), i, at + record.MEASUREMENT_AT, at + record.CONTROL_AT)
-        if raised != 0:
-            return record.LAW_RAISED
-        limit = pointer(sim.limits)[i]
-        wanted = asked.u + added
-        u = min(max(wanted, -limit), limit)
-        if not (math.isfinite(wanted) and math.isfinite(asked.s) and abs(u) * max(1.0, sim.scale) < MAX_CONTROL):
-            return record.NOT_FINITE
-        buffer[i], sample.u, sample.s, sample.r = u, u, asked.s, y.r
-        last[i] = u
-    return record.FINE
+        if _evaluate_reference(at, sim, k, i) != 0:
+            return record.REFERENCE_RAISED
+        x, v, a = pointer(seen.x)[i], pointer(seen.v)[i], pointer(sim.a)[i]
+        pointer(y.x)[i], pointer(y.v)[i] = x, v
+        pointer(y.e)[i], pointer(y.de)[i] = x - motion.value, v - motion.rate
+        pointer(y.r)[i], pointer(y.dr)[i], pointer(y.ddr)[i] = motion.value, motion.rate, motion.acceleration
+        pointer(y.a)[i], pointer(y.limit)[i] = motion.acceleration if math.isnan(a) else a, pointer(sim.limits)[i]
+    return _measure_dynamics(at, sim)
 
 
 @njit(error_model="numpy")
-def _own_equations(at, sim, M, h):
-    """Write M, h and g of channels with an equation x'' = f + g u each: M is diagonal. Return a failure code."""
-    n, v, kept = sim.n, pointer(sim.v), pointer(sim.joint + 8 * (HEADER + sim.n))  # kept: the law's own copy of v
-    mass = pointer(M)
-    for i in range(n * n):
-        mass[i] = 0.0
-    for part in range(2):  # h at v, then g at rest
-        into = pointer(h + 8 * n * part)
-        for i in range(n):
-            if _evaluate_model(at, sim, i) != 0:
-                return record.NOMINAL_RAISED
-            mass[(n + 1) * i], into[i] = 1.0 / sim.model.g, -sim.model.f / sim.model.g
-        for i in range(n):
-            v[i] = 0.0 if part == 0 else kept[i]
-    return record.FINE
-
-
-@njit(error_model="numpy")
-def _model(at, sim, M, h):
-    """Write nominal M, h and g of all channels, per unit of u, to the addresses M and h, and behind h.
-
-    Return a failure code.
-    """
-    n, v, mass, force, failure = sim.n, pointer(sim.v), pointer(M), pointer(h), record.FINE
-    rest = pointer(h + 8 * n)
+def _measure_dynamics(at, sim):
+    """Write nominal M, h and g of all channels, per unit of u, into a joint measurement. Return a failure code."""
+    n, v, M, h, g = sim.n, pointer(sim.seen.v), pointer(sim.joint.M), pointer(sim.joint.h), pointer(sim.joint.g)
+    failure = record.FINE
     if sim.uses_model == 0.0:
         for i in range(n * n):
-            mass[i] = 1.0 if i % (n + 1) == 0 else 0.0
+            M[i] = 1.0 if i % (n + 1) == 0 else 0.0
         for i in range(n):
-            force[i], rest[i] = 0.0, 0.0
+            h[i], g[i] = 0.0, 0.0
         return failure
     if sim.dynamics.address == 0:
-        failure = _own_equations(at, sim, M, h)
-    elif _call(sim.dynamics, 0, sim.x, M) != 0:
+        failure = _separate_equations(at, sim, M, h, g)
+    elif _call(sim.dynamics, 0, at + record.SEEN_AT, sim.joint.M) != 0:
         failure = record.NOMINAL_RAISED
     for i in range(n * n):
-        mass[i] /= sim.drive_gain
+        M[i] /= sim.drive_gain
     for i in range(n):
-        force[i], rest[i] = (force[i] + sim.drive_drag * v[i]) / sim.drive_gain, rest[i] / sim.drive_gain
+        h[i], g[i] = (h[i] + sim.drive_drag * v[i]) / sim.drive_gain, g[i] / sim.drive_gain
     return failure
 
 
 @njit(error_model="numpy")
-def _inform_together(at, sim, t):
-    """Write into the record what a law of many joints reads at time t, s. Return a failure code."""
-    n, step, motion, r, dr, ddr = sim.n, 8 * sim.n, sim.motion, 0.0, 0.0, 0.0
-    head, first = pointer(sim.joint), sim.joint + 8 * HEADER
-    head[0], head[1], head[2], head[3], head[4] = t, sim.period, sim.uses_model, sim.on_request, n
-    y = pointer(first)
-    x, v, a, limits = pointer(sim.x), pointer(sim.v), pointer(sim.a), pointer(sim.limits)
+def _separate_equations(at, sim, M, h, g):
+    """Write M, h and g of channels with an equation x'' = f + g u each: M is diagonal. Return a failure code."""
+    n, v, measured = sim.n, pointer(sim.seen.v), pointer(sim.joint.v)
+    for i in range(n * n):
+        M[i] = 0.0
+    for moving in (True, False):  # h at v, then g at rest
+        for i in range(n):
+            v[i] = measured[i] if moving else 0.0
+        for i in range(n):
+            if _evaluate_model(at, sim, i) != 0:
+                return record.NOMINAL_RAISED
+            M[(n + 1) * i] = 1.0 / sim.model.g
+            if moving:
+                h[i] = -sim.model.f / sim.model.g
+            else:
+                g[i] = -sim.model.f / sim.model.g
     for i in range(n):
-        if sim.references != 0 or i == 0:
-            function = function_at(sim.references, i) if sim.references != 0 else sim.reference
-            if _call(function, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
-                return record.REFERENCE_RAISED
-            r, dr, ddr = motion.value, motion.rate, motion.acceleration
-        y[i], y[n + i], y[2 * n + i], y[3 * n + i] = x[i], v[i], x[i] - r, v[i] - dr
-        y[4 * n + i], y[5 * n + i], y[6 * n + i] = r, dr, ddr
-        y[7 * n + i], y[8 * n + i] = ddr if math.isnan(a[i]) else a[i], limits[i]
-    M = first + VECTORS * step
-    return _model(at, sim, M, M + n * step)
-
-
-@njit(error_model="numpy")
-def _decide_together(at, sim, k, t):
-    """Run a law of many joints at sample k, as `_decide` runs one of one channel. Return a failure code."""
-    n, added, law = sim.n, 0.0, sim.law
-    sim.instant.t = t
-    failure = _inform_together(at, sim, t)
-    if failure != record.FINE:
-        return failure
-    if sim.feedforward.address != 0:
-        if _call(sim.feedforward, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
-            return record.FEEDFORWARD_RAISED
-        added = sim.motion.value
-    r = pointer(sim.joint + 8 * (HEADER + 4 * n))
-    for i in range(n):  # before the law, which may write into its measurement
-        log_at(sim.log, k * n + i).r = r[i]
-    if call(law.address, sim.joint, law.parameters, law.memory, sim.torques) != 0:
-        return record.LAW_RAISED
-    asked, last, limits = pointer(sim.torques), pointer(sim.u), pointer(sim.limits)
-    buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
-    for i in range(n):
-        wanted, s, limit = asked[i] + added, asked[n + i], limits[i]
-        u = min(max(wanted, -limit), limit)
-        if not (math.isfinite(wanted) and math.isfinite(s) and abs(u) * max(1.0, sim.scale) < MAX_CONTROL):
-            pointer(sim.joints)[0] = i
-            return record.NOT_FINITE
-        sample = log_at(sim.log, k * n + i)
-        buffer[i], sample.u, sample.s = u, u, s
-        last[i] = u
+        v[i] = measured[i]
     return record.FINE
 
 
@@ -514,7 +486,7 @@ def _rub(at, sim, data):
         rubbing.v, rubbing.motor = v, data.actuator_force[channel.force] if channel.force >= 0 else 0.0
         rubbing.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
         rubbing.load += data.qfrc_constraint[joint] + _disturbance(data, channel)
-        pointer(sim.joints)[0] = i
+        sim.seen.i = i
         if _call(function, 0, at + record.RUBBING_AT, at + record.RESISTANCE_AT) != 0:
             return record.FRICTION_RAISED
         f, low, high = resistance.f, resistance.low, resistance.high

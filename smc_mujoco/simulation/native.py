@@ -29,18 +29,25 @@ from smc_mujoco.common.jit import (
     Uncompiled,
     attempt,
     checked,
+    floats,
     jit,
     loader,
     named,
     pointer,
+    record_at,
 )
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
-from smc_mujoco.control.joint_law import HEADER, measurement_at
+from smc_mujoco.control.joint_law import measurement_at
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
+from smc_mujoco.mechanisms.plant import SEEN
 from smc_mujoco.simulation.callback import magic
 from smc_mujoco.simulation.signals import Signal
+from smc_mujoco.simulation.state import INSTANT, RUBBING
+
+SERIES = floats(("address", "count"))  # what follows the parameters of a series: its data
+instant_at, rubbing_at, seen_at, series_at = map(record_at, (INSTANT, RUBBING, SEEN, SERIES))
 
 
 @functools.cache
@@ -83,9 +90,10 @@ def _joint(function: Callable, gains: tuple[str, ...], shared: tuple[str, ...], 
         return 0
 
     def native(y, g, m, out):
-        n = int(carray(pointer(y), (HEADER,))[HEADER - 1])
+        seen = measurement_at(y)
+        n = len(seen.x)
         memories, output = carray(pointer(m), (n, memory)), carray(pointer(out), (2 * n,))
-        ok, _ = attempt(law, (measurement_at(y), values(g, n), memories, output))
+        ok, _ = attempt(law, (seen, values(g, n), memories, output))
         return not ok
 
     made = Function(native, _cached(function, gains, shared, memory))
@@ -119,7 +127,7 @@ def with_acceleration(typingctx, result):
 
 @functools.cache
 def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
-    """Compile t, seed, channel, stream, e, e', s -> value, first and second derivative.
+    """Compile a record INSTANT -> value, first and second derivative.
 
     The parameters of a series are followed by the address and the number of its data.
     """
@@ -128,16 +136,19 @@ def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
     rows, sees = kind.rows, kind.sees
 
     def native(y, p, m, out):
-        i = carray(pointer(y), (7,))
+        now = instant_at(y, 0)
         if random:
-            ok, result = attempt(body, (i[0], values(p), carray(pointer(m), (memory,)), i[1], i[2], i[3]))
+            noise = carray(pointer(m), (memory,))
+            ok, result = attempt(body, (now.t, values(p), noise, now.seed, now.channel, now.stream))
         elif sees:
-            ok, result = attempt(body, (i[0], values(p), carray(pointer(m), (memory,)), i[4], i[5], i[6]))
+            held = carray(pointer(m), (memory,))
+            ok, result = attempt(body, (now.t, values(p), held, now.e, now.de, now.s))
         elif series:
-            data = carray(pointer(p + behind), (2,))
-            ok, result = attempt(body, (i[0], values(p), carray(pointer(int(data[0])), (rows, int(data[1])))))
+            data = series_at(p + behind, 0)
+            table = carray(pointer(int(data.address)), (rows, int(data.count)))
+            ok, result = attempt(body, (now.t, values(p), table))
         else:
-            ok, result = attempt(body, (i[0], values(p)))
+            ok, result = attempt(body, (now.t, values(p)))
         if ok:
             r, dr, ddr = result
             output = carray(pointer(out), (3,))
@@ -151,14 +162,13 @@ def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
 
 @functools.cache
 def nominal(function: Callable, names: tuple[str, ...]) -> Function:
-    """Compile i, n, x (n,), v (n,) -> f and g of channel i."""
+    """Compile a record SEEN -> f and g of channel i."""
     body, values = jit(function), loader(named(names))
 
     def native(y, p, m, out):
-        head = carray(pointer(y), (2,))
-        i, n = int(head[0]), int(head[1])
-        x, v = carray(pointer(y + 16), (n,)), carray(pointer(y + 16 + 8 * n), (n,))
-        ok, result = attempt(body, (x, v, i, values(p)))
+        seen = seen_at(y, 0)
+        x, v = carray(pointer(seen.x), (seen.n,)), carray(pointer(seen.v), (seen.n,))
+        ok, result = attempt(body, (x, v, seen.i, values(p)))
         if ok:
             f, g = result
             output = carray(pointer(out), (2,))
@@ -176,8 +186,8 @@ def _friction(function: Callable, names: tuple[str, ...]) -> Function:
     body, values = jit(function), loader(named(names))
 
     def native(y, p, m, out):
-        i = carray(pointer(y), (3,))
-        ok, result = attempt(body, (i[0], i[1], i[2], values(p)))
+        rubbing = rubbing_at(y, 0)
+        ok, result = attempt(body, (rubbing.v, rubbing.motor, rubbing.load, values(p)))
         if ok:
             f, low, high = result
             output = carray(pointer(out), (3,))

@@ -8,7 +8,7 @@ What does not compile runs in the reference loop; `prepared.why_not` says why.
 
 import dataclasses
 import math
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from typing import Any
 
 import mujoco
@@ -27,6 +27,7 @@ from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel, Push, Recorded, Signal
 
 PERFECT = Encoder(counts=math.inf)
+ONE_OF_ALL = ("laws", "references")  # tables that a record has only where channels differ
 DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData, measured: what it takes, and a channel more
 READING_BYTES = 67  # measured: of a delayed sensor's history, per channel and reading, in mjData and in the Batch
 
@@ -70,7 +71,7 @@ class Prepared:
         surface = 0 if s.surface is None else s.surface.memory
         memories = s.law.memory + surface + s.velocity.memory + sum(d.memory for d in s.disturbance)
         numbers = 200 + s.plant.n * (memories + s.input_delay / s.control_period + 20)
-        numbers += joint_law.numbers(s.plant.n) if s.law.joint else 0
+        numbers += joint_law.stored_dtype(s.plant.n).itemsize / 8 if s.law.joint else 0
         of_channel = state.LOG.itemsize * (s.samples + 1) + CHANNEL_BYTES + READING_BYTES * s.readings
         return int(of_channel * s.plant.n + 8 * numbers + state.SIMULATION.itemsize + DATA_BYTES)
 
@@ -156,102 +157,85 @@ def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
     Args:
       log: (K + 1, n) LOG, written at samples. It must outlive the run, as `prepared` must.
     """
-    s, compiled = prepared.scenario.resolved, prepared.functions
-    model, channels = prepared.mechanism.model, prepared.mechanism.channels
-    assert compiled is not None
-    n, sensor, drives, buffer = s.plant.n, s.sensor or PERFECT, s.drive_step, state.Buffer()
-
-    def function(made: Any, values: Any, memory: int = 0, channels: int = n) -> dict[str, int]:
-        places = buffer.put(values), buffer.reserve(memory * channels)
-        return {"address": made.address, "parameters": places[0], "memory": places[1], "stride": 8 * memory}
-
-    coupled, joint = s.plant.nominal if isinstance(s.plant.nominal, Coupled) else None, s.law.joint
-    modelled = s.model == "nominal"
-    own = None if coupled is None else _own(s, coupled)
-    functions = {
-        "estimator": function(compiled.estimator, s.velocity.gains.values(), s.velocity.memory),
-    }
-    law_functions = [
-        function(made, joint_gains(law, n) if joint else law.gains.values())
-        for made, law in zip(compiled.laws, s.law.of_channels(s.plant.driven), strict=True)
-    ]
-    memory = buffer.reserve(s.law.memory * n)
-    law_functions = [one | {"memory": memory, "stride": 8 * s.law.memory} for one in law_functions]
-    signal_functions = [
-        function(made, native.values_of(signal))
-        for made, signal in zip(compiled.references, references(s), strict=True)
-    ]
-    functions |= {"law": law_functions[0], "reference": signal_functions[0]}
-    if own is not None:
-        functions["dynamics" if joint else "nominal"] = function(own, own.values)
-    elif compiled.nominal is not None:
-        functions["nominal"] = function(compiled.nominal, s.plant.parameters.values())
-    if s.feedforward is not None:
-        functions["feedforward"] = function(compiled.feedforward, native.values_of(s.feedforward))
-    if s.surface is not None:
-        functions["surface"] = function(compiled.surface, s.surface.gains.values(), s.surface.memory)
-    disturbances = [
-        pushed(d, model)
-        | {"function": function(made, native.values_of(d), d.memory)}
-        | {"stream": s.stream(i), "cartesian": d.cartesian, "sees": d.sees}
-        for i, (made, d) in enumerate(zip(compiled.disturbances, s.disturbance, strict=True))
-    ]
-    frictions = _frictions(prepared, buffer)
-    jitter = s.clock.steps(s.physics_step)
-    slots = s.delay_steps // s.steps + (2 if jitter else 1)  # late commands may arrive after the next sample began
-    joints = buffer.put([0.0, float(n), *[0.0] * (4 * n)])
-    states = buffer.reserve(state.CHANNEL_STATE.itemsize // 8 * n)
-    limits, delay_buffer = buffer.put(s.limits), buffer.reserve(slots * n)
-    measurement = buffer.reserve(joint_law.numbers(n)) if joint else None
-    torques = buffer.reserve(2 * n) if joint else None
-    dynamics = buffer.reserve(4) if joint and own is not None else None
+    s, mechanism, buffer = prepared.scenario.resolved, prepared.mechanism, state.Buffer()
+    nominal = _native_nominal(s)
+    tables = _tables(prepared, buffer)
+    values = _functions(prepared, nominal, buffer) | _circumstances(s) | _arrays(s, buffer)
+    if s.law.joint:
+        values |= _joint_measurement(s, nominal, values, buffer)
+    values["law"], values["reference"] = tables["laws"][0], tables["references"][0]
     numbers = buffer.array()
-
-    def placed(found: dict[str, int]) -> dict[str, int]:
-        return found | {name: buffer.address(found[name]) for name in ("parameters", "memory")}
-
-    signals = np.array(
-        [state.as_tuple(state.SIGNAL, one | {"function": placed(one["function"])}) for one in disturbances],
-        state.SIGNAL,
-    )
-    several = {
-        name: [] if len(each) == 1 else each
-        for name, each in (("laws", law_functions), ("references", signal_functions))
+    kept = {
+        name: np.array(
+            [buffer.as_tuple(kind, one) for one in (table if len(table) > 1 or name not in ONE_OF_ALL else ())], kind
+        )
+        for (name, table), kind in zip(tables.items(), (state.FUNCTION,) * 3 + (state.SIGNAL,), strict=True)
     }
-    tables = {
-        name: np.array([state.as_tuple(state.FUNCTION, placed(one)) for one in each], state.FUNCTION)
-        for name, each in (several | {"frictions": frictions}).items()
+    values |= {name: state.address(table) for name, table in kept.items() if len(table)}
+    values |= {"n": s.plant.n, "driven": s.plant.driven, "nq": mechanism.model.nq, "nv": mechanism.model.nv}
+    values |= {"samples": len(log), "signal_count": len(kept["signals"]), "log": state.address(log)}
+    values["channels"] = state.address(mechanism.channels)
+    return buffer.as_tuple(state.SIMULATION, values), Packed(numbers, **kept, nominal=nominal)
+
+
+def _function(made: Any, values: Any, buffer: state.Buffer, memory: int = 0, channels: int = 1) -> dict[str, int]:
+    """Return the fields of a FUNCTION. Its parameters and its memory, of each channel, go into the buffer."""
+    places = buffer.put(values), buffer.reserve(memory * channels)
+    return {"address": made.address, "parameters": places[0], "memory": places[1], "stride": 8 * memory}
+
+
+def _tables(prepared: Prepared, buffer: state.Buffer) -> dict[str, list[dict[str, Any]]]:
+    """Return the laws, references and frictions of the channels, and the disturbances."""
+    s, compiled = prepared.scenario.resolved, prepared.functions
+    assert compiled is not None
+    n, memory = s.plant.n, {"memory": buffer.reserve(s.law.memory * s.plant.n), "stride": 8 * s.law.memory}
+    laws = zip(compiled.laws, s.law.of_channels(s.plant.driven), strict=True)
+    named = zip(compiled.references, references(s), strict=True)
+    disturbed = enumerate(zip(compiled.disturbances, s.disturbance, strict=True))
+    return {
+        "laws": [
+            _function(made, joint_gains(law, n) if law.joint else law.gains.values(), buffer) | memory
+            for made, law in laws
+        ],
+        "references": [_function(made, native.values_of(signal), buffer) for made, signal in named],
+        "frictions": _frictions(prepared, buffer),
+        "signals": [
+            pushed(d, prepared.mechanism.model)
+            | {"function": _function(made, native.values_of(d), buffer, d.memory, n)}
+            | {"stream": s.stream(i), "cartesian": d.cartesian, "sees": d.sees}
+            for i, (made, d) in disturbed
+        ],
     }
-    at = buffer.address(joints)
-    values: dict[str, Any] = {name: placed(found) for name, found in functions.items()}
-    if measurement is not None and torques is not None:
-        values |= {"joint": buffer.address(measurement), "torques": buffer.address(torques)}
-    if dynamics is not None and coupled is not None:
-        called = coupled.native_coriolis(), coupled.native_jacobian(), values["dynamics"]["parameters"], s.drive.gain
-        numbers[dynamics : dynamics + 4] = called
-        values["on_request"] = buffer.address(dynamics)
-    values |= {name: state.address(table) for name, table in tables.items() if len(table)}
-    values |= {
-        "n": n,
-        "driven": int(np.sum(channels["ctrl"] >= 0)),
-        "nq": model.nq,
-        "nv": model.nv,
-        "samples": len(log),
-        "signal_count": len(signals),
+
+
+def _functions(prepared: Prepared, nominal: Native | None, buffer: state.Buffer) -> dict[str, Any]:
+    """Return the functions of a record that all channels share, but law and reference."""
+    s, compiled = prepared.scenario.resolved, prepared.functions
+    assert compiled is not None
+    n, found = s.plant.n, {}
+    for name, made, part in (("estimator", compiled.estimator, s.velocity), ("surface", compiled.surface, s.surface)):
+        if part is not None:
+            found[name] = _function(made, part.gains.values(), buffer, part.memory, n)
+    if nominal is not None:
+        found["dynamics" if s.law.joint else "nominal"] = _function(nominal, nominal.values, buffer)
+    elif compiled.nominal is not None:
+        found["nominal"] = _function(compiled.nominal, s.plant.parameters.values(), buffer)
+    if s.feedforward is not None:
+        found["feedforward"] = _function(compiled.feedforward, native.values_of(s.feedforward), buffer)
+    return found
+
+
+def _circumstances(s: Resolved) -> dict[str, Any]:
+    """Return the numbers of a record: of clock, sensor and drives."""
+    sensor, drives = s.sensor or PERFECT, s.drive_step
+    return {
         "steps": s.steps,
         "stages": s.stages,
         "step": s.physics_step,
         "period": s.control_period,
-        "channels": state.address(channels),
-        "states": buffer.address(states),
-        "log": state.address(log),
-        "signals": state.address(signals),
-        "jitter": jitter,
+        "jitter": s.clock.steps(s.physics_step),
         "missed": s.clock.missed,
         "delay": s.delay_steps,
-        "delay_slots": slots,
-        "delay_buffer": buffer.address(delay_buffer),
-        "limits": buffer.address(limits),
         "scale": math.prod(part.scale for part in s.actuator),
         "has_drives": drives is not None,
         "drive_step": drives._asdict() if drives else {},
@@ -263,25 +247,57 @@ def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
         "dropout": sensor.dropout,
         "read_period": sensor.period or 0.0,
         "read_delay": sensor.delay,
-        "uses_model": modelled,
+        "uses_model": s.model == "nominal",
         "drive_gain": s.drive.gain,
         "drive_drag": s.drive.drag,
-        "joints": at,
-        "x": at + 16,
-        "v": at + 16 + 8 * n,
-        "a": at + 16 + 16 * n,
-        "u": at + 16 + 24 * n,
     }
-    return state.as_tuple(state.SIMULATION, values), Packed(numbers, signals, **tables, nominal=own)
 
 
-def _own(s: Resolved, nominal: Coupled) -> Native | None:
-    """Return MuJoCo's own nominal model for one simulation; None for a law of many joints that may not use it."""
+def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
+    """Return the places of what the callback measures, commands and remembers."""
+    n, width = s.plant.n, s.plant.n if s.law.joint else 1
+    late = bool(s.clock.steps(s.physics_step))  # late commands may arrive after the next sample began
+    slots = s.delay_steps // s.steps + 1 + late
+    return {
+        "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")},
+        "a": buffer.reserve(n),
+        "width": width,
+        "commands": buffer.reserve(2 * width),
+        "states": buffer.reserve(state.CHANNEL_STATE.itemsize // 8 * n),
+        "limits": buffer.put(s.limits),
+        "delay_slots": slots,
+        "delay_buffer": buffer.reserve(slots * n),
+    }
+
+
+def _joint_measurement(
+    s: Resolved, nominal: Native | None, functions: Mapping[str, Any], buffer: state.Buffer
+) -> dict[str, Any]:
+    """Return the fields of a record that only a law of many joints has."""
+    stored = joint_law.stored_dtype(s.plant.n)
+    head = buffer.reserve(stored.itemsize // 8)
+    places = {name: state.Place(head + offset // 8) for name, (_, offset, *_) in (stored.fields or {}).items()}
+    found: dict[str, Any] = {"joint": places | {"head": head}}
+    if nominal is not None and isinstance(coupled := s.plant.nominal, Coupled):
+        found["requests"] = {
+            "coriolis": coupled.native_coriolis(),
+            "jacobian": coupled.native_jacobian(),
+            "parameters": functions["dynamics"]["parameters"],
+            "unit": s.drive.gain,
+        }
+    return found
+
+
+def _native_nominal(s: Resolved) -> Native | None:
+    """Return MuJoCo's own nominal model for one simulation; None for another, or if a law of many joints has none."""
+    if not isinstance(s.plant.nominal, Coupled):
+        return None
     if not s.law.joint:
-        return nominal.native(s.plant.parameters)
+        return s.plant.nominal.native(s.plant.parameters)
     if s.model == "none":
         return None
-    return nominal.native_dynamics(s.plant.parameters, s.plant.tip, at_rest="g" in read_by(s.law.function))
+    at_rest = "g" in read_by(s.law.function)
+    return s.plant.nominal.native_dynamics(s.plant.parameters, s.plant.tip, at_rest=at_rest)
 
 
 def pushed(disturbance: Signal, model: mujoco.MjModel) -> dict[str, Any]:

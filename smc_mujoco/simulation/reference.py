@@ -209,33 +209,43 @@ class Loop:
 
     def decide(self, x: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
         """Return saturated commands and sliding variables, (n,) each, for measured x and v at time t, s."""
-        scenario = self.scenario
-        if scenario.law.joint:
-            return self.decide_together(x, v, t)
-        u, s = np.empty_like(x), np.empty_like(x)
-        limits = scenario.limits
-        known = [evaluate(signal, t) for signal in references(scenario)]  # one for all, or one for each
+        scenario, n = self.scenario, len(x)
         added = 0.0 if scenario.feedforward is None else evaluate(scenario.feedforward, t)[0]
-        for i in range(len(x)):
-            if not self.driven[i]:  # only measured
-                u[i] = s[i] = self.r[i] = 0.0
-                continue
-            r, dr, ddr = known[i % len(known)]
-            self.r[i] = r
-            xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i, i)
-            y = Measurement(
-                t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g),
-                float(ddr if math.isnan(self.a[i]) else self.a[i]), limits[i], float(scenario.model == "nominal"),
-            )  # fmt: skip
-            if (j := i + len(limits)) < len(x):  # moves with it, without an actuator
-                fq, gq = self.model_at(x, v, j, i)
-                y = y._replace(q=float(x[j]), dq=float(v[j]), fq=float(fq), gq=float(gq))
-            if self.surface:
-                sliding, v_eq = self.surface(i, y)
-                y = y._replace(has_surface=1.0, s=sliding, v_eq=v_eq)
-            u[i], s[i] = self.law(i, y)
+        known = [evaluate(signal, t) for signal in references(scenario)]  # one for all, or one for each
+        motion = np.array([known[i % len(known)] for i in range(n)]).T.copy()
+        self.r, u, s = np.where(self.driven, motion[0], 0.0), np.zeros(n), np.zeros(n)
+        if scenario.law.joint:
+            u, s = self.law.together(self.joint_measurement(x, v, t, motion))
+            return np.array([self.bounded(i, u[i] + added, s[i]) for i in range(n)]), s
+        for i in np.flatnonzero(self.driven).tolist():
+            u[i], s[i] = self.law(i, self.measurement(x, v, t, motion, i))
             u[i] = self.bounded(i, u[i] + added, s[i])
         return u, s
+
+    def measurement(self, x: np.ndarray, v: np.ndarray, t: float, motion: np.ndarray, i: int) -> Measurement:
+        """Return what the law of channel i reads; `motion` are the references and their two derivatives, (3, n)."""
+        scenario, r, dr, ddr = self.scenario, *motion[:, i].tolist()
+        xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i, i)
+        y = Measurement(
+            t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g),
+            float(ddr if math.isnan(self.a[i]) else self.a[i]), scenario.limits[i], float(scenario.model == "nominal"),
+        )  # fmt: skip
+        if (j := i + len(scenario.limits)) < len(x):  # moves with it, without an actuator
+            fq, gq = self.model_at(x, v, j, i)
+            y = y._replace(q=float(x[j]), dq=float(v[j]), fq=float(fq), gq=float(gq))
+        if self.surface:
+            sliding, v_eq = self.surface(i, y)
+            y = y._replace(has_surface=1.0, s=sliding, v_eq=v_eq)
+        return y
+
+    def joint_measurement(self, x: np.ndarray, v: np.ndarray, t: float, motion: np.ndarray) -> JointMeasurement:
+        """Return what a law of many joints reads, as `measurement` does for one."""
+        scenario, (r, dr, ddr) = self.scenario, motion
+        return JointMeasurement(
+            t, scenario.control_period, float(scenario.model == "nominal"), OnRequest(scenario, x, v), x.copy(),
+            v.copy(), x - r, v - dr, r, dr, ddr, np.where(np.isnan(self.a), ddr, self.a), self.limits.copy(),
+            *dynamics(scenario, x, v),
+        )  # fmt: skip
 
     def bounded(self, i: int, u: float, s: float) -> float:
         """Return the command u of channel i within its bound, which becomes the channel's latest."""
@@ -244,21 +254,6 @@ class Loop:
         if not (math.isfinite(u) and math.isfinite(s) and min(abs(u), limit) * max(1.0, self.scale) < MAX_CONTROL):
             raise Failure(f"{self.law.name} returned u = {u:g}, s = {s:g} in channel {i}")
         return self.latest[i]
-
-    def decide_together(self, x: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return what `decide` returns, under a law of many joints."""
-        scenario, n = self.scenario, len(x)
-        known = [evaluate(signal, t) for signal in references(scenario)]
-        r, dr, ddr = np.array([known[i % len(known)] for i in range(n)]).T.copy()
-        self.r[:] = r
-        added = 0.0 if scenario.feedforward is None else evaluate(scenario.feedforward, t)[0]
-        a = np.where(np.isnan(self.a), ddr, self.a)
-        y = JointMeasurement(
-            t, scenario.control_period, float(scenario.model == "nominal"), OnRequest(scenario, x, v), x.copy(),
-            v.copy(), x - r, v - dr, r, dr, ddr, a, self.limits.copy(), *dynamics(scenario, x, v),
-        )  # fmt: skip
-        u, s = self.law.together(y)
-        return np.array([self.bounded(i, u[i] + added, s[i]) for i in range(n)]), s
 
     def model_at(self, x: np.ndarray, v: np.ndarray, i: int, driven: int) -> tuple[float, float]:
         """Return nominal f and g of channel i, for the u of a driven channel."""

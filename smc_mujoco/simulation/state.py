@@ -12,22 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.jit import record_at
+from smc_mujoco.common.jit import floats, record_at
 from smc_mujoco.control.estimator import Reading
+from smc_mujoco.control.joint_law import ARRAYS, REQUESTS
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.drives import DriveStep
+from smc_mujoco.mechanisms.plant import SEEN
 
-
-def floats(names: Iterable[str]) -> np.dtype:
-    """Return the dtype of a record of float64."""
-    return np.dtype([(name, "f8") for name in names], align=True)
-
-
-# Inputs and outputs of functions. Law: MEASUREMENT -> CONTROL. Surface: MEASUREMENT -> SLIDING. Estimator: READING ->
-# ESTIMATE. Reference and disturbance: INSTANT -> MOTION. Nominal model: -> MODEL.
+# Inputs and outputs of functions. Law: MEASUREMENT, or the numbers at JOINT_MEASUREMENT -> u and s, one or n of each.
+# Surface: MEASUREMENT -> SLIDING. Estimator: READING -> ESTIMATE. Reference and disturbance: INSTANT -> MOTION. Nominal
+# model: SEEN -> MODEL.
 MEASUREMENT, READING = floats(Measurement._fields), floats(Reading._fields)
 INSTANT = floats(("t", "seed", "channel", "stream", "e", "de", "s"))
-CONTROL, SLIDING, ESTIMATE = floats(("u", "s")), floats(("s", "v_eq")), floats(("v", "a"))
+SLIDING, ESTIMATE = floats(("s", "v_eq")), floats(("v", "a"))
 MOTION, MODEL = floats(("value", "rate", "acceleration")), floats(("f", "g"))
 
 # A friction by a formula: speed, force of the drive and load -> what resists, and the bounds of what holds.
@@ -40,6 +37,8 @@ CHANNEL_STATE = floats(
     ("held_x", "held_v", "arrived", "first", "second", "force", "reaction", "stuck", "stuck_at", "speed")
 )
 DRIVE_STEP = floats(DriveStep._fields)
+# Addresses of what a law of many joints measures, see control/joint_law.py: of its first number, and of its arrays.
+JOINT_MEASUREMENT = np.dtype([(name, "i8") for name in ("head", *ARRAYS)])
 
 # A sample of a channel: position, velocity, command, command after its delay, sliding variable, disturbance, reference,
 # the drive's force, what friction and contacts exert.
@@ -89,14 +88,15 @@ SIMULATION = np.dtype(
         ("agent", "i8"),
         # the drive as the nominal model knows it: force = gain u - drag v
         ("drive_gain", "f8"), ("drive_drag", "f8"),
-        # addresses of the nominal model's input (i, n, x, v, a, u; the last four (n,) each) and of x, v, a and u in it
-        ("joints", "i8"), ("x", "i8"), ("v", "i8"), ("a", "i8"), ("u", "i8"),
-        # a law of many joints: addresses of its measurement (0: a law of one channel) and of its u and s, (n,) each;
-        # the nominal M, h and g (0: from `nominal`, one equation per channel), and the address of what is computed only
-        # if the law asks: the functions of C and of the tip's Jacobian, their parameters, and force per unit of u
-        ("joint", "i8"), ("torques", "i8"), ("dynamics", FUNCTION), ("on_request", "i8"),
+        # what has been measured, and the address of estimated accelerations, (n,)
+        ("seen", SEEN), ("a", "i8"),
+        # the law: how many channels it commands at a call, 1 or n, and the address of its u and s, (2, width)
+        ("width", "i8"), ("commands", "i8"),
+        # a law of many joints: its measurement, all 0 for a law of one channel; the nominal M, h and g (0: from
+        # `nominal`, one equation per channel), and the functions of C and of the tip's Jacobian (0: there are none)
+        ("joint", JOINT_MEASUREMENT), ("dynamics", FUNCTION), ("requests", REQUESTS),
         # inputs and outputs of functions
-        ("y", MEASUREMENT), ("reading", READING), ("instant", INSTANT), ("control", CONTROL), ("sliding", SLIDING),
+        ("y", MEASUREMENT), ("reading", READING), ("instant", INSTANT), ("sliding", SLIDING),
         ("estimate", ESTIMATE), ("motion", MOTION), ("model", MODEL), ("rubbing", RUBBING), ("resistance", RESISTANCE),
         ("unused", "f8", (8,)),  # so that no two simulations write to one cache line
     ],
@@ -110,12 +110,13 @@ simulation_at, state_at, log_at, signal_at, function_at = map(
 
 # Bytes from the start of a simulation's record to the inputs and outputs of functions.
 (
-    MEASUREMENT_AT, READING_AT, INSTANT_AT, CONTROL_AT, SLIDING_AT, ESTIMATE_AT, MOTION_AT, MODEL_AT, RUBBING_AT,
-    RESISTANCE_AT,
+    MEASUREMENT_AT, READING_AT, INSTANT_AT, SLIDING_AT, ESTIMATE_AT, MOTION_AT, MODEL_AT, RUBBING_AT, RESISTANCE_AT,
+    SEEN_AT, REQUESTS_AT,
 ) = (
     SIMULATION.fields[name][1]  # pyright: ignore[reportOptionalSubscript]
     for name in (
-        "y", "reading", "instant", "control", "sliding", "estimate", "motion", "model", "rubbing", "resistance",
+        "y", "reading", "instant", "sliding", "estimate", "motion", "model", "rubbing", "resistance", "seen",
+        "requests",
     )
 )  # fmt: skip
 
@@ -126,34 +127,30 @@ simulation_at, state_at, log_at, signal_at, function_at = map(
 ) = range(13)  # fmt: skip
 
 
-def as_tuple(dtype: np.dtype, values: Mapping[str, Any]) -> tuple:
-    """Return the values of a record in the order of its fields, 0 for each that is not named."""
-    return tuple(
-        values.get(name, 0) if (kind := dtype[name]).names is None else as_tuple(kind, values.get(name, {}))
-        for name in dtype.names or ()
-    )
+class Place(int):
+    """The place of a number in a Buffer."""
 
 
 class Buffer:
     """Float64 numbers for one array. Each part has a place at once, and an address once the array is made.
 
     buffer = Buffer()
-    gains = buffer.put([6.0, 3.0])      # a place
+    gains = buffer.put([6.0, 3.0])                          # a Place
     array = buffer.array()
-    buffer.address(gains)               # address of the gains, valid as long as `array` lives
+    buffer.as_tuple(FUNCTION, {"parameters": gains, ...})   # with its address, valid as long as `array` lives
     """
 
     def __init__(self) -> None:
         self.values: list[float] = []
         self.base = 0
 
-    def put(self, values: Iterable[float]) -> int:
+    def put(self, values: Iterable[float]) -> Place:
         """Append numbers and return their place."""
-        place = len(self.values)
+        place = Place(len(self.values))
         self.values.extend(values)
         return place
 
-    def reserve(self, count: int) -> int:
+    def reserve(self, count: int) -> Place:
         """Append zeros and return their place."""
         return self.put(itertools.repeat(0.0, count))
 
@@ -163,9 +160,15 @@ class Buffer:
         self.base = address(made)
         return made
 
-    def address(self, place: int) -> int:
-        """Return the address of a place in the array."""
-        return self.base + 8 * place
+    def as_tuple(self, dtype: np.dtype, values: Mapping[str, Any]) -> tuple:
+        """Return the values of a record in the order of its fields: an address for a Place, 0 for one not named."""
+        found = []
+        for name in dtype.names or ():
+            value = values.get(name, 0)
+            if dtype[name].names is not None:
+                value = self.as_tuple(dtype[name], value or {})
+            found.append(self.base + 8 * value if isinstance(value, Place) else value)
+        return tuple(found)
 
 
 def address(array: np.ndarray) -> int:

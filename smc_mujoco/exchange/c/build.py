@@ -23,8 +23,7 @@ INPUTS = len(Measurement._fields)  # numbers in a measurement
 # How a measurement is stored, for glue.c and replay.c.
 LAYOUT = (
     f"-DSMC_INPUTS={INPUTS}",
-    f"-DSMC_HEADER={joint_law.HEADER}",
-    f"-DSMC_VECTORS={joint_law.VECTORS}",
+    f"-DSMC_VECTORS={joint_law.ARRAYS.index('M')}",
 )
 PROTOTYPE = "int smc_law(const {} *y, const smc_real *gains, smc_real *memory, smc_real *out)"
 # The same arithmetic as compiled Python: no fused multiply-add.

@@ -9,6 +9,9 @@
 #include <string.h>
 
 typedef long long smc_entry(const double *, const double *, double *, double *);
+/* What joint_law.py stores before the arrays (HEAD), and what `dynamics` is the address of (REQUESTS). */
+typedef struct { double t, dt, model, dynamics, joints; } head;
+typedef struct { double coriolis, jacobian, parameters, unit; } requests;
 
 const char *__asan_default_options(void);
 const char *__asan_default_options(void) { return "detect_leaks=0"; }
@@ -34,7 +37,8 @@ int main(int count, char **word)
     void *library, *found;
     int (*setup)(void);
     smc_entry *law;
-    double *gains, *memory, *y, *out, asked[4] = {0.0, 0.0, 0.0, 1.0};
+    double *gains, *memory, *y, *out;
+    requests asked = {(double)(intptr_t)nothing, (double)(intptr_t)nothing, 0.0, 1.0};
     size_t many, size, inputs, each, joints;
     FILE *file;
 
@@ -43,9 +47,8 @@ int main(int count, char **word)
     if (!library) return failed(dlerror());
     joints = (size_t)*(const int *)dlsym(library, "smc_mujoco_joints");
     each = joints ? joints : 1;
-    inputs = joints ? SMC_HEADER + (SMC_VECTORS + 2 + joints) * joints : SMC_INPUTS;
+    inputs = joints ? sizeof(head) / sizeof(double) + (SMC_VECTORS + 2 + joints) * joints : SMC_INPUTS;
     y = numbers(inputs), out = numbers(2 * each);
-    asked[0] = asked[1] = (double)(intptr_t)nothing;
     many = each * strtoul(word[3], NULL, 10), size = each * strtoul(word[4], NULL, 10);
     gains = numbers(many), memory = numbers(size);
     file = fopen(word[2], "rb");
@@ -59,8 +62,8 @@ int main(int count, char **word)
     found = dlsym(library, "smc_mujoco_entry");
     memcpy(&law, &found, sizeof found);
     while (fread(y, sizeof(double), inputs, file) == inputs) {
-        if (joints) y[3] = (double)(intptr_t)asked;
-        if (y[0] == 0.0) memset(memory, 0, size * sizeof(double)); /* a run begins */
+        if (joints) ((head *)y)->dynamics = (double)(intptr_t)&asked;
+        if (((head *)y)->t == 0.0) memset(memory, 0, size * sizeof(double)); /* a run begins */
         law(y, gains, memory, out);
     }
     return 0;

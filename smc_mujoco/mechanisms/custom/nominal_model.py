@@ -37,13 +37,23 @@ from numba import carray, njit
 
 from smc_mujoco.common import libmujoco
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.jit import Function, integers, pointer
+from smc_mujoco.common.jit import Function, floats, integers, pointer, record_at
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
-from smc_mujoco.mechanisms.plant import Coupled, Dynamics, Field, Native, Values, ready, write
+from smc_mujoco.mechanisms.plant import SEEN, Coupled, Dynamics, Field, Native, Values, ready, write
 
 _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
-VALUES = 16  # of `native_dynamics`: n, nv, addresses, whether h is of passive forces alone, the tip's site, at_rest
+# Parameters of the C functions: numbers of channels, of driven ones and of degrees of freedom; addresses of model and
+# data, of their arrays, and of arrays of this simulation's own.
+NOMINAL = floats(
+    ("n", "driven", "nv", "model", "data", "qpos", "qvel", "ctrl", "acceleration", "places", "seen", "solved")
+)
+# The same of M, h and g; then whether h is of passive forces alone, the tip's site or -1, whether to compute g.
+DYNAMICS = floats(
+    ("n", "nv", "model", "data", "qpos", "qvel", "bias", "passive", "actuator", "places", "dense", "state", "moves",
+     "alone", "site", "at_rest")
+)  # fmt: skip
+nominal_at, dynamics_at, seen_at = map(record_at, (NOMINAL, DYNAMICS, SEEN))
 _SLEEP = mujoco.mjtEnableBit.mjENBL_SLEEP.value
 _lock = threading.Lock()  # held while Python computes with the mjData of a model
 free_after_fork(_lock)
@@ -267,36 +277,36 @@ def _stages() -> tuple[Callable, Callable]:
 def native_dynamics() -> Function:
     """Return the C function of M, h and g.
 
-    Its inputs are x and v, (n,) each; its outputs M (n, n), h and g, (n,) each. Without `at_rest` g is NaN.
+    Its input is a record SEEN, its outputs are M (n, n), h and g, (n,) each. Without `at_rest` g is NaN.
     """
     positions, velocities = _stages()
     full = _called("mj_fullM", 1)
 
     def native(y, p, m, out):
-        own = carray(pointer(p), (VALUES,))
-        n, nv, model, data = int(own[0]), int(own[1]), int(own[2]), int(own[3])
-        biases, alone = int(own[6]), own[13] != 0.0
-        given, state = carray(pointer(y), (2 * n,)), carray(pointer(int(own[11])), (2 * n,))
-        qpos, qvel = carray(pointer(int(own[4])), (1 << 40,)), carray(pointer(int(own[5])), (nv,))
-        bias, passive = carray(pointer(biases), (nv,)), carray(pointer(int(own[7])), (nv,))
-        actuator, table = carray(pointer(int(own[8])), (nv,)), carray(integers(int(own[9])), (2 * n,))
-        dense, output = carray(pointer(int(own[10])), (nv, nv)), carray(pointer(out), (n * n + 2 * n,))
+        own, read = dynamics_at(p, 0), seen_at(y, 0)
+        n, nv, model, data = int(own.n), int(own.nv), int(own.model), int(own.data)
+        biases, alone = int(own.bias), own.alone != 0.0
+        x, v, state = pointer(read.x), pointer(read.v), carray(pointer(int(own.state)), (2 * n,))
+        qpos, qvel = carray(pointer(int(own.qpos)), (1 << 40,)), carray(pointer(int(own.qvel)), (nv,))
+        bias, passive = carray(pointer(biases), (nv,)), carray(pointer(int(own.passive)), (nv,))
+        actuator, table = carray(pointer(int(own.actuator)), (nv,)), carray(integers(int(own.places)), (2 * n,))
+        dense, output = carray(pointer(int(own.dense)), (nv, nv)), carray(pointer(out), (n * n + 2 * n,))
         for j in range(n):
-            state[j], state[n + j] = given[j], given[n + j]
-            qpos[table[j]] = given[j]
+            state[j], state[n + j] = x[j], v[j]
+            qpos[table[j]] = x[j]
         positions(model, data, biases, alone)
-        full(model, data, int(own[10]))
+        full(model, data, int(own.dense))
         for i in range(n):
             for j in range(n):
                 output[n * i + j] = dense[table[n + i], table[n + j]]
         first = 0
-        if own[15] == 0.0:  # without g
+        if own.at_rest == 0.0:  # without g
             first = 1
             for j in range(n):
                 output[n * n + n + j] = math.nan
         for part in range(first, 2):  # g, then h, so that the velocities are those of the sample afterwards
             for j in range(n):
-                qvel[table[n + j]] = part * given[n + j]
+                qvel[table[n + j]] = part * v[j]
             velocities(model, data, biases, alone)
             for j in range(n):
                 k = table[n + j]
@@ -312,20 +322,20 @@ def native_coriolis() -> Function:
     rates, newton_euler, velocity = _called("mj_comVel"), _called("mj_rne", 2), _called("mj_fwdVelocity")
 
     def native(y, p, m, out):
-        own = carray(pointer(p), (VALUES,))
-        n, nv, model, data = int(own[0]), int(own[1]), int(own[2]), int(own[3])
+        own = dynamics_at(p, 0)
+        n, nv, model, data = int(own.n), int(own.nv), int(own.model), int(own.data)
         w, output = carray(pointer(y), (n,)), carray(pointer(out), (n,))
-        state, qvel = carray(pointer(int(own[11])), (2 * n,)), carray(pointer(int(own[5])), (nv,))
-        bias, table = carray(pointer(int(own[6])), (nv,)), carray(integers(int(own[9])), (2 * n,))
+        state, qvel = carray(pointer(int(own.state)), (2 * n,)), carray(pointer(int(own.qvel)), (nv,))
+        bias, table = carray(pointer(int(own.bias)), (nv,)), carray(integers(int(own.places)), (2 * n,))
         for j in range(n):
             output[j] = 0.0
         for part in range(2):
             sign = 1.0 - 2.0 * part
             for j in range(n):
                 qvel[table[n + j]] = state[n + j] + sign * w[j]
-            if own[13] != 0.0:
+            if own.alone != 0.0:
                 rates(model, data)
-                newton_euler(model, data, 0, int(own[6]))
+                newton_euler(model, data, 0, int(own.bias))
             else:
                 velocity(model, data)
             for j in range(n):
@@ -341,13 +351,13 @@ def native_jacobian() -> Function:
     of_site = _called("mj_jacSite", 3)
 
     def native(y, p, m, out):
-        own = carray(pointer(p), (VALUES,))
-        n, nv, site = int(own[0]), int(own[1]), int(own[14])
-        output, table = carray(pointer(out), (3, n)), carray(integers(int(own[9])), (2 * n,))
-        moves = carray(pointer(int(own[12])), (3, nv))
+        own = dynamics_at(p, 0)
+        n, nv, site = int(own.n), int(own.nv), int(own.site)
+        output, table = carray(pointer(out), (3, n)), carray(integers(int(own.places)), (2 * n,))
+        moves = carray(pointer(int(own.moves)), (3, nv))
         if site < 0:
             return 1
-        of_site(int(own[2]), int(own[3]), int(own[12]), 0, site)
+        of_site(int(own.model), int(own.data), int(own.moves), 0, site)
         for i in range(3):
             for j in range(n):
                 output[i, j] = moves[i, table[n + j]]
@@ -360,7 +370,7 @@ def native_jacobian() -> Function:
 def native() -> Function:
     """Return the C function of the nominal model.
 
-    Its inputs are i, n, and x, v, acceleration (unused) and u, (n,) each; its outputs f and g of channel i.
+    Its input is a record SEEN, its outputs are f and g of channel i.
     """
     library = libmujoco.library()
     positions, velocities, solve = library.mj_fwdPosition, library.mj_fwdVelocity, library.mj_solveM
@@ -370,31 +380,31 @@ def native() -> Function:
     solve.argtypes = [ctypes.c_int64] * 4 + [ctypes.c_int]
 
     def native(y, p, m, out):
-        head, own = carray(pointer(y), (2,)), carray(pointer(p), (12,))
-        i, n, driven, nv = int(head[0]), int(own[0]), int(own[1]), int(own[2])
-        model, data = int(own[3]), int(own[4])
-        state = carray(pointer(y + 16), (4 * n,))
-        qpos, qvel = carray(pointer(int(own[5])), (1 << 40,)), carray(pointer(int(own[6])), (1 << 40,))
-        ctrl, qacc = carray(pointer(int(own[7])), (1 << 40,)), carray(pointer(int(own[8])), (nv,))
-        table, seen = carray(integers(int(own[9])), (2 * n + driven,)), carray(pointer(int(own[10])), (2 * n,))
-        solved = carray(pointer(int(own[11])), (2 * nv,))
+        read, own = seen_at(y, 0), nominal_at(p, 0)
+        i, n, driven, nv = read.i, int(own.n), int(own.driven), int(own.nv)
+        x, v, u = pointer(read.x), pointer(read.v), pointer(read.u)
+        model, data = int(own.model), int(own.data)
+        qpos, qvel = carray(pointer(int(own.qpos)), (1 << 40,)), carray(pointer(int(own.qvel)), (1 << 40,))
+        ctrl, qacc = carray(pointer(int(own.ctrl)), (1 << 40,)), carray(pointer(int(own.acceleration)), (nv,))
+        table, seen = carray(integers(int(own.places)), (2 * n + driven,)), carray(pointer(int(own.seen)), (2 * n,))
+        solved = carray(pointer(int(own.solved)), (2 * nv,))
         fresh = False
-        for j in range(2 * n):
-            if seen[j] != state[j]:  # NaN, the initial value, differs from everything
-                fresh, seen[j] = True, state[j]
+        for j in range(n):
+            if seen[j] != x[j] or seen[n + j] != v[j]:  # NaN, the initial value, differs from everything
+                fresh, seen[j], seen[n + j] = True, x[j], v[j]
         if fresh:  # the first channel of a sample; the others have the same state
             for j in range(n):
-                qpos[table[j]], qvel[table[n + j]] = state[j], state[n + j]
+                qpos[table[j]], qvel[table[n + j]] = x[j], v[j]
             positions(model, data)
             velocities(model, data)
         for j in range(driven):
-            ctrl[table[2 * n + j]] = 0.0 if j == i % driven else state[3 * n + j]
+            ctrl[table[2 * n + j]] = 0.0 if j == i % driven else u[j]
         actuation(model, data)
         accelerations(model, data)
         for j in range(nv):
             solved[nv + j] = 0.0
         solved[nv + table[n + i % driven]] = 1.0
-        solve(model, data, int(own[11]), int(own[11]) + 8 * nv, 1)
+        solve(model, data, int(own.solved), int(own.solved) + 8 * nv, 1)
         output = carray(pointer(out), (2,))
         output[0], output[1] = qacc[table[n + i]], solved[table[n + i]]
         return 0
