@@ -19,9 +19,8 @@ from smc_mujoco.common.version import __version__
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Component, Template, Value, at, written
 from smc_mujoco.control.law import catalogue, known_laws
-from smc_mujoco.exchange.c import build, joint_translate
-from smc_mujoco.exchange.c.joint_translate import JOINTS, SLOTS
-from smc_mujoco.exchange.c.translate import MATH, Untranslatable, plain, rows, translate
+from smc_mujoco.exchange.c import build
+from smc_mujoco.exchange.c.translate import JOINTS, MATH, SLOTS, Untranslatable, plain, rows, translate
 
 BYTES = {"double": 8, "float": 4, "q15": 8}  # of a number of memory, by type of numbers
 Q15 = "observer_free_q15"
@@ -111,7 +110,7 @@ def translated(component: Component, single: bool = False, joints: int = 0) -> t
       ScenarioError: it uses Python without translation, which is quoted.
     """
     try:
-        return joint_translate.translate(component, single, joints) if joints else translate(component, single)
+        return translate(component, single, joints)
     except Untranslatable as error:
         raise ScenarioError(f"{component.kind} {component.name!r} cannot be written in C: {error}") from None
 

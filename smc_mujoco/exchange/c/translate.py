@@ -2,10 +2,17 @@
 
 numba turns some powers with a constant exponent into products or roots. The C does the same, so that its results in
 double precision equal those of the compiled function bit for bit.
+
+An array has a kind such as "real[SMC_JOINTS]" or "real[3][SMC_JOINTS]". An expression of arrays becomes a loop over its
+elements, with the operations of numba in the same order. A function that returns an array writes it to a pointer.
+
+Python's names of arrays may share numbers, as `w = memory[:, 0]` does with the memory. The C copies. So an array that
+the function changes must not share its numbers with another name; such code is refused.
 """
 
 import ast
 import builtins
+import functools
 import inspect
 import itertools
 import math
@@ -19,6 +26,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
@@ -30,7 +38,18 @@ WHOLE_KINDS = ("bool", "int")
 TYPES = {"bool": "int32_t", "int": "int32_t", "single": "float", "real": "smc_real"}
 # The arguments of a component. They are pointers, not numbers.
 ARGUMENTS = {"y": "const smc_measurement *", "gains": "const smc_real *", "memory": "smc_real *"}
+SEEN = {"estimator": "smc_reading"}  # structs of y, where they differ from a measurement
 READS = {"law": Measurement._fields, "surface": Measurement._fields, "estimator": Reading._fields}  # the fields of y
+
+# Laws of many joints: dimensions that are macros in the file, fields of the measurement -> their dimensions, and what
+# the caller of the law provides.
+JOINTS, SLOTS = "SMC_JOINTS", "SMC_LAW_MEMORY"
+FIELDS = dict.fromkeys(joint_law.ARRAYS, f"[{JOINTS}]") | dict.fromkeys(("t", "dt", "model"), "")
+FIELDS["M"] = f"[{JOINTS}][{JOINTS}]"
+ON_REQUEST = {joint_law.coriolis: ("coriolis", (JOINTS,)), joint_law.jacobian: ("jacobian", ("3", JOINTS))}
+ROW, COLUMN = "\x00", "\x01"  # stand for the indices in the text of an array's element
+TOKEN = re.compile("\x02(\\d+)\x03")  # stands for a call in an expression, which may move before its loop
+ALONE = re.compile("(?<!\\w)\\((\x02\\d+\x03)\\)")  # the same in parentheses
 
 # Precedence of C's operators. An operand of lower precedence is put in parentheses.
 ATOM, UNARY, PRODUCT, SUM, LOOSE = 5, 4, 3, 2, 1
@@ -49,13 +68,27 @@ SAME_IN_C = {getattr(math, name) for name in MATH_NAMES.split()}
 ROUNDING = {math.floor: "floor", math.ceil: "ceil", math.trunc: "trunc"}  # integers in Python, floating-point in C
 MATH = {"pow", *ROUNDING.values(), *MATH_NAMES.split()}
 CASTS = {float: "real", np.float64: "real", np.float32: "single", int: "int"}
-# Python's min, max, abs, and % and indices of integers: functions that the C file defines if it uses them.
+# Functions of numpy with elements -> the same in C.
+OF_MATH = ("sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "fabs")
+OF_MATH_RENAMED = {"arctan": "atan", "arctan2": "atan2", "arcsin": "asin", "arccos": "acos", "hypot": "hypot"}
+ELEMENTWISE = {getattr(np, name): name for name in OF_MATH} | {getattr(np, n): c for n, c in OF_MATH_RENAMED.items()}
+ELEMENTWISE |= {np.abs: "fabs", abs: "fabs"}
+HELPED = {np.minimum: "lesser", np.maximum: "greater", np.sign: "sign"}
+FILLED = {np.zeros: 0.0, np.empty: 0.0, np.ones: 1.0}
+NEW = {*FILLED, np.full, np.array, np.where}  # functions that return a new array
+SHARED = "which shares its numbers with another name: write .copy() behind it"
+
+# Python's min, max, abs, % and indices of integers, and numpy's functions as numba compiles them, where NaN stays NaN:
+# functions that the C file defines if it uses them.
 HELPERS = {
     "minimum": "b < a ? b : a",
     "maximum": "b > a ? b : a",
     "absolute": "a < 0 ? -a : a",
     "modulo": "(a % b + b) % b",
     "wrapped": "a < 0 ? a + b : a",  # an index from the end
+    "lesser": "a <= b || a != a ? a : b",
+    "greater": "a >= b || a != a ? a : b",
+    "sign": "a > 0 ? 1 : a < 0 ? -1 : a",
 }
 SQUARE, FOURTH = "(a * a)", "((a * a) * (a * a))"
 POWERS = {  # multiplied in numba's order: by repeated squaring, from the lowest bit
@@ -97,24 +130,20 @@ class Value(NamedTuple):
         return self.text if self.level >= level else f"({self.text})"
 
 
-def translate(component: Component, single: bool) -> tuple[int, str]:
+def translate(component: Component, single: bool, joints: int = 0) -> tuple[int, str]:
     """Return the number of memory slots of a component, and the C of its function and of all functions it calls.
 
-    The function's name is smc_law, smc_surface or smc_estimator. A law of many joints goes to `joint_translate`.
+    The function's name is smc_law, smc_surface or smc_estimator.
 
     Args:
       single: whether smc_real is float.
+      joints: for how many joints a law of many joints is written; 0 for a component of one channel.
 
     Raises:
       Untranslatable: a piece of Python, which is quoted, has no translation.
     """
-    return text_of(Program(component, single))
-
-
-def text_of(program: "Program") -> tuple[int, str]:
-    """Return the number of memory slots and the C of a program."""
-    function = program.component.function
-    functions = [program.make(program, function, list(ARGUMENTS), {}, entry=True).text(program.symbol)]
+    program = Program(component, single, joints)
+    functions = [Function(program, component.function, list(ARGUMENTS), {}, entry=True).text(program.symbol)]
     for name, text in reversed(program.functions.items()):
         if any(re.search(rf"\b{name}\(", other) for other in functions):  # calls by earlier, narrower drafts are gone
             functions.insert(0, text)
@@ -127,14 +156,18 @@ def text_of(program: "Program") -> tuple[int, str]:
 class Program:
     """The C file of a component: constant arrays, functions, and the names they use."""
 
-    def __init__(self, component: Component, single: bool):
+    def __init__(self, component: Component, single: bool, joints: int):
         self.component, self.gains, self.single = component, component.gains, single
-        self.symbol, self.make = f"smc_{component.kind}", Function
+        self.symbol, self.joints = f"smc_{component.kind}", joints
         self.arrays: dict[str, str] = {}  # name -> text
         self.functions: dict[str, str] = {}  # name -> text
         self.translated: dict[tuple, tuple[str, list[str]] | None] = {}  # -> name, kinds; None while in progress
         self.used_names = {self.symbol, *ARGUMENTS, *RESERVED}
         self.slots = 0  # of memory
+
+    def size(self, dimension: str) -> int:
+        """Return a dimension as a number; that of the memory is not known before the end."""
+        return self.joints if dimension == JOINTS else int(dimension)
 
     def unique_name(self, name: str) -> str:
         """Reserve and return a name that is not used yet: `name`, or `name` with a number."""
@@ -199,7 +232,7 @@ class Program:
         key = (written, tuple(kinds), tuple(constants.items()))
         if key not in self.translated:
             self.translated[key] = None
-            translated = self.make(self, function, kinds, constants)
+            translated = Function(self, function, kinds, constants)
             name = self.unique_name(plain(tree.name))
             self.translated[key] = name, translated.results
             self.functions[name] = translated.text(name)
@@ -223,12 +256,17 @@ class Function:
 
     Attributes:
       counters: variables of the present loops that are never negative.
+      frames: for each elementwise expression within another, the shapes of its operands and its calls.
+      before: lines that belong before the present one, such as loops that fill arrays.
+      temporaries: name -> kind of arrays for results within expressions.
+      fixed: whether nothing may move before the present line.
     """
 
     def __init__(
         self, program: Program, function: Any, kinds: Sequence[str], constants: Mapping[str, float], entry: bool = False
     ):
         self.program, self.constants, self.entry, self.counters = program, constants, entry, set[str]()
+        self.frames, self.fixed = list[tuple[list[str], list[Value]]](), False
         written, self.tree = parsed(function)
         cells = zip(written.__code__.co_freevars, written.__closure__ or (), strict=True)
         self.globals = written.__globals__ | {name: cell.cell_contents for name, cell in cells} | dict(constants)
@@ -247,12 +285,16 @@ class Function:
             self.names = {name: Value(self.c_name(name), kind) for name, kind in self.kinds.items()}
             self.assigned = set(self.parameters)
             self.lines = list(self.block(self.tree.body))
+        self.check_sharing()
 
     def text(self, name: str) -> str:
         """Return the whole function under a name.
 
-        A variable is declared by its first assignment, or at the top if that is inside a block or by a pointer.
+        A variable is declared by its first assignment, or at the top if that is inside a block or by a pointer. C does
+        not read a length that only declares arrays.
         """
+        words = set(re.findall(r"\w+", " ".join(line.partition(" = ")[2] or line for line in self.lines)))
+        self.read -= {n for n, kind in self.kinds.items() if kind in WHOLE_KINDS and self.c_name(n) not in words}
         numbers = {n: TYPES[kind] for n, kind in self.kinds.items() if kind in TYPES and n not in self.parameters}
         types = {self.c_name(n): of for n, of in numbers.items()}
         unread = [self.c_name(n) for n in self.kinds if n not in self.read]
@@ -273,18 +315,23 @@ class Function:
 
     def arrays(self) -> Iterable[str]:
         """Return the declarations of the function's arrays."""
-        return ()
+        kinds = {self.c_name(n): kind for n, kind in self.kinds.items() if n not in self.parameters}
+        return [declared(kind, name) for name, kind in (kinds | self.temporaries).items() if shape(kind)]
 
     def head(self, name: str) -> str:
-        """Return the declaration without a semicolon."""
-        pointers = ARGUMENTS | ({"y": "const smc_reading *"} if self.program.component.kind == "estimator" else {})
-        types = {n: pointers.get(kind, f"{TYPES.get(kind)} ") for n, kind in self.kinds.items()}
-        arguments = [f"{types[n]}{self.c_name(n)}" for n in self.parameters]
+        """Return the declaration without a semicolon. Arrays are pointers."""
+        seen = "smc_joint_measurement" if self.program.joints else "smc_measurement"
+        pointers = ARGUMENTS | {"y": f"const {SEEN.get(self.program.component.kind, seen)} *"}
+        arguments = []
+        for parameter in self.parameters:
+            kind = self.kinds[parameter]
+            of = pointers.get(kind) or (f"const {TYPES[base(kind)]} *" if shape(kind) else f"{TYPES[kind]} ")
+            arguments.append(f"{of}{self.c_name(parameter)}")
         if self.entry:
             return f"int {name}({', '.join(arguments)}, smc_real *out)"
-        if len(self.results) == 1:
+        if len(self.results) == 1 and not shape(self.results[0]):
             return f"static {TYPES[self.results[0]]} {name}({', '.join(arguments) or 'void'})"
-        arguments += [f"{TYPES[kind]} *out_{i}" for i, kind in enumerate(self.results)]
+        arguments += [f"{TYPES[base(kind)]} *out_{i}" for i, kind in enumerate(self.results)]
         return f"static void {name}({', '.join(arguments)})"
 
     def c_name(self, name: str) -> str:
@@ -296,37 +343,48 @@ class Function:
     # statements
 
     def block(self, body: Sequence[ast.stmt]) -> Iterator[str]:
-        """Yield the lines of some statements, without indentation."""
-        for node in body:
-            match node:
-                case ast.Expr(value=ast.Constant(value=str())) | ast.Pass():
-                    pass
-                case ast.Assign(targets=[target]):
-                    yield from self.assign(target, node.value)
-                case ast.AnnAssign(target=target, value=ast.expr() as value):
-                    yield from self.assign(target, value)
-                case ast.AugAssign():
-                    yield from self.augment(node)
-                case ast.If():
-                    yield from self.branch(node)
-                case ast.For(target=ast.Name(id=name), orelse=[]):
-                    yield from self.loop(node, name)
-                case ast.While(orelse=[]):
-                    yield f"while ({self.truth(node.test)}) {{"
-                    yield from self.block(node.body)
-                    yield "}"
-                case ast.Break() | ast.Continue():
-                    yield f"{ast.unparse(node)};"
-                case ast.Return(value=ast.expr() as value):
-                    yield from self.returned(value)
-                case _:
-                    raise refuse(node, f"{type(node).__name__.lower()}")
+        """Yield the lines of some statements, each after the lines that have moved before it."""
+        if body is self.tree.body:
+            self.before, self.temporaries, self.counts = list[str](), dict[str, str](), itertools.count(1)
+        for line in itertools.chain.from_iterable(map(self.statement, body)):
+            before, self.before = self.before, []
+            yield from before
+            yield line
+
+    def statement(self, node: ast.stmt) -> Iterator[str]:
+        """Yield the lines of a statement, without indentation."""
+        match node:
+            case ast.Expr(value=ast.Constant(value=str())) | ast.Pass():
+                pass
+            case ast.Assign(targets=[target]):
+                yield from self.assign(target, node.value)
+            case ast.AnnAssign(target=target, value=ast.expr() as value):
+                yield from self.assign(target, value)
+            case ast.AugAssign():
+                yield from self.augment(node)
+            case ast.If():
+                yield from self.branch(node)
+            case ast.For(target=ast.Name(id=name), orelse=[]):
+                yield from self.loop(node, name)
+            case ast.While(orelse=[]):
+                yield f"while ({self.truth(node.test)}) {{"
+                yield from self.block(node.body)
+                yield "}"
+            case ast.Break() | ast.Continue():
+                yield f"{ast.unparse(node)};"
+            case ast.Return(value=ast.expr() as value):
+                yield from self.returned(value)
+            case _:
+                raise refuse(node, f"{type(node).__name__.lower()}")
 
     def assign(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
-        """Assign to one target, or to a tuple of them."""
+        """Assign numbers or arrays to one target, or to a tuple of them."""
         if not isinstance(target, ast.Tuple | ast.List):
             number = self.numeric(value)
-            yield f"{self.destination(target, number.kind)} = {number.text};"
+            if shape(number.kind) or self.is_array(target):
+                yield from self.store(target, number)
+            else:
+                yield f"{self.destination(target, number.kind)} = {number.text};"
             return
         targets, values = target.elts, self.parts(value, len(target.elts))
         if values is not None and clash(targets, values):
@@ -348,8 +406,10 @@ class Function:
             raise refuse(value, "a tuple from anything but a call")
 
     def at_once(self, targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> Iterator[str]:
-        """Compute all values before the first assignment, because one of them reads an earlier target."""
+        """Compute all values before the first assignment, because one reads an earlier target. Arrays are refused."""
         new = [self.numeric(value) for value in values]
+        if any(shape(one.kind) for one in new):
+            raise refuse(values[0], "arrays that change places at once")
         yield from (f"const {TYPES[v.kind]} new_{i} = {v.text};" for i, v in enumerate(new))
         for i, (target, value) in enumerate(zip(targets, new, strict=True)):
             yield f"{self.destination(target, value.kind)} = new_{i};"
@@ -364,17 +424,29 @@ class Function:
 
     def unpack(self, targets: Sequence[ast.expr], call: ast.Call) -> Iterator[str]:
         """Assign the results of a function that has several."""
-        values = [self.value(a) for a in call.args]
+        values = [self.argument(a) for a in call.args]
         kinds, beginning = self.program.function(self.callee(call), values, call.args)
         if len(kinds) != len(targets):
             raise refuse(call, f"{len(targets)} names for {len(kinds)} results")
-        pointers = [f"&{self.destination(target, kind)}" for target, kind in zip(targets, kinds, strict=True)]
+        pointers, stores = [], []
+        for target, kind in zip(targets, kinds, strict=True):
+            if shape(kind):
+                found = self.temporary(kind)
+                pointers.append(found.pointer)
+                stores.append((target, found))
+            else:
+                pointers.append(f"&{self.destination(target, kind)}")
         yield call_to(beginning, ", ".join(pointers))
+        for target, found in stores:
+            yield from self.store(target, found)
 
     def destination(self, target: ast.expr, kind: str) -> str:
         """Return a target in C, to which a value of a kind is assigned."""
-        if isinstance(target, ast.Subscript) and (value := self.value(target)).kind == "real":
-            return value.text
+        if isinstance(target, ast.Subscript):
+            place = self.changeable(target)
+            if wider(place.kind, kind) != place.kind:
+                raise refuse(target, "a real number for an element of an array of whole numbers")
+            return place.text
         name = target.id if isinstance(target, ast.Name) else ""
         if not name or self.kinds.get(name) in ARGUMENTS or name in self.constants:
             raise refuse(target, "an assignment to this")
@@ -384,8 +456,11 @@ class Function:
         return self.c_name(name)
 
     def augment(self, node: ast.AugAssign) -> Iterator[str]:
-        """Translate target op= value."""
+        """Translate target op= value, element by element if the target is an array."""
         result = self.numeric(whole_expression(node))
+        if self.is_array(node.target):
+            yield from self.store(node.target, result)
+            return
         target = self.destination(node.target, result.kind)
         if type(node.op) in OPERATORS and result.kind not in WHOLE_KINDS:
             yield f"{target} {OPERATORS[type(node.op)][0]}= {self.numeric(node.value).text};"
@@ -405,6 +480,17 @@ class Function:
         yield "}"
 
     def loop(self, node: ast.For, variable: str) -> Iterator[str]:
+        """Translate for i in range(...) and for element in array."""
+        if isinstance(node.iter, ast.Name) and len(shape(self.kinds.get(node.iter.id, ""))) == 1:
+            array, i = self.value(node.iter), self.index()
+            yield f"for (int32_t {i} = 0; {i} < {shape(array.kind)[0]}; {i}++) {{"
+            yield f"{self.destination(node.target, base(array.kind))} = {array.text.replace(ROW, i)};"
+            yield from self.block(node.body)
+            yield "}"
+        else:
+            yield from self.counted(node, variable)
+
+    def counted(self, node: ast.For, variable: str) -> Iterator[str]:
         """Translate for i in range(...) with a step of 1 or -1."""
         call = node.iter
         if not (isinstance(call, ast.Call) and ast.unparse(call.func) == "range" and 1 <= len(call.args) <= 3):
@@ -431,37 +517,217 @@ class Function:
     def returned(self, value: ast.expr) -> Iterator[str]:
         """Translate return."""
         values = [self.numeric(v) for v in (value.elts if isinstance(value, ast.Tuple) else [value])]
-        self.results = self.results or [v.kind for v in values]
         if self.entry and self.program.component.kind == "estimator" and len(values) == 1:
-            values, self.results = [*values, Value("NAN", "real", UNARY)], [*self.results, "real"][:2]
-        if len(values) != len(self.results) or (self.entry and len(values) != 2):
+            values.append(Value("NAN", "real", UNARY))
+        self.results = self.results or [v.kind for v in values]
+        if len(values) != len(self.results):
             raise refuse(value, "another number of results")
         self.results = [wider(one, v.kind) for one, v in zip(self.results, values, strict=True)]
-        if len(values) == 1:
+        wanted = f"real[{JOINTS}]" if self.program.joints else "real"
+        if self.entry and (len(values) != 2 or any(not self.fits(kind, wanted) for kind in self.results)):
+            joints = "a result other than two vectors, u and s, of one number for each joint,"
+            raise refuse(value, joints if self.program.joints else "another number of results")
+        if len(values) == 1 and not shape(self.results[0]):
             yield f"return {values[0].text};"
             return
-        yield from (f"{f'out[{i}]' if self.entry else f'*out_{i}'} = {v.text};" for i, v in enumerate(values))
+        for i, v in enumerate(values):
+            if not self.entry:
+                yield from self.fill(array_at(f"out_{i}", v.kind) if shape(v.kind) else Value(f"*out_{i}", v.kind), v)
+            elif self.program.joints:
+                yield from self.fill(array_at("out", v.kind, f"{JOINTS} + " if i else ""), v)
+            else:
+                yield f"out[{i}] = {v.text};"
         yield "return 0;" if self.entry else "return;"
+
+    def store(self, target: ast.expr, value: Value) -> Iterator[str]:
+        """Assign an array, or a number to all elements of an array."""
+        if isinstance(target, ast.Name):
+            if target.id in self.parameters:
+                raise refuse(target, "an assignment to an argument that is an array")
+            before, kind = self.kinds.get(target.id, ""), value.kind
+            if shape(before) and self.fits(before, kind):  # 3 or SMC_JOINTS, where there are three joints
+                kind = base(kind) + before[len(base(before)) :]
+            self.destination(target, kind)
+            place = self.value(target)
+        else:
+            place = self.changeable(target)
+            if wider(base(place.kind), base(value.kind)) != base(place.kind):
+                raise refuse(target, "real numbers for elements of an array of whole numbers")
+        if shape(value.kind) and not self.fits(value.kind, place.kind):
+            raise refuse(target, f"an array of {', '.join(shape(value.kind))} numbers for one of another shape")
+        own = [re.escape(place.text), rf"\w+\[{ROW} \* {SLOTS} \+ \w+\]"]  # elements of the same joint
+        others = re.sub("|".join(own), "", value.text)
+        if re.search(rf"\b{place.text.partition('[')[0]}\b", others):  # reads elements that the loop has changed
+            kept = self.temporary(value.kind)
+            yield from self.fill(kept, value)
+            value = kept
+        yield from self.fill(place, value)
+
+    def fill(self, place: Value, value: Value) -> Iterator[str]:
+        """Yield the loops that copy an array, or one number, to a place."""
+        dimensions = shape(place.kind)
+        if call := self.last_call(place, value):
+            yield f"{call}, {place.pointer});"
+            return
+        indices = [self.index(i) for i in range(len(dimensions))]
+        loops = [f"for (int32_t {i} = 0; {i} < {n}; {i}++)" for i, n in zip(indices, dimensions, strict=True)]
+        line = f"{place.text} = {value.text};"
+        for token, i in zip((ROW, COLUMN), indices, strict=False):
+            line = line.replace(token, i)
+        yield " ".join([*loops, line])
+
+    def last_call(self, place: Value, value: Value) -> str:
+        """Take back the call that has just computed a value, if it can write to a place itself; else an empty text."""
+        end = f", {value.pointer});"
+        if not (place.pointer and self.before and value.pointer in self.temporaries and self.before[-1].endswith(end)):
+            return ""
+        call = self.before[-1].removesuffix(end)
+        if re.search(rf"\b{place.pointer.partition(' ')[0]}\b", call.partition("(")[2]):  # it reads from there
+            return ""
+        self.before.pop()
+        del self.temporaries[value.pointer]
+        return call
+
+    def changeable(self, target: ast.expr) -> Value:
+        """Return elements that the function may change: of its memory, or of an array that it makes."""
+        name = root(target)
+        kind = self.kinds.get(name, "")
+        if kind != "memory" and (not shape(kind) or name in self.parameters):
+            raise refuse(target, "an assignment to this, which is no array of the function's own,")
+        return self.value(target)
+
+    def is_array(self, target: ast.expr) -> bool:
+        """Return whether a target of an assignment is an array already."""
+        kind, indices = self.kinds.get(root(target), ""), 0
+        while isinstance(target, ast.Subscript):
+            places = target.slice.elts if isinstance(target.slice, ast.Tuple) else [target.slice]
+            indices += sum(not isinstance(place, ast.Slice) for place in places)
+            target = target.value
+        return indices < (1 + bool(self.program.joints) if kind == "memory" else len(shape(kind)))
+
+    def fits(self, kind: str, other: str) -> bool:
+        """Return whether two kinds have the same shape."""
+        sizes = [[self.program.size(n) for n in shape(one)] for one in (kind, other)]
+        return sizes[0] == sizes[1]
+
+    def index(self, place: int = 0) -> str:
+        """Return the name of a loop's index, which no variable has."""
+        taken = {n.id for n in ast.walk(self.tree) if isinstance(n, ast.Name)} | set(self.parameters)
+        return [name for name in (*"ijklmn", "row", "column", "element_1", "element_2") if name not in taken][place]
 
     # expressions
 
     def value(self, node: ast.expr) -> Value:
-        """Translate an expression that is a number or one of the law's arguments."""
+        """Translate an expression that is a number, an array, or one of the law's arguments."""
         method: Callable[[Any], Value] | None = getattr(self, f"_{type(node).__name__.lower()}", None)
         if method is None:
             raise refuse(node, f"{type(node).__name__}")
+        match node:
+            case ast.UnaryOp() | ast.BinOp() | ast.Compare():
+                return self.elementwise(method, node)
+            case ast.IfExp():
+                return self.staying(self.elementwise, method, node)
+            case ast.BoolOp():
+                return self.staying(self.outside, method, node)
         return method(node)
 
     def numeric(self, node: ast.expr) -> Value:
-        """Translate an expression that is a number."""
+        """Translate an expression that is a number or an array; within an elementwise one its element."""
         value = self.value(node)
         if value.kind in ARGUMENTS:
             raise refuse(node, f"{value.text} as a number")
+        if not self.frames:
+            return value
+        shapes, calls = self.frames[-1]
+        if dimensions := shape(value.kind):
+            if shapes and not self.fits(shapes[0], value.kind):
+                raise refuse(node, "arrays of different shapes in one expression")
+            shapes.append("".join(f"[{n}]" for n in dimensions))
+            return value._replace(kind=base(value.kind))
+        if "(" in value.text and not isinstance(node, ast.Constant):
+            calls.append(value)
+            return Value(f"\x02{len(calls) - 1}\x03", value.kind, value.level)
         return value
+
+    def elementwise(self, method: Callable[[Any], Value], node: Any) -> Value:
+        """Translate an expression by its elements: an array if an operand is one. Calls then move before the loop."""
+        self.frames.append(([], []))
+        try:
+            value = method(node)
+        finally:
+            shapes, calls = self.frames.pop()
+        if not shapes:
+            return value._replace(text=TOKEN.sub(lambda found: calls[int(found[1])].text, value.text))
+        names = {}
+
+        def moved(found: re.Match[str]) -> str:
+            if found[1] not in names:
+                call = calls[int(found[1])]
+                names[found[1]] = self.new_name("number")
+                self.move(f"const {TYPES[call.kind]} {names[found[1]]} = {call.text};", node)
+            return names[found[1]]
+
+        text = ALONE.sub("\\1", value.text)  # a name needs no parentheses
+        return Value(TOKEN.sub(moved, text), value.kind + shapes[0], value.level)
+
+    def outside(self, method: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a method whose operands are no elements of the present expression."""
+        frames, self.frames = self.frames, []
+        try:
+            return method(*arguments)
+        finally:
+            self.frames = frames
+
+    def staying(self, method: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a method that must not move anything before the present line."""
+        fixed, self.fixed = self.fixed, True
+        try:
+            return method(*arguments)
+        finally:
+            self.fixed = fixed
+
+    def move(self, line: str, node: ast.AST) -> None:
+        """Put a line before the present one."""
+        if self.fixed:
+            raise refuse(node, "an array that is computed within a condition")
+        self.before.append(line)
+
+    def new_name(self, word: str) -> str:
+        """Return a name that the function does not have."""
+        taken = {*self.read, *self.kinds}
+        return next(name for i in self.counts if (name := f"{word}_{i}") not in taken)
+
+    def temporary(self, kind: str) -> Value:
+        """Return a new array."""
+        name = self.new_name("array")
+        self.temporaries[name] = kind
+        return array_at(name, kind)
+
+    def stored(self, value: Value, node: ast.AST) -> Value:
+        """Return an array whose numbers lie in a row: itself, or a copy."""
+        if value.pointer:
+            return value
+        kept = self.temporary(value.kind)
+        lines = list(self.fill(kept, value))
+        for line in lines:
+            self.move(line, node)
+        return kept
+
+    def argument(self, node: ast.expr) -> Value:
+        """Translate an argument of a function: a number, an array as a pointer, or y or gains."""
+        value = self.outside(self.value, node)
+        if value.kind == "memory" and self.program.joints:
+            raise refuse(node, "a function that gets the memory")
+        if not shape(value.kind):
+            return value
+        kept = self.stored(value, node)
+        return kept._replace(text=kept.pointer)
 
     def truth(self, node: ast.expr) -> str:
         """Translate an expression as a condition."""
-        value = self.numeric(node)
+        value = self.staying(self.outside, self.numeric, node)
+        if shape(value.kind):
+            raise refuse(node, "an array as a condition")
         return value.text if value.kind in WHOLE_KINDS else f"{value.within(UNARY)} != 0"
 
     def constant(self, node: ast.expr) -> float | None:
@@ -493,37 +759,63 @@ class Function:
 
     def _name(self, node: ast.Name) -> Value:
         if node.id in self.names:
-            return self.names[node.id]
+            value = self.names[node.id]
+            return array_at(value.text, value.kind) if shape(value.kind) else value
         if node.id not in self.globals:
             raise refuse(node, "a name without a value")
-        return literal(self.globals[node.id], self.program.single, node)
+        return self.outer(node, self.globals[node.id])
 
     def _attribute(self, node: ast.Attribute) -> Value:
         if (constant := self.resolve(node)) is not None:
-            return literal(constant, self.program.single, node)
-        owner, name = self.value(node.value), node.attr
+            return self.outer(node, constant)
+        owner, name, joints = self.outside(self.value, node.value), node.attr, self.program.joints
         if owner.kind == "y":
             kind = self.program.component.kind
-            known(name, "reading" if kind == "estimator" else "measurement", READS[kind])
+            known(name, "reading" if kind == "estimator" else "measurement", FIELDS if joints else READS[kind])
+            if joints and FIELDS[name]:
+                return array_at(f"{owner.text}->{name}", f"real{FIELDS[name]}")
             return Value(f"{owner.text}->{name}", "real")
         if owner.kind == "gains":
             known(name, "gain", self.program.gains)
-            return Value(f"{owner.text}[GAIN_{plain(name)}]", "real")
+            place = f"GAIN_{plain(name)}" + f" * {JOINTS}" * bool(joints)
+            if joints and name not in self.program.component.shared:
+                return array_at(owner.text, f"real[{JOINTS}]", f"{place} + ")
+            return Value(f"{owner.text}[{place}]", "real")
         raise refuse(node, "an attribute")
 
+    def outer(self, node: ast.expr, value: Any) -> Value:
+        """Return a constant from outside of the function: a number or an array."""
+        if not isinstance(value, np.ndarray):
+            return literal(value, self.program.single, node)
+        made = self.program.array(ast.unparse(node).replace(".", "_"), value)
+        found = array_at(made.text, f"{made.kind}[{len(value)}]")
+        return found if made.kind == "real" else found._replace(pointer="")  # of 16 bits, so that functions get a copy
+
     def _subscript(self, node: ast.Subscript) -> Value:
-        array, index = self.resolve(node.value), self.numeric(node.slice)
-        if index.kind != "int":
-            raise refuse(node, "an index that is not an integer")
-        if isinstance(array, tuple | list | np.ndarray):
-            constants = self.program.array(ast.unparse(node.value).replace(".", "_"), array)
-            if (place := self.constant(node.slice)) is not None and not -len(array) <= place < len(array):
-                raise refuse(node, f"an index outside {-len(array)} to {len(array) - 1}")
-            return Value(f"{constants.text}[{self.from_start(node.slice, index, len(array)).text}]", constants.kind)
-        owner = self.value(node.value)
-        if owner.kind != "memory":
+        array, joints = self.resolve(node.value), self.program.joints
+        if isinstance(array, tuple | list) or (isinstance(array, np.ndarray) and not joints):
+            return self.outside(self.of_constants, node, array)
+        owner = self.outside(self.value, node.value)
+        if owner.kind == "memory" and not joints:
+            return self.outside(self.of_memory, node, owner)
+        if owner.kind == "memory":
+            owner = Value(f"{owner.text}[{ROW} * {SLOTS} + {COLUMN}]", f"real[{JOINTS}][{SLOTS}]")
+        dimensions = shape(owner.kind)
+        places = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        if not dimensions or len(places) > len(dimensions):
             raise refuse(node, "an element")
-        place, component = self.constant(node.slice), self.program.component
+        return self.elements(node, owner, [*places, *[ast.Slice()] * (len(dimensions) - len(places))])
+
+    def of_constants(self, node: ast.Subscript, array: Any) -> Value:
+        """Return an element of a constant array."""
+        index, constants = self.whole(node), self.program.array(ast.unparse(node.value).replace(".", "_"), array)
+        if (place := self.constant(node.slice)) is not None and not -len(array) <= place < len(array):
+            raise refuse(node, f"an index outside {-len(array)} to {len(array) - 1}")
+        return Value(f"{constants.text}[{self.from_start(node.slice, index, len(array)).text}]", constants.kind)
+
+    def of_memory(self, node: ast.Subscript, owner: Value) -> Value:
+        """Return a number of the memory of a component of one channel."""
+        index, place, component = self.whole(node), self.constant(node.slice), self.program.component
         if place is None and component.kind == "estimator":  # a ring of readings, as long as its memory
             place = component.memory - 1
         if place is None or place < 0:
@@ -531,6 +823,43 @@ class Function:
             raise refuse(node, f"memory {why}")
         self.program.claim(node, int(place))
         return Value(f"{owner.text}[{index.text}]", "real")
+
+    def whole(self, node: ast.Subscript) -> Value:
+        """Return the only index of an element, an integer."""
+        index = self.numeric(node.slice)
+        if index.kind != "int":
+            raise refuse(node, "an index that is not an integer")
+        return index
+
+    def elements(self, node: ast.Subscript, owner: Value, places: Sequence[ast.expr]) -> Value:
+        """Return some elements of an array, by an index or a colon for each dimension."""
+        text, left, pointer = owner.text, list[str](), owner.pointer
+        for token, place, dimension in zip((ROW, COLUMN), places, shape(owner.kind), strict=False):
+            if isinstance(place, ast.Slice):
+                if place.lower or place.upper or place.step or dimension == SLOTS:
+                    raise refuse(node, "a part of an array")
+                text = text.replace(token, (ROW, COLUMN)[len(left)])
+                left.append(dimension)
+                continue
+            index = self.outside(self.numeric, place)
+            self.check_index(node, place, index, dimension)
+            index = self.from_start(place, index, dimension)
+            text = text.replace(token, index.within(PRODUCT))
+            row = pointer and token == ROW and len(places) == 2
+            pointer = f"{pointer} + {index.within(PRODUCT)} * {shape(owner.kind)[1]}" if row else ""
+        return Value(text, base(owner.kind) + "".join(f"[{n}]" for n in left), owner.level, pointer)
+
+    def check_index(self, node: ast.Subscript, place: ast.expr, index: Value, dimension: str) -> None:
+        """Refuse an index that is no integer, or out of range as far as it is known."""
+        constant = self.constant(place)
+        if index.kind != "int":
+            raise refuse(node, "an index that is not an integer")
+        if dimension == SLOTS:
+            if constant is None or constant < 0:
+                raise refuse(node, f"memory at {'a negative' if constant else 'an'} index that is not constant")
+            self.program.claim(node, int(constant))
+        elif constant is not None and not 0 <= constant < self.program.size(dimension):
+            raise refuse(node, f"an index outside 0 to {self.program.size(dimension) - 1}")
 
     def from_start(self, place: ast.expr, index: Value, length: int | str) -> Value:
         """Return an index from the start for an index of Python, which counts from the end if it is negative."""
@@ -572,6 +901,8 @@ class Function:
     def _binop(self, node: ast.BinOp) -> Value:
         if isinstance(node.op, ast.Pow):
             return self._power(node)
+        if isinstance(node.op, ast.MatMult):
+            raise refuse(node, "the operator @")
         left, right = self.numeric(node.left), self.numeric(node.right)
         whole = left.kind in WHOLE_KINDS and right.kind in WHOLE_KINDS
         if type(node.op) in BITS:
@@ -629,13 +960,35 @@ class Function:
     def _call(self, node: ast.Call) -> Value:
         if node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
             raise refuse(node, "a call with names or stars")
-        function, values = self.callee(node), [self.value(a) for a in node.args]
-        if (built_in := self.built_in(function, values, node)) is not None:
-            return built_in
+        if isinstance(node.func, ast.Attribute) and node.func.attr == "copy" and not node.args:
+            return self.outside(self.value, node.func.value)._replace(pointer="")
+        function = self.callee(node)
+        if function in ELEMENTWISE or function in HELPED or function is np.where:
+            return self.elementwise(lambda one: self.of_elements(function, one), node)
+        if function is len or function is np.full or function in FILLED:
+            method = self.sized
+        elif function is np.array:
+            method = self.listed
+        else:
+            method = self.requested if function in ON_REQUEST else self.called
+        return self.outside(method, function, node)
+
+    def called(self, function: Any, node: ast.Call) -> Value:
+        """Translate a call of a function of Python, math, or one that is translated itself."""
+        values = [self.argument(a) for a in node.args]
+        if not any(shape(v.kind) for v in values):
+            if (built_in := self.built_in(function, values, node)) is not None:
+                return built_in
+        elif function in (min, max) or inspect.isbuiltin(function) or isinstance(function, type | np.ufunc):
+            raise refuse(node, f"{getattr(function, '__name__', function)} of an array")
         kinds, beginning = self.program.function(function, values, node.args)
         if len(kinds) != 1:
             raise refuse(node, "several results within an expression")
-        return Value(f"{beginning})", kinds[0])
+        if not shape(kinds[0]):
+            return Value(f"{beginning})", kinds[0])
+        found = self.temporary(kinds[0])
+        self.move(call_to(beginning, found.pointer), node)
+        return found
 
     def built_in(self, function: Any, values: list[Value], node: ast.Call) -> Value | None:
         """Translate a call of a function of Python, math or numpy; return None for another function."""
@@ -667,6 +1020,113 @@ class Function:
         single = all(v.kind == "single" for v in values)
         suffix = "f" if single or self.program.single else ""
         return Value(f"{name}{suffix}({', '.join(v.text for v in values)})", "single" if single else "real")
+
+    def of_elements(self, function: Any, node: ast.Call) -> Value:
+        """Translate a function of numpy, by its elements."""
+        values = [self.numeric(a) for a in node.args]
+        kind = "single" if all(v.kind == "single" for v in values) else "real"
+        if function is np.where:
+            if len(values) != 3:
+                raise refuse(node, "where without two values")
+            test, yes, no = values
+            return Value(f"{test.within(SUM)} ? {yes.within(SUM)} : {no.within(SUM)}", wider(yes.kind, no.kind), LOOSE)
+        if function in HELPED:
+            return Value(f"{self.program.helper(HELPED[function], kind)}({', '.join(v.text for v in values)})", kind)
+        if function in (abs, np.abs) and values[0].kind in WHOLE_KINDS:
+            return Value(f"{self.program.helper('absolute', 'int')}({values[0].text})", "int")
+        return self.math(ELEMENTWISE[function], values)
+
+    def requested(self, function: Any, node: ast.Call) -> Value:
+        """Translate coriolis and jacobian, which the caller of the law provides."""
+        name, dimensions = ON_REQUEST[function]
+        y, *rest = [self.argument(a) for a in node.args]
+        found = self.temporary("real" + "".join(f"[{n}]" for n in dimensions))
+        arguments = [f"{y.text}->plant", *(one.text for one in rest)]
+        self.move(f"{y.text}->{name}({', '.join(arguments)}, {found.pointer});", node)
+        return found
+
+    def listed(self, function: Any, node: ast.Call) -> Value:
+        """Translate np.array of a list of numbers."""
+        if len(node.args) != 1 or not isinstance(node.args[0], ast.List | ast.Tuple) or not node.args[0].elts:
+            raise refuse(node, "an array of anything but a list of numbers")
+        items = [self.numeric(item) for item in node.args[0].elts]
+        if any(shape(item.kind) for item in items):
+            raise refuse(node, "an array of arrays")
+        kind = functools.reduce(wider, (item.kind for item in items))
+        found = self.temporary(f"{kind}[{len(items)}]")
+        for i, item in enumerate(items):
+            self.move(f"{found.pointer}[{i}] = {item.text};", node)
+        return found
+
+    def sized(self, function: Any, node: ast.Call) -> Value:
+        """Translate len, and arrays of one number."""
+        if len(node.args) != (2 if function is np.full else 1):
+            raise refuse(node, "a call with another number of arguments")
+        if function is len:
+            return Value(self.dimensions(node)[0], "int")
+        dimensions = "".join(f"[{n}]" for n in self.dimensions(node.args[0]))
+        if function is np.full:
+            value = self.numeric(node.args[1])
+            return value._replace(kind=value.kind + dimensions)
+        return literal(FILLED[function], self.program.single, node)._replace(kind=f"real{dimensions}")
+
+    def dimensions(self, node: ast.expr) -> list[str]:
+        """Return the dimensions that an expression gives: a number, len(array), a variable of these, a tuple of them.
+
+        Raises:
+          Untranslatable: they are not known before the law runs.
+        """
+        match node:
+            case ast.Tuple(elts=elements) if len(elements) <= 2:
+                return [self.dimensions(one)[0] for one in elements]
+            case ast.Constant(value=int(size)) if size > 0:
+                return [str(size)]
+            case ast.Call(func=ast.Name(id="len"), args=[array]):
+                if dimensions := shape(self.value(array).kind):
+                    return [dimensions[0]]
+            case ast.Name(id=name):
+                given = [one for one in ast.walk(self.tree) if name in assigned(one)]
+                if len(given) == 1 and isinstance(given[0], ast.Assign) and isinstance(given[0].targets[0], ast.Name):
+                    return self.dimensions(given[0].value)
+                if isinstance(size := self.globals.get(name), int) and not given and name not in self.kinds:
+                    return [str(size)]
+        raise refuse(node, "a length that is not known before the law runs")
+
+    # names that share numbers
+
+    def check_sharing(self) -> None:
+        """Refuse arrays that the function changes and that share their numbers with another name."""
+        changed, pairs = {n for n, kind in self.kinds.items() if kind == "memory" and self.program.joints}, []
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.Assign):
+                (target,) = node.targets
+                paired = isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple)
+                pairs += zip(target.elts, node.value.elts, strict=True) if paired else [(target, node.value)]  # pyright: ignore[reportAttributeAccessIssue]
+            if isinstance(node, ast.Assign | ast.AugAssign):
+                targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+                whole = [t for t in targets if isinstance(t, ast.Subscript) or isinstance(node, ast.AugAssign)]
+                changed |= {name for t in whole if shape(self.kinds.get(name := root(t), ""))}
+        for target, value in pairs:
+            shares = self.shared(value)
+            if isinstance(target, ast.Name | ast.Tuple) and (
+                shares & changed or (shares and names_in([target]) & changed)
+            ):
+                raise refuse(value, f"an array, {SHARED},")
+
+    def shared(self, node: ast.expr) -> set[str]:
+        """Return the names of arrays with which the value of an expression may share its numbers."""
+        found, parts = set[str](), list[ast.expr]()
+        match node:
+            case ast.Name() | ast.Subscript() if self.is_array(node):
+                found = {root(node)}
+            case ast.Attribute() | ast.Subscript(value=ast.Attribute()):  # of y or gains
+                found = {ast.unparse(node)}
+            case ast.IfExp():
+                parts = [node.body, node.orelse]
+            case ast.Call():
+                parts = [node.args[i] for i in shared_arguments(self.resolve(node.func))]
+                found = {a.id for a in parts if isinstance(a, ast.Name) and self.kinds.get(a.id) in ARGUMENTS}
+        return found.union(*map(self.shared, parts))
 
 
 # reading Python
@@ -736,6 +1196,53 @@ def refuse(node: ast.AST | None, what: str) -> Untranslatable:
     )
 
 
+def shared_arguments(function: Any) -> set[int]:
+    """Return the places of the arguments that a function may return, in whole or in part."""
+    if not isinstance(getattr(function, "py_func", function), FunctionType) or function in NEW:
+        return set()
+    written, tree = parsed(function)
+    names = [a.arg for a in tree.args.args]
+    origins = {name: {i} for i, name in enumerate(names)}  # variable -> arguments of which it may be a part
+
+    def shared(value: ast.expr) -> set[int]:
+        parts = list[ast.expr]()
+        match value:
+            case ast.Name(id=name):
+                return origins.get(name, set())
+            case ast.Subscript() | ast.Attribute():
+                parts = [value.value]
+            case ast.IfExp():
+                parts = [value.body, value.orelse]
+            case ast.Tuple():
+                parts = value.elts
+            case ast.Call(func=ast.Name(id=name), args=arguments):
+                parts = [arguments[i] for i in shared_arguments(written.__globals__.get(name))]
+            case ast.Call(func=ast.Attribute(value=ast.Name(id=module), attr=name), args=arguments):
+                parts = [arguments[i] for i in shared_arguments(getattr(written.__globals__.get(module), name, None))]
+        return set().union(*map(shared, parts))
+
+    inside, before = list(ast.walk(tree)), {}
+    while before != origins:
+        before = dict(origins)
+        for one in inside:
+            if isinstance(one, ast.Assign):
+                origins |= {name: origins.get(name, set()) | shared(one.value) for name in assigned(one)}
+    return set().union(*(shared(n.value) for n in inside if isinstance(n, ast.Return) and n.value is not None))
+
+
+def assigned(node: ast.AST) -> set[str]:
+    """Return the names in the targets of an assignment or of a loop; none of other code."""
+    targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+    return names_in(t for t in targets if t is not None and not isinstance(t, ast.Subscript))
+
+
+def root(node: ast.expr) -> str:
+    """Return the name of the array whose elements an expression names, or an empty text."""
+    while isinstance(node, ast.Subscript):
+        node = node.value
+    return node.id if isinstance(node, ast.Name) else ""
+
+
 # writing C
 
 
@@ -791,3 +1298,25 @@ def rows(items: Sequence[str]) -> str:
     """Return items in lines of at most 100 characters."""
     text = ", ".join(items) + ","
     return textwrap.fill(text, 100, initial_indent="    ", subsequent_indent="    ")
+
+
+def shape(kind: str) -> list[str]:
+    """Return the dimensions of a kind."""
+    return re.findall(r"\[(\w+)\]", kind)
+
+
+def base(kind: str) -> str:
+    """Return the kind of the elements."""
+    return kind.partition("[")[0]
+
+
+def declared(kind: str, name: str) -> str:
+    """Return the declaration of an array, whose numbers lie in one row."""
+    return f"{TYPES[base(kind)]} {name}[{' * '.join(shape(kind))}];"
+
+
+def array_at(pointer: str, kind: str, offset: str = "") -> Value:
+    """Return the array at a pointer, from an offset on."""
+    place = ROW if len(shape(kind)) == 1 else f"{ROW} * {shape(kind)[-1]} + {COLUMN}"
+    moved = f"{pointer} + {offset.removesuffix(' + ')}" if offset else pointer
+    return Value(f"{pointer}[{offset}{place}]", kind, ATOM, moved)

@@ -20,8 +20,7 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.control.units import ACCELERATION, FORCE, INPUT_GAIN, POSITION, SPEED, TIME, Unit
 from smc_mujoco.exchange.c import export
-from smc_mujoco.exchange.c.joint_translate import JOINTS
-from smc_mujoco.exchange.c.translate import plain
+from smc_mujoco.exchange.c.translate import JOINTS, plain
 from smc_mujoco.simulation.controller import MAX_CONTROL
 
 UNBOUNDED = sys.float_info.max  # stands for infinity, because not every importer reads INF
