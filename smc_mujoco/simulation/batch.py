@@ -207,7 +207,9 @@ def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
                 for j, signal in enumerate(s.disturbance):
                     memories = memory(packed.signals[j]["function"], signal.memory)
                     for channel in range(n if signal.random else 1):
-                        reference.evaluate(signal, t, memories[channel], s.noise_seed, channel, s.stream(j))
+                        noise = s.noise_seed, channel, s.stream(j)
+                        seen = record["instant"][["e", "de", "s"]].tolist()
+                        reference.evaluate(signal, t, memories[channel], *(seen if signal.sees else noise))
     except reference.Failure as failure:
         return str(failure)
     return None
