@@ -74,8 +74,7 @@ def export_fmu(
     Outputs are u and s. All gains are tunable parameters. Many joints have x[1], x[2], M[1,1] and so on.
 
     Raises:
-      ScenarioError: a law in C, Python without translation into C, a surface that does not fit, no
-        compiler.
+      ScenarioError: a law in C, Python without translation into C, a surface that does not fit, no compiler.
     """
     if isinstance(law, Scenario):
         given = {"surface": surface, "velocity": velocity, "control_period": control_period}
