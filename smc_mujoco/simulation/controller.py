@@ -233,7 +233,7 @@ def _evaluate_reference(at, sim, k, i):
     return 0
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def _measure_channel(at, sim, k, t, i):
     """Write into the record what the law of channel i reads at sample k, at time t, s. Return a failure code.
 
