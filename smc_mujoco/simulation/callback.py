@@ -37,7 +37,7 @@ def magic() -> float:
     It is a hash of the sources, so that an outdated compiled callback ignores a record written by newer code.
     """
     package = Path(__file__).parents[1]
-    rooms = (package / room for room in ("simulation", "common", "control", "mechanisms/hardware"))
+    rooms = (package / room for room in ("simulation", "common", "control", "mechanisms", "mechanisms/hardware"))
     sources = b"".join(path.read_bytes() for room in rooms for path in sorted(room.glob("*.py")))
     return float(int.from_bytes(hashlib.sha256(sources).digest()[:6]))
 
