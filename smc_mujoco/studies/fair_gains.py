@@ -153,5 +153,7 @@ def _tuned(
     every = [dict(zip(tuned.bounds, one.gains, strict=True)) for one in tuned.sets]
     found = (dataclasses.replace(chosen, gains=dict(chosen.gains) | own) for own in every)
     sets = tuple(one.sourced(its.kind, its.search) for one in found)
-    about = joined(search_space.without_unit(chosen))
-    return Candidate(sets[0], sets, f"{about} searched about the defaults, as no unit is known" * bool(about))
+    about = list(search_space.without_unit(chosen))
+    have = "have no unit, so their" if len(about) > 1 else "has no unit, so its"
+    words = f"{joined(about)} {have} search is about the defaults and not by the rule: a lead may come from that"
+    return Candidate(sets[0], sets, words * bool(about))
