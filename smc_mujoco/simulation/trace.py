@@ -67,7 +67,7 @@ class Trace:
 
     def __post_init__(self):
         for name in ARRAYS:
-            getattr(self, name).flags.writeable = False
+            np.ndarray.setflags(getattr(self, name), write=False)  # a TypeError for what is no array
 
     def __setstate__(self, fields: dict) -> None:  # so that the arrays of a copy are read-only, too
         vars(self).update(fields)
