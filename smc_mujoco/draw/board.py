@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
 
 from smc_mujoco.analysis.bootstrap import Interval, median_interval, share_interval
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns, sources, values
@@ -121,6 +122,7 @@ def _panel(ax: Axes, table: Columns, plant: str, metric: str, conditions, laws, 
     sizes = [v for one in found.values() for v in one[:3] if np.isfinite(v)]
     if metric != SETTLES and sizes and min(sizes) > 0.0 and max(sizes) > 20.0 * min(sizes):
         ax.set_xscale("log")
+        ax.xaxis.set_minor_formatter(NullFormatter())  # numbers between decades would overlap
     for (law, line), one in found.items():
         _dot(ax, one, line, {"color": colours[law], "marker": marks[law], "ms": style.points(6), "mec": "none"})
     if not sizes:
