@@ -125,6 +125,13 @@ class Trace:
             found[column] = known.get(name, EFFORT[x])
         return found
 
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
+        """Return the `columns` as a stream of Arrow's C interface: what polars.from_dataframe and duckdb take."""
+        with package("pyarrow", "Trace.__arrow_c_stream__"):
+            import pyarrow
+
+        return pyarrow.table(self.columns()).__arrow_c_stream__(requested_schema)
+
     def to_pandas(self) -> "pandas.DataFrame":
         """Return the `columns` as a pandas DataFrame, indexed by t. Its `attrs` have the "units" and the "scenario".
 

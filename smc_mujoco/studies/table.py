@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, taken
+from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import MAX_RATIO, MAX_UNPACKED, from_json, reading, replacing, to_json
 from smc_mujoco.common.html import table
 from smc_mujoco.common.text import number
@@ -33,6 +34,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
+    import pandas  # pyright: ignore[reportMissingImports]
     import pyarrow as pa
 
 # Column -> its type, before and after the metrics.
@@ -163,6 +165,15 @@ class Table:
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         """Return the rows as a stream of Arrow's C interface: what polars.from_dataframe, duckdb and pandas take."""
         return self.data.__arrow_c_stream__(requested_schema)
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Return the rows as a pandas DataFrame.
+
+        Raises:
+          MissingPackageError: pandas is not installed.
+        """
+        with package("pandas", "Table.to_pandas"):
+            return self.data.to_pandas()
 
     def rows(self) -> list[dict[str, Any]]:
         """Return every row as column -> value."""

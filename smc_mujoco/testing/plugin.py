@@ -91,8 +91,8 @@ def step_response(
 
 
 @pytest.fixture
-def golden(request: pytest.FixtureRequest) -> Callable[..., None]:
-    """Compare a response with the metrics that `pytest --smc-update` recorded: golden(r, settling_time=0.01).
+def smc_golden(request: pytest.FixtureRequest) -> Callable[..., None]:
+    """Compare a response with the metrics that `pytest --smc-update` recorded: smc_golden(r, settling_time=0.01).
 
     Named metrics are compared within a tolerance in their unit. If none is named, all metrics are compared, within 1 %
     of their recorded value by default. With rel=0.05 the metrics that are not named are compared too, within 5 %.

@@ -5,6 +5,7 @@ import re
 from xml.etree import ElementTree
 
 import numpy as np
+import pyarrow
 import pytest
 
 import smc_mujoco as smc
@@ -128,6 +129,12 @@ def test_pandas_has_every_column_bit_for_bit_with_units(trace, cart):
         assert all(np.array_equal(frame[name], columns[name]) for name in frame.columns)
         assert frame.attrs["units"] == one.units()
         assert json.loads(frame.attrs["scenario"])["plant"]["name"] == one.scenario.plant.name
+
+
+def test_arrow_has_every_column_bit_for_bit(cart):
+    columns, table = cart.columns(), pyarrow.table(cart)
+    assert table.column_names == list(columns)
+    assert all(np.array_equal(table[name].to_numpy(), columns[name]) for name in columns)
 
 
 def test_xarray_has_every_array_bit_for_bit_with_units(trace, cart):

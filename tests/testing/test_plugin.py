@@ -337,9 +337,9 @@ def test_without_a_renderer_smc_film_is_one_sentence(session, monkeypatch):
 # golden metrics
 
 GOLDEN = """
-def test_as_ever(step_response, golden):
+def test_as_ever(step_response, smc_golden):
     r = pendulum(step_response, phi=PHI)
-    golden(r, settling_time=0.001, overshoot=0.5)
+    smc_golden(r, settling_time=0.001, overshoot=0.5)
     golden(r)
 """
 

@@ -50,10 +50,10 @@ def test_a_step_down_is_a_step_up_mirrored(step_response, plant):
 
 
 @pytest.mark.smc(plants=["inverted_pendulum", "duffing"])
-def test_in_friction_the_boundary_layer_answers_as_it_always_has(step_response, golden, plant):
+def test_in_friction_the_boundary_layer_answers_as_it_always_has(step_response, smc_golden, plant):
     narrow = smc.law("boundary_layer", k=6.0, c=6.0, phi=0.3)
     r = step_response(plant, narrow, STEP, friction=smc.Coulomb(0.05), duration=4.0)
-    golden(r, settling_time=0.002, rise_time=0.002, overshoot=0.05, steady_error=1e-5, max_u=1e-3)
+    smc_golden(r, settling_time=0.002, rise_time=0.002, overshoot=0.05, steady_error=1e-5, max_u=1e-3)
 
 
 def test_an_arm_steps_from_its_rest_on_every_joint(step_response):
