@@ -105,6 +105,10 @@ def _writable(folder: Path) -> Path:
     Raises:
       ScenarioError: it is a file, or a folder with other files in it.
     """
-    if folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / FACTS).is_file())):
+    try:
+        other = folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / FACTS).is_file()))
+    except OSError as error:  # a name that is too long
+        raise ScenarioError(f"cannot write the live page to {shown(str(folder))}: {error.strerror}") from None
+    if other:
         raise ScenarioError(f"cannot write the live page to {folder}: something else is there, choose another folder")
     return folder
