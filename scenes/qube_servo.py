@@ -28,7 +28,7 @@ scene = smc.Scene(
         "six seconds": {label: TWINS[label].scenario(duration=6.0, **RUN) for label in STANDING},
         "the start": {label: rig.scenario(duration=1.5, **RUN) for label, rig in TWINS.items()},
     },
-    film="six seconds",
+    film="the start",
     answer=answer,
 )
 

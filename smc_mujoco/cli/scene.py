@@ -9,7 +9,6 @@ from smc_mujoco.cli import tables
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, printable
-from smc_mujoco.common.progress import bar
 from smc_mujoco.draw.film.camera import Camera
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
@@ -157,5 +156,4 @@ def filmed(
         terminal.note(sentence, "yellow")
     if video.missing():
         return []
-    with bar("film", len(video.clock(runs, video.FPS, speed).times)) as drawn:
-        return [video.film(runs, path, names, title, report=drawn.advance, speed=speed, camera=camera)]
+    return [video.film(runs, path, names, title, speed=speed, camera=camera)]

@@ -56,6 +56,7 @@ SHOWN = {
     "spread\nsettles": "spread_settling_time",
 }
 FAILED = Text("failed", style="red")
+MAX_OVERSHOOT = 1000  # %, the largest that is printed as a number; chosen
 MAX_NAMED_JOINTS = 4  # in the heading of a group
 SPARKS = "▁▂▃▄▅▆▇█"
 
@@ -87,11 +88,10 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
         units = {m.name: m.unit_for(group.unit, group.effort) for m in metrics() if m.fits(group)}
         shown = {head: name for head, name in SHOWN.items() if name in units}
         heads = [Text(f"{head}\n").append(units[name], "dim") for head, name in shown.items()]
-        table = _by_label(", ".join(filter(None, (title, heading))), heads)
+        table = _by_label(", ".join(filter(None, (title, heading))), heads, traces.values())
         for label, trace in traces.items():
-            cells = (
-                [number(values[label][group.name][name]) for name in shown.values()] if label in values else [FAILED]
-            )
+            own = values[label][group.name] if label in values else {}
+            cells = [_shown(name, own[name]) for name in shown.values()] if own else [FAILED]
             table.add_row(_label(label, trace), *cells)
         tables.append(table)
     gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
@@ -107,7 +107,7 @@ def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:
     shown = {head: one for head, one in TIP.items() if any(one[0] in each for each in values.values())}
     heads = [Text(f"{head}\n").append(unit, "dim") for head, (_, unit, _) in shown.items()]
     room = len(shown) < MAX_TIP_COLUMNS
-    table = _by_label(f"{title}, tip", [*heads, *([Text("most work\n").append("J", "dim")] * room)])
+    table = _by_label(f"{title}, tip", [*heads, *([Text("most work\n").append("J", "dim")] * room)], traces.values())
     for label, trace in traces.items():
         if label not in values:
             table.add_row(_label(label, trace), FAILED)
@@ -158,7 +158,8 @@ def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> 
 
 def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace]]]) -> Table:
     """Return a table with a line for every label; each column has a heading, a metric and labelled runs."""
-    table = _by_label(title, [Text(head) for head, _, _ in columns], 30)
+    runs = [trace for _, _, each in columns for trace in each.values()]
+    table = _by_label(title, [Text(head) for head, _, _ in columns], runs, 30)
     table.min_width = len(title)  # a narrower table would break the title
     lines = {label: trace for _, _, runs in reversed(columns) for label, trace in runs.items()}
     for label in dict.fromkeys(label for _, _, runs in columns for label in runs):
@@ -170,12 +171,19 @@ def _cell(metric: Metric, trace: Trace | None) -> Text | str:
     """Return a metric of a run as text; "" if there is no run, or if the metric does not apply to its plant."""
     if trace is None or metric.refusal(trace.scenario.plant):
         return ""
-    return FAILED if trace.diverged_at is not None else number(metric.of(trace))
+    return FAILED if trace.diverged_at is not None else _shown(metric.name, metric.of(trace))
 
 
-def _by_label(title: str, heads: Iterable[Text], width: int = 16) -> Table:
-    """Return an empty table with a column for labels, at most `width` characters wide, and columns for numbers."""
-    label = Column("law", no_wrap=True, vertical="bottom", max_width=width, overflow="ellipsis")
+def _shown(metric: str, value: float) -> str:
+    """Return a score as text. A run that goes far away has no overshoot to speak of."""
+    return f"> {MAX_OVERSHOOT}" if metric == "overshoot" and MAX_OVERSHOOT < value < math.inf else number(value)
+
+
+def _by_label(title: str, heads: Iterable[Text], traces: Iterable[Trace], width: int = 16) -> Table:
+    """Return an empty table with a column for labels of traces, at most `width` wide, and columns for numbers."""
+    laws = [trace.scenario.law.name for trace in traces]
+    head = "run" if len(set(laws)) == 1 < len(laws) else "law"  # labels of one law say what differs
+    label = Column(head, no_wrap=True, vertical="bottom", max_width=width, overflow="ellipsis")
     numbers = (Column(head, justify="right", vertical="bottom") for head in heads)
     return titled(title, label, *numbers, padding=0, show_edge=False, pad_edge=False)
 

@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.ticker import ScalarFormatter
+from matplotlib.ticker import NullFormatter, ScalarFormatter
 
 from smc_mujoco.control.law import Law
 from smc_mujoco.draw import style
@@ -47,7 +47,7 @@ VISIBLE = 0.01  # of a panel's height: chattering that is smaller needs no words
 SMALL = 0.03  # of a unit: axes with smaller values show thousandths, such as mm; chosen
 FLAT = 0.02  # of a panel's height: x that stays within it rests; chosen
 ZOOM = 1.3, 0.5  # of the time until all rest: what panels over time show, if that is less than this part of the run
-ROUNDING = 1e-9  # rad or m: smaller errors are drawn at it
+ROUNDING, DECADES = 1e-9, 20.0  # rad or m: smaller errors are drawn at it; least ratio of a logarithmic axis, chosen
 JUMP = 2.0  # a reference jumps where its rate is more than this many times the 99 % quantile; chosen
 ALIKE = {"spread": "x", "e": "x", "worst": "x", "joint": "x", "settling": "x", "largest": "u", "applied": "u"} | {
     "reaction": "force", "d": "force",
@@ -327,6 +327,7 @@ def over_time(
     name, means = panel.quantity, [QUANTITIES[panel.quantity](trace).mean(axis=1) for trace in panel.traces]
     if name == "settling":
         ax.set_yscale("log")
+        ax.yaxis.set_minor_formatter(NullFormatter())
     ax.set_ylim(limits(among or panel.traces, name))
     if name == "reaction":
         clip_impacts(ax, panel, colours, label)
@@ -606,7 +607,11 @@ def lasting(traces: Sequence[Trace], name: str) -> dict[int, np.ndarray]:
 
 def far_off(traces: Sequence[Trace], name: str) -> int | None:
     """Return the index of the run that would flatten all others in a panel of an arm, or None."""
-    sizes = {k: float(np.abs(y).max()) for k, y in lasting(traces, name).items()} if name in OF_ARMS else {}
+    sizes = (
+        {k: float(np.abs(y).max()) for k, y in lasting(traces, name).items()}
+        if name in OF_ARMS and name != "settling"
+        else {}
+    )
     if len(sizes) < 2:
         return None
     *_, second, largest = sorted(sizes, key=lambda k: sizes[k])
@@ -638,6 +643,7 @@ def limits(traces: Sequence[Trace], name: str) -> tuple[float, float]:
     if name == "e":
         low, high = min(low, 0.0), max(high, 0.0)
     if name == "settling":
-        return max(low, ROUNDING) / 1.5, max(high, 2.0 * ROUNDING) * 1.5
+        high = max(high, DECADES * ROUNDING)
+        return min(max(low, ROUNDING), high / DECADES) / 1.5, high * 1.5
     air = MARGIN * (high - low) or 1.0
     return low - air, high + air

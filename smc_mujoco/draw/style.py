@@ -108,8 +108,8 @@ def law_colour(law: Component | str) -> str:
     template, name = _template(law)
     if template and template.colour:
         return template.colour
-    palette, own = _palette(), [name for name, known in known_laws().own.items() if not known.colour]
-    return palette[own.index(name) if name in own else zlib.crc32(name.encode()) % len(palette)]
+    palette = _palette()
+    return palette.get(name) or [*palette.values()][zlib.crc32(name.encode()) % len(palette)]
 
 
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
@@ -128,14 +128,17 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
 
 
 @functools.cache
-def _palette() -> tuple[str, ...]:
-    """Return colours for laws that state none, each the farthest from those before it and from all else in pictures."""
-    stated = [template.colour for template in known_laws().own.values()]
-    used = [PAPER, DISTURBANCE, REACTION, FAILED, *filter(None, stated)]
-    first = len(used)
-    for _ in range(stated.count("")):
-        used.append(_farthest([colour for colour in _grid(0) if colour not in used], used)[0])
-    return tuple(used[first:])
+def _palette() -> dict[str, str]:
+    """Return the colours of the library's laws that state none, each the farthest from all before it.
+
+    The baselines, which are beside other laws most often, are first.
+    """
+    laws = known_laws().own.values()
+    found, used = {}, [PAPER, DISTURBANCE, REACTION, FAILED, *(law.colour for law in laws if law.colour)]
+    for law in sorted((law for law in laws if not law.colour), key=lambda law: law.family != "baseline"):
+        found[law.name] = _farthest([colour for colour in _grid(0) if colour not in used], used)[0]
+        used.append(found[law.name])
+    return found
 
 
 def _farthest(colours: Sequence[str], others: Sequence[str]) -> tuple[str, float]:

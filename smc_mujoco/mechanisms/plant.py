@@ -148,6 +148,7 @@ class Plant:
       friction: that of its joints by its source, to give to a scenario, whose default is none; or None.
       limits: largest force of each driven channel's motor, N m or N; empty: no limits.
       label, short: long and short name in figures; "": made from its name.
+      scenery: what a film shows beside the machine, in words, such as "rail: a mark each 0.5 m"; "": nothing.
       jumps: "mild" or "hard" -> parameter -> factor of the jump in the suite's condition of that size.
       ranges: joint, least and largest position of each channel, rad or m; empty: no joint has limits.
       tip: name of the site that the mechanism moves: where an arm's tool is; "": none.
@@ -182,6 +183,7 @@ class Plant:
     ranges: tuple[tuple[str, float, float], ...] = ()
     label: str = ""
     short: str = ""
+    scenery: str = ""
     jumps: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
     tip: str = ""
     suggested: Mapping[str, tuple] = dataclasses.field(default_factory=dict, compare=False, repr=False)

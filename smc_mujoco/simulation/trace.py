@@ -1,5 +1,6 @@
 """A trace: what one run did at its control samples, with the scenario that made it."""
 
+import csv
 import dataclasses
 import math
 import os
@@ -13,6 +14,7 @@ from numpy.lib import format as npy
 from smc_mujoco.common.errors import ScenarioError, find, one_line
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import from_json, reading, replacing, to_json
+from smc_mujoco.mechanisms.hardware.part import column_ends, joint_names
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.scenario import Scenario
@@ -108,21 +110,26 @@ class Trace:
         return self.diverged_at is not None and (self.failure is None or self.failure.startswith(PLANT_DIVERGED))
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return the arrays by channel: t, x, v, ... for one channel, t, x0, x1, ..., v0, ... for several."""
-        n = self.x.shape[1]
+        """Return the arrays by channel: t, x, v, ... for one channel, t, x0, x1, ..., v0, ... for several.
+
+        Those of your own model have the names of its joints: x_shoulder, x_elbow, ...
+        """
+        ends = column_ends(self.scenario.plant)
         return {"t": self.t} | {
-            f"{name}{i}" if n > 1 else name: getattr(self, name)[:, i] for name in ARRAYS[1:] for i in range(n)
+            f"{name}{end}": getattr(self, name)[:, i] for name in ARRAYS[1:] for i, end in enumerate(ends)
         }
 
     def units(self) -> dict[str, str]:
         """Return the unit of each of the `columns`: "s", "rad", "N m", ...; "" for s, whose unit depends on the law."""
-        found = {}
-        for column in self.columns():
-            name = column.rstrip("0123456789")
-            i = int(column[len(name) :] or 0)
-            x, u = self.scenario.plant.units[i], self.scenario.efforts[i]
-            known = {"t": "s", "x": x, "r": x, "v": f"{x}/s", "u": u, "applied": u, "s": ""}
-            found[column] = known.get(name, EFFORT[x])
+        each = [unit for name in ARRAYS[1:] for unit in self._units(name)]
+        return dict(zip(self.columns(), ["s", *each], strict=True))
+
+    def _units(self, name: str) -> list[str]:
+        """Return the unit of an array for each channel, (n,)."""
+        found = []
+        for x, u in zip(self.scenario.plant.units, self.scenario.efforts, strict=True):
+            known = {"x": x, "r": x, "v": f"{x}/s", "u": u, "applied": u, "s": ""}
+            found.append(known.get(name, EFFORT[x]))
         return found
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
@@ -150,8 +157,9 @@ class Trace:
         """Return the arrays as an xarray Dataset: a variable for each, with dimensions t and channel.
 
         Each variable has its unit in `attrs["units"]`. Where channels have different units, the coordinate "unit" has
-        that of x for each channel, and x, v, u, ... have "by channel". The coordinate "channel" counts from 0. The
-        Dataset's `attrs` have the "scenario", and of a run that failed the "failure".
+        that of x for each channel, and x, v, u, ... have "by channel". The coordinate "channel" counts from 0, and
+        "joint" has the names of the joints. The Dataset's `attrs` have the "scenario", and of a run that failed the
+        "failure".
 
         Raises:
           MissingPackageError: xarray is not installed.
@@ -159,9 +167,7 @@ class Trace:
         with package("xarray", "Trace.to_xarray"):
             import xarray  # pyright: ignore[reportMissingImports]
 
-        units: dict[str, list[str]] = {}
-        for column, unit in self.units().items():
-            units.setdefault(column.rstrip("0123456789"), []).append(unit)
+        units = {"t": ["s"]} | {name: self._units(name) for name in ARRAYS[1:]}
         attrs = {name: {"units": own[0] if len(set(own)) == 1 else "by channel"} for name, own in units.items()}
         about = {"scenario": to_json(serialise.describe(self.scenario))}
         return xarray.Dataset(
@@ -169,6 +175,7 @@ class Trace:
             coords={
                 "t": ("t", self.t, attrs["t"]),
                 "channel": np.arange(self.x.shape[1]),
+                "joint": ("channel", list(joint_names(self.scenario.plant))),
                 "unit": ("channel", list(self.scenario.plant.units)),
             },
             attrs=about | ({"failure": self.failure} if self.failure else {}),
@@ -196,7 +203,7 @@ class Trace:
 def _write_csv(trace: Trace, file: Path) -> None:
     heads = [f"{name} [{unit}]" if unit else name for name, unit in trace.units().items()]
     with file.open("w", encoding="utf-8", newline="") as stream:
-        stream.write(f"{','.join(heads)}\n")
+        csv.writer(stream, lineterminator="\n").writerow(heads)
         for row in np.column_stack(list(trace.columns().values())):
             stream.write(f"{','.join(map(repr, row.tolist()))}\n")
 
@@ -204,8 +211,8 @@ def _write_csv(trace: Trace, file: Path) -> None:
 def _write_mat(trace: Trace, file: Path) -> None:
     from scipy.io import savemat
 
-    about, units = to_json(serialise.describe(trace.scenario)), trace.units()
-    listed = {name: [units[c] for c in units if c.rstrip("0123456789") == name] for name in ARRAYS}
+    about = to_json(serialise.describe(trace.scenario))
+    listed = {"t": ["s"]} | {name: trace._units(name) for name in ARRAYS[1:]}
     alike = {name: us[0] if len(set(us)) == 1 else np.array(us, object) for name, us in listed.items()}
     arrays = {name: getattr(trace, name) for name in ARRAYS}
     savemat(file, arrays | {"units": alike, "scenario": about}, oned_as="column")

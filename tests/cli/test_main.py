@@ -164,9 +164,9 @@ def test_with_its_output_closed_a_command_does_its_work(trace, folder):
 def test_run_prints_scores_of_a_scene_file_and_writes_its_files(call, scene, folder):
     code, out, err = call("run", scene, "--no-film", "--out", "results")
     assert (code, err) == (0, "")
-    assert {path.name for path in (folder / "results").iterdir()} == FILES
+    assert {path.name for path in (folder / "results" / "mine").iterdir()} == FILES
     said = out.partition("wrote\n")[2].split()
-    assert {Path(name) for name in said} == {Path("results") / name for name in FILES}
+    assert {Path(name) for name in said} == {Path("results/mine") / name for name in FILES}
     for heading in ("Mine, calm", "Mine, noisy"):
         assert heading in out
 
@@ -223,7 +223,7 @@ def test_no_number_and_no_heading_of_a_score_table_is_cut_at_80_columns(plant, f
     table = out.partition("Wide")[2].partition("\n\n")[0].splitlines()
     assert max(map(len, table)) <= 80
     (row,) = [line for line in table if line.startswith(LABEL[:8])]
-    (saved,) = [path for path in (folder / "out").glob("*.npz") if "label" in path.name]
+    (saved,) = [path for path in (folder / "out" / "wide").glob("*.npz") if "label" in path.name]
     values = score(smc.load(saved))
     expected = [tables.number(values[name]) for name in tables.SHOWN.values() if name in values]
     assert row.split()[-len(expected) :] == expected
@@ -249,13 +249,13 @@ def test_a_failing_law_is_named_and_others_keep_their_scores(call, undrawn, fold
     told = " ".join(out.split())
     assert "bad: law 'sour' raised ValueError (sour grapes) in channel 0, at t = 0.051 s" in told
     assert told.index("good") < told.index("bad: law 'sour'")
-    assert tables.number(score(smc.load("out/nominal-good.npz"))["ultimate_bound"]) in told
+    assert tables.number(score(smc.load("out/sour/nominal-good.npz"))["ultimate_bound"]) in told
 
 
 def test_another_seed_changes_random_numbers_and_the_same_seed_nothing(call, undrawn, scene):
     for out, seed in (("a", 1), ("b", 1), ("c", 2)):
         assert call("run", scene, "--no-film", "--out", out, "--seed", seed)[0] == 0
-    a, b, c = (smc.load(f"{out}/noisy-rough.npz") for out in "abc")
+    a, b, c = (smc.load(f"{out}/mine/noisy-rough.npz") for out in "abc")
     assert (a.scenario.seed, c.scenario.seed) == (1, 2)
     np.testing.assert_array_equal(a.x, b.x)
     np.testing.assert_array_equal(a.s, b.s)
@@ -273,7 +273,7 @@ def test_threads_are_as_many_as_asked_for_and_change_no_bit(call, undrawn, scene
     for threads in (1, 2):
         assert call("run", scene, "--no-film", "--out", str(threads), "--threads", threads)[0] == 0
     assert asked == [1, 2]
-    np.testing.assert_array_equal(smc.load("1/noisy-rough.npz").x, smc.load("2/noisy-rough.npz").x)
+    np.testing.assert_array_equal(smc.load("1/mine/noisy-rough.npz").x, smc.load("2/mine/noisy-rough.npz").x)
 
 
 def test_timing_names_the_stretches_and_they_add_up(call, scene):
@@ -292,7 +292,7 @@ def test_without_a_renderer_only_the_film_is_missing_and_one_line_says_the_cure(
     code, out, err = call("run", scene, "--out", "out")
     gl.missing.cache_clear()
     assert (code, err) == (0, "")
-    assert {path.name for path in (folder / "out").iterdir()} == FILES
+    assert {path.name for path in (folder / "out" / "mine").iterdir()} == FILES
     (line,) = [line for line in out.splitlines() if line.startswith("no film: ")]
     assert "install" in line
 
@@ -306,7 +306,7 @@ def test_with_rendering_turned_off_only_the_film_is_missing(scene, folder):
         assert (done.returncode, done.stderr) == (0, "")
         (line,) = [line for line in done.stdout.splitlines() if line.startswith("no film: ")]
         assert "MUJOCO_GL" in line
-    assert {path.name for path in (folder / "first").iterdir()} == FILES
+    assert {path.name for path in (folder / "first" / "mine").iterdir()} == FILES
 
 
 # show
@@ -362,11 +362,11 @@ def test_a_scene_of_carts_with_poles_has_a_table_of_each(call, undrawn, folder):
     cart, pole = out.split("Poles, driven: slide (m)")[1].split("Poles, free: hinge (rad)")
     assert "TV rate" in cart
     assert "TV rate" not in pole
-    peaks = smc.scores(smc.load("out/nominal-k-2.npz"))
+    peaks = smc.scores(smc.load("out/poles/nominal-k-2.npz"))
     for part, group, unit in ((cart, "driven", "m s^2"), (pole, "free", "rad s^2")):
         assert tables.number(peaks[group]["itae"]) in part
         assert unit in part
-    assert {path.name for path in (folder / "out").glob("*.npz")} == {"nominal-k-2.npz", "nominal-k--2.npz"}
+    assert {path.name for path in (folder / "out" / "poles").glob("*.npz")} == {"nominal-k-2.npz", "nominal-k--2.npz"}
 
 
 ANSWERS = """
@@ -537,7 +537,7 @@ def test_a_folder_that_cannot_be_made_is_named_before_anything_runs(call, scene,
 
 
 def test_a_file_that_cannot_be_written_is_named(call, scene, folder):
-    (folder / "out" / "noisy-rough.npz").mkdir(parents=True)
+    (folder / "out" / "mine" / "noisy-rough.npz").mkdir(parents=True)
     refused(call("run", scene, "--no-film", "--out", "out"), "noisy-rough.npz")
 
 

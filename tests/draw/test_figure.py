@@ -242,7 +242,7 @@ def test_chattering_that_cannot_be_seen_has_no_words(pair, tmp_path):
 def test_laws_keep_their_colours_and_traces_never_share_one(pair):
     assert style.law_colours([trace.scenario.law for trace in pair]) == [style.law_colour(law) for law in LAWS]
     assert len(set(style.law_colours([trace.scenario.law for trace in pair * 4]))) == 8
-    assert style.law_colour("my_own") in style._palette()
+    assert style.law_colour("my_own") in style._palette().values()
 
 
 def test_labels_are_the_laws_names_unless_given(pair):

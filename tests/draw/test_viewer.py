@@ -391,7 +391,7 @@ def test_run_exports_each_trace_beside_its_npz(call, short):
     code, out, _ = call("run", "short.py", "--no-film", "--out", "out", "--export", "csv, mat,parquet")
     assert code == 0
     files = {f"calm-one.{ending}" for ending in ("npz", "csv", "mat", "parquet")}
-    assert {path.name for path in (short / "out").iterdir()} == files
+    assert {path.name for path in (short / "out" / "short").iterdir()} == files
     assert all(file in out for file in files)
 
 

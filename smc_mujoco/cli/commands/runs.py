@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @errors_as_sentences()
 def run(
     name: options.SceneName,
-    out: Annotated[Path | None, typer.Option(help="Folder for the results; default videos/SCENE.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for results; each scene has its own in it.")] = Path("videos"),
     film: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
     speed: Annotated[
         float | None,
@@ -70,7 +70,7 @@ def run(
         scene = scene.seeded(seed)
     if camera is not None:
         scene = dataclasses.replace(scene, camera=from_text(camera))
-    terminal, folder = Terminal(), out or Path("videos") / path.stem
+    terminal, folder = Terminal(), out / path.stem
     perform(scene, folder, film, threads, clock, terminal, endings, scenes.question(path), speed)
     if timing:
         terminal.note(str(clock), "dim")
@@ -139,8 +139,9 @@ def _step_change(trace: "Trace") -> "StepChange | None":
 def _print_curves(trace: "Trace", terminal: Terminal) -> None:
     """Print the columns of a trace as curves of block characters. A large group shows only its first channel."""
     from smc_mujoco.cli import tables
+    from smc_mujoco.mechanisms.hardware.part import column_ends
 
-    plant = trace.scenario.plant
+    ends = column_ends(trace.scenario.plant)
     for group, heading in tables.headings(trace.scenario).items():
         if heading:
             terminal.note(f"{heading}:")
@@ -148,8 +149,7 @@ def _print_curves(trace: "Trace", terminal: Terminal) -> None:
         names = ["x", "v", *("u", "s") * group.driven, *["reaction"] * bool(trace.reaction[:, channels].any())]
         for name, i in itertools.product(names, channels):
             column = getattr(trace, name)[:, i]
-            label = f"{name}{i}" if plant.n > 1 else name  # the name of the exported column
-            terminal.note(f"{label} {tables.spark(column)} {column[0]:.3g} to {column[-1]:.3g}")
+            terminal.note(f"{name}{ends[i]} {tables.spark(column)} {column[0]:.3g} to {column[-1]:.3g}")
 
 
 @errors_as_sentences()

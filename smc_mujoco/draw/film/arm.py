@@ -53,7 +53,7 @@ def key(traces: Sequence[Trace]) -> list[str]:
     if style.pushes(traces):
         words.append("violet arrow: the blow")
     if any(tip.tip_error(trace).max() > LOST for trace in traces):
-        words.append("translucent: the wanted pose")
+        words.append("translucent machine: where the reference wants it")
     return words
 
 

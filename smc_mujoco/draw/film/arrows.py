@@ -51,6 +51,8 @@ class Mount(NamedTuple):
 
     Attributes:
       joint: of the film's scene.
+      beyond: whether the arrows of a hinge are on the other side of it than the body: the pendulums of a network swing
+        past each other.
       unit: length of the longest arrow at a slide, m; its factor at a hinge, over HINGE of the pendulum's.
       thick: thickness at a slide, m.
       front: direction to the camera, (3,), of arrows before a slide that carries something; None for those above it.
@@ -60,6 +62,7 @@ class Mount(NamedTuple):
     unit: float
     thick: float
     front: np.ndarray | None
+    beyond: bool = False
 
 
 def mounts(
@@ -71,11 +74,14 @@ def mounts(
     length, thick = (
         (OWN_LENGTH * extent, OWN_THICKNESS * extent) if own else (SLIDE * rail, min(THICKNESS, SHORT * rail))
     )
+    beyond = plant.network and not own
     turning = NETWORK if plant.n > 1 and not own else 1.0
     if plant.n == 1 and not own and "l" in plant.parameters and (usual := catalogue().get(plant.name)):
         turning = max(1.0, usual.parameters["l"] / plant.parameters["l"])  # no smaller on a short rod
     before = front if own or plant.free else None
-    return [Mount(j, length if slide else turning, thick, before) for j, slide in zip(joints, slides, strict=True)]
+    return [
+        Mount(j, length if slide else turning, thick, before, beyond) for j, slide in zip(joints, slides, strict=True)
+    ]
 
 
 class Loads(NamedTuple):
@@ -168,6 +174,9 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, mou
             arm / length,
         )
         along, start = np.cross(data.xaxis[mount.joint], out), radius + OFF_ARC * width
+        if mount.beyond:
+            out = np.array([0.0, 0.0, -1.0 if out[2] > 0.0 else 1.0])
+            place, along = data.xanchor[mount.joint], np.cross(out, data.xaxis[mount.joint])
     else:
         reach, width, along, out = mount.unit, mount.thick, data.xaxis[mount.joint], np.array([0.0, 0.0, 1.0])
         if mount.front is not None:

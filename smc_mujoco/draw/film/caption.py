@@ -243,13 +243,14 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
     if sizes := longest("control"):
         drive = any(scale.drive for scale in scales.values())
         what = "force of the drive" if drive else "mean control"
-        words += [f"coloured arrow: {what}, longest {sizes}", "bar: the range over which it switches"]
+        words += [f"coloured arrow: {what}, longest {sizes}", "bar: range over which it switches"]
         words += ["pale arrow: command"] * drive
     if sizes := longest("disturbance"):
         words.append(f"dark arrow: disturbance, longest {sizes}")
     if sizes := longest("reaction"):
         words.append(f"violet arrow: {reaction_words(traces)}, longest {sizes}")
-    words.append("translucent: where the reference is")
+    words.append("translucent machine: where the reference wants it")
+    words += [scenery] if (scenery := traces[0].scenario.plant.scenery) else []
     if any(gauges(trace.scenario) for trace in traces):
         words.append("strip: counts of the encoder, the line is the position, the dot what is read")
     most = max(trace.scenario.plant.n for trace in traces)
@@ -276,7 +277,7 @@ def wrapped(parts: Sequence[str], room: float, size: float) -> list[str]:
     """Return the parts in as few lines as the room allows."""
     lines: list[str] = []
     for part in parts:
-        longer = f"{lines[-1]}     {part}" if lines else part
+        longer = f"{lines[-1]}  ·  {part}" if lines else part
         if lines and style.width(longer, size) <= room:
             lines[-1] = longer
         else:

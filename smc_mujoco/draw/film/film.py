@@ -8,7 +8,7 @@ and written one by one, so that memory does not grow with a film's length.
 import contextlib
 import os
 import warnings
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,15 +17,16 @@ from PIL import Image
 from smc_mujoco.common import errors, extras, gl
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, taken, users_frame
 from smc_mujoco.common.files import replacing
+from smc_mujoco.common.progress import bar
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import finite, windows
 from smc_mujoco.draw.film import arm, arrows, pace, scene
-from smc_mujoco.draw.film.camera import Camera, checked
+from smc_mujoco.draw.film.camera import Camera, Room, checked
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.charts import Charts
 from smc_mujoco.draw.film.encoder import encoder
 from smc_mujoco.draw.film.pace import Clock
-from smc_mujoco.draw.film.puppet import motion
+from smc_mujoco.draw.film.puppet import Motion, motion
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.simulation.trace import Trace
 
@@ -34,7 +35,6 @@ MAX_MACHINES = 8  # more are too small to tell apart
 MIN_SIZE, MAX_SIZE = (320, 180), (1920, 1080)  # px
 FULL_WIDTH = 1280  # px, for which sizes of letters are stated
 CHARTS = 0.36  # height of the charts, of the film's
-BLANK = 8  # of 255: a picture whose colours differ by less shows nothing; chosen
 PAUSE = 1200  # ms for which a clip's last picture stays before it repeats
 Report = Callable[[int], None]
 
@@ -46,7 +46,7 @@ def film(
     title: str | None = None,
     size: tuple[int, int] = (1280, 720),
     fps: float = FPS,
-    report: Report = lambda frames: None,
+    report: Report | None = None,
     speed: float | None = None,
     camera: Camera | None = None,
 ) -> Path:
@@ -59,7 +59,7 @@ def film(
       labels: one a trace; default: the laws' labels.
       title: default: the plant's name.
       size: width and height in px, even.
-      report: called with the number of frames written since its last call.
+      report: called with the number of frames written since its last call; default: a progress bar.
       speed: of playback, such as 1 for real time or 0.25; default: what suits the motion, see pace.py.
       camera: name of a camera of the model, or (azimuth, elevation) in degrees as of MuJoCo's free camera, or
         (azimuth, elevation, distance), m for a lens of 45 degrees. A name and two angles give the direction of the
@@ -72,16 +72,24 @@ def film(
     path = Path(path)
     if path.suffix != ".mp4":
         raise ScenarioError(f"cannot film to {path.name!r}: end the name in .mp4")
-    pictures = frames(traces, clock(traces, fps, speed), labels, title, size, camera)
-    with replacing(path) as part, contextlib.closing(pictures):
+    shown = clock(traces, fps, speed)
+    pictures = frames(traces, shown, labels, title, size, camera)
+    with replacing(path) as part, contextlib.closing(pictures), reporting(report, len(shown.times)) as done:
         first = next(pictures)
         with encoder(part, first.shape[:2], fps) as write:
             write(first)
-            report(1)
+            done(1)
             for picture in pictures:
                 write(picture)
-                report(1)
+                done(1)
     return path
+
+
+@contextlib.contextmanager
+def reporting(report: Report | None, frames: int) -> Iterator[Report]:
+    """Yield the function that is told of frames, or that of a progress bar if there is none."""
+    with bar("film", frames, shown=report is None) as drawn:
+        yield report or drawn.advance
 
 
 def missing() -> str | None:
@@ -97,7 +105,7 @@ def clip(
     span: tuple[float, float] = (0.0, 4.0),
     size: tuple[int, int] = (800, 450),
     fps: float = 20.0,
-    report: Report = lambda frames: None,
+    report: Report | None = None,
     speed: float | None = None,
     camera: Camera | None = None,
 ) -> Path:
@@ -113,9 +121,10 @@ def clip(
     if not 0 < count <= 600:
         raise ScenarioError(f"a clip of {start:g} .. {stop:g} s has {count} frames: give a span with 1 to 600")
     pictures = []
-    for picture in frames(traces, shown, labels, title, size, camera):
-        pictures.append(Image.fromarray(picture))
-        report(1)
+    with reporting(report, count) as done:
+        for picture in frames(traces, shown, labels, title, size, camera):
+            pictures.append(Image.fromarray(picture))
+            done(1)
     ends = [round(1000 / fps)] * (count - 1) + [PAUSE]
     with replacing(path) as part:
         pictures[0].save(part, save_all=True, append_images=pictures[1:], duration=ends, loop=0, quality=60, method=4)
@@ -193,7 +202,7 @@ def frames(
     caption = Caption(traces, names, colours, title, above, scale, scales, timelines, row, below, words)
     charts = Charts(traces, names, colours, (size[0], low), scale)
     motions = [motion(trace, times) for trace in traces]
-    with Stage(traces, colours, above, caption.room, chosen, motions, caption.apart if arms else 0.0) as stage:
+    with framed(traces, colours, above, caption.room, chosen, motions, caption.apart if arms else 0.0) as stage:
         caption.place(stage.boxes)
         over = (
             arm.Overlay(traces, colours, stage.where, stage.project, above, edges, caption.badges, scale)
@@ -215,8 +224,6 @@ def frames(
                 for i, longest in enumerate([] if failed[k] or arms else by_channel[k][: stage.shown[k]]):
                     drawn += [(k, i, arrow) for arrow in arrows.arrows(loads[k], frame, i, longest, colour)]
             picture = stage.render(drawn)
-            if frame == 0:
-                warn_of_nothing(traces[0].scenario.plant.name, stage, picture)
             if over:
                 picture = over.over(picture, frame, stage.find)
             moods = tuple(each[frame] for each in timelines)
@@ -224,15 +231,36 @@ def frames(
             yield np.concatenate([picture, charts.at(time)])
 
 
-def warn_of_nothing(name: str, stage: Stage, picture: np.ndarray) -> None:
-    """Warn of a picture, (height, width, 3), of one colour, and of machines without a visible part that moves."""
-    if np.ptp(picture.reshape(-1, 3), axis=0).max() <= BLANK:
-        fact = "has one colour: give another camera, such as camera=(60, -20)"
-    elif not any(len(links) for links in stage.links):
-        fact = "shows no part that moves: give it geoms in groups 0 to 2 that are not transparent"
+def framed(
+    traces: Sequence[Trace],
+    colours: Sequence[str],
+    size: tuple[int, int],
+    room: Room,
+    chosen: Camera | None,
+    motions: Sequence[Motion | None],
+    apart: float,
+) -> Stage:
+    """Return the stage from the chosen view or, if that shows nothing, from the first of others that shows something.
+
+    Arguments are those of `Stage`. It warns of a chosen view that shows nothing, and if no view shows anything.
+    """
+    name = traces[0].scenario.plant.name
+    for view in (chosen, *scene.OTHERS):
+        stage = Stage(traces, colours, size, room, view, motions, apart)
+        if stage.shows():
+            if view != chosen is not None:
+                fact = f"camera {chosen!r} shows nothing of {name}: the picture is from camera={view}"
+                warnings.warn(fact, ScenarioWarning, users_frame())
+            return stage
+        if not any(len(links) for links in stage.links):
+            fact = "shows no part that moves: give it geoms in groups 0 to 2 that are not transparent"
+            break
+        stage.canvas.close()
     else:
-        return
+        stage = Stage(traces, colours, size, room, chosen, motions, apart)
+        fact = "shows nothing from any side: give another camera, such as camera=(60, -20, 3)"
     warnings.warn(f"the picture of {name} {fact}", ScenarioWarning, users_frame())
+    return stage
 
 
 def positions(t: np.ndarray, x: np.ndarray, times: np.ndarray) -> np.ndarray:

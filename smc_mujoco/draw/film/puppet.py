@@ -134,6 +134,6 @@ def places(puppets: Sequence[Puppet], reaches: Sequence[np.ndarray], turn: np.nd
     scenarios = [puppet.scenario for puppet in puppets]
     step = scene.lane(scenarios, reaches, turn)
     found = step * (np.arange(len(puppets)) - (len(puppets) - 1) / 2)[:, None]
-    if not scenarios[0].plant.on_stage:
-        found[:, 2] += [scene.depth(puppet.shapes[0].model) for puppet in puppets]
+    if not scenarios[0].plant.on_stage:  # the floor hides what is below it
+        found[:, 2] += [max(0.0, -float(points[:, 2].min())) for points in reaches]
     return found

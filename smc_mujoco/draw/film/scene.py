@@ -1,7 +1,7 @@
 """The model of a film: one machine a trace, side by side, without their surroundings, and a camera that suits them.
 
 Machines are the scenarios' own mechanisms with all that they touch. The camera looks in the direction of the plant's
-own camera `look`, or of the chosen one. A model that is not built on the theme keeps its lights and cameras.
+own camera `look`, or of the chosen one. A user's model keeps its cameras; its lights, sky and floor are the film's.
 """
 
 import dataclasses
@@ -34,8 +34,11 @@ HAZE = (0.66, 0.725, 0.80)  # red, green, blue, chosen
 FADED = 0.9  # part of the haze at the top of the picture, chosen
 HORIZON = 3.0  # distances of the farthest machine, where the haze is as thick if the floor reaches further
 NO_HAZE = 1.05  # a floor less far than this, of the distance of the farthest point, gets no haze; chosen
-FRONT = (1.0, 0.0, 0.0, 0.0, 0.2, 1.0)  # right and up of a camera before an own model, a little above it
-ABOVE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.35)  # of one above, for joints with vertical axes
+LOW = -12.0  # degrees, elevation of a view of an own model: a little above it, so that the floor is seen; chosen
+FRONT, ABOVE = (90.0, LOW), (90.0, -70.0)  # azimuth and elevation, degrees: of slides, and of vertical hinges
+CORNER = (125.0, -18.0)  # of hinges about several axes, which no view along one of them shows; chosen
+PARALLEL = 0.95  # cosine of two axes; chosen
+OTHERS = (CORNER, FRONT, ABOVE, (0.0, LOW), (-55.0, -30.0))  # views to try where one shows nothing
 EMISSION = 0.13  # of the floor, so that it is nearly as white as the page below
 FIXED, DIRECTIONAL = mujoco.mjtCamLight.mjCAMLIGHT_FIXED.value, mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
 PLANE, CAPSULE = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_CAPSULE
@@ -44,21 +47,16 @@ PLANE, CAPSULE = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_CAPSULE
 def compose(scenarios: Sequence[Scenario], places: np.ndarray, size: tuple[int, int]) -> mujoco.MjModel:
     """Return one model with machine k at place k, (3,) m, its names prefixed m<k>/, and a camera `film`.
 
-    A user's own model brings its lights; if it has none, it gets those of the film. Pictures are of `size` px.
+    Pictures are of `size` px.
     """
     spec = mujoco.MjSpec.from_file(str(model_path("common/theme.xml")))
     for name, value in QUALITY.items():
         setattr(spec.visual.quality, name, value)
     spec.visual.global_.offwidth, spec.visual.global_.offheight = size
-    lit = False
     for k, (scenario, place) in enumerate(zip(scenarios, places, strict=True)):
         machine = assembly.spec(scenario)
-        if k == 0 and not scenario.plant.on_stage and (lit := bool(machine.lights)):
-            take(spec.visual.headlight, machine.visual.headlight)
-            for light in list(spec.lights):
-                spec.delete(light)
         if not scenario.plant.on_stage:
-            machine = own_machine(machine, spec, lit, first=k == 0)
+            machine = own_machine(machine, spec)
             spec.attach(machine, frame=spec.worldbody.add_frame(pos=place), prefix=f"m{k}/")
             continue
         strip(machine, *machine.lights, machine.geom("floor"), machine.material("floor"), *machine.textures)
@@ -81,18 +79,16 @@ def strip(machine: mujoco.MjSpec, *surroundings) -> None:
         machine.delete(item)
 
 
-def own_machine(machine: mujoco.MjSpec, film: mujoco.MjSpec, lit: bool, first: bool) -> mujoco.MjSpec:
-    """Return a user's mechanism without its surroundings, with the film's settings, and its lights if it is `lit`.
-
-    Light that comes from everywhere is the first machine's.
-    """
+def own_machine(machine: mujoco.MjSpec, film: mujoco.MjSpec) -> mujoco.MjSpec:
+    """Return a user's mechanism without its surroundings, with the film's settings."""
     machine.option = film.option  # MuJoCo warns of settings that differ
+    for name in (name for name in dir(machine) if name.startswith("nuser_")):
+        setattr(machine, name, getattr(film, name))
     for name in ("global_", "quality", "headlight", "map", "scale", "rgba"):
         take(getattr(machine.visual, name), getattr(film.visual, name))
     planes = [geom for geom in machine.geoms if geom.type == PLANE]
     skies = [texture for texture in machine.textures if texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX]
-    dark = [light for light in machine.lights if not lit or (light.type == DIRECTIONAL and not first)]
-    strip(machine, *machine.equalities, *machine.texts, *planes, *skies, *dark)
+    strip(machine, *machine.equalities, *machine.texts, *planes, *skies, *machine.lights)
     return machine
 
 
@@ -151,9 +147,7 @@ def turn(scenario: Scenario, chosen: Camera | None = None) -> np.ndarray:
     if chosen is not None:
         return camera.turn(*chosen[:2])
     if not scenario.plant.on_stage:
-        right, up = np.reshape(view(assembly.model(scenario)), (2, 3))
-        right, back = right / np.linalg.norm(right), np.cross(right, up) / np.linalg.norm(np.cross(right, up))
-        return np.column_stack([right, np.cross(back, right), back])
+        return camera.turn(*view(assembly.model(scenario)))
     return named(scenario, LOOK)
 
 
@@ -168,23 +162,26 @@ def named(scenario: Scenario, name: str) -> np.ndarray:
     return data.cam_xmat[which].reshape(3, 3).copy()
 
 
-def view(model: mujoco.MjModel) -> tuple[float, ...]:
-    """Return right and up, (6,), of an own model's first fixed camera, or of one that sees its joints turn."""
+def view(model: mujoco.MjModel) -> tuple[float, float]:
+    """Return azimuth and elevation, degrees, of an own model's first fixed camera, or of one that sees its joints turn.
+
+    The view looks down a little at least: along the floor or from below it there is nothing to see.
+    """
     for i in range(model.ncam):
         if model.cam_bodyid[i] == 0 and model.cam_mode[i] == FIXED:
-            right, up, _ = model.cam_mat0[i].reshape(3, 3).T
-            return (*map(float, right), *map(float, up))
+            right, _, back = model.cam_mat0[i].reshape(3, 3).T
+            azimuth, elevation = np.degrees([np.arctan2(right[0], -right[1]), np.arcsin(np.clip(-back[2], -1.0, 1.0))])
+            return float(azimuth), min(float(elevation), LOW)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    turning = [i for i in joint_ids(model) if model.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE]
-    return ABOVE if turning and abs(data.xaxis[turning[0], 2]) > 0.9 else FRONT
-
-
-def depth(model: mujoco.MjModel) -> float:
-    """Return how far a model reaches below z = 0, m, planes left out."""
-    data = mujoco.MjData(model)
-    forward(model, data)
-    return max(0.0, -float(boxes(model, data)[model.geom_type != PLANE][..., 2].min(initial=0.0)))
+    axes = data.xaxis[[i for i in joint_ids(model) if model.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE]]
+    if not len(axes):
+        return FRONT
+    if (np.abs(axes @ axes[0]) < PARALLEL).any():
+        return CORNER
+    if abs(axes[0, 2]) > PARALLEL:
+        return ABOVE
+    return float(np.degrees(np.arctan2(abs(axes[0, 1]), axes[0, 0] * np.sign(axes[0, 1] or 1.0)))), LOW
 
 
 def in_a_row(scenario: Scenario, turn: np.ndarray) -> bool:

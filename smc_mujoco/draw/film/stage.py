@@ -18,7 +18,11 @@ from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.trace import Trace
 
-OWN = 0.85  # share of the law's colour in that of an own model's links; chosen
+FILLED = 0.7  # part of the width that the places of machines in a row take at least; chosen
+SAME = 1e-9  # of a camera's distance, that rounding may change
+OWN = 0.75  # share of the law's colour in that of an own model's links, where several laws are shown; chosen
+BLANK = 8  # of 255: colours that differ by less are one; chosen
+SEEN = 2e-4  # least part of a picture that shows something, such as 120 px of 1280 x 460; chosen
 GROUPS = 3  # groups of geoms that MuJoCo draws by default
 GHOST = np.array([0.12, 0.14, 0.16, 0.22], np.float32)  # ink, translucent
 INSIDE = 0.97  # size of a ghost: it is hidden by the machine that has reached its reference
@@ -53,17 +57,7 @@ class Stage:
         runs = zip(self.puppets, traces, self.motions, strict=True)
         reaches = [puppet.reach(trace, motion) for puppet, trace, motion in runs]
         distance = None if chosen is None or isinstance(chosen, str) or len(chosen) < 3 else chosen[2]
-        where = places(self.puppets, reaches, turn)
-        if arm.is_arm(traces):  # the floor hides what is below it
-            floors = [(-np.inf, -np.inf, -there[2]) for there in where]
-            reaches = [np.maximum(points, floor) for points, floor in zip(reaches, floors, strict=True)]
-        seen = [points + there for points, there in zip(reaches, where, strict=True)]
-        place = camera.fit(np.concatenate(seen), turn, size, room, distance)
-        step = np.diff(camera.project(where, turn, place, size)[:, 0]).mean() if len(where) > 1 else apart
-        if 0.0 < step < apart:  # then labels would not be below their machines
-            where *= (apart / step, apart / step, 1.0)
-            seen = [points + there for points, there in zip(reaches, where, strict=True)]
-            place = camera.fit(np.concatenate(seen), turn, size, room, distance)
+        where, seen, place = placed(traces, self.puppets, reaches, turn, size, room, distance, apart)
         self.model = scene.compose(scenarios, where, size)
         self.data, self.goal = mujoco.MjData(self.model), mujoco.MjData(self.model)
         self.aimed = np.zeros(len(traces), bool)
@@ -75,7 +69,8 @@ class Stage:
             np.flatnonzero(np.isin(self.model.geom_bodyid, np.array(each.links) + first) & self.visible())
             for each, first in zip(self.puppets, bodies, strict=False)
         ]
-        self.paint = self.model.geom_rgba.copy()
+        material = self.model.geom_matid
+        self.paint = np.where((material >= 0)[:, None], self.model.mat_rgba[material], self.model.geom_rgba)
         names = [[joint.name for joint in joints(assembly.spec(scenario))] for scenario in scenarios]
         self.joints = [[self.model.joint(f"m{k}/{name}").id for name in each] for k, each in enumerate(names)]
         self.shape, self.colours, self.changed = [-1] * len(scenarios), [""] * len(scenarios), True
@@ -102,6 +97,18 @@ class Stage:
     def __exit__(self, *_: object) -> None:
         self.canvas.close()
 
+    def shows(self) -> bool:
+        """Return whether a picture has more than one colour, and of an own model some of what its channels move."""
+        links, casts = np.concatenate(self.links), self.canvas.casts
+        groups = self.model.geom_group[links].copy()
+        self.canvas.casts = np.zeros_like(casts)  # a shadow shows nothing
+        picture, self.changed = self.canvas.draw(whole=True).astype(int), True
+        self.model.geom_group[links] = scene.HIDDEN
+        bare = self.canvas.draw(whole=True)
+        self.canvas.casts, self.model.geom_group[links] = casts, groups
+        seen = (np.abs(picture - bare).max(axis=2) > BLANK).mean() > SEEN
+        return bool(np.ptp(picture.reshape(-1, 3), axis=0).max() > BLANK and (seen or not self.own))
+
     def set_shape(self, k: int, time: float) -> None:
         """Give machine k its shape at a time, s: a scenario's rod may be longer than the plant's, and may change."""
         now = self.puppets[k].shape(time)
@@ -116,13 +123,15 @@ class Stage:
         self.changed = True
 
     def set_colour(self, k: int, colour: str) -> None:
-        """Colour the accent of machine k; of a user's own model all links."""
+        """Colour the accent of machine k; of a user's own model all links, if there are several machines."""
         if self.colours[k] == colour:
             return
         rgb, links = np.array(style.rgb(colour)) / 255, self.links[k]
         if self.own:
-            self.model.geom_matid[links] = -1
-            self.model.geom_rgba[links, :3] = OWN * rgb + (1.0 - OWN) * self.paint[links, :3]
+            if len(self.colours) > 1 or colour == style.FAILED:
+                self.model.geom_matid[links] = -1
+                self.model.geom_rgba[links] = self.paint[links]
+                self.model.geom_rgba[links, :3] = OWN * rgb + (1.0 - OWN) * self.paint[links, :3]
         else:
             self.model.mat(f"m{k}/accent").rgba[:3] = rgb
         self.colours[k], self.changed = colour, True
@@ -181,3 +190,38 @@ class Stage:
             shape.dataid, shape.objtype, shape.transparent = 2 * model.geom_dataid[i], OTHER, 1
             shape.specular = 0.0
             shown.ngeom += 1
+
+
+def placed(
+    traces: Sequence[Trace],
+    puppets: Sequence[Puppet],
+    reaches: Sequence[np.ndarray],
+    turn: np.ndarray,
+    size: tuple[int, int],
+    room: camera.Room,
+    distance: float | None,
+    apart: float,
+) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    """Return the places of the machines, (machines, 3) m, their points there, and the place of the camera, (3,) m.
+
+    Machines in a row are at least `apart` px apart, and fill FILLED of the room if that makes them no smaller.
+    """
+    where = places(puppets, reaches, turn)
+    if arm.is_arm(traces):  # the floor hides what is below it
+        floors = [(-np.inf, -np.inf, -there[2]) for there in where]
+        reaches = [np.maximum(points, floor) for points, floor in zip(reaches, floors, strict=True)]
+
+    def fitted(where: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+        seen = [points + there for points, there in zip(reaches, where, strict=True)]
+        return where, seen, camera.fit(np.concatenate(seen), turn, size, room, distance)
+
+    found = fitted(where)
+    step = np.diff(camera.project(where, turn, found[2], size)[:, 0]).mean() if len(where) > 1 else 0.0
+    pitch = FILLED * (room.right - room.left) / len(where)
+    if 0.0 < step < apart:  # else labels would not be below their machines
+        found = fitted(where * (apart / step, apart / step, 1.0))
+    elif 0.0 < step < pitch and scene.in_a_row(puppets[0].scenario, turn):
+        wide = fitted(where * (pitch / step, pitch / step, 1.0))
+        if (wide[2] - found[2]) @ turn[:, 2] < SAME * np.abs(found[2]).max():
+            return wide
+    return found

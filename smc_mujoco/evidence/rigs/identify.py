@@ -23,6 +23,7 @@ from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes, cost
 from smc_mujoco.evidence.rigs.rig import FAR_BETTER, Quantity, Rig, Source
 from smc_mujoco.evidence.rigs.rig import rig as find_rig
 from smc_mujoco.evidence.rigs.uncertainty import statistics
+from smc_mujoco.mechanisms.hardware.part import column_ends
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -187,7 +188,7 @@ def _of_plant(plant: Plant, base: Scenario | None) -> Rig:
     least = dict.fromkeys(plant.parameters, -np.inf)
     least |= dict.fromkeys((FRICTIONS | INERTIAS | {*plant.dry, *plant.added}) & set(plant.parameters), 0.0)
     least |= dict.fromkeys(plant.positive, 1e-6)
-    ends = [""] if plant.n == 1 else [str(i) for i in range(plant.n)]
+    ends = column_ends(plant)
     return Rig(
         name=plant.name,
         label=plant.label or plant.name,

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from dm_control.mjcf import RootElement
 
 MAX_TIMEOUT = 86_400.0  # s, of a timeout
+UNNAMED = mujoco.MjSpec().modelname  # name of a model whose file gives none
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 WITHOUT = "give a law without a model"
 CURRENT = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # dynamics of an actuator whose state changes although ctrl is 0
@@ -136,7 +137,7 @@ def plant_from(
       path: of an MJCF file; or the model itself: its text, an MjSpec as it is now, or a mjcf.RootElement of dm_control.
       channels: joint -> Channel, a dict of its fields, or None for the defaults; or a list of joints' names. The
         plant's channels have the same order.
-      name: name of the plant; default: the file's or the model's.
+      name: name of the plant, and title of its pictures; default: the file's, with the model's own name as the title.
       keyframe: name of the model's keyframe with the initial positions; default: the model's qpos0. Runs start at rest,
         unless the scenario has a v0.
       assets: name -> content of the files that a text names.
@@ -149,7 +150,8 @@ def plant_from(
         x0 outside its joint's range.
 
     A scenario may have model="nominal" if every joint that moves with the channels is a channel or a partner, and no
-    equality constraint acts; `plant.unmodelled` says why not. Films show the model in its own colours.
+    equality constraint acts; `plant.unmodelled` says why not. Films show the model in its own colours, mixed with the
+    laws' if there are several.
     """
     source = mjcf.source(path, assets)
     mjcf.tried(source, errors.number("timeout", timeout, above=0.0, most=MAX_TIMEOUT))
@@ -165,7 +167,8 @@ def own_plant(
     recorded: bool = False,
 ) -> Plant:
     """Return the plant of a model, see `plant_from`. `recorded` skips checks added after a run was recorded."""
-    label, model = source.label, source.compiled(source.read())
+    label, spec = source.label, source.read()
+    model, title = source.compiled(spec), spec.modelname
     if not recorded:
         mjcf.check_model(label, model)
         check_name(name)
@@ -209,6 +212,7 @@ def own_plant(
         ranges=ranges(model, joints),
         tip=tip or "",
         suggested=scenarios,
+        label=title if called == named(label) and title != UNNAMED else "",
     )
 
 

@@ -158,6 +158,13 @@ def joint_names(plant: Plant) -> tuple[str, ...]:
     return tuple(model.joint(int(joint)).name for joint in joint_ids(model))
 
 
+def column_ends(plant: Plant) -> tuple[str, ...]:
+    """Return what follows x, v, u, ... in the name of each channel's column: "", or 0, 1, ..., or _shoulder, ..."""
+    if plant.n == 1:
+        return ("",)
+    return tuple(f"_{name}" for name in joint_names(plant)) if plant.direct else tuple(map(str, range(plant.n)))
+
+
 def dof_ids(model: mujoco.MjModel) -> np.ndarray:
     """Return the indices of the channels' degrees of freedom, (n,)."""
     return model.jnt_dofadr[joint_ids(model)]

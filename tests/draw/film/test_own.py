@@ -59,6 +59,25 @@ def test_a_picture_that_shows_nothing_is_told(tmp_path, group, floor, words):
             smc.still([trace], 0.1, tmp_path / "a.png", size=(320, 180))
 
 
+def test_a_view_that_shows_nothing_is_framed_again(tmp_path):
+    """The wall hides the machine from the model's own camera, and from the chosen one."""
+    (tmp_path / "one.xml").write_text("""
+      <mujoco><worldbody><camera name="eye" pos="0 -3 1" xyaxes="1 0 0 0 0 1"/>
+        <geom type="box" pos="0 -.5 1" size="2 .1 2"/><body pos="0 0 .5"><joint name="j" axis="0 1 0"/>
+        <geom size=".1" pos="0 0 .3" rgba="1 0 0 1"/></body></worldbody>
+      <actuator><motor joint="j"/></actuator></mujoco>""")
+    trace = smc.run(smc.Scenario(plant=smc.plant_from(tmp_path / "one.xml", ["j"]), law="none", duration=0.1))
+    for chosen in (None, "eye"):
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            path = smc.still([trace], 0.1, tmp_path / "a.png", size=(640, 360), camera=chosen)
+        picture = np.asarray(Image.open(path)).astype(int)[:230]
+        assert (picture[..., 0] - picture[..., 1] > 60).sum() > 50
+        assert [str(one.message).partition(":")[0] for one in told] == ["camera 'eye' shows nothing of one"] * bool(
+            chosen
+        )
+
+
 def test_arrows_of_a_foreign_cart_are_seen_and_all_of_its_rail_is_in_the_picture():
     """The arrow lies before the pole, which stands where it begins; the rail is longer than what moves on it."""
     plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
