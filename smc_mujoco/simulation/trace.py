@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib import format as npy
 
+from smc_mujoco.common import annexes
 from smc_mujoco.common.errors import ScenarioError, find, one_line
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import from_json, reading, replacing, to_json
@@ -182,19 +183,20 @@ class Trace:
         )
 
     def export(self, path: str | os.PathLike[str]) -> Path:
-        """Write the trace to a .csv, a .parquet or a .mat file (MATLAB 5), without losing a bit of any number.
+        """Write the trace to a .csv, .parquet, .mat (MATLAB 5) or .mcap file, without losing a bit of any number.
 
         CSV: a header line with units, "t [s]", "x [rad]", ..., then a line per sample, with the fewest digits that
         identify each number (0.1, not 0.10000000000000001), and nan after a failure. Parquet: the `columns`; the
         metadata of each column has its "unit", and that of the schema the "scenario", as JSON. MAT: the arrays by name,
-        (K + 1, n), a struct `units` with the unit of each (a cell array if channels differ), and `scenario`.
+        (K + 1, n), a struct `units` with the unit of each (a cell array if channels differ), and `scenario`. MCAP:
+        the moving machine and the arrays, for Foxglove and Rerun (`pip install 'smc-mujoco[mcap]'`).
 
         Raises:
           ScenarioError: the name has another ending.
         """
         path = Path(path)
         if path.suffix not in _WRITERS:
-            raise ScenarioError(f"cannot export to {path.name!r}: end the name in .csv, .mat or .parquet")
+            raise ScenarioError(f"cannot export to {path.name!r}: end the name in .csv, .mat, .mcap or .parquet")
         with replacing(path) as file:
             _WRITERS[path.suffix](self, file)
         return path
@@ -228,7 +230,11 @@ def _write_parquet(trace: Trace, file: Path) -> None:
         parquet.write_table(pa.table(trace.columns(), pa.schema(fields, metadata={"scenario": about})), stream)
 
 
-_WRITERS = {".csv": _write_csv, ".mat": _write_mat, ".parquet": _write_parquet}
+def _write_mcap(trace: Trace, file: Path) -> None:
+    annexes.module("smc_mujoco.exchange.recording", "Trace.export to .mcap").write(trace, file)
+
+
+_WRITERS = {".csv": _write_csv, ".mat": _write_mat, ".mcap": _write_mcap, ".parquet": _write_parquet}
 FORMATS = tuple(ending.removeprefix(".") for ending in _WRITERS)  # of Trace.export
 
 

@@ -45,7 +45,7 @@ def run(
     threads: options.Threads = None,
     export: Annotated[
         str | None,
-        typer.Option(metavar="FORMAT,...", help="Also write each trace as csv, mat or parquet, beside its .npz."),
+        typer.Option(metavar="FORMAT,...", help="Also write each trace as csv, mat, mcap or parquet, beside its .npz."),
     ] = None,
     timing: Annotated[bool, typer.Option("--timing", help="Print how long each part took.")] = False,
 ) -> None:
@@ -84,7 +84,7 @@ def show(
         str | None,
         typer.Option(
             metavar="FORMAT,...|FILE",
-            help="Also write its columns, with units, as csv, mat or parquet beside TRACE, or to the FILE.",
+            help="Also write its columns, with units, as csv, mat, mcap or parquet beside TRACE, or to the FILE.",
         ),
     ] = None,
 ) -> None:

@@ -1,0 +1,162 @@
+"""A trace as an .mcap file: the moving machine, and its signals as curves, for Foxglove and Rerun.
+
+Messages are protobuf, which both read; of JSON, Rerun 0.41 shows nothing. Foxglove's own kinds have the machine:
+FrameTransforms the pose of every body in the world, SceneUpdate the shapes that move with the bodies, which Rerun does
+not draw. Each of x, v, u, applied, s, d, r, force and reaction is a topic, whose messages have a number for each joint.
+The scenario is JSON in the file's metadata.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.extras import extra
+from smc_mujoco.common.files import to_json
+from smc_mujoco.draw.film import replay
+from smc_mujoco.draw.states import shapes
+from smc_mujoco.mechanisms.hardware.part import joint_ids, joint_names
+from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation.state import LOGGED
+from smc_mujoco.simulation.trace import Trace
+
+RATE = 100.0  # Hz, most of poses: screens show 60; chosen
+GROUPS = 3  # groups of geoms that MuJoCo draws by default
+GEOM = mujoco.mjtGeom
+
+
+def write(trace: Trace, file: Path) -> None:
+    """Write a trace to an .mcap file.
+
+    Raises:
+      MissingPackageError: the extra "mcap" is not installed.
+    """
+    with extra("mcap", "Trace.export to .mcap"):
+        from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+        from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+        from mcap_protobuf.writer import Writer
+
+    message = message_of(joint_names(trace.scenario.plant))
+    fields, model = message.DESCRIPTOR.fields_by_name, shapes(trace.scenario)[0].model
+    samples, places, turns = posed(trace)
+    scene, at = SceneUpdate(), {sample: i for i, sample in enumerate(samples.tolist())}
+    add_shapes(scene, model)
+    with file.open("wb") as stream, Writer(stream) as writer:
+        about = to_json(serialise.describe(trace.scenario))
+        writer.add_metadata("trace of smc_mujoco", {"scenario": about, "failure": trace.failure or ""})
+        writer.write_message("/machine", scene, 0, 0)
+        for k, time in enumerate((1e9 * trace.t).round().astype(int).tolist()):
+            if k in at:
+                poses = FrameTransforms()
+                add_poses(poses, frames(model), places[at[k]], turns[at[k]], time)
+                writer.write_message("/poses", poses, time, time)
+            for name in LOGGED:
+                if np.isfinite(values := getattr(trace, name)[k]).any():
+                    signal = message(**dict(zip(fields, values.tolist(), strict=True)))
+                    writer.write_message(f"/{name}", signal, time, time)
+
+
+def message_of(joints: Sequence[str]) -> Any:
+    """Return a protobuf message with a number for each joint. Letters that protobuf has not in names become _."""
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+
+    file = descriptor_pb2.FileDescriptorProto(name="smc_mujoco/joints.proto", package="smc_mujoco", syntax="proto3")
+    message = file.message_type.add(name="Joints")
+    plain = [re.sub(r"^(?=\d)|\W", "_", joint, flags=re.ASCII) for joint in joints]
+    for number, name in enumerate(plain, 1):
+        unique = name if plain.count(name) == 1 else f"{name}_{number}"
+        message.field.add(name=unique, number=number, type="TYPE_DOUBLE", label="LABEL_OPTIONAL")
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(file)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName("smc_mujoco.Joints"))
+
+
+def posed(trace: Trace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return samples of a trace, (m,), at most RATE a second; places, (m, nbody, 3), and quaternions of the bodies."""
+    machines = shapes(trace.scenario)
+    data = [mujoco.MjData(machine.model) for machine in machines]
+    first = machines[0].model
+    channels = first.jnt_qposadr[joint_ids(first)]
+    step = max(1, round(1.0 / (RATE * trace.scenario.control_period)))
+    samples = np.flatnonzero(np.isfinite(trace.x).all(axis=1))[::step]
+    whole = replay.poses(trace, trace.t[samples]) if first.nq > len(channels) else None
+    if whole is None:
+        whole = np.tile(assembly.start(first, trace.scenario)[0], (len(samples), 1))
+    whole[:, channels] = trace.x[samples]
+    places, turns = np.empty((len(samples), first.nbody, 3)), np.empty((len(samples), first.nbody, 4))
+    for i, k in enumerate(samples.tolist()):
+        now = sum(trace.t[k] >= machine.time for machine in machines) - 1
+        data[now].qpos[:] = whole[i]
+        mujoco.mj_kinematics(machines[now].model, data[now])
+        places[i], turns[i] = data[now].xpos, data[now].xquat
+    return samples, places, turns
+
+
+def frames(model: mujoco.MjModel) -> list[str]:
+    """Return the name of each body's frame, (nbody,): its own, or its number; that of the first is "world"."""
+    return [model.body(i).name or f"body {i}" for i in range(model.nbody)]
+
+
+def add_poses(message: Any, names: Sequence[str], places: np.ndarray, turns: np.ndarray, time: int) -> None:
+    """Add the pose of each body in the world to a FrameTransforms; `time` in ns."""
+    for name, place, turn in list(zip(names, places, turns, strict=True))[1:]:
+        one = message.transforms.add(parent_frame_id=names[0], child_frame_id=name)
+        one.timestamp.FromNanoseconds(time)
+        put(one.translation, "xyz", place)
+        put(one.rotation, "wxyz", turn)
+
+
+def add_shapes(message: Any, model: mujoco.MjModel) -> None:
+    """Add an entity for each body to a SceneUpdate, with the shapes that MuJoCo draws, but for planes and fields."""
+    for body, name in enumerate(frames(model)):
+        entity = message.entities.add(id=name, frame_id=name, frame_locked=True)
+        for geom in range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body]):
+            material = model.geom_matid[geom]
+            rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+            if model.geom_group[geom] < GROUPS and rgba[3] > 0.0:
+                for shape, place in primitives(entity, model, geom):
+                    put(shape.color, "rgba", rgba)
+                    put(shape.pose.position, "xyz", place)
+                    put(shape.pose.orientation, "wxyz", model.geom_quat[geom])
+
+
+def primitives(entity: Any, model: mujoco.MjModel, geom: int) -> Iterator[tuple[Any, np.ndarray]]:
+    """Yield the primitives of a geom, added to an entity, with their places in the body."""
+    kind, size, place = GEOM(model.geom_type[geom]), model.geom_size[geom], model.geom_pos[geom]
+    if kind == GEOM.mjGEOM_BOX:
+        yield sized(entity.cubes.add(), 2.0 * size), place
+    elif kind in (GEOM.mjGEOM_SPHERE, GEOM.mjGEOM_ELLIPSOID):
+        yield sized(entity.spheres.add(), 2.0 * (size if kind == GEOM.mjGEOM_ELLIPSOID else size[[0, 0, 0]])), place
+    elif kind in (GEOM.mjGEOM_CYLINDER, GEOM.mjGEOM_CAPSULE):
+        yield sized(entity.cylinders.add(bottom_scale=1.0, top_scale=1.0), 2.0 * size[[0, 0, 1]]), place
+        axis = np.empty(3)
+        mujoco.mju_rotVecQuat(axis, np.array([0.0, 0.0, size[1]]), model.geom_quat[geom])
+        for end in (axis, -axis) if kind == GEOM.mjGEOM_CAPSULE else ():
+            yield sized(entity.spheres.add(), 2.0 * size[[0, 0, 0]]), place + end
+    elif kind == GEOM.mjGEOM_MESH:
+        mesh = model.mesh(model.geom_dataid[geom])
+        shape = entity.triangles.add(indices=model.mesh_face[slice_of(mesh.faceadr, mesh.facenum)].ravel().tolist())
+        for vertex in model.mesh_vert[slice_of(mesh.vertadr, mesh.vertnum)].tolist():
+            put(shape.points.add(), "xyz", vertex)
+        yield shape, place
+
+
+def slice_of(start: np.ndarray, count: np.ndarray) -> slice:
+    """Return the part of an array that an object of a model has."""
+    return slice(int(start[0]), int(start[0] + count[0]))
+
+
+def sized(shape: Any, size: np.ndarray) -> Any:
+    """Return a primitive with its size, (3,) m."""
+    put(shape.size, "xyz", size)
+    return shape
+
+
+def put(message: Any, names: str, values: Sequence[float] | np.ndarray) -> None:
+    """Set the fields of a message that have these names, of one letter each."""
+    for name, value in zip(names, values, strict=True):
+        setattr(message, name, float(value))
