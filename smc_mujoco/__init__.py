@@ -6,6 +6,9 @@
     trace = smc.run(scenario)
     print(smc.score(trace))
 
+A plant is a name of `smc.plants()`, or your own MJCF with the joints to control: `smc.which("arm.xml:shoulder,elbow")`
+tunes laws on it and says which to take.
+
 The names by task, those of a first script first; `help(smc.run)` tells what a name does:
 
     Run and look: Scenario, run, Trace, load, score, figure, plot, film, still, show

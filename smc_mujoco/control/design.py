@@ -7,7 +7,8 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown, taken
 from smc_mujoco.control.law import Law, law
-from smc_mujoco.mechanisms.plant import Plant, as_plant
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
 
 STEP = 1e-6  # rad or m, and per second: of the central differences, about the cube root of a float's precision
 

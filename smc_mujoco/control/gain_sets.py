@@ -26,7 +26,8 @@ from smc_mujoco.control import source
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.law import law as find_law
-from smc_mujoco.mechanisms.plant import Plant, as_plant
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 
 SETS = ("study", "tuned", "tracking")

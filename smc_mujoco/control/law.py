@@ -25,7 +25,8 @@ from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.registry import catalogue_of
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component, LawOptions, Template, decorated
-from smc_mujoco.mechanisms.plant import Plant, as_plant
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 
 Law = Component

@@ -19,7 +19,8 @@ from smc_mujoco.envs.rubbing import Rubbing
 from smc_mujoco.envs.tasks import TASKS, Pair, rest, reward, starts, tasks
 from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
-from smc_mujoco.mechanisms.plant import Plant, as_plant, ready
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant, ready
 from smc_mujoco.simulation import callback, coerce
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation.channels import channels

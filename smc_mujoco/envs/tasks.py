@@ -25,7 +25,8 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.mechanisms.hardware.part import joint_ids
-from smc_mujoco.mechanisms.plant import Plant, Values, as_plant
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant, Values
 from smc_mujoco.simulation.signals import Signal, Sine
 
 LN10 = math.log(10.0)

@@ -5,7 +5,8 @@ import numpy as np
 
 from smc_mujoco.common.errors import find, number
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.mechanisms.plant import Plant, as_plant, write
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant, write
 
 GRID = 41  # positions and velocities of one channel
 STATES = 500  # random states of a network

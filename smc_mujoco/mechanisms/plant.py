@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.catalogue import Catalogue
-from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, number, shown, unknown, whole
+from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, number, unknown, whole
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
@@ -347,18 +347,6 @@ def plant(name: str, **parameters: float) -> Plant:
     x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))
     smooth = not any(values[key] for key in base.dry) if base.dry else base.smooth
     return dataclasses.replace(base, parameters=values, n=n, x0=x0, smooth=smooth)
-
-
-def as_plant(value: object) -> Plant:
-    """Return a plant, from itself or its name.
-
-    Raises:
-      ScenarioError: it is neither.
-    """
-    found = plant(value) if isinstance(value, str) else value
-    if not isinstance(found, Plant):
-        raise ScenarioError(f"plant is {shown(found)}: give a name that smc.plants() lists, or smc.plant(...)")
-    return found
 
 
 def plants() -> list[str]:

@@ -27,7 +27,8 @@ from smc_mujoco.control import from_text
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import Law, checked_name, known_laws
-from smc_mujoco.mechanisms.plant import Plant, as_plant, catalogue
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant, catalogue
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, DURATION, Condition, find_condition

@@ -31,7 +31,8 @@ from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, drive_step
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Nominal
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
-from smc_mujoco.mechanisms.plant import Coupled, Plant, as_plant
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Coupled, Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.clock import Clock
 from smc_mujoco.simulation.perturbations import Jump, Noise

@@ -8,7 +8,8 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.mechanisms.inverse_kinematics import Tip, solve
-from smc_mujoco.mechanisms.plant import Plant, as_plant
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.time_series import TimeSeries
 
 STEP = 0.01  # s between the knots of a path in space: chosen; the tip leaves its path by micrometres between them

@@ -48,7 +48,8 @@ from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.source import by_words, kinds
-from smc_mujoco.mechanisms.plant import Plant, as_plant
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import last
 from smc_mujoco.simulation.conditions import Condition, find_condition
 from smc_mujoco.simulation.grid import DURATION, case, listed, listed_laws

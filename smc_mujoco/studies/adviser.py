@@ -42,10 +42,11 @@ from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import PROPERTIES, suitable
-from smc_mujoco.mechanisms.plant import Plant, as_plant
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
-from smc_mujoco.simulation.grid import case, crossed, listed, listed_laws
+from smc_mujoco.simulation.grid import case, check_moving, crossed, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.studies.advice import NEEDS, Advice, Choice, ties
 from smc_mujoco.studies.fair_gains import Candidate, fair_gains
@@ -93,7 +94,7 @@ def which(
     """Advise a law for a plant: compare all laws that suit, with gains for the plant, and say how sure the answer is.
 
     Args:
-      plant: a name, or a Plant, such as one from your own MJCF.
+      plant: a name, a Plant, or your own MJCF and its joints, as "arm.xml:shoulder,elbow".
       conditions: names, texts or Conditions, see `condition`. Default: nominal, noise and sine.
       needs: what to compare: "fast", "accurate" (at the end), "on-track" (on the way), "calm", "gentle", "frugal",
         "no-overshoot"; by default fast, accurate and calm. And what every law must have: "no-velocity", "continuous"
@@ -121,8 +122,10 @@ def which(
     asked = [find_condition(one) for one in _conditions(conditions, machine, duration)]
     if NO_VELOCITY in properties:
         asked = [_without_velocity(one) for one in asked]
-    # refuses what the plant cannot have before gains are searched
-    efforts = {case(machine, "none", one, duration, starts=starts).efforts[0] for one in asked}
+    tried = [case(machine, "none", one, duration, starts=starts) for one in asked]
+    for scenario in tried:  # refuses what cannot be compared before gains are searched
+        check_moving([scenario])
+    efforts = {scenario.efforts[0] for scenario in tried}
     chosen = _suited(machine, [name for name in properties if name != NO_VELOCITY], laws)
     found = fair_gains(machine, chosen, folder / "gains", extent.budget, starts, threads, progress)
     candidates = {candidate.law.name: candidate for candidate in found}

@@ -32,7 +32,8 @@ from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template, written
 from smc_mujoco.control.law import Law, catalogue, fits, known_laws
 from smc_mujoco.control.properties import suitable
-from smc_mujoco.mechanisms.plant import Plant, as_plant
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import coerce, serialise
 from smc_mujoco.simulation.conditions import Condition, applicable, find_condition

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable, Mapping
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.common.text import table
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.mechanisms.plant import Plant, as_plant
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import score, scores
 from smc_mujoco.metrics.channel_groups import groups
 from smc_mujoco.metrics.conventions import CATALOGUE

@@ -390,7 +390,7 @@ def test_answers_have_a_table_per_metric_with_labels_by_conditions(call, undrawn
     code, out, err = call("run", "blocks.py", "--no-film", "--out", "out")
     assert (code, err) == (0, "")
     after = out[out.index("stick_time (s)") :]
-    assert re.search(r"law +dry +wet *\n", after)
+    assert re.search(r"run +dry +wet *\n", after)
     stick, reaction = (re.findall(r"^(light|heavy) +(.*?) *$", part, re.M) for part in after.split("peak_reaction (N)"))
     assert [label for label, _ in stick] == ["light", "heavy"]
     assert stick[0][1].split()[1] == "0"  # nothing holds it in the wet
@@ -405,7 +405,7 @@ def test_answers_of_one_condition_are_one_table(call, undrawn, folder):
     (folder / "blocks.py").write_text(ANSWERS.replace(', "wet": {"light": block(0.0)}', ""))
     code, out, err = call("run", "blocks.py", "--no-film", "--out", "out")
     assert (code, err) == (0, "")
-    assert re.search(r"law +stick_time \(s\) +peak_reaction \(N\)", out)
+    assert re.search(r"run +stick_time \(s\) +peak_reaction \(N\)", out)
     assert re.search(r"heavy +0\.300 +\d", out)
 
 

@@ -255,19 +255,10 @@ def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:
 
 
 def plant(text: str) -> "str | Plant":
-    """Return a plant by its name, or from FILE.xml:joint+joint, an MJCF model with the joints to control.
+    """Return a plant's name, or the plant of FILE.xml:joint+joint."""
+    from smc_mujoco.mechanisms.named import from_text
 
-    Raises:
-      ScenarioError: a model without joints, or one that cannot be a plant.
-    """
-    from smc_mujoco.mechanisms.custom.plant_from import plant_from
-
-    path, _, joints = text.rpartition(":") if ".xml:" in text else (text, "", "")
-    if not path.endswith(".xml"):
-        return text
-    if not (chosen := [joint for joint in joints.split("+") if joint]):
-        raise ScenarioError(f"plant {text!r} names no joints: say which are controlled, as {path}:shoulder+elbow")
-    return plant_from(path, chosen)
+    return from_text(text) if ".xml" in text else text
 
 
 def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":

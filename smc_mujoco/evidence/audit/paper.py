@@ -32,7 +32,7 @@ from smc_mujoco.control.law import catalogue as laws_known
 from smc_mujoco.control.source import STUDY
 from smc_mujoco.evidence.audit.threshold import Threshold
 from smc_mujoco.evidence.audit.verdict import DERIVED, EXISTENTIAL, NAMED, OURS, PAPER, UNIVERSAL, WHOSE, Statement
-from smc_mujoco.mechanisms.custom.plant_from import plant_from
+from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.mechanisms.plant import plant as find_plant
@@ -525,11 +525,8 @@ def _plant(key: str, data: object, folder: Path) -> Plant:
     base = values.pop("plant", None)
     if not isinstance(base, str):
         raise ScenarioError(f'plants.{key} names no plant: write it as {{ plant = "duffing", delta = 0.0 }}')
-    file, _, joints = base.rpartition(":") if ".xml:" in base else (base, "", "")
     try:
-        if file.endswith(".xml"):
-            return plant_from(folder / file, [joint for joint in joints.split("+") if joint], **values)
-        return find_plant(base, **values)
+        return from_text(base, folder, **values)
     except ScenarioError as error:
         raise ScenarioError(f"plants.{key}: {error}") from None
 

@@ -11,7 +11,8 @@ from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.region import BLUES, checked
 from smc_mujoco.evidence.certificates import loops
-from smc_mujoco.mechanisms.plant import EFFORT, as_plant
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation.trace import Trace
 
 SIZE = (11.0, 5.6)  # inches

@@ -49,7 +49,7 @@ def identify(
         from smc_mujoco.evidence.rigs.identify import identify as find
         from smc_mujoco.evidence.rigs.records import load
         from smc_mujoco.evidence.rigs.rig import rigs
-        from smc_mujoco.mechanisms.plant import as_plant
+        from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.mechanisms.plant import catalogue as plants
 
     json, terminal = options.json_file(json)

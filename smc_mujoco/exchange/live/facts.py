@@ -28,7 +28,8 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.film import arrows
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
-from smc_mujoco.mechanisms.plant import Field, Plant, as_plant, catalogue, field_array, model_path
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Field, Plant, catalogue, field_array, model_path
 from smc_mujoco.simulation import controller
 from smc_mujoco.simulation import scenario as defaults
 from smc_mujoco.simulation.conditions import SENSOR_NOISE, SINE

@@ -14,7 +14,8 @@ from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.control import gain_sets as sets
-from smc_mujoco.mechanisms.plant import Plant, as_plant
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import (  # noqa: F401  # smc.paper has the paper's own numbers, too
     CONTROL_PERIOD,
     DIFFERENCED,

@@ -1,0 +1,128 @@
+"""A road of models that nobody here wrote: a plant, a run, a picture, margins, gains and C from each."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.common import gl
+from smc_mujoco.draw import panels
+from smc_mujoco.mechanisms.named import as_plant
+
+ARM = """
+<mujoco model="spatial arm">
+  <compiler angle="radian"/>
+  <default><default class="visual"><geom group="2" contype="0" conaffinity="0"/></default>
+    <default class="collision"><geom group="3" type="capsule"/></default>
+    <joint armature="0.1" damping="1"/><position kp="100" kv="10" inheritrange="1"/></default>
+  <asset><material name="white" rgba="1 1 1 1"/></asset>
+  <worldbody><light pos="0 0 3"/><geom name="floor" type="plane" size="0 0 .05"/>
+    <body name="base" pos="0 0 .3"><geom class="visual" type="cylinder" size=".08 .3" material="white" pos="0 0 -.3"/>
+      <body name="shoulder"><joint name="pan" axis="0 0 1" range="-3 3"/>
+        <geom class="visual" type="sphere" size=".09" material="white"/>
+        <inertial pos="0 0 0" mass="3" diaginertia=".1 .1 .1"/>
+        <body name="upper"><joint name="lift" axis="0 1 0" range="-2 2"/>
+          <geom class="visual" type="capsule" size=".05" fromto="0 0 0 0 0 .4" material="white"/>
+          <geom class="collision" size=".06" fromto="0 0 0 0 0 .4"/>
+          <body name="fore" pos="0 0 .4"><joint name="elbow" axis="0 1 0" range="-2.5 2.5"/>
+            <geom class="visual" type="capsule" size=".04" fromto="0 0 0 .3 0 0" material="white"/>
+            <geom class="collision" size=".05" fromto="0 0 0 .3 0 0"/></body></body></body></body>
+  </worldbody>
+  <actuator><position joint="pan" forcerange="-80 80"/><position joint="lift" forcerange="-80 80"/>
+    <position joint="elbow" forcerange="-40 40"/></actuator>
+</mujoco>"""  # as those of mujoco_menagerie: visual geoms in group 2, collision geoms in group 3, position servos
+SERVO = smc.Channel(motor=True)
+ROAD = {  # name -> package, file, channels
+    "menagerie-like": (None, ARM, {"pan": SERVO, "lift": SERVO, "elbow": SERVO}),
+    "reacher": ("dm_control", "suite/reacher.xml", ["shoulder", "wrist"]),
+    "finger": ("dm_control", "suite/finger.xml", ["proximal", "distal"]),
+    "dm acrobot": ("dm_control", "suite/acrobot.xml", ["elbow"]),
+    "manipulator": ("dm_control", "suite/manipulator.xml", ["arm_root", "arm_shoulder", "arm_elbow", "arm_wrist"]),
+    "gym reacher": ("gymnasium", "envs/mujoco/assets/reacher.xml", ["joint0", "joint1"]),
+    "gym pusher": ("gymnasium", "envs/mujoco/assets/pusher_v5.xml", ["r_shoulder_pan_joint", "r_shoulder_lift_joint"]),
+    "gym cheetah": ("gymnasium", "envs/mujoco/assets/half_cheetah.xml", ["bthigh", "bshin", "fthigh", "fshin"]),
+}
+
+
+def model(name: str) -> tuple:
+    """Return what `plant_from` takes, for a model of the road."""
+    package, file, channels = ROAD[name]
+    if package is None:
+        return file, channels
+    found = importlib.util.find_spec(package)
+    if found is None or not found.submodule_search_locations:
+        pytest.skip(f"{package} is not installed")
+    return Path(found.submodule_search_locations[0]) / file, channels
+
+
+@pytest.mark.filterwarnings("ignore:.*settotalmass", "ignore:.*Attach conflict", "ignore:no set of gains tried")
+@pytest.mark.parametrize("name", ROAD)
+def test_a_foreign_model_goes_the_whole_road(name, tmp_path):
+    text, channels = model(name)
+    plant = smc.plant_from(text, channels)
+    start = [x + 0.05 * (1 if not plant.ranges or x + 0.05 < high else -1) for x, (_, _, high) in zip(
+        plant.x0, plant.ranges or [("", 0.0, np.inf)] * plant.n, strict=True)]  # fmt: skip
+    runs = [smc.Scenario(plant=plant, law=law, x0=start, duration=0.3) for law in ("pid", "super_twisting")]
+    traces = smc.run(runs)
+    assert not [trace.failure for trace in traces if trace.failure]
+    joints = list(channels)
+    if plant.n > 1:
+        assert list(traces[0].columns())[1 : 1 + plant.n] == [f"x_{joint}" for joint in joints]
+    labels = [ax.get_ylabel() for ax in smc.figure(traces, tmp_path / "a.png").axes]
+    for joint in joints:
+        assert any(label.startswith(f"{joint} u (") for label in labels), labels
+    assert not any("mean" in label for label in labels)
+    if gl.missing() is None:
+        picture = np.asarray(Image.open(smc.still(traces, 0.2, tmp_path / "b.png", size=(640, 360)))).astype(int)
+        assert picture[60:200].std() > 5.0
+        assert (picture[60:230].min(axis=2) > 250).mean() < 0.5  # the floor is not burnt white
+    law = smc.law("pid")
+    if not plant.unscaled:
+        brief = Objective(conditions=("nominal",), duration=0.2)
+        law = smc.tune(plant, "pid", budget=4, objective=brief, starts=smc.starts(x0=start)).law
+        assert law.source.kind in ("tuned here", "default")  # where no set of gains tried is better
+    else:
+        with pytest.raises(smc.ScenarioError, match="nominal model"):
+            smc.tune(plant, "pid", budget=4, starts=smc.starts(x0=start))
+    assert "GAIN_kp" in smc.law_to_c(law)
+
+
+def test_margins_of_a_foreign_model():
+    plant = smc.plant_from(*model("menagerie-like"))
+    law = smc.law("pid", kp=400.0, ki=400.0, kd=60.0)
+    (margin,) = smc.margins(plant, law, "delay", quick=True, starts=smc.starts(x0=0.5))
+    assert 0.0 < margin.value < 0.5
+
+
+def test_a_plant_is_named_by_its_file_and_joints(tmp_path, monkeypatch):
+    (tmp_path / "arm.xml").write_text(ARM)
+    monkeypatch.chdir(tmp_path)
+    for text in ("arm.xml:lift,elbow", "arm.xml:lift+elbow", "arm.xml: lift, elbow"):
+        with pytest.raises(smc.ScenarioError, match="motor=True"):  # a menagerie's servos are not motors
+            as_plant(text)
+    (tmp_path / "arm.xml").write_text(
+        ARM.replace("<position", "<motor").replace(' kp="100" kv="10" inheritrange="1"', "")
+    )
+    for text in ("arm.xml:lift,elbow", "arm.xml:lift+elbow", "arm.xml: lift, elbow"):
+        scenario = smc.Scenario(plant=text, law="pid", x0=0.1, duration=0.1)
+        assert scenario.plant.label == "spatial arm"
+        assert [panel.label for panel in panels.strip([smc.run(scenario)])] == [
+            "lift x (rad)", "lift u (N·m)", "elbow x (rad)", "elbow u (N·m)",
+        ]  # fmt: skip
+    for text, words in (
+        ("arm.xml", "as arm.xml:shoulder"),
+        ("no.xml:a", "no model at"),
+        ("arm.xml:ift", "mean 'lift'"),
+    ):
+        with pytest.raises(smc.ScenarioError, match=words):
+            as_plant(text)
+    (tmp_path / "one.xml").write_text("""
+      <mujoco><worldbody><body><joint name="j" axis="0 1 0"/><geom size=".05" pos="0 0 -.3"/></body></worldbody>
+      <actuator><motor joint="j"/></actuator></mujoco>""")
+    with pytest.raises(smc.ScenarioError, match="starts at rest at 0"):  # before any gains are searched
+        smc.which("one.xml:j", "nominal", needs="fast", laws="pid", out=tmp_path / "which")
+    assert not (tmp_path / "which").exists()
