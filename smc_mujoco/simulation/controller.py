@@ -155,6 +155,17 @@ def _read(sim, state, i, x, v, j, hinge):
     return x, v
 
 
+@njit(error_model="numpy", inline="always")
+def _error(at, sim, function, t):
+    """Return an error of measurement at time t, s: -0 without one, which changes no bit; NaN if it raised."""
+    if function.address == 0:
+        return -0.0
+    sim.instant.t = t
+    if _call(function, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+        return math.nan
+    return sim.motion.value
+
+
 @njit(error_model="numpy")
 def _measure(at, sim, data, k, t):
     """Measure position, and estimate velocity and acceleration, of every channel at sample k, at time t, s.
@@ -166,9 +177,10 @@ def _measure(at, sim, data, k, t):
         j = max(0, math.floor((t - sim.read_delay) / sim.read_period + 1e-6))
     reading, estimate = sim.reading, sim.estimate
     reading.dt = sim.period
+    x_error, v_error = _error(at, sim, sim.position_error, t), _error(at, sim, sim.velocity_error, t)
     for i in range(sim.n):
         channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
-        position, velocity = data.sensordata[channel.x_sensor], data.sensordata[channel.v_sensor]
+        position, velocity = data.sensordata[channel.x_sensor] + x_error, data.sensordata[channel.v_sensor] + v_error
         reading.x, reading.v = _read(sim, state, i, position, velocity, j, channel.tip >= 0)
         sim.seen.i = i
         if _call(sim.estimator, i, at + record.READING_AT, at + record.ESTIMATE_AT) != 0:

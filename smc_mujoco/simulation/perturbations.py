@@ -5,18 +5,36 @@ from collections.abc import Mapping
 
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.frozen import Frozen, frozen
+from smc_mujoco.simulation.signals import PerChannel, Signal
 
 
 @dataclasses.dataclass(frozen=True)
 class Noise:
-    """Zero-mean Gaussian measurement noise, by the standard deviations of position and velocity, in SI units."""
+    """Measurement noise: zero-mean and Gaussian, and errors that are known signals of time, the same in every channel.
+
+    Attributes:
+      position, velocity: standard deviations, in SI units.
+      position_error, velocity_error: signals that are added to what is measured, such as Held(times, values).
+    """
 
     position: float = 0.0
     velocity: float = 0.0
+    position_error: Signal | None = None
+    velocity_error: Signal | None = None
 
     def __post_init__(self):
         for name in ("position", "velocity"):
             object.__setattr__(self, name, number(f"Noise's {name}", getattr(self, name), least=0.0))
+        for error in (self.position_error, self.velocity_error):
+            known = isinstance(error, Signal | None) and not isinstance(error, PerChannel)
+            if not known or (error and (error.random or error.cartesian or error.sees)):
+                cure = "give a known signal, such as smc.Held(times, values)"
+                raise ScenarioError(f"Noise's error is {shown(error)}: {cure}")
+
+    @property
+    def errors(self) -> tuple[Signal | None, Signal | None]:
+        """The errors of position and velocity."""
+        return self.position_error, self.velocity_error
 
 
 @dataclasses.dataclass(frozen=True)

@@ -44,6 +44,7 @@ class Functions:
     feedforward: Function | None
     disturbances: tuple[Function, ...]
     friction: Function | None  # by a formula
+    errors: tuple[Function | None, Function | None]  # of measurement: of position and velocity
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -104,7 +105,7 @@ def _check_code(scenario: Scenario) -> None:
     for part in (*scenario.law.parts, scenario.surface, scenario.resolved.velocity):
         if part is not None and part.function is None:
             raise ScenarioError(f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}")
-    for signal in (*known, *scenario.disturbance):
+    for signal in (*known, *scenario.disturbance, *scenario.noise.errors):
         if isinstance(signal, Recorded):
             raise ScenarioError(f"signal {signal.kind!r} came from a file without its code: give the signal")
 
@@ -112,7 +113,8 @@ def _check_code(scenario: Scenario) -> None:
 def _compile(s: Resolved) -> Functions:
     """Compile every function of a scenario; NotCompilable names the first that numba refuses."""
     plant = s.plant
-    for signal in (*dict.fromkeys(s.references), *s.disturbance, *([] if s.feedforward is None else [s.feedforward])):
+    others = [one for one in (s.feedforward, *s.noise.errors) if one]
+    for signal in (*dict.fromkeys(s.references), *s.disturbance, *others):
         native.values_of(signal)  # refuses data that compiled code would misread
     return Functions(
         laws=tuple(native.component(law) for law in s.law.of_channels(plant.driven)),
@@ -123,6 +125,7 @@ def _compile(s: Resolved) -> Functions:
         feedforward=s.feedforward and native.of_signal(s.feedforward),
         disturbances=tuple(map(native.of_signal, s.disturbance)),
         friction=s.sliding and native.of_friction(s.sliding),
+        errors=tuple(one and native.of_signal(one) for one in s.noise.errors),  # pyright: ignore[reportArgumentType]
     )
 
 
@@ -222,7 +225,8 @@ def _functions(prepared: Prepared, nominal: Native | None, buffer: state.Buffer)
         found["nominal"] = _function(compiled.nominal, s.plant.parameters.values(), buffer)
     if s.feedforward is not None:
         found["feedforward"] = _function(compiled.feedforward, native.values_of(s.feedforward), buffer)
-    return found
+    errors = zip(("position_error", "velocity_error"), compiled.errors, s.noise.errors, strict=True)
+    return found | {name: _function(made, native.values_of(one), buffer) for name, made, one in errors if one}
 
 
 def _circumstances(s: Resolved) -> dict[str, Any]:

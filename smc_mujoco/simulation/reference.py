@@ -186,8 +186,9 @@ class Loop:
         j, sensor = k, self.scenario.sensor
         if sensor is not None and sensor.period is not None:
             j = max(0, math.floor((t - sensor.delay) / sensor.period + 1e-6))
+        errors = [-0.0 if one is None else evaluate(one, t)[0] for one in self.scenario.noise.errors]
         for i in range(len(x)):
-            x[i], v[i] = self.read(i, x[i], v[i], j)
+            x[i], v[i] = self.read(i, x[i] + errors[0], v[i] + errors[1], j)
             v[i], self.a[i] = self.estimator(i, Reading(self.scenario.control_period, float(x[i]), float(v[i])))
         return x, v
 

@@ -46,7 +46,7 @@ def describe(scenario: Scenario) -> dict:
             "reference": _signal(scenario.reference),
             "feedforward": scenario.feedforward and _signal(scenario.feedforward),
             "disturbance": [_signal(d) for d in scenario.disturbance],
-            "noise": dataclasses.asdict(scenario.noise),
+            "noise": _noise(scenario.noise),
             "clock": dataclasses.asdict(scenario.clock),
             "mismatch": dict(scenario.mismatch),
             "jump": scenario.jump and {"time": scenario.jump.time, "factors": dict(scenario.jump.factors)},
@@ -82,7 +82,7 @@ def restore(data: dict) -> Scenario:
         "reference": _restore_signal(data["reference"]),
         "feedforward": (added := data.get("feedforward")) and _restore_signal(added),
         "disturbance": tuple(_restore_signal(d) for d in data["disturbance"]),
-        "noise": Noise(**data["noise"]),
+        "noise": _restore_noise(data["noise"]),
         "clock": Clock(**data["clock"]),
         "mismatch": data["mismatch"],
         "jump": data["jump"] and Jump(**data["jump"]),
@@ -122,6 +122,16 @@ def _restore_signal(data: dict) -> Signal:
         return PerChannel(tuple(_restore_signal(one) for one in data["each"]))
     kind, values = _kinds(Signal).get((data["kind"], data["module"])), _values(data)
     return kind(**values) if kind else Recorded(data["kind"], data["module"], values)
+
+
+def _noise(noise: Noise) -> dict:
+    data = {"position": noise.position, "velocity": noise.velocity}
+    errors = zip(("position_error", "velocity_error"), noise.errors, strict=True)
+    return data | {name: _signal(error) for name, error in errors if error}
+
+
+def _restore_noise(data: dict) -> Noise:
+    return Noise(**{name: _restore_signal(one) if isinstance(one, dict) else one for name, one in data.items()})
 
 
 def _parts(value: Part | Sequence[Part] | None) -> dict | list[dict] | None:

@@ -76,7 +76,7 @@ SIMULATION = np.dtype(
         ("has_drives", "i8"), ("drive_step", DRIVE_STEP),
         # the sensor: noise, encoder
         ("seed", "f8"), ("sigma_x", "f8"), ("sigma_v", "f8"), ("bias", "f8"), ("counts", "f8"), ("dropout", "f8"),
-        ("read_period", "f8"), ("read_delay", "f8"),
+        ("read_period", "f8"), ("read_delay", "f8"), ("position_error", FUNCTION), ("velocity_error", FUNCTION),
         # functions, and whether the law may use the nominal model
         ("law", FUNCTION), ("surface", FUNCTION), ("estimator", FUNCTION), ("nominal", FUNCTION),
         ("reference", FUNCTION), ("feedforward", FUNCTION), ("uses_model", "f8"),

@@ -8,7 +8,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.worst_case.strategies import recorded
-from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation import reference, serialise
 from smc_mujoco.simulation.signals import Relay
 
 CLASSICAL = smc.law("classical", k=1.826, c=2.874)
@@ -22,6 +22,7 @@ CLASSES = {
     "force": smc.Uncertainty(disturbance=2.0),
     "slope": smc.Uncertainty(disturbance=2.0, slope=8.0),
     "constants": smc.Uncertainty(mass=(0.7, 1.3), delay=(0.0, 0.01), friction=(0.0, 0.1), x0=0.2),
+    "errors": smc.Uncertainty(position_noise=0.01, velocity_noise=0.05, hold=0.04),
     "all": smc.Uncertainty(disturbance=1.0, jitter=5e-4, mass=(0.7, 1.3), parameters={"alpha": (0.8, 1.2)}),
 }
 
@@ -40,10 +41,23 @@ def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(within):
         assert np.abs(np.diff(trace.d[:, 0])).max() <= within.slope * base.control_period * (1 + 1e-9)
     made = worst.scenario
     assert 0.0 <= made.input_delay <= within.delay[1]
+    for error, bound in zip(made.noise.errors, (within.position_noise, within.velocity_noise), strict=True):
+        assert np.abs(error.values if error else 0.0).max() <= bound
+        assert error is None or np.allclose(np.diff(error.times), within.hold)
     for name, factor in made.mismatch.items():
         low, high = {"mass": within.mass, **within.parameters}[name]
         assert low <= factor <= high
     assert np.abs(np.array(made.resolved.x0) - 1.5).max() <= 1.5 * within.x0 * (1 + 1e-12)
+
+
+def test_errors_of_measurement_reach_the_law_alike_in_both_loops():
+    error, steps = smc.Held([0.0, 0.05], [0.02, -0.02]), smc.TimeSeries([0.0, 0.2], [0.1, -0.1])
+    made = scenario(duration=0.1, noise=smc.Noise(position=1e-3, position_error=error, velocity_error=steps))
+    fast, slow = smc.run(made), reference.run(made)
+    plain = smc.run(dataclasses.replace(made, noise=smc.Noise(position=1e-3)))
+    for name in ("x", "v", "u", "s"):
+        np.testing.assert_array_equal(getattr(fast, name), getattr(slow, name))
+    assert fast.s[0, 0] - plain.s[0, 0] == pytest.approx(2.874 * 0.02 + 0.1)
 
 
 def test_a_larger_budget_continues_the_search():

@@ -3,7 +3,7 @@
 A search tries the same in the same order, whatever its budget:
 
 1. constant forces, and relays that switch with the sign of s, of e and of e': an adversary who sees the loop;
-2. relays of blends of these, sines and square waves about the frequency at which the loop swings;
+2. relays of blends of these, forces that switch once, and waves about the frequency at which the loop swings;
 3. the corners of the constants of the class, at most 16, each with both constant forces and a relay of e';
 4. in turns, changes of the worst members of different origin: a piece of a force turned round, a switch shifted,
    constants moved; and an evolution of the worst member by separable CMA-ES (R. Ros & N. Hansen, PPSN X, 2008; package
@@ -63,7 +63,7 @@ class Search:
     Attributes:
       tried: every member that was run, in order.
       runs: number of runs so far.
-      swing: the first run under a relay of e', of which the loop's frequency is read.
+      swing: the first run under a relay of e', or without a force, of which the loop's frequency is read.
     """
 
     def __init__(
@@ -101,9 +101,10 @@ class Search:
         scenarios = [self.members.scenario_of(case.member, case.relay) for case in cases]
         for i, trace in stream(scenarios, self.threads, self.report):
             member, relay, origin = cases[i]
+            if self.swing is None and (relay.rate > 0.0 if relay else not self.members.forced):
+                self.swing = trace
             if relay:
                 member = dataclasses.replace(member, force=strategies.recorded(trace, relay))
-                self.swing = trace if self.swing is None and relay.rate > 0.0 else self.swing
             found[i] = Tried(member, self._key(trace), first + i if origin < 0 else origin)
             if relay and (relay.slope or trace.scenario.clock.jitter):  # it did not see, or do, quite what is recorded
                 again.append(Case(member))
@@ -129,8 +130,15 @@ class Search:
             yield [*steady, *(Case(bare.named(kind), relay) for kind, relay in relays)]
         if self.members.forced and self.swing:
             relays = [*strategies.blends(self.swing, within.disturbance, slope)]
-            waves = [self._forced(*one) for one in strategies.waves(self.swing)]
+            timed = itertools.chain(strategies.steps(self.members.samples), strategies.waves(self.swing))
+            waves = [self._forced(*one) for one in timed]
             yield [*(Case(bare.named(kind), relay) for kind, relay in relays), *waves]
+        if self.members.times:
+            base = bare if not self.members.forced else self.worst.member
+            if self.swing is None:
+                yield [Case(bare.named("no error"))]
+            found = strategies.errors(self.swing, self.members.times, self.members.held) if self.swing else ()
+            yield [Case(dataclasses.replace(base, noise=noise, kind=kind)) for kind, noise in found]
 
     def _forced(self, kind: str, force: np.ndarray) -> Case:
         """Return a member with a force, or one of the class that is near to it."""

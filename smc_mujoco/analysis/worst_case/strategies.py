@@ -4,6 +4,7 @@ Forces are over their bound, one number for each control sample, within -1 .. 1.
 function of the force, so the worst force jumps between its bounds, as most of these do.
 """
 
+import itertools
 import math
 from collections.abc import Iterator
 
@@ -14,6 +15,7 @@ from smc_mujoco.simulation.trace import Trace
 
 SIGHTS = {"sign of s": "s", "sign of e": "error", "sign of e'": "rate"}  # strategy -> what a relay looks at
 LEADS = (-1.2, -0.6, 0.6, 1.2)  # rad, by which blends of e' and e lead e' in phase; chosen
+STEPS = (0.25, 0.5, 0.75)  # of a run, at which a force switches once; chosen
 PITCHES = (0.5, 0.8, 1.0, 1.25, 2.0)  # frequencies of waves over that of the loop; chosen
 FASTEST = 0.1  # of the control frequency: a faster oscillation of the loop is chattering; chosen
 
@@ -22,6 +24,12 @@ def constants(samples: int) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the constant forces of both signs."""
     for sign in (1.0, -1.0):
         yield "constant", np.full(samples + 1, sign)
+
+
+def steps(samples: int) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield forces that change their sign once, by which time a law with an integral is used to the first one."""
+    for share, sign in itertools.product(STEPS, (1.0, -1.0)):
+        yield "one switch", np.where(np.arange(samples + 1) < share * samples, sign, -sign)
 
 
 def relays(amplitude: float, slope: float) -> Iterator[tuple[str, Relay]]:
@@ -65,6 +73,16 @@ def frequency(trace: Trace) -> float:
     late = np.nan_to_num(trace.x[:, 0] - trace.r[:, 0])[len(trace.t) // 4 :]
     swings = max(1.0, np.count_nonzero(np.diff(late > late.mean())) / 2.0)
     return min(swings / (0.75 * float(trace.t[-1])), FASTEST / trace.scenario.control_period)
+
+
+def errors(trace: Trace, times: int, held: int) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield errors of position and velocity, (2, times), held for `held` samples: constant, and as a loop swings."""
+    for signs in itertools.product((1.0, -1.0), repeat=2):
+        yield "constant error", np.repeat(np.reshape(signs, (2, 1)), times, axis=1)
+    for part in seen(trace).values():
+        signs = np.where(np.nan_to_num(part[: times * held : held]) > 0.0, 1.0, -1.0)
+        for sign in (1.0, -1.0):
+            yield "error that switches", sign * np.array([signs, signs])
 
 
 def waves(trace: Trace) -> Iterator[tuple[str, np.ndarray]]:

@@ -78,9 +78,6 @@ class Uncertainty:
         put(hold=number("Uncertainty's hold", self.hold, above=0.0))
         if self.slope is not None:
             put(slope=number("Uncertainty's slope", self.slope, above=0.0))
-        for name in ("position_noise", "velocity_noise"):
-            if getattr(self, name):
-                raise ScenarioError(f"Uncertainty's {name} is not available yet: leave it out")
         put(delay=_range("delay", self.delay, 0.0), friction=_range("friction", self.friction, 0.0))
         put(mass=_range("mass", self.mass, 0.0, strict=True))
         if not isinstance(self.parameters, Mapping):
@@ -166,6 +163,9 @@ class Members:
         self.constants = dict(_constants(scenario, within))
         self.held = max(1, round(within.hold / self.h))  # samples for which an error of measurement is held
         self.times = -(-self.samples // self.held) if within.position_noise or within.velocity_noise else 0
+        if self.times and any(scenario.noise.errors):
+            cure = "the adversary chooses them: leave them out"
+            raise ScenarioError(f"the scenario has errors of measurement, {scenario.noise.errors}, and {cure}")
         self.bare = Member(np.full(len(self.constants), 0.5), np.zeros(0), np.zeros((2, self.times)))
         for share in (0.0, 1.0):
             self.placed(np.full(len(self.constants), share))
@@ -183,7 +183,16 @@ class Members:
         if relay or len(member.force):
             signal = relay or self.signal(self.within.disturbance * member.force)
             made = dataclasses.replace(made, disturbance=(*made.disturbance, signal))
+        if self.times:
+            made = dataclasses.replace(made, noise=dataclasses.replace(made.noise, **self.errors(member.noise)))
         return made
+
+    def errors(self, noise: np.ndarray) -> dict[str, Signal]:
+        """Return the signals of a member's errors of measurement."""
+        bounds = {"position_error": self.within.position_noise, "velocity_error": self.within.velocity_noise}
+        t = (np.arange(self.times + 1) * self.held * self.h).tolist()
+        rows = zip(bounds.items(), noise, strict=True)
+        return {name: Held(t, [*(bound * row).tolist(), 0.0]) for (name, bound), row in rows if bound}
 
     def signal(self, values: np.ndarray) -> Signal:
         """Return values at the control samples as a signal: steps if they mostly rest and may jump, else lines."""

@@ -9,7 +9,6 @@ The plant is its equation M x'' = phi(x) - D(x) x' + u + d, integrated exactly, 
 else a machine does is in `Certificate.leaves_out`.
 """
 
-import dataclasses
 import functools
 import itertools
 import math
@@ -84,7 +83,8 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
 def left_out(scenario: Scenario) -> dict[str, str]:
     """Return what the theorems leave out -> what this scenario has of it, in words."""
     s = scenario.resolved
-    noise = [f"{name} {value:g}" for name, value in dataclasses.asdict(s.noise).items() if value]
+    sizes = {"position": s.noise.position, "velocity": s.noise.velocity}
+    noise = [f"{name} {value:g}" for name, value in sizes.items() if value] + ["chosen errors"] * any(s.noise.errors)
     return {
         "sampling": f"the law acts every {1e3 * s.control_period:g} ms",
         "delay": f"{1e3 * s.input_delay:g} ms" if s.input_delay else "none here",
