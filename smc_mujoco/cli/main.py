@@ -30,6 +30,7 @@ GROUPS = {  # heading in the help -> name -> command; the annexes add theirs
     "Tune and analyse": {
         "tune": analysis.tune,
         "margins": analysis.margins,
+        "worst": analysis.worst,
         "accuracy": analysis.accuracy,
         "basin": analysis.basin,
         "chatter": analysis.chatter,

@@ -26,6 +26,8 @@ from smc_mujoco.metrics.tip import tip_scores, worst_joint
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.accuracy import AccuracyTable, heads, lines, remarks
+from smc_mujoco.studies.worst_case import HEADINGS as HEADINGS_OF_WORST
+from smc_mujoco.studies.worst_case import WorstCases
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.chattering import Chattering
@@ -277,6 +279,15 @@ def margins(kind: str, found: Sequence[Margin]) -> Table:
         within = number(margin.resolution) if margin.resolution else ""
         table.add_row(plant, law, value, within, theory, margin.unit)
         last = margin.plant
+    return table
+
+
+def worst_cases(found: WorstCases) -> Table:
+    """Return the worst cases of laws: a line for each, the least bad first."""
+    law, *numbers, by = HEADINGS_OF_WORST
+    table = titled(found.title, law, *(Column(head, justify="right", no_wrap=True) for head in numbers), by)
+    for one, (name, *cells) in zip(found, found.rows, strict=True):
+        table.add_row(Text(name, style=style.law_colour(one.nominal.law.name)), *cells)
     return table
 
 

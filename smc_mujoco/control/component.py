@@ -72,6 +72,7 @@ class LawOptions(SurfaceOptions, total=False):
     continuous: bool
     finite_time: str
     accuracy: Mapping[str, Order]
+    admits: Mapping[str, Callable[[SimpleNamespace], float]]
     joint: bool
 
 
@@ -237,6 +238,7 @@ class Template:
       rest: its linear part; None if it is not linear at rest.
       family, continuous, finite_time: as in the decorator; `smc_mujoco.control.properties` chooses laws by them.
       accuracy: as in the decorator; `order` evaluates it.
+      admits: as in the decorator.
       joint: whether it is a law of many joints.
     """
 
@@ -257,6 +259,7 @@ class Template:
     continuous: bool = False
     finite_time: str = ""
     accuracy: Mapping[str, Order] = dataclasses.field(default_factory=dict)
+    admits: Mapping[str, Callable[[SimpleNamespace], float]] = dataclasses.field(default_factory=dict)
     joint: bool = False
 
     def __repr__(self) -> str:

@@ -131,7 +131,8 @@ def _noise(noise: Noise) -> dict:
 
 
 def _restore_noise(data: dict) -> Noise:
-    return Noise(**{name: _restore_signal(one) if isinstance(one, dict) else one for name, one in data.items()})
+    errors: dict = {name: _restore_signal(one) for name, one in data.items() if isinstance(one, dict)}
+    return Noise(**data | errors)
 
 
 def _parts(value: Part | Sequence[Part] | None) -> dict | list[dict] | None:

@@ -10,19 +10,21 @@ adversary than another: `analysis.worst_case` describes both. What it finds is a
 """
 
 import dataclasses
+import math
 import os
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from smc_mujoco.analysis.worst_case.search import Search
-from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty
+from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, outside
 from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.progress import bar
-from smc_mujoco.common.text import number
+from smc_mujoco.common.text import number, table
 from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -35,6 +37,8 @@ METRIC = "rms_error"
 STEPS = 1_250_000  # physics steps times channels of the search in the default budget: 5 s of a core for a plain plant
 MIN_RUNS, MAX_RUNS = 32, 1024  # of the default budget
 MOST_RUNS = 1_000_000
+PANELS = "error", "d", "u", "phase"  # of a figure
+HEADINGS = "law", "worst found", "median", "place by median", "found by"
 BEGIN = 2  # random members that the search also changes, the worst of them
 
 
@@ -78,19 +82,30 @@ class WorstCase:
         label = CATALOGUE[self.metric].label
         return (
             f"{s.law.name} on {s.plant.name}: {label} {self.words}, median of random members "
-            f"{number(self.median)}; {self.within.words(s.plant)}"
+            f"{self.shown(self.median)}; {self.within.words(s.plant)}"
         )
+
+    def shown(self, value: float) -> str:
+        """Return a value of the metric as text: "fails" where a run failed."""
+        return "fails" if value == math.inf and self.unit != "s" else number(value)
 
     @property
     def words(self) -> str:
         """The value with its unit, such as "0.98 m"."""
-        return f"{number(self.value)} {self.unit}".strip()
+        return f"{self.shown(self.value)} {self.unit * (self.value < math.inf)}".strip()
+
+    def about(self) -> dict[str, Any]:
+        """Return it as JSON data. `scenario` is what a trace's file has, too."""
+        values = {name: getattr(self, name) for name in ("value", "median", "unit", "found_by", "tried", "metric")}
+        rest = {"strategies": dict(self.strategies), "outside": self.outside, "seed": self.seed}
+        within = dataclasses.asdict(self.within)
+        return values | rest | {"within": within, "scenario": serialise.describe(self.scenario)}
 
     def _repr_html_(self) -> str:
         rows = sorted(self.strategies.items(), key=lambda pair: -pair[1])
         return html.table(
             ["strategy", f"largest {CATALOGUE[self.metric].label}" + f" ({self.unit})" * bool(self.unit)],
-            [(kind, number(value)) for kind, value in rows],
+            [(kind, self.shown(value)) for kind, value in rows],
             str(self),
             "; ".join(filter(None, [f"{self.tried} runs, half of them random", self.outside])),
             range(1, 2),
@@ -111,9 +126,69 @@ class WorstCase:
         traces = run([self.nominal, self.scenario])
         title = title or f"{traces[0].scenario.plant.name}: the worst of {self.within.words(self.nominal.plant)}"
         labels = "as given", f"worst found, {CATALOGUE[self.metric].label} {self.words}"
-        return figure(traces, path, labels, title, ("error", "d", "u", "s", "phase"), size, format, fig)
+        return figure(traces, path, labels, title, PANELS, size, format, fig)
 
     plot = figure
+
+
+class WorstCases(list[WorstCase]):
+    """Worst cases of several laws on one plant within one class, the least bad law first, as a table."""
+
+    def __init__(self, found: Iterable[WorstCase]):
+        super().__init__(sorted(found, key=lambda one: (one.value, one.median)))
+
+    @property
+    def tau(self) -> float:
+        """Kendall's tau between the order by median and the order by worst found; NaN for fewer than two laws."""
+        from scipy.stats import kendalltau
+
+        return float(kendalltau([one.median for one in self], [one.value for one in self]).statistic)
+
+    @property
+    def title(self) -> str:
+        """Plant, metric and class."""
+        one = self[0]
+        unit = f" in {one.unit}" * bool(one.unit)
+        return f"{one.nominal.plant.name}: {CATALOGUE[one.metric].label}{unit}, {one.within.words(one.nominal.plant)}"
+
+    @property
+    def rows(self) -> list[tuple[str, str, str, str, str]]:
+        """Law, worst found, median of random members, its place by median, and what found the worst."""
+        by_median = sorted(self, key=lambda one: one.median)
+        return [
+            (
+                one.nominal.law.name,
+                one.shown(one.value),
+                one.shown(one.median),
+                str(by_median.index(one) + 1),
+                one.found_by,
+            )
+            for one in self
+        ]
+
+    @property
+    def notes(self) -> list[str]:
+        """Kendall's tau, and what is known of laws whose theorem the class goes beyond."""
+        tau = [f"Kendall's tau between the two orders: {self.tau:.2f}"] if len(self) > 2 else []
+        return tau + [f"{one.nominal.law.name}: {one.outside}" for one in self if one.outside]
+
+    def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
+        """Draw the worst runs of all laws; arguments as in `smc.figure`."""
+        from smc_mujoco.draw.figure import figure
+
+        if len(self) == 1:
+            return self[0].figure(path, **options)
+        options = {"title": self.title, "panels": PANELS} | options
+        labels = [f"{one.nominal.law.name}: {one.words}" for one in self]
+        return figure(run([one.scenario for one in self]), path, labels, **options)
+
+    def __str__(self) -> str:
+        return "\n".join([self.title, table(HEADINGS, self.rows), *self.notes])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return html.table(HEADINGS, self.rows, self.title, "; ".join(self.notes), range(1, 4), len(self))
 
 
 def worst_case(
@@ -170,7 +245,7 @@ def worst_case(
         nominal=scenario,
         within=within,
         metric=metric,
-        outside="",
+        outside=outside(scenario, within),
         seed=seed,
     )
 

@@ -10,6 +10,7 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.worst_case.strategies import recorded
 from smc_mujoco.simulation import reference, serialise
 from smc_mujoco.simulation.signals import Relay
+from smc_mujoco.studies.worst_case import WorstCases
 
 CLASSICAL = smc.law("classical", k=1.826, c=2.874)
 
@@ -120,3 +121,15 @@ def test_a_failed_run_is_the_worst():
 def test_bad_values_get_a_sentence(make, part):
     with pytest.raises(smc.ScenarioError, match=part):
         make()
+
+
+def test_a_table_orders_by_the_worst_and_says_what_a_theorem_leaves_out():
+    laws = "observer_free", smc.law("classical", k=1.9), smc.law("super_twisting", k2=1.0)
+    found = WorstCases(smc.worst_case(scenario(law=law), within=CLASSES["force"], budget=3) for law in laws)
+    assert [one.value for one in found] == sorted(one.value for one in found)
+    assert sorted(note.partition(":")[0] for note in found.notes) == [
+        "Kendall's tau between the two orders", "classical", "super_twisting",
+    ]  # fmt: skip
+    text = str(found)
+    assert "its theorem needs |d| < 1.9 N with these gains" in text
+    assert "its theorem needs |d'| < 1 N/s with these gains" in text

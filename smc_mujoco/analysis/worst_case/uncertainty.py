@@ -13,11 +13,13 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Iterator, Mapping
+from types import SimpleNamespace
 
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.simulation.scenario import Scenario
@@ -108,6 +110,23 @@ class Uncertainty:
         parts += [f"jitter <= {self.jitter:g} s"] if self.jitter else []
         parts += [f"x0 within {100 * self.x0:g} %"] if self.x0 else []
         return ", ".join(parts)
+
+
+def outside(scenario: Scenario, within: Uncertainty) -> str:
+    """Return how a class goes beyond the theorem of the law, in words; "" if nothing is known of that."""
+    found, d, u = [], within.disturbance, EFFORT[scenario.plant.units[0]]
+    if d >= (most := min(scenario.limits)):
+        found.append(f"no law with |u| <= {most:g} {u} holds |d| = {d:g} {u}")
+    admits = {} if scenario.law.template is None else scenario.law.template.admits
+    for gains in [SimpleNamespace(**one.gains) for one in scenario.law.of_channels(scenario.plant.driven)][:1]:
+        if d and "d" in admits and d >= (bound := admits["d"](gains)):
+            found.append(f"its theorem needs |d| < {bound:.3g} {u} with these gains")
+        if d and "d'" in admits and (within.slope or math.inf) >= (bound := admits["d'"](gains)):
+            found.append(f"its theorem needs |d'| < {bound:.3g} {u}/s with these gains")
+    beside = {"delay": within.delay[1], "noise": within.position_noise + within.velocity_noise, "jitter": within.jitter}
+    if admits and any(beside.values()):
+        found.append(f"its theorem is without {joined(name for name, size in beside.items() if size)}")
+    return "; ".join(found)
 
 
 def _range(name: str, value: object, least: float, strict: bool = False) -> Range:

@@ -144,6 +144,86 @@ def margins(
 
 
 @errors_as_sentences()
+def worst(
+    plant: options.PlantName,
+    law: options.Laws = None,
+    disturbance: Annotated[float, typer.Option(help="Bound on |d|, N or N m, on every driven joint.")] = 0.0,
+    slope: Annotated[float | None, typer.Option(help="Bound on |d'|, per second; default: d may jump.")] = None,
+    position_noise: Annotated[float, typer.Option(help="Bound on errors of measured positions, rad or m.")] = 0.0,
+    velocity_noise: Annotated[float, typer.Option(help="Bound on errors of measured velocities, per second.")] = 0.0,
+    hold: Annotated[float, typer.Option(help="How long each error of measurement lasts, s.")] = 0.05,
+    delay: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Input delay, s, as 0:0.01.")] = None,
+    jitter: Annotated[float, typer.Option(help="Largest delay of a control sample, s.")] = 0.0,
+    mass: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Factor on the mass, as 0.7:1.3.")] = None,
+    friction: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Dry friction, N or N m, as 0:0.1.")] = None,
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=LOW:HIGH", help="Another parameter, as alpha=0.8:1.2. May be repeated."),
+    ] = None,
+    spread: Annotated[float, typer.Option(help="How far x0 may be off, as a share of it.")] = 0.0,
+    metric: Annotated[str, typer.Option(help="The metric that is to be large; any of `smc.score`.")] = "rms_error",
+    gains: options.Gains = "tuned",
+    condition: options.Condition = "nominal",
+    duration: Annotated[float, typer.Option(help="Duration of the runs, s.")] = 8.0,
+    budget: Annotated[int | None, typer.Option(min=1, help="Runs of a search; default: about 10 s a law.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the search.")] = 0,
+    out: Annotated[
+        Path | None, typer.Option(help="Also draw the worst runs, as OUT.svg and OUT.png, or OUT.pdf.")
+    ] = None,
+    json: options.Json = None,
+    threads: options.Threads = None,
+) -> None:
+    """Find the worst that can happen to laws within bounds that you give: an adversary instead of random seeds.
+
+    You say what is uncertain, and nothing else: a bound on the disturbance, ranges of mass, delay and friction. The
+    search is the same for every law: constant forces, forces that switch with the sign of s, of e or of its rate, waves
+    at the frequency of the loop, all corners of the ranges, and an evolution from the worst of these. The column worst
+    found has the error of the worst run, the column median that of as many random members of the class. Laws are
+    ordered by the worst. A line below the table says where a class goes beyond the theorem of a law. What is found is
+    a lower bound: there may be worse.
+
+    Example: smc-mujoco worst duffing --law classical,super_twisting,observer_free --disturbance 2 --mass 0.7:1.3
+    """
+    with held_back():
+        from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+        from smc_mujoco.cli import tables
+        from smc_mujoco.common.files import ended, writable, write_json
+        from smc_mujoco.control import gain_sets
+        from smc_mujoco.draw.page import files
+        from smc_mujoco.simulation.grid import case
+        from smc_mujoco.studies.worst_case import WorstCases, worst_case
+
+    json, terminal = options.json_file(json)
+    for file in (*(files(out) if out else ()), *([ended(json, ".json")] if json else [])):
+        writable(file)
+    apart = [text.partition("=") for text in parameter or ()]
+    known = {"delay": delay, "mass": mass, "friction": friction}
+    within = Uncertainty(
+        disturbance=disturbance,
+        slope=slope,
+        position_noise=position_noise,
+        velocity_noise=velocity_noise,
+        hold=hold,
+        jitter=jitter,
+        x0=spread,
+        parameters={name: options.low_and_high(f"--parameter {name}", text) for name, _, text in apart},
+        **{name: options.low_and_high(f"--{name}", text) for name, text in known.items() if text},
+    )
+    chosen, machine = options.laws(law, gain_sets.LAWS), options.plant(plant)
+    cases = [case(machine, one, condition, duration, gains) for one in chosen]
+    found = WorstCases(worst_case(one, metric, within, budget, seed, threads, progress=True) for one in cases)
+    terminal.print(tables.worst_cases(found))
+    for note in found.notes:
+        terminal.note(note, "dim", wrap=True)
+    terminal.note(f"{sum(one.tried for one in found)} runs, {options.gains_used(chosen, gains)}", "dim")
+    if json:
+        terminal.wrote(write_json(ended(json, ".json"), [one.about() for one in found]))
+    if out:
+        found.figure(out)
+        terminal.wrote(*files(out))
+
+
+@errors_as_sentences()
 def accuracy(
     plants: Annotated[
         list[str], typer.Argument(metavar="PLANT", help="Plants from `smc-mujoco list`, or FILE.xml:joint+joint.")

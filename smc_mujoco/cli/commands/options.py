@@ -304,6 +304,19 @@ def compared_laws(
     return laws(texts)
 
 
+def low_and_high(option: str, text: str) -> tuple[float, float]:
+    """Return the ends of a range such as "0.7:1.3".
+
+    Raises:
+      ScenarioError: the text is no range.
+    """
+    try:
+        low, high = map(float, text.split(":"))
+    except ValueError:
+        raise ScenarioError(f"{option} is {text!r}: give the lowest and the highest, as 0.7:1.3") from None
+    return low, high
+
+
 def starts(x0: float | None, spread: float | None) -> "Starts | None":
     """Return the initial states of runs, or None if neither option is set."""
     from smc_mujoco.simulation import initial_states

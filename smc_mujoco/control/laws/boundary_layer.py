@@ -23,6 +23,7 @@ REST = Rest(
     family="first-order",
     continuous=True,
     accuracy={"s": 0, "e": 0},
+    admits={"d": lambda g: g.k},
     gains={
         "k": Gain(6.0, FORCE, nonnegative=True),
         "c": Gain(2.5, RATE, nonnegative=True),

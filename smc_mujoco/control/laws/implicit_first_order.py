@@ -18,6 +18,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
     family="first-order",
     finite_time="s",
     accuracy={"s": 1, "e": 1},
+    admits={"d": lambda g: g.k},
     label="Implicit first-order",
     gains={"k": Gain(4.0, FORCE, nonnegative=True), "c": Gain(2.5, RATE, nonnegative=True)},
 )

@@ -22,6 +22,7 @@ REST = Rest(linear=lambda g: (g.lam, g.k1), force=lambda g, x: g.lam * np.tanh(g
     family="observer-free",
     continuous=True,
     accuracy={"s": 0, "e": 0},
+    admits={"d": lambda g: g.lam},
     gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE)},
     label="Observer-free",
     short="OF",

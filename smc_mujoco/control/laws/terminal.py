@@ -18,6 +18,7 @@ from smc_mujoco.control.units import FORCE, Gain, Unit
     family="terminal",
     finite_time="e",
     accuracy={"s": 1, "e": lambda g: 1.0 / g.p},
+    admits={"d": lambda g: g.k},
     gains={
         "k": Gain(4.0, FORCE, positive=True),
         "b": Gain(2.0, lambda g: Unit(position=1 - g.p, time=-1), positive=True),

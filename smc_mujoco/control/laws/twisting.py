@@ -16,6 +16,7 @@ from smc_mujoco.control.units import FORCE, Gain
     family="higher-order",
     finite_time="e",
     accuracy={"s": 2, "e": 2},
+    admits={"d": lambda g: min(g.r1 - g.r2, g.r2)},
     gains={"r1": Gain(3.7, FORCE, positive=True), "r2": Gain(2.3, FORCE, positive=True)},
     memory=1,
     relative_degree=2,
