@@ -659,6 +659,7 @@ def test_a_run_of_one_step_by_hand():
         "steady_error": 1.0,
         "ultimate_bound": 1.0,
         "ripple": 0.0,
+        "rms_error": 1.0,  # of the last sample alone
         "ise": 0.5 * (4 + 1) / 2,
         "iae": 0.5 * (2 + 1) / 2,
         "itae": 0.5 * (0 + 0.5) / 2,
@@ -734,7 +735,8 @@ def test_scaling_x_and_r_scales_lengths_and_leaves_times_and_percentages(trace, 
         return  # the scale is then 1 by convention
     before = m.score(trace)
     after = m.score(dataclasses.replace(trace, x=c * trace.x, r=c * trace.r))
-    powers = dict.fromkeys(("peak", "steady_error", "ultimate_bound", "ripple", "iae", "itae", "spread_bound"), 1)
+    lengths = "peak", "steady_error", "ultimate_bound", "ripple", "rms_error", "iae", "itae", "spread_bound"
+    powers = dict.fromkeys(lengths, 1)
     powers["ise"] = 2
     for name, value in before.items():
         assert after[name] == pytest.approx(abs(c) ** powers.get(name, 0) * value, rel=1e-12, abs=1e-12, nan_ok=True), (
