@@ -109,6 +109,7 @@ def test_a_law_of_many_joints_may_be_late_too():
 def test_a_law_that_raises_late_ends_the_run_with_its_own_reason():
     made = dataclasses.replace(scenario(smc.Clock(jitter=0.9 * PERIOD)), law=failing_at_half_a_second())
     trace = smc.run(made)
+    assert trace.failure is not None
     assert "late" in trace.failure
     assert_same(trace, reference.run(made))
 

@@ -378,7 +378,7 @@ def test_numbers_that_are_no_time_series_are_refused(times, values, parts):
 
 
 @dataclasses.dataclass(frozen=True)
-class Held(Signal):
+class Staircase(Signal):
     """A user's series: the last value, times a gain."""
 
     gain: float = 2.0
@@ -392,15 +392,15 @@ class Held(Signal):
 
 
 def test_a_user_s_series_has_parameters_beside_its_data():
-    np.testing.assert_array_equal(compiled(Held(), [0.05, 0.15])[:, 0], [2.0, 4.0])
-    made = scenario(law="none", disturbance=Held(3.0))
+    np.testing.assert_array_equal(compiled(Staircase(), [0.05, 0.15])[:, 0], [2.0, 4.0])
+    made = scenario(law="none", disturbance=Staircase(3.0))
     np.testing.assert_array_equal(smc.run(made).d, reference.run(made).d)
 
 
 @pytest.mark.parametrize("data", [np.zeros(3), np.zeros((3, 2)), np.zeros((2, 3), int), np.zeros((3, 2)).T], ids=str)
 def test_data_that_compiled_code_would_misread_are_refused(data, monkeypatch):
-    monkeypatch.setattr(Held, "data", data)
-    refused(lambda: native.values_of(Held()), "Held", data.shape)
+    monkeypatch.setattr(Staircase, "data", data)
+    refused(lambda: native.values_of(Staircase()), "Staircase", data.shape)
 
 
 # CSV files

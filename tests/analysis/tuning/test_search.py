@@ -221,9 +221,16 @@ def test_the_search_knows_nothing_of_the_gains_it_is_given():
     assert one.before != other.before
 
 
-def test_a_law_without_units_is_refused():
-    with pytest.raises(smc.ScenarioError, match=r"no unit of failing's gain 'when'.*Gain\(.*in its decorator"):
-        tune("duffing", failing(), budget=5, objective=LEAN)
+def test_gains_without_units_are_searched_about_their_defaults_with_a_warning():
+    with pytest.warns(smc.ScenarioWarning, match=r"failing's when and k have no unit.*Gain\("):
+        tuned = tune("duffing", failing(), budget=5, objective=LEAN)
+    for name, (low, high) in tuned.bounds.items():
+        assert low * high == pytest.approx(failing().gains[name] ** 2)
+
+
+def test_a_gain_without_a_unit_that_is_not_positive_is_refused():
+    with pytest.raises(smc.ScenarioError, match="unit"):
+        tune("duffing", smc.law_function(one_gain, gains={"k": 0.0})(), budget=5, objective=LEAN)
 
 
 def test_a_search_leaves_a_box_that_lacks_the_optimum_by_a_decade_and_says_so():
