@@ -31,10 +31,9 @@ def rocking(trace):
 def answer(runs):
     rubs = runs["arm rubs"]
     up = rubs.those(lambda trace: abs(trace.x[-1, 1]) < 0.1)
-    return (
-        f"with friction in the arm, the pendulum stays up under {up.named}; the arm rocks least, in degrees, with "
-        f"{rubs.least(rocking)}, most with {rubs.most(rocking)}"
-    )
+    least, most = rubs.least(rocking), rubs.most(rocking)
+    upright = f"with friction in the arm, the pendulum stays up under {up.named}"
+    return f"{upright}; the arm rocks least, in degrees, with {least}, most with {most}"
 
 
 scene = smc.Scene(

@@ -111,7 +111,7 @@ def test_the_wheel_says_what_it_is_and_needs(wheel):
     } == set()
     assert "mujoco<5,>=3.17" in needs
     assert {*about.get_all("Provides-Extra", [])} == {*EXTRAS}
-    assert {*EXTRAS} == {"dm", "film", "report", "cluster", "rl", "live", "fmu", "proof", "all"}
+    assert {*EXTRAS} == {"dm", "film", "report", "cluster", "rl", "live", "fmu", "proof", "mcap", "all"}
     assert about["Author"] == "The smc_mujoco developers"
     assert "Typing :: Typed" in about.get_all("Classifier", [])
 
