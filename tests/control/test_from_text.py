@@ -71,16 +71,16 @@ def test_a_tuning_goes_through_every_door(files, tuned, capsys):
     for words in (
         ("export-c", "st.json"),
         ("export-fmu", "st.json", "--no-binary"),
-        ("bench", "--plants", "duffing", "--laws", "st.json,two.py", "--seeds", "1", "--duration", "0.1",
-         "--conditions", "nominal"),
-        ("margins", "duffing", "--laws", "st.json", "--kinds", "delay", "--quick"),
+        ("compare", "duffing", "--law", "st.json,two.py", "--seeds", "1", "--duration", "0.1", "--condition", "nominal",
+         "--no-tune"),
+        ("margins", "duffing", "--law", "st.json", "--kinds", "delay", "--quick"),
         ("basin", "duffing", "--law", "st.json", "--points", "2", "--duration", "0.1"),
         ("tune", "duffing", "st.json", "--budget", "1"),
     ):  # fmt: skip
         with pytest.raises(SystemExit) as end:
             cli.main([*words])
         assert not end.value.code, (words, capsys.readouterr().err)
-    rows = pyarrow.parquet.read_table("study/results.parquet")
+    rows = pyarrow.parquet.read_table("compared/results.parquet")
     assert {*rows["law"].to_pylist()} == {"boundary_layer", "mine", "other"}
 
 

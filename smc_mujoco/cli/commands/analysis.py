@@ -91,7 +91,10 @@ def margins(
     plants: options.Plants = None,
     law: options.Laws = None,
     kinds: Annotated[
-        str | None, typer.Option(help="Any of delay, disturbance, friction, mass and noise, as a,b; default all.")
+        str | None,
+        typer.Option(
+            help="Any of delay, disturbance, friction, mass, noise, jitter, missed, as a,b; default the first 5."
+        ),
     ] = None,
     gains: options.Gains = "tuned",
     quick: Annotated[
