@@ -19,8 +19,8 @@ class Noise:
 
     position: float = 0.0
     velocity: float = 0.0
-    position_error: Signal | None = None
-    velocity_error: Signal | None = None
+    position_error: Signal | None = dataclasses.field(default=None, repr=False)
+    velocity_error: Signal | None = dataclasses.field(default=None, repr=False)
 
     def __post_init__(self):
         for name in ("position", "velocity"):

@@ -399,5 +399,5 @@ def test_run_exports_each_trace_beside_its_npz(call, short):
 def test_another_format_is_refused_before_the_run(formats, call, short):
     code, _, err = call("run", "short.py", "--no-film", "--out", "out", "--export", formats)
     assert (code, err.count("\n")) == (2, 1)
-    assert "csv, mat, parquet" in err
+    assert "csv, mat, mcap, parquet" in err
     assert not (short / "out").exists()

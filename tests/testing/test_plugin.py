@@ -340,7 +340,7 @@ GOLDEN = """
 def test_as_ever(step_response, smc_golden):
     r = pendulum(step_response, phi=PHI)
     smc_golden(r, settling_time=0.001, overshoot=0.5)
-    golden(r)
+    smc_golden(r)
 """
 
 
@@ -374,7 +374,9 @@ def test_a_golden_file_is_plain_and_holds_each_call(session, pytester):
 
 
 def test_recording_one_test_keeps_the_others(session, pytester):
-    both = "".join(f"def test_{x}(step_response, golden): golden(pendulum(step_response), overshoot=1)\n" for x in "ab")
+    both = "".join(
+        f"def test_{x}(step_response, smc_golden): smc_golden(pendulum(step_response), overshoot=1)\n" for x in "ab"
+    )
     session(both, "--smc-update", passed=2)
     before = (pytester.path / "test_my_laws.golden.json").read_bytes()
     session(both, "--smc-update", "-k", "test_b", passed=1, deselected=1)

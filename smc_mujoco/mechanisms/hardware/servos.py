@@ -16,7 +16,7 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from smc_mujoco.common.errors import find, shown
+from smc_mujoco.common.errors import find
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.sliding import PerJoint, Sliding
 
@@ -99,7 +99,8 @@ def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
     Raises:
       ScenarioError: an unknown servo, model or command.
     """
-    fitted = find(f"model of {shown(name)}", model, find("servo", name, SERVOS))
+    models = find("servo", name, SERVOS)
+    fitted = find(f"model of {name}", model, models)
     k, resistance, armature = fitted["kt"], fitted["R"], fitted["armature"]
     motor = DCMotor(
         resistance, 0.0, k, gear=1.0, rotor_inertia=armature, voltage=VOLTAGE, current=math.inf, command=command

@@ -268,7 +268,7 @@ REFUSED = {
     "u = [y.e, y.de][0]": "List",
     "u = y.e // 2.0": "the operator FloorDiv",
     "u = 'a'": "the value 'a'",
-    "u = y.e if y.de else np.sign(y.e)": "sign",
+    "u = y.e if y.de else np.sinc(y.e)": "sinc",
     "memory[int(y.t)] = 1.0; u = 0.0": "memory at an index that is not constant",
     "memory[-1] = 1.0; u = 0.0": "memory at a negative index",
     "memory[8] = 1.0; u = 0.0": r"it uses memory\[8\], and its memory has 8 numbers: give memory=9",
