@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import tomllib
 import venv
 import zipfile
@@ -79,7 +80,10 @@ def test_the_sdist_builds_the_same_wheel(wheel, tmp_path):
     done = run(sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", tmp_path, cwd=ROOT)
     assert done.returncode == 0, done.stderr
     (archive,) = tmp_path.glob("*.tar.gz")
-    shutil.unpack_archive(archive, tmp_path, filter="data")
+    with tarfile.open(archive) as files:
+        if hasattr(tarfile, "data_filter"):  # from Python 3.11.4 on
+            files.extraction_filter = tarfile.data_filter
+        files.extractall(tmp_path)
     (source,) = (path for path in tmp_path.iterdir() if path.is_dir())
     done = run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", tmp_path, cwd=source)
     assert done.returncode == 0, done.stderr
