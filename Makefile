@@ -6,7 +6,7 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo test quick attack check docs tagged build report live gains gallery bench lock setup
+.PHONY: help demo test slow quick attack check docs tagged build report live gains gallery bench lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -15,9 +15,13 @@ help: ## list the targets
 demo: setup ## the inverted pendulum under the paper's four laws: scores, traces, a figure, a film
 	$(BIN)/smc-mujoco run scenes/inverted_pendulum.py
 
-test: ## all tests, a file of them at a time on each core
+test: ## all tests but the slow ones, a file of them at a time on each core
 	@./setup.sh requirements-test.lock
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"
+
+slow: ## the tests of more than about 4 s each, for releases; weekly elsewhere
+	@./setup.sh requirements-test.lock
+	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
 
 quick: ## the first case of each test that takes little: a minute, for every change
 	@./setup.sh requirements-test.lock

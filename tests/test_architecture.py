@@ -10,9 +10,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from conftest import QUICK
 
 import smc_mujoco as smc
+
+pytestmark = pytest.mark.quick
 
 PACKAGE = Path(smc.__file__).parent
 ROOT = PACKAGE.parent
@@ -107,6 +108,7 @@ def test_a_file_imports_from_its_own_room_and_those_below():
     assert {name: found for name, found in above.items() if found} == {}
 
 
+@pytest.mark.slow
 def test_the_core_works_without_the_annexes(tmp_path):
     left_out = shutil.ignore_patterns(*ANNEXES, "__pycache__")
     shutil.copytree(PACKAGE, tmp_path / "smc_mujoco", ignore=left_out)
@@ -279,8 +281,3 @@ def test_no_file_names_a_folder_of_one_machine():
     folder = re.compile(r"""(?<![\w.}/])/(?:home|root|Users|tmp|work|mnt|opt|var)/[\w.]+|[A-Z]:\\\\Users""")
     found = {label(path): folder.findall(path.read_text()) for path in TEXTS}
     assert {name: folders for name, folders in found.items() if folders} == {}
-
-
-def test_every_quick_file_is_there():
-    tests = Path(__file__).parent
-    assert [name for name in QUICK if not (tests / name).is_file()] == []

@@ -21,6 +21,8 @@ from smc_mujoco.cli import scene as show
 from smc_mujoco.common import gl
 from smc_mujoco.studies import scene
 
+pytestmark = pytest.mark.quick
+
 README = PAGES[0].read_text()
 TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
 

@@ -11,6 +11,8 @@ import yaml
 
 import smc_mujoco
 
+pytestmark = pytest.mark.quick
+
 ROOT = Path(__file__).parents[1]
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 PAGES = ("docs/install.md", "CONTRIBUTING.md")

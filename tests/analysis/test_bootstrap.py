@@ -1,8 +1,11 @@
 """Intervals of medians: their two ends are treated in the same way, and another seed draws other resamples."""
 
 import numpy as np
+import pytest
 
 from smc_mujoco.analysis.bootstrap import median_interval
+
+pytestmark = pytest.mark.quick
 
 SAMPLES = np.random.default_rng(0).normal(size=(20, 2, 15))  # two blocks each: the values of one are sorted first
 

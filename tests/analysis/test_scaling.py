@@ -7,6 +7,8 @@ import pytest
 
 from smc_mujoco.analysis.scaling import fit, scaling
 
+pytestmark = pytest.mark.quick
+
 PERIODS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)
 H = np.array(PERIODS)
 

@@ -15,6 +15,8 @@ from smc_mujoco.control.estimator import estimators
 from smc_mujoco.control.law import catalogue, law_function, laws
 from smc_mujoco.control.surface import surfaces
 
+pytestmark = pytest.mark.quick
+
 ROOT = Path(smc.__file__).parents[1]
 EVERY = [(name, t) for name, templates in law_pages.catalogue().items() for t, _ in templates]
 ONE_BY_ONE = pytest.mark.parametrize(("name", "template"), EVERY, ids=lambda v: v if isinstance(v, str) else v.kind)

@@ -8,6 +8,8 @@ import pytest
 
 from smc_mujoco.common import html
 
+pytestmark = pytest.mark.quick
+
 EVIL = '<script>alert("x")</script> & "y"'
 
 

@@ -3,10 +3,13 @@
 from collections.abc import Callable
 from typing import Any
 
+import pytest
 from numba import njit
 
 import smc_mujoco as smc
 from smc_mujoco.common.jit import jit, reason
+
+pytestmark = pytest.mark.quick
 
 
 def names(function: Callable[..., Any] | None) -> dict[str, Any]:

@@ -9,6 +9,8 @@ import pytest
 
 from smc_mujoco.common import progress
 
+pytestmark = pytest.mark.quick
+
 
 class ZMQInteractiveShell:
     """What get_ipython returns in a notebook, by the name that rich looks at."""

@@ -5,6 +5,8 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.control.units import RATE, Gain
 
+pytestmark = pytest.mark.quick
+
 
 def zero(y, gains, memory):
     return 0.0, 0.0

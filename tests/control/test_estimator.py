@@ -13,6 +13,8 @@ from smc_mujoco.control.estimator import Reading, catalogue
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.simulation import reference
 
+pytestmark = pytest.mark.quick
+
 H = 1e-3  # s
 FROM_POSITION = [name for name in smc.estimators() if name != "measured"]
 ESTIMATORS = pytest.mark.parametrize("name", FROM_POSITION)

@@ -14,6 +14,8 @@ from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.simulation import grid
 from smc_mujoco.simulation.run import run
 
+pytestmark = pytest.mark.quick
+
 SETS = list(itertools.product(gains.OBJECTIVES, scenarios.PLANTS))
 RANKED = list(itertools.product(scenarios.PLANTS, gains.LAWS))
 
@@ -103,6 +105,7 @@ def test_shipped_gains_cost_what_their_record_says(gain_set, law):
         assert max(costs) <= 1.031 * costs[0]
 
 
+@pytest.mark.slow
 def test_the_first_start_of_a_shipped_search_comes_out_again():
     known = gains.tuned("duffing", "observer_free")
     (end,) = search.tune("duffing", "observer_free", 2 * search.START, known.seed).ends

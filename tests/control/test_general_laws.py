@@ -7,6 +7,8 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.gain_sets import FORMS, general_laws
 from smc_mujoco.control.law import catalogue
 
+pytestmark = pytest.mark.quick
+
 
 def test_every_general_law_is_ranked_and_no_law_beside_itself():
     found = general_laws(smc.paper.PLANTS, "default")

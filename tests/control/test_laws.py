@@ -12,6 +12,8 @@ from scipy.linalg import expm
 
 import smc_mujoco as smc
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize("against", [0.0, 0.5, 1.5])
 def test_classical_reaches_in_the_time_that_the_gain_leaves(against):

@@ -12,6 +12,8 @@ import smc_mujoco as smc
 from smc_mujoco.control.laws.fuzzy_gain import inferred
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 
+pytestmark = pytest.mark.quick
+
 D, RATE = 1.5, 1.0  # bounds on |d| and |d'| of `wave`
 DECADES = pytest.mark.parametrize("s0", [10.0**p for p in range(-2, 5)])
 

@@ -30,6 +30,8 @@ import smc_mujoco as smc
 from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.surface import surface
 
+pytestmark = pytest.mark.quick
+
 STEPS = (1e-2, 1e-3, 2e-4)
 HUM = sine(1 / 6, 6.0) + constant(0.3)  # |d'| <= 1, of a period that the last 20 % of 6 s hold
 DECADES = math.log10(STEPS[0] / STEPS[2])

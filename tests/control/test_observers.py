@@ -9,6 +9,8 @@ from helpers.plants_ab import called, constant, measured, plant_a, plant_b, sine
 import smc_mujoco as smc
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 
+pytestmark = pytest.mark.quick
+
 H = 1e-3  # s
 LAWS = ("extended_state", "disturbance_observer")
 OBSERVERS = pytest.mark.parametrize("name", LAWS)

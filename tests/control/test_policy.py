@@ -21,7 +21,10 @@ from smc_mujoco.control import policy
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.studies import run_key
 
-pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
+pytestmark = [
+    pytest.mark.quick,
+    pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning"),
+]
 
 
 Y = Measurement(t=0.0, dt=0.001, x=0.5, v=0.0, e=0.5, de=0.0, r=0.0, dr=0.0, ddr=0.0, f=0.0, g=1.0, limit=6.0)

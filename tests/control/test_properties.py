@@ -11,6 +11,8 @@ import smc_mujoco as smc
 from smc_mujoco.control.law import Measurement, catalogue, law_function
 from smc_mujoco.control.properties import PROPERTIES, families, reads, searched, suitable
 
+pytestmark = pytest.mark.quick
+
 LAWS = pytest.mark.parametrize("name", smc.laws())
 STEP = 1e-9  # s, control period: short, so that a layer as wide as a step is a jump
 JUMP = 4e-3  # of the range of u; the words of the fixed-point law make steps of 1e-3

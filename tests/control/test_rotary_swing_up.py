@@ -8,6 +8,8 @@ from scipy.linalg import solve_continuous_are
 
 import smc_mujoco as smc
 
+pytestmark = pytest.mark.quick
+
 
 def surface(plant, torque_per_command=1.0, back_emf=0.0):
     """b'P of the Riccati equation upright, over the weight of u, 2000 for a torque, on a level table."""

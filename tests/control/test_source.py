@@ -11,6 +11,8 @@ from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import by_channel
 from smc_mujoco.control.law import law_function
 
+pytestmark = pytest.mark.quick
+
 PLANT, LAW = "inverted_pendulum", "super_twisting"
 
 

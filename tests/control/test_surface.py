@@ -15,6 +15,8 @@ from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.surface import catalogue, surface, surfaces
 from smc_mujoco.simulation import reference
 
+pytestmark = pytest.mark.quick
+
 SURFACES = pytest.mark.parametrize("name", surfaces())
 SECOND = [name for name in surfaces() if name != "higher_order"]  # those that an acceleration of the error keeps
 MASS = smc.plant("duffing", M=1.0, alpha=0.0, beta=0.0, delta=0.0)

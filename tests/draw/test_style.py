@@ -13,6 +13,8 @@ from smc_mujoco.control.law import catalogue
 from smc_mujoco.draw import figure, style
 from smc_mujoco.draw.pareto import MARKS, pareto
 
+pytestmark = pytest.mark.quick
+
 STATED = [template.colour for template in catalogue().values() if template.colour]
 SEEN = {  # linear sRGB as it looks to whom: G. M. Machado et al., IEEE TVCG 15(6), 2009, severity 1
     "all cones": np.eye(3),

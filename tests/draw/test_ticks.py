@@ -7,6 +7,8 @@ from matplotlib.figure import Figure
 
 from smc_mujoco.draw import style, ticks
 
+pytestmark = pytest.mark.quick
+
 
 @pytest.mark.parametrize("width", [1.0, 1.8, 3.5, 12.0])
 @pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (0.0, 0.002), (0.0, 3.0), (-60.0, 0.0), (99.998, 100.001)])

@@ -10,6 +10,8 @@ from smc_mujoco.mechanisms.geometry.pendulum_chain import HOOK
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.plant import catalogue, plant, write
 
+pytestmark = pytest.mark.quick
+
 NETWORKS = pytest.mark.parametrize("name", ["pendulum_network", "inverted_pendulum_network"])
 OTHERS = [(name, other) for name, p in sorted(catalogue().items()) for other in p.mechanisms]
 

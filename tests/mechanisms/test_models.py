@@ -14,6 +14,8 @@ import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.mechanisms.plant import Coupled, catalogue, model_path, plant, write
 
+pytestmark = pytest.mark.quick
+
 NAMES = sorted(catalogue())
 SIZES = {1: [1], 2: [2], 7: [7]}  # largest n -> which are tested
 SIZED = [(name, n) for name in NAMES for n in SIZES.get(catalogue()[name].sizes[1], [2, 3, 5, 40, 100])]

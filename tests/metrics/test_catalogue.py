@@ -20,6 +20,8 @@ from smc_mujoco.metrics import limit_cycle
 from smc_mujoco.metrics.conventions import scale
 from smc_mujoco.simulation.trace import Trace
 
+pytestmark = pytest.mark.quick
+
 CYCLE = {"chattering_amplitude", "chattering_frequency"}
 SYNC = {"mean_settling_time", "spread_settling_time", "spread_bound"}
 

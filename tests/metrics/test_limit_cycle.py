@@ -7,6 +7,8 @@ import pytest
 
 from smc_mujoco.metrics.limit_cycle import limit_cycle
 
+pytestmark = pytest.mark.quick
+
 T = np.arange(0.0, 2.0, 1e-3)
 
 

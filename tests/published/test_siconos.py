@@ -17,6 +17,8 @@ import pytest
 
 import smc_mujoco as smc
 
+pytestmark = pytest.mark.quick
+
 PUBLISHED = Path(__file__).parents[2] / ".." / "shared" / "published"
 files = pytest.mark.skipif(not PUBLISHED.is_dir(), reason="needs the published trajectories in ../shared/published")
 STEP, PERIOD = 1e-4, 1e-2  # s, of the first example

@@ -22,6 +22,8 @@ from smc_mujoco.simulation.initial_states import SEEDS
 from smc_mujoco.studies.run_key import condition as told
 from smc_mujoco.studies.run_key import key
 
+pytestmark = pytest.mark.quick
+
 ARM = """<mujoco model="arm">
   <option gravity="0 0 -9.81"/>
   <worldbody>

@@ -6,6 +6,8 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.simulation.model import model, without_scenery
 
+pytestmark = pytest.mark.quick
+
 REFERRED = """
 <mujoco>
   <default><geom size="0.1" contype="0" conaffinity="0"/></default>

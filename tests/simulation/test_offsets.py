@@ -13,6 +13,8 @@ import smc_mujoco as smc
 from smc_mujoco.simulation import callback
 from smc_mujoco.simulation import offsets as layout
 
+pytestmark = pytest.mark.quick
+
 FIELDS = layout.Offsets._fields[1:]
 SCENARIO = smc.Scenario(plant="duffing", law="classical", duration=0.05)
 

@@ -12,6 +12,8 @@ import pytest
 
 import smc_mujoco as smc
 
+pytestmark = pytest.mark.quick
+
 NAN, INF = math.nan, math.inf
 TINY, HUGE = 1e-320, 1e308  # subnormal; its quotient with anything small overflows
 

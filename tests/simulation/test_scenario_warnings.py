@@ -9,6 +9,8 @@ import smc_mujoco as smc
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.simulation import serialise
 
+pytestmark = pytest.mark.quick
+
 PENDULUM = smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01)
 DEGREES = [
     {"x0": 30.0},

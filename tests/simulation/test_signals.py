@@ -37,6 +37,8 @@ from smc_mujoco.simulation.signals import (
 from smc_mujoco.simulation.time_series import Held, TimeSeries
 from smc_mujoco.simulation.waypoints import Waypoints
 
+pytestmark = pytest.mark.quick
+
 FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * 4)
 NOISE = BandLimited(0.3, 5.0, 15.0)
 UNEVEN = TimeSeries([0.1, 0.2, 0.25, 0.7, 1.3], [1.0, -2.0, 0.5, 0.0, 3.0])

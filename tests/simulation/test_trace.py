@@ -24,6 +24,8 @@ from scipy.io import loadmat
 
 import smc_mujoco as smc
 
+pytestmark = pytest.mark.quick
+
 ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r", "force", "reaction")
 FORCES = ("u", "applied", "d", "force", "reaction")
 

@@ -13,6 +13,8 @@ import smc_mujoco as smc
 from smc_mujoco.mechanisms.inverse_kinematics import Tip
 from smc_mujoco.simulation import reference
 
+pytestmark = pytest.mark.quick
+
 TIMES, VALUES = (0.2, 0.5, 1.3, 1.5, 2.0), (0.1, 0.6, -0.4, 0.0, 0.3)
 
 

@@ -19,6 +19,8 @@ from smc_mujoco.studies.advice import _interval
 from smc_mujoco.studies.board_tables import spread
 from smc_mujoco.studies.leaderboard import Boards, leaderboard
 
+pytestmark = pytest.mark.quick
+
 EVIL = r"50 % & <b>x_1^{2}</b> \ λ = 2 #~$"
 LAWS = (EVIL, "second", "third")
 SEEDS = 20

@@ -127,6 +127,7 @@ def python(code: str, out: Path) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="lives are forked")
+@pytest.mark.slow
 def test_killed_twenty_times_a_study_ends_with_the_same_table_and_does_nothing_twice(tmp_path):
     done = python(LOADED + KILLER, tmp_path)
     assert done.returncode == 0, done.stderr

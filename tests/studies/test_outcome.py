@@ -14,6 +14,8 @@ from smc_mujoco.studies import outcome as words
 from smc_mujoco.studies import scene as scenes
 from smc_mujoco.studies.outcome import Outcome, summary
 
+pytestmark = pytest.mark.quick
+
 FILES = sorted((Path(smc.__file__).parents[1] / "scenes").glob("*.py"))
 RUN = smc.Scenario(plant="duffing", law="classical", x0=1.0, duration=2.0)
 

@@ -23,6 +23,8 @@ from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.study import condition, key
 
+pytestmark = pytest.mark.quick
+
 ROOT = Path(__file__).parents[2]
 scenario = functools.partial(runs.scenario, duration=0.05)
 

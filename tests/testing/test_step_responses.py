@@ -5,6 +5,8 @@ import pytest
 
 import smc_mujoco as smc
 
+pytestmark = pytest.mark.quick
+
 STEP = 0.2  # rad or m
 SETTLES = {  # s, chosen: a tenth above the slowest of the discontinuous laws
     "inverted_pendulum": 0.45,

@@ -11,6 +11,8 @@ import smc_mujoco as smc
 from smc_mujoco.draw.film import encoder
 from smc_mujoco.draw.film.encoder import AHEAD, in_thread
 
+pytestmark = pytest.mark.quick
+
 PICTURE = np.zeros((180, 320, 3), np.uint8)
 
 

@@ -10,6 +10,8 @@ from smc_mujoco.draw import states
 from smc_mujoco.draw.film import pace
 from smc_mujoco.simulation.trace import ARRAYS
 
+pytestmark = pytest.mark.quick
+
 FPS = 30.0
 
 

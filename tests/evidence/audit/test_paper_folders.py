@@ -16,6 +16,8 @@ from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.threshold import Threshold
 from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Beside, Check
 
+pytestmark = pytest.mark.quick
+
 TEMPLATE = Path(template.__file__).parent
 MINIMAL = """
 title = "t"

@@ -8,6 +8,8 @@ from smc_mujoco.evidence.audit.badge import svg
 from smc_mujoco.evidence.audit.paper import paper
 from smc_mujoco.evidence.audit.verdict import DERIVED, OURS, PAPER, Statement, check, judged, summary, totals
 
+pytestmark = pytest.mark.quick
+
 DATA = """
 title = "t"
 authors = "a"

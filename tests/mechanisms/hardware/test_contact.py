@@ -11,6 +11,8 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.contact import Contact, damping_ratio
 from smc_mujoco.mechanisms.plant import catalogue, field_array, plant, write
 
+pytestmark = pytest.mark.quick
+
 with mjcb.installed(None):  # this import compiles a model
     from mujoco.batch import Batch
 
