@@ -62,9 +62,6 @@ def amplitudes(
       path, size, format, fig: as in `figure`.
       title: default: "Chattering".
 
-    Returns:
-      The figure.
-
     Raises:
       ScenarioError: no traces, or as `chattering` and `figure`.
     """

@@ -46,9 +46,6 @@ def plot(
       metrics: names of metrics, or "settles" for the share of runs that settle.
       path, title, size, format, fig: as in `figure`.
 
-    Returns:
-      The figure.
-
     Raises:
       ScenarioError: no runs, an unknown metric, or as `figure`.
     """

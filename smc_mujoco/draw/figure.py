@@ -68,9 +68,6 @@ def figure(
       format: "svg", "png" or "pdf", of the file.
       fig: Figure or SubFigure to draw into; default: a new one.
 
-    Returns:
-      The figure.
-
     Raises:
       ScenarioError: no traces, traces of several plants, an unknown panel, size or format, or a path that cannot be
         written.
@@ -326,9 +323,6 @@ def signals(
       traces: one or several traces.
       labels: condition of each trace; traces under the same condition have the same label.
       path, title, size, format, fig: as in `figure`.
-
-    Returns:
-      The figure.
 
     Raises:
       ScenarioError: as in `figure`; also two traces of one law under one condition, or u in several units.

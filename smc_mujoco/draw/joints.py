@@ -47,9 +47,6 @@ def joints(
       traces: of one plant.
       path, labels, title, size, format, fig: as in `figure`.
 
-    Returns:
-      The figure.
-
     Raises:
       ScenarioError: as `figure`.
     """

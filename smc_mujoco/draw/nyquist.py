@@ -51,9 +51,6 @@ def nyquist(
       traces: of these scenarios; default: they are run.
       path, size, format, fig: as in `figure`.
 
-    Returns:
-      The figure.
-
     Raises:
       ScenarioError: no scenarios, or as `chattering` and `figure`.
     """

@@ -39,9 +39,6 @@ def orders(
       path, size, format, fig: as in `figure`.
       title: default: "Accuracy", with the plant and the condition if there is one of each.
 
-    Returns:
-      The figure.
-
     Raises:
       ScenarioError: no rows, or as `figure`.
     """

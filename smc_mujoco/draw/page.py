@@ -56,11 +56,7 @@ def css_width(page: Figure | SubFigure) -> float:
 
 
 def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, float | None]:
-    """Return the width and height of a figure in inches; None for a height that depends on the contents.
-
-    Raises:
-      ScenarioError: an unknown name, numbers out of range, or a size together with `fig`, which has one.
-    """
+    """Return the width and height of a figure in inches; None for a height that depends on the contents."""
     if fig is not None:
         if size is not None:
             raise ScenarioError(f"size is {shown(size)}, but fig already has a size: give one of the two")
@@ -188,9 +184,6 @@ def files(path: str | os.PathLike[str], format: str | None = None) -> list[Path]
     """Return the files of a figure: a PDF for .pdf, else an SVG and a PNG; only one of them if `format` is given.
 
     ".5" in "lam_0.5" and ".b c" in "a.b c" do not count as endings.
-
-    Raises:
-      ScenarioError: no name, an unknown format or ending, or an ending that contradicts the format.
     """
     base = Path(path)
     if not base.name or "\0" in base.name:

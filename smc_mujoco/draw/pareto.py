@@ -41,9 +41,6 @@ def pareto(
       path, size, format, fig: as in `figure`.
       title: default: one with the plant's name.
 
-    Returns:
-      The figure.
-
     Raises:
       ScenarioError: no tunings, tunings that cannot be compared, or as `figure`.
     """

@@ -37,11 +37,7 @@ def draw(
     size: Size = None,
     fig: "Figure | SubFigure | None" = None,
 ) -> "Figure | SubFigure":
-    """Draw maps side by side, and write them to the file `path` if it is given. `size` and `fig` are as in `figure`.
-
-    Raises:
-      ScenarioError: an unknown kind of file, no maps, or an unknown size.
-    """
+    """Draw maps side by side, and write them to the file `path` if it is given. `size` and `fig` are as in `figure`."""
     paths = [] if path is None else [checked(path)]
     if not maps:
         raise ScenarioError("no map to draw: give at least one")

@@ -215,9 +215,6 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
     """Return one label per trace: the given ones, else the laws' labels, with the differences between runs of one law.
 
     Runs of one law without differences are numbered.
-
-    Raises:
-      ScenarioError: the number of labels is not that of the traces.
     """
     if given is not None:
         if isinstance(given, str) or len(given) != len(traces):
@@ -355,11 +352,7 @@ def wrapped(text: str, room: float, size: float, lines: int) -> str:
 
 
 def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
-    """Return the traces as a list.
-
-    Raises:
-      ScenarioError: no traces, or traces that cannot share axes.
-    """
+    """Return the traces as a list; refuse those that cannot share axes."""
     if hasattr(traces, "column"):
         raise ScenarioError(f"traces is {shown(traces)}: smc.plot draws a table, and this draws traces of smc.run")
     traces = [traces] if isinstance(traces, Trace) else taken("traces", traces)

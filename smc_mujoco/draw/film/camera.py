@@ -25,11 +25,7 @@ class Room(NamedTuple):
 
 
 def checked(chosen: Camera | None) -> Camera | None:
-    """Return the chosen camera; a name of a camera is checked where the model is at hand.
-
-    Raises:
-      ScenarioError: neither a name nor two or three numbers.
-    """
+    """Return the chosen camera; a name of a camera is checked where the model is at hand."""
     if chosen is None or isinstance(chosen, str):
         return chosen
     parts = taken("camera", chosen)

@@ -24,10 +24,6 @@ def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Write]:
     """Yield a function that adds a picture (height, width, 3) to the film at `path`. The film is whole afterwards.
 
     Ctrl-C raises KeyboardInterrupt here. The terminal sends it to ffmpeg too, which must not end first.
-
-    Raises:
-      MissingPackageError: there is no ffmpeg.
-      ScenarioError: it cannot write.
     """
     options = {"codec": "h264", "encoded_format": "yuv420p", "crf": CRF, "fps": fps}
     writer = mediapy().VideoWriter(path, shape, **options, ffmpeg_args=ARGUMENTS)
@@ -43,11 +39,7 @@ def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Write]:
 
 
 def mediapy() -> ModuleType:
-    """Return mediapy, with the ffmpeg of imageio_ffmpeg.
-
-    Raises:
-      MissingPackageError: one of them is not installed, or has no ffmpeg.
-    """
+    """Return mediapy, with the ffmpeg of imageio_ffmpeg."""
     with extras.extra("film", "a film"):
         import imageio_ffmpeg
         import mediapy as module

@@ -49,9 +49,6 @@ def clock(traces: Sequence[Trace], fps: float, speed: float | None = None) -> Cl
 
     Args:
       speed: of playback, 1 for real time; None for the rule above.
-
-    Raises:
-      ScenarioError: fps or speed out of range.
     """
     fps = number("fps", fps)
     if not 1.0 <= fps <= 120.0:

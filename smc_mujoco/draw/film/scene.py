@@ -137,11 +137,7 @@ def hide_cut(
 
 
 def turn(scenario: Scenario, chosen: Camera | None = None) -> np.ndarray:
-    """Return the frame of the camera, (3, 3), as camera.py has it: the chosen one, else the plant's own.
-
-    Raises:
-      ScenarioError: no camera of that name, or not two or three angles.
-    """
+    """Return the frame of the camera, (3, 3), as camera.py has it: the chosen one, else the plant's own."""
     if isinstance(chosen, str):
         return named(scenario, chosen)
     if chosen is not None:

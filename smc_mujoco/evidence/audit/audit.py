@@ -193,9 +193,6 @@ def measure(entry: Entry, runs: Runs) -> Evidence:
     """Return the checks of a claim under one set of gains, and the numbers beside them.
 
     Of a claim about all or some of the gains that the paper allows, those at the gains that decide.
-
-    Raises:
-      ScenarioError: the claim's function raises something, or returns what its thresholds are not about.
     """
     if entry.over:
         from smc_mujoco.evidence.audit import search

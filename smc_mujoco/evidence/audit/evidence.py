@@ -32,11 +32,7 @@ ENDINGS = (".py", ".toml", ".xml")  # of a paper's files that count
 
 
 def document(audit: Any) -> dict[str, Any]:
-    """Return the evidence of an audit as plain data, with its seal.
-
-    Raises:
-      ScenarioError: runs were taken from a table, or laws replaced.
-    """
+    """Return the evidence of an audit as plain data, with its seal."""
     if not audit.sealable:
         raise ScenarioError("evidence is of runs that the audit made itself: leave out the table and the substitutes")
     names: dict[str, str] = {}  # key of a run -> its name in the file
@@ -79,11 +75,7 @@ def seal(data: Mapping[str, Any]) -> str:
 
 
 def check(path: str | Path) -> dict[str, Any]:
-    """Return the evidence in a file whose seal is whole.
-
-    Raises:
-      ScenarioError: there is no such file, it is no evidence, or it was changed after it was written.
-    """
+    """Return the evidence in a file whose seal is whole."""
     with reading(path, "file of evidence", "give one that `smc-mujoco claims --evidence FILE.json` wrote") as file:
         data = read_json(file)
         if data["format"] != FORMAT:

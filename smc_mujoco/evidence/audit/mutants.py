@@ -96,11 +96,7 @@ def evaluations(
 
 
 def first_law(entry: Entry) -> str:
-    """Return the law that mutants of a claim replace.
-
-    Raises:
-      ScenarioError: the claim names no law.
-    """
+    """Return the law that mutants of a claim replace."""
     if not entry.laws:
         raise ScenarioError(f"claim {entry.id} names no law: write laws, first the one that it is about, or immune")
     return entry.laws[0]

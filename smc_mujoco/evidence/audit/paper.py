@@ -251,11 +251,7 @@ def _known(home: Home) -> Paper:
 
 
 def papers() -> dict[str, Paper]:
-    """Return every paper that ships, or comes with another package, by its name, in alphabetical order.
-
-    Warns:
-      PackageWarning: another package's paper has something wrong with it, and is left out.
-    """
+    """Return every paper that ships, or comes with another package, by its name, in alphabetical order."""
     found: dict[str, Paper] = {}
     for key, home in catalogue().items():
         try:
@@ -268,11 +264,7 @@ def papers() -> dict[str, Paper]:
 
 
 def new(folder: Path) -> list[Path]:
-    """Copy the template, a paper that runs, to a folder, and return the files.
-
-    Raises:
-      ScenarioError: the folder has files already, or cannot be written.
-    """
+    """Copy the template, a paper that runs, to a folder, and return the files."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ScenarioError(f"{folder} is there already: give the name of a new folder")
     written = [folder / FILE, folder / CODE]

@@ -52,9 +52,6 @@ def decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence]) -> E
       entry: a claim with `over`.
       runs: of the claim, under a set of gains.
       measure: runs -> evidence.
-
-    Raises:
-      ScenarioError: no gains within the bounds meet the conditions, or as `audit.measure`.
     """
     if entry.over == "all" or len(entry.plants) == 1:
         return _decisive(entry, runs, measure, "")

@@ -42,11 +42,7 @@ class Threshold(NamedTuple):
 
     @classmethod
     def read(cls, measure: str, text: object, sentence: str = "") -> "Threshold":
-        """Return the threshold in a text.
-
-        Raises:
-          ScenarioError: the text is none of the forms, or an empty range.
-        """
+        """Return the threshold in a text."""
         words = text if isinstance(text, str) else ""
         if found := LIMIT.fullmatch(words):
             return cls(measure, words, found[1], float(found[2]), sentence=sentence)
@@ -63,11 +59,7 @@ class Threshold(NamedTuple):
         return f"{self.measure} {self.text}" if self.low is None else f"{self.measure} is {self.text}"
 
     def distance(self, value: float) -> float:
-        """Return how far a number is from the range; NaN for NaN.
-
-        Raises:
-          ScenarioError: the threshold has no range.
-        """
+        """Return how far a number is from the range; NaN for NaN."""
         if self.low is None or self.high is None:
             raise ScenarioError(f"the threshold of {self.measure!r} is {self.text!r}, which has no range: {FORMS}")
         return math.nan if math.isnan(value) else max(self.low - value, value - self.high, 0.0)

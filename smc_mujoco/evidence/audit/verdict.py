@@ -74,9 +74,6 @@ def check(what: str, value: float, relation: str, limit: float, sentence: str = 
     """Return the check of a value against its limit.
 
     NaN never holds. Nor does infinity against infinity: of two laws that never settle, neither is faster.
-
-    Raises:
-      ScenarioError: a relation other than <, <=, > and >=.
     """
     compare = find("relation", relation, RELATIONS)
     value, limit = float(value), float(limit)
@@ -251,9 +248,6 @@ def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
 
     Args:
       evidence: set of gains -> checks and the numbers beside them.
-
-    Raises:
-      ScenarioError: two numbers of one name.
     """
     verdicts = {name: verdict(some, statement.quantifier) for name, some in evidence.items()}
     overall, flips, sentence = combined(verdicts, statement.quantifier)

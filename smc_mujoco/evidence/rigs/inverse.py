@@ -26,11 +26,7 @@ class Filter:
     """The filter of a record's columns at its own rate."""
 
     def __init__(self, data: Record, columns: Columns):
-        """Make the filter of a record.
-
-        Raises:
-          ScenarioError: the record is too short, or is sampled too slowly.
-        """
+        """Make the filter of a record."""
         from scipy.signal import butter
 
         t = data[columns.time]

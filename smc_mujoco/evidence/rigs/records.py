@@ -154,10 +154,6 @@ def checked(record: Mapping[str, Any], columns: Columns, period: float | None, r
       period: s, of the rig's controller, at which a closed loop must be recorded. None for an open loop, whose columns
         are interpolated at the record's own median step.
       rig: its name, for errors.
-
-    Raises:
-      ScenarioError: a missing column, values that are not finite numbers, columns of different lengths, time that runs
-        backward, or another sampling rate than the rig's.
     """
     if not isinstance(record, Mapping):
         raise ScenarioError(f"record is {shown(record)}: give a mapping of columns, such as numpy.load(file)")

@@ -34,9 +34,6 @@ def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[
 
     Args:
       by_steps: errors of the quantities by the steps of their simulation, in their scales, (p,).
-
-    Raises:
-      ScenarioError: records that cannot tell the quantities apart.
     """
     names, twin = replays.names, replays.twin
     J = np.concatenate(slopes.freed(slopes.by_values))

@@ -100,11 +100,7 @@ def _own(law: object) -> Component:
 
 
 def _writable(folder: Path) -> Path:
-    """Return the folder if it is new, empty or a live page.
-
-    Raises:
-      ScenarioError: it is a file, or a folder with other files in it.
-    """
+    """Return the folder if it is new, empty or a live page; refuse others."""
     try:
         other = folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / FACTS).is_file()))
     except OSError as error:  # a name that is too long

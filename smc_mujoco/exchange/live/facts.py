@@ -57,11 +57,7 @@ def _why_not(plant: Plant) -> str:
 
 
 def checked(names: Sequence[str | Plant]) -> list[Plant]:
-    """Return the plants of these names.
-
-    Raises:
-      ScenarioError: there is no such plant, or the page cannot have it.
-    """
+    """Return the plants of these names."""
     for name in names:
         if isinstance(name, str) and name not in catalogue():
             raise unknown("plant", name, plants())

