@@ -23,7 +23,7 @@ SEEN = {  # linear sRGB as it looks to whom: G. M. Machado et al., IEEE TVCG 15(
     "no blue": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
 }
 # Steps of L, a and b of CIELAB that half of all observers notice in marks of a third of a degree, which is 3.5 mm from
-# 60 cm. Source: M. Stone, D. A. Szafir and V. Setlur, "An engineering model for color difference as a function of size",
+# 60 cm. Source: M. Stone, D. Szafir and V. Setlur, "An engineering model for color difference as a function of size",
 # Color and Imaging Conference 2014; these are the smallest marks of that study.
 NOTICEABLE = 0.5 * (np.array([10.16, 10.68, 10.70]) + 3.0 * np.array([1.50, 3.08, 5.74]))
 # What fails: pairs of laws whose colours half of all observers do not tell apart. Lines are thinner than such marks.
