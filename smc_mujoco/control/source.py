@@ -16,10 +16,12 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
 
 NONE, DEFAULT, TUNED, SHIPPED, STUDY, YOURS = "none", "default", "tuned here", "shipped", "study", "yours"
+ABOUT_DEFAULTS = "tuned about defaults"
 KINDS = {  # kind -> what it means
     NONE: "the law has no gains",
     DEFAULT: "the defaults of the law's own file",
     TUNED: "found by a search that the user ran",
+    ABOUT_DEFAULTS: "as tuned here, but some have no unit, and so a search about their defaults",
     SHIPPED: "those of the package for this plant",
     STUDY: "those of a published study",
     YOURS: "given by the user",

@@ -155,5 +155,5 @@ def _tuned(
     sets = tuple(one.sourced(its.kind, its.search) for one in found)
     about = list(search_space.without_unit(chosen))
     have = "have no unit, so their" if len(about) > 1 else "has no unit, so its"
-    words = f"{joined(about)} {have} search is about the defaults and not by the rule: a lead may come from that"
+    words = f"{joined(about)} {have} search is about the defaults and not by the rule"
     return Candidate(sets[0], sets, words * bool(about))

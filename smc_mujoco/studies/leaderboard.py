@@ -15,7 +15,7 @@ would hold in other conditions.
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -40,7 +40,7 @@ from smc_mujoco.analysis.signed_rank import least_p
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.common.text import joined, number
-from smc_mujoco.control.source import DEFAULT, Source
+from smc_mujoco.control.source import ABOUT_DEFAULTS, DEFAULT, Source, kinds
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies import board_tables
 
@@ -245,24 +245,30 @@ class Board:
             least = min(leads, key=_shown_lead, default=None)
             several = f" in all {len(self.blocks)} {self.kind}" * (len(self.blocks) > 1)
             how = f": {'at least ' * (len(leads) > 1)}{least.words}" if least else ""
-            return f"{self.winner} wins{several}{how}{self.gains}"
-        results = []
+            return f"{self.winner} wins{several}{how}{self._gains([self.winner])}"
+        results = {}
         for law in (entry.law for entry in self.entries):
             if wins := self.wins(law):
                 losses = self.losses(law)
-                results.append(f"{law} wins under {_listed(wins)}" + f", loses under {_listed(losses)}" * any(losses))
+                results[law] = f"{law} wins under {_listed(wins)}" + f", loses under {_listed(losses)}" * any(losses)
         if results:
-            return f"no winner in all {len(self.blocks)} {self.kind}: {'; '.join(results)}{self.gains}"
+            words = "; ".join(results.values()) + self._gains(results)
+            return f"no winner in all {len(self.blocks)} {self.kind}: {words}"
         if self.why:
             return f"no winner: {self.why}"
         if len(self.best) == len(self.entries):
             return "no winner: all laws are level" if len(self.best) > 2 else "no winner: both laws are level"
         return f"no winner, undefeated: {_listed(self.best)}"
 
-    @property
-    def gains(self) -> str:
-        """The words "for these gains", after a comma, if no law ran with several sets of gains; else ""."""
-        return ", for these gains" if all(block.sets == 1 for block in self.blocks) else ""
+    def _gains(self, laws: Collection[str]) -> str:
+        """Return what limits the results of laws that win, after commas: their search, and "for these gains"."""
+        others = [one.law for one in self.entries if one.law in laws and ABOUT_DEFAULTS in kinds(one.sources)]
+        whose = (
+            f"{joined(others)} " * (len(laws) > 1)
+            + f"with gains searched about {'its' if len(others) == 1 else 'their'}"
+        )
+        rule = f", {whose} defaults and not by the rule" * bool(others)
+        return rule + ", for these gains" * all(block.sets == 1 for block in self.blocks)
 
     @property
     def why(self) -> str:

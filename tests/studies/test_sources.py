@@ -15,6 +15,11 @@ def at_default(law):
     return law.sourced("default")
 
 
+def about_defaults(law):
+    """The same run, with gains that count as searched about the law's defaults."""
+    return law.sourced("tuned about defaults")
+
+
 def ranked(laws, out, **options):
     """The board of ITAE of laws on the Duffing oscillator."""
     table = smc.study(smc.grid("duffing", laws, "nominal", 16, duration=2.5), out)
@@ -42,6 +47,18 @@ def test_a_winner_is_named_over_rivals_at_their_defaults_only_where_it_is_asked_
 def test_a_law_at_its_own_defaults_may_win_over_others(folder):
     (board,) = ranked([at_default(FAST), SLOW], folder)
     assert board.winner == "fast"
+
+
+def test_a_verdict_says_whether_the_winner_s_gains_were_searched_by_another_rule(folder):
+    about, (fast, slow) = "with gains searched about its defaults and not by the rule", (FAST, SLOW)
+    for laws, said in (
+        ((fast, slow), False),
+        ((about_defaults(fast), slow), True),
+        ((fast, about_defaults(slow)), False),
+    ):
+        (board,) = ranked(laws, folder)
+        assert board.winner == "fast"
+        assert (about in board.verdict) == said
 
 
 def test_boards_print_the_sources(folder):

@@ -102,8 +102,8 @@ class Tuned:
             lines.append((name, f"{self.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", ", ".join(notes)))
         return lines
 
-    def sourced(self, kind: str = source.TUNED) -> "Tuned":
-        """Return the tuning with a law that names this search as the source of its gains."""
+    def sourced(self, kind: str) -> "Tuned":
+        """Return the tuning with a law that names this search as the source of its gains, of a kind of `source`."""
         search = source.Search(rule=self.rule, evaluations=self.evaluations, converged=self.converged)
         return dataclasses.replace(self, law=self.law.sourced(kind, search))
 
@@ -231,7 +231,7 @@ def load(path: str | os.PathLike[str]) -> Tuned:
             law=scenario.law,
             plant=scenario.plant,
             definition=restore(data["definition"]),
-        ).sourced()
+        )
 
 
 def _short(value: float) -> float:
