@@ -18,14 +18,11 @@ from smc_mujoco.control import joint_law
 from smc_mujoco.control.law import Measurement
 
 HERE = Path(__file__).parent
-HEADER, JOINT_HEADER = HERE / "smc_law.h", HERE / "smc_joint_law.h"
+HEADER = HERE / "smc_law.h"
 INPUTS = len(Measurement._fields)  # numbers in a measurement
 # How a measurement is stored, for glue.c and replay.c.
-LAYOUT = (
-    f"-DSMC_INPUTS={INPUTS}",
-    f"-DSMC_VECTORS={joint_law.ARRAYS.index('M')}",
-)
-PROTOTYPE = "int smc_law(const {} *y, const smc_real *gains, smc_real *memory, smc_real *out)"
+LAYOUT = f"-DSMC_INPUTS={INPUTS}", f"-DSMC_VECTORS={joint_law.ARRAYS.index('M')}"
+PROTOTYPE = "int {}(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
 # The same arithmetic as compiled Python: no fused multiply-add.
 FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
 # A library uses its own functions and data even if the C library has the same names, such as remove, y0, timezone.
@@ -131,14 +128,7 @@ def static_data(library: Path, symbol: str) -> tuple[int, list[tuple[str, int, i
 
 def undefined(source: Path, symbol: str) -> str:
     """Return the error message for a file without the law's function."""
-    return f"{source.name} has no function {symbol}: define {_prototype(source, symbol)}"
-
-
-def _prototype(source: Path, symbol: str) -> str:
-    """Return the declaration that a law must have, by the header that its file includes."""
-    joint = source.suffix == ".c" and JOINT_HEADER.name in source.read_text(encoding="utf-8", errors="replace")
-    prototype = PROTOTYPE.format("smc_joint_measurement" if joint else "smc_measurement")
-    return prototype.replace("smc_law(", f"{symbol}(")
+    return f"{source.name} has no function {symbol}: define {PROTOTYPE.format(symbol)}"
 
 
 def _sentence(source: Path, symbol: str, command: str, output: str) -> str:
@@ -151,8 +141,8 @@ def _sentence(source: Path, symbol: str, command: str, output: str) -> str:
         lines = [line for line in output.splitlines() if line.strip()] or ["it says nothing"]
         telling = [line for line in lines if re.search(r"ndefined|cannot find|error:", line)] or lines
         return f"{name} does not compile, {command} says: {telling[0].strip()}; fix it, or give other flags="
-    if f"'{symbol}'" in what or file in ("glue.c", "joint_glue.h"):
-        return f"{name} has another {symbol} than smc_mujoco calls: it must be {_prototype(source, symbol)}"
+    if f"'{symbol}'" in what or file == "glue.c":
+        return f"{name} has another {symbol} than smc_mujoco calls: it must be {PROTOTYPE.format(symbol)}"
     if what.startswith("#error"):
         wanted = what.removeprefix("#error").strip(' "')
         return f"{name} does not compile: {wanted}"

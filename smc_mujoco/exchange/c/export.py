@@ -1,4 +1,4 @@
-"""Export laws to C99: one file without dependencies, with the signature of `smc_law.h` or `smc_joint_law.h`.
+"""Export laws to C99: one file without dependencies, with the signature of `smc_law.h`.
 
 The C is translated from the law's Python, operation by operation. In double precision it equals the compiled law bit
 for bit if both use the same C library. A division by zero raises nothing in C: it gives inf or NaN, which ends a run
@@ -159,7 +159,7 @@ def _facts(law: Component, slots: int, joints: int, single: bool) -> str:
     values = [_literal(at(value, i), single) for value in law.gains.values() for i in range(max(joints, 1))]
     lines = [
         *([f"#define {JOINTS} {joints}", f"#define {SLOTS} {slots}"] if joints else []),
-        (build.JOINT_HEADER if joints else build.HEADER).read_text(encoding="utf-8"),
+        build.HEADER.read_text(encoding="utf-8"),
         *gain_names(law),
         f'const char smc_law_gains[] = "{defaults}";',
         *(textwrap.wrap(f"const smc_real smc_law_defaults[] = {{{', '.join(values)}}};", 112) if values else []),

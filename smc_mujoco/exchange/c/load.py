@@ -1,9 +1,8 @@
 """Laws written in C: `law_from_c` compiles and loads them, and they run in the callback like the library's own.
 
-`smc_law.h` and, for laws of many joints, `smc_joint_law.h`, beside this file, describe the C function. A file is
-compiled together with `glue.c`, which calls the law the way the callback does, so a law of another type is a compiler
-error. A shared library is called directly. Loading, smc_setup and, on request, the law itself are tried in a separate
-process first, because they can hang or crash.
+`smc_law.h`, beside this file, describes the C function. A file is compiled together with `glue.c`, which calls the law
+the way the callback does, so a law of another type is a compiler error. A shared library is called directly. Loading,
+smc_setup and, on request, the law itself are tried in a separate process first, because they can hang or crash.
 """
 
 # pyright: reportCallIssue=false
@@ -177,8 +176,8 @@ def law_from_c(
 
     Args:
       source: a .c file, compiled by $CC or cc in a temporary folder; or a .so with the function in double precision.
-        `smc_law.h`, which the file may include, describes the function. A file that includes `smc_joint_law.h` is a law
-        of SMC_JOINTS joints.
+        `smc_law.h`, which the file may include, describes the function. A file that defines SMC_JOINTS before it is
+        of so many joints.
       gains: name -> default or Gain, in the order of the function's gains[]. If the file has smc_law_gains, they
         change its defaults.
       memory: number of state variables per channel. Default: smc_law_memory of the file, or 8.

@@ -320,8 +320,7 @@ class Function:
 
     def head(self, name: str) -> str:
         """Return the declaration without a semicolon. Arrays are pointers."""
-        seen = "smc_joint_measurement" if self.program.joints else "smc_measurement"
-        pointers = ARGUMENTS | {"y": f"const {SEEN.get(self.program.component.kind, seen)} *"}
+        pointers = ARGUMENTS | {"y": f"const {SEEN.get(self.program.component.kind, 'smc_measurement')} *"}
         arguments = []
         for parameter in self.parameters:
             kind = self.kinds[parameter]

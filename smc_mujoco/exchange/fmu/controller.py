@@ -5,33 +5,50 @@ results, parameters, the control period, and the memories of law, surface and es
 nothing of the law. `controller.c` computes, like the callback,
 
     estimator -> surface -> law -> saturation
+
+With a law of many joints, every vector and matrix is one variable for each element, x[1], x[2], M[1,1], M[1,2], counted
+from 1 as in FMI's structured names. The arrays of FMI 3.0 are not used, because FMPy's `simulate_fmu` takes no inputs
+of several shapes. The elements follow each other in the array of variables, so C reads them as an array.
 """
 
 import dataclasses
+import itertools
 import math
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from smc_mujoco.control.component import Component, at
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
-from smc_mujoco.control.units import ACCELERATION, FORCE, INPUT_GAIN, POSITION, SPEED, TIME, Unit
+from smc_mujoco.control.units import (
+    ACCELERATION,
+    FORCE,
+    FORCE_PER_SPEED,
+    INERTIA,
+    INPUT_GAIN,
+    POSITION,
+    SPEED,
+    TIME,
+    Unit,
+)
 from smc_mujoco.exchange.c import export
 from smc_mujoco.exchange.c.translate import JOINTS, plain
 from smc_mujoco.simulation.controller import MAX_CONTROL
 
 UNBOUNDED = sys.float_info.max  # stands for infinity, because not every importer reads INF
 
-# Input -> its unit and description, in the order of the variables.
-INPUTS: dict[str, tuple[Unit | None, str]] = {
+# Input -> its unit and description, in the order of the variables: of every FMU, and of one channel or of many joints.
+MEASURED: dict[str, tuple[Unit | None, str]] = {
     "x": (POSITION, "measured position"),
     "v": (SPEED, "measured velocity"),
     "r": (POSITION, "reference"),
     "dr": (SPEED, "first derivative of the reference"),
     "ddr": (ACCELERATION, "second derivative of the reference"),
+}
+OF_CHANNEL: dict[str, tuple[Unit | None, str]] = {
     "f": (ACCELERATION, "nominal f of x'' = f + g u, at the measured x and v"),
     "g": (INPUT_GAIN, "nominal g of x'' = f + g u, at the measured x and v"),
     "q": (None, "measured position of the joint without actuator that this one moves"),
@@ -39,7 +56,14 @@ INPUTS: dict[str, tuple[Unit | None, str]] = {
     "fq": (None, "nominal fq of q'' = fq + gq u"),
     "gq": (None, "nominal gq of q'' = fq + gq u"),
 }
-STARTS = {"g": 1.0, "gq": 1.0}  # values of inputs before they are set: laws divide by these; 0 for all others
+OF_JOINTS: dict[str, tuple[Unit | None, str]] = {
+    "h": (FORCE, "nominal h of M x'' + h = u, at the measured x and v"),
+    "g": (FORCE, "nominal gravity and springs, at the measured x"),
+    "M": (INERTIA, "nominal mass matrix of M x'' + h = u, at the measured x"),
+    "C": (FORCE_PER_SPEED, "nominal matrix of Coriolis forces C v, M' - 2 C skew-symmetric"),
+    "J": (None, "nominal Jacobian of the tip, in the world: its velocity is J v"),
+}
+MODEL = {"f", "g", "fq", "gq", "M", "h"}  # inputs of the nominal model; C and J are what coriolis and jacobian need
 ALWAYS = ("x", "r", "dr")  # inputs of every FMU
 OUTPUTS = ("u", "s")
 SYMBOLS = (  # names that the linker sees
@@ -95,6 +119,11 @@ class Controller:
     joints: int = 0
 
     @property
+    def places(self) -> tuple[str, ...]:
+        """What follows the name of a quantity: "", or "[1]", "[2]", ... for each joint."""
+        return tuple(f"[{i + 1}]" for i in range(self.joints)) or ("",)
+
+    @property
     def parts(self) -> dict[str, Component]:
         """Kind -> component, without those that are None."""
         parts = {"law": self.law, "surface": self.surface, "estimator": self.estimator}
@@ -114,43 +143,58 @@ class Controller:
 
 def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> list[Variable]:
     """Return the variables in the order of their value references. `code` is `controller.code()`."""
-    reached = code.values() if controller.modelled else [(n, UNREACHED.sub(r"\1", text)) for n, text in code.values()]
-    wanted = {*ALWAYS, *_needed(controller, code, reads(reached))}
-    inputs = [
-        Variable(name, "SMC_INPUT", words, unit, STARTS.get(name, 0.0))
-        for name, (unit, words) in INPUTS.items()
-        if name in wanted
-    ]
-    computed = [
-        Variable("u", "SMC_COMPUTED", "command, within u_max", FORCE),
-        Variable("s", "SMC_COMPUTED", "sliding variable"),
-    ]
+    places, of_model = controller.places, OF_JOINTS if controller.joints else OF_CHANNEL
+    wanted = inputs(controller, code)
+    listed = [Variable("time", "SMC_CLOCK", "time", TIME)]
+    for name, (unit, words) in {**MEASURED, **of_model}.items():
+        starts = _starts(name, controller) if name in wanted else {}
+        listed += [Variable(f"{name}{place}", "SMC_INPUT", words, unit, start) for place, start in starts.items()]
+    computed = [("u", "command, within u_max", FORCE), ("s", "sliding variable", None)]
     if controller.surface:
-        computed.append(Variable("v_eq", "SMC_COMPUTED", "acceleration of the error that keeps s constant"))
+        computed.append(("v_eq", "acceleration of the error that keeps s constant", None))
     if controller.estimator:
-        computed.append(Variable("v_estimated", "SMC_COMPUTED", "estimated velocity", SPEED))
-    parameters = [bounded("u_max", controller.u_max[0])]
+        computed.append(("v_estimated", "estimated velocity", SPEED))
+    for name, words, unit in computed:
+        listed += [Variable(name + place, "SMC_COMPUTED", words, unit) for place in places]
+    listed += [bounded(f"u_max{place}", bound) for place, bound in zip(places, controller.u_max, strict=True)]
     for kind, part in controller.parts.items():
-        parameters += [parameter(kind, part, name, value) for name, value in part.gains.items()]
-    period = Variable("dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, controller.period)
-    memory = [
-        Variable(f"{kind}.memory[{i + 1}]", "SMC_STATE", f"number {i + 1} of the memory of the {kind}")
-        for kind, (slots, _) in code.items()
-        for i in range(slots)
-    ]
-    time = Variable("time", "SMC_CLOCK", "time", TIME)
-    return [time, *inputs, *computed, *parameters, period, *memory]
+        for name, value in part.gains.items():
+            own = places if kind == "law" and name not in part.shared else ("",)
+            listed += [parameter(kind, part, name, at(value, i), place) for i, place in enumerate(own)]
+    listed.append(Variable("dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, controller.period))
+    for kind, (slots, _) in code.items():
+        for i in range(max(1, controller.joints)):
+            joint, place = (f", joint {i + 1}", f"{i + 1},") if controller.joints else ("", "")
+            listed += [
+                Variable(f"{kind}.memory[{place}{k}]", "SMC_STATE", f"number {k} of the memory of the {kind}{joint}")
+                for k in range(1, slots + 1)
+            ]
+    return listed
 
 
-def _needed(controller: Controller, code: Mapping[str, tuple[int, str]], read: set[str]) -> Iterator[str]:
-    """Yield the inputs that the components read, in addition to ALWAYS. `read` are the fields of y in their C."""
+def _starts(name: str, controller: Controller) -> dict[str, float]:
+    """Return what follows the name of an input, of each element -> its value before it is set.
+
+    It is 1 where laws divide by the input, as by g or the diagonal of M, else 0.
+    """
+    if name not in ("M", "C", "J"):
+        return dict.fromkeys(controller.places, float(name in ("g", "gq") and not controller.joints))
+    rows, columns = range(1, 4 if name == "J" else controller.joints + 1), range(1, controller.joints + 1)
+    return {f"[{i},{j}]": float(name == "M" and i == j) for i in rows for j in columns}
+
+
+def inputs(controller: Controller, code: Mapping[str, tuple[int, str]]) -> set[str]:
+    """Return the names of the inputs that the components read, without indices."""
+    reached = code.values() if controller.modelled else [(n, UNREACHED.sub(r"\1", text)) for n, text in code.values()]
+    read, wanted = reads(reached), {*ALWAYS}
     if controller.estimator is None or "v" in reads([code["estimator"]]):
-        yield "v"
+        wanted.add("v")
     if read & {"a", "ddr"}:  # a is ddr if no estimator gives it
-        yield "ddr"
+        wanted.add("ddr")
     if controller.modelled:
-        yield from read & {"f", "g", "fq", "gq"}
-    yield from read & {"q", "dq"}
+        wanted |= read & MODEL
+        wanted |= {name for name, needs in (("C", "coriolis"), ("J", "jacobian")) if needs in read}
+    return wanted | (read & {"q", "dq"})
 
 
 def reads(code: Iterable[tuple[int, str]]) -> set[str]:
@@ -258,52 +302,116 @@ def source(listed: Sequence[Variable], helpers: Iterable[str], body: Iterable[st
 
 
 def helpers(controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterator[str]:
-    """Yield the lines of functions that the law calls: there are none."""
-    yield from ()
+    """Yield the lines of the C functions that a law of many joints calls: coriolis, for C(x, v) w, and jacobian."""
+    wanted, needs = inputs(controller, code), reads([code["law"]])
+    if "coriolis" in needs:
+        yield "/* out = C w */"
+        yield "static void coriolis(void *plant, const double *w, double *out)"
+        yield "{"
+        if "C" in wanted:
+            yield f"    const double *C = (const double *)plant + {place('C[1,1]')};"
+        else:
+            yield "    (void)plant, (void)w;"
+        yield "    for (int i = 0; i < SMC_JOINTS; i++) {"
+        yield "        out[i] = 0.0;"
+        if "C" in wanted:
+            yield "        for (int j = 0; j < SMC_JOINTS; j++) out[i] += C[i * SMC_JOINTS + j] * w[j];"
+        yield "    }"
+        yield from ("}", "")
+    if "jacobian" in needs:
+        yield "static void jacobian(void *plant, double *out)"
+        yield "{"
+        source = f"((const double *)plant)[{place('J[1,1]')} + i]" if "J" in wanted else "NAN"
+        yield from () if "J" in wanted else ("    (void)plant;",)
+        yield f"    for (int i = 0; i < 3 * SMC_JOINTS; i++) out[i] = {source};"
+        yield from ("}", "")
 
 
 def body(listed: Sequence[Variable], controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterator[str]:
-    """Yield the statements of smc_controller, without indentation."""
-    found = {one.name: f"value[{place(one.name)}]" for one in listed}
+    """Yield the statements of smc_controller, without indentation. What is of each joint is in a loop over j."""
+    wanted, many = inputs(controller, code), controller.joints
+    j, each, other = ("[j]", "[j]", "[SMC_JOINTS + j]") if many else ("", "[0]", "[1]")
+
+    def value(name: str, absent: str = "0.0") -> str:
+        if name in MEASURED | OF_CHANNEL | OF_JOINTS and name not in wanted:
+            return absent
+        return f"value[{place(name + controller.places[0])}{' + j' * bool(many)}]"
+
+    def for_each(lines: Iterator[str]) -> Iterator[str]:
+        if not many:
+            return lines
+        return itertools.chain(["for (int j = 0; j < SMC_JOINTS; j++) {"], (f"    {line}" for line in lines), ["}"])
+
+    yield from _tables(listed, controller, code)
+    yield "smc_measurement y = {0};"
+    yield f"double out[{'2 * SMC_JOINTS' if many else 2}];"
+    yield "int failure;"
+    yield f"y.t = t, y.dt = SMC_DT, y.model = {float(controller.modelled)!r};"
+    if needs := [name for name in ("coriolis", "jacobian") if name in reads([code["law"]])]:
+        yield f"y.plant = value, {', '.join(f'y.{name} = {name}' for name in needs)};"
+    yield from for_each(_measured(controller, code, value, j))
+    if many and controller.modelled and "M" in wanted:
+        yield f"for (int j = 0; j < SMC_JOINTS * SMC_JOINTS; j++) y.M[j] = value[{place('M[1,1]')} + j];"
+    if controller.surface:
+        yield from _call("surface", "&y", "surface_memory")
+        yield f"y.has_surface = 1.0, y.s = out[0], y.v_eq = {value('v_eq')} = out[1];"
+    yield from _call("law", "&y", "law_memory")
+    yield from for_each(
+        iter(
+            (
+                f"const double u = fmin(fmax(out{each}, -y.limit{j}), y.limit{j}), s = out{other};",
+                f"{value('u')} = u, {value('s')} = s;",
+                f"if (!(isfinite(out{each}) && isfinite(s) && fabs(u) < {MAX_CONTROL!r})) return SMC_NOT_FINITE;",
+            )
+        )
+    )
+    yield "return 0;"
+
+
+def _tables(listed: Sequence[Variable], controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterator[str]:
+    """Yield the lines that collect the gains of each component, and find its memory."""
+    names = {one.name for one in listed}
     for kind, part in controller.parts.items():
         yield f"const double {kind}_gains[] = {{"
-        yield from (f"    number({found[f'{kind}.{plain(name)}']})," for name in part.gains)
+        for name in part.gains:
+            shared = f"{kind}.{plain(name)}"
+            own = [shared] * max(1, controller.joints * (kind == "law"))
+            own = own if shared in names else [shared + place for place in controller.places]
+            yield from (f"    number(value[{place(one)}])," for one in own)
         yield from ("    0.0,",) if not part.gains else ()
         yield "};"
-        memory = "&" + found[f"{kind}.memory[1]"] if code[kind][0] else "NULL"
-        yield f"double *{kind}_memory = {memory};"
-    yield "smc_measurement y = {0};"
+        first = place(f"{kind}.memory[1{',1' * bool(controller.joints)}]")
+        yield f"double *{kind}_memory = {f'&value[{first}]' if code[kind][0] else 'NULL'};"
+
+
+def _measured(
+    controller: Controller, code: Mapping[str, tuple[int, str]], value: Callable[..., str], j: str
+) -> Iterator[str]:
+    """Yield the statements that fill in the measurement of one joint. `value` returns a variable in C, `j` an index."""
+    yield f"y.limit{j} = number({value('u_max')});"
+    yield f"y.x{j} = {value('x')}, y.r{j} = {value('r')}, y.dr{j} = {value('dr')};"
+    yield f"y.ddr{j} = y.a{j} = {value('ddr')};"
     if controller.estimator:
-        yield f"const smc_reading reading = {{SMC_DT, {found['x']}, {found.get('v', '0.0')}}};"
-    yield "double out[2];"
-    yield "int failure;"
-    yield f"y.t = t, y.dt = SMC_DT, y.limit = number({found['u_max']}), y.model = {float(controller.modelled)!r};"
-    yield f"y.r = {found['r']}, y.dr = {found['dr']}, y.ddr = y.a = {found.get('ddr', '0.0')};"
-    for name in ("f", "g"):
-        yield f"y.{name} = {found.get(name, 'NAN')};"
-    for name in ("q", "dq", "fq", "gq"):
-        if name in found:
-            yield f"y.{name} = {found[name]};"
-    yield f"y.x = {found['x']};"
-    if controller.estimator:
-        yield from _call("estimator", "&reading")
-        yield f"y.v = {found['v_estimated']} = out[0];"
-        yield "if (!isnan(out[1])) y.a = out[1];"
+        slots = code["estimator"][0]
+        yield f"const smc_reading reading = {{SMC_DT, y.x{j}, {value('v')}}};"
+        yield from _call("estimator", "&reading", "estimator_memory" + f" + {slots} * j" * bool(j and slots))
+        yield f"y.v{j} = {value('v_estimated')} = out[0];"
+        yield f"if (!isnan(out[1])) y.a{j} = out[1];"
     else:
-        yield f"y.v = {found['v']};"
-    yield "y.e = y.x - y.r, y.de = y.v - y.dr;"
-    if controller.surface:
-        yield from _call("surface", "&y")
-        yield f"y.has_surface = 1.0, y.s = out[0], y.v_eq = {found['v_eq']} = out[1];"
-    yield from _call("law", "&y")
-    yield f"{found['u']} = fmin(fmax(out[0], -y.limit), y.limit);"
-    yield f"{found['s']} = out[1];"
-    yield f"return isfinite(out[0]) && isfinite(out[1]) && fabs({found['u']}) < {MAX_CONTROL!r} ? 0 : SMC_NOT_FINITE;"
+        yield f"y.v{j} = {value('v')};"
+    yield f"y.e{j} = y.x{j} - y.r{j}, y.de{j} = y.v{j} - y.dr{j};"
+    if not j:
+        yield f"y.f = {value('f', 'NAN')}, y.g = {value('g', 'NAN')};"
+        yield f"y.q = {value('q')}, y.dq = {value('dq')}, y.fq = {value('fq')}, y.gq = {value('gq')};"
+    elif controller.modelled:
+        yield f"y.h{j} = {value('h')}, y.g{j} = {value('g')};"
+    else:
+        yield "y.M[j * SMC_JOINTS + j] = 1.0;"
 
 
-def _call(kind: str, measured: str) -> Iterator[str]:
-    """Yield the call of a component, and the return if it fails. `measured` is its first argument in C."""
-    yield f"failure = smc_{kind}({measured}, {kind}_gains, {kind}_memory, out);"
+def _call(kind: str, measured: str, memory: str) -> Iterator[str]:
+    """Yield the call of a component, and the return if it fails. The arguments are in C."""
+    yield f"failure = smc_{kind}({measured}, {kind}_gains, {memory}, out);"
     yield "if (failure) return failure;"
 
 

@@ -27,8 +27,8 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.c.export import number_of_joints, writable
-from smc_mujoco.exchange.fmu import controller as one_joint
-from smc_mujoco.exchange.fmu import description, joint_controller
+from smc_mujoco.exchange.fmu import controller as inside
+from smc_mujoco.exchange.fmu import description
 from smc_mujoco.exchange.fmu.controller import Controller
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.scenario import Scenario, check_surface
@@ -172,7 +172,7 @@ def _identifier(name: str) -> str:
 
 def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str]:
     """Return path in the archive -> text, for all files but the binary."""
-    code, inside = controller.code(), joint_controller if controller.joints else one_joint
+    code = controller.code()
     listed = inside.variables(controller, code)
     if joint == MIXED:
         joint = "hinge"  # of which no unit is left but powers of the second
@@ -180,19 +180,18 @@ def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str
             one if one.unit and not (one.unit.force or one.unit.position) else one._replace(unit=None) for one in listed
         ]
     body = inside.body(listed, controller, code)
-    files = {"controller.c": one_joint.source(listed, inside.helpers(controller, code), body)}
-    files["law.c"] = one_joint.law_file(controller, *code["law"])
+    files = {"controller.c": inside.source(listed, inside.helpers(controller, code), body)}
+    files["law.c"] = inside.law_file(controller, *code["law"])
     for kind, (slots, text) in code.items():
         if kind != "law":
-            files[f"{kind}.c"] = one_joint.component_file(controller.parts[kind], slots, text)
+            files[f"{kind}.c"] = inside.component_file(controller.parts[kind], slots, text)
     files = {"fmu.c": (HERE / "fmu.c").read_text(encoding="utf-8"), **files}
-    content = "\0".join([*files.values(), one_joint.header(listed, controller, identifier, ""), joint])
+    content = "\0".join([*files.values(), inside.header(listed, controller, identifier, ""), joint])
     token = f"{{{uuid.UUID(bytes=hashlib.sha256(content.encode()).digest()[:16])}}}"
     compiled = list(files)
-    files["controller.h"] = one_joint.header(listed, controller, identifier, token)
+    files["controller.h"] = inside.header(listed, controller, identifier, token)
     files["smc_fmu.h"] = (HERE / "smc_fmu.h").read_text(encoding="utf-8")
-    own = build.JOINT_HEADER if controller.joints else build.HEADER
-    files[own.name] = own.read_text(encoding="utf-8")
+    files[build.HEADER.name] = build.HEADER.read_text(encoding="utf-8")
     files |= {name: (HERE / "headers" / name).read_text(encoding="utf-8") for name in HEADERS}
     return {
         "modelDescription.xml": description.model_description(listed, controller, identifier, token, joint),

@@ -2,13 +2,10 @@
 #ifndef SMC_FMU_H
 #define SMC_FMU_H
 
-#ifdef SMC_JOINTS
-#include "smc_joint_law.h"
-#else
 #include "smc_law.h"
+
 /* Sets out[0] = s and out[1] = v_eq, as in smc_measurement. */
 int smc_surface(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out);
-#endif
 
 /* Inputs of a velocity estimator, in SI units. */
 typedef struct {

@@ -4,7 +4,6 @@ import math
 import re
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,7 +25,7 @@ pytestmark = needs_compiler
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wmissing-prototypes")
 LAWS = catalogue()
-TYPE = "int smc_law(const smc_joint_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
+TYPE = "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
 EACH = np.array([1.0, 0.25, 3.0])
 ORDER = np.array([2, 0, 1])
 
@@ -245,12 +244,12 @@ def test_a_trial_in_a_process_of_its_own_finds_nothing_wrong(folder, capsys):
 def own(body: str, joints: str = "#define SMC_JOINTS 2", head: str = TYPE) -> str:
     """A C file with a law of this body for two joints."""
     quiet = "int i;\n    (void)y; (void)gains; (void)memory;\n    for (i = 0; i < 4; i++) out[i] = 0.0;\n"
-    return f'{joints}\n#include "smc_joint_law.h"\n{head}\n{{\n    {quiet}    {body}\n    return 0;\n}}\n'
+    return f'{joints}\n#include "smc_law.h"\n{head}\n{{\n    {quiet}    {body}\n    return 0;\n}}\n'
 
 
 MISTAKES = {
-    "no number": (own("", joints=""), "mine.c does not compile: define SMC_JOINTS, the number of joints, before"),
-    "type": (own("", head=TYPE.replace("_joint_", "_other_")), "does not compile: line 3"),
+    "no number": (own("out[0] = y->x[1];", joints=""), "does not compile: line 8, subscripted value is neither"),
+    "type": (own("", head=TYPE.replace("smc_meas", "other_meas")), "does not compile: line 3"),
     "header": (own("").replace("smc_law(", "smc_other("), f"has no function smc_law: define {TYPE}"),
     "less": (own("", head=TYPE.replace(", smc_real *out", "").replace("{", "{ smc_real out[4];")), f"must be {TYPE}"),
     "memory": (own("memory[16] = 1.0;"), "smc_law writes beyond the 8 numbers of its memory"),
@@ -372,11 +371,5 @@ def test_the_file_says_how_many_joints_it_is_for_and_what_it_reads():
         assert words in head
     assert "#define SMC_JOINTS 3\n" in rest
     assert "c=1.0 2.0 3.0," in rest
-    assert build.JOINT_HEADER.read_text() in rest
+    assert build.HEADER.read_text() in rest
     assert max(map(len, text.splitlines())) <= 123
-
-
-def test_the_page_has_the_whole_header():
-    page = (Path(smc.__file__).parents[1] / "docs" / "c.md").read_text()
-    text = build.JOINT_HEADER.read_text()
-    assert text[text.index("/* Inputs of a law") : text.index("#endif", text.index("smc_setup"))].strip() in page

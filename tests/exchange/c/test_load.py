@@ -19,6 +19,7 @@ from helpers.compiler import needs_compiler
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
+from smc_mujoco.control import joint_law
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.exchange.c import build
 from smc_mujoco.simulation import reference
@@ -640,8 +641,9 @@ def test_the_docs_show_the_header_and_a_law_that_passes(file):
 
 
 def test_the_header_has_the_numbers_of_the_measurement_in_their_order():
-    (struct,) = re.findall(r"typedef struct \{(.*?)\}", HEADER, re.DOTALL)
-    assert tuple(re.findall(r"smc_real (\w+);", struct)) == Measurement._fields
+    one, many = re.findall(r"typedef struct \{(.*?)\}", HEADER, re.DOTALL)
+    assert tuple(re.findall(r"smc_real (\w+);", one)) == Measurement._fields
+    assert tuple(re.findall(r"smc_real (\w+)\[", many)) == joint_law.ARRAYS
     assert len(Measurement._fields) == build.INPUTS
 
 
