@@ -14,14 +14,18 @@ import secrets
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError, shown, whole
 from smc_mujoco.common.files import write_json
+from smc_mujoco.common.text import joined
+from smc_mujoco.control.component import Component
 from smc_mujoco.simulation.scenario import MAX_SEED, Scenario
 
 DRAWN = "drawn"
 FILE = "noise_key.json"
+CODE = "its code"  # beside the names of variables
 
 
 def draw() -> int:
@@ -50,7 +54,7 @@ def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume
         if not resume:
             (folder / FILE).unlink(missing_ok=True)
         scenarios = found
-        key = _of_folder(folder / FILE, sorted(set(map(identity, filter(own, found)))))
+        key = _of_folder(folder / FILE, {identity(one): _about(one) for one in filter(own, found)})
     elif isinstance(wanted, str):
         raise ScenarioError(f"noise_key is {shown(wanted)}: give a whole number, or {DRAWN!r}")
     else:
@@ -60,31 +64,60 @@ def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume
         yield scenario if same else dataclasses.replace(scenario, noise_key=key).named(scenario.condition)
 
 
-def _of_folder(file: Path, laws: list[str]) -> int:
-    """Return the key in a file if it was drawn for all these laws, else a new one, which is kept there."""
+def _of_folder(file: Path, laws: dict[str, dict[str, Any]]) -> int:
+    """Return the key in a file if it was drawn for all these laws, else a new one, which is kept there.
+
+    Args:
+      laws: `identity` of each of the user's laws -> what `_about` returns.
+    """
     try:
         known = json.loads(file.read_text(encoding="utf-8"))
-        key, fixed = whole("noise_key", known["key"], 1, MAX_SEED), set(known["laws"])
+        key, fixed = whole("noise_key", known["key"], 1, MAX_SEED), dict(known["laws"])
     except (OSError, ValueError, KeyError, TypeError):
-        key, fixed = 0, set()
-    if key and fixed.issuperset(laws):
+        key, fixed = 0, {}
+    others = [about for name, about in laws.items() if name not in fixed]
+    if key and not others:
         return key
     if key:
-        print("a law of yours is new or has changed: with a new noise key, all runs are done again", file=sys.stderr)
+        changes = joined(dict.fromkeys(_changed(about, list(fixed.values())) for about in others))
+        print(f"{changes}: a new noise key is drawn, and all runs are done again", file=sys.stderr)
     key = draw()
     write_json(file, {"key": key, "laws": laws})
     return key
 
 
+def _about(scenario: Scenario) -> dict[str, Any]:
+    """Return the name of a scenario's law, and the hashes of what law, surface and estimator read."""
+    functions = tuple(part.function for part in _parts(scenario))
+    reads = {CODE: fingerprint.of(functions)}
+    for function in functions:
+        reads |= fingerprint.variables(function)
+    return {"name": scenario.law.name, "reads": reads}
+
+
+def _changed(about: dict[str, Any], before: list[dict[str, Any]]) -> str:
+    """Return in words what is new or has changed of a law, compared with the laws of its name before."""
+    name = about["name"]
+    alike = [one["reads"] for one in before if one["name"] == name]
+    if not alike:
+        return f"law {name} is new"
+    names = [what for what, its in about["reads"].items() if its != alike[-1].get(what)]
+    variables = [what for what in names if what != CODE]
+    return f"law {name} has changed ({joined(variables or names or ['its gains'])})"
+
+
+def _parts(scenario: Scenario) -> list[Component]:
+    """Return the law, or those of the channels, the surface and the estimator of a scenario."""
+    return [part for part in (*scenario.law.parts, scenario.surface, scenario.velocity) if part]
+
+
 def own(scenario: Scenario) -> bool:
     """Return whether the law, its surface or its estimator is not of this package."""
-    parts = (*scenario.law.parts, scenario.surface, scenario.velocity)
-    return any(
-        part and not (getattr(part.function, "__module__", "") or "").startswith("smc_mujoco.") for part in parts
-    )
+    modules = (getattr(part.function, "__module__", "") or "" for part in _parts(scenario))
+    return not all(module.startswith("smc_mujoco.") for module in modules)
 
 
 def identity(scenario: Scenario) -> str:
     """Return a hash of the code and the gains of a scenario's law, surface and estimator."""
-    parts = [part for part in (*scenario.law.parts, scenario.surface, scenario.velocity) if part]
+    parts = _parts(scenario)
     return fingerprint.of(tuple(part.function for part in parts))[:16] + repr([dict(part.gains) for part in parts])
