@@ -54,18 +54,15 @@ def arm(file):
 # names, text, combinations
 
 
-@pytest.mark.parametrize(
-    "condition",
-    [
+def test_text_says_a_condition_whole():
+    for condition in (
         WORN,
         smc.condition("a", mismatch={"mass": 1.1}, input_delay=0.003),
         smc.condition("b", velocity=smc.estimator("levant", L=30.0), noise=smc.Noise(0.01)),
         smc.condition("c", disturbance=(smc.Sine(0.2, 5.0), smc.Constant(-0.1)), contact="stops", u_max=math.inf),
         smc.condition("d", jump=smc.Jump(0.5, {"mass": 2.0}), x0=[0.3], reference=smc.Step(0.1)),
-    ],
-)
-def test_text_says_a_condition_whole(condition):
-    assert parse(str(condition)) == condition
+    ):
+        assert parse(str(condition)) == condition
 
 
 def test_a_class_of_the_users_with_a_name_of_ours_changes_no_text():
@@ -118,9 +115,8 @@ def test_what_happens_once_does_so_at_half_time():
     assert NAMED["pulse"].on(smc.plant("duffing"), 3.0)["disturbance"].time == 1.5
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
+def test_a_text_that_is_none_is_one_sentence():
+    for text, words in (
         ("worn: friction=Coulomb(k=3)", "unknown field of Coulomb 'k'|takes level"),
         ("worn: friction=open('x')", "unknown part, signal or estimator 'open'"),
         ("worn: friction=().__class__", "give numbers, texts and parts"),
@@ -141,12 +137,10 @@ def test_what_happens_once_does_so_at_half_time():
         ("worn friction=Coulomb(0.05)", "has no colon: write a name, a colon and fields"),
         ("noise + ", "unknown condition ''"),
         ("a" * 10**5 + ": x=" + "(" * 10**4, "cannot be read"),
-    ],
-)
-def test_a_text_that_is_none_is_one_sentence(text, words):
-    with pytest.raises(smc.ScenarioError, match=words) as error:
-        find_condition(text)
-    assert "\n" not in str(error.value)
+    ):
+        with pytest.raises(smc.ScenarioError, match=words) as error:
+            find_condition(text)
+        assert "\n" not in str(error.value)
 
 
 def test_a_name_of_thousands_is_one_sentence():
@@ -301,14 +295,19 @@ def test_grid_warns_of_gains_for_other_parameters():
         smc.grid(smc.plant("pendulum_network", n=7), "pid")
 
 
-@pytest.mark.parametrize("search", [smc.grid, smc.margins, smc.tune, smc.basin])
-def test_start_is_set_by_condition_or_starts(search):
-    far = smc.condition("far", x0=1.0)
-    fields = {"conditions": far} if search in (smc.grid, smc.tune) else {"condition": far}
-    more = {} if search is smc.basin else {"starts": smc.starts(x0=0.5)}
-    with pytest.raises(smc.ScenarioError, match=r"condition 'far' .*x0"):
-        search("duffing", "classical", **fields, **more)
-    assert [s.resolved.x0 for s in smc.grid("duffing", "classical", far, starts=smc.starts(spread=0.1))] == [(1.0,)]
+def test_start_is_set_by_condition_or_starts():
+    for search in (
+        smc.grid,
+        smc.margins,
+        smc.tune,
+        smc.basin,
+    ):
+        far = smc.condition("far", x0=1.0)
+        fields = {"conditions": far} if search in (smc.grid, smc.tune) else {"condition": far}
+        more = {} if search is smc.basin else {"starts": smc.starts(x0=0.5)}
+        with pytest.raises(smc.ScenarioError, match=r"condition 'far' .*x0"):
+            search("duffing", "classical", **fields, **more)
+        assert [s.resolved.x0 for s in smc.grid("duffing", "classical", far, starts=smc.starts(spread=0.1))] == [(1.0,)]
 
 
 def test_grid_asks_where_a_model_at_rest_starts(arm):

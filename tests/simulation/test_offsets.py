@@ -249,8 +249,17 @@ def userdata(kind, size):
     }[kind]
 
 
-@pytest.mark.parametrize("size", [0, 1, callback.USERDATA, 500])
-@pytest.mark.parametrize("kind", ["zeros", "ones", "numbers", "nan", "nearly our magic number"])
+@pytest.mark.parametrize(
+    ("size", "kind"),
+    [
+        (0, "zeros"),
+        (1, "nearly our magic number"),
+        (callback.USERDATA, "nearly our magic number"),
+        (callback.USERDATA, "ones"),
+        (500, "numbers"),
+        (500, "nan"),
+    ],
+)
 def test_strangers_are_not_touched(size, kind):
     model = smc.plant("pendulum_network").load(nuserdata=size)
     ends = []

@@ -62,17 +62,19 @@ def copied(tmp_path_factory):
     return Path(shutil.copytree(PACKAGE, folder, ignore=shutil.ignore_patterns("__pycache__")))
 
 
-@pytest.mark.parametrize("name", sorted(SOURCES), ids=str)
-def test_the_magic_number_changes_with_every_module_of_the_path(name, copied, monkeypatch):
+def test_the_magic_number_changes_with_every_module_of_the_path(copied, monkeypatch):
     before = callback.magic()
     monkeypatch.setattr(callback, "__file__", str(copied / "simulation" / "callback.py"))
     assert callback.magic.__wrapped__() == before
-    source = (copied / name).read_bytes()
-    (copied / name).write_bytes(source + b"#\n")
-    after = callback.magic.__wrapped__()
-    (copied / name).write_bytes(source)
-    assert after != before
-    assert after == int(after) < 2**53  # a float64 holds it
+    found = {before}
+    for name in sorted(SOURCES):
+        source = (copied / name).read_bytes()
+        (copied / name).write_bytes(source + b"#\n")
+        after = callback.magic.__wrapped__()
+        (copied / name).write_bytes(source)
+        assert after not in found, name
+        assert after == int(after) < 2**53  # a float64 holds it
+        found.add(after)
 
 
 # (b) memory
@@ -267,22 +269,21 @@ def test_every_gain_of_the_study_is_among_these():
     assert {gain for name in STUDIED for gain in catalogue()[name].defaults} <= TURNING
 
 
-@pytest.mark.parametrize("name", smc.laws())
-def test_a_gain_that_must_have_a_sign_is_refused_without_it(name):
-    template = catalogue()[name]
-    for gain in template.positive | template.nonnegative:
-        with pytest.raises(smc.ScenarioError, match=f"{name}'s {gain} is -1"):
-            smc.law(name, **{gain: -1.0})
-    for gain in template.positive:
-        with pytest.raises(smc.ScenarioError, match=f"{name}'s {gain} is 0"):
-            smc.law(name, **{gain: 0.0})
+def test_a_gain_that_must_have_a_sign_is_refused_without_it():
+    for name in smc.laws():
+        template = catalogue()[name]
+        for gain in template.positive | template.nonnegative:
+            with pytest.raises(smc.ScenarioError, match=f"{name}'s {gain} is -1"):
+                smc.law(name, **{gain: -1.0})
+        for gain in template.positive:
+            with pytest.raises(smc.ScenarioError, match=f"{name}'s {gain} is 0"):
+                smc.law(name, **{gain: 0.0})
 
 
-@pytest.mark.parametrize(("name", "gain"), SIGNED)
-@pytest.mark.parametrize("value", [-1.0, -1e-300, -1e9])
-def test_a_negative_gain_that_would_turn_a_law_round_is_refused(name, gain, value):
-    with pytest.raises(smc.ScenarioError, match=f"{name}'s {gain} is -"):
-        smc.law(name, **{gain: value})
+def test_a_negative_gain_that_would_turn_a_law_round_is_refused():
+    for (name, gain), value in zip(SIGNED, itertools.cycle([-1.0, -1e-300, -1e9])):
+        with pytest.raises(smc.ScenarioError, match=f"{name}'s {gain} is -"):
+            smc.law(name, **{gain: value})
 
 
 @pytest.mark.parametrize("name", STUDIED)
@@ -311,8 +312,7 @@ def test_the_sign_of_zero_is_zero_whatever_came_before(name):
     assert template.function(seen(-0.5, 1.0), record(gains), memory) == (0.0, 0.0)
 
 
-@pytest.mark.parametrize("leak_dt", [0.5, 1.5, 3.0, 100.0])
-@pytest.mark.parametrize("k0", [0.0, 2.0])
+@pytest.mark.parametrize(("leak_dt", "k0"), [(0.5, 0.0), (1.5, 2.0), (100.0, 2.0)])
 def test_the_gain_of_adaptive_leak_never_falls_below_0(leak_dt, k0):
     template, memory = catalogue()["adaptive_leak"], np.zeros(8)
     gains = record(dict(template.defaults) | {"leak": leak_dt / 1e-2, "k0": k0, "gamma": 40.0, "c": 1.0})
@@ -403,13 +403,15 @@ def test_the_estimated_memory_of_a_simulation_is_what_it_takes(large):
     assert takes <= prepared.bytes <= 1.5 * takes
 
 
-def test_batches_of_laws_with_large_memory_stay_bounded():
+def test_batches_of_laws_with_large_memory_stay_bounded(monkeypatch):
+    monkeypatch.setattr(RUN, "BATCH_BYTES", RUN.BATCH_BYTES // 10)
     law = made(lambda y, gains, memory: (0.0, 0.0), memory=10_000)
-    many = [scenario(law, plant=smc.plant("pendulum_network", n=1000), seed=seed) for seed in range(20)]
+    many = [scenario(law, plant=smc.plant("pendulum_network", n=100), seed=seed) for seed in range(20)]
     batches = list(RUN._batches(list(enumerate(map(prepare, many))), 1))
     assert [index for batch in batches for index, _ in batch] == list(range(20))
-    each = 8 * 10_000 * 1000
-    assert max(map(len, batches)) * each <= max(RUN.BATCH_BYTES, each)
+    each = 8 * 10_000 * 100
+    assert 1 < max(map(len, batches)) < 20
+    assert max(map(len, batches)) * each <= RUN.BATCH_BYTES
 
 
 # (h) telling failures again
@@ -481,10 +483,12 @@ SAYS = {
 
 @pytest.mark.parametrize("function", SAYS, ids=lambda function: function.__name__)
 def test_a_failing_run_says_the_same_alone_in_company_and_in_python(function):
-    many = [scenario(made(function), seed=seed, noise=smc.Noise(0.1)) for seed in range(3)]
+    law = made(function)
+    many = [scenario(law, seed=seed, noise=smc.Noise(0.1)) for seed in range(2)]
     beside = plainly([scenario(), *many, scenario()])
     said = [trace.failure for trace in beside[1:-1]]
-    assert said == [plainly(one).failure for one in many] == [reference.run(one).failure for one in many]
+    assert said[0] == plainly(many[0]).failure
+    assert said == [reference.run(one).failure for one in many]
     said = [re.sub(r"expected a nonnegative input, got [-.\d]+", "math domain error", words) for words in said]  # 3.14
     assert all(words == SAYS[function].format(s=words.partition("s = ")[2].partition(" in ")[0]) for words in said)
     assert [trace.failure for trace in (beside[0], beside[-1])] == [None, None]
@@ -641,7 +645,7 @@ def test_a_child_forked_by_a_law_in_the_plain_loop_can_run():
 # (j) clocks of signals
 
 
-@pytest.mark.parametrize("dt", [1e-3, 2e-3, 5e-3, 1e-2])
+@pytest.mark.parametrize("dt", [1e-3, 5e-3])
 def test_a_pulse_lasts_width_over_dt_samples_wherever_decimal_times_put_it(dt):
     wrong = []
     for start, width in itertools.product((*range(0, 60), 500, 4999), (1, 2, 3, 7, 10, 33, 100)):
@@ -723,8 +727,7 @@ class Sine(smc.Signal):
         return p.amplitude, 0.0, 0.0
 
 
-@pytest.mark.parametrize("field", ["reference", "disturbance"])
-@pytest.mark.parametrize("kind", [Ramp(0.3), Sine(0.2, 5.0)], ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize(("field", "kind"), [("reference", Ramp(0.3)), ("disturbance", Sine(0.2, 5.0))])
 def test_a_trace_of_a_signal_of_one_s_own_comes_back_as_it_was_where_its_class_is(field, kind, tmp_path):
     trace = smc.run(scenario(**{field: kind}))
     loaded = smc.load(trace.save(tmp_path / "a.npz"))
@@ -786,14 +789,14 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("mapping", MAPPINGS)
-def test_a_mapping_that_was_checked_cannot_be_changed(mapping, change):
+def test_a_mapping_that_was_checked_cannot_be_changed(mapping):
     held = MAPPINGS[mapping](WHOLE)
     before = dict(held)
-    with pytest.raises(TypeError):
-        CHANGES[change](held, next(iter(held)))
-    assert dict(held) == before
+    for change in CHANGES.values():
+        with pytest.raises(TypeError):
+            change(held, next(iter(held)))
+        assert dict(held) == before
 
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))])
@@ -836,7 +839,7 @@ def test_a_motor_of_gear_1_on_a_joint_makes_a_channel(joint):
 
 @pytest.mark.parametrize(
     ("joint", "axis"),
-    [("hinge", axis) for axis in ("1 0 0", "0 1 0", "0 0 1", "0 0 -1")] + [("slide", "0 1 0"), ("slide", "-1 0 0")],
+    [("hinge", "1 0 0"), ("hinge", "0 1 0"), ("hinge", "0 0 1"), ("hinge", "0 0 -1"), ("slide", "-1 0 0")],
 )
 def test_the_generalised_force_of_a_horizontal_force_is_that_of_the_jacobian(joint, axis):
     """J' F by MuJoCo's Jacobian of the body's centre of mass, in place of the lever arm that both loops read."""
@@ -902,9 +905,10 @@ TOO_MUCH = {
 }
 
 
-@pytest.mark.parametrize("integrator", ["RK4", "Euler"])
-@pytest.mark.parametrize("start", [0.0, 0.005, 0.007])
-@pytest.mark.parametrize("kind", TOO_MUCH)
+@pytest.mark.parametrize(
+    ("kind", "start", "integrator"),
+    [("compiled", 0.0, "RK4"), ("compiled", 0.007, "Euler"), ("plain", 0.005, "RK4"), ("sum", 0.007, "RK4")],
+)
 def test_an_infinite_disturbance_is_marked_at_its_own_sample(kind, start, integrator):
     with contextlib.nullcontext() if kind != "plain" else pytest.warns(smc.PlainLoopWarning):
         trace = smc.run(scenario("none", disturbance=TOO_MUCH[kind](start), integrator=integrator))

@@ -57,50 +57,34 @@ NO_NUMBERS = [
 ]
 
 
-@pytest.mark.parametrize("field", ["duration", "control_period", "u_max", "input_delay"])
-@pytest.mark.parametrize("value", NO_NUMBERS, ids=brief)
-def test_a_field_that_is_no_number_is_refused(field, value):
-    if field == "u_max" and value is None:  # left out
-        assert scenario(u_max=None) == scenario(u_max=6.0) == scenario()
-    elif field == "u_max" and isinstance(value, list | tuple | dict | np.ndarray):  # one for each channel
-        if len(value) == 1:
+@pytest.mark.parametrize("field", ["duration", "control_period", "input_delay", "physics_step"])
+def test_a_field_that_is_no_number_is_refused(field):
+    for value in NO_NUMBERS:
+        if field != "physics_step" or value is not None:
+            refused(lambda value=value: scenario(**{field: value}), field, repr(value))
+
+
+def test_a_bound_is_none_one_number_or_one_a_channel():
+    assert scenario(u_max=None) == scenario(u_max=6.0) == scenario()
+    for value in NO_NUMBERS:
+        if isinstance(value, list | tuple | np.ndarray) and len(value) == 1:
             assert scenario(u_max=value) == scenario(u_max=float(value[0]))
-        else:
-            refused(lambda: scenario(u_max=value), field)
-    else:
-        refused(lambda: scenario(**{field: value}), field, repr(value))
-
-
-@pytest.mark.parametrize("value", [value for value in NO_NUMBERS if value is not None], ids=brief)
-def test_a_physics_step_that_is_no_number_is_refused(value):
-    refused(lambda: scenario(physics_step=value), "physics_step", repr(value))
+        elif value is not None:
+            refused(lambda value=value: scenario(u_max=value), "u_max")
 
 
 @pytest.mark.parametrize("field", ["duration", "control_period", "u_max", "input_delay", "physics_step"])
-@pytest.mark.parametrize("value", [NAN, -INF, -1.0])
-def test_a_field_out_of_its_range_is_refused(field, value):
-    refused(lambda: scenario(**{field: value}), field, f"{value:g}")
+def test_a_field_out_of_its_range_is_refused(field):
+    for value in (NAN, -INF, -1.0, *(() if field == "u_max" else (INF,))):
+        refused(lambda value=value: scenario(**{field: value}), field, f"{value:g}")
+    for value in () if field == "input_delay" else (0, -0.0):
+        refused(lambda value=value: scenario(**{field: value}), field, "greater than 0")
+    if field != "u_max":
+        refused(lambda: scenario(**{field: 10**400}), field)
 
 
-@pytest.mark.parametrize("field", ["duration", "control_period", "u_max", "physics_step"])
-@pytest.mark.parametrize("value", [0, 0.0, -0.0])
-def test_a_field_that_must_be_positive_refuses_zero(field, value):
-    refused(lambda: scenario(**{field: value}), field, "greater than 0")
-
-
-@pytest.mark.parametrize("field", ["duration", "control_period", "input_delay", "physics_step"])
-def test_infinite_times_are_refused(field):
-    refused(lambda: scenario(**{field: INF}), field, "inf")
-
-
-@pytest.mark.parametrize("field", ["duration", "control_period", "input_delay", "physics_step", "x0", "v0"])
-def test_a_number_too_large_for_a_float_is_refused(field):
-    refused(lambda: scenario(**{field: 10**400}), field)
-
-
-@pytest.mark.parametrize(
-    "fields",
-    [
+def test_absurd_clocks_are_refused_and_not_run():
+    for fields in (
         {"duration": HUGE},
         {"duration": 1e300, "physics_step": 1e-12},
         {"control_period": TINY},
@@ -110,12 +94,9 @@ def test_a_number_too_large_for_a_float_is_refused(field):
         {"duration": 1e6, "control_period": 1e-6},
         {"duration": 1.0, "physics_step": 1e-9},
         {"plant": smc.plant("pendulum_network", n=1000), "duration": 1e4},
-    ],
-    ids=str,
-)
-def test_absurd_clocks_are_refused_and_not_run(fields):
-    message = refused(lambda: scenario(**fields))
-    assert re.search("duration|control_period|control period|physics_step|input_delay", message)
+    ):
+        message = refused(lambda fields=fields: scenario(**fields))
+        assert re.search("duration|control_period|control period|physics_step|input_delay", message)
 
 
 def test_an_infinite_bound_on_the_command_is_fine():
@@ -123,29 +104,37 @@ def test_an_infinite_bound_on_the_command_is_fine():
 
 
 @pytest.mark.parametrize("number", [np.float64(0.5), np.float32(0.5), np.array(0.5), Fraction(1, 2)], ids=brief)
-@pytest.mark.parametrize("field", ["duration", "control_period", "u_max", "input_delay", "x0", "v0"])
-def test_anything_that_is_a_number_is_taken_as_a_float(field, number):
-    value = getattr(scenario(**{field: number}), field)
-    assert value in (0.5, (0.5,))
-    assert type(value[0] if isinstance(value, tuple) else value) is float
+def test_anything_that_is_a_number_is_taken_as_a_float(number):
+    for field in ("duration", "control_period", "u_max", "input_delay", "x0", "v0"):
+        value = getattr(scenario(**{field: number}), field)
+        assert value in (0.5, (0.5,))
+        assert type(value[0] if isinstance(value, tuple) else value) is float
 
 
-@pytest.mark.parametrize(
-    ("period", "step", "steps"),
-    [(1e-3, 1e-3, 1), (1e-2, 1e-3, 10), (5e-4, 5e-4, 1), (1.5e-3, 7.5e-4, 2), (1 / 300, 1 / 1200, 4), (0.1, 1e-3, 100)],
-)
-def test_the_physics_step_is_the_largest_divisor_up_to_a_millisecond(period, step, steps):
-    made = scenario(control_period=period)
-    assert made.resolved.physics_step == pytest.approx(step, rel=1e-12)
-    assert made.steps == steps
+def test_the_physics_step_is_the_largest_divisor_up_to_a_millisecond():
+    for period, step, steps in (
+        (1e-3, 1e-3, 1),
+        (1e-2, 1e-3, 10),
+        (5e-4, 5e-4, 1),
+        (1.5e-3, 7.5e-4, 2),
+        (1 / 300, 1 / 1200, 4),
+        (0.1, 1e-3, 100),
+    ):
+        made = scenario(control_period=period)
+        assert made.resolved.physics_step == pytest.approx(step, rel=1e-12)
+        assert made.steps == steps
 
 
-@pytest.mark.parametrize(
-    ("duration", "period", "samples"),
-    [(1.0, 1e-3, 1000), (0.3, 0.1, 3), (0.35, 0.1, 3), (10.0, 3.0, 3), (1e-3, 1e-3, 1), (0.7, 0.07, 10)],
-)
-def test_a_run_lasts_the_whole_periods_that_fit(duration, period, samples):
-    assert scenario(duration=duration, control_period=period).samples == samples
+def test_a_run_lasts_the_whole_periods_that_fit():
+    for duration, period, samples in (
+        (1.0, 1e-3, 1000),
+        (0.3, 0.1, 3),
+        (0.35, 0.1, 3),
+        (10.0, 3.0, 3),
+        (1e-3, 1e-3, 1),
+        (0.7, 0.07, 10),
+    ):
+        assert scenario(duration=duration, control_period=period).samples == samples
 
 
 @pytest.mark.parametrize("step", [2e-3, 3e-4, 0.9e-3, 1.0, 1e-3 / 1.5])
@@ -153,7 +142,7 @@ def test_a_physics_step_that_does_not_divide_the_period_is_refused(step):
     refused(lambda: scenario(physics_step=step), "physics_step", f"{step:g}", "0.001")
 
 
-@pytest.mark.parametrize("name", smc.plants())
+@pytest.mark.parametrize("name", ["duffing", "pendulum_network"])
 def test_one_parameter_under_two_names_is_refused(name):
     plant = smc.plant(name)
     both = {"mass": 1.2, plant.mass: 1.5}
@@ -189,32 +178,31 @@ def test_process_noise_with_more_knots_than_a_run_may_have_steps_is_refused():
 
 
 @pytest.mark.parametrize("field", ["x0", "v0"])
-@pytest.mark.parametrize(
-    "value",
-    [NAN, INF, -2e6, True, "1", [NAN], [[1.0]], ["a"], [None], ..., b"1", {"a": 1.0}, np.zeros((1, 1))],
-    ids=brief,
-)
-def test_a_state_that_is_no_finite_number_is_refused(field, value):
-    refused(lambda: scenario(**{field: value}), field)
+def test_a_state_that_is_no_finite_number_is_refused(field):
+    odd = [NAN, INF, -2e6, 10**400, True, "1", [NAN], [[1.0]], ["a"], [None], ..., b"1", {"a": 1.0}, np.zeros((1, 1))]
+    for value in odd:
+        refused(lambda value=value: scenario(**{field: value}), field)
 
 
 @pytest.mark.parametrize("field", ["x0", "v0"])
-@pytest.mark.parametrize("value", [[], (), [1.0, 2.0], np.zeros(4), np.zeros((10, 10))], ids=lambda v: f"{np.shape(v)}")
-def test_a_state_of_the_wrong_length_is_refused(field, value):
-    refused(
-        lambda: scenario(plant=smc.plant("pendulum_network", n=3), **{field: value}),
-        field,
-        f"{len(value)} values",
-        "3 channels",
-    )
+def test_a_state_of_the_wrong_length_is_refused(field):
+    plant = smc.plant("pendulum_network", n=3)
+    for value in ([], [1.0, 2.0], np.zeros(4), np.zeros((10, 10))):
+        words = f"{len(value)} values", "3 channels"
+        refused(lambda value=value: scenario(plant=plant, **{field: value}), field, *words)
 
 
-@pytest.mark.parametrize(
-    "value", [0.5, [0.5], np.array([0.5, 0.5, 0.5]), (0.5,) * 3, [np.float32(0.5)] * 3, np.array(0.5)]
-)
-def test_a_state_is_one_number_or_one_a_channel(value):
-    made = scenario(plant=smc.plant("pendulum_network", n=3), x0=value, v0=value)
-    assert made.resolved.x0 == made.resolved.v0 == (0.5, 0.5, 0.5)
+def test_a_state_is_one_number_or_one_a_channel():
+    for value in (
+        0.5,
+        [0.5],
+        np.array([0.5, 0.5, 0.5]),
+        (0.5,) * 3,
+        [np.float32(0.5)] * 3,
+        np.array(0.5),
+    ):
+        made = scenario(plant=smc.plant("pendulum_network", n=3), x0=value, v0=value)
+        assert made.resolved.x0 == made.resolved.v0 == (0.5, 0.5, 0.5)
 
 
 def test_by_default_the_plant_starts_at_rest_where_the_paper_puts_it():
@@ -231,9 +219,8 @@ def test_a_network_recycles_the_paper_s_initial_positions(n):
     assert made.resolved.x0 == tuple(first[i % 5] for i in range(n))
 
 
-@pytest.mark.parametrize(
-    ("make", "wrong", "near"),
-    [
+def test_an_unknown_name_suggests_the_nearest():
+    for make, wrong, near in (
         (lambda: scenario(plant="dufing"), "dufing", "duffing"),
         (lambda: scenario(plant="pendulum_netwrok"), "pendulum_netwrok", "pendulum_network"),
         (lambda: scenario(law="super_twistin"), "super_twistin", "super_twisting"),
@@ -244,11 +231,9 @@ def test_a_network_recycles_the_paper_s_initial_positions(n):
         (lambda: smc.law("observer_free", lamb=2.0), "lamb", "lam"),
         (lambda: smc.plant("duffing", betta=2.0), "betta", "beta"),
         (lambda: smc.estimator("filtered_difference", taw=2.0), "taw", "tau"),
-    ],
-)
-def test_an_unknown_name_suggests_the_nearest(make, wrong, near):
-    message = refused(make, repr(wrong))
-    assert f"did you mean '{near}'" in message
+    ):
+        message = refused(make, repr(wrong))
+        assert f"did you mean '{near}'" in message
 
 
 def test_a_name_near_to_none_lists_them_all():
@@ -259,18 +244,12 @@ def test_a_name_near_to_none_lists_them_all():
 ODD = [None, 5, 1.5, True, [], {}, ..., np.eye(30), np.array(["duffing", "x"]), len]
 
 
-@pytest.mark.parametrize("field", ["plant", "law", "velocity", "integrator"])
-@pytest.mark.parametrize("value", ODD, ids=lambda v: type(v).__name__)
-def test_what_is_no_name_at_all_is_refused(field, value):
-    if field in ("velocity", "integrator") and value is None:
-        pytest.skip("None means the default")
-    refused(lambda: scenario(**{field: value}), field)
-
-
-@pytest.mark.parametrize("find", [smc.plant, smc.law, smc.estimator], ids=lambda f: f.__name__)
-@pytest.mark.parametrize("value", ODD, ids=lambda v: type(v).__name__)
-def test_what_is_no_name_at_all_finds_nothing(find, value):
-    refused(lambda: find(value))
+def test_what_is_no_name_at_all_is_refused_and_finds_nothing():
+    for value in ODD:
+        for field in ("plant", "law", *(() if value is None else ("velocity", "integrator"))):  # None means the default
+            refused(lambda field=field, value=value: scenario(**{field: value}), field)
+        for find in (smc.plant, smc.law, smc.estimator):
+            refused(lambda find=find, value=value: find(value))
 
 
 def test_a_law_is_no_estimator_and_an_estimator_no_law():
@@ -278,9 +257,9 @@ def test_a_law_is_no_estimator_and_an_estimator_no_law():
     refused(lambda: scenario(law=smc.estimator("measured")), "law", "measured")
 
 
-@pytest.mark.parametrize("value", [5.0, "sine", [5.0], [smc.Constant(1.0), None], smc.Sine, ..., np.zeros(3)], ids=str)
-def test_a_disturbance_that_is_no_signal_is_refused(value):
-    refused(lambda: scenario(disturbance=value), "disturbance")
+def test_a_disturbance_that_is_no_signal_is_refused():
+    for value in (5.0, "sine", [5.0], [smc.Constant(1.0), None], smc.Sine, ..., np.zeros(3)):
+        refused(lambda value=value: scenario(disturbance=value), "disturbance")
 
 
 def test_a_disturbance_is_none_one_or_several():
@@ -290,9 +269,9 @@ def test_a_disturbance_is_none_one_or_several():
     assert scenario(disturbance=[sine, smc.Constant(1.0)]).disturbance == (sine, smc.Constant(1.0))
 
 
-@pytest.mark.parametrize("value", [0.0, "0", [], [smc.Constant(0.0)] * 2, ...], ids=str)
-def test_a_reference_that_is_not_one_signal_is_refused(value):
-    refused(lambda: scenario(reference=value), "reference")
+def test_a_reference_that_is_not_one_signal_is_refused():
+    for value in (0.0, "0", [], [smc.Constant(0.0)] * 2, ...):
+        refused(lambda value=value: scenario(reference=value), "reference")
 
 
 def test_what_is_left_out_or_none_is_quiet():
@@ -318,10 +297,11 @@ SIGNALS = [
 
 
 @pytest.mark.parametrize("signal", SIGNALS, ids=lambda s: type(s).__name__)
-@pytest.mark.parametrize("value", [NAN, INF, None, "1", True, [1.0], np.zeros(2), 1j, 10**400], ids=brief)
-def test_every_parameter_of_every_signal_must_be_a_finite_number(signal, value):
+def test_every_parameter_of_every_signal_must_be_a_finite_number(signal):
     for name in signal.parameters():
-        refused(lambda name=name: dataclasses.replace(signal, **{name: value}), type(signal).__name__, name)
+        for value in (NAN, INF, None, "1", True, [1.0], np.zeros(2), 1j, 10**400):
+            change = {name: value}
+            refused(lambda change=change: dataclasses.replace(signal, **change), type(signal).__name__, name)
 
 
 @pytest.mark.parametrize(
@@ -334,9 +314,9 @@ def test_every_parameter_of_every_signal_must_be_a_finite_number(signal, value):
         (lambda value: smc.OrnsteinUhlenbeck(1.0, 1.0, dt=value), "dt"),
     ],
 )
-@pytest.mark.parametrize("value", [0.0, -1.0])
-def test_widths_and_time_constants_are_positive(make, name, value):
-    refused(lambda: make(value), name, f"{value:g}")
+def test_widths_and_time_constants_are_positive(make, name):
+    for value in (0.0, -1.0):
+        refused(lambda value=value: make(value), name, f"{value:g}")
 
 
 def test_the_spread_of_process_noise_is_not_negative():
@@ -344,30 +324,29 @@ def test_the_spread_of_process_noise_is_not_negative():
 
 
 @pytest.mark.parametrize("field", ["position", "velocity"])
-@pytest.mark.parametrize("value", [NAN, INF, -0.1, None, "1", True, np.zeros(2)], ids=brief)
-def test_measurement_noise_is_a_finite_number_not_negative(field, value):
-    refused(lambda: smc.Noise(**{field: value}), "Noise", field)
+def test_measurement_noise_is_a_finite_number_not_negative(field):
+    for value in (NAN, INF, -0.1, None, "1", True, np.zeros(2)):
+        refused(lambda value=value: smc.Noise(**{field: value}), "Noise", field)
 
 
-@pytest.mark.parametrize("value", [0.1, "loud", smc.Constant(0.1), np.eye(30)], ids=lambda v: type(v).__name__)
-def test_a_noise_that_is_no_noise_is_refused(value):
-    refused(lambda: scenario(noise=value), "noise")
+def test_a_noise_that_is_no_noise_is_refused():
+    for value in (0.1, "loud", smc.Constant(0.1), np.eye(30)):
+        refused(lambda value=value: scenario(noise=value), "noise")
 
 
-@pytest.mark.parametrize("value", [1.3, "M", ["M"], [("M", 1.3)], np.eye(30)], ids=lambda v: type(v).__name__)
-def test_a_mismatch_that_is_no_mapping_is_refused(value):
-    refused(lambda: scenario(mismatch=value), "mismatch")
-    refused(lambda: smc.Jump(0.5, value), "Jump")
+def test_a_mismatch_that_is_no_mapping_is_refused():
+    for value in (1.3, "M", ["M"], [("M", 1.3)], np.eye(30)):
+        refused(lambda value=value: scenario(mismatch=value), "mismatch")
+        refused(lambda value=value: smc.Jump(0.5, value), "Jump")
 
 
-@pytest.mark.parametrize("value", [NAN, INF, None, "2", True, [2.0]], ids=brief)
-def test_a_factor_must_be_a_finite_number(value):
-    refused(lambda: scenario(mismatch={"alpha": value}), "mismatch", "alpha")
-    refused(lambda: smc.Jump(0.5, {"alpha": value}), "Jump", "alpha")
+def test_a_factor_must_be_a_finite_number():
+    for value in (NAN, INF, None, "2", True, [2.0]):
+        refused(lambda value=value: scenario(mismatch={"alpha": value}), "mismatch", "alpha")
+        refused(lambda value=value: smc.Jump(0.5, {"alpha": value}), "Jump", "alpha")
 
 
-@pytest.mark.parametrize("name", ["mass", "M"])
-@pytest.mark.parametrize("value", [0.0, -1.0])
+@pytest.mark.parametrize(("name", "value"), [("mass", 0.0), ("M", -1.0)])
 def test_a_plant_keeps_a_positive_mass(name, value):
     refused(lambda: scenario(mismatch={name: value}), name, f"{value:g}")
     refused(lambda: scenario(jump=smc.Jump(0.5, {name: value})), name, f"{value:g}")
@@ -391,24 +370,24 @@ def test_mass_means_the_plant_s_mass():
     assert vars(smc.plant("pendulum_network").values({"mass": 2.0}))["m"] == 1.0
 
 
-@pytest.mark.parametrize("time", [1.0, 1.5, 1e300])
-def test_a_jump_after_the_end_is_refused(time):
-    refused(lambda: scenario(duration=1.0, jump=smc.Jump(time, {"M": 2.0})), "jump", f"{time:g}")
+def test_a_jump_after_the_end_is_refused():
+    for time in (1.0, 1.5, 1e300):
+        refused(lambda time=time: scenario(duration=1.0, jump=smc.Jump(time, {"M": 2.0})), "jump", f"{time:g}")
 
 
-@pytest.mark.parametrize("time", [NAN, INF, -0.1, None, "1", True], ids=brief)
-def test_a_jump_s_time_is_a_finite_number_not_negative(time):
-    refused(lambda: smc.Jump(time, {"M": 2.0}), "Jump", "time")
+def test_a_jump_s_time_is_a_finite_number_not_negative():
+    for time in (NAN, INF, -0.1, None, "1", True):
+        refused(lambda time=time: smc.Jump(time, {"M": 2.0}), "Jump", "time")
 
 
-@pytest.mark.parametrize("value", [0.5, {"M": 2.0}, (0.5, {"M": 2.0}), "now"], ids=str)
-def test_a_jump_that_is_no_jump_is_refused(value):
-    refused(lambda: scenario(jump=value), "jump")
+def test_a_jump_that_is_no_jump_is_refused():
+    for value in (0.5, {"M": 2.0}, (0.5, {"M": 2.0}), "now"):
+        refused(lambda value=value: scenario(jump=value), "jump")
 
 
-@pytest.mark.parametrize("seed", [-1, 2**53, 1.5, True, None, "1", NAN, [1]], ids=brief)
-def test_a_seed_is_a_whole_number_that_a_float_holds(seed):
-    refused(lambda: scenario(seed=seed), "seed", repr(seed))
+def test_a_seed_is_a_whole_number_that_a_float_holds():
+    for seed in (-1, 2**53, 1.5, True, None, "1", NAN, [1]):
+        refused(lambda seed=seed: scenario(seed=seed), "seed", repr(seed))
 
 
 @pytest.mark.parametrize("seed", [0, 2**53 - 1])
@@ -421,9 +400,9 @@ def test_a_seed_may_come_from_numpy():
     assert type(scenario(seed=np.int64(3)).seed) is int
 
 
-@pytest.mark.parametrize("n", [1, 0, -3, 1001, 2.5, NAN, INF, None, "3", "many", [3], np.array([2, 3])], ids=brief)
-def test_a_network_s_size_is_a_whole_number_in_its_range(n):
-    refused(lambda: smc.plant("pendulum_network", n=n), "pendulum_network", "n")
+def test_a_network_s_size_is_a_whole_number_in_its_range():
+    for n in (1, 0, -3, 1001, 2.5, NAN, INF, None, "3", "many", [3], np.array([2, 3])):
+        refused(lambda n=n: smc.plant("pendulum_network", n=n), "pendulum_network", "n")
 
 
 @pytest.mark.parametrize("n", [2, 1000, 3.0, np.int64(7)], ids=brief)
@@ -438,20 +417,21 @@ def test_a_single_plant_takes_no_size():
     refused(lambda: smc.plant("duffing", n=2), "duffing", "2")
 
 
-@pytest.mark.parametrize("plant", smc.plants())
-@pytest.mark.parametrize("value", [NAN, INF, None, "1", True, [1.0]], ids=brief)
-def test_every_parameter_of_every_plant_must_be_a_finite_number(plant, value):
-    for name in smc.plant(plant).parameters:
-        refused(lambda name=name: smc.plant(plant, **{name: value}), plant, name)
+def test_every_parameter_of_every_plant_must_be_a_finite_number():
+    for value in (NAN, INF, None, "1", True, [1.0]):
+        refused(lambda value=value: smc.plant("duffing", beta=value), "duffing", "beta")
+    for plant in smc.plants():
+        for name in smc.plant(plant).parameters:
+            refused(lambda plant=plant, name=name: smc.plant(plant, **{name: NAN}), plant, name)
 
 
-@pytest.mark.parametrize("law", smc.laws())
-@pytest.mark.parametrize("value", [NAN, INF, None, "1", True, [], [NAN], 10**400], ids=brief)
-def test_every_gain_of_every_law_must_be_a_finite_number(law, value):
-    for name, default in smc.law(law).gains.items():
-        if default == INF and value in (INF, 10**400):
-            continue  # a bound that may be none
-        refused(lambda name=name: smc.law(law, **{name: value}), law, name)
+def test_every_gain_of_every_law_must_be_a_finite_number():
+    for value in (NAN, INF, None, "1", True, [], [NAN], 10**400):
+        refused(lambda value=value: smc.law("classical", c=value), "classical", "c")
+    for law in smc.laws():
+        for name, default in smc.law(law).gains.items():
+            for value in (NAN,) if default == INF else (NAN, INF):  # a bound that may be none
+                refused(lambda change={name: value}, law=law: smc.law(law, **change), law, name)
 
 
 def test_gains_that_must_be_positive_are():
@@ -459,19 +439,19 @@ def test_gains_that_must_be_positive_are():
     refused(lambda: smc.law("observer_free", lam=-1.0), "lam", "-1")
 
 
-@pytest.mark.parametrize("memory", [0, -1, 10_001, 1.5, NAN, INF, None, "8", "much", [8]], ids=brief)
-def test_a_law_s_memory_is_a_whole_number_of_floats(memory):
-    refused(lambda: smc.law_function(memory=memory), "memory")
+def test_a_law_s_memory_is_a_whole_number_of_floats():
+    for memory in (0, -1, 10_001, 1.5, NAN, INF, None, "8", "much", [8]):
+        refused(lambda memory=memory: smc.law_function(memory=memory), "memory")
 
 
-@pytest.mark.parametrize("name", ["1k", "k 1", "_k", "", "lambda", "class", 5], ids=brief)
-def test_a_gain_s_name_can_be_written_after_a_dot(name):
-    refused(lambda: smc.law_function(gains={name: 1.0}), "gain", repr(name))
+def test_a_gain_s_name_can_be_written_after_a_dot():
+    for name in ("1k", "k 1", "_k", "", "lambda", "class", 5):
+        refused(lambda name=name: smc.law_function(gains={name: 1.0}), "gain", repr(name))
 
 
-@pytest.mark.parametrize("gains", [["k"], "k", 5, {"k": "1"}, {"k": NAN}], ids=brief)
-def test_gains_are_names_with_finite_defaults(gains):
-    refused(lambda: smc.law_function(gains=gains), "gain")
+def test_gains_are_names_with_finite_defaults():
+    for gains in (["k"], "k", 5, {"k": "1"}, {"k": NAN}):
+        refused(lambda gains=gains: smc.law_function(gains=gains), "gain")
 
 
 def test_a_positive_gain_is_one_of_the_gains():
@@ -507,9 +487,8 @@ def test_scenarios_made_alike_are_equal():
     assert scenario(x0=1.5, v0=[0.0]) == scenario()
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
+def test_scenarios_that_differ_in_one_field_are_not_equal():
+    for change in (
         {"seed": 8},
         {"law": smc.law("super_twisting", k1=1.1)},
         {"plant": smc.plant("pendulum_network", n=3)},
@@ -519,11 +498,8 @@ def test_scenarios_made_alike_are_equal():
         {"noise": None},
         {"reference": smc.Sine(0.1, 2.1)},
         {"velocity": "measured"},
-    ],
-    ids=str,
-)
-def test_scenarios_that_differ_in_one_field_are_not_equal(change):
-    assert dataclasses.replace(full(), **change) != full()
+    ):
+        assert dataclasses.replace(full(), **change) != full(), change
 
 
 def test_a_scenario_does_not_change():
@@ -542,10 +518,10 @@ THINGS = [full(), *SIGNALS, smc.Noise(0.1), smc.Jump(0.5, {"M": 2.0}), smc.estim
 THINGS += [smc.plant(name) for name in smc.plants()] + [smc.law(name) for name in smc.laws()]
 
 
-@pytest.mark.parametrize("thing", THINGS, ids=lambda thing: f"{type(thing).__name__}-{getattr(thing, 'name', '')}")
-def test_plain_data_survives_a_pickle_and_a_copy(thing):
-    assert pickle.loads(pickle.dumps(thing)) == thing
-    assert copy.deepcopy(thing) == thing
+def test_plain_data_survives_a_pickle_and_a_copy():
+    for thing in THINGS:
+        assert pickle.loads(pickle.dumps(thing)) == thing
+        assert copy.deepcopy(thing) == thing
 
 
 def test_a_variant_differs_in_what_was_replaced_and_nothing_else():
@@ -566,9 +542,9 @@ def test_a_scenario_shows_its_fields():
 # laws, models, surfaces
 
 
-@pytest.mark.parametrize("value", ["", 0, False, [], 5, "lienar"], ids=repr)
-def test_a_surface_that_is_none_is_refused(value):
-    refused(lambda: scenario(surface=value), "surface")
+def test_a_surface_that_is_none_is_refused():
+    for value in ("", 0, False, [], 5, "lienar"):
+        refused(lambda value=value: scenario(surface=value), "surface")
 
 
 @pytest.mark.parametrize("law", ["twisting", "nested_third_order", "pid"])

@@ -177,8 +177,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_bad_input_is_one_sentence(case):
-    make, said = REFUSED[case]
-    with pytest.raises(smc.ScenarioError, match=re.escape(said)):
-        make()
+def test_bad_input_is_one_sentence():
+    for make, said in REFUSED.values():
+        with pytest.raises(smc.ScenarioError, match=re.escape(said)):
+            make()
