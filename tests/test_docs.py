@@ -94,13 +94,12 @@ def test_the_tutorial_s_comparison_prints_what_the_page_shows(tmp_path, monkeypa
     with beside(TUTORIAL, tmp_path), contextlib.redirect_stdout(io.StringIO()) as said:
         runpy.run_path("compare.py", run_name="__main__")
     (shown,) = blocks(TUTORIAL.read_text(), "text")
-    settled = r"^settling time on .*: \S+ wins: .. % less than"  # another machine's tanh moves the digits of chattering
+    settled = r"^settling time on .*: \S+ wins: "  # no digits: noise and another machine's tanh move them
     told = [re.findall(settled, text, re.MULTILINE) for text in (said.getvalue(), shown)]
     assert told[0] == told[1]
     assert len(told[0]) == 2
     names = [
-        re.findall(r"^\S+ +(\S+) +(shipped|tuned about defaults) +\d+ ", text, re.MULTILINE)
-        for text in (said.getvalue(), shown)
+        re.findall(r"^\S+ +(\S+) +(shipped|tuned here) +\d+ ", text, re.MULTILINE) for text in (said.getvalue(), shown)
     ]
     assert names[0] == names[1] != []
 

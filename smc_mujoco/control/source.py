@@ -16,12 +16,10 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
 
 NONE, DEFAULT, TUNED, SHIPPED, STUDY, YOURS = "none", "default", "tuned here", "shipped", "study", "yours"
-ABOUT_DEFAULTS = "tuned about defaults"
 KINDS = {  # kind -> what it means
     NONE: "the law has no gains",
     DEFAULT: "the defaults of the law's own file",
     TUNED: "found by a search that the user ran",
-    ABOUT_DEFAULTS: "as tuned here, but some have no unit, and so a search about their defaults",
     SHIPPED: "those of the package for this plant",
     STUDY: "those of a published study",
     YOURS: "given by the user",
@@ -38,11 +36,13 @@ class Search:
       rule: how it searches, in words; its name stands before the first comma, colon or bracket.
       evaluations: number of sets of gains that it tried.
       converged: whether its starts agree, see `analysis.tuning`; None if it made too few to tell.
+      about_defaults: whether it drew its starts about the law's defaults, as a gain has no unit.
     """
 
     rule: str
     evaluations: int
     converged: bool | None = None
+    about_defaults: bool = False
 
     @property
     def name(self) -> str:
@@ -50,7 +50,7 @@ class Search:
         name = self.rule
         for mark in ("(", ",", ":", ";"):
             name = name.partition(mark)[0].rstrip()
-        return name
+        return name + " about the defaults" * self.about_defaults
 
     @property
     def ended(self) -> str:

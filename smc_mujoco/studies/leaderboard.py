@@ -40,7 +40,7 @@ from smc_mujoco.analysis.signed_rank import least_p
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.common.text import joined, number
-from smc_mujoco.control.source import ABOUT_DEFAULTS, DEFAULT, Source, kinds
+from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies import board_tables
 
@@ -71,6 +71,11 @@ class Entry:
     failed: int
     runs: int
     sources: tuple[Source, ...] = ()
+
+    @property
+    def about_defaults(self) -> bool:
+        """Whether gains of it were searched about their defaults, as one has no unit."""
+        return any(source.search and source.search.about_defaults for source in self.sources)
 
 
 class Lead(NamedTuple):
@@ -262,7 +267,7 @@ class Board:
 
     def _gains(self, laws: Collection[str]) -> str:
         """Return what limits the results of laws that win, after commas: their search, and "for these gains"."""
-        others = [one.law for one in self.entries if one.law in laws and ABOUT_DEFAULTS in kinds(one.sources)]
+        others = [one.law for one in self.entries if one.law in laws and one.about_defaults]
         whose = (
             f"{joined(others)} " * (len(laws) > 1)
             + f"with gains searched about {'its' if len(others) == 1 else 'their'}"

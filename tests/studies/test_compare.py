@@ -104,7 +104,7 @@ def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tm
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         made = smc.compare([plain_law, "classical"], "duffing", "nominal", 2, out=tmp_path, **SHORT)
-    assert kinds(made)["plain_law"] == "tuned about defaults"
+    assert kinds(made)["plain_law"] == "tuned here"
     assert "plain_law: lam and k1 have no unit, so their search is about the defaults and not by the rule" in repr(
         made.remarks
     )

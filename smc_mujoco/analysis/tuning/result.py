@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis.tuning.objective import FAILED, Objective, restore
-from smc_mujoco.analysis.tuning.search_space import DECADES, ROUNDING, Box, at_bound, box, largest
+from smc_mujoco.analysis.tuning.search_space import DECADES, ROUNDING, Box, at_bound, box, largest, without_unit
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import ended, read_json, reading, write_json
 from smc_mujoco.common.html import table
@@ -102,10 +102,13 @@ class Tuned:
             lines.append((name, f"{self.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", ", ".join(notes)))
         return lines
 
-    def sourced(self, kind: str) -> "Tuned":
-        """Return the tuning with a law that names this search as the source of its gains, of a kind of `source`."""
-        search = source.Search(rule=self.rule, evaluations=self.evaluations, converged=self.converged)
-        return dataclasses.replace(self, law=self.law.sourced(kind, search))
+    def sourced(self) -> "Tuned":
+        """Return the tuning with a law that names this search as the source of its gains."""
+        about = bool(without_unit(self.law))
+        search = source.Search(
+            rule=self.rule, evaluations=self.evaluations, converged=self.converged, about_defaults=about
+        )
+        return dataclasses.replace(self, law=self.law.sourced(source.TUNED, search))
 
     @property
     def gains(self) -> dict[str, float]:

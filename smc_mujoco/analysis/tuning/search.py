@@ -51,7 +51,6 @@ from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.common.errors import ScenarioWarning, find, users_frame, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
-from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
@@ -176,7 +175,7 @@ def tune(
         bounds=start,
         searched=searched,
         versions=versions(),
-    ).sourced(source.ABOUT_DEFAULTS if about else source.TUNED)
+    ).sourced()
 
 
 @dataclasses.dataclass
