@@ -98,8 +98,11 @@ def error(trace, states):
     return np.abs(states[:, 0] - trace.x).max(), np.abs(states[:, 1] - trace.v).max()
 
 
+DURATION = {"inverted_pendulum_network": 10.0}  # s; the others: 2 s
+
+
 @functools.cache
-def ten_seconds(plant):
+def long(plant):
     """Law -> the scenario of `everything`, and the oracle's states."""
     scenarios = [everything(plant, law) for law in SMOOTH]
     return dict(zip(SMOOTH, zip(scenarios, oracle(scenarios), strict=True), strict=True))
@@ -108,7 +111,7 @@ def ten_seconds(plant):
 def everything(plant, law):
     """A tracking run with delay, sine disturbance, a plant 30 % heavier than believed, and a jump."""
     return dataclasses.replace(
-        smc.paper.scenario(plant, law, "jump_mild"),
+        smc.paper.scenario(plant, law, "jump_mild", duration=DURATION.get(plant, 2.0)),
         reference=smc.Sine(amplitude=0.1, omega=2.0),
         input_delay=0.007,
         mismatch={"mass": 1.3},
@@ -121,9 +124,10 @@ def test_every_plant_of_the_study_has_its_equation_here():
 
 @PLANTS
 @pytest.mark.parametrize("law", sorted(SMOOTH))
-def test_ten_seconds_of_the_closed_loop_follow_the_equation(plant, law):
-    scenario, states = ten_seconds(plant)[law]
-    assert (scenario.samples, scenario.resolved.physics_step, scenario.resolved.integrator) == (10_000, 1e-3, "RK4")
+def test_seconds_of_the_closed_loop_follow_the_equation(plant, law):
+    scenario, states = long(plant)[law]
+    assert scenario.jump.time == scenario.duration / 2
+    assert (scenario.resolved.physics_step, scenario.resolved.integrator) == (1e-3, "RK4")
     x, v = error(smc.run(scenario), states)
     assert x < 1e-10  # the requirement is 1e-7
     assert v < 1e-9
@@ -132,7 +136,7 @@ def test_ten_seconds_of_the_closed_loop_follow_the_equation(plant, law):
 @PLANTS
 def test_a_delay_that_is_no_multiple_of_the_control_period_is_exact(plant):
     scenario = dataclasses.replace(
-        everything(plant, "observer_free"), control_period=5e-3, physics_step=1e-3, duration=2.0, jump=None
+        everything(plant, "observer_free"), control_period=5e-3, physics_step=1e-3, duration=0.5, jump=None
     )
     x, v = error(smc.run(scenario), *oracle([scenario]))
     assert x < 1e-10
@@ -141,7 +145,7 @@ def test_a_delay_that_is_no_multiple_of_the_control_period_is_exact(plant):
 
 @PLANTS
 def test_a_mass_off_by_a_millionth_is_noticed(plant):
-    scenario = dataclasses.replace(everything(plant, "observer_free"), duration=1.0, jump=None)
+    scenario = dataclasses.replace(everything(plant, "observer_free"), duration=0.5, jump=None)
     assert error(smc.run(scenario), *oracle([scenario], factor=1 + 1e-6))[0] > 1e-8
 
 
@@ -158,8 +162,17 @@ def coarse(plant):
     return scenario, *oracle([scenario])
 
 
-@PLANTS
-@pytest.mark.parametrize(("integrator", "order"), [("RK4", 4), ("Euler", 1), ("implicitfast", 1), ("implicit", 1)])
+@pytest.mark.parametrize(
+    ("plant", "integrator", "order"),
+    [
+        *((plant, "RK4", 4) for plant in sorted(EQUATION)),
+        ("duffing", "Euler", 1),
+        ("inverted_pendulum", "implicitfast", 1),
+        ("inverted_pendulum_network", "implicit", 1),
+        ("pendulum_network", "Euler", 1),
+        ("van_der_pol", "implicitfast", 1),
+    ],
+)
 def test_the_error_falls_with_the_order_of_the_integrator(plant, integrator, order):
     (scenario, states), steps = coarse(plant), (8e-3, 4e-3, 2e-3)
     traces = smc.run([dataclasses.replace(scenario, physics_step=h, integrator=integrator) for h in steps])
@@ -199,8 +212,10 @@ def disturbance(trace, since):
     return d
 
 
-@PLANTS
-@pytest.mark.parametrize("condition", CONDITIONS)
+@pytest.mark.parametrize(
+    ("plant", "condition"),
+    [(p, c) for i, p in enumerate(sorted(EQUATION)) for j, c in enumerate(CONDITIONS) if (i + j) % 5 in (0, 2)],
+)
 def test_every_step_of_every_law_obeys_the_equation(plant, condition):
     """From each logged state, one step with the logged control ends in the next logged state."""
     fields = CONDITIONS[condition]

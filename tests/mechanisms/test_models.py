@@ -18,7 +18,7 @@ pytestmark = pytest.mark.quick
 
 NAMES = sorted(catalogue())
 SIZES = {1: [1], 2: [2], 7: [7]}  # largest n -> which are tested
-SIZED = [(name, n) for name in NAMES for n in SIZES.get(catalogue()[name].sizes[1], [2, 3, 5, 40, 100])]
+SIZED = [(name, n) for name in NAMES for n in SIZES.get(catalogue()[name].sizes[1], [2, 5])]
 CASES = pytest.mark.parametrize(("name", "n"), SIZED, ids=[f"{name}-{n}" for name, n in SIZED])
 # one pendulum or cart a channel; the others: tests/mechanisms/test_underactuated.py, test_rig_plants.py, test_panda.py
 DRIVEN = [(name, n) for name, n in SIZED if not catalogue()[name].free and name not in ("double_pendulum", "panda")]
@@ -87,40 +87,33 @@ def worst_error(p, model, rng, trials=20):
     return worst
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if not isinstance(catalogue()[name].nominal, Coupled)])
-def test_nominal_compiles_to_the_same_numbers(name):
-    p = catalogue()[name]
-    parameters = believed(p)
-    compiled = numba.njit(p.nominal)
-    rng = np.random.default_rng(0)
-    x, v = rng.uniform(-2, 2, p.n), rng.uniform(-3, 3, p.n)
-    for i in range(p.n):
-        np.testing.assert_allclose(compiled(x, v, i, parameters), p.nominal(x, v, i, parameters), rtol=1e-14)
+def test_nominal_compiles_to_the_same_numbers():
+    for p in (p for p in catalogue().values() if not isinstance(p.nominal, Coupled)):
+        parameters = believed(p)
+        compiled = numba.njit(p.nominal)
+        rng = np.random.default_rng(0)
+        x, v = rng.uniform(-2, 2, p.n), rng.uniform(-3, 3, p.n)
+        for i in range(p.n):
+            expected = p.nominal(x, v, i, parameters)
+            np.testing.assert_allclose(compiled(x, v, i, parameters), expected, rtol=1e-14, err_msg=p.name)
 
 
 @CASES
-def test_the_model_obeys_its_equation(name, n):
+def test_the_model_obeys_its_equation_with_its_own_and_with_other_parameters(name, n):
     rng = np.random.default_rng(1)
     p = sized(name, n)
     assert worst_error(p, p.load(), rng) < 1e-9
+    for _ in range(2):
+        other = changed(name, n, rng)
+        assert worst_error(other, other.load(), rng) < 1e-9
+    model = p.load()  # a jump writes fields into a running simulation: nothing else may need refreshing
+    write(model, other.fields(model, other.values({})))
+    assert worst_error(other, model, rng) < 1e-9
 
 
-@CASES
-def test_the_model_obeys_its_equation_with_changed_parameters(name, n):
-    rng = np.random.default_rng(2)
-    for _ in range(5):
-        p = changed(name, n, rng)
-        assert worst_error(p, p.load(), rng) < 1e-9
-
-
-@CASES
-def test_fields_alone_carry_a_parameter_change(name, n):
-    """A jump writes fields into a running simulation: nothing else may need refreshing."""
-    rng = np.random.default_rng(3)
-    base, p = sized(name, n), changed(name, n, rng)
-    model = base.load()
-    write(model, p.fields(model, p.values({})))
-    assert worst_error(p, model, rng) < 1e-9
+def test_a_long_chain_obeys_its_equation():
+    p = sized("pendulum_network", 40)
+    assert worst_error(p, p.load(), np.random.default_rng(1), trials=5) < 1e-9
 
 
 @CASES
@@ -138,9 +131,9 @@ def test_every_parameter_is_felt_by_the_model(name, n):
         assert np.all(np.abs(a - b) > 1e-6), key
 
 
-@CASES
-def test_default_fields_change_nothing_of_the_compiled_file(name, n):
-    p = plant(name, n=n)
+@PLANTS
+def test_default_fields_change_nothing_of_the_compiled_file(name):
+    p = catalogue()[name]
     model = p.spec().compile()
     for field, index, value, _ in p.fields(model, p.values({})):
         owner = model.opt if field.startswith("opt.") else model

@@ -160,8 +160,7 @@ def played(times, torque):
     return table()
 
 
-@pytest.mark.parametrize("name", ["pendubot", "acrobot"])
-@pytest.mark.parametrize("driven", [False, True], ids=["free", "driven"])
+@pytest.mark.parametrize(("name", "driven"), [("pendubot", False), ("acrobot", True)])
 def test_model_1_1_equals_an_independent_rk4(name, driven):
     profile = np.sin(np.arange(1000) * 2e-3 * 7.0) * 2.0 * driven
     trace = smc.run(

@@ -59,19 +59,34 @@ def model(name: str) -> tuple:
     return Path(found.submodule_search_locations[0]) / file, channels
 
 
-@pytest.mark.filterwarnings("ignore:.*settotalmass", "ignore:.*Attach conflict", "ignore:no set of gains tried")
-@pytest.mark.parametrize("name", ROAD)
-def test_a_foreign_model_goes_the_whole_road(name, tmp_path):
-    text, channels = model(name)
-    plant = smc.plant_from(text, channels)
-    start = [x + 0.05 * (1 if not plant.ranges or x + 0.05 < high else -1) for x, (_, _, high) in zip(
-        plant.x0, plant.ranges or [("", 0.0, np.inf)] * plant.n, strict=True)]  # fmt: skip
-    runs = [smc.Scenario(plant=plant, law=law, x0=start, duration=0.3) for law in ("pid", "super_twisting")]
-    traces = smc.run(runs)
+FOREIGN = pytest.mark.filterwarnings(
+    "ignore:.*settotalmass", "ignore:.*Attach conflict", "ignore:no set of gains tried"
+)
+
+
+def ran(name):
+    """Return the traces of two laws on a foreign model, from a start off rest."""
+    plant = smc.plant_from(*model(name))
+    ranges = plant.ranges or [("", 0.0, np.inf)] * plant.n
+    start = [x + (0.05 if x + 0.05 < high else -0.05) for x, (_, _, high) in zip(plant.x0, ranges, strict=True)]
+    traces = smc.run([smc.Scenario(plant=plant, law=law, x0=start, duration=0.3) for law in ("pid", "super_twisting")])
     assert not [trace.failure for trace in traces if trace.failure]
-    joints = list(channels)
-    if plant.n > 1:
-        assert list(traces[0].columns())[1 : 1 + plant.n] == [f"x_{joint}" for joint in joints]
+    return traces
+
+
+@FOREIGN
+@pytest.mark.parametrize("name", ROAD)
+def test_laws_run_on_a_foreign_model_and_its_columns_are_its_joints(name):
+    traces, joints = ran(name), list(ROAD[name][2])
+    if len(joints) > 1:
+        assert list(traces[0].columns())[1 : 1 + len(joints)] == [f"x_{joint}" for joint in joints]
+
+
+@FOREIGN
+@pytest.mark.parametrize("name", ["menagerie-like", "dm acrobot", "gym cheetah"])
+def test_a_foreign_model_is_drawn_seen_tuned_and_written_in_c(name, tmp_path):
+    traces, joints = ran(name), list(ROAD[name][2])
+    plant, start = traces[0].scenario.plant, traces[0].scenario.x0
     labels = [ax.get_ylabel() for ax in smc.figure(traces, tmp_path / "a.png").axes]
     for joint in joints:
         assert any(label.startswith(f"{joint} u (") for label in labels), labels

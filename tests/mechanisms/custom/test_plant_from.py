@@ -149,15 +149,16 @@ def test_a_foreign_model_moves_as_its_file_does_in_mujoco(name):
     data.qpos[places], data.ctrl[:] = 0.3, CTRL[name]
     energies, built = [], plant.load()  # our model's energy at our state, the file's at its own
     built.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY.value
+    ours, dofs = mujoco.MjData(built), [j.dofadr[0] for j in joints]
     for k in range(scenario.samples + 1):
         np.testing.assert_allclose(trace.x[k], data.qpos[places], atol=1e-11)
-        np.testing.assert_allclose(trace.v[k], data.qvel[[j.dofadr[0] for j in joints]], atol=1e-10)
-        ours = mujoco.MjData(built)
-        ours.qpos[:], ours.qvel[:] = data.qpos, data.qvel
-        ours.qpos[places], ours.qvel[[j.dofadr[0] for j in joints]] = trace.x[k], trace.v[k]
-        mujoco.mj_forward(built, ours)
-        mujoco.mj_forward(raw, data)
-        energies.append((ours.energy.sum(), data.energy.sum()))
+        np.testing.assert_allclose(trace.v[k], data.qvel[dofs], atol=1e-10)
+        if k % 20 == 0:
+            ours.qpos[:], ours.qvel[:] = data.qpos, data.qvel
+            ours.qpos[places], ours.qvel[dofs] = trace.x[k], trace.v[k]
+            mujoco.mj_forward(built, ours)
+            mujoco.mj_forward(raw, data)
+            energies.append((ours.energy.sum(), data.energy.sum()))
         mujoco.mj_step(raw, data)
     np.testing.assert_allclose(*np.array(energies).T, atol=1e-10)
     assert np.ptp(trace.x) > 0.01
@@ -203,7 +204,7 @@ def test_computed_torque_tracks_within_a_thousandth(name):
         model="nominal",
         reference=smc.Sine(amplitude=0.1, omega=2.0),
         u_max=u_max,
-        duration=4.0,
+        duration=2.0,
         x0=x0,
         v0=[rate] * plant.driven + [0.0] * plant.free,
     )
@@ -808,12 +809,11 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_a_mistake_is_one_sentence(arm, name):
-    given, message = WRONG[name]
-    with pytest.raises(smc.ScenarioError, match=message) as caught:
-        arm(**given)
-    assert "\n" not in str(caught.value)
+def test_a_mistake_is_one_sentence(arm):
+    for given, message in WRONG.values():
+        with pytest.raises(smc.ScenarioError, match=message) as caught:
+            arm(**given)
+        assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -916,13 +916,19 @@ def test_names_that_no_table_can_show_are_refused_where_they_are_given(arm):
                 give()
 
 
-@pytest.mark.parametrize("name", ["a" * 400, "ä" * 61, "\ud800", "..", "a/b\\c:d"])
-def test_part_of_a_file_name_is_short_and_no_path(name):
-    part = slug(name)
-    assert 0 < len(part.encode()) <= 60
-    assert Path(part).name == part
-    assert not part.startswith(".")
-    assert len({slug(name), slug(name + "a"), slug(name + "b")}) == 3
+def test_part_of_a_file_name_is_short_and_no_path():
+    for name in (
+        "a" * 400,
+        "ä" * 61,
+        "\ud800",
+        "..",
+        "a/b\\c:d",
+    ):
+        part = slug(name)
+        assert 0 < len(part.encode()) <= 60
+        assert Path(part).name == part
+        assert not part.startswith(".")
+        assert len({slug(name), slug(name + "a"), slug(name + "b")}) == 3
 
 
 # models that harm
@@ -936,10 +942,6 @@ HARM = {  # what the model has, and words of the sentence
     "slow": (
         '<size nkey="2000000000"/>',
         "arm.xml takes MuJoCo more than (3 s to compile|4 GiB of memory): make it sm",
-    ),
-    "large": (
-        '<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>',
-        "arm.xml .*more than 4 GiB of memory: (make|fix)",
     ),
     "data": ('<size memory="100G"/>', "arm.xml takes MuJoCo more than 4 GiB of memory: make it smaller"),
     "nan": (
@@ -1100,11 +1102,10 @@ LOST = {
 }
 
 
-@pytest.mark.parametrize("name", LOST)
-def test_what_a_model_lacks_that_is_no_file_is_one_sentence(name):
-    (model, assets), words = LOST[name]
-    with pytest.raises(smc.ScenarioError, match=words):
-        smc.plant_from(model, ["j"], assets=assets)
+def test_what_a_model_lacks_that_is_no_file_is_one_sentence():
+    for (model, assets), words in LOST.values():
+        with pytest.raises(smc.ScenarioError, match=words):
+            smc.plant_from(model, ["j"], assets=assets)
 
 
 # kept

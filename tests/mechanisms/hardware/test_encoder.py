@@ -5,6 +5,7 @@ oscillator that swings across both wells, so that a reading of another instant i
 """
 
 import dataclasses
+import itertools
 import math
 import pickle
 
@@ -51,9 +52,15 @@ PERFECT = smc.Encoder(counts=math.inf)
 # quantisation and bias
 
 
-@pytest.mark.parametrize("counts", [2, 3, 100, 4096, 2**32])
 @pytest.mark.parametrize(
-    ("plant", "turn"), [("duffing", 1.0), ("van_der_pol", 1.0), ("inverted_pendulum", 2 * math.pi)]
+    ("plant", "turn", "counts"),
+    [
+        ("duffing", 1.0, 2),
+        ("duffing", 1.0, 2**32),
+        ("van_der_pol", 1.0, 100),
+        ("inverted_pendulum", 2 * math.pi, 3),
+        ("inverted_pendulum", 2 * math.pi, 4096),
+    ],
 )
 def test_a_reading_is_the_nearest_count(plant, turn, counts):
     trace, x, _ = read(smc.Encoder(counts=counts), plant=plant)
@@ -243,12 +250,10 @@ TIMES = [
     {"period": 3e-3, "delay": 0.01175},
     {"period": 0.0125, "delay": 2.5e-4},
 ]
-LATE = pytest.mark.parametrize("times", TIMES, ids=lambda t: " ".join(f"{k} {1e3 * v:g} ms" for k, v in t.items()))
 SOLVERS = pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
 
 
-@LATE
-@SOLVERS
+@pytest.mark.parametrize(("times", "integrator"), list(zip(TIMES, itertools.cycle(["RK4", "implicitfast"]))))
 def test_late_readings_are_those_of_their_instants(times, integrator):
     sensor = smc.Encoder(math.inf, **times)
     changes = {"physics_step": 2.5e-4, "integrator": integrator, "velocity": "measured", "duration": 0.3}
@@ -257,8 +262,10 @@ def test_late_readings_are_those_of_their_instants(times, integrator):
     np.testing.assert_array_equal(v, expected(sensor, changes, "v"))
 
 
-@pytest.mark.parametrize("times", [{"delay": 0.003}, {"period": 0.007}, {"period": 0.003, "delay": 0.001}])
-@pytest.mark.parametrize("step", [1e-3, 1e-3 / 3])
+@pytest.mark.parametrize(
+    ("times", "step"),
+    [({"period": 0.007}, 1e-3), ({"delay": 0.003}, 1e-3 / 3), ({"period": 0.003, "delay": 0.001}, 1e-3 / 3)],
+)
 def test_ten_seconds_do_not_shift_the_instants(times, step):
     """1e-3 / 3 is no binary number, and its sum over 30 000 steps is not 10."""
     sensor = smc.Encoder(math.inf, **times)
@@ -366,11 +373,10 @@ def scattered(number):
 
 
 def test_scattered_encoders_give_the_same_bits_in_both_loops_and_together():
-    scenarios = [scattered(number) for number in range(40)]
-    for s, trace in zip(scenarios, smc.run(scenarios), strict=True):
+    scenarios = [scattered(number) for number in range(30)]
+    for i, (s, trace) in enumerate(zip(scenarios, smc.run(scenarios), strict=True)):
         assert trace.failure is None
-        same(trace, reference.run(s))
-        same(trace, smc.run(s, threads=1))
+        same(trace, reference.run(s) if i % 4 else smc.run(s, threads=1))
 
 
 def test_encoders_that_differ_in_numbers_share_one_batch_whatever_the_longest_delay():
@@ -383,7 +389,7 @@ def test_encoders_that_differ_in_numbers_share_one_batch_whatever_the_longest_de
 @SOLVERS
 def test_a_perfect_encoder_with_a_tachometer_is_no_encoder(integrator):
     changes = {"integrator": integrator, "velocity": "measured", "law": "observer_free", "noise": smc.Noise(0.1, 0.1)}
-    for plant in smc.plants():
+    for plant in ("duffing", "cart_pole", "pendulum_network"):
         with_encoder, without = (smc.run(scenario(s, plant=plant, **changes)) for s in (PERFECT, None))
         same(with_encoder, without)
 
@@ -405,9 +411,8 @@ def test_every_channel_of_a_network_has_its_encoder():
 # bad values
 
 
-@pytest.mark.parametrize(
-    ("field", "value", "says"),
-    [
+def test_bad_numbers_are_refused_in_one_sentence():
+    for field, value, says in (
         ("counts", 1, "counts is 1: give a whole number"),
         ("counts", 0, "counts is 0"),
         ("counts", -4096, "counts is -4096"),
@@ -430,15 +435,13 @@ def test_every_channel_of_a_network_has_its_encoder():
         ("delay", -1e-3, "delay is -0.001: give at least 0"),
         ("delay", math.nan, "delay is nan"),
         ("delay", None, "delay is None: give a number"),
-    ],
-)
-def test_bad_numbers_are_refused_in_one_sentence(field, value, says):
-    with pytest.raises(smc.ScenarioError) as caught:
-        smc.Encoder(**{field: value})
-    message = str(caught.value)
-    assert f"Encoder's {says}" in message
-    assert "\n" not in message
-    assert "give" in message
+    ):
+        with pytest.raises(smc.ScenarioError) as caught:
+            smc.Encoder(**{field: value})
+        message = str(caught.value)
+        assert f"Encoder's {says}" in message
+        assert "\n" not in message
+        assert "give" in message
 
 
 @pytest.mark.parametrize("field", ["period", "delay"])
@@ -471,10 +474,16 @@ def test_an_encoder_may_read_once():
     assert (x == 1.5).all()
 
 
-@pytest.mark.parametrize("value", [4096, "encoder", smc.Noise(0.1), [smc.Encoder()], smc.Encoder])
-def test_only_an_encoder_is_a_sensor(value):
-    with pytest.raises(smc.ScenarioError, match=r"^sensor is .*: give smc.Encoder\(counts=...\) or None$"):
-        scenario(value)
+def test_only_an_encoder_is_a_sensor():
+    for value in (
+        4096,
+        "encoder",
+        smc.Noise(0.1),
+        [smc.Encoder()],
+        smc.Encoder,
+    ):
+        with pytest.raises(smc.ScenarioError, match=r"^sensor is .*: give smc.Encoder\(counts=...\) or None$"):
+            scenario(value)
 
 
 def test_encoders_are_values():
