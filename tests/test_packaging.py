@@ -139,12 +139,19 @@ def test_the_package_is_a_program_and_a_star_import_gives_its_public_names(binar
     assert done.stdout.splitlines() == ["", "Scenario True True"], done.stderr
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_a_shell_completes_commands(binaries, tmp_path, shell):
-    asked = {"COMP_WORDS": "smc-mujoco mar", "COMP_CWORD": "1", "_TYPER_COMPLETE_ARGS": "smc-mujoco mar"}
+@pytest.mark.parametrize(
+    ("shell", "typed", "meant"),
+    [
+        ("bash", "smc-mujoco mar", "margins"),
+        ("zsh", "smc-mujoco accuracy duffing,van", "duffing,van_der_pol"),
+        ("fish", "smc-mujoco basin duffing --condition noise+enc", "noise+encoder"),
+    ],
+)
+def test_a_shell_completes_commands_and_names(binaries, tmp_path, shell, typed, meant):
+    asked = {"COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" ")), "_TYPER_COMPLETE_ARGS": typed}
     asked |= {"_TYPER_COMPLETE_FISH_ACTION": "get-args", "_SMC_MUJOCO_COMPLETE": f"complete_{shell}"}
     done = run(binaries / "smc-mujoco", cwd=tmp_path, **asked)
-    assert "margins" in done.stdout
+    assert meant in done.stdout
     assert "basin" not in done.stdout
 
 

@@ -48,7 +48,7 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
         from control import StateSpace
 
     plant = as_plant(plant)
-    at = Scenario(plant=plant, law="none", x0=plant.rest if x is None and plant.rest else x or 0.0, v0=0.0)
+    at = Scenario(plant=plant, law="none", x0=(plant.rest or 0.0) if x is None else x, v0=0.0)
     with installed(None):
         made = assembly.with_values(assembly.model(at), at)
         made.opt.disableflags |= JUMPING

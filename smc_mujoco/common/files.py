@@ -45,7 +45,7 @@ def ended(path: str | os.PathLike[str], ending: str) -> Path:
 def writable(path: str | os.PathLike[str]) -> None:
     """Raise ScenarioError for a file that cannot be written. Call it before a computation that takes minutes."""
     path = Path(path)
-    if path.is_dir():
+    if os.path.isdir(path):  # unlike Path.is_dir, False also for a name that is too long
         raise ScenarioError(f"cannot write {path}: it is a folder, give the file in it a name")
     with _writing(path), tempfile.TemporaryFile(dir=path.parent):
         pass
@@ -54,6 +54,8 @@ def writable(path: str | os.PathLike[str]) -> None:
 @contextlib.contextmanager
 def _writing(path: Path) -> Iterator[None]:
     """Make a file's folder, and turn an OSError in the block into a ScenarioError."""
+    if "\0" in str(path):
+        raise ScenarioError(f"cannot write {shown(str(path))}: give a name without \\0")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield

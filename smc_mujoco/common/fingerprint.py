@@ -83,7 +83,7 @@ def of(thing: Any) -> str:
       ScenarioError: it contains something that can be neither read nor pickled.
     """
     try:
-        return _held[thing] if thing in _held else _cached(thing) if _ours(thing) else now(thing)
+        return _held[thing] if thing in _held else _cached(thing) if ours(thing) else now(thing)
     except TypeError:  # not hashable
         return now(thing)
 
@@ -124,7 +124,7 @@ _held: dict[Any, str] = {}  # function or class -> its hash when it was compiled
 _cached = functools.cache(now)
 
 
-def _ours(thing: Any) -> bool:
+def ours(thing: Any) -> bool:
     """Return whether a thing is a function or class of this package."""
     return isinstance(thing, FunctionType | type) and (thing.__module__ or "").startswith(f"{PACKAGE.name}.")
 

@@ -123,6 +123,8 @@ class Component:
         return super().__reduce__()
 
     def __post_init__(self):
+        if not isinstance(self.name, str):
+            raise ScenarioError(f"name of a {self.kind} is {shown(self.name)}: give a text")
         gains = {name: _value(f"{self.name}'s {name}", gain, infinite=True) for name, gain in self.gains.items()}
         object.__setattr__(self, "gains", frozen(gains))
         if self.source.gains != self.gains:  # the gains were replaced
@@ -481,6 +483,8 @@ def template(
             stated[name] = dataclasses.replace(stated[name], **{sign: True})
 
     def decorate(function: Callable) -> Template:
+        if not callable(function):
+            raise ScenarioError(f"{kind} is {shown(function)}: give a function (y, gains, memory)")
         name = errors.name(f"name of the {kind}", getattr(function, "__name__", type(function).__name__))
         try:
             inspect.signature(getattr(function, "py_func", function)).bind(None, None, None)

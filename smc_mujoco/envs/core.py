@@ -107,7 +107,7 @@ class Setting:
         shape = copies + self.shape
         try:
             a = np.asarray(action, float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             a = np.array(np.nan)
         if a.shape != shape or not np.isfinite(a).all():
             wrong = shown(action)

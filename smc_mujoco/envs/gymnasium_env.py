@@ -3,7 +3,7 @@
     environment = gymnasium.make("smc_mujoco:Duffing-v0", task="track")
 
 An observation is one array of positions and velocities, and for `track` also r, r', r''. An action is the command of
-the driven channels, divided by their limits, in float32. An episode is truncated at the scenario's duration, which is
+the driven channels, divided by their limits. An episode is truncated at the scenario's duration, which is
 also the max_episode_steps of its spec, and terminated if the plant diverges. The info has "time", s since the start,
 and "error", the e of the task in each channel. The module `tasks` describes tasks and rewards; `vector_env` has many
 copies of a plant in one batch.
@@ -33,8 +33,11 @@ registration.register()  # also if only this module is imported
 
 
 def action_space(setting: Setting) -> spaces.Box:
-    """Return the space of actions: commands of the driven channels, divided by their limits."""
-    return spaces.Box(-1.0, 1.0, setting.shape, np.float32)
+    """Return the space of actions: commands of the driven channels, divided by their limits.
+
+    It is of float64, as laws compute, and so holds the float32 of learners too.
+    """
+    return spaces.Box(-1.0, 1.0, setting.shape, np.float64)
 
 
 def observation_space(setting: Setting) -> spaces.Box:

@@ -106,7 +106,7 @@ def cartesian_path(
         raise ScenarioError(f"site is {shown(site)} and body is {shown(body)}: give the name of one of them")
     try:
         array = np.asarray(points, float)
-    except (TypeError, ValueError):  # no numbers, or rows of unequal lengths
+    except (TypeError, ValueError, OverflowError):  # no numbers, or rows of unequal lengths
         array = np.empty(0)
     if array.shape != (len(times), 3):
         raise ScenarioError(

@@ -113,8 +113,7 @@ def _parts(scenario: Scenario) -> list[Component]:
 
 def own(scenario: Scenario) -> bool:
     """Return whether the law, its surface or its estimator is not of this package."""
-    modules = (getattr(part.function, "__module__", "") or "" for part in _parts(scenario))
-    return not all(module.startswith("smc_mujoco.") for module in modules)
+    return not all(fingerprint.ours(part.function) for part in _parts(scenario))
 
 
 def identity(scenario: Scenario) -> str:

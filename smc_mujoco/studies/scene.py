@@ -9,6 +9,7 @@ import ast
 import dataclasses
 import functools
 import hashlib
+import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -145,7 +146,7 @@ def _of_package(point: EntryPoint) -> Path:
 
 def find(name: str) -> Path:
     """Return the scene file at a path, or the one of that name that comes with a package."""
-    if Path(name).is_file():
+    if os.path.isfile(name):
         return Path(name)
     if Path(name).suffix or Path(name).name != name:
         raise ScenarioError(f"no scene file {name}: give the path of a scene file, or a name from smc-mujoco list")

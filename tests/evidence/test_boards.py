@@ -155,6 +155,7 @@ def test_the_grid_is_the_published_one():
     counts = {test: sum(case.test == test for case in grid) for test in simulator.TESTS}
     assert list(counts.values()) == [210, 210, 210, 21, 21, 50]
     assert grid == simulator.cases()
+    assert [one.pulses == other.pulses for one, other in zip(grid, simulator.cases(7), strict=True)].count(False) == 50
     values = {name: [case.value for case in grid if case.name == name] for name in ("Ir", "m2r2", "b1", "cf2", "delay")}
     for name, (first, last) in {
         "Ir": (0, 1e-4),
@@ -167,6 +168,27 @@ def test_the_grid_is_the_published_one():
     pulses = [pulse for case in grid for pulse in case.pulses]
     assert len(pulses) == 150
     assert all(1.0 <= centre <= 9.0 and 0.05 <= width <= 0.1 and 0.5 <= abs(a) <= 5.0 for centre, width, a in pulses)
+
+
+@smc.law_function(plants=("acrobot",))
+def mine(y, gains, memory):
+    return -y.v, y.x
+
+
+def test_no_law_of_a_user_s_can_know_its_noise(monkeypatch):
+    """Each call has a new key, which the result keeps, and a scenario repeats."""
+    grid, keys = simulator.cases, []
+    monkeypatch.setattr(simulator, "cases", lambda key=0: keys.append(key) or grid(key)[::200])
+    scenario = boards.on_board("acrobot", mine)
+    one, other = boards.robustness(scenario), boards.robustness(scenario)
+    assert boards.robustness(dataclasses.replace(scenario, noise_key=one.noise_key)) == one
+    assert boards.robustness(boards.entry("acrobot")).noise_key == 0 < min(one.noise_key, other.noise_key)
+    assert keys == [one.noise_key, other.noise_key, one.noise_key, 0]
+    assert one.noise_key != other.noise_key
+    noisy = simulator.Case(velocity_noise=0.3)
+    runs = [simulator.Machine(dataclasses.replace(scenario, noise_key=key)).simulate(noisy)[1] for key in keys]
+    assert np.array_equal(runs[0], runs[2])
+    assert not np.array_equal(runs[0], runs[1])
 
 
 # this package's rows

@@ -49,6 +49,8 @@ def driven_by_gym(environment, act):
     states, over = [], False
     while True:
         u = act(observation)
+        assert environment.action_space.contains(u)
+        assert environment.observation_space.contains(observation)
         states.append([*observation[: 2 * n], *(u * limit)])
         if over:
             return np.array(states)

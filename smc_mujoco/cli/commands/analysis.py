@@ -229,7 +229,12 @@ def worst(
 @errors_as_sentences()
 def accuracy(
     plants: Annotated[
-        list[str], typer.Argument(metavar="PLANT", help="Plants from `smc-mujoco list`, or FILE.xml:joint+joint.")
+        list[str],
+        typer.Argument(
+            metavar="PLANT",
+            autocompletion=options.PLANTS,
+            help="Plants from `smc-mujoco list`, or FILE.xml:joint+joint.",
+        ),
     ],
     law: options.Laws = None,
     condition: options.Condition = "constant",
@@ -298,7 +303,9 @@ def accuracy(
 @errors_as_sentences()
 def basin(
     plant: options.PlantName,
-    law: Annotated[str, typer.Option(help=f"A law. {options.OWN_GAINS}")] = "observer_free",
+    law: Annotated[
+        str, typer.Option(autocompletion=options.LAWS, help=f"A law. {options.OWN_GAINS}")
+    ] = "observer_free",
     points: Annotated[int, typer.Option(min=2, help="Number of positions, and of velocities.")] = 50,
     gains: options.Gains = "tuned",
     duration: Annotated[float, typer.Option(help="Duration of the longest runs, s.")] = 10.0,

@@ -46,7 +46,10 @@ def list_() -> None:
 @errors_as_sentences()
 def laws(
     name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="A law, surface or velocity estimator; by default all.")
+        str | None,
+        typer.Argument(
+            metavar="NAME", autocompletion=options.LAWS, help="A law, surface or velocity estimator; by default all."
+        ),
     ] = None,
     needs: Annotated[
         str | None,
@@ -59,7 +62,10 @@ def laws(
         str | None, typer.Option(help="Only laws of a family, such as terminal, adaptive or super-twisting.")
     ] = None,
     plant: Annotated[
-        str | None, typer.Option(metavar="PLANT", help="Only laws for a plant, or FILE.xml:joint+joint.")
+        str | None,
+        typer.Option(
+            metavar="PLANT", autocompletion=options.PLANTS, help="Only laws for a plant, or FILE.xml:joint+joint."
+        ),
     ] = None,
 ) -> None:
     """Show all laws, surfaces and velocity estimators, or one in full: formula, gains, conditions, source.

@@ -26,11 +26,11 @@ OWN_GAINS = "With your own gains: pid(kp=50, ki=1). Of a file: my_law.py, or gai
 
 
 def _completing(list_known: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
-    """Return a function that completes the last name of a text such as "a,b" for a shell."""
+    """Return a function that completes the last name of a text such as "a,b" or "a+b" for a shell."""
 
     def complete(incomplete: str) -> list[str]:
-        before, comma, last = incomplete.rpartition(",")
-        return [f"{before}{comma}{name}" for name in list_known() if name.startswith(last)]
+        last = re.split("[,+]", incomplete)[-1]
+        return [incomplete + name[len(last) :] for name in list_known() if name.startswith(last)]
 
     return complete
 

@@ -11,6 +11,7 @@ import dataclasses
 import functools
 import importlib
 import inspect
+import os
 import re
 import sys
 import tomllib
@@ -238,7 +239,7 @@ def paper(which: str | Path) -> Paper:
     if isinstance(which, str) and which in known:
         return _known(known[which])
     folder = Path(which)
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         if isinstance(which, str) and not set("/\\.") & set(which):
             raise unknown("paper", which, known)
         raise ScenarioError(f"no folder {str(which)!r} with a {FILE}: give one, or a name of {', '.join(known)}")
@@ -265,7 +266,7 @@ def papers() -> dict[str, Paper]:
 
 def new(folder: Path) -> list[Path]:
     """Copy the template, a paper that runs, to a folder, and return the files."""
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    if os.path.exists(folder) and (not folder.is_dir() or any(folder.iterdir())):
         raise ScenarioError(f"{folder} is there already: give the name of a new folder")
     written = [folder / FILE, folder / CODE]
     for file in written:

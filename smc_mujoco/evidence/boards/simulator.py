@@ -15,7 +15,8 @@ The published simulator is repeated here, because some of these machines cannot 
 response beyond 1. It is RK4 at 2 ms of the double pendulum's equation, with the dry friction cf arctan(100 q'). The law
 and its estimator run as in every scenario, compiled, by their addresses. In the published simulator a pulse on the
 joint without a motor has no effect (its input matrix is 0 there), so only the driven joint's are drawn. The published
-test has other random numbers at every run. Here they depend only on `SEED`.
+test has other random numbers at every run. Here they depend only on `SEED`, and for a law that is not of this package
+on a noise key, which is drawn when the test begins: no law can know its noise.
 Source: leaderboard/*/robustness_v2 and src/python/double_pendulum of
 github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), rewritten here.
 """
@@ -36,6 +37,7 @@ from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1, acceleration
 from smc_mujoco.simulation import native
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.studies.noise_key import draw, own
 
 SEED = 20240  # of all random numbers; chosen before any run
 STEP, STEPS = 2e-3, 5000  # s; number of
@@ -85,9 +87,11 @@ class Robustness:
 
     Attributes:
       survived: the levels of each test: (name, value) -> whether the law survived it.
+      noise_key: of the random numbers; a scenario with it repeats them. 0: those of `SEED` alone.
     """
 
     survived: Mapping[str, tuple[tuple[str, float, bool], ...]]
+    noise_key: int = 0
 
     @property
     def percent(self) -> dict[str, float]:
@@ -106,8 +110,8 @@ class Robustness:
         return {name: sum(ok for other, _, ok in self.survived["model"] if other == name) for name in names}
 
 
-def cases() -> list[Case]:
-    """Return every run of the test, in order. Runs of one level stand together."""
+def cases(key: int = 0) -> list[Case]:
+    """Return every run of the test, in order, with the pulses of a noise key. Runs of one level stand together."""
     ramp, made = np.linspace(0.75, 1.25, LEVELS), list[Case]()
 
     def model(name: str, value: float, **parameters: float) -> None:
@@ -115,9 +119,9 @@ def cases() -> list[Case]:
 
     for value in np.linspace(0.0, 1e-4, LEVELS):
         model("Ir", float(value), Ir=float(value))
-    for name, key in SCALED.items():
+    for name, parameter in SCALED.items():
         for factor in map(float, ramp):
-            changed = {key: factor * MODEL_1_1[key]}
+            changed = {parameter: factor * MODEL_1_1[parameter]}
             model(name, factor, **changed)
     for name, most in (("b1", 0.1), ("b2", 0.1), ("cf1", 0.2), ("cf2", 0.2)):
         for value in map(float, np.linspace(-most, most, LEVELS)):
@@ -131,7 +135,7 @@ def cases() -> list[Case]:
         made.append(Case(test="torque_response", name="torque_response", value=value, response=value))
     for late in range(LEVELS):
         made.append(Case(test="delay", name="delay", value=late * STEP, delay=late))
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng([SEED, key])
     for profile in range(PROFILES):
         pulses = _pulses(rng)
         made.append(Case(test="perturbations", name="perturbations", value=float(profile), pulses=pulses))
@@ -154,13 +158,15 @@ def robustness(scenario: Scenario, report: Callable[[float, float], None] | None
 
     Args:
       scenario: plant pendubot or acrobot; its law and velocity estimator are tested. The law may know the plant's
-        nominal parameters if the scenario says so.
+        nominal parameters if the scenario says so. If its noise_key is 0, and the law is your own, one is drawn.
       report: called with the runs that are done and all runs.
 
     Raises:
       ScenarioError: another plant, a surface, a reference that moves, or a law that does not compile.
     """
-    machine, todo = Machine(scenario), cases()
+    if not scenario.noise_key and own(scenario):
+        scenario = dataclasses.replace(scenario, noise_key=draw())
+    machine, todo = Machine(scenario), cases(scenario.noise_key)
     ends = list[bool]()
     for done, case in enumerate(todo):
         ends.append(upright(machine.simulate(case)[0][-1]))
@@ -172,7 +178,7 @@ def robustness(scenario: Scenario, report: Callable[[float, float], None] | None
         levels.setdefault((case.test, case.name, case.value), []).append(end)
     for (test, name, value), results in levels.items():
         survived[test].append((name, value, sum(results) > len(results) / 2))
-    return Robustness({test: tuple(rows) for test, rows in survived.items()})
+    return Robustness({test: tuple(rows) for test, rows in survived.items()}, scenario.noise_key)
 
 
 def upright(state: np.ndarray) -> bool:
@@ -200,12 +206,13 @@ class Machine:
         self.gains, self.filter = np.array([*law.gains.values(), 0.0]), np.array([*velocity.gains.values(), 0.0])
         self.sizes = law.memory, velocity.memory
         self.known = np.array([scenario.plant.parameters[name] for name in MODEL_1_1])
-        self.limit, self.uses_model = scenario.limits[0], float(resolved.model == "nominal")
+        self.key, self.limit = scenario.noise_key, scenario.limits[0]
+        self.uses_model = float(resolved.model == "nominal")
 
     def simulate(self, case: Case) -> tuple[np.ndarray, np.ndarray]:
         """Return the states (q1, q2, q1', q2'), (5001, 4), and the motor's torque, N m, (5000,), of a case."""
         true = dict(zip(MODEL_1_1, self.known, strict=True)) | dict(case.parameters)
-        t, rng = STEP * np.arange(STEPS), np.random.default_rng([SEED, case.seed])
+        t, rng = STEP * np.arange(STEPS), np.random.default_rng([SEED, case.seed, self.key])
         noise = rng.normal(size=(STEPS, 3)) * [case.velocity_noise, case.velocity_noise, case.torque_noise]
         pulse = np.zeros(STEPS)
         for centre, width, amplitude in case.pulses:

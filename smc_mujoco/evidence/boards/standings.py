@@ -21,7 +21,7 @@ KEY = (
     "are clipped at 6 N m. *: measured velocities, as in published rows; else velocities from a filter of 5 positions"
 )
 # Fields of a Scenario that are an entry's own. The rules fix all others.
-DESIGN = ("law", "model", "surface", "velocity", "reference", "feedforward", "seed", "condition")
+DESIGN = ("law", "model", "surface", "velocity", "reference", "feedforward", "seed", "noise_key", "condition")
 WORDS = {
     "swing_up_time": "time",
     "energy": "energy",

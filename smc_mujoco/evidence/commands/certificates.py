@@ -16,10 +16,18 @@ METRIC = "ultimate_bound"  # largest |x| in the last fifth of a run
 def certify(
     plant: Annotated[
         str | None,
-        typer.Argument(metavar="PLANT", help="A plant from `smc-mujoco list`.", show_default=False),
+        typer.Argument(
+            metavar="PLANT",
+            autocompletion=options.PLANTS,
+            help="A plant from `smc-mujoco list`.",
+            show_default=False,
+        ),
     ] = None,
     law: Annotated[
-        str, typer.Option(metavar="LAW", help="A law, as pid or boundary_layer(k=5, c=2, phi=0.5).")
+        str,
+        typer.Option(
+            metavar="LAW", autocompletion=options.LAWS, help="A law, as pid or boundary_layer(k=5, c=2, phi=0.5)."
+        ),
     ] = "observer_free",
     disturbance: Annotated[
         float | None, typer.Option(min=0.0, help="Bound of |d|, N or N m; default that of the condition.")

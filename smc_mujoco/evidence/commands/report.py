@@ -24,7 +24,10 @@ def report(
     ] = None,
     law: Annotated[
         list[str] | None,
-        typer.Option(help="Further laws, as a,b, beside the study's; each needs tuned gains on the study's plants."),
+        typer.Option(
+            autocompletion=options.LAWS,
+            help="Further laws, as a,b, beside the study's; each needs tuned gains on the study's plants.",
+        ),
     ] = None,
     paper: Annotated[
         str | None,

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -121,7 +122,7 @@ def repeated(work: Work, folder: Path | None) -> tuple[Repeated, ...]:
 
 def read(folder: Path) -> list[tuple[Path, Rig, Mapping[str, np.ndarray]]]:
     """Return the records in a folder with their rigs: CSV and npz files that have all columns of a rig."""
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise ScenarioError(f"no folder at {printable(str(folder))}: give one with records, CSV or npz files")
     known = [twin for twin in map(rig, rigs()) if twin.free]
     found = []

@@ -221,7 +221,7 @@ def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
     """Return a column as finite floats, (K,)."""
     try:
         found = np.asarray(values, float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ScenarioError(f"column {name} of {rig} is {shown(values)}: give numbers") from None
     if found.ndim != 1:
         raise ScenarioError(f"column {name} of {rig} has the shape {found.shape}: give one number a sample")

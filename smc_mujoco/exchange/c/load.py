@@ -12,6 +12,7 @@ import dataclasses
 import functools
 import hashlib
 import math
+import os
 import re
 import shutil
 import sys
@@ -260,7 +261,7 @@ def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: flo
         raise ScenarioError(f"flags is {shown(flags)}: give several, such as ['-DUNIT_TEST']")
     if path.suffix not in (".c", *LIBRARIES):
         raise ScenarioError(f"cannot take a law from {shown(str(path))}: give a .c file, or a shared library, .so")
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise ScenarioError(f"there is no file {path}: give the path of a .c file or of a .so")
     if path.suffix == ".c":
         file, warnings = build.library(path, symbol, flags, timeout)

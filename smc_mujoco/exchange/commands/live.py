@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.interrupts import held_back
 
@@ -17,6 +18,7 @@ def live(
         list[str] | None,
         typer.Argument(
             metavar="[PLANT...]",
+            autocompletion=options.PLANTS,
             help="Plants with one motor; by default inverted_pendulum, duffing and van_der_pol.",
         ),
     ] = None,

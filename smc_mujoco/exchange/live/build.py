@@ -102,9 +102,12 @@ def _own(law: object) -> Component:
 def _writable(folder: Path) -> Path:
     """Return the folder if it is new, empty or a live page; refuse others."""
     try:
-        other = folder.exists() and (not folder.is_dir() or (any(folder.iterdir()) and not (folder / FACTS).is_file()))
-    except OSError as error:  # a name that is too long
-        raise ScenarioError(f"cannot write the live page to {shown(str(folder))}: {error.strerror}") from None
+        folder.stat()
+        other = not folder.is_dir() or (any(folder.iterdir()) and not (folder / FACTS).is_file())
+    except FileNotFoundError:
+        other = False
+    except (OSError, ValueError) as error:  # a name that no folder can have
+        raise ScenarioError(f"cannot write the live page to {shown(str(folder))}: {error}") from None
     if other:
         raise ScenarioError(f"cannot write the live page to {folder}: something else is there, choose another folder")
     return folder
