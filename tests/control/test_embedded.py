@@ -15,7 +15,7 @@ from smc_mujoco.simulation import reference
 PLANTS = ("inverted_pendulum", "van_der_pol", "duffing", "pendulum_network", "inverted_pendulum_network")
 FORMS = ("observer_free_table", "observer_free_taylor", "observer_free_single", "observer_free_q15")
 LAM, K1 = 6.0, 2.5
-HALF = np.linspace(0.0, 12.0, 15_001)
+HALF = np.linspace(0.0, 12.0, 6001)
 GRID = np.concatenate([-HALF[:0:-1], HALF])
 
 
@@ -38,7 +38,7 @@ def squash(name, s=GRID, **gains):
 # error against tanh: what the docstrings say, and no less
 
 
-@pytest.mark.parametrize("size", [8, 16, 32, 64, 128, 256])
+@pytest.mark.parametrize("size", [8, 32, 256])
 def test_the_table_is_as_close_as_linear_interpolation_allows(size):
     error = np.abs(squash("observer_free_table", size=size) - np.tanh(GRID)).max()
     bound = max(0.0963 * (5.0 / size) ** 2, 9.1e-5)
@@ -51,7 +51,7 @@ def test_the_table_s_documented_errors():
         assert found == pytest.approx(error, rel=0.05)
 
 
-@pytest.mark.parametrize("size", [1, 3, 5, 7, 50, 100, 200, 255])
+@pytest.mark.parametrize("size", [1, 7, 100, 255])
 def test_a_size_that_divides_nothing_gets_at_least_its_steps(size):
     error = np.abs(squash("observer_free_table", size=size) - np.tanh(GRID)).max()
     assert error <= max(0.0963 * (5.0 / size) ** 2, 9.1e-5, 1.0 if size == 1 else 0.0)
@@ -63,7 +63,7 @@ def test_the_table_is_exact_at_its_nodes_and_one_beyond_its_end():
     assert squash("observer_free_table", np.array([5.0, 6.0, 1e9, -5.0, -1e9])).tolist() == [1, 1, 1, -1, -1]
 
 
-@pytest.mark.parametrize(("terms", "error"), [(1, 3.3e-3), (2, 9.1e-5), (3, 5.5e-6), (4, 6e-7), (5, 2.3e-7)])
+@pytest.mark.parametrize(("terms", "error"), [(1, 3.3e-3), (3, 5.5e-6), (5, 2.3e-7)])
 def test_the_series_is_as_close_as_its_terms_allow(terms, error):
     assert 0.75 * error < np.abs(squash("observer_free_taylor", terms=terms) - np.tanh(GRID)).max() <= error
 
@@ -211,22 +211,15 @@ APART = {
 }
 
 
-@pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize("name", FORMS)
-def test_a_form_moves_a_plant_as_the_paper_s_law_does(name, plant, runs):
-    exact, form = runs[plant]["observer_free"], runs[plant][name]
-    assert form.failure is None
-    apart = np.abs(form.x - exact.x).max()
-    assert 0.0 < apart <= APART[name]
-
-
-@pytest.mark.parametrize("plant", PLANTS)
-@pytest.mark.parametrize("name", FORMS)
-def test_a_form_comes_to_rest_where_the_paper_s_law_does(name, plant, runs):
-    """Exactly, except in fixed point: within two steps of e, 4 / 2^15."""
+def test_a_form_moves_a_plant_as_the_paper_s_law_does_and_to_where_it_comes_to_rest(name, runs):
+    """There exactly, except in fixed point: within two steps of e, 4 / 2^15."""
     step = 4.0 / 2**15 if name == "observer_free_q15" else 5e-7
-    exact, form = (runs[plant][n].x[-2000:] for n in ("observer_free", name))
-    assert np.abs(form - exact).max() <= 2.0 * step
+    for plant in PLANTS:
+        exact, form = runs[plant]["observer_free"], runs[plant][name]
+        assert form.failure is None
+        assert 0.0 < np.abs(form.x - exact.x).max() <= APART[name], plant
+        assert np.abs(form.x[-2000:] - exact.x[-2000:]).max() <= 2.0 * step, plant
 
 
 @pytest.mark.parametrize("name", FORMS)

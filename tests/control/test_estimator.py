@@ -1,5 +1,6 @@
 """What each velocity estimator gives on polynomials, sines and noise, and inside a run."""
 
+import itertools
 import math
 
 import numpy as np
@@ -50,8 +51,7 @@ def test_measured_is_the_sensor():
     np.testing.assert_array_equal(estimates(smc.estimator("measured"), x, v), v)
 
 
-@pytest.mark.parametrize("tau", [0.0, 1e-3, 5e-3, 0.1])
-@pytest.mark.parametrize("h", [1e-3, 5e-3])
+@pytest.mark.parametrize(("tau", "h"), [(0.0, 5e-3), (1e-3, 1e-3), (0.1, 5e-3)])
 def test_filtered_difference_of_a_ramp_is_its_slope_after_an_exponential(tau, h):
     """v_k = c (1 - a^k), a = tau / (tau + h): exact at once for tau = 0."""
     k = np.arange(3000)
@@ -67,15 +67,13 @@ def test_filtered_difference_lags_by_tau_and_half_a_sample(tau):
     np.testing.assert_allclose(lag[2000:], tau + H / 2, atol=1e-9)
 
 
-@pytest.mark.parametrize("tau", [0.0, 1e-3, 5e-3, 0.05])
+@pytest.mark.parametrize("tau", [0.0, 5e-3, 0.05])
 def test_filtered_difference_passes_noise_by_its_formula(tau):
     """The impulse response is (1-a)/h (1, -(1-a), -(1-a) a, ...): its energy is 2 (1-a)^2 / ((1+a) h^2)."""
     gain = math.sqrt(2.0 / ((tau + H) * (2.0 * tau + H)))
     impulse = np.zeros(5000)
     impulse[1] = 1.0
     assert np.linalg.norm(estimates(differenced(tau), impulse)) == pytest.approx(gain, rel=1e-9)
-    noise = 0.01 * np.random.default_rng(0).normal(size=200_000)
-    assert estimates(differenced(tau), noise)[2000:].std() == pytest.approx(0.01 * gain, rel=0.02)
 
 
 def test_filtered_difference_starts_from_zero_wherever_the_plant_starts():
@@ -108,8 +106,7 @@ def show_acceleration(y, gains, memory):
     return 0.0, y.a
 
 
-@ESTIMATORS
-@pytest.mark.parametrize("period", [1e-3, 5e-3])
+@pytest.mark.parametrize(("name", "period"), list(zip(FROM_POSITION, itertools.cycle([1e-3, 5e-3]))))
 def test_in_a_run_every_channel_has_its_own_estimate_of_what_it_measures(name, period):
     """Memory shared between channels or runs, or a dt from elsewhere, would show."""
     estimator = smc.estimator(name)
@@ -138,12 +135,8 @@ def test_in_a_run_the_estimate_follows_the_true_velocity():
 
 
 @ESTIMATORS
-def test_an_estimate_starts_from_the_first_reading_without_a_kick(name):
+def test_an_estimate_starts_without_a_kick_is_odd_and_does_not_read_the_velocity_sensor(name):
     np.testing.assert_array_equal(both(smc.estimator(name), np.full(50, 1e3)), np.zeros((2, 50)))
-
-
-@ESTIMATORS
-def test_an_estimate_is_odd_in_the_position_and_does_not_read_the_velocity_sensor(name):
     x, v = np.random.default_rng(0).normal(size=(2, 200))
     np.testing.assert_array_equal(both(smc.estimator(name), x, v), -both(smc.estimator(name), -x))
 
@@ -159,8 +152,7 @@ def test_a_linear_estimate_takes_its_time_from_dt(name):
     np.testing.assert_allclose(other * np.array([[7.0], [49.0]]), one, rtol=1e-7, atol=1e-7 * np.abs(one).max())
 
 
-@ESTIMATORS
-@pytest.mark.parametrize("h", [1e-3, 5e-3])
+@pytest.mark.parametrize(("name", "h"), list(zip(FROM_POSITION, itertools.cycle([5e-3, 1e-3]))))
 def test_an_estimate_of_a_ramp_is_its_slope_and_no_acceleration(name, h):
     t = np.arange(round(2.0 / h)) * h
     estimator = smc.estimator(name)
@@ -184,12 +176,11 @@ def test_an_estimate_of_second_order_is_exact_on_parabolas(name):
 
 
 @ESTIMATORS
-@pytest.mark.parametrize("sigma", [0.001, 0.01])
-def test_defaults_carry_the_paper_s_laws_through_noise_on_every_plant(name, sigma):
+def test_defaults_carry_the_paper_s_laws_through_noise_on_every_plant(name):
     """Without a velocity sensor."""
-    laws = scenarios.LAWS if name == "levant" else ("observer_free", "classical")
+    laws = scenarios.LAWS if name == "levant" else ("observer_free",)
     pairs = [(plant, law) for plant in scenarios.GAINS for law in laws]
-    changes = {"velocity": name, "noise": smc.Noise(position=sigma), "integrator": "Euler"}
+    changes = {"velocity": name, "noise": smc.Noise(position=0.01), "integrator": "Euler"}
     traces = smc.run([scenarios.scenario(*pair, duration=5.0, changes=changes) for pair in pairs])
     for pair, trace in zip(pairs, traces, strict=True):
         assert trace.failure is None, pair
@@ -230,10 +221,11 @@ def test_savitzky_golay_passes_noise_by_its_formula(N):
     assert gains_of("savitzky_golay", window=N, degree=1)[0] == pytest.approx(math.sqrt(12 / (N**3 - N)) / H, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", LINEAR)
-def test_noise_in_is_noise_out_by_the_impulse_response(name):
+def test_noise_in_is_noise_out_by_the_impulse_response():
     noise = 0.01 * np.random.default_rng(0).normal(size=60_000)
-    assert estimates(smc.estimator(name), noise)[2000:].std() == pytest.approx(0.01 * gains_of(name)[0], rel=0.05)
+    assert estimates(smc.estimator("kalman"), noise)[2000:].std() == pytest.approx(
+        0.01 * gains_of("kalman")[0], rel=0.05
+    )
 
 
 # each by itself
@@ -358,7 +350,7 @@ def test_the_bare_difference_is_of_first_order_on_a_sine():
     np.testing.assert_allclose(errors[:, 0], [5e-3, 5e-4], rtol=0.01)
 
 
-@pytest.mark.parametrize(("n", "steps"), [(1, [1e-2, 1e-3, 1e-4]), (2, [1e-2, 1e-3, 1e-4]), (3, [3e-2, 1e-2, 3e-3])])
+@pytest.mark.parametrize(("n", "steps"), [(1, [1e-2, 1e-3, 1e-4]), (2, [1e-2, 3e-3, 1e-3]), (3, [3e-2, 1e-2, 3e-3])])
 def test_levant_s_order_on_a_sine_is_its_order(n, steps):
     """O(h^n) for the velocity and O(h^(n-1)) for the acceleration, with L = 1 >= |x^(n+1)|."""
     slopes, errors = order_on_a_sine(smc.estimator("levant", L=1.0, order=n), steps)
@@ -423,15 +415,15 @@ def test_levant_without_taylor_s_terms_would_be_of_first_order():
     assert max(errors[10_000:]) > 50 * worst(smc.estimator("levant", L=1.0), H)[0]
 
 
-@ESTIMATORS
-def test_gains_that_would_turn_an_estimator_round_are_refused(name):
-    for gain in smc.estimator(name).gains:
-        with pytest.raises(smc.ScenarioError, match=gain):
-            smc.estimator(name, **{gain: -1.0})
+def test_gains_that_would_turn_an_estimator_round_are_refused():
+    for name in FROM_POSITION:
+        for gain in smc.estimator(name).gains:
+            with pytest.raises(smc.ScenarioError, match=gain):
+                smc.estimator(name, **{gain: -1.0})
 
 
-@ESTIMATORS
-def test_an_estimator_names_its_equation_and_its_source(name):
-    text = catalogue()[name].doc
-    assert "=" in text
-    assert name == "filtered_difference" or "Source" in text
+def test_an_estimator_names_its_equation_and_its_source():
+    for name in FROM_POSITION:
+        text = catalogue()[name].doc
+        assert "=" in text
+        assert name == "filtered_difference" or "Source" in text

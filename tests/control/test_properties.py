@@ -13,7 +13,6 @@ from smc_mujoco.control.properties import PROPERTIES, families, reads, searched,
 
 pytestmark = pytest.mark.quick
 
-LAWS = pytest.mark.parametrize("name", smc.laws())
 STEP = 1e-9  # s, control period: short, so that a layer as wide as a step is a jump
 JUMP = 4e-3  # of the range of u; the words of the fixed-point law make steps of 1e-3
 
@@ -41,15 +40,11 @@ def changes(name):
     return found
 
 
-@LAWS
-def test_a_law_is_changed_by_no_field_that_it_does_not_read(name):
-    assert changes(name) <= reads(catalogue()[name])
-
-
-@LAWS
-def test_a_law_is_changed_by_the_error_and_the_velocity_that_it_reads(name):
-    wanted = {"e", "de", "v", "dq", "q", "a", "limit"} & reads(catalogue()[name])
-    assert wanted - changes(name) == set()
+def test_a_law_is_changed_by_what_it_reads_and_by_nothing_else():
+    for name in smc.laws():
+        read = reads(catalogue()[name])
+        assert changes(name) <= read, name
+        assert {"e", "de", "v", "dq", "q", "a", "limit"} & read <= changes(name), name
 
 
 def test_what_a_law_reads_is_found_through_functions_and_else_is_everything():
@@ -91,10 +86,10 @@ def jump(name, model):
     return worst
 
 
-@LAWS
-def test_u_is_continuous_where_a_law_says_so_and_jumps_where_it_does_not(name):
-    largest = max(jump(name, model) for model in (0.0, 1.0))
-    assert (largest < JUMP) == catalogue()[name].continuous, largest
+def test_u_is_continuous_where_a_law_says_so_and_jumps_where_it_does_not():
+    for name in smc.laws():
+        largest = max(jump(name, model) for model in (0.0, 1.0))
+        assert (largest < JUMP) == catalogue()[name].continuous, (name, largest)
 
 
 # finite time
@@ -115,17 +110,15 @@ def arrival(name):
     return (times[2] - times[1]) / (times[1] - times[0]) if times[1] else 0.0
 
 
-@pytest.mark.parametrize("name", [name for name, law in catalogue().items() if law.finite_time])
-def test_laws_with_finite_time_approach_ever_faster(name):
-    assert arrival(name) < 0.6
+def test_laws_with_finite_time_approach_ever_faster():
+    slow = {name: arrival(name) for name, law in catalogue().items() if law.finite_time and arrival(name) >= 0.6}
+    assert not slow
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["observer_free", "observer_free_third", "boundary_layer", "pid", "lqr", "computed_torque", "barrier_adaptive"],
-)
-def test_laws_that_decay_exponentially_do_not_approach_ever_faster(name):
-    assert arrival(name) > 0.7
+def test_laws_that_decay_exponentially_do_not_approach_ever_faster():
+    names = ("observer_free", "observer_free_third", "boundary_layer", "pid", "lqr", "computed_torque")
+    for name in (*names, "barrier_adaptive"):
+        assert arrival(name) > 0.7, name
 
 
 # choosing

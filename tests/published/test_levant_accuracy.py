@@ -23,7 +23,7 @@ from smc_mujoco.control.estimators.levant import levant
 
 WITHIN = 0.1  # of the exponent
 PERIODS = (2e-3, 1e-3, 5e-4, 2.5e-4)  # s
-SEEDS = 24  # with 4 the exponent of e under noise comes out between .95 and 1.11
+SEEDS = 24  # with 4 the exponent of e under noise comes out between .95 and 1.11; without noise 4 are enough
 LATE = 3000  # samples in which errors are measured: as many for every period, as their maximum grows with the number
 
 
@@ -81,12 +81,13 @@ def sliding(r, noise):
         )
         for law in laws
         for h in PERIODS
-        for seed in range(SEEDS)
+        for seed in range(SEEDS if noise else 4)
     ]
     errors = [late(t.x, t.v, t.force + t.d)[:r] for t in smc.run(scenarios)]
-    return np.reshape(errors, (len(laws), len(PERIODS), SEEDS, r))
+    return np.reshape(errors, (len(laws), len(PERIODS), -1, r))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("r", [2, 3])
 def test_errors_under_noise_have_levant_s_exponents(r):
     eps = (np.array(PERIODS) / 0.03) ** r
@@ -100,10 +101,12 @@ def test_errors_in_the_sampling_period_have_levant_s_exponents(r):
         np.testing.assert_allclose(exponents(PERIODS, errors), r - np.arange(r), rtol=0, atol=WITHIN)
 
 
+@pytest.mark.slow
 def test_noise_is_what_the_errors_under_noise_are_made_of():
     """Ten times the errors that sampling alone leaves, so that the exponents are those of the noise."""
     for r in (2, 3):
-        assert np.all(sliding(r, 1.0)[..., 0] > 10.0 * sliding(r, 0.0)[..., 0])
+        alone = sliding(r, 0.0)[..., 0]
+        assert np.all(sliding(r, 1.0)[:, :, : alone.shape[2], 0] > 10.0 * alone)
 
 
 # differentiators
