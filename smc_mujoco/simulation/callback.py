@@ -63,6 +63,7 @@ def callback():
             pointer(integers(data + at.sensordata)[0]),
             pointer(integers(data + at.xipos)[0]),
             pointer(integers(data + at.xanchor)[0]),
+            pointer(integers(data + at.xaxis)[0]),
             pointer(integers(data + at.actuator_force)[0]),
             pointer(integers(data + at.qfrc_constraint)[0]),
             pointer(integers(data + at.qfrc_bias)[0]),

@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+from numba import njit
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import record_at
@@ -11,15 +12,15 @@ from smc_mujoco.mechanisms.plant import DIRECTLY
 # Indices of a channel in mjData, -1 if it has no such thing:
 #   qpos, qvel, x_sensor and v_sensor (in sensordata), ctrl, force (in actuator_force)
 #   xfrc: of a generalised force d in xfrc_applied, which enters there with `sign`
-#   push: of a horizontal force on the body in xfrc_applied, with `push_sign`
-#   tip, anchor: of the ends of that force's lever arm, in xipos and xanchor; -1 for a slide
+#   push: of a horizontal force on the body in xfrc_applied; on that of a hinge along the world's axis `along`, 0 or 1
+#   tip, anchor: of the ends of that force's lever arm, in xipos and xanchor, and of the axis in xaxis; -1 for a slide
 #   friction, brake: of a friction in actuator_force, and in ctrl if the callback computes it
 #   direct: in qfrc_applied, in users' models, whose disturbances act on the joint itself
 CHANNEL = np.dtype(
     [
         (name, "i8")
         for name in (
-            "qpos", "qvel", "x_sensor", "v_sensor", "ctrl", "force", "xfrc", "sign", "push", "push_sign", "tip",
+            "qpos", "qvel", "x_sensor", "v_sensor", "ctrl", "force", "xfrc", "sign", "push", "along", "tip",
             "anchor", "friction", "brake", "direct",
         )
     ]
@@ -27,8 +28,15 @@ CHANNEL = np.dtype(
 channel_at = record_at(CHANNEL)  # how compiled code reads channel i of an array at an address
 
 _SENSORS = {"x_sensor": mujoco.mjtSensor.mjSENS_JOINTPOS, "v_sensor": mujoco.mjtSensor.mjSENS_JOINTVEL}
-# Axis of a hinge -> direction of the horizontal force, component of its lever arm, sign of arm x force about the axis
-_LEVERS = {0: (1, 2, -1), 1: (0, 2, 1), 2: (0, 1, -1)}
+
+
+@njit(error_model="numpy", inline="always")
+def lever(channel, xipos, xanchor, xaxis):
+    """Return the torque of a horizontal force of 1 N about a hinge, m: axis . (arm x force). All are flat arrays."""
+    j, k = channel.along + 1, (channel.along + 2) % 3
+    arm_j = xipos[channel.tip + j] - xanchor[channel.anchor + j]
+    arm_k = xipos[channel.tip + k] - xanchor[channel.anchor + k]
+    return xaxis[channel.anchor + j] * arm_k - xaxis[channel.anchor + k] * arm_j
 
 
 def channels(model: mujoco.MjModel) -> np.ndarray:
@@ -74,7 +82,7 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
         "xfrc": xfrc,
         "sign": sign,
         "push": xfrc,
-        "push_sign": sign,
+        "along": 0,
         "tip": -1,
         "anchor": -1,
         "friction": -1 if friction < 0 else model.actuator_outadr[friction],
@@ -82,9 +90,8 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
         "direct": model.jnt_dofadr[joint] if direct else -1,
     }
     if hinge:
-        direction, arm, turn = _LEVERS[component]
-        found |= {"push": 6 * body + direction, "push_sign": turn * sign, "tip": 3 * body + arm}
-        found["anchor"] = 3 * joint + arm
+        along = int(component == 0)  # across the axis
+        found |= {"push": 6 * body + along, "along": along, "tip": 3 * body, "anchor": 3 * joint}
     for field, kind in _SENSORS.items():
         there = np.flatnonzero((model.sensor_type == kind) & (model.sensor_objid == joint))
         if not len(there):

@@ -26,7 +26,7 @@ from smc_mujoco.control.joint_law import head_at
 from smc_mujoco.mechanisms.hardware.sliding import SLOW
 from smc_mujoco.simulation import clock, philox
 from smc_mujoco.simulation import state as record
-from smc_mujoco.simulation.channels import channel_at
+from smc_mujoco.simulation.channels import channel_at, lever
 from smc_mujoco.simulation.state import function_at, log_at, signal_at, state_at
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo itself gives up at 1e10
@@ -45,6 +45,7 @@ class Arrays(NamedTuple):
     sensordata: object
     xipos: object
     xanchor: object
+    xaxis: object
     actuator_force: object
     qfrc_constraint: object
     qfrc_bias: object
@@ -478,13 +479,12 @@ def _disturb(at, sim, data, t, k):
 
 @njit(error_model="numpy", inline="always")
 def _disturbance(data, channel):
-    """Return the generalised force that disturbances exert on a channel."""
+    """Return the generalised force on a channel's joint of the disturbances that act on its body."""
     if channel.direct >= 0:
         return data.qfrc_applied[channel.direct]
     d = channel.sign * data.xfrc_applied[channel.xfrc]
     if channel.tip >= 0:
-        arm = data.xipos[channel.tip] - data.xanchor[channel.anchor]
-        d += channel.push_sign * arm * data.xfrc_applied[channel.push]
+        d += lever(channel, data.xipos, data.xanchor, data.xaxis) * data.xfrc_applied[channel.push]
     return d
 
 

@@ -49,6 +49,7 @@ class Offsets(NamedTuple):
     sensordata: int
     xipos: int
     xanchor: int
+    xaxis: int
     qfrc_bias: int
     qfrc_spring: int
     actuator_force: int

@@ -284,8 +284,10 @@ class Loop:
             xfrc[at["xfrc"]], data.qfrc_applied[at["direct"]] = 0.0, joints
         d = joints if self.scenario.plant.direct else at["sign"] * xfrc[at["xfrc"]]
         if self.hinged.any():
-            arm = data.xipos.ravel()[at["tip"]] - data.xanchor.ravel()[at["anchor"]]
-            d[self.hinged] += (at["push_sign"] * arm * xfrc[at["push"]])[self.hinged]
+            arm, axis = data.xipos[at["tip"] // 3] - data.xanchor[at["anchor"] // 3], data.xaxis[at["anchor"] // 3]
+            channel, j, k = np.arange(len(d)), at["along"] + 1, (at["along"] + 2) % 3
+            turn = axis[channel, j] * arm[channel, k] - axis[channel, k] * arm[channel, j]
+            d[self.hinged] += (turn * xfrc[at["push"]])[self.hinged]
         if not np.isfinite(d).all():
             raise Failure("the disturbance became NaN or inf")
         return d

@@ -43,7 +43,7 @@ class Trace:
         command is a voltage.
       applied: what the actuator gets at t_k, i.e. u after the input delay, (K + 1, n).
       s: sliding variable as the law returns it, (K + 1, n).
-      d: disturbance as a generalised force on the joint, (K + 1, n), N or N m.
+      d: disturbance as a generalised force on the joint: of what acts on the joint's own body, (K + 1, n), N or N m.
       r: reference, (K + 1, n); of free joints, which have none, the plant's goal.
       force: what the actuator delivers at the joint, and with a Backlash at its rotor, (K + 1, n), N or N m.
       reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. Both are means

@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.mechanisms.plants.double_pendulum import L2, MODEL_1_0
+from smc_mujoco.simulation import reference
 
 GRAV = 9.81
 STATES = 1000
@@ -238,3 +239,16 @@ def test_a_negative_dry_friction_is_refused(name):
 def test_the_motor_limits_the_command(name):
     limit = {"furuta": 0.05, "servo_axis": 351.507}.get(name, 6.0)
     assert smc.Scenario(plant=name, law="none").limits == (pytest.approx(limit),) * smc.plant(name).driven
+
+
+def test_a_gust_on_the_pole_of_a_turned_arm_is_logged_as_its_torque_about_the_hinge():
+    """Against the force times dp/dq of the pole's centre p, by the formula of its place: F l cos(q) cos(x)."""
+    gust = smc.Gust(0.02, time=-1.0, width=3.0)
+    fields = {"law": "none", "x0": (0.8, 0.5), "v0": (3.0, 0.0), "disturbance": gust}
+    trace = smc.run(smc.Scenario(plant="furuta", duration=0.3, **fields))
+    (x, q), force = trace.x.T, np.array([smc.Gust.value(t, gust)[0] for t in trace.t])
+    assert np.ptp(np.cos(x)) > 0.5
+    lever = trace.scenario.plant.parameters["l"] * np.cos(q) * np.cos(x)
+    np.testing.assert_allclose(trace.d[:, 1], force * lever, rtol=1e-9, atol=1e-15)
+    assert not trace.d[:, 0].any()  # the centre of the arm lies on its own axis
+    np.testing.assert_array_equal(trace.d, reference.run(trace.scenario).d)

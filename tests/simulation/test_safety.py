@@ -36,7 +36,7 @@ from smc_mujoco.common import jit as compiled_module
 from smc_mujoco.common.jit import compiled
 from smc_mujoco.control.law import Measurement, catalogue
 from smc_mujoco.simulation import callback, controller, offsets, reference, state
-from smc_mujoco.simulation.channels import channels
+from smc_mujoco.simulation.channels import channels, lever
 from smc_mujoco.simulation.prepare import pack, prepare
 from smc_mujoco.studies import run_key
 
@@ -849,9 +849,9 @@ def test_the_generalised_force_of_a_horizontal_force_is_that_of_the_jacobian(joi
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     mujoco.mj_jacBodyCom(model, data, jacobian, None, 1)
-    force = channel["push_sign"]
+    force = channel["sign"]
     if joint == "hinge":
-        force = force * (data.xipos.ravel()[channel["tip"]] - data.xanchor.ravel()[channel["anchor"]])
+        force = lever.py_func(np.rec.array(channel), data.xipos.ravel(), data.xanchor.ravel(), data.xaxis.ravel())
     direction = channel["push"] - 6
     assert 0 <= direction < 2
     assert force == pytest.approx(jacobian[direction, 0], rel=1e-9)

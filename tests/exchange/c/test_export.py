@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from helpers.compiler import needs_compiler
 from helpers.sources import strange
+from numba import njit
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
@@ -261,6 +262,25 @@ def test_a_law_of_one_s_own_runs_alike_in_both(folder):
     (folder / "turns.c").write_text(smc.law_to_c(turns))
     first, second = smc.run([scenario(law) for law in (turns, smc.law_from_c(folder / "turns.c"))])
     np.testing.assert_array_equal(first.u, second.u)
+
+
+@smc.law_function
+def signs(y, gains, memory):
+    return np.sign(y.e), np.sign(y.de)
+
+
+@njit
+def numpy_signs(a):
+    return np.sign(a), np.sign(-a)
+
+
+@pytest.mark.parametrize("e", [math.nan, 0.0, -0.0, 1.0, -1.0])
+def test_numpy_s_sign_is_that_of_the_compiled_python(folder, e):
+    y = Measurement(*[0.0] * 11)._replace(e=e, de=-e)
+    found, wanted = back(folder, signs())(y, (), np.zeros(1)), numpy_signs(e)
+    np.testing.assert_array_equal(found, wanted)
+    if not math.isnan(e):  # whose sign no operation promises
+        np.testing.assert_array_equal(np.signbit(found), np.signbit(wanted))
 
 
 REFUSED = {
