@@ -150,7 +150,7 @@ class Setting:
         for name, value in (options or {}).items():
             if name not in ("x0", "v0"):
                 raise unknown("option of an episode", name, ("x0", "v0"))
-            state = np.array(coerce.per_channel(name, coerce.state(name)(value), self.scenario.plant.n))
+            state = np.array(coerce.state(name, value, self.scenario))
             if name == "x0":
                 check_ranges(self.scenario.plant.name, self.scenario.plant.ranges, state)
             x, v = (state, v) if name == "x0" else (x, state)

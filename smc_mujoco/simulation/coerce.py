@@ -1,6 +1,7 @@
 """Converters from what users give for a scenario's fields to what the fields hold.
 
-Each raises ScenarioError, one sentence with the field, the value and the cure, for what it cannot convert.
+A converter takes the field's name, what the user gave, and the scenario, whose fields before this one are converted
+already. It raises ScenarioError, one sentence with the field, the value and the cure, for what it cannot convert.
 """
 
 import itertools
@@ -9,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number, shown, taken, unknown
+from smc_mujoco.common.errors import ScenarioError, number, shown, taken, unknown, whole
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import Estimator
@@ -19,12 +20,11 @@ from smc_mujoco.control.surface import Surface
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import Lag
-from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_names
+from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.clock import Clock
 from smc_mujoco.simulation.controller import MAX_STATE
-from smc_mujoco.simulation.perturbations import Jump, Noise, parameter_factors
+from smc_mujoco.simulation.perturbations import parameter_factors
 from smc_mujoco.simulation.signals import Constant, PerChannel, Signal
 
 P = TypeVar("P", bound=Part)
@@ -32,8 +32,9 @@ T = TypeVar("T")
 
 INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
 MODELS = ("none", "nominal")
+MIN_TIME = 1e-9  # s, of periods
+MAX_SEED = 2**53 - 1  # the largest whole number that every float64 below it has
 REST = Constant(0.0)
-
 
 ByChannel = Mapping[str, T] | Sequence[T]  # joint -> value, or values in the order of the driven channels
 Laws = Law | Template | str | ByChannel[Law | Template | str]
@@ -44,27 +45,32 @@ def law(value: Law | Template | str) -> Law:
     return component("law", from_text.law(value) if isinstance(value, str) else value)
 
 
-def laws(value: Laws | None, plant: Plant) -> Law:
+def laws(name: str, value: Laws | None, s: Any) -> Law:
     """Return the law of a plant's driven channels, from one law for all or one for each; from None the plant's."""
-    value = plant.suggested.get("law") if value is None else value
+    value = s.plant.suggested.get("law") if value is None else value
     if not isinstance(value, Mapping | list | tuple):
         return law(value)  # pyright: ignore[reportArgumentType]
-    return by_channel([law(one) for one in each("law", value, plant)])  # pyright: ignore[reportArgumentType]
+    return by_channel([law(one) for one in each(name, value, s.plant)])  # pyright: ignore[reportArgumentType]
 
 
-def unchanged_law(value: Laws | None) -> Law:
-    """Return a law as given. `laws` converts it when the plant is known."""
-    return value  # pyright: ignore[reportReturnType]
+def plant(name: str, value: object, s: Any) -> Plant:
+    """Return a plant, from itself or its name."""
+    return as_plant(value)
 
 
-def unchanged_reference(value: Signal | ByChannel[Signal] | None) -> Signal | None:
-    """Return a reference as given. `reference` converts it when the plant is known."""
-    return value  # pyright: ignore[reportReturnType]
+def real(**limits: Any) -> Callable[[str, float, Any], float]:
+    """Return the converter of a field with a number within some limits, those of `errors.number`."""
+    return lambda name, value, s: number(name, value, **limits)
 
 
-def unchanged_bound(value: float | ByChannel[float] | None) -> float | tuple[float, ...] | None:
-    """Return a bound as given. `bound` converts it when the plant is known."""
-    return value  # pyright: ignore[reportReturnType]
+def input_delay(name: str, value: float, s: Any) -> float:
+    """Return a delay, s, that is not longer than the run."""
+    return number(name, value, least=0.0, most=s.duration)
+
+
+def seed(name: str, value: int, s: Any) -> int:
+    """Return a seed, or a key of seeds."""
+    return whole(name, value, 0, MAX_SEED)
 
 
 def each(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
@@ -90,27 +96,27 @@ def each(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
     return list(value)
 
 
-def bound(value: float | ByChannel[float] | None, plant: Plant) -> float | tuple[float, ...] | None:
+def bound(name: str, value: float | ByChannel[float] | None, s: Any) -> float | tuple[float, ...] | None:
     """Return the bound on |u| of all channels, or of each driven one if they differ."""
     value = value.tolist() if isinstance(value, np.ndarray) else value
     if not isinstance(value, Mapping | list | tuple):
-        return None if value is None else number("u_max", value, above=0.0, infinite=True)
-    joints = list(value) if isinstance(value, Mapping) else range(plant.driven)
-    listed = each("u_max", value, plant)
+        return None if value is None else number(name, value, above=0.0, infinite=True)
+    joints = list(value) if isinstance(value, Mapping) else range(s.plant.driven)
+    listed = each(name, value, s.plant)
     checked = [
-        number(f"u_max[{shown(i)}]", one, above=0.0, infinite=True) for i, one in zip(joints, listed, strict=True)
+        number(f"{name}[{shown(i)}]", one, above=0.0, infinite=True) for i, one in zip(joints, listed, strict=True)
     ]
     return checked[0] if len(set(checked)) == 1 else tuple(checked)
 
 
-def surface(value: Surface | Template | str | None) -> Surface | None:
+def surface(name: str, value: Surface | Template | str | None, s: Any) -> Surface | None:
     """Return a surface, from itself, its template or its text, as "linear(c=3)"."""
     if isinstance(value, str):
-        return from_text.component("surface", value, surfaces(), "linear(c=3)")
+        return from_text.component(name, value, surfaces(), "linear(c=3)")
     return None if value is None else component("surface", value)
 
 
-def velocity(value: Estimator | Template | str | None) -> Estimator | None:
+def velocity(name: str, value: Estimator | Template | str | None, s: Any) -> Estimator | None:
     """Return an estimator, from itself, its template or its text, as "levant(L=4800)"."""
     if isinstance(value, str):
         return from_text.component("velocity estimator", value, estimators(), "levant(L=4800)")
@@ -126,102 +132,83 @@ def component(kind: str, value: object) -> Component:
     raise ScenarioError(f"{field} is {shown(made)}: give smc.{kind}(...), your own {kind}, or a name")
 
 
-def state(name: str) -> Callable[[float | Sequence[float] | None], tuple[float, ...] | None]:
-    """Return the converter of a field with positions or rates: one number or several become a tuple."""
-
-    def convert(value: float | Sequence[float] | None) -> tuple[float, ...] | None:
-        if value is None:
-            return None
-        if isinstance(value, np.ndarray):
-            value = value.tolist()
-        if isinstance(value, Mapping | Set):
-            raise ScenarioError(f"{name} is {shown(value)}: give one number, or a list of one for each channel")
-        if isinstance(value, Iterable) and not isinstance(value, str | bytes):
-            return tuple(taken(name, value))
-        return (value,)  # type: ignore[return-value]
-
-    return convert
-
-
-def per_channel(name: str, values: tuple[float, ...] | None, n: int) -> tuple[float, ...] | None:
+def state(name: str, value: float | Sequence[float] | None, s: Any) -> tuple[float, ...] | None:
     """Return n positions or rates, from n numbers or one. A run beyond MAX_STATE has diverged, so none may be there."""
-    if values is None:
+    if value is None:
         return None
+    if isinstance(value, Mapping | Set):
+        raise ScenarioError(f"{name} is {shown(value)}: give one number, or a list of one for each channel")
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    listed = isinstance(value, Iterable) and not isinstance(value, str | bytes)
+    values, n = taken(name, value) if listed else [value], s.plant.n  # pyright: ignore[reportArgumentType]
     if len(values) not in (1, n):
         raise ScenarioError(f"{name} has {len(values)} values for {n} channels: give one number or {n}")
     values = values if len(values) == n else values * n
-    return tuple(number(name, value, least=-MAX_STATE, most=MAX_STATE) for value in values)
+    return tuple(number(name, one, least=-MAX_STATE, most=MAX_STATE) for one in values)
 
 
-def physics_step(value: object, period: float, least: float) -> float | None:
+def physics_step(name: str, value: float | None, s: Any) -> float | None:
     """Return a step, s, that divides the control period exactly, from one that does so up to rounding."""
     if value is None:
         return None
-    h = number("physics_step", value, above=0.0, least=least)
+    h, period = number(name, value, above=0.0, least=MIN_TIME), s.control_period
     count = period / h
     if count < 1.0 - 1e-9 or abs(count - round(count)) > 1e-6 * count:
         raise ScenarioError(f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N")
     return period / round(count)
 
 
-def one_of(name: str, value: object, names: Sequence[str]) -> str | None:
-    """Return one of some names, or None."""
-    if value is None or (isinstance(value, str) and value in names):
-        return value
-    raise unknown(name, value, names)
+def one_of(names: Sequence[str]) -> Callable[[str, str | None, Any], str | None]:
+    """Return the converter of a field with one of some names, or None."""
+
+    def convert(name: str, value: str | None, s: Any) -> str | None:
+        if value is None or (isinstance(value, str) and value in names):
+            return value
+        raise unknown(name, value, names)
+
+    return convert
 
 
-def mechanism(value: object, plant: Plant) -> str:
+def mechanism(name: str, value: str, s: Any) -> str:
     """Return the name of a mechanism that the plant offers."""
-    names = ["equation", *plant.mechanisms]
+    names = ["equation", *s.plant.mechanisms]
     if not isinstance(value, str) or value not in names:
-        raise unknown(f"mechanism of {plant.name}", value, names)
+        raise unknown(f"{name} of {s.plant.name}", value, names)
     return value
 
 
-def instance(name: str, value: T | None, kind: type[T], example: str) -> T | None:
-    """Return a value of a class, or None."""
-    if not isinstance(value, kind | None):
-        raise ScenarioError(f"{name} is {shown(value)}: give {example} or None")
-    return value
+def instance(kind: type[T], example: str, absent: Any = None) -> Callable[[str, T | None, Any], T]:
+    """Return the converter of a field with a value of a class, and `absent` for None."""
+
+    def convert(name: str, value: T | None, s: Any) -> T:
+        if not isinstance(value, kind | None):
+            raise ScenarioError(f"{name} is {shown(value)}: give {example} or None")
+        return absent if value is None else value  # pyright: ignore[reportReturnType]
+
+    return convert
 
 
-def noise(value: Noise | None) -> Noise:
-    """Return measurement noise, none of it from None."""
-    return instance("noise", value, Noise, "smc.Noise(position=..., velocity=...)") or Noise()
-
-
-def clock(value: Clock | None) -> Clock:
-    """Return the controller's clock, a regular one from None."""
-    return instance("clock", value, Clock, "smc.Clock(jitter=..., missed=...)") or Clock()
-
-
-def mismatch(value: Mapping[str, float] | None) -> Mapping[str, float]:
+def mismatch(name: str, value: Mapping[str, float] | None, s: Any) -> Mapping[str, float]:
     """Return parameter factors, none from None."""
-    return parameter_factors("mismatch", {} if value is None else value)
-
-
-def jump(value: Jump | None) -> Jump | None:
-    """Return a jump of the plant's parameters, or None."""
-    return instance("jump", value, Jump, "smc.Jump(time=..., factors=...)")
-
-
-def sensor(value: Encoder | None) -> Encoder | None:
-    """Return an encoder, or None."""
-    return instance("sensor", value, Encoder, "smc.Encoder(counts=...)")
+    return parameter_factors(name, {} if value is None else value)
 
 
 def suggested_reference(plant: Plant) -> Signal:
     """Return the reference that the plant's channels suggest, and the plant's rest for those that suggest none."""
     resting = [Constant(x) for x in plant.rest] or [REST]
     given = plant.suggested.get("reference", (None,) * len(resting))
-    return reference(
+    return _references(
         [still if one is None else one for still, one in zip(itertools.cycle(resting), given, strict=False)], plant
     )
 
 
-def reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
+def reference(name: str, value: Signal | ByChannel[Signal] | None, s: Any) -> Signal | None:
     """Return the reference of a plant's driven channels, from one signal for all, also in a list, or one for each."""
+    return None if value is None else _references(value, s.plant)
+
+
+def _references(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
+    """Return the reference of a plant's driven channels."""
     value = value.signals if isinstance(value, PerChannel) else value
     listed = [value[0]] * plant.driven if isinstance(value, list | tuple) and len(value) == 1 else value
     items: list[Any] = each("reference", listed, plant) if isinstance(listed, Mapping | list | tuple) else [listed]
@@ -232,48 +219,44 @@ def reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
     return items[0] if all(item == items[0] for item in items) else PerChannel(tuple(items))
 
 
-def feedforward(value: Signal | None) -> Signal | None:
-    """Return one signal, or None."""
-    return instance("feedforward", value, Signal, "one signal, such as smc.TimeSeries(times, values)")
-
-
-def disturbance(value: Signal | Sequence[Signal] | None) -> tuple[Signal, ...]:
+def disturbance(name: str, value: Signal | Sequence[Signal] | None, s: Any) -> tuple[Signal, ...]:
     """Return signals, from one, several or None."""
     items = several(value)
     for item in items:
         if not isinstance(item, Signal):
-            raise ScenarioError(
-                f"disturbance is {shown(item)}: give a signal such as smc.Sine(amplitude=0.2, omega=5.0)"
-            )
+            raise ScenarioError(f"{name} is {shown(item)}: give a signal such as smc.Sine(amplitude=0.2, omega=5.0)")
     return items
 
 
-def contact(value: Contact | str | None) -> Contact:
-    """Return a contact, from itself or its kind; none from None."""
-    kind = "none" if value is None else value
-    return Contact(kind) if isinstance(kind, str) else kind
+def contact(name: str, value: Contact | str | None, s: Any) -> Contact:
+    """Return a contact that the plant offers, from itself or its kind; none from None."""
+    made = Contact("none") if value is None else Contact(value) if isinstance(value, str) else value
+    if not isinstance(made, Contact):
+        raise ScenarioError(f"{name} is {shown(made)}: give smc.Contact(...) or one of {', '.join(s.plant.contacts)}")
+    made.check(s.plant)
+    return made
 
 
-def friction(value: Friction | Sequence[Friction] | None) -> tuple[Friction, ...]:
+def friction(name: str, value: Friction | Sequence[Friction] | None, s: Any) -> tuple[Friction, ...]:
     """Return frictions sorted by kind, from one, several or None. No two are of a kind, at most one has bristles."""
-    items = parts("friction", value, Friction, "smc.Coulomb(0.05)")
-    check_once("friction", items, [type(part).__name__ for part in items])
+    items = parts(name, value, Friction, "smc.Coulomb(0.05)")
+    check_once(name, items, [type(part).__name__ for part in items])
     if len(alone := [part for part in items if part.bristles]) > 1:
         first, second = (type(part).__name__ for part in alone[:2])
-        raise ScenarioError(f"friction has {first} and {second}, which both hold a joint by bristles: give one")
+        raise ScenarioError(f"{name} has {first} and {second}, which both hold a joint by bristles: give one")
     return tuple(sorted(items, key=lambda part: type(part).__name__))
 
 
-def actuator(value: Actuator | Sequence[Actuator] | None) -> tuple[Actuator, ...]:
+def actuator(name: str, value: Actuator | Sequence[Actuator] | None, s: Any) -> tuple[Actuator, ...]:
     """Return at most two drives in the given order and after them a Backlash, from one, several or None."""
-    items = parts("actuator", value, Actuator, "smc.Lag(0.01)")
+    items = parts(name, value, Actuator, "smc.Lag(0.01)")
     drives = [part for part in items if part.drives]
-    check_once("actuator", items, [type(part).__name__ for part in items if not part.drives])
+    check_once(name, items, [type(part).__name__ for part in items if not part.drives])
     if len(drives) > 2:
-        raise ScenarioError(f"actuator has {len(drives)} drives, {shown(items)}: give one, or two in series")
+        raise ScenarioError(f"{name} has {len(drives)} drives, {shown(items)}: give one, or two in series")
     if len(drives) == 2 and not isinstance(drives[0], Lag):
         raise ScenarioError(
-            f"actuator has {shown(drives[0])} before {shown(drives[1])}, but the first of two drives in series must be "
+            f"{name} has {shown(drives[0])} before {shown(drives[1])}, but the first of two drives in series must be "
             f"a Lag: give one drive, or (smc.Lag(0.01), another)"
         )
     return tuple(sorted(items, key=lambda part: not part.drives))

@@ -27,21 +27,11 @@ SEEDS = 2**52  # number of a grid's seeds; larger ones are kept for tuning
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Starts:
-    """Where runs begin, by seed; see `starts`.
-
-    Attributes:
-      x0: the middle, one number or one for each channel; None: the plant's own, or the condition's.
-      spread: how far starts lie to either side of the middle, as a fraction of it.
-      by: how much farther they lie, rad or m.
-    """
+    """Where runs begin, by seed; see `starts`, whose arguments are its fields."""
 
     x0: tuple[float, ...] | None = None
     spread: float = SPREAD
     by: float = 0.0
-
-    def __post_init__(self):
-        number("spread", self.spread, least=0.0)
-        number("by", self.by, least=0.0)
 
     def reach(self, scenario: Scenario) -> float:
         """Return the largest distance from 0 of any channel at a start, rad or m."""
@@ -91,4 +81,5 @@ def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by
             users_frame(),
         )
     items = taken("x0", x0) if isinstance(x0, Sequence) and not isinstance(x0, str) else [x0]
-    return Starts(x0=None if x0 is None else tuple(number("x0", item) for item in items), spread=spread, by=by)
+    middle = None if x0 is None else tuple(number("x0", item) for item in items)
+    return Starts(x0=middle, spread=spread, by=number("by", by, least=0.0))

@@ -67,9 +67,7 @@ def _component(function: Callable, kind: str, gains: tuple[str, ...], memory: in
             output[0], output[1] = first, second
         return not ok
 
-    made = Function(native, _cached(function, kind, gains, memory))
-    fingerprint.hold(function)
-    return made
+    return _made(native, function, kind, gains, memory)
 
 
 @functools.cache
@@ -96,9 +94,7 @@ def _joint(function: Callable, gains: tuple[str, ...], shared: tuple[str, ...], 
         ok, _ = attempt(law, (seen, values(g, n), memories, output))
         return not ok
 
-    made = Function(native, _cached(function, gains, shared, memory))
-    fingerprint.hold(function)
-    return made
+    return _made(native, function, gains, shared, memory)
 
 
 @functools.cache
@@ -155,7 +151,7 @@ def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
             output[0], output[1], output[2] = r, dr, ddr
         return not ok
 
-    made = Function(native, _cached(kind.value, names, random, series, memory, rows, sees))
+    made = _made(native, kind.value, names, random, series, memory, rows, sees)
     fingerprint.hold(kind)
     return made
 
@@ -175,9 +171,7 @@ def nominal(function: Callable, names: tuple[str, ...]) -> Function:
             output[0], output[1] = f, g
         return not ok
 
-    made = Function(native, _cached(function, names))
-    fingerprint.hold(function)
-    return made
+    return _made(native, function, names)
 
 
 @functools.cache
@@ -194,7 +188,12 @@ def _friction(function: Callable, names: tuple[str, ...]) -> Function:
             output[0], output[1], output[2] = f, low, high
         return not ok
 
-    made = Function(native, _cached(function, names))
+    return _made(native, function, names)
+
+
+def _made(native: Callable, function: Callable, *arguments: object) -> Function:
+    """Return a C function of a user's function, kept on disk under its hash and these arguments."""
+    made = Function(native, _cached(function, *arguments))
     fingerprint.hold(function)
     return made
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, number, shown, users_frame, whole
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, users_frame
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.control.component import Template, written
@@ -31,21 +31,20 @@ from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, drive_step
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Nominal
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
-from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Coupled, Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.clock import Clock
+from smc_mujoco.simulation.coerce import MAX_SEED, MIN_TIME
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.philox import PROCESS
 from smc_mujoco.simulation.signals import Impulse, OrnsteinUhlenbeck, PerChannel, Push, Signal
 
-MIN_TIME, MAX_TIME = 1e-9, 1e9  # s, of periods and of runs
+MAX_TIME = 1e9  # s, of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
 JITTER_STEPS = 4  # physics steps in the clock's jitter, at least; chosen: it takes five values or more
 SHORT_LAG = 0.2  # control periods: a shorter lag needs no shorter physics step, see `longest_step`
-MAX_SEED = 2**53 - 1  # the largest whole number that every float64 below it has
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 MAX_ANGLE = 3.0 * math.pi  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
@@ -59,9 +58,9 @@ MIN_MILLISECONDS = 1.0  # s, of an input delay: chosen; no plant here tolerates 
 Out = TypeVar("Out")
 
 
-def field(*, converter: Callable[[Any], Out], default: Any = dataclasses.MISSING) -> Out:
-    """Return a dataclass field whose value a converter makes from what the user gives."""
-    return dataclasses.field(default=default, metadata={"converter": converter})
+def field(convert: Callable[..., Out], default: Any = dataclasses.MISSING) -> Out:
+    """Return a dataclass field whose value a function of `coerce` makes from what the user gives."""
+    return dataclasses.field(default=default, metadata={"convert": convert})
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -124,33 +123,36 @@ class Scenario:
         u_max could.
     """
 
-    plant: Plant = field(converter=as_plant)
-    law: Law = field(converter=coerce.unchanged_law, default=None)
-    model: str | None = None
-    surface: Surface | None = field(converter=coerce.surface, default=None)
-    duration: float = 10.0
-    control_period: float = 1e-3
-    physics_step: float | None = None
-    u_max: float | tuple[float, ...] | None = field(converter=coerce.unchanged_bound, default=None)
-    x0: tuple[float, ...] | None = field(converter=coerce.state("x0"), default=None)
-    v0: tuple[float, ...] | None = field(converter=coerce.state("v0"), default=None)
-    reference: Signal | None = field(converter=coerce.unchanged_reference, default=None)
-    feedforward: Signal | None = field(converter=coerce.feedforward, default=None)
-    disturbance: tuple[Signal, ...] = field(converter=coerce.disturbance, default=None)
-    noise: Noise = field(converter=coerce.noise, default=None)
-    input_delay: float = 0.0
-    clock: Clock = field(converter=coerce.clock, default=None)
-    velocity: Estimator | None = field(converter=coerce.velocity, default=None)
-    mismatch: Mapping[str, float] = field(converter=coerce.mismatch, default=None)
-    jump: Jump | None = field(converter=coerce.jump, default=None)
-    seed: int = 0
-    noise_key: int = 0
-    integrator: str | None = None
-    friction: tuple[Friction, ...] = field(converter=coerce.friction, default=None)
-    contact: Contact = field(converter=coerce.contact, default=None)
-    mechanism: str = "equation"
-    actuator: tuple[Actuator, ...] = field(converter=coerce.actuator, default=None)
-    sensor: Encoder | None = field(converter=coerce.sensor, default=None)
+    # converted in this order
+    plant: Plant = field(coerce.plant)
+    law: Law = field(coerce.laws, None)
+    model: str | None = field(coerce.one_of(coerce.MODELS), None)
+    surface: Surface | None = field(coerce.surface, None)
+    duration: float = field(coerce.real(above=0.0, most=MAX_TIME), 10.0)
+    control_period: float = field(coerce.real(above=0.0, least=MIN_TIME), 1e-3)
+    physics_step: float | None = field(coerce.physics_step, None)
+    u_max: float | tuple[float, ...] | None = field(coerce.bound, None)
+    x0: tuple[float, ...] | None = field(coerce.state, None)
+    v0: tuple[float, ...] | None = field(coerce.state, None)
+    reference: Signal | None = field(coerce.reference, None)
+    feedforward: Signal | None = field(
+        coerce.instance(Signal, "one signal, such as smc.TimeSeries(times, values)"), None
+    )
+    disturbance: tuple[Signal, ...] = field(coerce.disturbance, None)
+    noise: Noise = field(coerce.instance(Noise, "smc.Noise(position=..., velocity=...)", Noise()), None)
+    input_delay: float = field(coerce.input_delay, 0.0)
+    clock: Clock = field(coerce.instance(Clock, "smc.Clock(jitter=..., missed=...)", Clock()), None)
+    velocity: Estimator | None = field(coerce.velocity, None)
+    mismatch: Mapping[str, float] = field(coerce.mismatch, None)
+    jump: Jump | None = field(coerce.instance(Jump, "smc.Jump(time=..., factors=...)"), None)
+    seed: int = field(coerce.seed, 0)
+    noise_key: int = field(coerce.seed, 0)
+    integrator: str | None = field(coerce.one_of(coerce.INTEGRATORS), None)
+    friction: tuple[Friction, ...] = field(coerce.friction, None)
+    contact: Contact = field(coerce.contact, None)
+    mechanism: str = field(coerce.mechanism, "equation")
+    actuator: tuple[Actuator, ...] = field(coerce.actuator, None)
+    sensor: Encoder | None = field(coerce.instance(Encoder, "smc.Encoder(counts=...)"), None)
     condition: str | None = dataclasses.field(default=None, init=False, repr=False)
 
     def __new__(cls, *_: Any, **given: Any) -> "Scenario":
@@ -213,29 +215,9 @@ class Scenario:
 
     def _convert(self) -> None:
         """Convert every field from what the user gave."""
-        put = vars(self).update  # the class is frozen
-        put(
-            (one.name, one.metadata["converter"](getattr(self, one.name)))
-            for one in dataclasses.fields(self)
-            if "converter" in one.metadata
-        )
-        if not isinstance(self.contact, Contact):
-            kinds = ", ".join(self.plant.contacts)
-            raise ScenarioError(f"contact is {shown(self.contact)}: give smc.Contact(...) or one of {kinds}")
-        self.contact.check(self.plant)
-        put(law=coerce.laws(self.law, self.plant))
-        put(reference=None if self.reference is None else coerce.reference(self.reference, self.plant))
-        put(model=coerce.one_of("model", self.model, coerce.MODELS))
-        put(integrator=coerce.one_of("integrator", self.integrator, coerce.INTEGRATORS))
-        put(mechanism=coerce.mechanism(self.mechanism, self.plant))
-        put(duration=number("duration", self.duration, above=0.0, most=MAX_TIME))
-        put(control_period=number("control_period", self.control_period, above=0.0, least=MIN_TIME))
-        put(seed=whole("seed", self.seed, 0, MAX_SEED), noise_key=whole("noise_key", self.noise_key, 0, MAX_SEED))
-        put(x0=coerce.per_channel("x0", self.x0, self.plant.n))
-        put(v0=coerce.per_channel("v0", self.v0, self.plant.n))
-        put(physics_step=coerce.physics_step(self.physics_step, self.control_period, MIN_TIME))
-        put(u_max=coerce.bound(self.u_max, self.plant))
-        put(input_delay=number("input_delay", self.input_delay, least=0.0, most=self.duration))
+        for one in dataclasses.fields(self):
+            if convert := one.metadata.get("convert"):
+                vars(self)[one.name] = convert(one.name, getattr(self, one.name), self)  # the class is frozen
 
     @functools.cached_property
     def noise_seed(self) -> int:
@@ -529,17 +511,12 @@ def check_signals(s: Resolved) -> None:
             f"disturbance {shown(forces[0])} is a force on a body, and disturbances of {s.plant.name} act on its "
             "joints: give another signal"
         )
-    for reference in dict.fromkeys(s.references):
-        if reference.cartesian:
-            raise ScenarioError(f"reference is a {type(reference).__name__}, which is a force: give a signal")
-        if reference.random:
-            raise ScenarioError(f"reference is {type(reference).__name__}, which is noise: give a smooth signal")
-        if reference.sees:
-            raise ScenarioError(f"reference is {type(reference).__name__}, which sees the loop: give a known signal")
-    if s.feedforward is not None and (s.feedforward.cartesian or s.feedforward.random or s.feedforward.sees):
-        kinds = {"noise": s.feedforward.random, "a disturbance that sees the loop": s.feedforward.sees}
-        kind = next((kind for kind, holds in kinds.items() if holds), "a force on a body")
-        raise ScenarioError(f"feedforward is {type(s.feedforward).__name__}, which is {kind}: give a known signal of u")
+    known = [("reference", one, "a smooth signal") for one in dict.fromkeys(s.references)]
+    known += [("feedforward", s.feedforward, "a known signal of u")] if s.feedforward else []
+    for name, signal, cure in known:
+        kinds = {"a force": signal.cartesian, "noise": signal.random, "one that sees the loop": signal.sees}
+        for kind in (kind for kind, holds in kinds.items() if holds):
+            raise ScenarioError(f"{name} is {type(signal).__name__}, which is {kind}: give {cure}")
 
 
 @functools.lru_cache(maxsize=32)

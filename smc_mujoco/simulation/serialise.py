@@ -2,15 +2,16 @@
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.fingerprint import arithmetic
 from smc_mujoco.common.registry import subclasses
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control import as_data as component
+from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.custom.plant_from import OwnModel, restored
@@ -24,39 +25,44 @@ from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import PerChannel, Recorded, Signal
 
-PLAIN = ("duration", "control_period", "physics_step", "u_max", "x0", "v0", "input_delay", "seed", "integrator")
 DEPENDENT = ("model", "physics_step", "integrator", "velocity", "u_max", "x0", "v0", "reference")  # None where left out
-PARTS = ("friction", "contact", "actuator", "sensor")
 T = TypeVar("T")
 
 
 def describe(scenario: Scenario) -> dict:
     """Return a scenario as plain data that JSON holds without loss."""
     given, scenario = scenario, scenario.resolved
-    return (
-        {name: getattr(scenario, name) for name in PLAIN}
-        | {
-            "plant": _plant(scenario.plant),
-            "versions": dict(_versions()),
-            "law": component.describe(scenario.law),
-            "source": scenario.law.source.about(),
-            "velocity": component.describe(scenario.velocity),
-            "surface": scenario.surface and component.describe(scenario.surface),
-            "model": scenario.model,
-            "reference": _signal(scenario.reference),
-            "feedforward": scenario.feedforward and _signal(scenario.feedforward),
-            "disturbance": [_signal(d) for d in scenario.disturbance],
-            "noise": _noise(scenario.noise),
-            "clock": dataclasses.asdict(scenario.clock),
-            "mismatch": dict(scenario.mismatch),
-            "jump": scenario.jump and {"time": scenario.jump.time, "factors": dict(scenario.jump.factors)},
-            "mechanism": scenario.mechanism,
-            "condition": scenario.condition,
-            "left_out": [name for name in DEPENDENT if getattr(given, name) is None],
-        }
-        | {name: _parts(getattr(scenario, name)) for name in PARTS}
-        | ({"noise_key": scenario.noise_key} if scenario.noise_key else {})
-    )
+    data = {name: _data(getattr(scenario, name)) for name in Scenario.fields() if name != "noise_key"}
+    data |= {"noise_key": scenario.noise_key} if scenario.noise_key else {}
+    return data | {
+        "versions": dict(_versions()),
+        "source": scenario.law.source.about(),
+        "condition": scenario.condition,
+        "left_out": [name for name in DEPENDENT if getattr(given, name) is None],
+    }
+
+
+def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
+    """Return the value of a scenario's field as plain data."""
+    match value:
+        case Plant():
+            return _plant(value)
+        case Component():
+            return component.describe(value)
+        case Recorded():
+            return {"kind": value.kind, "module": value.module, "values": value.parameters()}
+        case PerChannel():
+            return {"each": [_data(one) for one in value.signals]}
+        case Signal() | Part():
+            values = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if f.init}
+            return dict(zip(("kind", "module"), _home(type(value)), strict=True)) | {"values": values}
+        case Noise() | Clock() | Jump():
+            return {name: _data(one) for name, one in vars(value).items() if one is not None}
+        case Mapping():
+            return dict(value)
+        case [Signal() | Part(), *_]:
+            return [_data(one) for one in value]
+    return value
 
 
 @functools.cache
@@ -71,22 +77,9 @@ def restore(data: dict) -> Scenario:
 
     Recorded scenarios skip validation rules added after they were recorded.
     """
-    fields = {name: data[name] for name in PLAIN}
-    fields |= {name: _restore_parts(data[name]) for name in PARTS if name in data}  # an ideal run's file may lack them
-    fields |= {name: data[name] for name in ("mechanism", "model", "noise_key") if name in data}
-    fields |= {
-        "plant": _restore_plant(data["plant"]),
-        "law": component.law(data["law"], data.get("source")),
-        "velocity": component.restore(data["velocity"], "estimator", estimators()),
-        "surface": data.get("surface") and component.restore(data["surface"], "surface", surfaces()),
-        "reference": _restore_signal(data["reference"]),
-        "feedforward": (added := data.get("feedforward")) and _restore_signal(added),
-        "disturbance": tuple(_restore_signal(d) for d in data["disturbance"]),
-        "noise": _restore_noise(data["noise"]),
-        "clock": Clock(**data["clock"]),
-        "mismatch": data["mismatch"],
-        "jump": data["jump"] and Jump(**data["jump"]),
-    }
+    fields = {name: data[name] for name in Scenario.fields() if name in data}  # an ideal run's file may lack parts
+    fields |= {name: restored(fields[name]) for name, restored in RESTORED.items() if fields.get(name)}
+    fields["law"] = component.law(data["law"], data.get("source"))
     exact = Scenario.recorded(**fields)
     given = Scenario.recorded(**fields | dict.fromkeys(data.get("left_out", ())))
     scenario = given if given == exact else exact  # where this version's defaults differ, keep the recorded values
@@ -109,14 +102,6 @@ def _restore_plant(data: dict) -> Plant:
     return find_plant(name, **plant)
 
 
-def _signal(signal: Signal) -> dict:
-    if isinstance(signal, Recorded):
-        return {"kind": signal.kind, "module": signal.module, "values": signal.parameters()}
-    if isinstance(signal, PerChannel):
-        return {"each": [_signal(one) for one in signal.signals]}
-    return _thing(signal)
-
-
 def _restore_signal(data: dict) -> Signal:
     if "each" in data:
         return PerChannel(tuple(_restore_signal(one) for one in data["each"]))
@@ -124,27 +109,9 @@ def _restore_signal(data: dict) -> Signal:
     return kind(**values) if kind else Recorded(data["kind"], data["module"], values)
 
 
-def _noise(noise: Noise) -> dict:
-    data = {"position": noise.position, "velocity": noise.velocity}
-    errors = zip(("position_error", "velocity_error"), noise.errors, strict=True)
-    return data | {name: _signal(error) for name, error in errors if error}
-
-
 def _restore_noise(data: dict) -> Noise:
-    errors: dict = {name: _restore_signal(one) for name, one in data.items() if isinstance(one, dict)}
-    return Noise(**data | errors)
-
-
-def _parts(value: Part | Sequence[Part] | None) -> dict | list[dict] | None:
-    if value is None or isinstance(value, Part):
-        return value and _thing(value)
-    return [_thing(part) for part in value]
-
-
-def _restore_parts(data: dict | Sequence[dict] | None) -> Part | tuple[Part, ...] | None:
-    if data is None or isinstance(data, dict):
-        return None if data is None else _restore_part(data)
-    return tuple(_restore_part(part) for part in data)
+    made: dict = {name: _restore_signal(one) if isinstance(one, dict) else one for name, one in data.items()}
+    return Noise(**made)
 
 
 def _restore_part(data: dict) -> Part:
@@ -154,10 +121,8 @@ def _restore_part(data: dict) -> Part:
     return kind(**_values(data))
 
 
-def _thing(thing: Signal | Part) -> dict:
-    """Return the class of a thing by name, and the values of its fields."""
-    values = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.init}
-    return dict(zip(("kind", "module"), _home(type(thing)), strict=True)) | {"values": values}
+def _restore_parts(data: Sequence[dict]) -> tuple[Part, ...]:
+    return tuple(map(_restore_part, data))
 
 
 def _values(data: dict) -> dict:
@@ -172,3 +137,20 @@ def _kinds(base: type[T]) -> dict[tuple[str, str], type[T]]:
 
 def _home(kind: type) -> tuple[str, str]:
     return kind.__name__, kind.__module__
+
+
+RESTORED: Mapping[str, Callable[[Any], Any]] = {  # field -> what makes its value of `_data`; other values are plain
+    "plant": _restore_plant,
+    "velocity": lambda data: component.restore(data, "estimator", estimators()),
+    "surface": lambda data: component.restore(data, "surface", surfaces()),
+    "reference": _restore_signal,
+    "feedforward": _restore_signal,
+    "disturbance": lambda data: tuple(map(_restore_signal, data)),
+    "noise": _restore_noise,
+    "clock": lambda data: Clock(**data),
+    "jump": lambda data: Jump(**data),
+    "friction": _restore_parts,
+    "contact": _restore_part,
+    "actuator": _restore_parts,
+    "sensor": _restore_part,
+}

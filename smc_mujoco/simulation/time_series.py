@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
+from numba import njit
 
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.common.files import csv_rows
@@ -15,6 +16,19 @@ from smc_mujoco.simulation.signals import EARLY, Signal
 MAX_GAP = 1.5  # median steps; chosen: a logger's jitter stays below, a missing row is above
 WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\]]*)\]")  # name of a column
 SECONDS = ("s", "sec", "second", "seconds")
+
+
+@njit(error_model="numpy")
+def last_before(data, t, end, early):
+    """Return the last of the points 0 .. end - 1 whose time, data[0, i] times `early`, is not after t, else 0."""
+    low, high = 0, end
+    while high - low > 1:
+        middle = (low + high) // 2
+        if t < data[0, middle] * early:
+            high = middle
+        else:
+            low = middle
+    return low
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -102,14 +116,8 @@ class TimeSeries(Signal):
         last = data.shape[1] - 1
         if t < data[0, 0] * EARLY or t > data[0, last] / EARLY:
             return 0.0, 0.0, 0.0
-        low, high = 0, last
-        while high - low > 1:
-            middle = (low + high) // 2
-            if t < data[0, middle] * EARLY:
-                high = middle
-            else:
-                low = middle
-        slope = (data[1, high] - data[1, low]) / (data[0, high] - data[0, low])
+        low = last_before(data, t, last, EARLY)
+        slope = (data[1, low + 1] - data[1, low]) / (data[0, low + 1] - data[0, low])
         return data[1, low] + slope * (t - data[0, low]), slope, 0.0
 
 
@@ -126,14 +134,7 @@ class Held(TimeSeries):
     def value(t, p, data):
         if t < data[0, 0] * EARLY:
             return 0.0, 0.0, 0.0
-        low, high = 0, data.shape[1]
-        while high - low > 1:
-            middle = (low + high) // 2
-            if t < data[0, middle] * EARLY:
-                high = middle
-            else:
-                low = middle
-        return data[1, low], 0.0, 0.0
+        return data[1, last_before(data, t, data.shape[1], EARLY)], 0.0, 0.0
 
 
 def _floats(what: str, items: object) -> tuple[float, ...]:

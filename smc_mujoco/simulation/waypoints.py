@@ -10,7 +10,7 @@ from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.mechanisms.inverse_kinematics import Tip, solve
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.time_series import TimeSeries
+from smc_mujoco.simulation.time_series import TimeSeries, last_before
 
 STEP = 0.01  # s between the knots of a path in space: chosen; the tip leaves its path by micrometres between them
 
@@ -48,13 +48,8 @@ class Waypoints(TimeSeries):
             return data[1, 0], 0.0, 0.0
         if t >= data[0, last]:
             return data[1, last], 0.0, 0.0
-        low, high = 0, last
-        while high - low > 1:
-            middle = (low + high) // 2
-            if t < data[0, middle]:
-                high = middle
-            else:
-                low = middle
+        low = last_before(data, t, last, 1.0)
+        high = low + 1
         # quintic through both ends: r = r0 + v0 T a + a0 T^2 a^2 / 2 + c3 a^3 + c4 a^4 + c5 a^5, a = (t - t0) / T
         T = data[0, high] - data[0, low]
         a = (t - data[0, low]) / T

@@ -133,7 +133,7 @@ def _controller(
     joints: int | None,
 ) -> Controller:
     """Return the controller, checked. Arguments and errors as in `export_fmu`."""
-    surface, estimator = coerce.surface(surface), coerce.velocity(velocity)
+    surface, estimator = coerce.surface("surface", surface, None), coerce.velocity("velocity", velocity, None)
     chosen = writable(law)
     count = number_of_joints(chosen, joints)
     if surface is not None and count:
