@@ -151,10 +151,9 @@ def test_a_relative_link_or_picture_leads_somewhere(page, link):
     assert path.stat().st_size > 0
 
 
-def test_the_tables_name_every_plant_law_and_scene():
+def test_the_tables_name_every_plant_and_law():
     assert rows("catalogue.md", "plants") == set(smc.plants())
     assert rows("catalogue.md", "laws") == set(smc.laws())
-    assert rows("scenes.md", "scene") == set(scene.scenes())
 
 
 def test_the_pages_list_what_a_law_measures():

@@ -1,4 +1,5 @@
-"""What the site adds to docs/: README's first screen, the gallery, notebooks, pages of laws and plants, equations."""
+"""What the site adds to docs/: README's first screen, films, notebooks, the C header, pages of laws and plants, tables
+of metrics, scenes and claims, equations."""
 
 import re
 import sys
@@ -10,12 +11,14 @@ ROOT = Path(__file__).parents[2]
 GALLERY = "videos/gallery"
 HERE = "<!-- README's first screen -->"
 CATALOGUE = "catalogue.md"  # its tables name all plants and laws
-BOOST = {"questions.md": 2.0, "mathematics.md": 2.0, "run_study.md": 1.5, "api.md": 0.3}  # in search
+BOOST = {"mathematics.md": 2.0, "run_study.md": 1.5, "api.md": 0.3}  # in search
 GROUP = "Catalogue"  # where the contents show their pages
+HEADER = "smc_mujoco/exchange/c/smc_law.h"  # to which pages link
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 import catalogue  # noqa: E402
+import known  # noqa: E402
 import notebooks  # noqa: E402
 from mathml import font, typeset  # noqa: E402
 
@@ -43,6 +46,7 @@ def on_files(files, config):
     """Add the gallery, the generated pages and their pictures to the site's files."""
     for path in sorted((ROOT / GALLERY).glob("*.webp")):
         files.append(File.generated(config, f"{GALLERY}/{path.name}", abs_src_path=str(path)))
+    files.append(File.generated(config, HEADER, abs_src_path=str(ROOT / HEADER)))
     for page in PAGES:
         files.append(File.generated(config, f"{page.path}.md", content=page.text))
     for path, content in notebooks.pages().items():
@@ -56,12 +60,14 @@ def on_files(files, config):
 
 
 def on_page_markdown(markdown, page, config, files):
-    """Put README's first screen where the page asks for it, link names of laws and plants in tables, and weigh the page
+    """Put README's first screen and the package's tables where the page asks for them, link names, and weigh the page
     for the search."""
     if boost := BOOST.get(page.file.src_uri):
         page.meta["search"] = {"boost": boost}
     first, _, _ = (ROOT / "README.md").read_text(encoding="utf-8").partition("\n<!-- end of the first screen -->")
-    markdown = markdown.replace(HERE, first.replace("](docs/", "](")).replace(f"](../{GALLERY}/", f"]({GALLERY}/")
+    markdown = known.filled(markdown.replace(HERE, first.replace("](docs/", "](")))
+    for place in (f"{GALLERY}/", HEADER):
+        markdown = markdown.replace(f"](../{place}", f"]({place}")
     if page.file.src_uri == notebooks.LISTED:
         markdown = markdown.replace(".ipynb)", ".md)")
     return linked(markdown) if page.file.src_uri == CATALOGUE else markdown

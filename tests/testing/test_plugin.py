@@ -525,13 +525,3 @@ def test_plugin_imports_nothing_heavy_and_never_sets_mujoco_gl(tmp_path, wish):
 def test_blocked_it_is_not_missed(pytester):
     pytester.makepyfile("def test(request): assert not request.config.pluginmanager.hasplugin('smc_mujoco')")
     pytester.runpytest_inprocess("-p", "no:cacheprovider", "-p", "no:smc_mujoco").assert_outcomes(passed=1)
-
-
-def test_what_the_documentation_shows_passes(pytester, undrawn):
-    text = (ROOT / "docs" / "test_law.md").read_text()
-    (block,) = [
-        b for b in re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL) if "step_response" in b
-    ]
-    pytester.makepyfile(test_my_laws=block)
-    outcomes = pytester.runpytest_inprocess(*PLUGIN).parseoutcomes()
-    assert set(outcomes) - {"warning", "warnings"} == {"passed"}  # pytest warns where it loads the plugin itself
