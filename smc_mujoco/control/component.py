@@ -364,11 +364,7 @@ def _per_channel(gains: Mapping[str, Value]) -> Iterable[SimpleNamespace]:
 
 
 def by_channel(laws: "Sequence[Component]") -> Component:
-    """Return the law that gives each driven channel one of these laws of one channel.
-
-    Raises:
-      ScenarioError: a law of many joints, or one that has gains by channel itself.
-    """
+    """Return the law that gives each driven channel one of these laws of one channel."""
     first = laws[0]
     for i, law in enumerate(laws):
         if law.joint or not law.uniform:
@@ -412,9 +408,6 @@ def as_gains(gains: object, known: Mapping[str, Value] = frozen({})) -> dict[str
 
     Args:
       known: other gains, which come first. `gains` can change their defaults.
-
-    Raises:
-      ScenarioError: not a mapping, a bad name or default, or a gain over an unknown one.
     """
     if not isinstance(gains, Mapping | None):
         raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
@@ -431,11 +424,7 @@ def as_gains(gains: object, known: Mapping[str, Value] = frozen({})) -> dict[str
 
 
 def decorated(kind: str, function: Callable | None, options: Mapping) -> "Callable[[Callable], Template] | Template":
-    """Return the Template of a function, or its decorator if the function is None.
-
-    Raises:
-      ScenarioError: an option that this kind of component does not have, or that is out of range.
-    """
+    """Return the Template of a function, or its decorator if the function is None."""
     options = dict(options)
     if foreign := options.keys() - OPTIONS[kind].__optional_keys__:
         raise unknown(f"option of {kind}_function", min(foreign), OPTIONS[kind].__optional_keys__)
@@ -454,12 +443,7 @@ def template(
     plants: Iterable[str] = (),
     **words: object,
 ) -> Callable[[Callable], Template]:
-    """Return a decorator that turns a function into a Template.
-
-    Raises:
-      ScenarioError: an option out of range. From the decorator: a function with other arguments, or with a name
-        longer than 100 characters.
-    """
+    """Return a decorator that turns a function into a Template."""
     stated = as_gains(gains)
     memory, relative_degree = whole("memory", memory, 1, 10_000), whole("relative_degree", relative_degree, 1, 10)
     if isinstance(plants, str):

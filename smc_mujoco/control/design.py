@@ -17,9 +17,6 @@ def linearised(plant: Plant) -> tuple[float, float, float]:
     """Return a1, a2, b of x'' = a1 x + a2 x' + b u at the origin; for a network, of its least stable channel.
 
     The motion of neighbours is not included.
-
-    Raises:
-      ScenarioError: no nominal model, or a channel without an actuator.
     """
     if plant.unmodelled:
         raise ScenarioError(f"{plant.name} has no nominal model: {plant.unmodelled}")

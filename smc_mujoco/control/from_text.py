@@ -140,11 +140,7 @@ READERS = {".py": _of_python, ".json": _of_tuning, ".c": _of_c, ".so": _of_c, ".
 
 
 def _reader(text: str) -> Callable[[str], list[Any]] | None:
-    """Return the function that reads the laws of a file; None for the text of no file.
-
-    Raises:
-      ScenarioError: there is no such file, or it is of another kind.
-    """
+    """Return the function that reads the laws of a file; None for the text of no file."""
     suffix, exists = Path(text).suffix, os.path.exists(text)
     if suffix in READERS and not exists:
         raise ScenarioError(f"no file {text!r}: give a file with a law in it, or a name")

@@ -120,11 +120,7 @@ def general() -> tuple[str, ...]:
 
 
 def general_laws(plants: Sequence[str | Plant], gains: str) -> list[str]:
-    """List the general laws that have gains in a set on each of these plants, those of LAWS first.
-
-    Raises:
-      ScenarioError: an unknown set, or one without gains for any law on these plants.
-    """
+    """List the general laws that have gains in a set on each of these plants, those of LAWS first."""
     found, why = [], None
     for name in general():
         try:
@@ -176,11 +172,7 @@ class TunedGains:
 
 
 def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:
-    """Return the gains of a law on a plant from a set that was tuned, and the search behind them.
-
-    Raises:
-      ScenarioError: an unknown set, or a set without gains for this law on this plant.
-    """
+    """Return the gains of a law on a plant from a set that was tuned, and the search behind them."""
     find("set of tuned gains", gains, OBJECTIVES)
     plant, name = as_plant(plant), FORMS.get(name, name)
     if (known := _known(plant.name, name, gains)) is not None:
@@ -199,11 +191,7 @@ def has(plant: Plant, name: str, gains: str = "tuned") -> bool:
 
 
 def converged(plant: str | Plant, name: str, gains: str = "tuned") -> bool | None:
-    """Return whether three starts of the search ended within 1 % of the best J; None if it had fewer.
-
-    Raises:
-      ScenarioError: as `tuned`.
-    """
+    """Return whether three starts of the search ended within 1 % of the best J; None if it had fewer."""
     return tuned(plant, name, gains).converged
 
 

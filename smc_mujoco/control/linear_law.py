@@ -187,11 +187,7 @@ def _rows(matrix: np.ndarray) -> Matrix:
 
 
 def _system(K: Any) -> System:
-    """Return what the user gave as matrices.
-
-    Raises:
-      ScenarioError: it is no linear system, or an improper one.
-    """
+    """Return what the user gave as matrices."""
     if isinstance(K, tuple | list) and len(K) in (4, 5):
         return _matrices(K[0], K[1], K[2], K[3], K[4] if len(K) == 5 else None)
     if all(hasattr(K, name) for name in "ABCD"):
@@ -242,11 +238,7 @@ def _realised(num: Any, den: Any, dt: Any) -> System:
 
 
 def _checked(K: System) -> System:
-    """Return a system whose sizes fit, of finite numbers, and with None for a dt of continuous time.
-
-    Raises:
-      ScenarioError: it is none.
-    """
+    """Return a system whose sizes fit, of finite numbers, and with None for a dt of continuous time."""
     n, inputs, outputs = len(K.a), K.d.shape[1], len(K.d)
     shapes = {"A": (K.a, (n, n)), "B": (K.b, (n, inputs)), "C": (K.c, (outputs, n)), "D": (K.d, (outputs, inputs))}
     for name, (matrix, shape) in shapes.items():

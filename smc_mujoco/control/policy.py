@@ -108,12 +108,7 @@ def attempt(order: Mapping[str, Any], say: Callable) -> None:
 
 @functools.lru_cache(maxsize=8)
 def opened(file: File) -> Act:
-    """Return the network in a file.
-
-    Raises:
-      ScenarioError: the file has changed, its library is not installed or cannot read it, or the network has other
-        inputs than one observation.
-    """
+    """Return the network in a file."""
     path = Path(file.path)
     if not path.is_file() or _digest(path) != file.digest:
         raise ScenarioError(f"policy {path.name!r} is gone or has changed: call smc.policy again")

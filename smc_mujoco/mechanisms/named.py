@@ -15,11 +15,7 @@ MODEL = re.compile(r"(?P<path>.*\.xml)(?::(?P<joints>.*))?", re.DOTALL)
 
 
 def as_plant(value: object) -> Plant:
-    """Return a plant: itself, by its name, or from "FILE.xml:joint,joint".
-
-    Raises:
-      ScenarioError: it is none of these, or the model cannot be a plant.
-    """
+    """Return a plant: itself, by its name, or from "FILE.xml:joint,joint"."""
     found = from_text(value) if isinstance(value, str) else value
     if not isinstance(found, Plant):
         raise ScenarioError(

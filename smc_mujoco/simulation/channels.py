@@ -44,10 +44,6 @@ def channels(model: mujoco.MjModel) -> np.ndarray:
 
     A disturbance d acts on the body of the joint, as a force along the axis of a slide or a torque about the axis of a
     hinge, so that its generalised force is d. A horizontal force acts on the body's centre of mass.
-
-    Raises:
-      ScenarioError: an actuator does not drive a hinge or slide with gear 1, or its joint lacks a position or velocity
-        sensor, or has an axis along no world axis, which only users' models may have.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

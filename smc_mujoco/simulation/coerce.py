@@ -74,11 +74,7 @@ def seed(name: str, value: int, s: Any) -> int:
 
 
 def each(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
-    """Return one value for each driven channel of a plant, in order, from a sequence, or a mapping by joint.
-
-    Raises:
-      ScenarioError: too few or too many, or a joint that is no driven channel, or that is missing.
-    """
+    """Return one value for each driven channel of a plant, in order, from a sequence, or a mapping by joint."""
     if isinstance(value, Mapping):
         joints = joint_names(plant)[: plant.driven]
         for joint in value:

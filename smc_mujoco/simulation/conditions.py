@@ -140,11 +140,7 @@ def condition(name: str, **fields: Any) -> Condition:
 
 
 def find_condition(value: Condition | str) -> Condition:
-    """Return the Condition for a Condition, a name, several names joined by "+", or the text of a condition.
-
-    Raises:
-      ScenarioError: the value is none of these.
-    """
+    """Return the Condition for a Condition, a name, several names joined by "+", or the text of a condition."""
     if isinstance(value, Condition):
         return value
     if not isinstance(value, str):
@@ -175,9 +171,6 @@ def parse(text: str) -> Condition:
 
     Values are numbers, texts, lists, dicts, and calls of parts, signals and estimators. These may be the suite's or
     imported ones of the user. Nothing is evaluated.
-
-    Raises:
-      ScenarioError: the text cannot be read, or names something unknown.
     """
     name, _, fields = text.partition(":")
     try:
@@ -189,12 +182,7 @@ def parse(text: str) -> Condition:
 
 
 def read_fields(text: str) -> dict[str, Any]:
-    """Return the fields in a text such as "friction=Coulomb(0.05), x0=0.3", see `parse`.
-
-    Raises:
-      SyntaxError: the text is no list of fields.
-      ScenarioError: it names something unknown, or a field twice.
-    """
+    """Return the fields in a text such as "friction=Coulomb(0.05), x0=0.3", see `parse`."""
     try:
         call = ast.parse(f"_({text})", mode="eval").body
     except (ValueError, RecursionError, MemoryError):
@@ -205,11 +193,7 @@ def read_fields(text: str) -> dict[str, Any]:
 
 
 def from_file(path: Path) -> list[Condition]:
-    """Return the conditions in a text file, one per line. Empty lines and lines that begin with # are skipped.
-
-    Raises:
-      ScenarioError: the file or a line cannot be read.
-    """
+    """Return the conditions in a text file, one per line. Empty lines and lines that begin with # are skipped."""
     with reading(path, "file of conditions", "give a text file, a condition a line") as file:
         lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
     found = []
@@ -293,11 +277,7 @@ def _frozen(value: Any) -> Any:
 
 
 def _joined(both: tuple[Condition, Condition], plant: Plant, duration: float) -> dict[str, Any]:
-    """Return the fields of two conditions at once.
-
-    Raises:
-      ScenarioError: both set a field, to different values, that does not add up.
-    """
+    """Return the fields of two conditions at once."""
     first, second = (one.on(plant, duration) for one in both)
     for field in [field for field in second if field in first]:
         if field in SEVERAL:

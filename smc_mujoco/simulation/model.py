@@ -61,9 +61,6 @@ class Mechanism:
 
         The path from the plant's own start, or from 0 if that is not free, must cross no obstacle, because the
         mechanism could not get to a start beyond a stop or inside it.
-
-        Raises:
-          ScenarioError: it starts inside an obstacle or beyond it.
         """
         if scenario.contact.kind == "none":
             return

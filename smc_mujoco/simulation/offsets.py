@@ -77,11 +77,7 @@ def _ctype(node: object) -> Any:
 
 @functools.cache
 def offsets() -> Offsets:
-    """Return the offsets, each checked against a live MjData.
-
-    Raises:
-      LayoutError: the field at an offset is not the array that MuJoCo's own binding shows.
-    """
+    """Return the offsets, each checked against a live MjData."""
     model = mujoco.MjModel.from_xml_string(LIVE)
     return checked(model, mujoco.MjData(model))
 

@@ -386,9 +386,6 @@ class PythonComponent:
 
         Args:
           y: a Reading for an estimator, else a Measurement.
-
-        Raises:
-          Failure: it raised an exception, or did not return numbers.
         """
         try:
             out = self.functions[i](y, self.gains[i], self.memory[i, : self.sizes[i]])
@@ -489,9 +486,6 @@ def evaluate(signal: Signal, t: float, *state: Any) -> list[float]:
     Args:
       state: memory, seed, channel and stream, which only process noise reads; or memory, e, e' and s, which only a
         disturbance reads that sees the loop.
-
-    Raises:
-      Failure: it raised an exception, or did not return three numbers.
     """
     name = type(signal).__name__
     try:

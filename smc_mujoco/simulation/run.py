@@ -141,11 +141,7 @@ def _prepared(scenarios: object) -> Iterator[Prepared]:
 
 
 def cores(threads: int | None = None) -> int:
-    """Return how many simulations to step at once: `threads`, or one for each core that this process may use.
-
-    Raises:
-      ScenarioError: no whole number from 1 to 1024.
-    """
+    """Return how many simulations to step at once: `threads`, or one for each core that this process may use."""
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return whole("threads", threads, 1, 1024)

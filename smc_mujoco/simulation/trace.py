@@ -239,11 +239,7 @@ FORMATS = tuple(ending.removeprefix(".") for ending in _WRITERS)  # of Trace.exp
 
 
 def formats(listed: str) -> tuple[str, ...]:
-    """Return the formats of Trace.export in a list such as "csv,mat".
-
-    Raises:
-      ScenarioError: the list is empty, or names another format.
-    """
+    """Return the formats of Trace.export in a list such as "csv,mat"."""
     names = dict.fromkeys(name.strip().lower().removeprefix(".") for name in listed.split(","))
     for name in names:
         find("format to export", name, dict.fromkeys(FORMATS))
@@ -303,11 +299,7 @@ def load(path: str | os.PathLike[str]) -> Trace:
 
 
 def _member(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = None) -> np.ndarray:
-    """Return an array of a file, checked against the scenario, or a text if there is none. The size is checked first.
-
-    Raises:
-      ScenarioError: it has another type or shape, or more bytes than it should.
-    """
+    """Return an array of a file, checked against the scenario, or a text if there is none. The size is checked first."""
     with archive.open(f"{name}.npy") as stream:
         headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
         shape, _, dtype = headers[npy.read_magic(stream)](stream)

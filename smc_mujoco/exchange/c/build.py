@@ -75,11 +75,7 @@ def compiler() -> list[str]:
 
 
 def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> tuple[Path, list[str]]:
-    """Compile a C file with the glue that calls its function `symbol`. Return the library and the warnings.
-
-    Raises:
-      ScenarioError: there is no compiler, it takes too long, or it reports an error.
-    """
+    """Compile a C file with the glue that calls its function `symbol`. Return the library and the warnings."""
     path, target, command = str(source.resolve()), fresh(".so"), compiler()
     if set('"\\\n') & set(path):
         raise ScenarioError(

@@ -65,11 +65,7 @@ def with_head(law: Component, numbers: str, slots: int, code: str, joints: int, 
 
 
 def writable(law: Component | Template | str) -> Component:
-    """Return a law that can be written in C.
-
-    Raises:
-      ScenarioError: it is no law, is in C already, or is of one channel and has gains by channel.
-    """
+    """Return a law that can be written in C."""
     law = from_text.law(law) if isinstance(law, str) else law() if isinstance(law, Template) else law
     if not isinstance(law, Component) or law.kind != "law" or law.function is None:
         raise ScenarioError(f"cannot write {shown(law)} in C: give smc.law(...), your own law, or a name")
@@ -81,11 +77,7 @@ def writable(law: Component | Template | str) -> Component:
 
 
 def number_of_joints(law: Component, joints: int | None) -> int:
-    """Return for how many joints the C of a law is: `joints`, or the number of values of a gain; 0 for one channel.
-
-    Raises:
-      ScenarioError: it is not known, or another than the number of values of a gain.
-    """
+    """Return for how many joints the C of a law is: `joints`, or the number of values of a gain; 0 for one channel."""
     several = {name: len(value) for name, value in law.gains.items() if isinstance(value, tuple)}
     if not law.joint:
         if joints is not None:
@@ -104,11 +96,7 @@ def number_of_joints(law: Component, joints: int | None) -> int:
 
 
 def translated(component: Component, single: bool = False, joints: int = 0) -> tuple[int, str]:
-    """Return the memory slots and the C of a component, of a law of many joints for a number of these.
-
-    Raises:
-      ScenarioError: it uses Python without translation, which is quoted.
-    """
+    """Return the memory slots and the C of a component, of a law of many joints for a number of these."""
     try:
         return translate(component, single, joints)
     except Untranslatable as error:

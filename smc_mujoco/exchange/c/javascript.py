@@ -34,9 +34,6 @@ def to_js(component: Component) -> str:
     `y` has the fields of the measurement, or of an estimator's reading, by name. `gains` and `memory` are arrays; gains
     are in the component's order. Its two results go to out[0] and out[1]. The acceleration of an estimator that gives
     none is NaN.
-
-    Raises:
-      ScenarioError: the component uses Python without translation, which is quoted.
     """
     what = f"{component.kind} {component.name!r}"
     if isinstance(component.function, AtAddress):

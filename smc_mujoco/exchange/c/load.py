@@ -69,9 +69,6 @@ class CLaw(AtAddress):
 
         Args:
           y: a Measurement, or a JointMeasurement.
-
-        Raises:
-          ArithmeticError: the C function returned anything but 0.
         """
         if not self.joints:
             u, s = self._out(y, gains, memory, 2)

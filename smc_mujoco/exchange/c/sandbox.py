@@ -89,9 +89,6 @@ def call(
       memory: number of state variables.
       modelled: whether the law needs the nominal model.
       joints: number of joints of a law of many joints; 0 for one channel.
-
-    Raises:
-      ScenarioError: as in `load`.
     """
     from smc_mujoco.control.component import at
     from smc_mujoco.exchange.c import build

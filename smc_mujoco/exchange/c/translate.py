@@ -138,9 +138,6 @@ def translate(component: Component, single: bool, joints: int = 0) -> tuple[int,
     Args:
       single: whether smc_real is float.
       joints: for how many joints a law of many joints is written; 0 for a component of one channel.
-
-    Raises:
-      Untranslatable: a piece of Python, which is quoted, has no translation.
     """
     program = Program(component, single, joints)
     functions = [Function(program, component.function, list(ARGUMENTS), {}, entry=True).text(program.symbol)]
@@ -1070,11 +1067,7 @@ class Function:
         return literal(FILLED[function], self.program.single, node)._replace(kind=f"real{dimensions}")
 
     def dimensions(self, node: ast.expr) -> list[str]:
-        """Return the dimensions that an expression gives: a number, len(array), a variable of these, a tuple of them.
-
-        Raises:
-          Untranslatable: they are not known before the law runs.
-        """
+        """Return the dimensions that an expression gives: a number, len(array), a variable of these, a tuple of them."""
         match node:
             case ast.Tuple(elts=elements) if len(elements) <= 2:
                 return [self.dimensions(one)[0] for one in elements]

@@ -130,11 +130,7 @@ class Controller:
         return {kind: part for kind, part in parts.items() if part is not None}
 
     def code(self) -> dict[str, tuple[int, str]]:
-        """Return kind -> number of memory slots, and C code, of each component.
-
-        Raises:
-          ScenarioError: a component uses Python that cannot be translated into C.
-        """
+        """Return kind -> number of memory slots, and C code, of each component."""
         return {
             kind: export.translated(part, joints=self.joints if kind == "law" else 0)
             for kind, part in self.parts.items()

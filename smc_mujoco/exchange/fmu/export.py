@@ -209,11 +209,7 @@ def platform_tuple() -> tuple[str, str]:
 
 
 def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
-    """Return path in the archive -> shared library for this machine, compiled from the sources in `files`.
-
-    Raises:
-      ScenarioError: there is no compiler, or it fails.
-    """
+    """Return path in the archive -> shared library for this machine, compiled from the sources in `files`."""
     (machine, suffix), command = platform_tuple(), build.compiler()
     with scratch() as folder:
         sources, target = {Path(n).name: t for n, t in files.items() if n.startswith("sources/")}, folder / "out"

@@ -147,9 +147,6 @@ def steps(period: float | None, dt: float) -> tuple[int, float]:
     Args:
       period: of the FMU's steps, s; None for the control period.
       dt: control period, s.
-
-    Raises:
-      ScenarioError: neither period is a multiple of the other.
     """
     if period is None:
         return 1, dt
@@ -172,11 +169,7 @@ def _end(place: int) -> None:
 
 
 def extracted(law: FmuLaw) -> Path:
-    """Return the folder with an FMU's extracted files. It is the same in each call.
-
-    Raises:
-      ScenarioError: the file has changed since `law_from_fmu`, or is gone.
-    """
+    """Return the folder with an FMU's extracted files. It is the same in each call."""
     return _extracted(law.path, law.digest)
 
 
@@ -290,11 +283,7 @@ def _file(path: str | os.PathLike[str]) -> Path:
 
 
 def _description(file: Path, digest: str) -> Any:
-    """Return FMPy's description of an FMU.
-
-    Raises:
-      ScenarioError: it is not an FMU, or cannot run here.
-    """
+    """Return FMPy's description of an FMU."""
     import fmpy
 
     if not zipfile.is_zipfile(file):
@@ -343,9 +332,6 @@ def _meanings(
       known: name -> variable of the FMU.
       chosen: our name -> the FMU's, from the user.
       constants: inputs of the FMU that do not change.
-
-    Raises:
-      ScenarioError: an unknown name, an input without a meaning, no u, or a variable that is no real number.
     """
     for what, value in (("variables", chosen), ("constants", constants)):
         if not isinstance(value, Mapping):
@@ -445,11 +431,7 @@ def _period(about: Any) -> float | None:
 
 
 def _try(law: FmuLaw, gains: Iterable[float], timeout: float) -> None:
-    """Try an FMU in a separate process, with these gains.
-
-    Raises:
-      ScenarioError: it failed, crashed or did not end.
-    """
+    """Try an FMU in a separate process, with these gains."""
     order = {"folder": str(extracted(law)), "inputs": dict(law.inputs), "outputs": law.outputs, "step": law.period}
     try:
         tried(slave.__name__, order | {"fixed": law.fixed(gains)}, timeout)

@@ -92,11 +92,7 @@ def channel(joint: object, value: object) -> Channel:
 
 
 def suggested(channels: Pairs) -> dict[str, tuple]:
-    """Return field -> what each channel suggests to scenarios, None where nothing; only fields that one suggests.
-
-    Raises:
-      ScenarioError: some channels have a law and others have none.
-    """
+    """Return field -> what each channel suggests to scenarios, None where nothing; only fields that one suggests."""
     found = {name: tuple(getattr(channel, name) for _, channel in channels) for name in SUGGESTED}
     bare = [joint for joint, channel in channels if channel.law is None]
     if 0 < len(bare) < len(channels):

@@ -66,11 +66,7 @@ class Source:
         return Path(self.path).name if self.path else f"{_modelname(self.text)}.xml"
 
     def read(self) -> mujoco.MjSpec:
-        """Return the model as an editable MjSpec.
-
-        Raises:
-          ScenarioError: MuJoCo cannot read it, or the file has changed.
-        """
+        """Return the model as an editable MjSpec."""
         try:
             if not self.path:
                 included = {name: content for name, content in self.assets if name.lower().endswith(XML)}
@@ -83,11 +79,7 @@ class Source:
         return spec
 
     def compiled(self, spec: mujoco.MjSpec) -> mujoco.MjModel:
-        """Return the spec of this model, compiled.
-
-        Raises:
-          ScenarioError: MuJoCo cannot compile it.
-        """
+        """Return the spec of this model, compiled."""
         try:
             return mjcb.compiled(spec)
         except ValueError as error:
@@ -99,10 +91,6 @@ def source(model: object, assets: Mapping[str, bytes] | None = None) -> Source:
 
     Args:
       assets: name -> content of the files that a text names.
-
-    Raises:
-      ScenarioError: none of these, no such file, a text that names a file which is not in `assets`, or an MjSpec that
-        cannot be written as XML without loss.
     """
     pymjcf = sys.modules.get("dm_control.mjcf")
     text = isinstance(model, str) and model.lstrip().startswith("<")
@@ -221,9 +209,6 @@ def tried(source: Source, timeout: float) -> None:
 
     Args:
       timeout: s.
-
-    Raises:
-      ScenarioError: MuJoCo cannot read it, crashes, or takes more than the allowed time or memory.
     """
     if source.sha256 in _tried:
         return

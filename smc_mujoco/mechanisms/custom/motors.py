@@ -33,11 +33,7 @@ class Motor(NamedTuple):
 
 
 def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) -> Motor:
-    """Return the motor that drives a joint.
-
-    Raises:
-      ScenarioError: the joint has no actuator, has several, or has one that is not a motor or pushes only one way.
-    """
+    """Return the motor that drives a joint."""
     number, wanted = model.joint(joint).id, channel.actuator
     bounds = [tuple(map(float, model.jnt_actfrcrange[number]))] if model.jnt_actfrclimited[number] else []
     own = [i for i in range(model.nactuator) if model.actuator_trntype[i] in MOTOR]

@@ -64,11 +64,7 @@ class OwnModel:
     tip: str = ""
 
     def __call__(self, n: int) -> mujoco.MjSpec:
-        """Return the model with a motor and two sensors per channel.
-
-        Raises:
-          ScenarioError: the file is gone or has changed.
-        """
+        """Return the model with a motor and two sensors per channel."""
         spec = self.source.read()
         while named := [*spec.tuples, *spec.sensors]:  # tuples may name sensors and motors that are deleted
             spec.delete(named[0])  # MuJoCo 4 also deletes the tuples that name it, so list them again
@@ -285,11 +281,7 @@ def unmeasured(model: mujoco.MjModel, loose: list[int], driven: int, partners: i
 
 
 def restored(data: Mapping, name: str) -> Plant:
-    """Return the plant that `OwnModel.about` describes.
-
-    Raises:
-      ScenarioError: the file is gone or has changed.
-    """
+    """Return the plant that `OwnModel.about` describes."""
     if "text" in data:
         model = data["text"]
         assets = {name: base64.b64decode(content) for name, content in data["assets"].items()}

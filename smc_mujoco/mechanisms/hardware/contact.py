@@ -74,11 +74,7 @@ class Contact(Part):
         self.check_numbers("restitution", least=0.0, most=MAX_RESTITUTION)
 
     def check(self, plant: Plant) -> None:
-        """Check that the plant offers this contact.
-
-        Raises:
-          ScenarioError: an unknown kind, or a friction or restitution that this kind does not have.
-        """
+        """Check that the plant offers this contact."""
         if self.kind != "none" and self.kind not in plant.contacts:
             raise unknown(f"contact of {plant.name}", self.kind, ["none", *plant.contacts])
         given = [name for name in ("friction", "restitution") if getattr(self, name) is not None]

@@ -42,9 +42,6 @@ class Part:
 
         Args:
           bounds: those of `errors.number`; `most` is MAX_PARAMETER by default.
-
-        Raises:
-          ScenarioError: a field is not a number within these bounds.
         """
         limits: dict[str, Any] = {"most": MAX_PARAMETER} | bounds
         for name in names:

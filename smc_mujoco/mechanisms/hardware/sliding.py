@@ -89,9 +89,6 @@ class Sliding(Friction):
         Args:
           names: of the fields.
           bounds: as of `errors.number`.
-
-        Raises:
-          ScenarioError: a field is not a number, or a sequence of numbers, within these bounds.
         """
         limits: dict[str, Any] = {"most": MAX_PARAMETER} | bounds
         for name in names:
