@@ -74,7 +74,7 @@ class Tip:
 
 
 def solve(tip: Tip, points: np.ndarray, start: Sequence[float]) -> np.ndarray:
-    """Return joint positions, (N, n), at which the tip is at each of the points, (N, 3), m, each found from the last."""
+    """Return joint positions, (N, n), at which the tip is at points, (N, 3), m. Each search begins at the last."""
     x, found, away = np.array(start, float), [], np.zeros(3)
     for i, point in enumerate(points):
         for _ in range(MOST):

@@ -5,7 +5,6 @@ A plant's file describes the mechanism in three ways, and tests check that they 
 actuated degree of freedom. Its actuator, its two sensors and its body are found in the compiled model.
 """
 
-import abc
 import dataclasses
 import functools
 import math
@@ -71,49 +70,6 @@ class Dynamics(NamedTuple):
     M: np.ndarray
     h: np.ndarray
     g: np.ndarray
-
-
-class Coupled(abc.ABC):
-    """Base of nominal models that also depend on the last commands of the other channels."""
-
-    @abc.abstractmethod
-    def __call__(
-        self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /, u: np.ndarray | None = None
-    ) -> tuple[float, float]:
-        """Return f and g of channel i, given the last commands u, (n,); u[i] is ignored. None: all are 0."""
-
-    @abc.abstractmethod
-    def native(self, parameters: Mapping[str, float]) -> Native:
-        """Return the C function of the nominal model for one simulation."""
-
-    @abc.abstractmethod
-    def dynamics(self, x: np.ndarray, v: np.ndarray, p: Any) -> Dynamics:
-        """Return M, h and g of all channels, at their x and v, (n,) each."""
-
-    @abc.abstractmethod
-    def coriolis(self, x: np.ndarray, v: np.ndarray, w: np.ndarray, p: Any) -> np.ndarray:
-        """Return C(x, v) w, (n,), with the C of Christoffel's symbols."""
-
-    @abc.abstractmethod
-    def jacobian(self, x: np.ndarray, p: Any, tip: str) -> np.ndarray:
-        """Return how the position of a site, the tip, depends on the channels, (3, n)."""
-
-    @abc.abstractmethod
-    def native_dynamics(self, parameters: Mapping[str, float], tip: str, at_rest: bool = True) -> Native:
-        """Return the C function of `dynamics` for one simulation. Its values serve the two functions below, too.
-
-        Args:
-          tip: the site of `jacobian`; "" for a plant without.
-          at_rest: whether to compute g; False: it is NaN.
-        """
-
-    @abc.abstractmethod
-    def native_coriolis(self) -> int:
-        """Return the address of the C function of `coriolis`, at the state of the last call of `dynamics`."""
-
-    @abc.abstractmethod
-    def native_jacobian(self) -> int:
-        """Return the address of the C function of `jacobian`, at the state of the last call of `dynamics`."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -240,7 +240,7 @@ def of_friction(f: Sliding) -> Function:
 
 
 def values_of(s: Signal) -> tuple[float, ...]:
-    """Return the numbers that a compiled signal reads as its parameters. They are valid as long as the signal exists."""
+    """Return the numbers that a compiled signal reads as its parameters, valid as long as the signal exists."""
     values = tuple(s.parameters().values())
     if not s.series:
         return values

@@ -19,8 +19,9 @@ from smc_mujoco.common.jit import AtAddress, Function, NotCompilable
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component, at
 from smc_mujoco.control.properties import read_by
+from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, native_coriolis, native_jacobian
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.plant import Coupled, Native
+from smc_mujoco.mechanisms.plant import Native
 from smc_mujoco.simulation import native, state
 from smc_mujoco.simulation.model import Mechanism, mechanism, with_values
 from smc_mujoco.simulation.scenario import Resolved, Scenario
@@ -120,7 +121,9 @@ def _compile(s: Resolved) -> Functions:
         laws=tuple(native.component(law) for law in s.law.of_channels(plant.driven)),
         surface=s.surface and native.component(s.surface),
         estimator=native.component(s.velocity),
-        nominal=None if isinstance(plant.nominal, Coupled) else native.nominal(plant.nominal, tuple(plant.parameters)),
+        nominal=None
+        if isinstance(plant.nominal, NominalModel)
+        else native.nominal(plant.nominal, tuple(plant.parameters)),
         references=tuple(native.of_signal(signal) for signal in references(s)),
         feedforward=s.feedforward and native.of_signal(s.feedforward),
         disturbances=tuple(map(native.of_signal, s.disturbance)),
@@ -282,10 +285,10 @@ def _joint_measurement(
     head = buffer.reserve(stored.itemsize // 8)
     places = {name: state.Place(head + offset // 8) for name, (_, offset, *_) in (stored.fields or {}).items()}
     found: dict[str, Any] = {"joint": places | {"head": head}}
-    if nominal is not None and isinstance(coupled := s.plant.nominal, Coupled):
+    if nominal is not None:
         found["requests"] = {
-            "coriolis": coupled.native_coriolis(),
-            "jacobian": coupled.native_jacobian(),
+            "coriolis": native_coriolis().address,
+            "jacobian": native_jacobian().address,
             "parameters": functions["dynamics"]["parameters"],
             "unit": s.drive.gain,
         }
@@ -294,7 +297,7 @@ def _joint_measurement(
 
 def _native_nominal(s: Resolved) -> Native | None:
     """Return MuJoCo's own nominal model for one simulation; None for another, or if a law of many joints has none."""
-    if not isinstance(s.plant.nominal, Coupled):
+    if not isinstance(s.plant.nominal, NominalModel):
         return None
     if not s.law.joint:
         return s.plant.nominal.native(s.plant.parameters)

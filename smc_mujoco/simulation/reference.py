@@ -18,8 +18,9 @@ from smc_mujoco.control.component import Component, at
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
+from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.sliding import SLOW, Sliding
-from smc_mujoco.mechanisms.plant import Coupled, Dynamics, Plant, Values
+from smc_mujoco.mechanisms.plant import Dynamics, Plant, Values
 from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import philox, trace
 from smc_mujoco.simulation.callback import installed
@@ -80,7 +81,7 @@ class Loop:
         self.law, self.estimator = (PythonComponent(c, n) for c in (scenario.law, self.scenario.velocity))
         self.surface = scenario.surface and PythonComponent(scenario.surface, n)
         self.nominal = Values(**scenario.plant.parameters)
-        if isinstance(scenario.plant.nominal, Coupled):  # compiles, while there is no Python callback
+        if isinstance(scenario.plant.nominal, NominalModel):  # compiles, while there is no Python callback
             scenario.plant.nominal(np.zeros(n), np.zeros(n), 0, self.nominal)
         self.signal_memory = [[np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance]
         self.streams = [scenario.stream(j) for j in range(len(scenario.disturbance))]
@@ -448,10 +449,10 @@ class OnRequest:
         return nominal.jacobian(self.x, Values(**plant.parameters), plant.tip)
 
     @property
-    def nominal(self) -> Coupled | None:
+    def nominal(self) -> NominalModel | None:
         """The nominal model of all joints, if the plant has one and the law may use it."""
         found = self.scenario.plant.nominal
-        return found if isinstance(found, Coupled) and self.scenario.resolved.model == "nominal" else None
+        return found if isinstance(found, NominalModel) and self.scenario.resolved.model == "nominal" else None
 
 
 def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
@@ -460,7 +461,7 @@ def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
     if scenario.resolved.model == "none":
         return Dynamics(np.eye(n), np.zeros(n), np.zeros(n))
     values = Values(**plant.parameters)
-    if isinstance(plant.nominal, Coupled):
+    if isinstance(plant.nominal, NominalModel):
         try:
             found = plant.nominal.dynamics(x, v, values)
         except RAISES as error:
@@ -499,7 +500,7 @@ def evaluate(signal: Signal, t: float, *state: Any) -> list[float]:
 def nominal(plant: Plant, x: np.ndarray, v: np.ndarray, i: int, values: Values, u: np.ndarray) -> tuple[float, float]:
     """Return nominal f and g of channel i. The model of coupled channels also depends on the last commands u, (n,)."""
     try:
-        return plant.nominal(x, v, i, values, *((u,) if isinstance(plant.nominal, Coupled) else ()))
+        return plant.nominal(x, v, i, values, *((u,) if isinstance(plant.nominal, NominalModel) else ()))
     except RAISES as error:
         raise raised(f"the nominal model of {plant.name}", error) from error
 

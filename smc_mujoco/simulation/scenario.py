@@ -25,13 +25,14 @@ from smc_mujoco.control.estimator import Estimator, estimator
 from smc_mujoco.control.law import Law, fits
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.mechanisms.custom.channels import check_ranges
+from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, drive_step
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Nominal
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
-from smc_mujoco.mechanisms.plant import Coupled, Plant
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.clock import Clock
 from smc_mujoco.simulation.coerce import MAX_SEED, MIN_TIME
@@ -597,7 +598,7 @@ def check_joints(s: Resolved) -> None:
 
 def check_inertia(s: Resolved) -> None:
     """Check that the M which a law of many joints sees can be inverted at the start."""
-    if s.law.joint and s.model == "nominal" and isinstance(s.plant.nominal, Coupled):
+    if s.law.joint and s.model == "nominal" and isinstance(s.plant.nominal, NominalModel):
         M = s.plant.nominal.dynamics(np.array(s.x0), np.array(s.v0), s.plant.values({})).M
         if not np.linalg.cond(M) < MAX_CONDITION:
             raise ScenarioError(

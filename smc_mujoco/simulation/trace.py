@@ -299,7 +299,7 @@ def load(path: str | os.PathLike[str]) -> Trace:
 
 
 def _member(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = None) -> np.ndarray:
-    """Return an array of a file, checked against the scenario, or a text if there is none. The size is checked first."""
+    """Return an array of a file, checked against the scenario, or a text if there is none. Its size comes first."""
     with archive.open(f"{name}.npy") as stream:
         headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
         shape, _, dtype = headers[npy.read_magic(stream)](stream)

@@ -11,8 +11,9 @@ import pytest
 from helpers.episodes import dm_control_suite
 
 import smc_mujoco as smc
+from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.part import joint_ids
-from smc_mujoco.mechanisms.plant import Coupled, catalogue, model_path, plant, write
+from smc_mujoco.mechanisms.plant import catalogue, model_path, plant, write
 
 pytestmark = pytest.mark.quick
 
@@ -53,7 +54,7 @@ def changed(name, n, rng):
 def expected(p, x, v, u):
     """x'' by the plant's nominal equation, (n,), and the size of its largest term."""
     parameters = SimpleNamespace(**p.parameters)
-    others = (u,) if isinstance(p.nominal, Coupled) else ()
+    others = (u,) if isinstance(p.nominal, NominalModel) else ()
     terms = [p.nominal(x, v, i, parameters, *others) for i in range(p.n)]
     forces = [u[i if i < p.driven else i - p.driven] for i in range(p.n)]  # that of the joint it moves with
     acc = np.array([f + g * force for (f, g), force in zip(terms, forces, strict=True)])
@@ -88,7 +89,7 @@ def worst_error(p, model, rng, trials=20):
 
 
 def test_nominal_compiles_to_the_same_numbers():
-    for p in (p for p in catalogue().values() if not isinstance(p.nominal, Coupled)):
+    for p in (p for p in catalogue().values() if not isinstance(p.nominal, NominalModel)):
         parameters = believed(p)
         compiled = numba.njit(p.nominal)
         rng = np.random.default_rng(0)

@@ -1067,7 +1067,7 @@ class Function:
         return literal(FILLED[function], self.program.single, node)._replace(kind=f"real{dimensions}")
 
     def dimensions(self, node: ast.expr) -> list[str]:
-        """Return the dimensions that an expression gives: a number, len(array), a variable of these, a tuple of them."""
+        """Return the dimensions that an expression gives: a number, len(array), a variable, or a tuple of these."""
         match node:
             case ast.Tuple(elts=elements) if len(elements) <= 2:
                 return [self.dimensions(one)[0] for one in elements]

@@ -29,7 +29,7 @@ import functools
 import math
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -40,7 +40,7 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.jit import Function, floats, integers, pointer, record_at
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
-from smc_mujoco.mechanisms.plant import SEEN, Coupled, Dynamics, Field, Native, Values, ready, write
+from smc_mujoco.mechanisms.plant import SEEN, Dynamics, Field, Native, Values, ready, write
 
 _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
 # Parameters of the C functions: numbers of channels, of driven ones and of degrees of freedom; addresses of model and
@@ -68,15 +68,17 @@ class Places(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class NominalModel(Coupled):
+class NominalModel:
     """The nominal model of a user's plant: f and g computed by MuJoCo from the model without mismatch."""
 
     build: Callable[[int], mujoco.MjSpec]
     fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
     why_not: str = ""  # why there is no nominal model
 
-    def __call__(self, x, v, i, p, /, u=None):
-        """Return f and g of channel i; NaN where there is no nominal model."""
+    def __call__(
+        self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /, u: np.ndarray | None = None
+    ) -> tuple[float, float]:
+        """Return f and g of channel i, given the last commands u, (n,), of the others; NaN without a nominal model."""
         if self.why_not:
             return np.nan, np.nan
         model, places, data, _ = prepared(self, frozen(vars(p)))
@@ -118,8 +120,8 @@ class NominalModel(Coupled):
             data = mujoco.MjData(model)
         return model, places, BorrowedData(data, spare)
 
-    def dynamics(self, x, v, p):
-        """Return M, h and g of all channels."""
+    def dynamics(self, x: np.ndarray, v: np.ndarray, p: Any) -> Dynamics:
+        """Return M, h and g of all channels, at their x and v, (n,) each."""
         model, places, data, _ = prepared(self, frozen(vars(p)))
         dense, found = np.zeros((model.nv, model.nv)), {}
         with _lock:
@@ -134,8 +136,8 @@ class NominalModel(Coupled):
                 found[name] = (data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator)[places.qvel]
         return Dynamics(dense[np.ix_(places.qvel, places.qvel)], found["h"], found["g"])
 
-    def coriolis(self, x, v, w, p):
-        """Return C(x, v) w."""
+    def coriolis(self, x: np.ndarray, v: np.ndarray, w: np.ndarray, p: Any) -> np.ndarray:
+        """Return C(x, v) w, (n,), with the C of Christoffel's symbols."""
         model, places, data, _ = prepared(self, frozen(vars(p)))
         found = np.zeros(len(x))
         with _lock:
@@ -148,8 +150,8 @@ class NominalModel(Coupled):
                 found += sign * 0.25 * data.qfrc_bias[places.qvel]
         return found
 
-    def jacobian(self, x, p, tip):
-        """Return how the tip's position depends on the channels."""
+    def jacobian(self, x: np.ndarray, p: Any, tip: str) -> np.ndarray:
+        """Return how the position of a site, the tip, depends on the channels, (3, n)."""
         model, places, data, _ = prepared(self, frozen(vars(p)))
         found = np.zeros((3, model.nv))
         with _lock:
@@ -160,7 +162,12 @@ class NominalModel(Coupled):
         return found[:, places.qvel]
 
     def native_dynamics(self, parameters: Mapping[str, float], tip: str, at_rest: bool = True) -> Native:
-        """Return the C function, and the addresses of one simulation's model, data and arrays."""
+        """Return the C function of `dynamics` for one simulation, whose values `coriolis` and `jacobian` use, too.
+
+        Args:
+          tip: the site of `jacobian`; "" for a plant without.
+          at_rest: whether to compute g; False: it is NaN.
+        """
         model, places, borrowed = self._borrow(parameters)
         data = borrowed.data
         data.ctrl[:] = data.qfrc_actuator[:] = 0.0
@@ -172,14 +179,6 @@ class NominalModel(Coupled):
         site = model.site(tip).id if tip else -1
         values = (len(places.qpos), model.nv, *addresses, passive_alone(model), site, at_rest)
         return Native(native_dynamics().address, tuple(map(float, values)), (model, borrowed, *arrays))
-
-    def native_coriolis(self) -> int:
-        """Return the address of the C function of `coriolis`."""
-        return native_coriolis().address
-
-    def native_jacobian(self) -> int:
-        """Return the address of the C function of `jacobian`."""
-        return native_jacobian().address
 
 
 @dataclasses.dataclass(eq=False)
@@ -372,12 +371,8 @@ def native() -> Function:
 
     Its input is a record SEEN, its outputs are f and g of channel i.
     """
-    library = libmujoco.library()
-    positions, velocities, solve = library.mj_fwdPosition, library.mj_fwdVelocity, library.mj_solveM
-    actuation, accelerations = library.mj_fwdActuation, library.mj_fwdAcceleration
-    for function in (positions, velocities, actuation, accelerations, solve):
-        function.restype, function.argtypes = None, [ctypes.c_int64] * 2
-    solve.argtypes = [ctypes.c_int64] * 4 + [ctypes.c_int]
+    positions, velocities = map(_called, ("mj_fwdPosition", "mj_fwdVelocity"))
+    actuation, accelerations, solve = map(_called, ("mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM"), (0, 0, 3))
 
     def native(y, p, m, out):
         read, own = seen_at(y, 0), nominal_at(p, 0)

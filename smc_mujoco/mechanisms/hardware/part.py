@@ -47,8 +47,11 @@ class Part:
         for name in names:
             value, optional = getattr(self, name), getattr(type(self), name, 0.0) is None
             if value is not None or not optional:
-                value = number(f"{type(self).__name__}'s {name}", value, **limits)
-                object.__setattr__(self, name, value)
+                object.__setattr__(self, name, self._number(f"{type(self).__name__}'s {name}", value, **limits))
+
+    def _number(self, name: str, value: Any, **limits: Any) -> Any:
+        """Return the value of a field, a number within limits."""
+        return number(name, value, **limits)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         """Add the part's objects to a mechanism, for every channel."""

@@ -64,8 +64,8 @@ class ServoFriction(Sliding):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.check_each("kv", "kc", "kcs", *LOADED, least=0.0)
-        self.check_each("vs", "alpha", above=0.0)
+        self.check_numbers("kv", "kc", "kcs", *LOADED, least=0.0)
+        self.check_numbers("vs", "alpha", above=0.0)
 
     @staticmethod
     def value(v, motor, load, p):

@@ -68,7 +68,7 @@ class Sliding(Friction):
         return True
 
     def __post_init__(self) -> None:
-        self.check_each("stiffness", above=0.0)
+        self.check_numbers("stiffness", above=0.0)
 
     @staticmethod
     def value(v: float, motor: float, load: float, p: Any, /) -> tuple[float, float, float]:
@@ -83,23 +83,11 @@ class Sliding(Friction):
         """
         raise NotImplementedError
 
-    def check_each(self, *names: str, **bounds: Any) -> None:
-        """Check fields, and replace each by a float or a tuple of floats. None stays if it is the field's default.
-
-        Args:
-          names: of the fields.
-          bounds: as of `errors.number`.
-        """
-        limits: dict[str, Any] = {"most": MAX_PARAMETER} | bounds
-        for name in names:
-            value, called = getattr(self, name), f"{type(self).__name__}'s {name}"
-            if value is None and getattr(type(self), name, 0.0) is None:
-                continue
-            if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
-                value = tuple(number(f"{called}[{i}]", one, **limits) for i, one in enumerate(value))
-            else:
-                value = number(called, value, **limits)
-            object.__setattr__(self, name, value)
+    def _number(self, name: str, value: Any, **limits: Any) -> Any:
+        """Return the value of a field, a number within limits or a tuple of them."""
+        if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
+            return tuple(number(f"{name}[{i}]", one, **limits) for i, one in enumerate(value))
+        return number(name, value, **limits)
 
     def check(self, plant: Plant) -> None:
         """Raise ScenarioError if a field is a sequence and does not have one number for each channel of the plant."""
@@ -167,9 +155,9 @@ class Sigmoid(Sliding):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.check_each("p1", "hold", least=0.0)
-        self.check_each("p2", above=0.0)
-        self.check_each("p3", least=-MAX_PARAMETER)
+        self.check_numbers("p1", "hold", least=0.0)
+        self.check_numbers("p2", above=0.0)
+        self.check_numbers("p3", least=-MAX_PARAMETER)
 
     @staticmethod
     def value(v, motor, load, p):

@@ -1,19 +1,18 @@
 """Hanging pendulums in a chain: m l^2 x_i'' = -m grav l sin x_i - b x_i' + kc (x_(i-1) - 2 x_i + x_(i+1)) + u_i + d.
 
 i = 0 .. n-1 with free ends. They hang on one shaft, neighbours joined by torsion springs kc: the coupling is -kc times
-the path graph's Laplacian. Numbers: chosen for the paper study.
+the path graph's Laplacian. Numbers: chosen for the paper study, those of `inverted_pendulum_network`.
 """
 
+import dataclasses
 from math import sin
 
 from smc_mujoco.mechanisms.geometry import pendulum_chain
-from smc_mujoco.mechanisms.plant import Plant, Variant
-
-X0 = (0.8, -0.4, 0.6, -0.2, 0.5)  # rad
+from smc_mujoco.mechanisms.plants import inverted_pendulum_network as inverted
 
 
 def build(n):
-    return pendulum_chain.compose("hanging_pendulum.xml", n, X0)
+    return pendulum_chain.compose("hanging_pendulum.xml", n, inverted.X0)
 
 
 def nominal(x, v, i, p):
@@ -26,19 +25,10 @@ def nominal(x, v, i, p):
     return (-p.m * p.grav * p.l * sin(x[i]) - p.b * v[i] + pull) / inertia, 1.0 / inertia
 
 
-PENDULUM_NETWORK = Plant(
+PENDULUM_NETWORK = dataclasses.replace(
+    inverted.INVERTED_PENDULUM_NETWORK,
     name="pendulum_network",
-    parameters={"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81, "kc": 0.5},  # kg, m, N m s/rad, m/s^2, N m/rad
-    mass="m",
-    unit="rad",
-    x0=X0,
-    n=5,
-    sizes=(2, 1000),
     build=build,
-    fields=pendulum_chain.fields,
     nominal=nominal,
-    lane=(1.15, 0.96, 0.0),  # across the view of `look`
     jumps={"mild": {"mass": 2.0}, "hard": {"mass": 11.062}},
-    contacts={"bobs": pendulum_chain.bobs},
-    mechanisms={"springs": Variant(pendulum_chain.springs, pendulum_chain.spring_fields)},
 )
