@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import wild
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import smc_mujoco as smc
@@ -54,6 +54,7 @@ def same(a: object, b: object) -> bool:
 
 
 @given(DATA)
+@settings(max_examples=40)
 def test_whatever_is_written_is_json_and_comes_back(data):
     assert same(strict(to_json(data)), plain(data))
     assert same(from_json(to_json(data)), data)
@@ -179,14 +180,15 @@ def test_what_is_no_regular_file_is_not_opened(ending, tmp_path):
             load(tmp_path / f"{'a' * 300}{ending}")
 
 
-@pytest.mark.parametrize("load", [smc.load, records.load])
-def test_an_archive_that_unpacks_to_too_much_is_refused_before(load, tmp_path):
+def test_an_archive_that_unpacks_to_too_much_is_refused_before(tmp_path):
     file = tmp_path / "bomb.npz"
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("x.npy", "w") as stream:
+    packed = zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1)
+    with packed as archive, archive.open("x.npy", "w") as stream:
         for _ in range(51):
             stream.write(bytes(10_000_000))
-    with pytest.raises(smc.ScenarioError, match=r"it unpacks from \d MB to 1 files of 510 MB in all, and 10,000 files"):
-        load(file)
+    for load in (smc.load, records.load):
+        with pytest.raises(smc.ScenarioError, match=r"it unpacks from \d MB to 1 files of 510 MB in all, and 10,000 f"):
+            load(file)
 
 
 def test_a_table_that_unpacks_to_too_much_is_refused_before(tmp_path):

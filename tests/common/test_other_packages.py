@@ -434,6 +434,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_the_template_installs_offline_and_passes_its_tests(tmp_path):
     target, clean = tmp_path / "site", {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST_", "PYTHON"))}
 

@@ -10,6 +10,14 @@ from smc_mujoco.envs import tasks
 from smc_mujoco.envs.core import FIELDS, Setting
 
 EVERY = [(plant, task) for plant in smc.plants() for task in tasks.tasks(plant)]
+
+
+def one_of_each(turn: int) -> list[tuple[str, str]]:
+    """Every plant with one of its tasks, another one with each turn."""
+    tasked = {plant: tasks.tasks(plant) for plant in smc.plants()}
+    return [(plant, known[(i + turn) % len(known)]) for i, (plant, known) in enumerate(tasked.items())]
+
+
 SHORT = {"duration": 0.05}
 LAW = smc.law("observer_free", lam=6.0, k1=3.076)
 
