@@ -23,11 +23,11 @@ from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
-from numba.core.typing.templates import builtin_registry
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.jit import AtAddress
+from smc_mujoco.common.numba_internals import builtin_registry
 from smc_mujoco.common.rebuild import names_in
 
 PACKAGE = Path(__file__).parents[1]

@@ -21,18 +21,23 @@ from typing import IO, Any
 import numpy as np
 from llvmlite import ir
 from numba import from_dtype, njit, types
-from numba.core.bytecode import FunctionIdentity
-from numba.core.caching import FunctionCache, IndexDataCacheFile
-from numba.core.ccallback import CFunc
-from numba.core.codegen import CPUCodeLibrary, RuntimeLinker
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.errors import TypingError
-from numba.core.sigutils import normalize_signature
-from numba.core.utils import _dynamic_modname, _dynamic_module
 from numba.extending import intrinsic
 
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.numba_internals import (
+    CFunc,
+    CPUCodeLibrary,
+    FunctionCache,
+    FunctionIdentity,
+    IndexDataCacheFile,
+    RuntimeLinker,
+    TypingError,
+    dynamic_modname,
+    dynamic_module,
+    global_compiler_lock,
+    normalize_signature,
+)
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.common.rebuild import rebuild
 
@@ -47,23 +52,46 @@ COLOURS = re.compile(r"\x1b\[[\d;]*m")  # numba writes them if NUMBA_COLOR_SCHEM
 
 # When numba loads a function from its cache, it imports the function's module. If that module cannot be imported, such
 # as a scene file, numba stores the name of a placeholder instead. Registering the placeholder lets numba import it.
-sys.modules.setdefault(_dynamic_modname, _dynamic_module)
+sys.modules.setdefault(dynamic_modname, dynamic_module)
 
 free_after_fork(global_compiler_lock)
 
 
-def number_functions_apart() -> None:
-    """Let numba number functions from a random number on, so that no other process gives the same ones.
+class Numbers:
+    """Numbers of the functions that this package compiles, from a random one on: no other process gives the same.
 
     The number is part of a function's symbol, also in code on disk. Numba counts from 1 in every process, so a process
-    that loads code of two others would run one function in place of another with the same name, types and number.
+    that loads code of two others would run one function in place of another with the same name, types and number
+    (https://github.com/numba/numba/issues/10486).
     """
-    FunctionIdentity._unique_ids = itertools.count(secrets.randbits(62))
+
+    FIRST = 2**61  # numba's own count does not come so far
+
+    def __init__(self) -> None:
+        self.begin()
+        if hasattr(os, "register_at_fork"):
+            os.register_at_fork(after_in_child=self.begin)
+
+    def begin(self) -> None:
+        """Count from another number on."""
+        self.count = itertools.count(self.FIRST + secrets.randbits(61))
+
+    @contextlib.contextmanager
+    def given(self) -> Iterator[None]:
+        """Let numba give these numbers to the functions that it compiles in the block."""
+        with global_compiler_lock:
+            theirs, FunctionIdentity._unique_ids = FunctionIdentity._unique_ids, self.count
+            try:
+                yield
+            finally:
+                FunctionIdentity._unique_ids = theirs
+
+    def missing(self, symbol: str) -> bool:
+        """Return whether a symbol has a number that is not of this count."""
+        return any(int(number) < self.FIRST for number in re.findall(r"B\d+v(\d+)", symbol))
 
 
-number_functions_apart()
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=number_functions_apart)
+NUMBERS = Numbers()
 
 
 class NotCompilable(Exception):
@@ -181,7 +209,7 @@ def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = Fal
     if cache:
         with contextlib.suppress(RuntimeError):  # nowhere to write
             made._cache = Cache(body, *(() if cache is True else cache))
-    with held_back():
+    with held_back(), NUMBERS.given():
         _load_numba()
         made.compile()
     return made
@@ -236,12 +264,15 @@ class Cache(FunctionCache):
 
 
 def _complete(library: CPUCodeLibrary) -> bool:
-    """Return whether code is complete before it is linked, so that another process can load it.
+    """Return whether code is complete before it is linked, so that another process can load it, beside any other.
 
     Numba fills in some addresses while it links, such as that of a function that calls itself, and only in the process
-    that compiles. A process that loads such code from the disk would abort.
+    that compiles. A process that loads such code from the disk would abort. A function that was compiled before has
+    one of numba's own numbers.
     """
-    return not any(one.name.startswith(RuntimeLinker.PREFIX) for one in library._final_module.global_variables)
+    module = library._final_module
+    linked = any(one.name.startswith(RuntimeLinker.PREFIX) for one in module.global_variables)
+    return not linked and not any(NUMBERS.missing(one.name) for one in module.functions if not one.is_declaration)
 
 
 class Sealed(IndexDataCacheFile):

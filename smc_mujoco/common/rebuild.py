@@ -9,7 +9,7 @@ from collections.abc import Callable
 from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
-from numba.core.dispatcher import Dispatcher
+from smc_mujoco.common.numba_internals import Dispatcher
 
 # Instructions with the name of a global variable; those of all others have the name of an attribute.
 OF_VARIABLES = {"LOAD_GLOBAL", "STORE_GLOBAL", "DELETE_GLOBAL", "LOAD_NAME", "LOAD_FROM_DICT_OR_GLOBALS"}

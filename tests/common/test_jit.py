@@ -1,12 +1,14 @@
 """Helpers that laws call: this package's are compiled once for all laws, a user's again for each law."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 from numba import njit
 
 import smc_mujoco as smc
+from smc_mujoco.common import numba_internals
 from smc_mujoco.common.jit import jit, reason
 
 pytestmark = pytest.mark.quick
@@ -39,3 +41,30 @@ def test_a_user_s_helper_follows_a_change_of_its_globals():
         exec("def mine(y, gains, memory):\n    return helper(y.e), y.e", space)
         laws.append(names(jit(space["mine"]))["helper"])
     assert laws[0] is not laws[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "attributes"),
+    [
+        ("FunctionIdentity", "_unique_ids"),
+        ("FunctionCache", "_impl_class _index_key save_overload"),
+        ("IndexDataCacheFile", "_load_index _load_data _data_path _open_for_write"),
+        ("CFunc", "compile address cache_hits"),
+        ("CPUCodeLibrary", "has_dynamic_globals add_linking_library"),
+        ("RuntimeLinker", "PREFIX"),
+        ("Dispatcher", "get_call_template"),
+        ("builtin_registry", "globals"),
+        ("global_compiler_lock", "__enter__"),
+        *((name, "") for name in ("TypingError", "normalize_signature", "dynamic_modname", "dynamic_module")),
+    ],
+)
+def test_a_private_name_of_numba_exists(name, attributes):
+    """The next numba is to fail here, and not in a user's run."""
+    thing = getattr(numba_internals, name)
+    assert [each for each in attributes.split() if not hasattr(thing, each)] == []
+
+
+def test_private_names_of_numba_stand_in_one_module():
+    package = Path(numba_internals.__file__).parents[1]
+    reaching = [file.name for file in package.rglob("*.py") if "from numba.core" in file.read_text(encoding="utf-8")]
+    assert reaching == ["numba_internals.py"]

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 from helpers.runs import assert_same
 from numba import njit
-from numba.core.bytecode import FunctionIdentity
 from numba.extending import overload
 
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
+from smc_mujoco.common.jit import NUMBERS
+from smc_mujoco.common.numba_internals import FunctionIdentity
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.simulation import native, reference
 
@@ -169,12 +170,29 @@ def test_forked_processes_number_functions_apart():
     ours, theirs = os.pipe()
     child = os.fork()
     if child == 0:
-        os.write(theirs, b"%d" % next(FunctionIdentity._unique_ids))
+        os.write(theirs, b"%d" % next(NUMBERS.count))
         os._exit(0)
     os.waitpid(child, 0)
-    assert abs(int(os.read(ours, 100)) - next(FunctionIdentity._unique_ids)) > 1_000_000
+    assert abs(int(os.read(ours, 100)) - next(NUMBERS.count)) > 1_000_000
     os.close(ours)
     os.close(theirs)
+
+
+def test_numba_numbers_the_functions_of_others_as_ever(cache):
+    before = next(FunctionIdentity._unique_ids)
+    assert force(mine()) == 3.0
+    assert list(cache.rglob("*.nbc"))
+    assert next(FunctionIdentity._unique_ids) == before + 1
+
+
+@njit
+def doubled_by_sorting(x):
+    both = np.array([2.0 * x, x])
+    both.sort()
+    return both[1]
+
+
+doubled_by_sorting(1.0)  # numba numbers its own function that sorts, and may give the number to another elsewhere
 
 
 @pytest.mark.parametrize(
@@ -183,10 +201,11 @@ def test_forked_processes_number_functions_apart():
         ("thing(gains.k)", ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(lambda x: 2.0 * x)),
         ("thing[0] * gains.k", np.full(1_000_000, 2.0)),  # too large to be copied into code
         ("thing(3) * gains.k / 3.0", factorial),
+        ("thing(gains.k)", doubled_by_sorting),
     ],
-    ids=["function", "array", "function that calls itself"],
+    ids=["function", "array", "function that calls itself", "function that was compiled before"],
 )
-def test_code_that_holds_an_address_is_not_kept(cache, body, thing):
+def test_code_that_holds_an_address_or_a_number_of_this_process_is_not_kept(cache, body, thing):
     """It would be another one in the next process."""
     assert force(mine(body, thing=thing)) == 6.0
     assert list(cache.rglob("*.nb?")) == []
