@@ -1,11 +1,11 @@
-"""Which law swings a rotary pendulum up, catches it and holds it, although the bearing of its arm rubs?
+"""Which law swings a rotary pendulum up, catches it and holds it, with friction in the bearing of its arm?
 
 All pump energy in the same way (K. J. Astrom & K. Furuta 2000), through the nominal model of the arm, and catch the
 pendulum on the surface s = b'P z of least quadratic cost. They differ in how they come to s = 0: by a relay, by one
 with a boundary layer, by super-twisting, or by u = -s, which is the linear quadratic regulator.
 
-Look for: all are up in 1.2 s. Where the arm rubs, the regulator and the layer rock it back and forth; the relay
-chatters anyway. Under super-twisting it comes to rest, once the integral balances the friction.
+Look for: all are up in 1.2 s. With friction in the arm, the regulator and the layer rock it back and forth, and the
+relay chatters anyway. Under super-twisting it comes to rest, once the integral balances the friction.
 """
 
 import smc_mujoco as smc

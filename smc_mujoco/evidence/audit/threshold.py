@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.evidence.audit.verdict import Beside, Check, check
+from smc_mujoco.evidence.audit.verdict import APART, Beside, Check, check
 
 NUMBER = r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|inf)\s*"
 LIMIT = re.compile(rf"\s*(<=|>=|<|>){NUMBER}")
@@ -75,5 +75,5 @@ class Threshold(NamedTuple):
                 yield check(what, value, self.relation, self.limit, self.sentence)
                 continue
             of = f"{self.low:g}" if self.low == self.high else f"{self.low:g} to {self.high:g}"
-            yield check(f"{what}, distance from {of}", self.distance(value), self.relation, self.limit, self.sentence)
+            yield check(f"{what}{APART}{of}", self.distance(value), self.relation, self.limit, self.sentence)
             yield Beside(what, value)

@@ -29,6 +29,7 @@ MARKS |= dict(zip(ANSWERS.values(), "■◧□–", strict=True))
 PAPER, DERIVED, OURS = WHOSE = ("paper", "derived", "ours")  # whose a claim is
 WHOSE_WORDS = {PAPER: "the paper's", DERIVED: "derived", OURS: "a question"}
 
+APART = ", distance from "  # in the name of a check of a range: the number's name before it, the range after it
 UNIVERSAL, NAMED, EXISTENTIAL = "universal", "of what it names", "existential"  # quantifiers
 
 RELATIONS: dict[str, Callable[[float, float], bool]] = {
@@ -52,7 +53,7 @@ class Check(NamedTuple):
     def __str__(self) -> str:
         """Return the check in a line: what was measured, and what the claim asks for."""
         limit = f"{self.relation} {measured(self.limit, self.what)}"
-        return f"{self.what} = {measured(self.value, self.what)} (asked: {limit})"
+        return f"{self.what} = {measured(self.value, self.what)} ({limit} asked)"
 
     @property
     def slack(self) -> float:
@@ -164,6 +165,16 @@ class Claim(Statement):
         """Return the check that fails by most, else the one nearest to its limit; None without checks."""
         return min(self.checks(gains), key=lambda one: (one.holds, one.slack), default=None)
 
+    def decided(self, gains: str) -> str:
+        """Return the decisive check in a line, that of a range by the number itself; the note without checks."""
+        if not (one := self.decisive(gains)):
+            return self.note
+        what, apart, middle = one.what.partition(APART)
+        if not apart or what not in self.beside.get(gains, {}):
+            return str(one)
+        width = f" +- {one.limit:g}" if one.limit else ""
+        return f"{what} = {measured(self.beside[gains][what], what)} ({middle}{width} asked)"
+
     def _repr_html_(self) -> str:
         lines = []
         for name in self.verdicts:
@@ -185,9 +196,9 @@ class Claims(list[Claim]):
     def _repr_html_(self) -> str:
         rows = []
         for claim in self:
-            decided = claim.decisive(list(claim.verdicts)[-1]) if claim.verdicts else None
+            decided = claim.decided(list(claim.verdicts)[-1]) if claim.verdicts else claim.note
             words = f"{MARKS[claim.verdict]} {claim.verdict}{', flips' * claim.flips}"
-            rows.append((claim.id, claim.text, claim.source, html.strong(words), decided or claim.note))
+            rows.append((claim.id, claim.text, claim.source, html.strong(words), decided))
         heads = ("id", "claim", "whose, read", "verdict", "decided by")
         return html.table(heads, rows, note=summary(self), most=99)
 

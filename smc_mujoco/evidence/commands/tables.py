@@ -94,11 +94,10 @@ def _claims_overview(claims: Sequence[Claim]) -> Table:
         pad_edge=False,
     )
     for claim in claims:
-        one = claim.decisive(sets[-1])
         marks = [MARKS[claim.verdicts[name]] for name in shown]
         words = Text(f" {claim.verdict}{', flips' * claim.flips}", style=COLOURS[claim.verdict])
-        decided = str(one) if one else claim.note
-        table.add_row(claim.id, Text(claim.text), claim.source, MARKS[claim.verdict] + words, *marks, Text(decided))
+        decided = Text(claim.decided(sets[-1]))
+        table.add_row(claim.id, Text(claim.text), claim.source, MARKS[claim.verdict] + words, *marks, decided)
     return table
 
 

@@ -20,6 +20,7 @@ from smc_mujoco.evidence.audit import runs as claim_runs
 from smc_mujoco.evidence.audit.audit import claims, evaluations
 from smc_mujoco.evidence.audit.paper import Entry, paper
 from smc_mujoco.evidence.audit.runs import Runs
+from smc_mujoco.evidence.audit.threshold import Threshold
 from smc_mujoco.evidence.audit.verdict import (
     EXISTENTIAL,
     NAMED,
@@ -466,14 +467,21 @@ def test_an_overview_has_a_line_a_claim(only, capsys):
     only(entry("3", found={"study": [YES], "tuned": [NO]}), entry("18", found=[], note="Nothing to see."))
     tables.print_claims(claims(gains=["study", "tuned"]), Console(width=120), full=False)
     text = capsys.readouterr().out
-    for part in ("partly supported, flips", "● ", "no = 3 (asked: < 2)", "Nothing to see.", "1 not testable"):
+    for part in ("partly supported, flips", "● ", "no = 3 (< 2 asked)", "Nothing to see.", "1 not testable"):
         assert part in text
 
 
 def test_a_time_that_never_comes_is_told_apart_from_what_has_no_bound():
     late = str(check("settling time, s", math.inf, "<", 10.0))
     far = str(check("deviation", math.inf, "<", 0.01))
-    assert (late, far) == ("settling time, s = never (asked: < 10)", "deviation = inf (asked: < 0.01)")
+    assert (late, far) == ("settling time, s = never (< 10 asked)", "deviation = inf (< 0.01 asked)")
+
+
+def test_a_range_is_told_by_the_number_itself(only):
+    exponent, share = Threshold.read("exponent", "2 +- 0.2"), Threshold.read("share", "2 to 15")
+    only(entry("3", found=list(exponent.evidence({"": 2.0288}))), entry("18", found=list(share.evidence({"arm": 1.0}))))
+    told = [claim.decided("study") for claim in claims(gains=["study"])]
+    assert told == ["exponent = 2.03 (2 +- 0.2 asked)", "arm: share = 1 (2 to 15 asked)"]
 
 
 def test_a_folder_is_no_file_to_write(terminal, tmp_path):
@@ -504,7 +512,7 @@ def test_a_notebook_shows_claims_in_a_line_each_and_one_in_full(only):
     shown = several._repr_html_()
     assert isinstance(several, list)
     assert re.findall(r"<b>(.*?)</b>", shown) == ["◐ partly supported, flips", "– not testable", "○ refuted"]
-    assert "no = 3 (asked: &lt; 2)" in shown
+    assert "no = 3 (&lt; 2 asked)" in shown
     assert "Nothing to see." in shown
     assert "1 partly supported, " in shown
     full = several[0]._repr_html_()
