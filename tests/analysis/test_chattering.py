@@ -71,15 +71,11 @@ CLOSED = {
         smc.law("suboptimal", r1=3.0, r2=2.0),
         -2 / (math.pi * A) * complex(3.0 * math.sqrt(3.0), 3.0 + 2 * 2.0),
     ),
-    "relay": (smc.law("classical", k=2.0, c=C), -4 * 2.0 / (math.pi * S) * S / A * TURN),
     "saturation": (smc.law("boundary_layer", k=2.0, c=C, phi=0.1), -saturated(2.0, 0.1, S) * S / A * TURN),
-    "saturation, all linear": (smc.law("boundary_layer", k=2.0, c=C, phi=0.5), -2.0 / 0.5 * S / A * TURN),
-    "power": (smc.law("power_rate", k=2.0, c=C, a=0.5), -2 * 2.0 * HALF / math.sqrt(S) * S / A * TURN),
     "super-twisting": (
         smc.law("super_twisting", k1=1.5, k2=1.1, c=C),
         -(2 * 1.5 * HALF / math.sqrt(S) + 4 * 1.1 / (math.pi * S * 1j * OMEGA)) * S / A * TURN,
     ),
-    "twisting": (smc.law("twisting", r1=3.0, r2=2.0), -4 / (math.pi * A) * (3.0 + 2.0j)),
 }
 
 
@@ -200,7 +196,7 @@ def test_a_coarse_encoder_s_count_moves_s_as_in_a_run(counts):
 @pytest.mark.parametrize("name", LAWS)
 def test_amplitude_and_frequency_follow_formulas_runs_and_exponents_of_the_lag(name):
     """Perez-Ventura & Fridman 2017: s' = u behind 1/(mu s + 1)^2."""
-    lags, found = (1e-3, 5e-3, 2e-2), []
+    lags, found = (1e-3, 2e-2), []
     for mu in lags:
         scenario = lagging(LAWS[name], mu, duration=1.0 + 40 * mu)
         cycle = chattering(scenario)
@@ -221,9 +217,19 @@ def test_amplitude_and_frequency_follow_formulas_runs_and_exponents_of_the_lag(n
     assert frequencies == pytest.approx(-1.0, rel=0.02)
 
 
-@pytest.mark.parametrize("actuator", [{"actuator": smc.Lag(0.01)}, {"input_delay": 0.01}], ids=["lag", "delay"])
-@pytest.mark.parametrize("plant", ["duffing", "inverted_pendulum"])
-@pytest.mark.parametrize("law", ["super_twisting", "twisting", "power_rate", "terminal", "quasi_continuous"])
+BEHIND_LAG, LATE = {"actuator": smc.Lag(0.01)}, {"input_delay": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("law", "plant", "actuator"),
+    [
+        ("super_twisting", "duffing", BEHIND_LAG),
+        ("twisting", "inverted_pendulum", LATE),
+        ("power_rate", "duffing", LATE),
+        ("terminal", "inverted_pendulum", BEHIND_LAG),
+        ("quasi_continuous", "duffing", BEHIND_LAG),
+    ],
+)
 def test_predicted_chattering_of_plants_is_that_of_runs(plant, law, actuator):
     scenario = smc.Scenario(plant=plant, law=law, x0=0.02, duration=6.0, **actuator)
     cycle = chattering(scenario)

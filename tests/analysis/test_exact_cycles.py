@@ -32,10 +32,7 @@ def scenario(loop, **fields):
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
 CLASSICAL, TWISTING, SUPER_TWISTING, QUASI_CONTINUOUS = range(4)
 VECTORS = {  # loop, and its exact amplitude of s and frequency, Hz: of independent integrations, to three digits
-    "classical, 10 ms, 0.1 ms": (ExactLoop(CLASSICAL, (2.0, 3.0), 1e-4, (0.01,)), 1.44e-4, 208.0),
     "classical, 10 ms, 1 ms": (ExactLoop(CLASSICAL, (2.0, 3.0), 1e-3, (0.01,)), 1.55e-3, 62.5),
-    "classical, 20 ms, 1 ms": (ExactLoop(CLASSICAL, (2.0, 3.0), 1e-3, (0.02,)), 1.77e-3, 41.7),
-    "classical, 50 ms, 1 ms": (ExactLoop(CLASSICAL, (2.0, 3.0), 1e-3, (0.05,)), 1.61e-3, 27.8),
     "classical, 10 ms, 5 ms": (ExactLoop(CLASSICAL, (2.0, 3.0), 5e-3, (0.01,)), 8.60e-3, 25.0),
     "classical, two lags": (ExactLoop(CLASSICAL, (2.0, 3.0), 1e-4, (0.01, 0.02)), 1.95e-2, 10.41),
     "twisting": (ExactLoop(TWISTING, (3.7, 2.3), 1e-4, (0.005,)), 3.10e-4, 19.37),
@@ -73,7 +70,7 @@ def loops(seed):
 
 def test_random_loops_behind_lags_oscillate_as_the_machine_does():
     lagging = (one for one in loops(1) if one[0].lags)
-    for loop, _, _ in itertools.islice(lagging, 10):
+    for loop, _, _ in itertools.islice(lagging, 4):
         amplitude, frequency = loop.cycle(8.0)
         trace = smc.run(scenario(loop, duration=8.0))
         late = trace.t > 4.8
@@ -82,6 +79,7 @@ def test_random_loops_behind_lags_oscillate_as_the_machine_does():
         assert found[1] == pytest.approx(frequency, rel=0.05), loop
 
 
+@pytest.mark.slow
 def test_ranges_hold_the_cycles_of_fresh_loops():
     """The ranges are calibrated on other loops, by benchmarks/chattering.py, to hold amplitudes in 95 %."""
     held = []
@@ -92,7 +90,9 @@ def test_ranges_hold_the_cycles_of_fresh_loops():
     assert (np.sum(held, axis=0) >= 18).all()
 
 
-@pytest.mark.parametrize("name", ["classical, two lags", "classical, 10 ms, 0.1 ms"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("classical, two lags", marks=pytest.mark.slow), "classical, 10 ms, 1 ms"]
+)
 def test_gains_for_an_amplitude_keep_the_machine_below_it(name):
     loop, amplitude, _ = VECTORS[name]
     base = scenario(loop)

@@ -45,16 +45,23 @@ def test_a_law_that_does_not_chatter_gets_the_largest_gains_there_are():
     assert design.law.gains["phi"] / smc.law("boundary_layer").gains["phi"] == pytest.approx(design.size)
 
 
-@pytest.mark.filterwarnings("ignore:classical with these gains")
+FAST = smc.law("classical", k=1.0, c=20.0)
+
+
+@pytest.mark.slow
 def test_a_frequency_decides_the_speed():
-    own = smc.law("classical", k=1.0, c=20.0)
     wanted, fields = 60.0, {"u_max": 10.0, **LAG}
     with pytest.warns(smc.ScenarioWarning, match="does not hold duffing, even without a disturbance"):
-        design = smc.gains_for(own, "duffing", frequency=wanted, **fields)
+        design = smc.gains_for(FAST, "duffing", frequency=wanted, **fields)
     assert design.chattering.frequency <= wanted
     assert (design.size, design.law.gains["k"]) == (1.0, pytest.approx(design.speed**2))
     assert design.law.gains["c"] == pytest.approx(20.0 * design.speed)
-    both = smc.gains_for(own, "duffing", amplitude=5e-3, frequency=wanted, **fields)
+
+
+@pytest.mark.filterwarnings("ignore:classical with these gains")
+def test_an_amplitude_and_a_frequency_decide_size_and_speed():
+    wanted, fields = 60.0, {"u_max": 10.0, **LAG}
+    both = smc.gains_for(FAST, "duffing", amplitude=5e-3, frequency=wanted, **fields)
     assert 4.9e-3 < both.chattering.amplitude_range[1] <= 5e-3
     assert both.chattering.frequency <= wanted
     assert both.law.gains["k"] == pytest.approx(both.size * both.speed**2)
@@ -71,7 +78,9 @@ def without_units(y, gains, memory):
         ("classical", {}, "needs a wanted amplitude, a frequency or both"),
         ("classical", {"amplitude": -1.0}, "amplitude is -1"),
         ("classical", {"frequency": 5.0}, "oscillates at 66.* Hz at least"),
-        ("super_twisting", {"frequency": 10.0}, "oscillates at 18 Hz at least"),  # ten times as fast it has no cycle
+        pytest.param(  # ten times as fast it has no cycle
+            "super_twisting", {"frequency": 10.0}, "oscillates at 18 Hz at least", marks=pytest.mark.slow
+        ),
         ("classical", {"frequency": 100.0, "u_max": 0.005}, "are 800 times what u_max allows, .* at most 100 times"),
         (without_units(), {"amplitude": 1e-3}, "knows no unit of without_units's gain 'k'"),
         (

@@ -30,13 +30,13 @@ CLASSES = {
 
 @pytest.mark.parametrize("within", CLASSES.values(), ids=CLASSES)
 def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(within):
-    base = scenario()
-    worst = smc.worst_case(base, within=within, budget=48)
-    again = smc.worst_case(base, within=within, budget=48, threads=1)
+    base = scenario(duration=1.0)
+    worst = smc.worst_case(base, within=within, budget=16)
+    again = smc.worst_case(base, within=within, budget=16, threads=1)
     assert (again.value, again.median, again.scenario) == (worst.value, worst.median, worst.scenario)
     trace = smc.run(serialise.restore(serialise.describe(worst.scenario)))
     assert smc.score(trace)["rms_error"] == worst.value >= worst.median
-    assert worst.tried == 96
+    assert worst.tried == 32
     assert np.abs(trace.d).max() <= within.disturbance
     if within.slope:
         assert np.abs(np.diff(trace.d[:, 0])).max() <= within.slope * base.control_period * (1 + 1e-9)
@@ -62,7 +62,8 @@ def test_errors_of_measurement_reach_the_law_alike_in_both_loops():
 
 
 def test_a_larger_budget_continues_the_search():
-    values = [smc.worst_case(scenario(), within=CLASSES["all"], budget=n).value for n in (1, 7, 20, 40, 90)]
+    base = scenario(duration=1.0)
+    values = [smc.worst_case(base, within=CLASSES["all"], budget=n).value for n in (1, 7, 20)]
     assert all(a <= b for a, b in itertools.pairwise(values))
     assert values[0] < values[-1]
 

@@ -21,8 +21,8 @@ from smc_mujoco.control.units import Gain, Unit
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.metrics.catalogue import itae, tv
 
-SHORT = Objective(duration=1.0)
-LEAN = Objective(conditions=("nominal",), duration=0.5)
+SHORT = Objective(duration=0.5)
+LEAN = Objective(conditions=("nominal",), duration=0.25)
 
 
 @smc.law_function(gains={"when": 0.1, "k": 3.0})
@@ -37,13 +37,13 @@ def one_gain(y, gains, memory):
 @pytest.fixture(scope="module")
 def found():
     """One tuning, for those tests that only look at it."""
-    return tune("duffing", "observer_free", budget=64, seed=3, objective=SHORT)
+    return tune("duffing", "observer_free", budget=32, seed=3, objective=SHORT)
 
 
 @pytest.fixture(scope="module")
 def rival():
     """Another law's, on equal terms."""
-    return tune("duffing", "classical", budget=64, seed=3, objective=SHORT)
+    return tune("duffing", "classical", budget=32, seed=3, objective=SHORT)
 
 
 # the same seed, a larger budget
@@ -51,7 +51,7 @@ def rival():
 
 @pytest.mark.filterwarnings("ignore:no set of gains")
 def test_the_same_seed_gives_the_same_gains_to_the_last_bit_at_any_thread_count(found):
-    assert tune("duffing", "observer_free", budget=64, seed=3, objective=SHORT, threads=1) == found
+    assert tune("duffing", "observer_free", budget=32, seed=3, objective=SHORT, threads=1) == found
     other = tune("duffing", "observer_free", budget=4, seed=4, objective=SHORT)
     assert other.history[-1].gains not in {e.gains for e in found.history}
 
@@ -126,7 +126,7 @@ def test_what_is_not_integrated_by_rk4_is_run_as_it_is_in_both_rounds():
 
 
 @pytest.mark.filterwarnings("ignore:no set of gains")
-@pytest.mark.parametrize("budget", [1, 7, 64, 100])
+@pytest.mark.parametrize("budget", [1, 7, 64])
 def test_it_stops_at_the_budget_and_no_set_of_gains_is_paid_for_twice(budget):
     tuned = tune("duffing", "observer_free", budget=budget, objective=LEAN)
     assert 0.6 * budget <= tuned.evaluations <= budget
@@ -143,7 +143,7 @@ def test_a_law_of_one_gain_is_tuned():
 
 def test_the_cost_of_the_best_gains_can_be_repeated(found):
     traces = smc.run(found.definition.scenarios(found.plant, found.law, found.seed))
-    again = sum(itae(t) / abs(t.x[0, 0]) + 1e-3 * tv(t) / (6.0 * 1.0) for t in traces)
+    again = sum(itae(t) / abs(t.x[0, 0]) + 1e-3 * tv(t) / (6.0 * 0.5) for t in traces)
     assert again == pytest.approx(found.objective, rel=1e-12)
     assert [t.scenario.input_delay for t in traces] == [0.0, 0.0, 0.01, *[0.0] * 4]
     assert [t.scenario.noise.position > 0.0 for t in traces] == [False, True, *[False] * 5]
@@ -270,9 +270,9 @@ def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, rival):
     assert {one.law.name for one in compare([rival, found])} == {"classical", "observer_free"}
     assert compare([rival, found]) == sorted([rival, found], key=lambda one: one.objective)
     unequal = {
-        "budget": dataclasses.replace(rival, budget=65),
+        "budget": dataclasses.replace(rival, budget=33),
         "rule": dataclasses.replace(rival, rule="by hand"),
-        "objective": dataclasses.replace(rival, definition=Objective(duration=1.0, u_max=12.0)),
+        "objective": dataclasses.replace(rival, definition=Objective(duration=0.5, u_max=12.0)),
         "seed": dataclasses.replace(rival, seed=4),
         "plant": dataclasses.replace(rival, plant=smc.plant("duffing", M=2.0)),
         "bounds": dataclasses.replace(rival, bounds=dict(rival.bounds) | {"k": (1e-3, 1e3)}),
@@ -301,7 +301,7 @@ def test_a_tuning_is_saved_and_read_back_as_it_was(found, tmp_path):
     path = found.save(tmp_path / "new" / "it.json")
     assert load(path) == found
     held = json.loads(path.read_text())
-    assert held["budget"] == 64
+    assert held["budget"] == 32
     assert held["record"]["sets"][0] == list(found.gains.values())
     assert held["definition"]["conditions"] == ["nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"]
     assert set(held["versions"]) == {"smc_mujoco", "mujoco", "numba", "numpy", "scipy", "cmaes"}

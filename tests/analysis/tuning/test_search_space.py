@@ -56,7 +56,7 @@ def systems(law, fixed, model, rng):
     They are powers of 4, so that roots are exact and rounding, which a switching law magnifies, is the same.
     """
     found = []
-    while len(found) < 4:
+    while len(found) < 2:
         F, X, T = 4.0 ** rng.integers(-2, 3, 3)
         system = {"F": X / T ** max(law.relative_degree, 2) if model else F, "X": X, "T": T}
         if (fixed is None or fixed.of(system) == 1.0) and (X, T) != (1.0, 1.0):
@@ -99,11 +99,15 @@ def converted(law, system):
     return dataclasses.replace(law, gains={g: v * known[g].of(system) for g, v in law.gains.items()})
 
 
-@pytest.mark.parametrize("model", [0.0, 1.0])
 @pytest.mark.parametrize("name", [name for name in LAWS if name != "swing_up"])
-def test_a_law_does_the_same_in_every_system_of_units(name, model):
+def test_a_law_does_the_same_in_every_system_of_units(name):
     rng = np.random.default_rng(sum(map(ord, name)))
     law = given(name, rng)
+    for model in (0.0, 1.0):
+        check_units(name, law, model, rng)
+
+
+def check_units(name, law, model, rng):
     x, u = run(law, model=model)
     assert np.abs(np.diff(x)).max() > 1e-3  # it moves
     fixed, _ = FIXED.get(name) or (WITHOUT_MODEL.get(name) if model == 0.0 else None) or (None, "")
@@ -122,12 +126,12 @@ def test_a_wrong_unit_of_any_gain_would_be_seen(name):
         assert max(abs(np.concatenate(run(other, model=m)) - plain).max() for m, plain in runs.items()) > 1e-6, gain
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_every_gain_has_a_unit_and_a_law_with_gains_can_be_tuned(name):
-    law = smc.law(name)
-    assert all(search_space.unit(law, gain) or catalogue()[name].gains[gain].held for gain in law.gains)
-    if name != "none":
-        assert search_space.box(law, {"F": 6.0, "X": 1.5, "M": 1.0, "T": 0.5})
+def test_every_gain_has_a_unit_and_a_law_with_gains_can_be_tuned():
+    for name in LAWS:
+        law = smc.law(name)
+        assert all(search_space.unit(law, gain) or catalogue()[name].gains[gain].held for gain in law.gains), name
+        if name != "none":
+            assert search_space.box(law, {"F": 6.0, "X": 1.5, "M": 1.0, "T": 0.5}), name
 
 
 def test_a_unit_follows_the_exponent_that_a_law_was_given():
