@@ -85,6 +85,7 @@ def test_text_stands_before_each_cell_and_links_lead_somewhere(path):
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.slow
 def test_a_notebook_runs_and_shows_what_its_text_says(path, tmp_path):
     if any("smc.show(" in text for text in code(path)) and gl.missing():
         pytest.skip(str(gl.missing()))

@@ -2,6 +2,7 @@
 missing, and a set-up that installs what the locks pin or fails in one sentence."""
 
 import email
+import importlib.util
 import os
 import re
 import shutil
@@ -19,6 +20,7 @@ from smc_mujoco.common import extras
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+README = (ROOT / "README.md").read_text("utf-8")
 EXTRAS = PROJECT["project"]["optional-dependencies"]
 GROUPS = PROJECT["dependency-groups"]
 LOCKS = sorted(path.name for path in ROOT.glob("*.lock"))
@@ -167,6 +169,7 @@ def test_models_are_found_from_the_wheel(binaries, tmp_path):
         assert path.as_posix().endswith(f"smc_mujoco/models/{name}")
 
 
+@pytest.mark.slow
 def test_a_scene_runs_from_the_wheel_in_any_folder(binaries, tmp_path):
     program, out = binaries / "smc-mujoco", tmp_path / "out"
     done = run(program, "run", "inverted_pendulum", "--no-film", "--out", out, cwd=tmp_path)
@@ -180,7 +183,7 @@ import pytest
 import smc_mujoco as smc
 @pytest.mark.parametrize("phi", [0.3, 2.0])
 def test_my_law_settles(step_response, phi):
-    r = step_response("inverted_pendulum", smc.law("boundary_layer", k=6, c=8, phi=phi), step=0.2, duration=2.0)
+    r = step_response("inverted_pendulum", smc.law("boundary_layer", k=6, c=8, phi=phi), step=0.2, duration=1.0)
     assert r.settling_time < 0.6 and r.overshoot < 20
 """
 
@@ -225,8 +228,8 @@ def without_extras(code: str, folder: Path) -> str:
 def test_the_core_runs_scores_and_draws_without_any_extra(tmp_path):
     code = """
 from smc_mujoco import *
-traces = run([Scenario(plant=name, law="classical", duration=0.05) for name in plants()])
-figure(traces[:1], "a.svg")
+traces = run([Scenario(plant=name, law="classical", duration=0.01) for name in plants()])
+figure(traces[:1], "a.svg", format="svg")
 table = study(grid(["duffing"], ["classical"], ["nominal"], seeds=2, duration=0.05), "study")
 print(len(traces) == len(plants()) > 10, score(traces[0])["itae"] > 0.0, len(table))
 """
@@ -299,6 +302,25 @@ except SystemExit as end:
     out = without_extras(code, tmp_path)
     assert "no film: it needs mediapy and imageio_ffmpeg: pip install 'smc-mujoco[film]'" in out
     assert "nominal.svg" in out
+
+
+def test_links_of_the_package_index_s_page_lead_to_the_repository():
+    spec = importlib.util.spec_from_file_location("metadata_hook", ROOT / ".github" / "metadata.py")
+    assert spec
+    assert spec.loader
+    hook = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(hook)
+    text = "[a](docs/a.md#b) ![c](docs/c.png) [d](../../actions/d) [e](https://e.org) [f](#f)"
+    assert hook.absolute(text, "https://h/r") == (
+        "[a](https://h/r/blob/main/docs/a.md#b) ![c](https://h/r/raw/main/docs/c.png) [d](https://h/r/actions/d) "
+        "[e](https://e.org) [f](#f)"
+    )
+    told = {}
+    for repository in ("", "https://h/r/"):
+        hook.Metadata(str(ROOT), {"repository": repository}).update(told.setdefault(repository, {}))
+    assert told[""] == {"urls": {}, "readme": {"content-type": "text/markdown", "text": README}}
+    assert told["https://h/r/"]["urls"]["Issues"] == "https://h/r/issues"
+    assert told["https://h/r/"]["readme"]["text"] == hook.absolute(README, "https://h/r")
 
 
 def named(requirement: str) -> str:

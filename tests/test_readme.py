@@ -1,12 +1,14 @@
 """What README and docs show works as it stands: code, commands, links, and the catalogues they name."""
 
 import contextlib
+import functools
 import io
 import re
 import runpy
 import shlex
 import sys
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -16,10 +18,11 @@ from helpers.pages import PAGES, ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
+from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.cli import main
 from smc_mujoco.cli import scene as show
 from smc_mujoco.common import gl
-from smc_mujoco.studies import scene
+from smc_mujoco.studies import fair_gains, scene
 
 pytestmark = pytest.mark.quick
 
@@ -41,6 +44,14 @@ LINES = [(page, line) for page in PAGES for line in commands(page.read_text())]
 ON_HOST = "../../actions/"  # pages of the repository's host, beside its files: badges
 LINKS = [(page, link) for page in PAGES for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text())]
 RELATIVE = [pair for pair in LINKS if "://" not in pair[1] and not pair[1].startswith(ON_HOST)]
+
+
+# What is asked for less of than a page does: as much code runs, in a tenth of the time.
+LITTLE = {"compare": {"seeds": 2, "duration": 0.3}, "tune": {"budget": 8}, "identify": {"most": 2}}
+
+
+def with_little(function: Callable, little: dict) -> Callable:
+    return lambda *given, **fields: function(*given, **fields | little)
 
 
 def named(value: object) -> str:
@@ -75,7 +86,10 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
         warnings.simplefilter("ignore", smc.PlainLoopWarning)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
-    monkeypatch.setattr(search, "BUDGET", 64)  # of the tunings in `smc.compare`
+    monkeypatch.setattr(search, "BUDGET", 8)  # of the tunings in `smc.compare`
+    monkeypatch.setattr(fair_gains, "Objective", functools.partial(Objective, duration=0.5))
+    for name, little in LITTLE.items():
+        monkeypatch.setattr(smc, name, with_little(getattr(smc, name), little))
     monkeypatch.setattr(sys, "argv", ["block.py", "--no-film"])  # read by a scene that plays itself
     Path("block.py").write_text(block)
     played = pytest.raises(SystemExit) if "smc.play(" in block else contextlib.nullcontext()
@@ -92,16 +106,20 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
     assert bool(written) == bool(wanted or end)
 
 
-@pytest.mark.parametrize(
-    ("page", "line"), [(page, line) for page, line in LINES if line.startswith("smc-mujoco ")], ids=named
-)
-def test_a_command_line_names_commands_options_and_files_that_exist(page, line):
-    word, *rest = shlex.split(line)[1:]
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_command_lines_name_commands_options_and_files_that_exist(page):
     program = typer.main.get_command(main.app)
     known = program.commands  # pyright: ignore[reportAttributeAccessIssue]
-    assert word in known
+    for line in (line for where, line in LINES if where == page and line.startswith("smc-mujoco ")):
+        check_command(line, known)
+
+
+def check_command(line: str, known: dict) -> None:
+    word, *rest = shlex.split(line)[1:]
+    assert word in known, line
     options = {option for parameter in known[word].params for option in (*parameter.opts, *parameter.secondary_opts)}
-    assert [option for option in rest if option.startswith("-") and option.partition("=")[0] not in options] == []
+    unknown = [option for option in rest if option.startswith("-") and option.partition("=")[0] not in options]
+    assert unknown == [], line
     given = [argument for argument in rest if not argument.startswith("-")]
     of_template = {path.stem for path in (ROOT / "examples").glob("*/*/scenes/*.py")}
     if word == "run" and given and given[0] not in {"NAME", *of_template}:
@@ -143,12 +161,12 @@ def test_files_that_command_lines_name_exist():
     assert [name for name in named - told if not (ROOT / name).is_file()] == []
 
 
-@pytest.mark.parametrize(("page", "link"), RELATIVE, ids=named)
-def test_a_relative_link_or_picture_leads_somewhere(page, link):
-    path = page.parent / link.partition("#")[0]
-    assert path.is_file()
-    assert path.resolve().is_relative_to(ROOT)
-    assert path.stat().st_size > 0
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_relative_links_and_pictures_lead_somewhere(page):
+    for path in (page.parent / link.partition("#")[0] for where, link in RELATIVE if where == page):
+        assert path.is_file(), path
+        assert path.resolve().is_relative_to(ROOT), path
+        assert path.stat().st_size > 0, path
 
 
 def test_the_tables_name_every_plant_and_law():

@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 import smc_mujoco as smc
@@ -51,10 +52,12 @@ def broken(trace: smc.Trace, at: int, failure: str = reference.PLANT_DIVERGED) -
     return dataclasses.replace(trace, **arrays, diverged_at=at_time, failure=f"{failure}, at t = {at_time:g} s")
 
 
-def words(path) -> str:
-    """The text of a figure: letters are paths, with what they say in comments."""
-    ET.parse(path)
-    return " ".join(re.findall(r"<!-- (.*?) -->", path.read_text()))
+def words(page) -> str:
+    """The text of a figure; in a file letters are paths, with what they say in comments."""
+    if isinstance(page, Figure):
+        return " ".join(text.get_text() for text in page.findobj(Text) if text.get_visible())
+    ET.parse(page)
+    return " ".join(re.findall(r"<!-- (.*?) -->", page.read_text()))
 
 
 def test_writes_svg_and_png_with_names_and_units(pair, tmp_path):
@@ -82,7 +85,7 @@ def test_a_figure_that_was_written_is_laid_out_again_when_it_is_shown(pair, tmp_
 
 
 def test_same_traces_give_the_same_files(pair, tmp_path):
-    first, second = figure(pair, tmp_path / "a", None), figure(pair, tmp_path / "b", None)
+    first, second = figure(pair[:1], tmp_path / "a", None), figure(pair[:1], tmp_path / "b", None)
     assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
 
 
@@ -98,21 +101,19 @@ def test_a_network_has_a_row_for_each_run_with_a_line_for_each_channel(tmp_path)
 
 def test_a_diverged_run_is_named_and_does_not_squash_the_others(pair, tmp_path):
     traces = [pair[0], broken(pair[1], 400)]
-    (svg,) = figure(traces, tmp_path / "a")
-    assert "Classical (diverged at 0.4 s)" in words(svg)
     page = draw_figure.figure(traces)
+    assert "Classical (diverged at 0.4 s)" in words(page)
     ends = [np.asarray(line.get_xdata())[0] for ax in page.axes for line in ax.lines if line.get_marker() == "X"]
     assert ends[:3] == [pytest.approx(0.399)] * 3  # in the panels of x, v and u over time
     assert panels.limits(traces, "x") == panels.limits(pair[:1], "x")
-    figure([broken(pair[1], 1)], tmp_path / "b")  # one finite sample
+    draw_figure.figure([broken(pair[1], 1)])  # one finite sample
 
 
-@pytest.mark.parametrize("plant", ["duffing", "pendulum_network"])
-def test_a_run_that_fails_at_once_is_an_x_where_it_started(plant, tmp_path):
-    good, bad = runs(plant, duration=0.5)
+def test_a_run_that_fails_at_once_is_an_x_where_it_started(tmp_path):
+    good, bad = runs("pendulum_network", duration=0.5)
     gone = broken(bad, 0, "law 'classical' raised ValueError (no)")
-    assert "Classical (failed at 0 s)" in words(figure([gone], tmp_path / "a")[0])
-    figure([good, gone], tmp_path / "b")
+    assert "Classical (failed at 0 s)" in words(draw_figure.figure([gone]))
+    draw_figure.figure([good, gone])
     signals([good, gone], tmp_path / "c", ["all", "all"])
     cut = decimate.finite(gone)
     assert cut.x.tolist() == [list(gone.scenario.resolved.x0)]
@@ -124,15 +125,14 @@ def test_a_run_that_fails_at_once_is_an_x_where_it_started(plant, tmp_path):
 def test_a_jump_is_marked_with_what_has_changed(tmp_path):
     factors = {"jump": smc.Jump(0.5, {"mass": 25.9, "delta": 2.0})}
     jumping = smc.run(smc.Scenario(plant="duffing", law="classical", duration=1.0, **factors))
-    assert "mass × 25.9, delta × 2" in words(figure([jumping], tmp_path / "a")[0])
+    assert "mass × 25.9, delta × 2" in words(draw_figure.figure([jumping]))
     still = dataclasses.replace(jumping, scenario=dataclasses.replace(jumping.scenario, jump=None))
     assert style.jumps([jumping, still], ["A", "B"]) == {0.5: "A: mass × 25.9, delta × 2"}
 
 
 def test_signals_has_a_column_for_each_condition(pair, tmp_path):
     noisy = runs(condition="noise")
-    (svg,) = signals([*pair, *noisy], tmp_path / "a", ["nominal", "nominal", "noise", "noise"])
-    text = words(svg)
+    text = words(draw_figure.signals([*pair, *noisy], None, ["nominal", "nominal", "noise", "noise"]))
     assert all(word in text for word in ("nominal", "noise", "Observer-free", "Classical", "u (N)"))
     with pytest.raises(smc.ScenarioError, match="one law under one condition"):
         signals([pair[0], pair[0]], tmp_path / "a", ["nominal", "nominal"])
@@ -143,12 +143,12 @@ def cart_and_pole(**fields) -> smc.Trace:
 
 
 def test_a_pole_has_panels_of_its_own_in_its_own_unit(tmp_path):
-    text = words(figure([cart_and_pole()], tmp_path / "a")[0])
+    text = words(draw_figure.figure([cart_and_pole()]))
     for name in ("position x (m)", "velocity v (m/s)", "free angle q (rad)", "velocity q′ (rad/s)", "control u (N)"):
         assert name in text
     assert "reaction" not in text
     assert "sliding variable s (" not in text  # of the cart and the pole: its unit is the law's
-    rubbed = words(figure([cart_and_pole(friction=Coulomb(0.01))], tmp_path / "b")[0])
+    rubbed = words(draw_figure.figure([cart_and_pole(friction=Coulomb(0.01))]))
     assert "reaction (mN)" in rubbed
     assert "reaction on q (mN·m)" in rubbed
 
@@ -185,7 +185,7 @@ def test_a_slide_and_a_hinge_that_are_driven_share_no_panel(tmp_path):
       <actuator><motor joint="lift"/><motor joint="turn"/></actuator></mujoco>""")
     plant = smc.plant_from(tmp_path / "arm.xml", ["lift", "turn"])
     trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.5, x0=0.1))
-    text = words(figure([trace], tmp_path / "a")[0])
+    text = words(draw_figure.figure([trace]))
     for name in ("lift x (m)", "turn x (rad)", "lift u (N)", "turn u (N·m)"):
         assert name in text
     assert "mean" not in text.replace("line: mean over", "")
@@ -213,11 +213,11 @@ def test_a_voltage_is_drawn_in_volts_beside_forces_in_newton_metres(tmp_path):
     )  # fmt: skip
     torque = dataclasses.replace(volts, actuator=motor)
     one, other = smc.run([volts, torque])
-    text = words(figure([one], tmp_path / "a")[0])
+    text = words(draw_figure.figure([one]))
     assert all(label in text for label in ("u (V)", "reaction (mN·m)"))
     assert "u (N·m)" not in text
     assert "sliding variable" not in text  # the law has none
-    assert "u (N·m)" in words(figure([other], tmp_path / "b")[0])
+    assert "u (N·m)" in words(draw_figure.figure([other]))
     with pytest.raises(smc.ScenarioError, match="traces of furuta have u in N m and V: draw those of one unit"):
         figure([one, other], tmp_path / "c")
 
@@ -235,7 +235,7 @@ def test_chattering_that_cannot_be_seen_has_no_words(pair, tmp_path):
     (trace,) = runs(duration=1.0)[:1]
     for ripple, told in ((1e-3, False), (0.1, True)):
         u = trace.u + ripple * np.abs(trace.u).max() * np.where(np.arange(len(trace.t)) % 2, 1.0, -1.0)[:, None]
-        text = words(figure([dataclasses.replace(trace, u=u)], tmp_path / f"{told}")[0])
+        text = words(draw_figure.figure([dataclasses.replace(trace, u=u)]))
         assert ("where it chatters" in text) == told
 
 
@@ -259,8 +259,7 @@ def test_labels_are_the_laws_names_unless_given(pair):
 
 def test_long_and_odd_labels_stay_inside(pair, tmp_path):
     labels = ["_lambda $6: " + "the law that the paper proposes, " * 3, "x" * 80]
-    (svg,) = figure(pair, tmp_path / "a", labels=labels, title="A long title " * 20)
-    text = words(svg)
+    text = words(draw_figure.figure(pair, labels=labels, title="A long title " * 20))
     assert "_lambda $6" in text
     assert labels[0] not in text
     assert text.count("…") == 3
@@ -324,7 +323,7 @@ def switching(lengths) -> np.ndarray:
     return np.concatenate([np.full(n, 6.0 if i % 2 else -6.0) for i, n in enumerate(lengths)])
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_within_chattering_the_line_is_a_whole_mean_whatever_is_held_shorter_than_the_window(seed):
     rng = np.random.default_rng(seed)
     within = switching([*rng.integers(1, 10, 6), *rng.integers(1, 41, 60), *rng.integers(1, 10, 6)])  # 40: the window
@@ -345,7 +344,7 @@ def test_chattering_to_the_end_of_a_run_ends_in_a_whole_mean():
     np.testing.assert_allclose(line[-20:], triangle(u, 20)[-1])
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(4))
 def test_the_line_is_the_same_read_backwards(seed):
     rng = np.random.default_rng(seed)
     u = switching(rng.choice([1, 3, 8, 20, 39, 41, 80], 300, p=[0.3, 0.3, 0.2, 0.1, 0.04, 0.03, 0.03]))
@@ -369,14 +368,14 @@ def test_the_line_of_a_late_and_noisy_control_stays_within_its_means():
 
 def test_the_legend_says_what_line_and_band_are(pair, tmp_path):
     chattering = runs(duration=1.5)
-    text = words(figure(chattering, tmp_path / "a")[0])
-    alone = words(signals(chattering, tmp_path / "b", ["c", "c"])[0])
+    text = words(draw_figure.figure(chattering))
+    alone = words(draw_figure.signals(chattering, None, ["c", "c"]))
     assert "band: range of u, s" in text
     assert "band: range of u" in alone
     assert "band: range of u, s" not in alone
     assert "line: mean over 40 ms where it chatters" in text
     assert "line: mean over 40 ms where it chatters" in alone
-    assert "band:" not in words(figure(pair, tmp_path / "c")[0])
+    assert "band:" not in words(draw_figure.figure(pair))
 
 
 # realistic mechanisms
@@ -389,18 +388,18 @@ def realistic(law: str = "observer_free", plant: str = "duffing", **parts) -> sm
 
 def test_an_overview_of_friction_has_a_panel_of_the_reaction_and_marks_where_it_holds(pair, tmp_path):
     rubbed = realistic(friction=Coulomb(0.5))
-    text = words(figure([pair[0], rubbed], tmp_path / "a")[0])
+    text = words(draw_figure.figure([pair[0], rubbed]))
     assert "reaction (N)" in text
     assert "held by friction for 0.15 s or longer" in text
     assert "range of u, reaction, s" in text or "band" not in text
-    ideal = words(figure(pair, tmp_path / "b")[0])
+    ideal = words(draw_figure.figure(pair))
     assert "reaction" not in ideal
     assert "held by friction" not in ideal
 
 
 def test_an_overview_with_an_actuator_has_a_panel_of_what_it_delivers(tmp_path):
     late = realistic(actuator=smc.Lag(0.05), duration=1.0)
-    text = words(figure([late], tmp_path / "a")[0])
+    text = words(draw_figure.figure([late]))
     assert "delivered (N)" in text
     assert "reaction" not in text  # nothing rubs or touches
 
@@ -417,22 +416,22 @@ def test_a_rest_is_marked_where_the_joint_stands_and_only_where_dry_friction_can
 
 def test_blows_are_told_and_do_not_squash_what_lasts(tmp_path):
     hit = realistic(contact="stops", v0=3.0)
-    text = words(figure([hit], tmp_path / "a")[0])
+    text = words(draw_figure.figure([hit]))
     assert f"|reaction| up to {np.abs(hit.reaction).max():.3g} N" in text
-    assert "|reaction|" not in words(figure([realistic(friction=Coulomb(0.5))], tmp_path / "b")[0])
+    assert "|reaction|" not in words(draw_figure.figure([realistic(friction=Coulomb(0.5))]))
     (ax,) = (ax for ax in draw_figure.figure([hit]).axes if ax.get_ylabel() == "reaction (N)")
     assert ax.get_ylim()[1] < 0.5 * np.abs(hit.reaction).max()
 
 
 def test_a_realistic_network_has_its_reactions(tmp_path):
     rubbed = realistic(plant="pendulum_network", friction=Coulomb(0.2), duration=1.0)
-    assert "reaction (N·m)" in words(figure([rubbed], tmp_path / "a")[0])
+    assert "reaction (N·m)" in words(draw_figure.figure([rubbed]))
 
 
-def test_a_realistic_run_that_fails_at_once_is_drawn(tmp_path):
+def test_a_realistic_run_that_fails_at_once_is_drawn():
     rubbed = realistic(friction=Coulomb(0.5), duration=1.0)
     for at in (0, 1, 400):
-        figure([broken(rubbed, at)], tmp_path / "a")
+        draw_figure.figure([broken(rubbed, at)]).draw_without_rendering()
 
 
 def test_one_trace_is_drawn_like_a_list_of_one(pair, tmp_path):

@@ -88,15 +88,14 @@ def check(page) -> None:
 @pytest.mark.parametrize(
     ("kind", "size"),
     [
-        ("one", None), ("four", COLUMN), ("ten", PAGE), ("ten", COLUMN), ("failed", COLUMN), ("jump", COLUMN),
-        ("jump", PAGE), ("short", None), ("short", COLUMN), ("arm", None), ("arm", PAGE), ("arm", COLUMN),
+        ("one", None), ("ten", PAGE), ("ten", COLUMN), ("failed", COLUMN), ("jump", COLUMN), ("short", COLUMN),
+        ("arm", PAGE),
     ],
 )  # fmt: skip
 def test_words_are_apart_and_on_the_page(kind, size, one, arm):
     jumps = [dataclasses.replace(one.scenario, jump=smc.Jump(at, {"mass": 2.0})) for at in (0.5, 0.6)]
     traces = {
         "one": [one],
-        "four": ten(one)[:4],
         "ten": ten(one),
         "failed": [one, failed(under(one, "pid", 0.5), 400), failed(under(one, "adaptive", 0.5), 1)],
         "jump": [dataclasses.replace(one, scenario=jump) for jump in jumps],

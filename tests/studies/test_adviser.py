@@ -1,6 +1,7 @@
 """The adviser: what it advises follows from its runs, what it says follows from its numbers, and it can say "no"."""
 
 import dataclasses
+import functools
 import io
 import math
 import re
@@ -16,6 +17,7 @@ import smc_mujoco as smc
 from smc_mujoco.analysis import ranking
 from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.analysis.tuning import search
+from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.cli import main, tables
 from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
@@ -360,6 +362,7 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(folder
     heavy, tuned, tune = smc.plant("duffing", M=2.0), [], search.tune
     monkeypatch.setattr(search, "tune", lambda *args, **named: tuned.append(tune(*args, **named)) or tuned[-1])
     monkeypatch.setattr(adviser, "FULL", adviser.FULL._replace(budget=16))
+    monkeypatch.setattr(fair_gains, "Objective", functools.partial(Objective, duration=1.0))
     options = {"laws": [my_pd], "needs": "fast,continuous", "out": folder} | COMMON
     options |= {"seeds": 2, "duration": 1.0, "conditions": "nominal"}
     found = smc.which(heavy, **options)

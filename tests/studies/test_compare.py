@@ -1,5 +1,6 @@
 """One call that compares laws: gains by one rule, their sources, verdicts that say where, resumed from its folder."""
 
+import functools
 import math
 import re
 import warnings
@@ -8,6 +9,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
+from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.cli import main
 from smc_mujoco.cli.commands import options
 from smc_mujoco.common.text import number
@@ -15,7 +17,8 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.units import FORCE, RATE, Gain
 from smc_mujoco.studies import compare, executors, fair_gains, worst_case
 
-SHORT = {"duration": 1.0, "budget": 48, "progress": False}
+SHORT = {"duration": 0.5, "budget": 48, "progress": False}
+PLANTS = ["duffing", "inverted_pendulum"]
 
 
 @smc.law_function(gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(3.0, RATE, positive=True)})
@@ -30,11 +33,19 @@ def plain_law(y, gains, memory):
     return -gains.lam * math.tanh(s), s
 
 
+@pytest.fixture(scope="module", autouse=True)
+def searched_shortly():
+    """Search gains by runs of 1 s."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fair_gains, "Objective", functools.partial(Objective, duration=1.0))
+        yield
+
+
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     laws = [my_law, "classical", smc.law("pid", kp=20.0)]
     out = tmp_path_factory.mktemp("compared")
-    return smc.compare(laws, ["duffing", "inverted_pendulum"], ["friction", "encoder"], 8, out=out, **SHORT)
+    return smc.compare(laws, PLANTS, ["friction", "encoder"], 8, out=out, **SHORT)
 
 
 def kinds(found, plant="duffing"):
@@ -97,7 +108,7 @@ def test_the_same_call_goes_on_from_its_folder(found, monkeypatch):
     monkeypatch.setattr(executors, "compute_here", lambda batches, *rest: [*batches].index(0))
     laws = [my_law, "classical", smc.law("pid", kp=20.0)]
     with pytest.raises(ValueError, match="0 is not in list"):  # no run is missing, so no batch
-        smc.compare(laws, ["duffing", "inverted_pendulum"], ["friction", "encoder"], 8, out=found.out, **SHORT)
+        smc.compare(laws, PLANTS, ["friction", "encoder"], 8, out=found.out, **SHORT)
 
 
 def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tmp_path):
@@ -146,7 +157,7 @@ def test_one_command_tunes_runs_tables_and_draws(tmp_path, monkeypatch, capsys):
     )
     words = ["compare", "inverted_pendulum,duffing", "--law", "classical,mine.py", "--condition", "friction,encoder"]
     words += ["--condition", "worn: friction=Coulomb(0.05), sensor=Encoder(counts=4096)", "--no-tune"]
-    words += ["--seeds", "2", "--duration", "0.5", "--out", "results", "--latex", "table.tex", "--figure", "fig"]
+    words += ["--seeds", "2", "--duration", "0.1", "--out", "results", "--latex", "table.tex", "--figure", "fig"]
     with pytest.raises(SystemExit) as end:
         main.main(words)
     assert end.value.code in (0, None)

@@ -326,6 +326,7 @@ def test_a_client_of_ones_own_and_its_address_give_the_same_table(dask, tmp_path
     assert (said, client.returncode) == ("1\n", 0), (tmp_path / "client.log").read_text()
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_in_mid_run_changes_nothing(dask, half_done, tmp_path):
     _, (_, *workers) = dask
     workers[0].send_signal(signal.SIGKILL)

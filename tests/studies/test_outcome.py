@@ -253,7 +253,7 @@ EVERY = pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 
 
 @EVERY
-def test_a_scene_has_an_answer_of_its_own_in_one_sentence(path):
+def test_a_scene_has_an_answer_of_its_own_in_one_sentence_that_singles_out_none_of_equal_runs(path):
     found, traces = declared(path)
     sentence = found.sentence(traces)
     assert found.answer is not summary
@@ -261,6 +261,9 @@ def test_a_scene_has_an_answer_of_its_own_in_one_sentence(path):
     assert not re.search(r"\.\s", sentence)
     assert sentence.endswith(".")
     assert len(sentence) < 480  # six lines of a terminal
+    equal = {name: dict.fromkeys(runs, made(next(iter(runs.values())).scenario, 0.3)) for name, runs in traces.items()}
+    labels = "|".join(re.escape(label) for label in Outcome(traces=traces).labels)
+    assert not re.search(rf"(?:: |under |with )(?:{labels}) (?:\(|in )", found.sentence(equal))
 
 
 @EVERY
@@ -297,11 +300,3 @@ def test_a_scene_s_sentence_changes_when_any_number_behind_it_does(path, monkeyp
         monkeypatch.setattr(words, "_true", lambda holds, run, code=code: true(holds, run) != (holds.__code__ is code))
         assert found.sentence(traces) != sentence, code.co_name
     assert seen | asked
-
-
-@EVERY
-def test_a_scene_singles_out_none_of_equal_runs(path):
-    found, traces = declared(path)
-    equal = {name: dict.fromkeys(runs, made(next(iter(runs.values())).scenario, 0.3)) for name, runs in traces.items()}
-    labels = "|".join(re.escape(label) for label in Outcome(traces=traces).labels)
-    assert not re.search(rf"(?:: |under |with )(?:{labels}) (?:\(|in )", found.sentence(equal))

@@ -108,7 +108,7 @@ def test_every_machine_moves():
 
 
 @renders
-@pytest.mark.parametrize("plant", ["inverted_pendulum", "van_der_pol", "duffing", "pendulum_network"])
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "van_der_pol"])
 def test_every_law_has_its_colour(plant):
     (picture,) = pictures(runs(plant), [0.1], size=(640, 360))
     for law in LAWS:
@@ -135,7 +135,7 @@ def test_arrows_are_to_scale_and_a_bar_shows_switching():
 
 
 @renders
-@pytest.mark.parametrize("plant", ["duffing", "inverted_pendulum", "cart_pole"])
+@pytest.mark.parametrize("plant", ["duffing", "inverted_pendulum"])
 def test_an_arrow_ends_where_the_bar_of_its_range_does(plant):
     """MuJoCo draws an arrow in half the length of a capsule between the same points."""
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.01, x0=0.0))
@@ -192,7 +192,7 @@ def test_a_failed_machine_turns_grey_and_stays_where_it_was():
 
 
 @renders
-@pytest.mark.parametrize("plant", ["inverted_pendulum", "van_der_pol", "pendulum_network"])
+@pytest.mark.parametrize("plant", ["inverted_pendulum", "pendulum_network"])
 def test_a_machine_that_fails_at_once_is_grey_from_the_start(plant):
     good, bad = runs(plant, laws=LAWS[::3])
     first, last = pictures([broken(bad, 0)], [0.0, 0.3])
@@ -366,7 +366,7 @@ def stood(scenarios) -> np.ndarray:
     return puppet.places(found, reaches * len(found), scene.turn(scenarios[0]))
 
 
-@pytest.mark.parametrize(("plant", "field", "name"), VARIANTS, ids=str)
+@pytest.mark.parametrize(("plant", "field", "name"), VARIANTS[::3], ids=str)
 def test_machines_side_by_side_keep_apart(plant, field, name):
     start = None if smc.plant(plant).ranges else 0.5
     scenario = smc.Scenario(plant=plant, law="none", x0=start, duration=0.1, **{field: name})
@@ -508,10 +508,10 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
 
 
 @renders
-@pytest.mark.parametrize("at", [0, 1, 100])
+@pytest.mark.parametrize("at", [0, 100])
 def test_a_realistic_machine_that_fails_is_filmed(at):
-    for parts in ({"actuator": smc.Backlash(0.2)}, {"friction": Coulomb(0.3), "contact": "stops"}):
-        pictures([broken(realistic(duration=0.2, **parts), at)], [0.0, 0.2], charts=True)
+    parts = {"actuator": smc.Backlash(0.2), "friction": Coulomb(0.3), "contact": "stops"}
+    pictures([broken(realistic(duration=0.2, **parts), at)], [0.0, 0.2], charts=True)
 
 
 @renders
@@ -530,13 +530,12 @@ def test_a_blow_is_cut_at_the_control_s_scale_and_the_key_says_so(hit):
 
 
 @renders
-@pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing"])
-def test_the_state_stands_in_a_badge_beside_the_label_in_the_picture(plant):
+def test_the_state_stands_in_a_badge_beside_the_label_in_the_picture():
+    plant = "inverted_pendulum"
     traces = [realistic(law, plant, friction=Coulomb(0.5)) for law in LAWS]
     told = [states.timeline(trace, seconds(trace)) for trace in traces]
     names = style.labels(traces, None)
-    row = plant != "duffing"
-    caption = Caption(traces, names, ["#0072B2"] * 4, None, (1280, 460), 1.0, scales(traces), told, row)
+    caption = Caption(traces, names, ["#0072B2"] * 4, None, (1280, 460), 1.0, scales(traces), told, row=True)
     with Stage(traces, ["#0072B2"] * 4, (1280, 460), caption.room) as shown:
         caption.place(shown.boxes)
     boxes = np.concatenate([caption.pills, caption.badges])

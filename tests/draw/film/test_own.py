@@ -25,8 +25,6 @@ FOREIGN = Path(SUITE.submodule_search_locations[0]) / "suite"
 @pytest.mark.parametrize(
     ("name", "channels"),
     [
-        ("cartpole", {"slider": smc.Channel(partner="hinge_1")}),
-        ("acrobot", {"elbow": None}),
         ("manipulator", {"arm_root": None, "arm_shoulder": None}),
         ("reacher", {"shoulder": None, "wrist": None}),  # from above, and its target reaches below the floor
     ],

@@ -50,7 +50,7 @@ GABER = paper("gaber")
 LIST = """1 3 4 5 7 10 11 12 13 14 15 18 19 20 21 24 25 27 28 29 31 32 33 34 35 36 37 38 39 40
           45 46 48 49 50 51 52 55 56 57 59 61 T"""
 UNIVERSALS = {"11", "18", "19", "20", "24", "50", "59"}
-CHEAP = ("3", "5", "18", "25")
+CHEAP = ("3", "5", "18")
 
 # checks
 
@@ -401,15 +401,12 @@ def test_the_true_law_passes_what_its_mutants_fail(verdicts):
         "3": SUPPORTED,
         "5": SUPPORTED,
         "18": REFUTED,
-        "25": SUPPORTED,
     }
 
 
-@pytest.mark.parametrize("mutant", [reversed_gain, zero_gain])
-def test_a_broken_law_fails(mutant, verdicts):
-    broken = claims(only=["5", "25"], gains="study", quick=True, substitute={OURS: mutant})
-    flipped = {one.id for one in broken if one.verdict != verdicts[one.id].verdict}
-    assert {"5", "25"} <= flipped
+def test_a_broken_law_fails(verdicts):
+    (broken,) = claims(only=["5"], gains="study", quick=True, substitute={OURS: zero_gain})
+    assert (verdicts["5"].verdict, broken.verdict) == (SUPPORTED, REFUTED)
 
 
 def test_more_chattering_than_the_classical_law_flips_the_claim_of_less():

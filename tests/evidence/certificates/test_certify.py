@@ -27,7 +27,8 @@ FORCE = {"duffing": 2.0, "inverted_pendulum": 1.0, "van_der_pol": 0.0}
 
 
 def scenario(plant, law="observer_free", gains="tuned", **changes):
-    return smc.Scenario(plant=plant, law=gain_sets.law(plant, law, gains), duration=8.0, **changes)
+    fields = {"duration": 8.0} | changes
+    return smc.Scenario(plant=plant, law=gain_sets.law(plant, law, gains), **fields)
 
 
 @functools.cache
@@ -227,10 +228,13 @@ MUTANTS = {
 }
 
 
+def test_the_checker_accepts_what_is_no_mutant():
+    assert not refused(copy.deepcopy(certificate("duffing", disturbance=2.0).data))
+
+
 @pytest.mark.parametrize("name", MUTANTS)
 def test_the_checker_refuses_a_mutant_with_a_new_seal(name):
     data = copy.deepcopy(certificate("duffing", disturbance=2.0).data)
-    assert not refused(data)
     MUTANTS[name](data)
     assert refused(data)
 
@@ -352,14 +356,11 @@ def test_no_start_leaves_its_certified_set_and_all_end_within_the_bound(plant):
     assert escapes(plant, 400, 6.0) == (0, 0)
 
 
-@pytest.mark.parametrize(
-    ("plant", "d0", "gains"),
-    [("duffing", 2.0, "tuned"), ("inverted_pendulum", 1.0, "tuned"), ("duffing", 1.0, "study")],
-)
-def test_the_bound_contains_the_worst_found_and_is_below_twice_as_large(plant, d0, gains):
+@pytest.mark.parametrize(("plant", "d0"), [("duffing", 2.0), ("inverted_pendulum", 1.0)])
+def test_the_bound_contains_the_worst_found_and_is_below_twice_as_large(plant, d0):
     """The worst found by the adversary, on the machine that MuJoCo samples."""
-    made, within = certificate(plant, disturbance=d0, gains=gains), smc.Uncertainty(disturbance=d0)
-    worst = smc.worst_case(scenario(plant, gains=gains), "ultimate_bound", within, budget=32)
+    made, within = certificate(plant, disturbance=d0), smc.Uncertainty(disturbance=d0)
+    worst = smc.worst_case(scenario(plant, duration=4.0), "ultimate_bound", within, budget=32)
     assert made.bound is not None
     assert worst.value <= made.bound <= 2.0 * worst.value
 

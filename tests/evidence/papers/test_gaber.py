@@ -561,8 +561,7 @@ def test_real_runs_give_the_verdicts_of_the_first_gains():
     assert over.value == pytest.approx(-100 * run.x.min() / 0.5)
 
 
-@pytest.mark.parametrize("mutant", [zero_gain, reversed_gain])
-def test_a_broken_law_loses_its_claims(mutant):
+def test_a_broken_law_loses_its_claims():
     ids = ["29", "35", "38", "45", "50", "57"]
-    found = claims(only=ids, gains="study", substitute={OURS: mutant})
+    found = claims(only=ids, gains="study", substitute={OURS: reversed_gain})
     assert {one.id: one.verdict for one in found} == dict.fromkeys(ids, REFUTED)

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smc_mujoco.evidence.audit import runs as claim_runs
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.mutants import survivors
 from smc_mujoco.evidence.audit.paper import paper, shipped
@@ -15,7 +14,7 @@ from smc_mujoco.evidence.papers.aldana_lopez_2019.claims import BAND, classical_
 from smc_mujoco.evidence.papers.measures import LATE, exponent, late, late_step, settled
 from smc_mujoco.evidence.papers.perez_ventura_2017.claims import predicted
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.run_key import key
+from tests.evidence.papers.test_quick_verdicts import runs_made_once
 
 ROOT = Path(__file__).parents[3]
 GOLDEN = Path(__file__).parent / "quick_verdicts.json"
@@ -42,24 +41,11 @@ def test_the_page_of_verdicts_has_every_paper_with_what_was_read_and_its_totals(
         assert f"| `{name}` | {paper(name).read} | {cells} |" in page, name
 
 
-@pytest.fixture
-def made_once(monkeypatch):
-    """Simulates each run once. Without it, a third of all steps would be repeated, for claims that share runs."""
-    made, stream = {}, claim_runs.stream
-
-    def kept(scenarios, threads):
-        keys = [key(scenario.named(None)) for scenario in scenarios]
-        new = {name: scenario for name, scenario in zip(keys, scenarios, strict=True) if name not in made}
-        made.update((list(new)[i], trace) for i, trace in stream(list(new.values()), threads))
-        return ((i, made[name]) for i, name in enumerate(keys))
-
-    monkeypatch.setattr(claim_runs, "stream", kept)
-
-
-@pytest.mark.usefixtures("made_once")
 @pytest.mark.parametrize("name", PAPERS)
+@pytest.mark.slow
 def test_a_broken_law_loses_each_claim(name):
-    assert survivors(name) == {}
+    with runs_made_once():
+        assert survivors(name) == {}
 
 
 # measures

@@ -8,6 +8,7 @@ import re
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from scipy.stats import chi2
 from typer.testing import CliRunner
 
@@ -16,6 +17,7 @@ from smc_mujoco.cli.main import app
 from smc_mujoco.evidence.commands import tables
 from smc_mujoco.evidence.rigs import identify as identification
 from smc_mujoco.evidence.rigs import records, uncertainty
+from smc_mujoco.evidence.rigs.figure import residual_figure
 from smc_mujoco.evidence.rigs.replays import Point, Replays
 from smc_mujoco.evidence.rigs.rig import Fall
 from smc_mujoco.simulation import philox
@@ -61,7 +63,7 @@ def axis_record(seconds, begin=0.0, speed=4.0):
 def test_columns_of_the_axis_give_all_four_however_they_begin(begin):
     """By another simulator without steps; a cubic through the first samples would err by 8 % in the offset."""
     near = AXIS.with_values({name: 1.05 * AXIS.values[name] for name in AXIS.free})
-    result = smc.identify(near, axis_record(1.1, begin), starts=1, most=5)
+    result = smc.identify(near, axis_record(0.6 + begin, begin), starts=1, most=4)
     for name, value in result.values.items():
         assert value == pytest.approx(AXIS.values[name], rel=0.02)
     assert min(result.fits[0].values()) > 99.0
@@ -99,7 +101,7 @@ def test_the_published_axis_is_found_within_two_percent(found):
 
 def test_equal_seeds_give_equal_results_and_starts_agree(moved, found):
     free = ("mass", "offset")
-    one, again = (smc.identify(found.rig.with_values({"mass": 80.0}), moved, free, starts=3, seed=5) for _ in range(2))
+    one, again = (smc.identify(found.rig.with_values({"mass": 80.0}), moved, free, starts=2, seed=5) for _ in range(2))
     assert one.values == again.values
     assert one.errors == again.errors
     for name, value in one.values.items():
@@ -122,7 +124,7 @@ def test_a_closed_loop_s_transient_gives_a_quantity_within_three_errors():
     """
     runs = [
         AXIS.scenario(reference=smc.Sine(0.05, 3.0), x0=0.0, duration=1.0, seed=seed, noise=smc.Noise(2e-7))
-        for seed in (4, 8, 10)
+        for seed in (4, 8)
     ]
     for trace in smc.run(runs):
         second = philox.normals(trace.scenario.seed, 0, philox.MEASUREMENT, 1)[0]
@@ -218,15 +220,20 @@ def least_errors(u):
     return NOISE * np.sqrt(np.diag(np.linalg.inv(J.T @ J)))[:4]
 
 
-@pytest.mark.parametrize("start", [{}, {"M": 95.0, "b": 203.0, "cf": 20.4, "offset": -3.2}], ids=["near", "95 kg"])
-def test_standard_errors_cover_the_truth_from_any_start(start):
+FAR = {"M": 95.0, "b": 203.0, "cf": 20.4, "offset": -3.2}
+
+
+@pytest.mark.parametrize(
+    ("start", "seconds"), [({}, 0.75), pytest.param(FAR, 1.5, marks=pytest.mark.slow)], ids=["near", "95 kg"]
+)
+def test_standard_errors_cover_the_truth_from_any_start(start, seconds):
     """The full coverage, three machines and 20 seeds, is in benchmarks/identification.py.
 
     Seed and bounds were fixed before this record was identified. A quantity lies within four standard errors but for
     1 in 16,000. The square of a jackknife's error, of n blocks, is the true one times chi squared / (n - 1), and what
     the steps add is at most half of it.
     """
-    record, rare = pushed(2026), math.erfc(4.0 / math.sqrt(2.0))
+    record, rare = pushed(2026, seconds), math.erfc(4.0 / math.sqrt(2.0))
     found = smc.identify(smc.plant("servo_axis", **CARRIAGE), record, start=start)
     assert min(found.fits[0].values()) >= min(found.fits_before[0].values())
     free = uncertainty.BLOCKS[0] - 1
@@ -253,11 +260,12 @@ def test_shorter_steps_change_what_a_record_with_stops_says():
 
 
 def test_swapped_columns_are_told():
-    record = pushed(1)
+    record = pushed(1, 0.75)
+    exchanged = record | {"x": record["u"], "u": record["x"]}
     with pytest.raises(
         smc.ScenarioError, match=r"columns x and u of the record of servo_axis look swapped, as its pie"
     ):
-        smc.identify(smc.plant("servo_axis"), record | {"x": record["u"], "u": record["x"]}, starts=1)
+        smc.identify(smc.plant("servo_axis", **CARRIAGE), exchanged, ["M"], starts=1)
 
 
 def test_masses_and_frictions_stay_physical():
@@ -337,6 +345,18 @@ def test_results_are_saved_and_drawn(found, tmp_path):
     assert len(data["correlations"]) == 4
     assert [path.suffix for path in found.figure(tmp_path / "fit")] == [".svg", ".png"]
     assert all(path.stat().st_size > 1000 for path in tmp_path.glob("fit.*"))
+
+
+def test_residuals_are_what_was_measured_less_what_was_predicted(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    t, measured, predicted = np.arange(3.0), {"x": np.array([1.0, 2.0, 6.0])}, {"x": np.array([2.0, 4.0, 4.0])}
+    residual_figure("A", t, measured, {"twin": predicted}, {"twin": {"x": 87.6}}, {"x": "m"}, tmp_path / "a")
+    left, right = drawn[0].axes
+    assert [line.get_ydata().tolist() for line in left.lines] == [[1.0, 2.0, 6.0], [2.0, 4.0, 4.0]]
+    assert right.lines[0].get_ydata().tolist() == [-1.0, -2.0, 2.0]
+    assert right.get_title(loc="left") == "residual, rms: twin 1.73"
+    assert left.get_title(loc="left") == "fit: twin 87.6 %"
 
 
 def test_files_of_columns_and_traces_are_read_alike(moved, tmp_path):
