@@ -1,7 +1,6 @@
 """What README and docs show works as it stands: code, commands, links, and the catalogues they name."""
 
 import contextlib
-import functools
 import io
 import re
 import runpy
@@ -47,7 +46,8 @@ RELATIVE = [pair for pair in LINKS if "://" not in pair[1] and not pair[1].start
 
 
 # What is asked for less of than a page does: as much code runs, in a tenth of the time.
-LITTLE = {"compare": {"seeds": 2, "duration": 0.3}, "tune": {"budget": 8}, "identify": {"most": 2}}
+SHORTLY = Objective(duration=0.5)
+LITTLE = {"compare": {"seeds": 2, "duration": 0.3}, "tune": {"objective": SHORTLY}, "identify": {"most": 2}}
 
 
 def with_little(function: Callable, little: dict) -> Callable:
@@ -87,7 +87,7 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
     monkeypatch.setattr(search, "BUDGET", 8)  # of the tunings in `smc.compare`
-    monkeypatch.setattr(fair_gains, "Objective", functools.partial(Objective, duration=0.5))
+    monkeypatch.setattr(fair_gains, "Objective", lambda: SHORTLY)
     for name, little in LITTLE.items():
         monkeypatch.setattr(smc, name, with_little(getattr(smc, name), little))
     monkeypatch.setattr(sys, "argv", ["block.py", "--no-film"])  # read by a scene that plays itself
