@@ -6,8 +6,8 @@
     trace = smc.run(scenario)
     print(smc.score(trace))
 
-A plant is a name of `smc.plants()`, or your own MJCF with the joints to control: `smc.which("arm.xml:shoulder,elbow")`
-tunes laws on it and says which to take.
+A plant is a name of `smc.plants()`, or your own MJCF with the joints to control. `smc.which("arm.xml:shoulder,elbow",
+starts=smc.starts(x0=0.3))` tunes laws on it and says which to take.
 
 The names by task, those of a first script first; `help(smc.run)` tells what a name does:
 

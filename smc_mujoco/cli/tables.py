@@ -1,9 +1,9 @@
-"""Tables of the command line: scores, advice, margins, chattering, tunings."""
+"""Tables of the command line: scores, margins, chattering."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,8 +12,6 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from smc_mujoco.analysis.step_halving import NOTE
-from smc_mujoco.analysis.tuning.result import HEADINGS, Tuned
-from smc_mujoco.common.tabular import folded
 from smc_mujoco.common.text import number
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw import style
@@ -25,16 +23,12 @@ from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.metrics.tip import tip_scores, worst_joint
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.accuracy import AccuracyTable, heads, lines, remarks
-from smc_mujoco.studies.worst_case import HEADINGS as HEADINGS_OF_WORST
-from smc_mujoco.studies.worst_case import WorstCases
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.chattering import Chattering
     from smc_mujoco.analysis.gains_for import Design
     from smc_mujoco.analysis.margins import Margin
     from smc_mujoco.analysis.step_halving import StepChange
-    from smc_mujoco.studies.advice import Advice
 
 MAX_TIP_COLUMNS = 5  # with more, the name of the joint that does most work does not fit into 80 characters
 TIP = {  # columns of a table of an arm's tip and worst joint: heading -> score, unit, factor on its SI value
@@ -242,28 +236,7 @@ def with_package(line: str, package: str) -> str:
     return f"{line} [{package}]" if package else line
 
 
-# advice
-
-
-def advice(found: Advice) -> Table:
-    """Return a line for each finalist: its place, how often it settles, its median on each need."""
-    law, *others = found.heads
-    columns = [Column(head.replace(": ", "\n").replace(", ", "\n"), justify="right") for head in others]
-    table = titled(found.title, Column(law, no_wrap=True), *columns, pad_edge=False)  # 80 columns hold three needs
-    for name, *cells in found.rows:
-        table.add_row(Text(folded(name, 15), style=style.law_colour(name)), *map(_two_lines, cells))
-    table.caption, table.caption_justify = found.key, "left"
-    return table
-
-
-def _two_lines(cell: str) -> str:
-    """Return "1.2 (1.1 to 1.3) *" as two lines, the second with the interval."""
-    middle, _, rest = cell.partition(" (")
-    interval, _, star = rest.partition(")")
-    return f"{middle}{star}\n{interval.replace(' to ', '–')}" if rest else cell
-
-
-# margins, chattering and tunings
+# margins and chattering
 
 
 def margins(kind: str, found: Sequence[Margin]) -> Table:
@@ -280,28 +253,6 @@ def margins(kind: str, found: Sequence[Margin]) -> Table:
         table.add_row(plant, law, value, within, theory, margin.unit)
         last = margin.plant
     return table
-
-
-def worst_cases(found: WorstCases) -> Table:
-    """Return the worst cases of laws: a line for each, the least bad first."""
-    law, *numbers, by = HEADINGS_OF_WORST
-    table = titled(found.title, law, *(Column(head, justify="right", no_wrap=True) for head in numbers), by)
-    for one, (name, *cells) in zip(found, found.rows, strict=True):
-        table.add_row(Text(name, style=style.law_colour(one.nominal.law.name)), *cells)
-    return table
-
-
-def accuracy(found: AccuracyTable) -> Iterator[Table | Text]:
-    """Yield a table for each plant and condition, then the remarks on its laws."""
-    for title, rows in found.groups.items():
-        law, *numbers = heads(rows)
-        columns = Column(law, no_wrap=True), *(Column(head, justify="right", no_wrap=True) for head in numbers)
-        table = titled(title, *columns, padding=(0, 2, 0, 0), pad_edge=False, show_edge=False)
-        for row, (name, *cells) in zip(rows, lines(rows), strict=True):
-            table.add_row(Text(name, style.law_colour(row.law)), *cells)
-        yield table
-        for text in remarks(rows):
-            yield Text(f"* {text}")
 
 
 def chattering(
@@ -350,15 +301,3 @@ def designs(designs: Sequence[Design], unit: str) -> Table:
         gains = ", ".join(f"{name}={number(gain)}" for name, gain in one.law.gains.items() if math.isfinite(gain))
         table.add_row(Text(one.law.name, style=style.law_colour(one.law.name)), gains, number(one.disturbance))
     return table
-
-
-def tuning(tuned: Tuned) -> Table:
-    """Return a line for each tuned gain: its value, the bounds of its search, and whether it is at one of them."""
-    title = f"{tuned.law.name} on {tuned.plant.name}"
-    table = Table(*HEADINGS, title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
-    for line in tuned.lines():
-        table.add_row(*line)
-    return table
-
-
-# claims

@@ -164,6 +164,33 @@ class Tabular:
         return "\n".join([*lines, "\\bottomrule", "\\end{tabular}\n"])
 
 
+class Tables:
+    """Base of results that are shown as `tables` by `print`, in terminals and notebooks, and in LaTeX."""
+
+    @property
+    def tables(self) -> Sequence[Tabular]:
+        """The tables, in their order."""
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        return "\n\n".join(map(str, self.tables))
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def __rich_console__(self, console: "Console", options: "ConsoleOptions") -> "Iterator[RenderableType]":
+        for table in self.tables:
+            yield table
+            yield ""
+
+    def _repr_html_(self) -> str:
+        return "<br>".join(table._repr_html_() for table in self.tables)
+
+    def to_latex(self) -> str:
+        """Return a LaTeX tabular for each table, below comments that say what it is of; needs booktabs."""
+        return "\n".join(table.to_latex() for table in self.tables if table.rows)
+
+
 def plain(shown: "RenderableType", width: int = PLAIN_WIDTH) -> str:
     """Return what rich prints, as text without colours."""
     from rich.console import Console
@@ -177,7 +204,9 @@ def plain(shown: "RenderableType", width: int = PLAIN_WIDTH) -> str:
 
 
 def folded(name: str, width: int) -> str:
-    """Return a name on several lines, broken at spaces and after underscores."""
+    """Return a name that is longer than a width on several lines, broken at spaces and after underscores."""
+    if len(name) <= width:
+        return name
     return "\n".join(line.replace("_ ", "_") for line in textwrap.wrap(name.replace("_", "_ "), width))
 
 

@@ -1,7 +1,7 @@
-"""Numbers, lists and tables as text."""
+"""Numbers and lists as text."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -24,10 +24,3 @@ def joined(parts: Iterable[str]) -> str:
     """Return "a, b and c"; "" for no parts."""
     *most, last = list(parts) or [""]
     return f"{', '.join(most)} and {last}" if most else last
-
-
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table as plain text, with columns two spaces apart."""
-    lines = [tuple(headings), *map(tuple, rows)]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join("  ".join(map(str.ljust, line, widths)).rstrip() for line in lines)

@@ -18,7 +18,6 @@ half the step. RK4, for plain equations, keeps the scenario's own step.
 import dataclasses
 import math
 import os
-import textwrap
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -27,7 +26,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis.scaling import QUANTITIES, Accuracy, Scaling, scaling
-from smc_mujoco.common import html
 from smc_mujoco.common.errors import (
     ScenarioError,
     ScenarioWarning,
@@ -42,12 +40,13 @@ from smc_mujoco.common.errors import (
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import ended, read_json, reading, write_json
 from smc_mujoco.common.progress import Report, summed
+from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import joined
-from smc_mujoco.common.text import table as text_table
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.source import by_words, kinds
+from smc_mujoco.draw.style import law_colour
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import last
@@ -72,7 +71,6 @@ MIN_STEPS = 16  # physics steps in a control period of a mechanism with friction
 RESOLUTION = 1e-11  # of the initial error; chosen, above rounding and the creep of stuck joints
 STEP_CHANGE = 0.25  # of an error when the physics step is halved, from which on it is said; chosen
 SATURATED = 0.05  # of the last samples at the bound on u, from which on it is said; chosen
-WIDTH = 80  # characters of a line of text
 PARTS = 3  # of a run, each as long as its last part, in which errors are compared
 MAX_SEEDS = 10_000
 FULL = 1.0 - 1e-9  # of the bound on u, above the rounding of a saturated u
@@ -84,34 +82,17 @@ KEY = (
 )
 
 
-class AccuracyTable(list[Accuracy]):
-    """Accuracies of laws, for each plant and condition the most accurate law first. Notebooks show them as tables."""
-
-    def __str__(self) -> str:
-        parts = []
-        for title, rows in self.groups.items():
-            below = [textwrap.fill(f"* {text}", WIDTH, subsequent_indent="  ") for text in remarks(rows)]
-            heading = textwrap.fill(title, WIDTH)
-            parts.append("\n".join([heading, text_table(heads(rows), lines(rows)), *below, ""]))
-        return "\n".join([*parts, textwrap.fill(KEY, WIDTH)])
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        parts = []
-        for title, rows in self.groups.items():
-            note = f"{KEY} {'. '.join(remarks(rows))}"
-            parts.append(html.table(heads(rows), lines(rows), title, note, range(1, 6), len(rows)))
-        return "".join(parts)
+class AccuracyTable(Tables, list[Accuracy]):
+    """Accuracies of laws, for each plant and condition the most accurate law first. They are shown as tables."""
 
     @property
-    def groups(self) -> "dict[str, AccuracyTable]":
-        """The rows of each plant and condition, by a title, which says where the laws' gains come from."""
-        found: dict[str, AccuracyTable] = {}
+    def tables(self) -> list[Tabular]:
+        """A table for each plant and condition, with remarks on its laws."""
+        groups: dict[str, list[Accuracy]] = {}
         for row in self:
-            found.setdefault(f"{row.plant}, {row.condition}: |e| in {row.unit}", AccuracyTable()).append(row)
-        gains = {title: by_words({row.law: row.gains for row in rows}) for title, rows in found.items()}
-        return {f"{title}, {gains[title]}" if gains[title] else title: rows for title, rows in found.items()}
+            groups.setdefault(f"{row.plant}, {row.condition}: |e| in {row.unit}", []).append(row)
+        made = [_table(title, rows) for title, rows in groups.items()]
+        return [*made[:-1], *(dataclasses.replace(one, notes=[*one.notes, KEY]) for one in made[-1:])]
 
     def to_pandas(self) -> "pandas.DataFrame":
         """Return a pandas DataFrame with a row for each law on each plant in each condition.
@@ -168,22 +149,22 @@ def _tuples(entry: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def heads(rows: Sequence[Accuracy]) -> list[str]:
-    """Return the headings of a table of rows that share plant and condition."""
+def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:
+    """Return the table of rows that share plant and condition; the title says where the laws' gains come from."""
     first, *_, last = rows[0].periods
-    return ["law", f"{1e3 * first:g} ms", f"{1e3 * last:g} ms", "order of e", "order of s", "theory"]
-
-
-def lines(rows: Sequence[Accuracy]) -> list[list[str]]:
-    """Return the cells of a table of rows that share plant and condition."""
-    return [
-        [row.law + "*" * bool(row.why), row.error(0), row.error(-1), str(row.e), str(row.s), row.theory] for row in rows
+    cells = [
+        [
+            Cell(row.law + "*" * bool(row.why), colour=law_colour(row.law)),
+            *(row.error(0), row.error(-1), str(row.e), str(row.s), row.theory),
+        ]
+        for row in rows
     ]
-
-
-def remarks(rows: Sequence[Accuracy]) -> list[str]:
-    """Return a sentence for each row that has something to say."""
-    return [f"{row.law}: {row.why}" for row in rows if row.why]
+    return Tabular(
+        headings=["law", f"{1e3 * first:g} ms", f"{1e3 * last:g} ms", "order of e", "order of s", "theory"],
+        rows=cells,
+        title=", ".join(filter(None, [title, by_words({row.law: row.gains for row in rows})])),
+        notes=[f"* {row.law}: {row.why}" for row in rows if row.why],
+    )
 
 
 def accuracy(
@@ -227,7 +208,7 @@ def accuracy(
     h = _longest_first(periods)
     numbers = listed("seeds", seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_SEEDS)))
     cells = [
-        _cell(as_plant(plant), find_condition(condition), law, h, numbers, gains, duration, starts)
+        _setup(as_plant(plant), find_condition(condition), law, h, numbers, gains, duration, starts)
         for plant in listed("plants", plants)
         for condition in listed("conditions", conditions)
         for law in listed_laws(laws)
@@ -289,7 +270,7 @@ def _measured(trace: Trace) -> Run:
     return Run(parts, float((np.abs(trace.u[end, driven]) >= FULL * np.array(trace.scenario.limits)).mean()))
 
 
-class Cell(NamedTuple):
+class Setup(NamedTuple):
     """A law on a plant in a condition.
 
     Attributes:
@@ -306,7 +287,7 @@ class Cell(NamedTuple):
     lacking: bool
 
 
-def _cell(
+def _setup(
     plant: Plant,
     condition: Condition,
     law: str | Law | Template,
@@ -315,7 +296,7 @@ def _cell(
     gains: str,
     duration: float,
     starts: Starts | None,
-) -> Cell:
+) -> Setup:
     """Return the runs of a law on a plant in a condition.
 
     Raises:
@@ -338,7 +319,7 @@ def _cell(
         return dataclasses.replace(made, physics_step=h / (steps * finer)).named(made.condition)
 
     runs = [at(seed, h) for seed in seeds for h in periods]
-    return Cell([*runs, at(seeds[0], periods[-1], finer=2)], periods, len(seeds), lacking)
+    return Setup([*runs, at(seeds[0], periods[-1], finer=2)], periods, len(seeds), lacking)
 
 
 def _has_gains(plant: Plant, law: str, gains: str) -> bool:
@@ -357,7 +338,7 @@ def _has_gains(plant: Plant, law: str, gains: str) -> bool:
     return True
 
 
-def _warn_of_defaults(cells: Sequence[Cell], gains: str) -> None:
+def _warn_of_defaults(cells: Sequence[Setup], gains: str) -> None:
     """Warn of laws that have no gains in the set that was asked for."""
     pairs = {f"{cell.scenarios[0].law.name} on {cell.scenarios[0].plant.name}": None for cell in cells if cell.lacking}
     if pairs:
@@ -369,8 +350,8 @@ def _warn_of_defaults(cells: Sequence[Cell], gains: str) -> None:
         )
 
 
-def _row(cell: Cell, runs: Sequence[Run]) -> Accuracy:
-    """Return the row of a law from its runs, in the order of `Cell.scenarios`."""
+def _row(cell: Setup, runs: Sequence[Run]) -> Accuracy:
+    """Return the row of a law from its runs, in the order of `Setup.scenarios`."""
     base, halved = cell.scenarios[0], runs[-1]
     counted = runs[:-1]
     failures = [run.failure for run in counted if run.failure]
@@ -419,7 +400,7 @@ def _outside(scenario: Scenario) -> str:
     return ""
 
 
-def _reasons(cell: Cell, runs: Sequence[Run]) -> Iterator[tuple[str, str]]:
+def _reasons(cell: Setup, runs: Sequence[Run]) -> Iterator[tuple[str, str]]:
     """Yield what may keep a law from the order that theory promises: name -> words."""
     laws = [scenario.law for scenario in cell.scenarios]
     unmet = {words for law in laws if law.template for words in law.template.unmet(law.gains)}

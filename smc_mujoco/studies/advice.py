@@ -12,14 +12,16 @@ import numpy as np
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.ranking import Comparison, Rank
 from smc_mujoco.analysis.signed_rank import least_p
-from smc_mujoco.common import html
-from smc_mujoco.common.text import joined, number, table
+from smc_mujoco.common.tabular import Cell, Tables, Tabular
+from smc_mujoco.common.text import joined, number
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.source import in_words
+from smc_mujoco.draw.style import law_colour
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.conventions import Metric
+from smc_mujoco.studies.board_tables import spread
 from smc_mujoco.studies.leaderboard import size_in_words
 from smc_mujoco.studies.table import Table
 
@@ -61,8 +63,8 @@ class Choice:
         return f"gains: {self.law.source}" + f"; {self.remark}" * bool(self.remark)
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class Advice:
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Advice(Tables):
     """Which law to use on a plant, and how sure that is; `print` shows it, as a notebook does.
 
     Attributes:
@@ -177,26 +179,27 @@ class Advice:
         return f"{self.plant.name} under {joined(self.conditions)}: {joined(self.needs)}{wanted}"
 
     @property
-    def heads(self) -> list[str]:
-        """The headings of the table."""
-        units = [
-            f"{need}: {NEEDS[need].label}, {NEEDS[need].unit_for(self.plant.unit, self.effort)}" for need in self.needs
-        ]
-        return ["law", "place", "settles", *units]
-
-    @property
-    def rows(self) -> list[list[str]]:
-        """The cells of the table, a row for each finalist; * where no finalist is better in any condition."""
+    def tables(self) -> list[Tabular]:
+        """One table with a row for each finalist, above the answer; marked where no finalist is better."""
+        of = [NEEDS[need] for need in self.needs]
+        units = [f"{metric.need}: {metric.label} ({metric.unit_for(self.plant.unit, self.effort)})" for metric in of]
         rows = []
         for choice in self.choices:
-            place = f"{choice.rank.place:g}" if choice.fit else "–"
-            name = choice.law.name
-            rivalled = len(self.compared) > 1 and name in self.compared
-            unbeaten = [need for need in self.needs if rivalled and not self.better(name, need)]
-            stars = [" *" * (need in unbeaten and not self._fails(name, need)) for need in self.needs]
-            cells = [_interval(choice.medians[need]) + star for need, star in zip(self.needs, stars, strict=True)]
-            rows.append([choice.law.name, place, f"{100 * choice.settles:.0f} %", *cells])
-        return rows
+            place, name = f"{choice.rank.place:g}" if choice.fit else "–", choice.law.name
+            settles = f"{100 * choice.settles:.0f} %"
+            rows.append(
+                [Cell(name, colour=law_colour(name)), place, settles, *(self._cell(choice, n) for n in self.needs)]
+            )
+        answer = [*self.answer, *([f"In Python: {self.code}"] if self.code else [])]
+        notes = [line for sentence in (self.key, *answer) for line in (sentence, "")][:-1]
+        return [Tabular(headings=["law", "place", "settles", *units], rows=rows, title=self.title, notes=notes)]
+
+    def _cell(self, choice: Choice, need: str) -> Cell:
+        """Return a median with its interval, marked if no finalist is better in any condition and no run fails."""
+        name, median = choice.law.name, choice.medians[need]
+        rivalled = len(self.compared) > 1 and name in self.compared
+        best = rivalled and not self.better(name, need) and not self._fails(name, need)
+        return Cell(number(median.median), spread(median, need) * (median.low < median.high), best)
 
     @property
     def key(self) -> str:
@@ -425,19 +428,5 @@ class Advice:
         parts += [f"on {need} under {joined(its)}" for need, its in by_need.items() if need not in whole]
         return ", ".join(parts)
 
-    def __str__(self) -> str:
-        answer = [*self.answer, *([f"In Python: {self.code}"] if self.code else [])]
-        return "\n".join([self.title, table(self.heads, self.rows), self.key, "", *answer])
-
     def __repr__(self) -> str:
         return f"Advice({self.plant.name}: {'no law' if self.barred else self.law})"
-
-    def _repr_html_(self) -> str:
-        paragraphs = "".join(f"<p>{html.text(sentence)}</p>" for sentence in self.answer)
-        return html.table(self.heads, self.rows, self.title, self.key, range(1, len(self.heads)), most=40) + paragraphs
-
-
-def _interval(interval: Interval) -> str:
-    """Return a median with its interval, where that has a width."""
-    middle, low, high = (number(value) for value in interval[:3])
-    return middle if math.isnan(interval.low) or low == middle == high else f"{middle} ({low} to {high})"

@@ -26,7 +26,7 @@ from smc_mujoco.common.errors import number as checked
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import read_json, replacing, write_json
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.tabular import Tabular, plain
+from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template, written
@@ -54,7 +54,6 @@ from smc_mujoco.studies.worst_case import WorstCase, worst_case
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure, SubFigure
-    from rich.console import Console, ConsoleOptions, RenderableType
 
     from smc_mujoco.draw.page import Size
 
@@ -64,7 +63,7 @@ MAX_BLOCKS = 12  # plants times conditions that have a table each; of more, each
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Compared:
+class Compared(Tables):
     """Laws compared on plants in conditions. `print` and notebooks show its tables and verdicts.
 
     Attributes:
@@ -151,25 +150,13 @@ class Compared:
                 stacked=True,
             )
 
-    def __repr__(self) -> str:
-        return plain(self)
-
-    def __rich_console__(self, console: "Console", options: "ConsoleOptions") -> "Iterator[RenderableType]":
-        for table in self.tables:
-            yield table
-            yield ""
-
-    def _repr_html_(self) -> str:
-        return "<br>".join(table._repr_html_() for table in self.tables)
-
     def to_latex(self, path: str | os.PathLike[str] | None = None) -> str:
         """Return a LaTeX tabular for each plant in each condition, below comments with the verdicts; needs booktabs.
 
         Args:
           path: of a file to which it is written too.
         """
-        worst = [table.to_latex() for table in self._worst_tables()]
-        text = "\n".join([self.leaderboard.to_latex(), *worst])
+        text = "\n".join(table.to_latex() for table in [*self.leaderboard.tables, *self._worst_tables()])
         if path is not None:
             with replacing(Path(path)) as file:
                 file.write_text(text, encoding="utf-8")

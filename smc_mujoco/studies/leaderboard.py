@@ -15,8 +15,8 @@ would hold in other conditions.
 
 import dataclasses
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,14 +38,11 @@ from smc_mujoco.analysis.ranking import (
 )
 from smc_mujoco.analysis.signed_rank import least_p
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
-from smc_mujoco.common.tabular import Tabular
+from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies import board_tables
-
-if TYPE_CHECKING:
-    from rich.console import Console, ConsoleOptions, RenderableType
 
 FEW_TIMES = 0.5  # ratio below which values are called so many times less, not so many percent; chosen
 MAX_NAMES = 4  # of plants or conditions in a verdict
@@ -149,7 +146,7 @@ class Block:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, repr=False)
-class Board:
+class Board(Tables):
     """Laws compared in one metric within one group of runs.
 
     Attributes:
@@ -193,15 +190,10 @@ class Board:
         winners = {block.winner for block in self.blocks}
         return winners.pop() if len(winners) == 1 else None
 
-    def __repr__(self) -> str:
-        return repr(Boards([self]))
-
-    def _repr_html_(self) -> str:
-        return Boards([self])._repr_html_()
-
-    def to_latex(self) -> str:
-        """Return the board as a LaTeX tabular, which needs the package booktabs, see `Boards.to_latex`."""
-        return Boards([self]).to_latex()
+    @property
+    def tables(self) -> list[Tabular]:
+        """The board as a table, see `Boards.tables`."""
+        return board_tables.tables([self])
 
     @property
     def about(self) -> str:
@@ -350,7 +342,7 @@ def _distinct(runs: int) -> str:
     return f"{runs} distinct run{'s' * (runs > 1)}"
 
 
-class Boards(list[Board]):
+class Boards(Tables, list[Board]):
     """Boards: a list that terminals, notebooks and `print` show as tables, with a verdict on each board."""
 
     @property
@@ -361,21 +353,6 @@ class Boards(list[Board]):
         there are enough runs for a winner.
         """
         return board_tables.tables(self)
-
-    def __repr__(self) -> str:
-        return "\n\n".join(map(str, self.tables))
-
-    def __rich_console__(self, console: "Console", options: "ConsoleOptions") -> "Iterator[RenderableType]":
-        for table in self.tables:
-            yield table
-            yield ""
-
-    def _repr_html_(self) -> str:
-        return "<br>".join(table._repr_html_() for table in self.tables)
-
-    def to_latex(self) -> str:
-        """Return a LaTeX tabular for each of the `tables`, below comments that say what it is of; needs booktabs."""
-        return "\n".join(table.to_latex() for table in self.tables) if self else ""
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -22,7 +22,9 @@ from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, out
 from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.progress import bar
-from smc_mujoco.common.text import number, table
+from smc_mujoco.common.tabular import Cell, Tables, Tabular
+from smc_mujoco.common.text import number
+from smc_mujoco.draw.style import law_colour
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.run import run
@@ -131,7 +133,7 @@ class WorstCase:
     plot = figure
 
 
-class WorstCases(list[WorstCase]):
+class WorstCases(Tables, list[WorstCase]):
     """Worst cases of several laws on one plant within one class, the least bad law first, as a table."""
 
     def __init__(self, found: Iterable[WorstCase]):
@@ -152,19 +154,17 @@ class WorstCases(list[WorstCase]):
         return f"{one.nominal.plant.name}: {CATALOGUE[one.metric].label}{unit}, {one.within.words(one.nominal.plant)}"
 
     @property
-    def rows(self) -> list[tuple[str, str, str, str, str]]:
-        """Law, worst found, median of random members, its place by median, and what found the worst."""
+    def tables(self) -> list[Tabular]:
+        """One table: what was found for each law, the median of random members, and the place by median."""
         by_median = sorted(self, key=lambda one: one.median)
-        return [
-            (
-                one.nominal.law.name,
-                one.shown(one.value),
-                one.shown(one.median),
-                str(by_median.index(one) + 1),
-                one.found_by,
-            )
+        rows = [
+            [
+                Cell(one.nominal.law.name, colour=law_colour(one.nominal.law.name)),
+                *(one.shown(one.value), one.shown(one.median), str(by_median.index(one) + 1), one.found_by),
+            ]
             for one in self
         ]
+        return [Tabular(headings=HEADINGS, rows=rows, title=self.title, notes=self.notes)]
 
     @property
     def notes(self) -> list[str]:
@@ -181,14 +181,6 @@ class WorstCases(list[WorstCase]):
         options = {"title": self.title, "panels": PANELS} | options
         labels = [f"{one.nominal.law.name}: {one.words}" for one in self]
         return figure(run([one.scenario for one in self]), path, labels, **options)
-
-    def __str__(self) -> str:
-        return "\n".join([self.title, table(HEADINGS, self.rows), *self.notes])
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        return html.table(HEADINGS, self.rows, self.title, "; ".join(self.notes), range(1, 4), len(self))
 
 
 def worst_case(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, ParamSpec, TypeVar
 
 from smc_mujoco.common.errors import ScenarioError, number, shown
-from smc_mujoco.common.text import table
+from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
 P = ParamSpec("P")
@@ -56,8 +56,10 @@ def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:
     """
     __tracebackhide__ = True
     if missed := [f"{metric} is {value}, {word} {limit}" for metric, value, limit, kept in limits if not kept]:
-        lines = table(("metric", "value", kind, "ok"), [(*line, "yes" if kept else "NO") for *line, kept in limits])
-        raise AssertionError(f"{'; '.join(missed)} ({note})\n{lines}")
+        rows = [(*line, "yes" if kept else "NO") for *line, kept in limits]
+        raise AssertionError(
+            f"{'; '.join(missed)} ({note})\n{Tabular(headings=('metric', 'value', kind, 'ok'), rows=rows)}"
+        )
 
 
 def quantity(value: float, unit: str = "") -> str:

@@ -5,7 +5,7 @@ import functools
 from collections.abc import Callable, Iterable, Mapping
 
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
-from smc_mujoco.common.text import table
+from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
@@ -149,9 +149,8 @@ class StepResponse:
         """Return a table, as text, of the metrics that have a meaning for this run."""
         if self.failure is not None:
             return f"failed: {self.failure}"
-        return table(
-            ("metric", "value"), [(name, quantity(*self.value(name))) for name in self.values if self.applies(name)]
-        )
+        rows = [(name, quantity(*self.value(name))) for name in self.values if self.applies(name)]
+        return str(Tabular(headings=("metric", "value"), rows=rows))
 
 
 def respond(

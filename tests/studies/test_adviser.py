@@ -18,7 +18,7 @@ from smc_mujoco.analysis import ranking
 from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.cli import main, tables
+from smc_mujoco.cli import main
 from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.law import catalogue, law_function
@@ -58,7 +58,7 @@ def test_doing_nothing_is_calmest_and_is_not_advised_nor_compared(advice):
     idle = advice.choices[-1]
     assert (idle.law.name, idle.fit, idle.settles) == ("idle", False, 0.0)
     assert idle.medians["calm"].median == 0.0
-    assert advice.rows[-1][1:] == ["–", "0 %", "never", "0"]
+    assert [getattr(cell, "text", cell) for cell in advice.tables[0].rows[-1][1:]] == ["–", "0 %", "never", "0"]
     assert "settles too seldom" in advice.key
     assert advice.compared == [choice.law.name for choice in advice.choices[:-1]]
     assert "idle" not in text(advice)
@@ -256,14 +256,14 @@ def test_the_reason_names_laws_with_the_same_mean_rank(advice):
 
 
 def test_a_table_has_a_row_for_each_finalist_with_intervals(advice):
-    assert advice.heads == ["law", "place", "settles", "fast: settling time, s", "calm: TV rate, N/s"]
+    (table,) = advice.tables
+    assert table.headings == ["law", "place", "settles", "fast: settling time (s)", "calm: TV rate (N/s)"]
     interval = advice.choices[0].medians["fast"]
     assert interval.low <= interval.median <= interval.high
-    assert f"{interval.median:.3g}" in advice.rows[0][3]
-    for row in advice.rows:
-        assert all(cell in str(advice) for cell in row)
+    assert f"{interval.median:.3g}" in table.rows[0][3].text
+    assert f"{interval.low:.3g}–{interval.high:.3g}" in table.rows[0][3].below
     assert ">observer_free</td>" in advice._repr_html_()
-    assert "<p>Use observer_free(" in advice._repr_html_()
+    assert "<br>Use observer_free(" in advice._repr_html_()
     assert repr(advice) == f"Advice(duffing: {FAST})"
 
 
@@ -487,7 +487,7 @@ def test_its_table_fits_into_80_columns_with_three_needs(advice, folder):
     capture = io.StringIO()
     laws = [choice.law for choice in advice.choices]
     many = smc.which("duffing", needs="fast,accurate,calm", laws=laws, out=folder, **COMMON)
-    Console(file=capture, width=80).print(tables.advice(many))
+    Console(file=capture, width=80).print(many)
     lines = capture.getvalue().splitlines()
     assert max(map(len, lines)) <= 80
     assert any(line.split()[:3] == ["observer_free", "1", "100"] for line in lines)

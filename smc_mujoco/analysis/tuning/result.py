@@ -14,7 +14,7 @@ from smc_mujoco.analysis.tuning.objective import FAILED, Objective, restore
 from smc_mujoco.analysis.tuning.search_space import DECADES, ROUNDING, Box, at_bound, box, largest, without_unit
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import ended, read_json, reading, write_json
-from smc_mujoco.common.html import table
+from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component
@@ -22,7 +22,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 
 ALIKE = ("rule", "plant", "definition", "budget", "seed", "versions")  # what two tunings must share to be compared
-HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of Tuned.lines
+HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of a tuning's table
 WRITTEN = (
     "objective", "before", "rule", "budget", "seed", "screened", "ends", "scales", "bounds", "searched", "versions",
 )  # fmt: skip
@@ -45,8 +45,8 @@ class Evaluation(NamedTuple):
         return self.tracking >= FAILED
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Tuned:
+@dataclasses.dataclass(frozen=True, kw_only=True, repr=False)
+class Tuned(Tables):
     """A law's best gains, and how they were tuned.
 
     Attributes:
@@ -86,21 +86,21 @@ class Tuned:
     def __repr__(self) -> str:
         return f"Tuned({self.plant.name}, {self.law}, objective={self.objective:.4g}, {self.verdict})"
 
-    def _repr_html_(self) -> str:
-        note = (
-            f"objective {self.objective:.4g} s², of the law's own gains {self.before:.4g} s²; "
-            f"{self.evaluations} evaluations, {self.verdict}"
-        )
-        return table(HEADINGS, self.lines(), f"{self.law.name} on {self.plant.name}", note, range(1, 4))
-
-    def lines(self) -> list[tuple[str, ...]]:
-        """Return a line of text for each gain: its value, the bounds of its search, whether it is at one."""
-        lines = []
+    @property
+    def tables(self) -> list[Tabular]:
+        """One table, a line for each gain: its value, the bounds of its search, and whether it is at one of them."""
+        rows = []
         for name, (low, high) in self.searched.items():
             notes = [f"at its {self.at_bound[name]} bound"] if name in self.at_bound else []
             notes += ["beyond the box of the starts"] if name in self.beyond_box else []
-            lines.append((name, f"{self.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", ", ".join(notes)))
-        return lines
+            rows.append((name, f"{self.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", ", ".join(notes)))
+        said = (
+            str(self.definition),
+            f"{self.verdict}; {len(self.near_optimal)} near-optimal set{'s' * (len(self.near_optimal) > 1)}",
+            f"objective {self.objective:.4g} s², with the law's own gains {self.before:.4g} s²; "
+            f"{self.evaluations} set{'s' * (self.evaluations > 1)} of gains, seed {self.seed}",
+        )
+        return [Tabular(headings=HEADINGS, rows=rows, title=f"{self.law.name} on {self.plant.name}", notes=said)]
 
     def sourced(self) -> "Tuned":
         """Return the tuning with a law that names this search as the source of its gains."""

@@ -50,7 +50,6 @@ def tune(
     """
     with held_back():
         from smc_mujoco.analysis.tuning import search
-        from smc_mujoco.cli import tables
         from smc_mujoco.common.files import ended, writable
 
     for file in (out, front):
@@ -69,13 +68,8 @@ def tune(
         starts=options.starts(x0, spread),
         chattering=chattering,
     )
-    terminal.print(tables.tuning(tuned))
-    terminal.note(str(tuned.definition))
-    terminal.note(f"{tuned.verdict}; {len(tuned.near_optimal)} near-optimal set{'s' * (len(tuned.near_optimal) > 1)}")
-    terminal.note(
-        f"objective {tuned.objective:.4g} s², with the law's default gains {tuned.before:.4g}; "
-        f"{tuned.evaluations} set{'s' * (tuned.evaluations > 1)} of gains, seed {seed}, {terminal.seconds:.1f} s"
-    )
+    terminal.print(tuned)
+    terminal.note(f"{terminal.seconds:.0f} s", "dim")
     if path:
         terminal.wrote(tuned.save(path))
     if front:
@@ -189,7 +183,6 @@ def worst(
     """
     with held_back():
         from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
-        from smc_mujoco.cli import tables
         from smc_mujoco.common.files import ended, writable, write_json
         from smc_mujoco.control import gain_sets
         from smc_mujoco.draw.page import files
@@ -215,9 +208,7 @@ def worst(
     chosen, machine = options.laws(law, gain_sets.LAWS), options.plant(plant)
     cases = [case(machine, one, condition, duration, gains) for one in chosen]
     found = WorstCases(worst_case(one, metric, within, budget, seed, threads, progress=True) for one in cases)
-    terminal.print(tables.worst_cases(found))
-    for note in found.notes:
-        terminal.note(note, "dim", wrap=True)
+    terminal.print(found)
     terminal.note(f"{sum(one.tried for one in found)} runs, {options.gains_used(chosen, gains)}", "dim")
     if json:
         terminal.wrote(write_json(ended(json, ".json"), [one.about() for one in found]))
@@ -266,13 +257,11 @@ def accuracy(
     Example: smc-mujoco accuracy duffing --condition coulomb --law classical,twisting,super_twisting,observer_free
     """
     with held_back():
-        from smc_mujoco.cli import tables
         from smc_mujoco.common.files import ended, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
         from smc_mujoco.control.law import laws as known
         from smc_mujoco.draw.page import files
-        from smc_mujoco.studies.accuracy import KEY
         from smc_mujoco.studies.accuracy import accuracy as measure
 
     json, terminal = options.json_file(json)
@@ -289,9 +278,7 @@ def accuracy(
         found = measure(
             chosen, machines, h, condition, seeds, gains, duration, options.starts(x0, spread), threads, drawn.reached
         )
-    for table in tables.accuracy(found):
-        terminal.print(table)
-    terminal.note(KEY, "dim", wrap=True)
+    terminal.print(found)
     terminal.note(f"{sum(row.runs for row in found)} runs, {terminal.seconds:.0f} s", "dim")
     if json:
         terminal.wrote(found.save(json))

@@ -57,7 +57,6 @@ def which(
     """
     with held_back():
         from smc_mujoco.analysis.differences import RELEVANT
-        from smc_mujoco.cli import tables
         from smc_mujoco.studies.adviser import which as advise
 
     terminal = Terminal()
@@ -77,15 +76,8 @@ def which(
         relevant=RELEVANT if relevant is None else relevant,
         noise_key=options.key(noise_key),
     )
-    terminal.print(tables.advice(advice))
-    for sentence in advice.answer:
-        terminal.print()
-        terminal.note(sentence, wrap=True)
+    terminal.print(advice)
     runs = f"{len(advice.table)} runs of the finalists are in {printable(str(out / 'finals' / 'results.parquet'))}"
-    terminal.print()
-    if advice.code:
-        terminal.note(f"In Python: {advice.code}", wrap=True)
-        terminal.print()
     terminal.note(f"{runs}; {terminal.seconds:.0f} s", "dim")
 
 

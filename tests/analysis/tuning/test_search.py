@@ -241,7 +241,7 @@ def test_a_search_leaves_a_box_that_lacks_the_optimum_by_a_decade_and_says_so():
     assert tuned.searched["lam"] == (pytest.approx(low / 10), pytest.approx(10 * high))
     assert high < tuned.gains["lam"] <= 10 * high
     assert tuned.beyond_box == ["lam"]
-    assert "beyond the box of the starts" in next(line for line in tuned.lines() if line[0] == "lam")[-1]
+    assert "beyond the box of the starts" in next(line for line in tuned.tables[0].rows if line[0] == "lam")[-1]
 
 
 @pytest.mark.parametrize(("gain", "side"), [(1.14, "lower"), (1.16, None), (860.0, None), (880.0, "upper")])
