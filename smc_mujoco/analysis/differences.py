@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 from smc_mujoco.common.errors import number
 
 RELEVANT = 0.03  # default share of the larger value that is relevant; chosen
-# In SI units, and relative: smaller differences are a tie, because they depend on how runs are integrated.
-ROUNDING, ALIKE = 1e-9, 1e-6
+ROUNDING = 1e-9  # in SI units: smaller differences are a tie, because they depend on how runs are integrated
 
 
 def least_difference(value: ArrayLike, resolution: ArrayLike = 0.0, relevant: float = RELEVANT) -> np.ndarray:
@@ -37,12 +36,6 @@ def exceeds(a: ArrayLike, b: ArrayLike, resolution: ArrayLike = 0.0, relevant: f
 def share_that_matters(relevant: float) -> float:
     """Return the share of a value that is relevant. Raise ScenarioError if it is out of range."""
     return number("relevant", relevant, least=0.0, most=0.5)
-
-
-def worse(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return 1.0 where a is larger than b, -1.0 where smaller, 0.0 where equal up to rounding; NaN where a is NaN."""
-    tie = np.maximum(ROUNDING, ALIKE * np.minimum(np.abs(a), np.abs(b)))
-    return np.where(np.isnan(a), np.nan, (a > b + tie).astype(float) - (b > a + tie))
 
 
 def coarse(values: np.ndarray) -> np.ndarray:

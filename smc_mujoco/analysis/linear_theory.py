@@ -5,7 +5,6 @@
     critical_delay(plant, lam=4.4, k1=9.7)                     # s, continuous control
     critical_delay(plant, lam=4.4, k1=9.7, control_period=1e-3)    # s, sampled and held, as in a run
     steady_error(plant, lam=4.4, k1=9.7, d=0.2)                # rad
-    rest_error(plant, law, d=0.2)                              # the same without linearising
 
 At rest the plant is M x'' = -K x - D x' + u + d (`linear`) and u = -lam tanh(x' + k1 x) is -lam (x' + k1 x), so that
 
@@ -135,23 +134,6 @@ def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
     at = linear(plant)
     loop = at.stiffness + lam * k1 * np.eye(plant.n)
     return float(np.abs(np.linalg.solve(loop, np.full(plant.n, d))).max())
-
-
-def rest_error(plant: Plant, law: Law, d: float, u_max: float = math.inf) -> float | None:
-    """Return `steady_error` without linearising: the nearest x > 0 with lam tanh(k1 x) - f(x, 0) / g = |d|.
-
-    inf if there is no such x, None for a law without linear part. Only x up to the first maximum of that force count,
-    because rest beyond it is unstable.
-    """
-    force = holding(plant, law, u_max)
-    if force is None:
-        return None
-    values, d = rising(force), abs(number("d", d))
-    beyond = np.flatnonzero(values >= d)
-    if beyond.size:
-        return float(np.interp(d, np.r_[0.0, values], np.r_[0.0, DISPLACEMENTS[: values.size]]))
-    summit, most = _summit(force, values.size)
-    return summit if d <= most else math.inf
 
 
 def tolerated_force(plant: Plant, law: Law, most: float, u_max: float = math.inf) -> float | None:

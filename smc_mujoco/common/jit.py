@@ -12,7 +12,6 @@ import os
 import re
 import secrets
 import sys
-import warnings
 from collections import namedtuple
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -204,7 +203,6 @@ def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = Fal
       cache: whether to load it from numba's cache on disk, and to write it there if the disk can be written. A body
         whose closure holds other functions needs a name and a hash of all that it reaches.
     """
-    _warned.clear()
     made = CFunc(body, normalize_signature(signature), {}, {"error_model": "numpy"})
     if cache:
         with contextlib.suppress(RuntimeError):  # nowhere to write
@@ -231,18 +229,6 @@ def _load_numba() -> None:
                 linalg.ensure_blas = ensure_blas
 
 
-_warned: list[str] = []  # while a function was compiled
-
-
-def warn(message: str) -> None:
-    """Warn of an old name in the function that is being compiled, and leave its code out of the cache.
-
-    A process that loaded the code would not warn.
-    """
-    _warned.append(message)
-    warnings.warn(message, DeprecationWarning, 3)
-
-
 class Cache(FunctionCache):
     """Cache of a compiled function on disk. A damaged file counts as missing; a full disk is not an error."""
 
@@ -257,9 +243,9 @@ class Cache(FunctionCache):
         return (sig, codegen.magic_tuple()) if self.content else super()._index_key(sig, codegen)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Write an overload, unless its compilation warned, or no other process could load it. Ignore a full disk."""
+        """Write an overload, unless no other process could load it. Ignore a full disk."""
         with contextlib.suppress(OSError):
-            if not _warned and not data.library.has_dynamic_globals and _complete(data.library):
+            if not data.library.has_dynamic_globals and _complete(data.library):
                 super().save_overload(sig, data)
 
 

@@ -62,8 +62,6 @@ if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure, SubFigure
 
-    from smc_mujoco.draw.page import Size
-
 PERIODS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)  # s
 CONDITION = "constant"  # chosen: a disturbance that every law can bear, and that leaves an error to smooth laws
 STARTS = 3  # initial states of each law at each period; chosen
@@ -105,18 +103,11 @@ class AccuracyTable(Tables, list[Accuracy]):
 
         return pandas.DataFrame([row.row() for row in self])
 
-    def plot(
-        self,
-        path: str | os.PathLike | None = None,
-        title: str | None = None,
-        size: "Size" = None,
-        format: str | None = None,
-        fig: "Figure | SubFigure | None" = None,
-    ) -> "Figure | SubFigure":
-        """Draw error over control period, both logarithmic; arguments as in `smc.figure`."""
+    def plot(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
+        """Draw error over control period, both logarithmic; title, size, format and fig are as in `smc.figure`."""
         from smc_mujoco.draw.orders import orders
 
-        return orders(self, path, title, size, format, fig)
+        return orders(self, path, **options)
 
     def save(self, path: str | os.PathLike) -> Path:
         """Write a .json file that `load` reads."""

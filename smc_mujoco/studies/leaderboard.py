@@ -9,8 +9,7 @@
 board is one metric in one group of runs. Laws are compared in each of its blocks, a plant in a condition. The tests are
 corrected for all blocks of the table in this metric, so the verdict on a block is the same on every board that has it.
 The winner of a board with several blocks wins in every one. The conclusions hold for the plants and conditions of the
-table, over initial states and noise, and over the gains with which the laws ran. `Board.friedman` says whether they
-would hold in other conditions.
+table, over initial states and noise, and over the gains with which the laws ran.
 """
 
 import dataclasses
@@ -27,12 +26,10 @@ from smc_mujoco.analysis.paired_runs import SETTLES, Columns
 from smc_mujoco.analysis.ranking import (
     Comparison,
     Effect,
-    Friedman,
     Limits,
     Rank,
     compare,
     corrected,
-    friedman,
     ranks,
     samples_of,
 )
@@ -162,7 +159,6 @@ class Board(Tables):
       level: level of intervals and tests.
       relevant: share of a value that is relevant.
       resolution: the largest difference that a sensor does not resolve, in the unit of the board.
-      friedman: Friedman's test; None for one law, or for one plant in one condition.
     """
 
     group: Mapping[str, str]
@@ -177,7 +173,6 @@ class Board(Tables):
     level: float
     relevant: float
     resolution: float
-    friedman: Friedman | None
 
     @property
     def best(self) -> tuple[str, ...]:
@@ -430,7 +425,6 @@ def leaderboard(
                 level=found.level,
                 relevant=found.relevant,
                 resolution=max(floors),
-                friedman=friedman(found),
             )
             boards.append(board)
     return boards

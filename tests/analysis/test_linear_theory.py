@@ -92,7 +92,6 @@ def test_a_law_that_switches_has_no_theory(name):
     plant = smc.plant("duffing")
     law = own(plant, name)
     assert linearisation.local(law) is None
-    assert linear_theory.rest_error(plant, law, 0.2) is None
     assert linear_theory.tolerated_force(plant, law, 0.1) is None
 
 
@@ -214,24 +213,14 @@ def test_the_measured_steady_error_is_the_one_of_theory_within_one_percent(plant
     trace = smc.run(smc.Scenario(plant=plant, law=law, disturbance=smc.Constant(d), x0=0.01, duration=15.0))
     measured = steady_error(trace)
     assert measured == pytest.approx(linear_theory.steady_error(plant, law.gains["lam"], law.gains["k1"], d), rel=0.01)
-    assert measured == pytest.approx(linear_theory.rest_error(plant, law, d), rel=1e-4)
 
 
 @each_plant
-def test_a_small_disturbance_needs_no_more_than_linear_theory(plant):
-    law = own(plant)
-    lam, k1 = linearisation.local(law) or (0.0, 0.0)
-    assert linear_theory.rest_error(plant, law, 1e-4) == pytest.approx(
-        linear_theory.steady_error(plant, lam, k1, 1e-4), rel=1e-5
-    )
-
-
-@each_plant
-def test_the_tolerated_force_moves_the_plant_to_the_limit(plant):
+def test_under_the_tolerated_force_the_plant_comes_to_rest_at_the_limit(plant):
     law, most = own(plant), 0.02
-    level = linear_theory.tolerated_force(plant, law, most)
-    assert level is not None
-    assert linear_theory.rest_error(plant, law, level) == pytest.approx(most, rel=1e-4)
+    push = smc.Constant(linear_theory.tolerated_force(plant, law, most) or math.nan)
+    trace = smc.run(smc.Scenario(plant=plant, law=law, disturbance=push, x0=0.01, duration=15.0))
+    assert steady_error(trace) == pytest.approx(most, rel=1e-3)
 
 
 @settings(max_examples=15, deadline=None)
@@ -260,10 +249,7 @@ def test_beyond_what_the_law_can_hold_a_pendulum_rests_nowhere():
     law = smc.law("observer_free", lam=2.0, k1=9.7)
     summit = linear_theory.tolerated_force(plant, law, 3.0)
     assert summit is not None
-    assert (linear_theory.rest_error(plant, law, 0.999 * summit) or math.inf) < 0.5
-    assert linear_theory.rest_error(plant, law, 1.001 * summit) == math.inf
-    near = linear_theory.rest_error(plant, law, 0.99 * summit)
     for factor in (0.99, 1.01):
         push = smc.Constant(factor * summit)
-        trace = smc.run(smc.Scenario(plant=plant, law=law, x0=near, disturbance=push, duration=20.0))
+        trace = smc.run(smc.Scenario(plant=plant, law=law, x0=0.1, disturbance=push, duration=20.0))
         assert (abs(trace.x[-1, 0]) < 0.5) == (factor < 1.0)

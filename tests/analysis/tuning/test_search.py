@@ -380,7 +380,7 @@ def test_the_command_prints_gains_and_writes_what_it_found(call, tmp_path):
     tuned = load(tmp_path / "k.json")
     assert code == 0
     assert f"{tuned.gains['k']:g}" in out
-    assert f"objective {tuned.objective:.4g} s², with the law's default gains {tuned.before:.4g}; 2 sets" in out
+    assert f"objective {tuned.objective:.4g} s², with the law's own gains {tuned.before:.4g} s²; 2 sets" in out
     assert tuned.definition == Objective(weight=0.0, u_max=6.0)
     assert ("no set of gains" in err) == (tuned.objective > tuned.before)
 
