@@ -204,11 +204,6 @@ def _value(name: str, value: object, **limits: Any) -> Value:
     return number(name, value, **limits)
 
 
-def _each(value: Value) -> tuple[float, ...]:
-    """Return the numbers of a gain."""
-    return value if isinstance(value, tuple) else (value,)
-
-
 def _template_at(module: str, name: str) -> "Template | None":
     """Return the Template with a dotted name in a module, or None."""
     value: object = sys.modules.get(module)
@@ -324,7 +319,7 @@ class Template:
             gain = self.gains[key]
             above = 0.0 if gain.positive else -math.inf
             least = 0.0 if gain.nonnegative else -math.inf
-            infinite = any(math.isinf(one) for one in _each(gain.default))
+            infinite = bool(np.isinf(gain.default).any())
             values[key] = _value(f"{self.name}'s {key}", value, above=above, least=least, infinite=infinite)
             if isinstance(values[key], tuple) and (gain.shared or self.kind != "law"):
                 raise ScenarioError(f"{self.name}'s {key} is {written(values[key])}: give one number for all channels")
@@ -345,15 +340,6 @@ class Template:
             template=self,
         )
         return made if gains else made.sourced(DEFAULT)
-
-
-def _check_orders(accuracy: object) -> None:
-    """Raise ScenarioError for an option `accuracy` that is not a mapping from "s" and "e" to orders."""
-    if not isinstance(accuracy, Mapping) or not accuracy.keys() <= {"s", "e"}:
-        raise ScenarioError(f"accuracy is {shown(accuracy)}: give orders of s and e, such as {{'s': 1, 'e': 1}}")
-    for quantity, order in accuracy.items():
-        if not callable(order):
-            number(f"accuracy of {quantity}", order, least=0.0)
 
 
 def _per_channel(gains: Mapping[str, Value]) -> Iterable[SimpleNamespace]:
@@ -448,18 +434,10 @@ def template(
     memory, relative_degree = whole("memory", memory, 1, 10_000), whole("relative_degree", relative_degree, 1, 10)
     if isinstance(plants, str):
         raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")
-    if not isinstance(conditions, Mapping | None) or not all(map(callable, (conditions or {}).values())):
-        raise ScenarioError(f"conditions is {shown(conditions)}: give words with functions of the gains")
-    for word in ("label", "short", "colour", "family"):
-        if not isinstance(words.get(word, ""), str):
-            raise ScenarioError(f"{word} is {shown(words[word])}: give a text")
     if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(words.get("colour", ""))):
         raise ScenarioError(f"colour is {shown(words['colour'])}: give one like '#0072B2'")
-    if not isinstance(words.get("joint", False), bool):
-        raise ScenarioError(f"joint is {shown(words['joint'])}: give True or False")
     if words.get("finite_time", "") not in FINITE:
         raise ScenarioError(f"finite_time is {shown(words['finite_time'])}: give 's', 'e' or ''")
-    _check_orders(words.get("accuracy", {}))
     for sign, names in (("positive", positive), ("nonnegative", nonnegative)):
         for name in names:
             if name not in stated:

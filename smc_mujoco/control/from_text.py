@@ -128,15 +128,14 @@ def _of_tuning(path: str) -> list[Law]:
     return [made]
 
 
-def _of_c(path: str) -> list[Law]:
-    return [annexes.module("smc_mujoco.exchange.c.load", f"law {path}").law_from_c(path)()]
+def _of_annex(kind: str) -> Callable[[str], list[Law]]:
+    """Return the function that reads the law of a file of a kind, "c" or "fmu"."""
+    home = f"smc_mujoco.exchange.{kind}.load"
+    return lambda path: [getattr(annexes.module(home, f"law {path}"), f"law_from_{kind}")(path)()]
 
 
-def _of_fmu(path: str) -> list[Law]:
-    return [annexes.module("smc_mujoco.exchange.fmu.load", f"law {path}").law_from_fmu(path)()]
-
-
-READERS = {".py": _of_python, ".json": _of_tuning, ".c": _of_c, ".so": _of_c, ".fmu": _of_fmu}  # by suffix
+READERS = {".py": _of_python, ".json": _of_tuning, ".fmu": _of_annex("fmu")}  # by suffix
+READERS |= dict.fromkeys((".c", ".so"), _of_annex("c"))
 
 
 def _reader(text: str) -> Callable[[str], list[Any]] | None:

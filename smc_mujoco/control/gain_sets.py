@@ -6,7 +6,7 @@
 - study: a first tuning of the paper's laws to the same bound |u| <= 6. It is never changed in the light of results.
 - tuned: the near-optimal gains of a search by `tuning`, for every general law, with a cost of the variation of u. The
   laws of LAWS have up to 24 sets of gains: run i of a study uses its own set, so that gains are part of the sample.
-  `converged` tells whether the starts of the search agree. All other laws have the gains of one start.
+  `tuned(...).converged` tells whether the starts of the search agree. All other laws have the gains of one start.
 - tracking: the same for the laws of LAWS, without that cost.
 - default: the law's own.
 
@@ -183,16 +183,6 @@ def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:
         cure += f", or as the FILE.json that smc-mujoco tune {plant.argument} {name} --out FILE.json writes"
     cure += ", or take the defaults (--gains default)"
     raise ScenarioError(f"no gains in set {gains!r} for {name} on {plant.name}: {cure}")
-
-
-def has(plant: Plant, name: str, gains: str = "tuned") -> bool:
-    """Return whether a set has gains for a law on a plant, for this form of it."""
-    return _known(plant.name, name, gains) is not None
-
-
-def converged(plant: str | Plant, name: str, gains: str = "tuned") -> bool | None:
-    """Return whether three starts of the search ended within 1 % of the best J; None if it had fewer."""
-    return tuned(plant, name, gains).converged
 
 
 def paper_plant(plant: object) -> str:

@@ -108,10 +108,7 @@ class Condition:
         """Return the text that `parse` reads, or the name alone for a condition of the suite."""
         if self.name in NAMED or callable(self.fields):
             return self.name
-        try:
-            texts = [f"{name}={_text(value)}" for name, value in self.fields.items()]
-        except Exception:  # from the repr of a user's value, which no scenario takes either
-            texts = [f"{name}={shown(value)}" for name, value in self.fields.items()]
+        texts = [f"{name}={_text(value)}" for name, value in self.fields.items()]
         return f"{self.name}: {', '.join(texts)}"
 
 
@@ -282,18 +279,10 @@ def _joined(both: tuple[Condition, Condition], plant: Plant, duration: float) ->
     for field in [field for field in second if field in first]:
         if field in SEVERAL:
             second[field] = *coerce.several(first[field]), *coerce.several(second[field])
-        elif not _equal(first[field], second[field]):
+        elif first[field] != second[field]:
             names = " and ".join(repr(one.name) for one in both)
             raise ScenarioError(f"conditions {names} both set {field}: give one of them, or smc.condition(...)")
     return first | second
-
-
-def _equal(one: Any, other: Any) -> bool:
-    """Return whether two values are equal; False if comparing them fails, as with arrays."""
-    try:
-        return bool(one == other)
-    except Exception:
-        return False
 
 
 def _jump(size: str) -> Recipe:

@@ -17,7 +17,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.jit import AtAddress, Function, NotCompilable
 from smc_mujoco.control import joint_law
-from smc_mujoco.control.component import Component, at
+from smc_mujoco.control.component import at
 from smc_mujoco.control.properties import read_by
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, native_coriolis, native_jacobian
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
@@ -195,12 +195,13 @@ def _tables(prepared: Prepared, buffer: state.Buffer) -> dict[str, list[dict[str
     s, compiled = prepared.scenario.resolved, prepared.functions
     assert compiled is not None
     n, memory = s.plant.n, {"memory": buffer.reserve(s.law.memory * s.plant.n), "stride": 8 * s.law.memory}
+    each = range(n if s.law.joint else 1)  # numbers of a gain
     laws = zip(compiled.laws, s.law.of_channels(s.plant.driven), strict=True)
     named = zip(compiled.references, references(s), strict=True)
     disturbed = enumerate(zip(compiled.disturbances, s.disturbance, strict=True))
     return {
         "laws": [
-            _function(made, joint_gains(law, n) if law.joint else law.gains.values(), buffer) | memory
+            _function(made, [at(value, i) for value in law.gains.values() for i in each], buffer) | memory
             for made, law in laws
         ],
         "references": [_function(made, native.values_of(signal), buffer) for made, signal in named],
@@ -323,8 +324,3 @@ def _frictions(prepared: Prepared, buffer: state.Buffer) -> list[dict[str, int]]
     inertia = with_values(shared.model, prepared.scenario).dof_M0[shared.channels["qvel"]]
     places = [(buffer.put(friction.parameters(i)), buffer.put(friction.bristle(i, a))) for i, a in enumerate(inertia)]
     return [{"address": made.address, "parameters": first, "memory": second} for first, second in places]
-
-
-def joint_gains(law: Component, n: int) -> list[float]:
-    """Return n numbers for each gain of a law of many joints, one after the other."""
-    return [at(value, i) for value in law.gains.values() for i in range(n)]

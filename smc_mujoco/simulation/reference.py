@@ -25,8 +25,9 @@ from smc_mujoco.simulation import model as assembly
 from smc_mujoco.simulation import philox, trace
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_CONTROL, MAX_STATE
+from smc_mujoco.simulation.prepare import references
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import PerChannel, Push, Signal
+from smc_mujoco.simulation.signals import Push, Signal
 from smc_mujoco.simulation.state import LOG
 from smc_mujoco.simulation.trace import Trace, from_log
 
@@ -473,12 +474,6 @@ def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
         )
         found = Dynamics(np.diag(1.0 / moving[:, 1]), -moving[:, 0] / moving[:, 1], -resting[:, 0] / resting[:, 1])
     return Dynamics(found.M / gain, (found.h + drag * v) / gain, found.g / gain)
-
-
-def references(scenario: Scenario) -> tuple[Signal, ...]:
-    """Return the reference of all channels, or those of the driven channels if they differ."""
-    one = scenario.resolved.reference
-    return one.signals if isinstance(one, PerChannel) else (one,)
 
 
 def evaluate(signal: Signal, t: float, *state: Any) -> list[float]:

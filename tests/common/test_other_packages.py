@@ -203,7 +203,7 @@ def test_a_package_brings_the_gains_of_its_law(install):
     assert [gain_sets.law("duffing", "tuned_law", seed=seed).gains for seed in range(len(tuned.sets))] == [
         dict(zip(tuned.bounds, one.gains, strict=True)) for one in tuned.sets
     ]
-    assert gain_sets.converged("duffing", "tuned_law") is None
+    assert gain_sets.tuned("duffing", "tuned_law").converged is None
 
 
 def test_a_plant_of_a_package_may_be_a_model_s_file(install, tmp_path):

@@ -11,6 +11,8 @@ MuJoCo simulates a DCMotor and its current, under implicitfast. It gets such a v
 a step is right for a held u, see `drive_step`.
 """
 
+# pyright: reportIncompatibleVariableOverride=false
+# (a constant of the base class is a property here)
 import dataclasses
 import math
 from collections.abc import Hashable, Iterator

@@ -89,17 +89,13 @@ class LuGre(Friction):
     """
 
     bristles = True
+    stateful = True  # the bend of the bristles
 
     coulomb: float
     static: float
     stribeck: float
     stiffness: float = 1e3
     damping: float | None = None
-
-    @property
-    def stateful(self) -> bool:
-        """Whether it has a state that MuJoCo integrates, inaccurately under RK4: the bend of the bristles."""
-        return True
 
     def __post_init__(self) -> None:
         self.check_numbers("coulomb", "static", "stribeck", "stiffness", above=0.0)

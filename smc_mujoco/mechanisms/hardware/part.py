@@ -32,10 +32,7 @@ START = "smc:start"  # keyframe with the initial positions of joints without a c
 class Part:
     """Base of all parts."""
 
-    @property
-    def stateful(self) -> bool:
-        """Whether it has a state that MuJoCo integrates, inaccurately under RK4."""
-        return False
+    stateful: ClassVar[bool] = False  # whether it has a state that MuJoCo integrates, inaccurately under RK4
 
     def check_numbers(self, *names: str, **bounds: Any) -> None:
         """Replace fields by floats. None stays if it is the field's default.
@@ -95,25 +92,10 @@ class Actuator(Part):
     drives: ClassVar[bool] = True  # whether it turns u into force; else it stands after a drive
     in_callback: ClassVar[bool] = False  # whether the callback simulates it, and MuJoCo gets its force
 
-    @property
-    def scale(self) -> float:
-        """Control of the model's actuator per unit of u."""
-        return 1.0
-
-    @property
-    def delay(self) -> float:
-        """Time constant with which the force follows a held u, s; 0 for none."""
-        return 0.0
-
-    @property
-    def unit(self) -> str:
-        """Unit of u; "" for that of the joint's force."""
-        return ""
-
-    @property
-    def nominal(self) -> "Nominal":
-        """What the law's model knows of it."""
-        return Nominal()
+    scale: ClassVar[float] = 1.0  # control of the model's actuator per unit of u
+    delay: ClassVar[float] = 0.0  # s, time constant with which the force follows a held u; 0 for none
+    unit: ClassVar[str] = ""  # of u; "" for that of the joint's force
+    nominal: ClassVar[Nominal] = Nominal()  # what the law's model knows of it
 
 
 def drives(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:

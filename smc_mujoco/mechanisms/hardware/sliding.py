@@ -54,6 +54,7 @@ class Sliding(Friction):
     """
 
     bristles = True
+    stateful = True  # its force is held over each physics step, so RK4 would not make it more accurate
 
     stiffness: PerJoint | None = dataclasses.field(default=None, kw_only=True)
 
@@ -61,11 +62,6 @@ class Sliding(Friction):
     def names(self) -> tuple[str, ...]:
         """The fields that the formula reads as p: all that a class adds to this one."""
         return tuple(field.name for field in dataclasses.fields(self) if field.name != "stiffness")
-
-    @property
-    def stateful(self) -> bool:
-        """True: its force is held over each physics step, so RK4 would not make it more accurate."""
-        return True
 
     def __post_init__(self) -> None:
         self.check_numbers("stiffness", above=0.0)
