@@ -788,44 +788,18 @@ class Function:
         return found if made.kind == "real" else found._replace(pointer="")  # of 16 bits, so that functions get a copy
 
     def _subscript(self, node: ast.Subscript) -> Value:
-        array, joints = self.resolve(node.value), self.program.joints
-        if isinstance(array, tuple | list) or (isinstance(array, np.ndarray) and not joints):
-            return self.outside(self.of_constants, node, array)
-        owner = self.outside(self.value, node.value)
-        if owner.kind == "memory" and not joints:
-            return self.outside(self.of_memory, node, owner)
+        constants, joints = self.resolve(node.value), self.program.joints
+        if isinstance(constants, tuple | list | np.ndarray):
+            owner = self.outer(node.value, np.asarray(constants))
+        else:
+            owner = self.outside(self.value, node.value)
         if owner.kind == "memory":
-            owner = Value(f"{owner.text}[{ROW} * {SLOTS} + {COLUMN}]", f"real[{JOINTS}][{SLOTS}]")
+            owner = array_at(owner.text, f"real[{JOINTS}][{SLOTS}]" if joints else f"real[{SLOTS}]")
         dimensions = shape(owner.kind)
         places = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         if not dimensions or len(places) > len(dimensions):
             raise refuse(node, "an element")
         return self.elements(node, owner, [*places, *[ast.Slice()] * (len(dimensions) - len(places))])
-
-    def of_constants(self, node: ast.Subscript, array: Any) -> Value:
-        """Return an element of a constant array."""
-        index, constants = self.whole(node), self.program.array(ast.unparse(node.value).replace(".", "_"), array)
-        if (place := self.constant(node.slice)) is not None and not -len(array) <= place < len(array):
-            raise refuse(node, f"an index outside {-len(array)} to {len(array) - 1}")
-        return Value(f"{constants.text}[{self.from_start(node.slice, index, len(array)).text}]", constants.kind)
-
-    def of_memory(self, node: ast.Subscript, owner: Value) -> Value:
-        """Return a number of the memory of a component of one channel."""
-        index, place, component = self.whole(node), self.constant(node.slice), self.program.component
-        if place is None and component.kind == "estimator":  # a ring of readings, as long as its memory
-            place = component.memory - 1
-        if place is None or place < 0:
-            why = "at an index that is not constant" if place is None else "at a negative index"
-            raise refuse(node, f"memory {why}")
-        self.program.claim(node, int(place))
-        return Value(f"{owner.text}[{index.text}]", "real")
-
-    def whole(self, node: ast.Subscript) -> Value:
-        """Return the only index of an element, an integer."""
-        index = self.numeric(node.slice)
-        if index.kind != "int":
-            raise refuse(node, "an index that is not an integer")
-        return index
 
     def elements(self, node: ast.Subscript, owner: Value, places: Sequence[ast.expr]) -> Value:
         """Return some elements of an array, by an index or a colon for each dimension."""
@@ -839,23 +813,26 @@ class Function:
                 continue
             index = self.outside(self.numeric, place)
             self.check_index(node, place, index, dimension)
-            index = self.from_start(place, index, dimension)
-            text = text.replace(token, index.within(PRODUCT))
+            index = index if dimension == SLOTS else self.from_start(place, index, dimension)
+            text = text.replace(f"[{token}]", f"[{index.text}]").replace(token, index.within(PRODUCT))
             row = pointer and token == ROW and len(places) == 2
             pointer = f"{pointer} + {index.within(PRODUCT)} * {shape(owner.kind)[1]}" if row else ""
         return Value(text, base(owner.kind) + "".join(f"[{n}]" for n in left), owner.level, pointer)
 
     def check_index(self, node: ast.Subscript, place: ast.expr, index: Value, dimension: str) -> None:
         """Refuse an index that is no integer, or out of range as far as it is known."""
-        constant = self.constant(place)
+        constant, component = self.constant(place), self.program.component
         if index.kind != "int":
             raise refuse(node, "an index that is not an integer")
         if dimension == SLOTS:
+            if constant is None and component.kind == "estimator":  # a ring of readings, as long as its memory
+                constant = component.memory - 1
             if constant is None or constant < 0:
-                raise refuse(node, f"memory at {'a negative' if constant else 'an'} index that is not constant")
+                why = "at an index that is not constant" if constant is None else "at a negative index"
+                raise refuse(node, f"memory {why}")
             self.program.claim(node, int(constant))
-        elif constant is not None and not 0 <= constant < self.program.size(dimension):
-            raise refuse(node, f"an index outside 0 to {self.program.size(dimension) - 1}")
+        elif constant is not None and not -(size := self.program.size(dimension)) <= constant < size:
+            raise refuse(node, f"an index outside {-size} to {size - 1}")
 
     def from_start(self, place: ast.expr, index: Value, length: int | str) -> Value:
         """Return an index from the start for an index of Python, which counts from the end if it is negative."""
