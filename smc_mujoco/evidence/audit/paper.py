@@ -26,7 +26,6 @@ from smc_mujoco.common.catalogue import KINDS, Catalogue, added, source, warn
 from smc_mujoco.common.errors import ScenarioError, find, name, shown, unknown
 from smc_mujoco.common.files import reading, replacing
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.registry import modules
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue as laws_known
@@ -295,21 +294,20 @@ def _read(folder: Path, package: str) -> Paper:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{folder / FILE} is no TOML: {error}") from None
-    code = _modules(folder, package)
+    code = _module(folder, package)
     try:
         return _checked(folder, data, code)
     except ScenarioError as error:
         raise ScenarioError(f"{folder / FILE}: {error}") from None
 
 
-def _modules(folder: Path, package: str) -> list[ModuleType]:
-    """Return the modules with a paper's functions: claims.py, or every module of a folder claims/."""
-    if not (folder / CODE).is_file() and not (folder / "claims").is_dir():
+def _module(folder: Path, package: str) -> ModuleType:
+    """Return the module claims.py with a paper's functions."""
+    if not (folder / CODE).is_file():
         raise ScenarioError(f"no {CODE} in {folder}: write one, with a function for each claim of {FILE}")
     before, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # a user's folder stays as it is
     try:
-        home = importlib.import_module(f"{package}.claims")
-        return [home, *(modules(home.__name__) if hasattr(home, "__path__") else ())]
+        return importlib.import_module(f"{package}.claims")
     except ScenarioError as error:
         raise ScenarioError(f"{folder / CODE}: {error}") from None
     except SyntaxError as error:
@@ -339,7 +337,7 @@ def failed(paper: Paper, entry: Entry, error: BaseException) -> ScenarioError:
     return ScenarioError(f"{_place(error, paper.folder)}: {called} raised {_said(error)}")
 
 
-def _checked(folder: Path, data: Mapping[str, Any], code: Sequence[ModuleType]) -> Paper:
+def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
     """Return the paper in a file's data."""
     for field in data:
         if field not in (known := (*TEXTS, "sets", "quick_sets", "plants", "conditions", "gains", "allowed", "claim")):
@@ -369,10 +367,7 @@ def _checked(folder: Path, data: Mapping[str, Any], code: Sequence[ModuleType]) 
         **texts,
         **parts,
     )
-    functions: dict[str, Callable] = {}
-    for module in code:
-        own = {key: value for key, value in vars(module).items() if inspect.isfunction(value)}
-        functions |= own | {f"{module.__name__.rpartition('.')[2]}.{key}": value for key, value in own.items()}
+    functions = {key: value for key, value in vars(code).items() if inspect.isfunction(value)}
     allowed = {law: _allowed(law, one, functions, paper) for law, one in _table(data, "allowed")}
     paper = dataclasses.replace(paper, allowed=allowed)
     claims = _typed("claim", data.get("claim", []), list, "tables, each under a line [[claim]]")
@@ -546,9 +541,9 @@ def _fields(what: str, text: str) -> dict[str, Any]:
     return fields
 
 
-def _laws(code: Sequence[ModuleType]) -> Iterator[tuple[str, Template | Component]]:
-    """Yield name, law of every law in a paper's modules; refuse one with the name of another law of the library."""
-    for value in [value for module in code for value in vars(module).values()]:
+def _laws(code: ModuleType) -> Iterator[tuple[str, Template | Component]]:
+    """Yield name, law of every law in a paper's module; refuse one with the name of another law of the library."""
+    for value in vars(code).values():
         if isinstance(value, Template | Component) and value.kind == "law":
             known = laws_known().get(value.name)
             if known and known.function is not value.function:

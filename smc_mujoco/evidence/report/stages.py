@@ -22,8 +22,7 @@ from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.evidence.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim
-from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.evidence.papers.gaber.claims import lyapunov
+from smc_mujoco.evidence.papers.gaber import lyapunov, scenarios
 from smc_mujoco.evidence.report import about, films, oscillation, precision, rigs, scores, words
 from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.evidence.report.scores import Place, Score

@@ -38,8 +38,9 @@ from smc_mujoco.evidence.audit.verdict import (
 )
 from smc_mujoco.evidence.commands import tables
 from smc_mujoco.evidence.commands.papers import claims as command
-from smc_mujoco.evidence.papers.gaber.claims import common, lyapunov, searches
-from smc_mujoco.evidence.papers.gaber.claims.common import OURS
+from smc_mujoco.evidence.papers.gaber import claims as measured
+from smc_mujoco.evidence.papers.gaber import lyapunov
+from smc_mujoco.evidence.papers.gaber.claims import OURS
 from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import metrics
@@ -373,14 +374,14 @@ def about(plants, **options):
 
 def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory():
     runs = about(("inverted_pendulum", "van_der_pol", "duffing"))
-    for name, found in searches.smallest_stable(runs).items():
-        theory, _ = lam_range(find_plant(name), runs.law(name, OURS).gains["k1"], common.PERIOD)
+    for name, found in measured.smallest_stable(runs).items():
+        theory, _ = lam_range(find_plant(name), runs.law(name, OURS).gains["k1"], measured.PERIOD)
         assert theory <= found <= 1.02 * theory, name
 
 
 def test_a_law_without_effect_stabilises_what_hangs_alone():
-    found = searches.smallest_stable(about(("duffing", "pendulum_network"), quick=True, substitute={OURS: zero_gain}))
-    assert found == {"duffing": math.inf, "pendulum_network": searches.MIN_LAMBDA}
+    found = measured.smallest_stable(about(("duffing", "pendulum_network"), quick=True, substitute={OURS: zero_gain}))
+    assert found == {"duffing": math.inf, "pendulum_network": measured.MIN_LAMBDA}
 
 
 # the audit

@@ -124,16 +124,12 @@ def test_fields_are_the_paper_s_then_the_condition_s_the_claim_s_and_the_changes
     assert (one.duration, one.x0, one.seed, one.u_max, one.condition) == (1.0, (0.2,), 3, 4.0, "far")
 
 
-def test_functions_may_be_in_several_files(folder):
-    home = folder(MINIMAL.replace('"small"', '"second.small"'), None)
-    (home / "claims").mkdir()
-    for name, value in (("first", 3.0), ("second", 1.5)):
-        code = f"from .shared import VALUE\ndef small(runs):\n    return {{'size': VALUE * {value}}}\n"
-        (home / "claims" / f"{name}.py").write_text(code)
-    (home / "claims" / "shared.py").write_text("VALUE = 1.0\n")
+def test_claims_may_import_other_files_of_their_folder(folder):
+    home = folder(MINIMAL, "from .shared import VALUE\ndef small(runs):\n    return {'size': VALUE * 1.5}\n")
+    (home / "shared.py").write_text("VALUE = 1.0\n")
     (one,) = claims(paper=home)
     assert one.numbers["default"]["size"]["value"] == 1.5
-    assert set(evidence.files(paper(home))) == {"paper.toml", "claims/first.py", "claims/second.py", "claims/shared.py"}
+    assert set(evidence.files(paper(home))) == {"paper.toml", "claims.py", "shared.py"}
 
 
 # broken folders

@@ -11,19 +11,12 @@ from smc_mujoco.analysis.margins import DELAYS, TOLERATED_ERROR
 from smc_mujoco.control.gain_sets import SETS
 from smc_mujoco.control.law import law_function
 from smc_mujoco.control.variants import reversed_gain, with_gains, zero_gain
-from smc_mujoco.evidence.audit.audit import claims
+from smc_mujoco.evidence.audit.audit import claims, measure
 from smc_mujoco.evidence.audit.paper import paper
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED, Check, verdict
-from smc_mujoco.evidence.papers.gaber.claims import (
-    common,
-    contributions,
-    lyapunov,
-    practical,
-    robustness,
-    searches,
-    table_one,
-)
+from smc_mujoco.evidence.papers.gaber import claims as measured
+from smc_mujoco.evidence.papers.gaber import lyapunov
 from smc_mujoco.evidence.papers.gaber.scenarios import LAWS
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.scenario import Scenario
@@ -63,12 +56,12 @@ class Stub(Runs):
 
 def of(runs: Runs, id: str) -> list[Check]:
     """The checks of a claim, without what stands beside them."""
-    return [one for one in GABER.claims[id].evidence(runs.of(GABER.claims[id])) if isinstance(one, Check)]
+    return [one for one in measure(GABER.claims[id], runs.of(GABER.claims[id])) if isinstance(one, Check)]
 
 
 def judged(runs: Runs, id: str) -> str:
     """The verdict on a claim under one set of gains."""
-    return verdict(GABER.claims[id].evidence(runs.of(GABER.claims[id])), GABER.claims[id].quantifier)
+    return verdict(measure(GABER.claims[id], runs.of(GABER.claims[id])), GABER.claims[id].quantifier)
 
 
 def test_what_a_law_may_ask_for_beyond_the_actuator_is_no_bound():
@@ -236,7 +229,7 @@ def test_a_check_has_one_name_under_all_sets_of_gains(id):
     for name in SETS:
         runs = Stub(lambda s: {"tv_rate": 7919.0 * s.law.gains["lam"] * (1.0 + s.input_delay) % 1.0})
         runs.gains = name
-        named.add(tuple(one.what for one in GABER.claims[id].evidence(runs.of(GABER.claims[id]))))
+        named.add(tuple(one.what for one in measure(GABER.claims[id], runs.of(GABER.claims[id]))))
     assert len(named) == 1
 
 
@@ -264,7 +257,7 @@ def test_the_plane_shows_a_rise_of_v_if_there_is_one(rate, expected, monkeypatch
 def test_complexity_is_judged_by_the_fastest_rival(time, expected, monkeypatch):
     """Claim 14; another may be slower."""
     told = {OURS: time, CLASSICAL: 1.0}
-    monkeypatch.setattr(contributions, "nanoseconds", lambda laws, quick: dict.fromkeys(laws, 9.0) | told)
+    monkeypatch.setattr(measured, "nanoseconds", lambda laws, quick: dict.fromkeys(laws, 9.0) | told)
     assert judged(Stub(), "14") == expected
 
 
@@ -329,7 +322,7 @@ def test_fluctuation_tells_the_numbers_of_a_sum_of_two_tones():
     """Amplitudes 3 and 4 at 10 and 100 Hz: variance 4.5 + 8, 16/25 of it above 50 Hz; before 8 s nothing counts."""
     u = 3 * np.sin(2 * np.pi * 10 * T) + 4 * np.sin(2 * np.pi * 100 * T) + np.where(T < 7.9, 1e3, 0.0)
     trace = Stub(drawn=lambda s: (0.0 * T, u)).trace(Runs(GABER, "study").scenario("van_der_pol", OURS))
-    std, step, share = robustness.fluctuation(trace)
+    std, step, share = measured.fluctuation(trace)
     assert std == pytest.approx(math.sqrt(12.5), rel=1e-3)
     assert share == pytest.approx(16 / 25, rel=1e-2)
     assert step == pytest.approx(np.abs(np.diff(u[8000:])).max())
@@ -349,11 +342,11 @@ def test_a_cheap_tanh_must_stay_near_the_exact_one_and_settle():
 
 def test_the_plain_series_is_tanh_near_zero_and_leaves_it_far_off():
     """Order 7: its first missing term is 62 s^9 / 2835."""
-    law = practical.observer_free_series(lam=1.0, k1=1.0)
+    law = measured.observer_free_series(lam=1.0, k1=1.0)
     for s in (0.1, 0.3):
-        (u,) = table_one._asked(law, np.array([s]))
+        (u,) = measured.commanded(law, np.array([s]))
         assert 0 < u + math.tanh(s) < 62 * s**9 / 2835
-    (far,) = table_one._asked(law, np.array([4.0]))
+    (far,) = measured.commanded(law, np.array([4.0]))
     assert far > 100.0  # the wrong way
 
 
@@ -386,9 +379,9 @@ def test_the_decay_rate_of_an_exponential_is_its_own_and_of_an_oscillation_its_e
     base = runs.scenario("duffing", OURS)
     for ring in (0.0, 40.0):
         x = 1.5 * np.exp(-2.0 * T) * np.cos(ring * T)
-        assert practical.decay_rate(Stub(drawn=lambda s, x=x: (x, x)).trace(base)) == pytest.approx(2.0, rel=0.03)
+        assert measured.decay_rate(Stub(drawn=lambda s, x=x: (x, x)).trace(base)) == pytest.approx(2.0, rel=0.03)
     for x in (1.5 + 0.0 * T, np.where(T < 5.0, 1.5 * np.exp(-T), np.nan)):
-        assert math.isnan(practical.decay_rate(Stub(drawn=lambda s, x=x: (x, x)).trace(base)))
+        assert math.isnan(measured.decay_rate(Stub(drawn=lambda s, x=x: (x, x)).trace(base)))
 
 
 @pytest.mark.parametrize(
@@ -421,22 +414,22 @@ def tolerating(most: dict[str, float]) -> Told:
 @pytest.mark.parametrize("periods", [0, 1, 3, 7, 20, 33, 61, 99, 100, 499, 500])
 def test_the_search_finds_the_largest_delay_to_one_control_period(periods):
     runs = Stub(tolerating({OURS: periods * 1e-3}))
-    assert searches.largest_delays(runs, ["duffing"], [OURS]) == {("duffing", OURS): pytest.approx(periods * 1e-3)}
+    assert measured.largest_delays(runs, ["duffing"], [OURS]) == {("duffing", OURS): pytest.approx(periods * 1e-3)}
 
 
 def test_a_law_that_tolerates_no_delay_and_one_that_tolerates_all_end_the_search():
-    found = searches.largest_delays(Stub(tolerating({OURS: -1.0, CLASSICAL: 9.0})), ["duffing"], [OURS, CLASSICAL])
+    found = measured.largest_delays(Stub(tolerating({OURS: -1.0, CLASSICAL: 9.0})), ["duffing"], [OURS, CLASSICAL])
     assert found == {("duffing", OURS): 0.0, ("duffing", CLASSICAL): DELAYS[-1]}
 
 
 def test_a_law_that_comes_to_rest_only_with_a_delay_tolerates_none():
     late = Stub(lambda s: {"ultimate_bound": 0.0 if s.input_delay else 9.0})
-    assert searches.largest_delays(late, ["duffing"], [OURS]) == {("duffing", OURS): 0.0}
+    assert measured.largest_delays(late, ["duffing"], [OURS]) == {("duffing", OURS): 0.0}
 
 
 def test_a_quick_search_ends_within_eight_periods_below():
     for periods in (13, 61, 333):
-        (found,) = searches.largest_delays(
+        (found,) = measured.largest_delays(
             Stub(tolerating({OURS: periods * 1e-3}), quick=True), ["duffing"], [OURS]
         ).values()
         assert periods - 8 < round(found * 1e3) <= periods
@@ -453,8 +446,8 @@ def test_delay_tolerance_is_more_than_each_rivals(ours, rivals, expected):
 
 
 def test_theory_of_a_delay_is_told_of_the_law_and_not_of_its_mutant():
-    assert searches.critical_delay(Runs(GABER, "study"), "duffing") == pytest.approx(0.178, abs=0.002)
-    assert math.isnan(searches.critical_delay(Runs(GABER, "study", substitute={OURS: zero_gain}), "duffing"))
+    assert measured.critical_delay(Runs(GABER, "study"), "duffing") == pytest.approx(0.178, abs=0.002)
+    assert math.isnan(measured.critical_delay(Runs(GABER, "study", substitute={OURS: zero_gain}), "duffing"))
 
 
 # table I
@@ -523,13 +516,13 @@ def test_needed_signals_and_growth_are_read_off_what_a_law_does():
     like = lambda law: {OURS: lambda _: law}  # noqa: E731
     table = GABER.claims["T"]
     as_it_is = Runs(GABER, "study").of(table)
-    assert table_one.estimated(as_it_is, OURS) == 0.0
-    assert table_one.estimated(Runs(GABER, "study", substitute=like(accelerated())).of(table), OURS) == 1.0
-    assert table_one.growth(as_it_is, OURS) == pytest.approx(0.0, abs=1e-6)
+    assert measured.estimated(as_it_is, OURS) == 0.0
+    assert measured.estimated(Runs(GABER, "study", substitute=like(accelerated())).of(table), OURS) == 1.0
+    assert measured.growth(as_it_is, OURS) == pytest.approx(0.0, abs=1e-6)
     for law, grows in ((accelerated(), pytest.approx(9.0)), (winding(), pytest.approx(1.0, rel=1e-2))):
-        assert table_one.growth(Runs(GABER, "study", substitute=like(law)).of(table), OURS) == grows
-    assert table_one.growth(as_it_is, HOSMC) > 0.5
-    assert table_one.growth(as_it_is, CLASSICAL) == 0.0
+        assert measured.growth(Runs(GABER, "study", substitute=like(law)).of(table), OURS) == grows
+    assert measured.growth(as_it_is, HOSMC) > 0.5
+    assert measured.growth(as_it_is, CLASSICAL) == 0.0
 
 
 # the catalogue, and real runs
@@ -548,8 +541,8 @@ def test_every_claim_of_the_simulations_is_there_and_says_what_it_measures():
 
 def test_of_two_laws_that_never_settle_none_is_slower_or_like_the_other():
     runs = Stub(lambda s: {"settling_time": never})
-    assert not common.slower(runs.of(GABER.claims["37"]), "duffing", CLASSICAL).holds
-    assert not common.alike(runs.of(GABER.claims["36"]), "duffing", CLASSICAL, OURS).holds
+    assert not measured.slower(runs.of(GABER.claims["37"]), "duffing", CLASSICAL).holds
+    assert not measured.alike(runs.of(GABER.claims["36"]), "duffing", CLASSICAL, OURS).holds
 
 
 def test_real_runs_give_the_verdicts_of_the_first_gains():

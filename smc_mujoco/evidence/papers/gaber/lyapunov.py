@@ -10,9 +10,7 @@ With alpha = v + k1 x and u = -lam tanh(alpha), on x'' = f(x, v) + g u,
     s'      = (1 + (lam / g) / cosh(alpha)^2) alpha'            for a constant g, as all of the study's plants have
     V'      = s s'                                                                                          (2)
 
-The paper asserts V' <= -eps s^2 without expanding s'. For g > 0, s has the sign of alpha and the bracket is positive,
-so V' has the sign of alpha alpha'. On alpha = 0, where v = -k1 x, (1) leaves alpha' = f(x, -k1 x) - k1^2 x: wherever
-that is not 0, V' is positive on one side of the line, arbitrarily near it, whatever lam is.
+So V rises beside alpha = 0 wherever f(x, -k1 x) is not k1^2 x, see docs/mathematics.md.
 
 A network is synchronised: with equal angles and rates its springs are relaxed and each channel is one pendulum. Such a
 state with V' > 0 is a state of the whole network.
