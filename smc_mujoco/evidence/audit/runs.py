@@ -15,7 +15,7 @@ import itertools
 import math
 from collections import ChainMap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.files import from_json
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from smc_mujoco.studies.table import Table
 
 Scores = dict[str, float]
+Name = TypeVar("Name")
 Substitute = Mapping[str, Callable[[Component], Component]]  # law's name -> what makes its mutant of it
 
 
@@ -219,6 +220,10 @@ class Runs:
             name = _key(scenario, plants)
             self.used[name] = self.used.get(name, Used(scenario))._replace(trace=_hash_of_trace(traces[i]))
         return [traces[i] for i in range(len(wanted))]
+
+    def traced(self, scenarios: Mapping[Name, Scenario]) -> dict[Name, Trace]:
+        """Return name -> trace of named scenarios, such as those of `grid`."""
+        return dict(zip(scenarios, self.traces(scenarios.values()), strict=True))
 
     def results(self) -> Iterator[Result]:
         """Yield every run of the audit whose scores were used, and every run of the table."""

@@ -120,9 +120,9 @@ def means(trace):
 
 def each(runs, measure):
     """Return condition -> measure of its trace; with the law's name if there are several."""
-    grid = runs.grid()
-    names = {cell: cell[2] if len(runs.laws) == 1 else f"{cell[1]}, {cell[2]}" for cell in grid}
-    return {names[cell]: measure(trace) for cell, trace in zip(grid, runs.traces(grid.values()), strict=True)}
+    traces = runs.traced(runs.grid())
+    names = {cell: cell[2] if len(runs.laws) == 1 else f"{cell[1]}, {cell[2]}" for cell in traces}
+    return {names[cell]: measure(trace) for cell, trace in traces.items()}
 
 
 def inside(runs):
@@ -157,8 +157,8 @@ def variation(runs):
 
 def reaching(runs):
     """Time from which |x| <= h rho, over the paper's bound h k0 = |x0| / (a - rho), rho the amplitude of d."""
-    grid, ratios = runs.grid(), {}
-    for (_, law, condition), trace in zip(grid, runs.traces(grid.values()), strict=True):
+    ratios = {}
+    for (_, law, condition), trace in runs.traced(runs.grid()).items():
         rho, gains = trace.scenario.disturbance[0].amplitude, trace.scenario.law.gains
         bound = abs(trace.scenario.resolved.v0[0]) / (gains["a" if "a" in gains else "k"] - rho)
         time = settled(trace, trace.v[:-1], 1.01 * trace.scenario.control_period * rho)
@@ -168,11 +168,8 @@ def reaching(runs):
 
 def explicit(runs):
     """Total variation of u, and the largest |x|, implicit over explicit."""
-    grid = runs.grid()
-    traces = {
-        (law, condition): trace for (_, law, condition), trace in zip(grid, runs.traces(grid.values()), strict=True)
-    }
-    pairs = {one: [traces[law, one] for law in runs.laws] for one in runs.conditions}
+    traces = runs.traced(runs.grid())
+    pairs = {one: [traces[runs.plant, law, one] for law in runs.laws] for one in runs.conditions}
     return {
         "variation of u, implicit / explicit": {
             k: variation_of(a.u) / variation_of(b.u) for k, (a, b) in pairs.items()
@@ -181,20 +178,20 @@ def explicit(runs):
     }
 
 
-def at_periods(runs, condition, periods):
-    """Return traces of the claim's law at each period, with one step of the plant a period."""
-    return runs.traces(
-        runs.scenario(runs.plant, runs.laws[0], condition, control_period=h, physics_step=h) for h in periods
+def at_periods(runs, condition, count=None):
+    """Return period -> trace of the claim's law at the first periods, with one step of the plant a period."""
+    law, periods = runs.laws[0], runs.values["periods"][:count]
+    return runs.traced(
+        {h: runs.scenario(runs.plant, law, condition, control_period=h, physics_step=h) for h in periods}
     )
 
 
 def with_a_model(runs):
     """Exponents of the largest |s_x| and |x| of the last half in the control period, 3 ms to 0.1 s."""
-    periods = runs.values["periods"]
-    traces = at_periods(runs, runs.conditions[0], periods)
+    traces = at_periods(runs, runs.conditions[0])
     return {
-        "exponent of the largest |s_x| in h": exponent(periods, [largest(one.s) for one in traces]),
-        "exponent of the largest |x| in h": exponent(periods, [largest(one.x) for one in traces]),
+        "exponent of the largest |s_x| in h": exponent([*traces], [largest(one.s) for one in traces.values()]),
+        "exponent of the largest |x| in h": exponent([*traces], [largest(one.x) for one in traces.values()]),
     }
 
 
@@ -202,7 +199,7 @@ def twisting(runs):
     """Largest |x - h^2 d of the step before| of the last half, over h^2 times the largest |d|."""
     errors = {}
     for condition in runs.conditions:
-        for h, trace in zip(runs.values["periods"], at_periods(runs, condition, runs.values["periods"]), strict=True):
+        for h, trace in at_periods(runs, condition).items():
             gap = trace.x[1:] - h**2 * trace.d[:-1]
             errors[f"{condition}, {h:g} s"] = largest(gap) / (h**2 * trace.scenario.disturbance[0].amplitude)
     return {"largest |x / (h^2 d) - 1|": errors}
@@ -210,22 +207,19 @@ def twisting(runs):
 
 def rests(runs):
     """Largest |x| and |u| of the last half without a disturbance, at 10 and 100 ms."""
-    periods = runs.values["periods"]
-    traces = dict(zip([f"{h:g} s" for h in periods], at_periods(runs, "nominal", periods), strict=True))
+    traces = at_periods(runs, "nominal")
     return {
-        "largest |x| at the end, m": {name: largest(one.x) for name, one in traces.items()},
-        "largest |u| at the end, N": {name: largest(one.u) for name, one in traces.items()},
+        "largest |x| at the end, m": {f"{h:g} s": largest(one.x) for h, one in traces.items()},
+        "largest |u| at the end, N": {f"{h:g} s": largest(one.u) for h, one in traces.items()},
     }
 
 
 def observed(runs):
     """Exponent of the largest error of the predicted position of the last half in the control period."""
-    periods = runs.values["periods"][: -1 if runs.quick else None]
-    errors = [largest(one.s) for one in at_periods(runs, runs.conditions[0], periods)]
-    names = [f"{h:g} s" for h in periods]
+    errors = {h: largest(one.s) for h, one in at_periods(runs, runs.conditions[0], -1 if runs.quick else None).items()}
     return {
-        "exponent of the largest |e1| in h": exponent(periods, errors),
-        "largest |e1|, m": dict(zip(names, errors, strict=True)),
+        "exponent of the largest |e1| in h": exponent([*errors], errors.values()),
+        "largest |e1|, m": {f"{h:g} s": error for h, error in errors.items()},
     }
 
 
@@ -233,8 +227,7 @@ def converges(runs):
     """Largest |x| of the last tenth of 120 s over h^2 times the largest |d|, from several starts at h = 0.1 s."""
     shares = {}
     for start, speed in runs.values["starts"][: 2 if runs.quick else None]:
-        grid = runs.grid(x0=start, v0=speed, physics_step=0.1)
-        for (_, _, condition), trace in zip(grid, runs.traces(grid.values()), strict=True):
+        for (_, _, condition), trace in runs.traced(runs.grid(x0=start, v0=speed, physics_step=0.1)).items():
             h, amplitude = trace.scenario.control_period, trace.scenario.disturbance[0].amplitude
             last = float(np.abs(trace.x[-len(trace.x) // 10 : -1]).max())
             shares[f"{condition}, from {start:g} m at {speed:g} m/s"] = last / (h**2 * amplitude)

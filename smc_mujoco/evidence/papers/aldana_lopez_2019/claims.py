@@ -57,61 +57,55 @@ def classical_bound(law):
     return 1.0 / (k1 * (1.0 - a)) + 1.0 / (k2 * (b - 1.0))
 
 
-def times(runs, laws, starts, band=BAND):
-    """Return the settling times of s in runs of each law from each start, in that order."""
-    scenarios = [
-        runs.scenario(plant, law.name, *runs.conditions, law=law, v0=v0, duration=LONGER * least_bound(law))
-        for plant, law in laws
-        for v0 in starts
-    ]
-    return [settled(trace, trace.s, band) for trace in runs.traces(scenarios)]
+def times(runs, cells, band=BAND):
+    """Return name -> settling time of s, from name -> plant, law and start."""
+    scenarios = {
+        name: runs.scenario(plant, law.name, *runs.conditions, law=law, v0=v0, duration=LONGER * least_bound(law))
+        for name, (plant, law, v0) in cells.items()
+    }
+    return {name: settled(trace, trace.s, band) for name, trace in runs.traced(scenarios).items()}
 
 
 def from_far(runs):
     """Time from which |s| stays within 1e-6 m/s, from 5000 m/s, over the least bound and over the classical one."""
-    (plant,), (name,) = runs.plants, runs.laws
-    law = runs.law(plant, name)
-    (time,) = times(runs, [(plant, law)], [runs.values["start"]])
-    return {"time from far / least bound": time / least_bound(law)} | {
-        "time from far / classical bound": time / classical_bound(law)
-    }
+    law = runs.law(runs.plant, *runs.laws)
+    (time,) = times(runs, {"": (runs.plant, law, runs.values["start"])}).values()
+    bounds = {"least": least_bound(law), "classical": classical_bound(law)}
+    return {f"time from far / {name} bound": time / bound for name, bound in bounds.items()}
 
 
 def from_anywhere(runs):
     """Time from which |s| stays within 1e-6 m/s, from 0.1 to 100 m/s on three plants, over the least bound."""
-    (name,), starts = runs.laws, runs.values["starts"]
-    laws = [(plant, runs.law(plant, name)) for plant in runs.plants[: 1 if runs.quick else None]]
-    names = [f"{plant}, from {start:g} m/s" for plant, _ in laws for start in starts]
-    found = zip(names, times(runs, laws, starts), strict=True)
-    return {"time / least bound": {name: time / least_bound(laws[0][1]) for name, time in found}}
+    laws = {plant: runs.law(plant, *runs.laws) for plant in runs.plants[: 1 if runs.quick else None]}
+    cells = {
+        f"{plant}, from {start:g} m/s": (plant, law, start)
+        for plant, law in laws.items()
+        for start in runs.values["starts"]
+    }
+    bound = least_bound(laws[runs.plant])
+    return {"time / least bound": {name: time / bound for name, time in times(runs, cells).items()}}
 
 
 def predefined(runs):
     """Time from which |s| stays within 1e-6 m/s, from 5000 m/s, over the time Tc that the gains were scaled for."""
-    (plant,), (name,), wanted = runs.plants, runs.laws, runs.values["times"][: 1 if runs.quick else None]
-    law = runs.law(plant, name)
-    scaled = []
-    for tc in wanted:
-        share = least_bound(law) / tc
-        gains = {"k1": share * law.gains["k1"], "k2": share * law.gains["k2"]}
-        scaled.append((plant, runs.law(plant, name, **gains)))
-    found = times(runs, scaled, [runs.values["start"]])
-    return {"time from far / time asked for": {f"{tc:g} s": time / tc for tc, time in zip(wanted, found, strict=True)}}
+    law, cells = runs.law(runs.plant, *runs.laws), {}
+    for tc in runs.values["times"][: 1 if runs.quick else None]:
+        gains = {gain: least_bound(law) / tc * law.gains[gain] for gain in ("k1", "k2")}
+        cells[tc] = runs.plant, runs.law(runs.plant, *runs.laws, **gains), runs.values["start"]
+    return {"time from far / time asked for": {f"{tc:g} s": time / tc for tc, time in times(runs, cells).items()}}
 
 
 def disturbed(runs):
     """Time from which |s| stays within 1 mm/s under d = 0.5 sin 5t, with k = 0.6, over the least bound."""
-    (plant,), (name,), starts = runs.plants, runs.laws, runs.values["starts"]
-    law = runs.law(plant, name, k=runs.values["k"])
-    found = times(runs, [(plant, law)], starts, SWITCHING)
-    names = [f"from {start:g} m/s" for start in starts]
-    return {"time / least bound": {one: time / least_bound(law) for one, time in zip(names, found, strict=True)}}
+    law = runs.law(runs.plant, *runs.laws, k=runs.values["k"])
+    cells = {f"from {start:g} m/s": (runs.plant, law, start) for start in runs.values["starts"]}
+    found = times(runs, cells, SWITCHING)
+    return {"time / least bound": {name: time / least_bound(law) for name, time in found.items()}}
 
 
 def general(runs):
     """Time from which |s| stays within 1e-6 m/s, from 5000 m/s, over gamma."""
-    (plant,), (name,) = runs.plants, runs.laws
-    law = runs.law(plant, name)
-    scenario = runs.scenario(plant, name, law=law, v0=runs.values["start"], duration=LONGER * gamma(law.gains))
+    law = runs.law(runs.plant, *runs.laws)
+    scenario = runs.scenario(runs.plant, law.name, law=law, v0=runs.values["start"], duration=LONGER * gamma(law.gains))
     (trace,) = runs.traces([scenario])
     return {"time from far / gamma": settled(trace, trace.s, BAND) / gamma(law.gains)}

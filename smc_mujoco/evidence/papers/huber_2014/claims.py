@@ -27,13 +27,12 @@ def quarter(signal):
 
 def rests(runs):
     """Largest |x| and |u| of the last quarter of 12 s at control periods of 5 to 100 ms, without a disturbance."""
-    (plant,), (law,), periods = runs.plants, runs.laws, runs.values["periods"]
-    traces = runs.traces(runs.scenario(plant, law, control_period=h) for h in periods)
-    names = [f"{1e3 * h:g} ms" for h in periods]
-    pairs = list(zip(names, traces, strict=True))
+    periods = {f"{1e3 * h:g} ms": h for h in runs.values["periods"]}
+    grid = {name: runs.scenario(runs.plant, *runs.laws, control_period=h) for name, h in periods.items()}
+    traces = runs.traced(grid).items()
     return {
-        "largest |x| of the last quarter, m": {name: np.abs(quarter(trace.x)).max() for name, trace in pairs},
-        "largest |u| of the last quarter, N": {name: np.abs(quarter(trace.u)).max() for name, trace in pairs},
+        "largest |x| of the last quarter, m": {name: np.abs(quarter(trace.x)).max() for name, trace in traces},
+        "largest |u| of the last quarter, N": {name: np.abs(quarter(trace.u)).max() for name, trace in traces},
     }
 
 

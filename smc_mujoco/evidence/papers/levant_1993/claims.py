@@ -67,10 +67,9 @@ def switching(runs):
 
 def finite_time(runs):
     """Time from which |x| stays within 1e-5 of its start, over that for 1e-2, sampled at 50 us."""
-    grid = runs.grid()
     wide, narrow = runs.values["bands"]
     ratios = {}
-    for (plant, *_), scenario, trace in zip(grid, grid.values(), runs.traces(grid.values()), strict=True):
-        start = max(map(abs, scenario.resolved.x0))
+    for (plant, *_), trace in runs.traced(runs.grid()).items():
+        start = max(map(abs, trace.scenario.resolved.x0))
         ratios[plant] = settled(trace, trace.x, narrow * start) / settled(trace, trace.x, wide * start)
     return {"time to 1e-5 |x0| / time to 1e-2 |x0|": ratios}

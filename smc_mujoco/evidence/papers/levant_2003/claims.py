@@ -53,9 +53,8 @@ def noise(runs):
 
 def finite_time(runs):
     """Time from which |x| stays within 1e-6 of its start, over that for 1e-3, sampled at 0.25 ms."""
-    (scenario,) = runs.grid(physics_step=2.5e-4).values()
-    (trace,) = runs.traces([scenario])
-    start = max(map(abs, scenario.resolved.x0))
+    (trace,) = runs.traces(runs.grid(physics_step=2.5e-4).values())
+    start = max(map(abs, trace.scenario.resolved.x0))
     wide, narrow = (settled(trace, trace.x, band * start) for band in runs.values["bands"])
     return {"time to 1e-6 |x0| / time to 1e-3 |x0|": narrow / wide}
 
@@ -68,19 +67,16 @@ def end(trace):
 
 def output_feedback(runs):
     """Largest |x| of the last tenth of 12 s, over |x0|, on three plants that the law does not know."""
-    grid = runs.grid()
-    shares = {
-        plant: end(trace) / max(map(abs, scenario.resolved.x0))
-        for (plant, *_), scenario, trace in zip(grid, grid.values(), runs.traces(grid.values()), strict=True)
-    }
+    traces = runs.traced(runs.grid())
+    shares = {plant: end(trace) / max(map(abs, trace.scenario.resolved.x0)) for (plant, *_), trace in traces.items()}
     return {"largest |x| of the last tenth / |x0|": shares}
 
 
 def standard_chatters(runs):
     """Largest step of u of the last tenth of 12 s over 2 k, and half the range of the force behind the lag over k."""
-    grid, steps, forces = runs.grid(), {}, {}
-    for (plant, *_), scenario, trace in zip(grid, grid.values(), runs.traces(grid.values()), strict=True):
-        last, k = slice(-int(END * len(trace.t)), -1), scenario.law.gains["k"]
+    steps, forces = {}, {}
+    for (plant, *_), trace in runs.traced(runs.grid()).items():
+        last, k = slice(-int(END * len(trace.t)), -1), trace.scenario.law.gains["k"]
         steps[plant] = float(np.abs(np.diff(trace.u[last], axis=0)).max()) / (2.0 * k)
         forces[plant] = float(np.ptp(trace.force[last])) / (2.0 * k)
     return {"largest step of u / 2 k": steps, "amplitude of the force / k": forces}
@@ -88,7 +84,6 @@ def standard_chatters(runs):
 
 def chattering(runs):
     """Largest |x| of the last tenth under the nested law over that under the classical law, behind the same lag."""
-    grid = runs.grid()
-    ends = {cell[:2]: end(trace) for cell, trace in zip(grid, runs.traces(grid.values()), strict=True)}
+    ends = {cell[:2]: end(trace) for cell, trace in runs.traced(runs.grid()).items()}
     nested, classical = runs.laws
     return {"largest |x|, nested / classical": {one: ends[one, nested] / ends[one, classical] for one in runs.plants}}

@@ -26,10 +26,9 @@ def half(signal):
 
 def stays(runs):
     """Largest |s| of the last half of 8 s over eps, under d = D sin 2t with D = 0.5, 2 and 10 N."""
-    grid = runs.grid(**sampled(runs))
     shares = {
-        f"{plant}, {condition}": half(trace.s) / scenario.law.gains["eps"]
-        for ((plant, _, condition), scenario), trace in zip(grid.items(), runs.traces(grid.values()), strict=True)
+        f"{plant}, {condition}": half(trace.s) / trace.scenario.law.gains["eps"]
+        for (plant, _, condition), trace in runs.traced(runs.grid(**sampled(runs))).items()
     }
     return {"largest |s| of the last half / eps": shares}
 
@@ -38,51 +37,44 @@ def limit(runs):
     """Largest |s| of the last half over eps, under d = D sin 2t with D below and above 2 sqrt(eps/h) - 1."""
     (plant,), (law,), periods = runs.plants, runs.laws, runs.values["periods"]
     eps, sides = runs.law(plant, law).gains["eps"], dict(zip(("below", "above"), runs.values["shares"], strict=True))
-    cells = [(side, h, share * (2.0 * (eps / h) ** 0.5 - 1.0)) for side, share in sides.items() for h in periods]
-    traces = runs.traces(
-        runs.scenario(
-            plant,
-            law,
-            law=runs.law(plant, law, k_max=JUMP * eps / h - size),
-            control_period=h,
-            disturbance=smc.Sine(size, 2.0),
-        )
-        for _, h, size in cells
-    )
-    found: dict[str, dict[str, float]] = {f"{side}: largest |s| of the last half / eps": {} for side in sides}
-    for (side, h, size), trace in zip(cells, traces, strict=True):
-        found[f"{side}: largest |s| of the last half / eps"][f"{1e3 * h:g} ms, D = {size:.3g} N"] = half(trace.s) / eps
+    found = {}
+    for side, share in sides.items():
+        grid = {}
+        for h in periods:
+            size = share * (2.0 * (eps / h) ** 0.5 - 1.0)
+            adapted, d = runs.law(plant, law, k_max=JUMP * eps / h - size), smc.Sine(size, 2.0)
+            name = f"{1e3 * h:g} ms, D = {size:.3g} N"
+            grid[name] = runs.scenario(plant, law, law=adapted, control_period=h, disturbance=d)
+        shares = {name: half(trace.s) / eps for name, trace in runs.traced(grid).items()}
+        found[f"{side}: largest |s| of the last half / eps"] = shares
     return found
 
 
 def predefined(runs):
     """Largest |s| of the last half of 8 s over eps = 0.3, 0.1 and 0.03, under d = 2 sin 2t."""
     (plant,), (law,), (condition,), widths = runs.plants, runs.laws, runs.conditions, runs.values["widths"]
-    traces = runs.traces(
-        runs.scenario(plant, law, condition, law=runs.law(plant, law, eps=eps), **sampled(runs)) for eps in widths
-    )
-    shares = {f"eps = {eps:g}": half(trace.s) / eps for eps, trace in zip(widths, traces, strict=True)}
+    grid = {
+        eps: runs.scenario(plant, law, condition, law=runs.law(plant, law, eps=eps), **sampled(runs)) for eps in widths
+    }
+    shares = {f"eps = {eps:g}": half(trace.s) / eps for eps, trace in runs.traced(grid).items()}
     return {"largest |s| of the last half / eps": shares}
 
 
 def converges(runs):
     """Time from which |s| < eps in 8 s, from s0 = 0.5, 5 and 50 m/s, under d = 2 sin 2t."""
     (plant,), (law,), (condition,), starts = runs.plants, runs.laws, runs.conditions, runs.values["starts"]
-    traces = runs.traces(runs.scenario(plant, law, condition, v0=start, **sampled(runs)) for start in starts)
+    grid = {start: runs.scenario(plant, law, condition, v0=start, **sampled(runs)) for start in starts}
     times = {
         f"from {start:g} m/s": settled(trace, trace.s, trace.scenario.law.gains["eps"])
-        for start, trace in zip(starts, traces, strict=True)
+        for start, trace in runs.traced(grid).items()
     }
     return {"time from which |s| < eps, s": times}
 
 
 def not_overestimated(runs):
     """Largest |u|, which is the gain K as u = -K sgn s, of the last half of 8 s, over the largest |d|."""
-    grid = runs.grid(**sampled(runs))
-    ratios = {
-        condition: half(trace.u) / half(trace.d)
-        for (_, _, condition), trace in zip(grid, runs.traces(grid.values()), strict=True)
-    }
+    traces = runs.traced(runs.grid(**sampled(runs)))
+    ratios = {condition: half(trace.u) / half(trace.d) for (_, _, condition), trace in traces.items()}
     return {"largest gain of the last half / largest |d|": ratios}
 
 
@@ -99,8 +91,8 @@ def falls(runs):
 
 def within(runs):
     """Largest |s| of the last half of 8 s over eps D / (1 + D), under d = D sin 2t with D = 0.5, 2 and 10 N."""
-    grid, ratios = runs.grid(**sampled(runs)), {}
-    for ((_, _, condition), scenario), trace in zip(grid.items(), runs.traces(grid.values()), strict=True):
+    ratios = {}
+    for (_, _, condition), trace in runs.traced(runs.grid(**sampled(runs))).items():
         bound = half(trace.d)
-        ratios[condition] = half(trace.s) / (scenario.law.gains["eps"] * bound / (1.0 + bound))
+        ratios[condition] = half(trace.s) / (trace.scenario.law.gains["eps"] * bound / (1.0 + bound))
     return {"largest |s| of the last half / (eps D / (1 + D))": ratios}

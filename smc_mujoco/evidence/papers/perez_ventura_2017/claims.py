@@ -45,15 +45,11 @@ def predicted(k1, k2, lag):
 def compared(runs, law, expected):
     """Return measured amplitude and frequency over those expected of a lag, and the exponent of the amplitude."""
     lags = runs.values["lags"][QUICK if runs.quick else 0 :]
-    found = [cycle(trace) for trace in runs.traces(behind(runs, law, lag) for lag in lags)]
-    amplitudes, frequencies = ({}, {})
-    for lag, (amplitude, frequency) in zip(lags, found, strict=True):
-        a, f = expected(lag)
-        amplitudes[f"{1e3 * lag:g} ms"], frequencies[f"{1e3 * lag:g} ms"] = amplitude / a, frequency / f
+    found = {lag: cycle(trace) for lag, trace in runs.traced({lag: behind(runs, law, lag) for lag in lags}).items()}
     return {
-        "amplitude / predicted": amplitudes,
-        "frequency / predicted": frequencies,
-        "exponent of the amplitude in the ATC": exponent(lags, [amplitude for amplitude, _ in found]),
+        "amplitude / predicted": {f"{1e3 * lag:g} ms": a / expected(lag)[0] for lag, (a, _) in found.items()},
+        "frequency / predicted": {f"{1e3 * lag:g} ms": f / expected(lag)[1] for lag, (_, f) in found.items()},
+        "exponent of the amplitude in the ATC": exponent(lags, [amplitude for amplitude, _ in found.values()]),
     }
 
 

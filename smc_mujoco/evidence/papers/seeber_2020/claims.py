@@ -23,12 +23,12 @@ def winds_up(runs):
     """
     (plant,), (law,), starts = runs.plants, runs.laws, runs.values["starts"]
     starts = starts[1:2] if runs.quick else starts
-    scenarios = [runs.scenario(plant, law, v0=start) for start in starts]
-    gains, bound = scenarios[0].law.gains, scenarios[0].u_max
+    grid = {f"from {start:g} m/s": runs.scenario(plant, law, v0=start) for start in starts}
+    gains, bound = runs.law(plant, law).gains, runs.scenario(plant, law).u_max
     most = min(bound**2 / (2.0 * gains["k2"]), (bound / gains["k1"]) ** 2)
     beyond = {
-        f"from {start:g} m/s": -float(trace.v.min()) / most if trace.v.min() <= 0.0 else math.nan
-        for start, trace in zip(starts, runs.traces(scenarios), strict=True)
+        name: -float(trace.v.min()) / most if trace.v.min() <= 0.0 else math.nan
+        for name, trace in runs.traced(grid).items()
     }
     return {"overshoot of s / bound of a law that does not wind up": beyond}
 
@@ -37,10 +37,10 @@ def reaches(runs):
     """Largest |s| of the last quarter of 40 s under d = 1.5 sin 0.6 t, |u| <= 2 N, from three starts."""
     (law,), (condition,), starts = runs.laws, runs.conditions, runs.values["starts"]
     cells = [(plant, start) for plant in runs.plants for start in starts][: 1 if runs.quick else None]
-    traces = runs.traces(runs.scenario(plant, law, condition, v0=start) for plant, start in cells)
+    grid = {cell: runs.scenario(cell[0], law, condition, v0=cell[1]) for cell in cells}
     ends = {
         f"{plant}, from {start:g} m/s": float(np.abs(trace.v[-(len(trace.t) // 4) :]).max())
-        for (plant, start), trace in zip(cells, traces, strict=True)
+        for (plant, start), trace in runs.traced(grid).items()
     }
     return {"largest |s| of the last quarter, m/s": ends}
 
@@ -61,7 +61,6 @@ def time(runs):
 def same(runs):
     """Largest difference of s between the two laws with the same gains, under d, with |u| <= 50 N."""
     (condition,) = runs.conditions
-    scenarios = [runs.scenario(plant, law, condition) for plant in runs.plants for law in runs.laws]
-    traces = runs.traces(scenarios)
-    pairs = zip(runs.plants, traces[::2], traces[1::2], strict=True)
-    return {"largest difference of s, m/s": {plant: float(np.abs(a.v - b.v).max()) for plant, a, b in pairs}}
+    traces = runs.traced(runs.grid())
+    pairs = {plant: [traces[plant, law, condition].v for law in runs.laws] for plant in runs.plants}
+    return {"largest difference of s, m/s": {plant: float(np.abs(a - b).max()) for plant, (a, b) in pairs.items()}}

@@ -1,5 +1,6 @@
 """How the claims of Seeber & Andritsch 2024 are measured."""
 
+import itertools
 import math
 
 import numpy as np
@@ -40,22 +41,12 @@ def late(trace):
 def random_runs(runs, law):
     """Return name -> trace under random slopes, for each period and seed."""
     seeds, periods = (runs.values[name][: 1 if runs.quick else None] for name in ("seeds", "periods"))
-    cells = [(period, seed) for period in periods for seed in seeds]
-    duration = 5.0
-    scenarios = [
-        runs.scenario(
-            runs.plant,
-            law,
-            runs.conditions[0],
-            control_period=period,
-            duration=duration,
-            v0=0.1,
-            disturbance=slopes(period, duration, seed),
-        )
-        for period, seed in cells
-    ]
-    names = [f"{1e3 * period:g} ms, seed {seed}" for period, seed in cells]
-    return dict(zip(names, runs.traces(scenarios), strict=True))
+    grid, fields = {}, {"duration": 5.0, "v0": 0.1}
+    for period, seed in itertools.product(periods, seeds):
+        drawn = {"control_period": period, "disturbance": slopes(period, 5.0, seed)}
+        name = f"{1e3 * period:g} ms, seed {seed}"
+        grid[name] = runs.scenario(runs.plant, law, runs.conditions[0], **fields, **drawn)
+    return runs.traced(grid)
 
 
 def bounded(runs):
@@ -82,10 +73,9 @@ def last(trace):
 
 def attained(runs):
     """|x| over L T^2 a period after a triangle of mean 0 over every period goes on with its slope."""
-    cells = [(law, condition) for law in runs.laws for condition in runs.conditions]
-    traces = runs.traces(flipped(runs, law, condition, 1.0) for law, condition in cells)
-    shares = {f"{law}, {condition}": last(one) for (law, condition), one in zip(cells, traces, strict=True)}
-    return {"largest |x| after the slope flips / (L T^2)": shares}
+    cells = itertools.product(runs.laws, runs.conditions)
+    traces = runs.traced({f"{law}, {condition}": flipped(runs, law, condition, 1.0) for law, condition in cells})
+    return {"largest |x| after the slope flips / (L T^2)": {name: last(one) for name, one in traces.items()}}
 
 
 def best_possible(runs):
@@ -101,10 +91,9 @@ def compared(runs):
     """Largest |x| of the last half of 5 s under random slopes, over that of the explicit and the older implicit law."""
     proper, *others = runs.laws
     ours = {name: late(trace) for name, trace in random_runs(runs, proper).items()}
-    ratios = {}
-    for law in others:
-        for name, trace in random_runs(runs, law).items():
-            ratios[f"{law}, {name}"] = ours[name] / late(trace)
+    ratios = {
+        f"{law}, {name}": ours[name] / late(trace) for law in others for name, trace in random_runs(runs, law).items()
+    }
     return {"proper / other, largest |x| of the last half": ratios}
 
 

@@ -30,10 +30,9 @@ def third(signal):
 
 def layer(runs):
     """Largest |s| of the last third of 30 s over mu, under d = D sin t with D = 0.5, 5 and 20 N."""
-    grid = runs.grid()
     shares = {
-        condition: float(np.abs(third(trace.v)).max()) / scenario.law.gains["mu"]
-        for ((_, _, condition), scenario), trace in zip(grid.items(), runs.traces(grid.values()), strict=True)
+        condition: float(np.abs(third(trace.v)).max()) / trace.scenario.law.gains["mu"]
+        for (_, _, condition), trace in runs.traced(runs.grid()).items()
     }
     return {"largest |s| of the last third / mu": shares}
 
@@ -41,10 +40,10 @@ def layer(runs):
 def established(runs):
     """Time from which |s| stays within 5 mu in 30 s, from s0 = 0.1 to 100 m/s, under d = 5 sin t."""
     (plant,), (law,), (condition,), starts = runs.plants, runs.laws, runs.conditions, runs.values["starts"]
-    traces = runs.traces(runs.scenario(plant, law, condition, v0=start) for start in starts)
+    grid = {f"from {start:g} m/s": runs.scenario(plant, law, condition, v0=start) for start in starts}
     times = {
-        f"from {start:g} m/s": settled(trace, trace.v, LAYERS * trace.scenario.law.gains["mu"])
-        for start, trace in zip(starts, traces, strict=True)
+        name: settled(trace, trace.v, LAYERS * trace.scenario.law.gains["mu"])
+        for name, trace in runs.traced(grid).items()
     }
     return {"time from which |s| <= 5 mu, s": times}
 
