@@ -1,5 +1,6 @@
 """Films, figures and their files in a notebook's cell, and a film's pictures for other packages."""
 
+import dataclasses
 import os
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -25,6 +26,7 @@ KINDS = {".mp4": "video/mp4", ".webm": "video/webm", ".webp": "image/webp", ".gi
 KINDS |= {".png": "image/png", ".svg": "image/svg+xml"}
 
 
+@dataclasses.dataclass(repr=False, eq=False)
 class Frames:
     """Pictures of a film, each (height, width, 3) uint8. They are made while you iterate, as often as you do.
 
@@ -35,19 +37,17 @@ class Frames:
       times: of the run at each picture, (frames,) s.
     """
 
-    def __init__(
-        self,
-        traces: Trace | Sequence[Trace],
-        labels: Sequence[str] | None,
-        title: str | None,
-        size: tuple[int, int],
-        fps: float,
-        speed: float | None,
-        camera: Camera | None,
-    ):
-        self.traces, self.labels, self.title, self.size = traces, labels, title, size
-        self.speed, self.camera = speed, checked(camera)
-        self.fps, self._clock = fps, film.clock(traces, fps, speed)
+    traces: Trace | Sequence[Trace]
+    labels: Sequence[str] | None
+    title: str | None
+    size: tuple[int, int]
+    fps: float
+    speed: float | None
+    camera: Camera | None
+
+    def __post_init__(self) -> None:
+        checked(self.camera)
+        self._clock = film.clock(self.traces, self.fps, self.speed)
         self.times = self._clock.times
 
     def __len__(self) -> int:

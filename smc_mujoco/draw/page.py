@@ -169,11 +169,7 @@ def run_handles(traces: Sequence[Trace], names: Sequence[str], colours: Sequence
 
 
 def gained(sources: Sequence[Iterable[Source]]) -> tuple[list[str], str]:
-    """Return where gains come from: what follows each label, such as ", gains: default", or one note for all alike.
-
-    Args:
-      sources: those of each label's law.
-    """
+    """Return where gains come from: what follows each label, such as ", gains: default", or one note for all alike."""
     words = [f"gains: {found}" if (found := kinds(each)) not in ("", NONE) else "" for each in sources]
     if len(said := {one for one in words if one}) == 1:
         return [""] * len(words), said.pop()

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 # From early to late, then undecided, then not. All differ in lightness, so also with colour blindness and in grey. Blue
 # and orange are those of Okabe and Ito.
 BLUES, OPEN, NOT = ("#00466B", "#0072B2", "#7CC0E8"), "#F4F4F4", "#F2B84B"
+COLOURS = (*BLUES, OPEN, NOT)
 PANEL = (5.4, 5.3)  # inches on a full page, width and height of a map
 
 
@@ -60,29 +61,34 @@ def fill(ax, region: Basin) -> None:
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    classes, entries = classed(region)
-    ax.pcolormesh(
-        region.x, region.v, classes, cmap=ListedColormap([*BLUES, OPEN, NOT]), vmin=-0.5, vmax=4.5, rasterized=True
-    )
+    after = horizons([region])
+    classes = classed(region, after)
+    ax.pcolormesh(region.x, region.v, classes, cmap=ListedColormap(COLOURS), vmin=-0.5, vmax=4.5, rasterized=True)
     ax.plot(0.0, 0.0, "+", color=style.PAPER, markersize=style.points(11), markeredgewidth=style.points(1.6))
     ax.grid(visible=False)
     gains = f"\ngains: {region.source}" * (region.source != NONE)
     ax.set_title(f"{style.law_name(region.law)} on {region.plant.replace('_', ' ')}{gains}")
     ax.set_xlabel(f"initial position ({region.unit})")
     ax.set_ylabel(f"initial velocity ({region.unit}/s)")
-    marks = [Patch(facecolor=colour, edgecolor=style.RULE, label=words) for colour, words in entries]
+    marks = [
+        Patch(facecolor=COLOURS[k], edgecolor=style.RULE, label=f"{words}: {100 * share:.3g} %")
+        for k, words in meanings(after, "comes to rest, by {:.3g} s", "does not").items()
+        if (share := (classes == k).mean())
+    ]
     ax.legend(handles=marks, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=style.points(9.5))
 
 
-def classed(region: Basin) -> tuple[np.ndarray, list[tuple[str, str]]]:
-    """Return the number of each state's colour, (nv, nx), and the colours that occur with their meaning."""
-    classes = np.where(region.outcome == DOES_NOT, 4, 3)
-    horizons = np.unique(region.decided_at[region.outcome == CONVERGES])
-    names = {3: "undecided", 4: "does not"}
-    for i, horizon in enumerate(horizons):
-        shade = min(i, len(BLUES) - 1)
-        classes[(region.outcome == CONVERGES) & (region.decided_at == horizon)] = shade
-        names[shade] = f"comes to rest, by {horizon:.3g} s"
-    shares = {k: (classes == k).mean() for k in range(5)}
-    colours = (*BLUES, OPEN, NOT)
-    return classes, [(colours[k], f"{names[k]}: {100 * shares[k]:.3g} %") for k in range(5) if shares[k]]
+def horizons(maps: Sequence[Basin]) -> list[float]:
+    """Return the run lengths, s, after which states were seen to converge, over all maps."""
+    return sorted({float(at) for one in maps for at in np.unique(one.decided_at[one.outcome == CONVERGES])})
+
+
+def classed(region: Basin, after: Sequence[float]) -> np.ndarray:
+    """Return the index into COLOURS for each state, (nv, nx): converging by horizon, then undecided, then not."""
+    shade = np.minimum(np.searchsorted(after, region.decided_at), len(BLUES) - 1)
+    return np.where(region.outcome == CONVERGES, shade, np.where(region.outcome == DOES_NOT, 4, 3))
+
+
+def meanings(after: Sequence[float], rests: str, never: str) -> dict[int, str]:
+    """Return index into COLOURS -> what it means; `rests` has a place for the horizon, s."""
+    return {min(k, len(BLUES) - 1): rests.format(at) for k, at in enumerate(after)} | {3: "undecided", 4: never}

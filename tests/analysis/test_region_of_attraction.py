@@ -218,9 +218,9 @@ def test_what_is_no_map_is_refused(text, tmp_path):
 def test_a_picture_is_drawn_and_its_shares_are_a_whole(weak, tmp_path):
     region.draw([weak, weak], tmp_path / "map.png")
     assert (tmp_path / "map.png").stat().st_size > 10_000
-    classes, entries = region.classed(weak)
-    assert np.array_equal(classes == 4, weak.outcome == DOES_NOT)
-    assert sum(float(words.split(": ")[1].rstrip(" %")) for _, words in entries) == pytest.approx(100, abs=1)
+    assert np.array_equal(region.classed(weak, region.horizons([weak])) == 4, weak.outcome == DOES_NOT)
+    entries = region.draw([weak]).axes[0].get_legend().get_texts()
+    assert sum(float(one.get_text().split(": ")[1].rstrip(" %")) for one in entries) == pytest.approx(100, abs=1)
     with pytest.raises(smc.ScenarioError, match=r"end the name in .svg, .png or .pdf"):
         region.draw([weak], tmp_path / "map.gif")
 

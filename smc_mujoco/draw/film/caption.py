@@ -110,12 +110,9 @@ class Caption:
         return style.width(text, BADGE * self.scale, bold=True) + 1.2 * BADGE * self.scale
 
     def place(self, boxes: np.ndarray) -> None:
-        """Place the labels under machines in a row, else at the left of each, so that none touches another.
+        """Place the labels under machines in a row, else at the left of each; `boxes` are their places, (n, 4) px.
 
         A badge is below its label, or at its right.
-
-        Args:
-          boxes: places of the machines, (machines, 4) px: left, top, right, bottom.
         """
         widths, height = np.array([self.width(text) for text in self.texts()]), 1.75 * LABEL * self.scale
         gap, middle, (wide, high) = 0.4 * height, (boxes[:, :2] + boxes[:, 2:]) / 2, self.badge.T

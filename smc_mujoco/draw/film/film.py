@@ -16,7 +16,7 @@ from PIL import Image
 
 from smc_mujoco.common import errors, extras, gl
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, taken, users_frame
-from smc_mujoco.common.files import replacing
+from smc_mujoco.common.files import ended, replacing
 from smc_mujoco.common.progress import bar
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import finite, windows
@@ -69,9 +69,7 @@ def film(
     Raises:
       ScenarioError: nothing to show, a size that is odd or too small or large, or no OpenGL to render with.
     """
-    path = Path(path)
-    if path.suffix != ".mp4":
-        raise ScenarioError(f"cannot film to {path.name!r}: end the name in .mp4")
+    path = ended(path, ".mp4")
     shown = clock(traces, fps, speed)
     pictures = frames(traces, shown, labels, title, size, camera)
     with replacing(path) as part, contextlib.closing(pictures), reporting(report, len(shown.times)) as done:
@@ -110,9 +108,7 @@ def clip(
     camera: Camera | None = None,
 ) -> Path:
     """Write an animated .webp of the time `span`, s, which web pages show as an image. Other arguments: as `film`."""
-    path = Path(path)
-    if path.suffix != ".webp":
-        raise ScenarioError(f"cannot write a clip to {path.name!r}: end the name in .webp")
+    path = ended(path, ".webp")
     if len(ends := taken("span", span)) != 2:
         raise ScenarioError(f"span is {errors.shown(span)}: give two times, in s")
     start, stop = (number("span", end) for end in ends)
@@ -141,9 +137,7 @@ def still(
     camera: Camera | None = None,
 ) -> Path:
     """Write the frame at `time` in s, within the runs, as a .png. Other arguments: as `film`."""
-    path = Path(path)
-    if path.suffix != ".png":
-        raise ScenarioError(f"cannot write a picture to {path.name!r}: end the name in .png")
+    path = ended(path, ".png")
     end = max(float(trace.t[-1]) for trace in style.same_plant(traces))
     now = Clock(np.array([number("time", time, least=0.0, most=end + 1e-9)]), np.ones(1))
     with contextlib.closing(frames(traces, now, labels, title, size, camera)) as pictures, replacing(path) as part:

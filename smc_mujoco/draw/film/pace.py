@@ -69,18 +69,20 @@ def clock(traces: Sequence[Trace], fps: float, speed: float | None = None) -> Cl
 
 def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the playback speed from each time on: times in s, (m,), the first is 0, and speeds, (m,)."""
+    from scipy.ndimage import maximum_filter1d
+
     whole = end(traces)
     grid = np.arange(max(1, round(whole * fps))) / fps
     runs = [finite(trace) for trace in traces]
     travel = motion(runs, np.append(grid, whole))
     powers = np.ceil(np.log2(np.maximum(travel / TRAVEL, 1.0)) - 1e-9)
-    powers = spread(powers, round(AROUND * fps))
+    powers = maximum_filter1d(powers, 2 * round(AROUND * fps) + 1, mode="nearest")
     for start in impacts(runs):
         powers[np.abs(grid + 0.5 / fps - start) <= IMPACT] = SLOWEST
     pushed = np.zeros(len(grid), bool)
     for push in style.pushes(runs):
         pushed |= np.abs(grid + 0.5 / fps - push.time - 0.5 * push.width) <= IMPACT
-    moving = spread(((travel > STILL) | pushed).astype(float), round(REST * fps)) > 0.0
+    moving = maximum_filter1d((travel > STILL) | pushed, 2 * round(REST * fps) + 1, mode="nearest")
     longest, found = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1]), np.ones(len(grid))
     steps = [(most, SLOWEST) for most in range(SLOWEST, 0, -1)] + [(0, most) for most in range(SLOWEST, -1, -1)]
     for most, around_pushes in steps:
@@ -111,12 +113,6 @@ def impacts(runs: Sequence[Trace]) -> list[float]:
         touch = states.held(np.asarray(states.in_contact(trace).any(axis=1)), trace.t, states.HOLD)
         starts += trace.t[np.flatnonzero(np.diff(touch.astype(int), prepend=1) > 0)].tolist()
     return starts
-
-
-def spread(y: np.ndarray, reach: int) -> np.ndarray:
-    """Return the largest of y (m,) within `reach` places before and after each."""
-    padded = np.pad(y, reach, mode="edge")
-    return np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
 
 
 def words(speed: float) -> str:

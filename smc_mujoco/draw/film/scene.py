@@ -197,10 +197,6 @@ def lane(scenarios: Sequence[Scenario], reaches: Sequence[np.ndarray], turn: np.
 
     Machines in a row stand as close as they can without hiding each other. Others stand the plant's lane apart, or
     further if they are realistic and would intersect.
-
-    Args:
-      reaches: what must be in the picture of each machine, (points, 3) m from its place.
-      turn: frame of the camera.
     """
     step = np.array(scenarios[0].plant.lane)
     if in_a_row(scenarios[0], turn):

@@ -26,11 +26,7 @@ def flattening(way: np.ndarray) -> np.ndarray:
 
 
 def casting(model: mujoco.MjModel, pixel: float, flat: float = 0.0) -> np.ndarray:
-    """Return which geoms cast shadows, (geoms,): opaque ones that are not too thin; `pixel` is the size of one, m.
-
-    Args:
-      flat: px, half of the thickness of flat shapes without a shadow.
-    """
+    """Return which geoms cast shadows, (geoms,): opaque ones, neither thin nor flat; `pixel` is the size of one, m."""
     least = np.where(model.geom_type == BOX, MARK, THIN) * pixel
     half = np.sort(model.geom_aabb[:, 3:], axis=1)
     return (half[:, 1] > least) & (half[:, 0] > flat * pixel) & (model.geom_type != PLANE)

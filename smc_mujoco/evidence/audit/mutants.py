@@ -103,13 +103,7 @@ def first_law(entry: Entry) -> str:
 
 
 def lost(entry: Entry, intact: Evidence, mutant: Evidence | None, holding: bool) -> bool:
-    """Return whether a mutant loses a claim.
-
-    Args:
-      intact: evidence under the law itself.
-      mutant: evidence under the mutant; None if it cannot be measured.
-      holding: whether some sentence of the claim holds under the law itself. If none does, the numbers are compared.
-    """
+    """Return whether a mutant loses a claim: `mutant` is None if it cannot be measured."""
     if mutant is None:
         return True
     if holding:

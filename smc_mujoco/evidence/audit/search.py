@@ -47,11 +47,6 @@ def decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence]) -> E
     """Return the evidence at the gains that decide, with these gains and their margins beside.
 
     What is said of some gains is said of each plant by itself: other plants have other gains.
-
-    Args:
-      entry: a claim with `over`.
-      runs: of the claim, under a set of gains.
-      measure: runs -> evidence.
     """
     if entry.over == "all" or len(entry.plants) == 1:
         return _decisive(entry, runs, measure, "")

@@ -255,11 +255,7 @@ def combined(verdicts: Mapping[str, str], quantifier: str = NAMED) -> tuple[str,
 
 
 def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
-    """Return a claim with its verdict.
-
-    Args:
-      evidence: set of gains -> checks and the numbers beside them.
-    """
+    """Return a claim with its verdict, from set of gains -> checks and the numbers beside them."""
     verdicts = {name: verdict(some, statement.quantifier) for name, some in evidence.items()}
     overall, flips, sentence = combined(verdicts, statement.quantifier)
     if statement.whose == OURS:

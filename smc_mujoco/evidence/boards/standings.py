@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from smc_mujoco.common import errors
+from smc_mujoco.common.text import joined
 from smc_mujoco.evidence.boards.entries import FEEDBACKS, entry, on_board
 from smc_mujoco.evidence.boards.published import ROBUSTNESS, SIMULATION, RobustnessRow, Row
 from smc_mujoco.evidence.boards.scoring import criteria, score, shoulder_first
@@ -127,7 +128,7 @@ def verdict(robot: str, trace: Trace, found: Robustness | None, name: str = NAME
         for field, words in WORDS.items()
         if getattr(rows[place - 1], field) > min(getattr(row, field) for row in others)
     ]
-    text += f"; others have less {_listed(worse)}" if worse else "; no other is better in any criterion"
+    text += f"; others have less {joined(worse)}" if worse else "; no other is better in any criterion"
     if found is None:
         return text
     rows = robustness_board(robot, found, name)
@@ -140,17 +141,12 @@ def verdict(robot: str, trace: Trace, found: Robustness | None, name: str = NAME
         > round(found.percent[field], 1)
     ]
     weak = [parameter for parameter, count in found.parameters.items() if count <= 10]
-    text += f"; others survive more of {_listed(worse)}" if worse else "; no other survives more of any test"
-    return text + (f"; fewer than half of the values of {_listed(weak)} are survived" if weak else "")
+    text += f"; others survive more of {joined(worse)}" if worse else "; no other survives more of any test"
+    return text + (f"; fewer than half of the values of {joined(weak)} are survived" if weak else "")
 
 
 def comparison(traces: Mapping[str, Trace], results: Mapping[str, Robustness] | None) -> str:
-    """Return sentences on what the control experiments say about the entry.
-
-    Args:
-      traces: name of each row of `experiments` -> its run.
-      results: name of each row -> its robustness, or None.
-    """
+    """Return sentences on what the runs of `experiments` and their robustness say about the entry."""
     trace = traces[NAME]
     robot, gains = trace.scenario.plant.name, trace.scenario.law.of_channel(0).gains
     largest = float(np.abs(gains["k"] * np.tanh(trace.s[:, 0] / gains["phi"])).max())
@@ -168,8 +164,3 @@ def comparison(traces: Mapping[str, Trace], results: Mapping[str, Robustness] | 
         f". With measured velocities, as in the published rows, its robustness is {rows[place - 1].score:.3f}: number "
         f"{place} of {len(rows)}"
     )
-
-
-def _listed(words: list[str]) -> str:
-    """Return words as "a, b and c"."""
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

@@ -3,7 +3,6 @@
 import copy
 import dataclasses
 import functools
-import html
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import ended, read_json, reading, to_json, write_json
@@ -79,13 +79,11 @@ class Certificate:
         return f"<Certificate of {self.law} on {self.plant}: {self.sentences[0]}>"
 
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f"<tr><td>{html.escape(one.theorem)}</td><td>{html.escape(one.name)}</td><td>{'yes' if one.holds else 'no'}"
-            f"</td><td>{html.escape(f'{number(one.margin)} {one.unit}')}</td><td>{html.escape(one.words)}</td></tr>"
+        rows = [
+            (one.theorem, one.name, "yes" if one.holds else "no", f"{number(one.margin)} {one.unit}", one.words)
             for one in self.conditions
-        )
-        head = "<tr><th>theorem</th><th>condition</th><th>holds</th><th>margin</th><th></th></tr>"
-        return "".join(f"<p>{html.escape(one)}</p>" for one in self.sentences) + f"<table>{head}{rows}</table>"
+        ]
+        return html.table(("theorem", "condition", "holds", "margin", ""), rows, note=". ".join(self.sentences))
 
     @property
     def plant(self) -> str:

@@ -29,8 +29,7 @@ def board(
     """
     with held_back():
         from smc_mujoco.cli.scene import filmed
-        from smc_mujoco.common.errors import ScenarioError
-        from smc_mujoco.common.files import writable
+        from smc_mujoco.common.files import ended, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.evidence import boards
         from smc_mujoco.evidence.commands import tables
@@ -41,9 +40,7 @@ def board(
     if figure:
         writable(figure)
     if film:
-        if film.suffix != ".mp4":
-            raise ScenarioError(f"cannot film to {film.name!r}: end the name in .mp4")
-        writable(film)
+        writable(ended(film, ".mp4"))
     traces, results = dict(zip(rows, run(list(rows.values())), strict=True)), None
     terminal.print(tables.board(robot, boards.board(traces), rows))
     if robustness:

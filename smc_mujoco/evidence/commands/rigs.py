@@ -124,7 +124,7 @@ def replay(
     with held_back():
         from smc_mujoco.cli.scene import filmed
         from smc_mujoco.common.errors import ScenarioError
-        from smc_mujoco.common.files import writable
+        from smc_mujoco.common.files import ended, writable
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.evidence.rigs.records import load
         from smc_mujoco.evidence.rigs.rig import rig as find_rig
@@ -132,9 +132,7 @@ def replay(
         from smc_mujoco.simulation.trace import Trace
 
     terminal, twin = Terminal(), find_rig(rig)
-    if film and film.suffix != ".mp4":
-        raise ScenarioError(f"cannot film to {film.name!r}: end the name in .mp4")
-    for path in (figure, film):
+    for path in (figure, film and ended(film, ".mp4")):
         if path:
             writable(path)
     record = load(file, options.columns(columns))

@@ -150,9 +150,6 @@ def identified(found: Identified, names: Sequence[str]) -> list[Table]:
     """Return a table of the quantities found, with standard errors and values before, and one of each record's fit.
 
     Of three records or more, median and worst fit are added; a fall is the worst.
-
-    Args:
-      names: of the records.
     """
     values = titled(
         found.rig.label, "quantity", *(Column(head, justify="right") for head in ("value", "±", "before")), ""

@@ -74,17 +74,8 @@ def curve(trace: Trace) -> Curve:
     tu, line = decimate.line(t, u, width)
     band = decimate.columns(t, u[:, None], BANDS) if decimate.stretches(u, width) else None
     tb, low, high = (band.t, band.low[:, 0], band.high[:, 0]) if band else (np.empty(0),) * 3
-    shown = _extremes(x)
-    return Curve(
-        law=trace.scenario.law.name, t=t[shown], x=x[shown], tu=tu, u=line, tb=tb[: len(low)], low=low, high=high
-    )
-
-
-def _extremes(y: np.ndarray) -> np.ndarray:
-    """Return the indices of the extremes of y (K + 1,) in each of some stretches, with its first and last."""
-    parts = np.array_split(np.arange(len(y)), min(decimate.POINTS, len(y)))
-    ends = [(part[np.argmin(y[part])], part[np.argmax(y[part])]) for part in parts]
-    return np.unique([0, *np.ravel(ends), len(y) - 1])
+    tx, x = decimate.line(t, x, 0)
+    return Curve(law=trace.scenario.law.name, t=tx, x=x, tu=tu, u=line, tb=tb[: len(low)], low=low, high=high)
 
 
 def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whole: None) -> tuple[bytes, bytes]:

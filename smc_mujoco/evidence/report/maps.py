@@ -16,27 +16,14 @@ if TYPE_CHECKING:
     from smc_mujoco.evidence.report.stages import Field
 
 FALLS, RISES = "#DCEAF4", "#C05A21"  # of V; light and dark apart from hue
-COLOURS = (*region.BLUES, region.OPEN, region.NOT)
-
-
-def horizons(found: "Sequence[Basin]") -> list[float]:
-    """Return the run lengths, s, after which states were seen to converge, over all maps."""
-    return sorted({float(at) for basin in found for at in np.unique(basin.decided_at[basin.outcome == 1])})
-
-
-def classed(basin: "Basin", after: Sequence[float]) -> np.ndarray:
-    """Return the index into COLOURS for each state, (nv, nx): converging by time, then undecided, then not."""
-    shade = np.minimum(np.searchsorted(after, basin.decided_at), len(region.BLUES) - 1)
-    return np.where(basin.outcome == 1, shade, np.where(basin.outcome == -1, len(COLOURS) - 1, len(COLOURS) - 2))
 
 
 def meanings(found: "Sequence[Basin]") -> dict[str, str]:
     """Return colour -> its meaning, for the colours that occur in any of the maps."""
-    after, last = horizons(found), len(region.BLUES) - 1
-    texts = {min(k, last): f"at rest, known after {at:g} s" for k, at in enumerate(after)}
-    texts |= {last + 1: "undecided", last + 2: "does not come to rest here"}
-    there = {int(k) for basin in found for k in np.unique(classed(basin, after))}
-    return {COLOURS[k]: text for k, text in texts.items() if k in there}
+    after = region.horizons(found)
+    there = {int(k) for basin in found for k in np.unique(region.classed(basin, after))}
+    texts = region.meanings(after, "at rest, known after {:g} s", "does not come to rest here")
+    return {region.COLOURS[k]: text for k, text in texts.items() if k in there}
 
 
 def basins(found: "Sequence[Basin]", after: Sequence[float]) -> Figure:
@@ -45,7 +32,7 @@ def basins(found: "Sequence[Basin]", after: Sequence[float]) -> Figure:
     data: list[dict] = []
     layout: dict[str, Any] = {"annotations": []}
     for panel, basin in zip(grid, found, strict=True):
-        data.append(_plane(panel, basin.x, basin.v, classed(basin, after), COLOURS))
+        data.append(_plane(panel, basin.x, basin.v, region.classed(basin, after), region.COLOURS))
         law = panel.title(words.law(basin.law), font={"color": words.colour(basin.law)})
         share = {"x": panel.x[1], "xanchor": "right", "font": {"size": 11, "color": style.MUTED}}
         layout["annotations"] += [law, panel.heading(f"{100 * basin.share:.0f} %", **share)]

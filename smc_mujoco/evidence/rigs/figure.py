@@ -4,11 +4,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from matplotlib import color_sequences
+from matplotlib.lines import Line2D
 
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import style
 from smc_mujoco.evidence.rigs.records import Record
 
-MEASURED = "#444444"
-PREDICTED = ("#1f77b4", "#d55e00", "#009e73", "#cc79a7")  # colours that the colour-blind can tell apart
+ROW = 2.6  # inches, height of a column's panels
 
 
 def residual_figure(
@@ -23,43 +26,36 @@ def residual_figure(
     """Draw each column of a record, measured and predicted, beside its residuals. Write PATH.svg and PATH.png.
 
     Args:
-      title: of the figure.
       t: times, s, (K,).
-      measured: column -> values, (K,).
       predicted, fits: name of a twin -> what it predicts, and its fit of each column, percent.
       units: column -> its unit.
-      path: of the files; its ending is replaced.
 
     Returns:
       The paths of both files.
     """
-    from matplotlib.figure import Figure
-
-    names = list(measured)
-    figure = Figure(figsize=(9.0, 2.6 * len(names)), layout="constrained")
-    axes = np.atleast_2d(figure.subplots(len(names), 2, sharex=True, width_ratios=(3, 2)))
-    for k, ((left, right), name) in enumerate(zip(axes, names, strict=True)):
-        left.plot(t, measured[name], color=MEASURED, lw=1.6, label="measured")
-        reached, left_over = [], []
-        for (twin, columns), colour in zip(predicted.items(), PREDICTED * len(predicted), strict=False):
-            residual = measured[name] - columns[name]
-            left.plot(t, columns[name], color=colour, lw=0.9, label=twin)
-            right.plot(t, residual, color=colour, lw=0.7)
-            reached.append(f"{twin} {list(fits[twin].values())[k]:.1f} %")
-            left_over.append(f"{twin} {np.sqrt(np.mean(residual**2)):.3g}")
-        left.set_ylabel(f"{name} ({units[name]})")
-        left.set_title(f"fit: {', '.join(reached)}", loc="left", fontsize=9)
-        right.axhline(0.0, color=MEASURED, lw=0.6)
-        right.set_title(f"residual, rms: {', '.join(left_over)}", loc="left", fontsize=9)
-    figure.legend(
-        *axes[0][0].get_legend_handles_labels(), ncols=5, frameon=False, fontsize=8, loc="outside lower center"
-    )
-    for ax in axes[-1]:
-        ax.set_xlabel("t (s)")
-    figure.suptitle(title, fontsize=10)
-    base = Path(path).with_suffix("")
-    base.parent.mkdir(parents=True, exist_ok=True)
-    written = [base.with_suffix(ending) for ending in (".svg", ".png")]
-    for file in written:
-        figure.savefig(file, dpi=150)
-    return written
+    paths = pages.files(Path(path).with_suffix(""))
+    colours = dict(zip(predicted, color_sequences["petroff10"], strict=False))
+    with style.page():
+        handles = [
+            Line2D([], [], color=colour, label=twin) for twin, colour in ({"measured": style.INK} | colours).items()
+        ]
+        height = pages.head(style.FULL_PAGE, handles) + ROW * len(measured)
+        page = pages.blank(style.FULL_PAGE, height)
+        axes = page.subplots(len(measured), 2, squeeze=False, sharex=True, width_ratios=(3, 2))
+        for k, ((left, right), (name, values)) in enumerate(zip(axes, measured.items(), strict=True)):
+            left.plot(t, values, color=style.INK, lw=1.6)
+            right.axhline(0.0, color=style.RULE, lw=0.8)
+            reached, left_over = [], []
+            for twin, colour in colours.items():
+                residual = values - predicted[twin][name]
+                left.plot(t, predicted[twin][name], color=colour, lw=0.9)
+                right.plot(t, residual, color=colour, lw=0.7)
+                reached.append(f"{twin} {list(fits[twin].values())[k]:.1f} %")
+                left_over.append(f"{twin} {np.sqrt(np.mean(residual**2)):.3g}")
+            left.set(ylabel=f"{name} ({units[name]})", title=f"fit: {', '.join(reached)}")
+            right.set_title(f"residual, rms: {', '.join(left_over)}")
+        for ax in axes[-1]:
+            ax.set_xlabel("time (s)")
+        pages.set_head(page, style.FULL_PAGE, title, handles)
+        pages.write(page, paths)
+    return paths

@@ -160,12 +160,7 @@ def _starting_states(
 
 
 def _twin(of: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapping[str, Any]]]:
-    """Return the rig to identify, and its records as columns.
-
-    Args:
-      of: as in `identify`.
-      many: the records.
-    """
+    """Return the rig to identify, and its records as columns."""
     if isinstance(of, str):
         of = find_rig(of)
     traces = [one for one in many if isinstance(one, Trace)]
@@ -177,11 +172,7 @@ def _twin(of: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapp
 
 
 def _of_plant(plant: Plant, base: Scenario | None) -> Rig:
-    """Return a rig whose quantities are a plant's parameters.
-
-    Args:
-      base: scenario of a run, whose parts the rig has; None for none.
-    """
+    """Return a rig whose quantities are a plant's parameters, with the parts of a run's scenario `base`."""
     own = {}
     if base is not None:
         own = {name: getattr(base, name) for name in OF_RUN if getattr(base, name) is not None}

@@ -78,13 +78,7 @@ def long_enough(data: Record, columns: Columns) -> bool:
 
 
 def torques(plant: Plant, data: Record, columns: Columns) -> Record:
-    """Return the torque of each joint that the measured motion takes, below CUTOFF, N m, by MuJoCo's inverse dynamics.
-
-    Args:
-      plant: with the joints of the record.
-      data: the record.
-      columns: names of its columns.
-    """
+    """Return the torque of each joint in the measured motion, below CUTOFF, N m, by MuJoCo's inverse dynamics."""
     own, model = Filter(data, columns), plant.load()
     state, joints, dofs = mujoco.MjData(model), joint_ids(model), dof_ids(model)
     x, v, a = (np.column_stack([own.cubic(name, order) for name in columns.x]) for order in range(3))

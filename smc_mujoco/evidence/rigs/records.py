@@ -238,10 +238,6 @@ def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.nd
     """Return positions and velocities at a sample, (n,) each.
 
     They come from the columns `state`; if there are none, from a cubic through the samples about it.
-
-    Args:
-      period: s.
-      at: index of the sample.
     """
     if columns.state:
         found = np.array([data[name][at] for name in columns.state])
@@ -262,11 +258,7 @@ def rate(values: np.ndarray, period: float) -> np.ndarray:
 
 
 def in_radians(record: Mapping[str, Any], columns: Columns, names: Sequence[str]) -> Record:
-    """Return the record with some columns converted from degrees to radians.
-
-    Args:
-      names: of those columns.
-    """
+    """Return the record with some columns converted from degrees to radians."""
     angles = {name: np.deg2rad(np.asarray(record[name], float)) for name in names if name in record}
     return {name: np.asarray(record[name]) for name in columns.known if name in record} | angles
 

@@ -519,16 +519,13 @@ class Rig:
 
     def torques(self, record: Mapping[str, Any]) -> Record:
         """Return the torque of each joint that a record's measured motion takes, below 5 Hz, N m."""
-        return inverse.torques(self._dynamics(), self.checked(record), self.columns)
+        if self.dynamics is None:
+            raise ScenarioError(f"records of {self.name} are replayed, and their torques are not predicted: use fit")
+        return inverse.torques(self.dynamics(Values(**self.values)), self.checked(record), self.columns)
 
     def measured_torques(self, record: Mapping[str, Any]) -> Record:
         """Return the recorded torque of each joint at the same times, through the same filter, N m."""
         return inverse.measured(self.checked(record), self.columns)
-
-    def _dynamics(self) -> Plant:
-        if self.dynamics is None:
-            raise ScenarioError(f"records of {self.name} are replayed, and their torques are not predicted: use fit")
-        return self.dynamics(Values(**self.values))
 
 
 def percentages(predicted: Record, measured: Record) -> dict[str, float]:
@@ -543,12 +540,7 @@ def percentages(predicted: Record, measured: Record) -> dict[str, float]:
 
 
 def fallen(predicted: Record, measured: Record, t: np.ndarray) -> Fall | None:
-    """Return the fall of a twin whose joints leave the measured ones by more than LOST of their ranges; else None.
-
-    Args:
-      predicted, measured: columns of the joints.
-      t: times of the record, s.
-    """
+    """Return the fall of a twin whose joints leave the measured ones by more than LOST of their ranges; else None."""
     for name, values in predicted.items():
         error, span = np.nan_to_num(np.abs(values - measured[name]), nan=np.inf), np.ptp(measured[name])
         if error.max() > LOST * span > 0.0:

@@ -126,11 +126,7 @@ def not_worse(replays: Replays, reached: Slopes) -> Slopes:
 
 
 def refine(replays: Replays, point: Point, most: int) -> Slopes:
-    """Return the slopes at the least squares near a point, whose cost is not above that of the point.
-
-    Args:
-      most: largest number of steps.
-    """
+    """Return the slopes at the least squares near a point, after at most `most` steps that lower the cost."""
     best = replays.slopes(point)
     for _ in range(most):
         chosen, reached = _best_step(replays, best)

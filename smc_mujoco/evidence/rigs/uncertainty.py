@@ -118,9 +118,6 @@ def _fed_back(replays: Replays, point: Point, J: np.ndarray) -> np.ndarray:
     """Return the deviation of the solution, (p,), that the measurement's noise causes through the controller.
 
     It is the root mean square over REPEATS simulations of the records with their noise and rounding, at first order.
-
-    Args:
-      J: slopes of the residuals, (N, p).
     """
     rig, pieces = replays.rig(point), replays.pieces
     known = [(piece.part, replays.state(point, k)) for k, piece in enumerate(pieces) if piece.part is not None]

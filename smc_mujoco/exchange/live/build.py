@@ -79,11 +79,7 @@ def _library(chosen: Sequence[Plant]) -> list[Component]:
 
 
 def _script(functions: Mapping[tuple[str, str], str]) -> str:
-    """Return a module that exports laws, surfaces and estimators, each an object of functions by name.
-
-    Args:
-      functions: kind and name -> JavaScript.
-    """
+    """Return a module that exports laws, surfaces and estimators, each an object of functions by name."""
     lines = []
     for kind in ("law", "surface", "estimator"):
         entries = [f"{json.dumps(name)}: {text},\n" for (of, name), text in functions.items() if of == kind]

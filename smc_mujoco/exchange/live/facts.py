@@ -70,13 +70,7 @@ def checked(names: Sequence[str | Plant]) -> list[Plant]:
 
 
 def facts(chosen: Sequence[Plant], offered: Sequence[Component], own: Sequence[Component]) -> dict[str, Any]:
-    """Return facts.json as a dict.
-
-    Args:
-      chosen: the plants of the page.
-      offered: laws, surfaces and velocity estimators, with the user's own laws.
-      own: the user's own laws.
-    """
+    """Return facts.json as a dict."""
     kinds = {kind: [one for one in offered if one.kind == kind] for kind in ("law", "surface", "estimator")}
     return {
         "version": __version__,
@@ -134,12 +128,7 @@ def _law(law: Component) -> dict[str, Any]:
 
 
 def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], own: Sequence[Component]) -> dict[str, Any]:
-    """Return the facts about a plant, with gains and ranges of the components that are offered on it.
-
-    Args:
-      kinds: kind of component -> all that the page offers.
-      own: the user's laws. They keep their gains, and the page opens with them.
-    """
+    """Return the facts about a plant, with gains and ranges of the components that are offered on it."""
     model = mujoco.MjModel.from_xml_path(str(_mjcf(plant)))
     joints = [model.joint(int(joint)) for joint in joint_ids(model)]
     resolved = defaults.Scenario(plant=plant, law="none").resolved

@@ -78,13 +78,7 @@ def pendulum(source, arm_inertia, arm_length, arm_damping, mass, centre, inertia
 
 
 def qube(version, source, motor, divisor, arm_damping, pendulum_damping, about):
-    """Return a QUBE-Servo with its rotary pendulum.
-
-    Args:
-      motor: arguments of `electric` after the source.
-      divisor: number that divides m r^2 in the inertia of the arm.
-      arm_damping, pendulum_damping: N m s/rad.
-    """
+    """Return a QUBE-Servo with its rotary pendulum; the arm has the inertia m r^2 / divisor."""
     arm, pole = (0.095, 0.085), (0.024, 0.129)  # kg, m
     return Rig(
         name=f"qube_servo_{version}",

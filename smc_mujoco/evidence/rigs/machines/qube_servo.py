@@ -82,6 +82,18 @@ def law(name, k, phi, k1=0.0, k2=0.0):
     return made.named(name).sourced(SHIPPED)
 
 
+NAMES = (
+    "pendulum_length", "arm_length", "arm_inertia", "arm_friction", "pendulum_damping", "torque_per_volt", "back_emf",
+    "slope_x", "slope_y", "encoder_offset",
+)  # fmt: skip
+ENSEMBLE = (  # identified in the same way with delays of 0, 0.5 and 1.5 ms
+    (0.0, (0.12264, 0.0851824, 9.17066e-05, 0.000230777, 7.8941e-08, 0.00428564, 0.0324444, -0.00448333, 0.00765301,
+           -0.00055608)),
+    (5e-4, (0.121922, 0.0847074, 9.82876e-05, 0.000246735, 8.42054e-06, 0.00447065, 0.0356571, -0.00511397, 0.00749969,
+            -0.00105909)),
+    (1.5e-3, (0.118806, 0.0826821, 0.000111814, 0.000268487, 1.43059e-05, 0.00482031, 0.053506, -0.00598963, 0.00746116,
+              -0.00177261)),
+)  # fmt: skip
 QUBE_SERVO = Rig(
     name="qube_servo",
     label="QUBE-Servo with rotary pendulum, identified from public records",
@@ -102,82 +114,25 @@ QUBE_SERVO = Rig(
     },
     machine=machine,
     controller=state_feedback(),
-    columns=Columns(
-        x=("theta", "alpha"),
-        u="plant_input",
-        reference="target_theta",
-        feedforward="feedforward",
-        others=("target_alpha",),
-    ),
+    columns=Columns(x=("theta", "alpha"), u="plant_input", reference="target_theta", others=("target_alpha",)),
     commands=commands,
     start=2.0,
     score_from=4.0,
     window=0.25,
-    free=(
-        "pendulum_length",
-        "arm_length",
-        "arm_inertia",
-        "arm_friction",
-        "pendulum_damping",
-        "torque_per_volt",
-        "back_emf",
-        "slope_x",
-        "slope_y",
-        "encoder_offset",
-    ),
+    free=NAMES,
     published={
         "driver": DRIVER | {"source": f"{PUBLISHED}: rotor 4e-6 kg m^2, arm's inertia m r^2/12"},
         "driver_damped": DRIVER
         | {"arm_damping": 5e-4, "pendulum_damping": 5e-5}
         | {"source": f"{PUBLISHED}, damping between the published ones"},
         "quanser": DRIVER
+        | {"arm_inertia": 4e-6 + 0.095 * 0.085**2 / 3}
         | {
-            "arm_inertia": 4e-6 + 0.095 * 0.085**2 / 3,
-            "source": "arm's inertia m r^2/3 as in "
-            "Quanser's qube3_rotpen_param.m (no licence stated): the rig's own controller lets it fall",
+            "source": "arm's inertia m r^2/3 as in Quanser's qube3_rotpen_param.m (no licence stated): the rig's own "
+            "controller lets it fall"
         },
     },
-    ensemble=(  # identified in the same way with delays of 0, 0.5 and 1.5 ms
-        {
-            "pendulum_length": 0.12264,
-            "arm_length": 0.0851824,
-            "arm_inertia": 9.17066e-05,
-            "arm_friction": 0.000230777,
-            "pendulum_damping": 7.8941e-08,
-            "torque_per_volt": 0.00428564,
-            "back_emf": 0.0324444,
-            "slope_x": -0.00448333,
-            "slope_y": 0.00765301,
-            "encoder_offset": -0.00055608,
-            "delay": 0.0,
-        },
-        {
-            "pendulum_length": 0.121922,
-            "arm_length": 0.0847074,
-            "arm_inertia": 9.82876e-05,
-            "arm_friction": 0.000246735,
-            "pendulum_damping": 8.42054e-06,
-            "torque_per_volt": 0.00447065,
-            "back_emf": 0.0356571,
-            "slope_x": -0.00511397,
-            "slope_y": 0.00749969,
-            "encoder_offset": -0.00105909,
-            "delay": 0.0005,
-        },
-        {
-            "pendulum_length": 0.118806,
-            "arm_length": 0.0826821,
-            "arm_inertia": 0.000111814,
-            "arm_friction": 0.000268487,
-            "pendulum_damping": 1.43059e-05,
-            "torque_per_volt": 0.00482031,
-            "back_emf": 0.053506,
-            "slope_x": -0.00598963,
-            "slope_y": 0.00746116,
-            "encoder_offset": -0.00177261,
-            "delay": 0.0015,
-        },
-    ),
+    ensemble=tuple(dict(zip(NAMES, values, strict=True)) | {"delay": delay} for delay, values in ENSEMBLE),
     laws=(
         law("relay", k=0.04, phi=1e-4),
         law("boundary layer", k=0.05, phi=0.025),
