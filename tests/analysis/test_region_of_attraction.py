@@ -219,7 +219,8 @@ def test_a_picture_is_drawn_and_its_shares_are_a_whole(weak, tmp_path):
     region.draw([weak, weak], tmp_path / "map.png")
     assert (tmp_path / "map.png").stat().st_size > 10_000
     assert np.array_equal(region.classed(weak, region.horizons([weak])) == 4, weak.outcome == DOES_NOT)
-    entries = region.draw([weak]).axes[0].get_legend().get_texts()
+    legend = region.draw([weak]).axes[0].get_legend()
+    entries = legend.get_texts() if legend else []
     assert sum(float(one.get_text().split(": ")[1].rstrip(" %")) for one in entries) == pytest.approx(100, abs=1)
     with pytest.raises(smc.ScenarioError, match=r"end the name in .svg, .png or .pdf"):
         region.draw([weak], tmp_path / "map.gif")

@@ -82,7 +82,7 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]
     pushed = np.zeros(len(grid), bool)
     for push in style.pushes(runs):
         pushed |= np.abs(grid + 0.5 / fps - push.time - 0.5 * push.width) <= IMPACT
-    moving = maximum_filter1d((travel > STILL) | pushed, 2 * round(REST * fps) + 1, mode="nearest")
+    moving = maximum_filter1d(np.logical_or(travel > STILL, pushed), 2 * round(REST * fps) + 1, mode="nearest")
     longest, found = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1]), np.ones(len(grid))
     steps = [(most, SLOWEST) for most in range(SLOWEST, 0, -1)] + [(0, most) for most in range(SLOWEST, -1, -1)]
     for most, around_pushes in steps:
