@@ -76,13 +76,14 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]
     runs = [finite(trace) for trace in traces]
     travel = motion(runs, np.append(grid, whole))
     powers = np.ceil(np.log2(np.maximum(travel / TRAVEL, 1.0)) - 1e-9)
-    powers = maximum_filter1d(powers, 2 * round(AROUND * fps) + 1, mode="nearest")
+    powers = np.asarray(maximum_filter1d(powers, 2 * round(AROUND * fps) + 1, mode="nearest"))
     for start in impacts(runs):
         powers[np.abs(grid + 0.5 / fps - start) <= IMPACT] = SLOWEST
     pushed = np.zeros(len(grid), bool)
     for push in style.pushes(runs):
         pushed |= np.abs(grid + 0.5 / fps - push.time - 0.5 * push.width) <= IMPACT
-    moving = maximum_filter1d(np.logical_or(travel > STILL, pushed), 2 * round(REST * fps) + 1, mode="nearest")
+    moved = (travel > STILL) | pushed
+    moving = np.asarray(maximum_filter1d(moved, 2 * round(REST * fps) + 1, mode="nearest"), bool)
     longest, found = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1]), np.ones(len(grid))
     steps = [(most, SLOWEST) for most in range(SLOWEST, 0, -1)] + [(0, most) for most in range(SLOWEST, -1, -1)]
     for most, around_pushes in steps:
