@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from smc_mujoco.common.errors import ScenarioError, find, taken
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
-from smc_mujoco.draw import style, ticks
+from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.draw.panels import Panel
@@ -131,7 +131,7 @@ def figure(
             )
         _draw_beside(page, others, column, (groups[0], *places), names, colours, rests)
         pages.set_head(page, width, title or style.plant_name(traces[0].scenario.plant), key, gains)
-        ticks.space(page)
+        pages.space_ticks(page)
         pages.write(page, paths)
     return page
 

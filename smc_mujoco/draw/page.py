@@ -1,4 +1,4 @@
-"""A page of figures: its size, title, legend and files.
+"""A page of figures: its size, title, legend, ticks and files.
 
 A figure is new, or is drawn into the caller's matplotlib Figure or SubFigure. It is as wide as a page of this package
 (12.8 in), an IEEE page or column, or has any size in inches.
@@ -9,13 +9,17 @@ import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.font_manager import FontProperties
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.text import Annotation
+from matplotlib.ticker import AutoLocator, MaxNLocator
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.files import replacing
@@ -32,6 +36,8 @@ LETTERS, TITLE = 11.0, 17.0  # points on a full page
 SAMPLE, GAPS = 1.6, 2.3  # of a legend's entry, in heights of its letters: its sample, and the space around its words
 PAD = 5.0  # points on a full page, above the title
 SHARE, WHOLE = 0.55, 0.95  # widest entry of a legend, of the page: in several columns, and in a single one
+MAX_TICKS = 9  # ticks of an axis, as of matplotlib's own
+TICK_GAP = 0.6  # between labels of ticks, in heights of their letters
 Handle = Line2D | Patch
 Size = str | tuple[float, float] | None
 
@@ -220,3 +226,33 @@ def lay_out(whole: Figure, format: str) -> None:
         layout.execute(whole)
         whole.set_canvas(canvas)
         whole.dpi = dpi
+
+
+class Spaced(AutoLocator):
+    """Round places whose labels do not touch. Matplotlib's own takes labels for three heights of a letter wide."""
+
+    def __init__(self):
+        super().__init__()
+        self.size = FontProperties(size=matplotlib.rcParams["xtick.labelsize"]).get_size_in_points()
+
+    def __call__(self) -> list[float]:
+        """Return the ticks of the visible range."""
+        assert self.axis is not None
+        low, high = sorted(self.axis.get_view_interval())
+        box, formatter, ticks = self.axis.axes.bbox, self.axis.get_major_formatter(), []
+        for most in range(MAX_TICKS, 0, -1):
+            self.set_params(nbins=most)
+            ticks = [tick for tick in self.tick_values(low, high).tolist() if low <= tick <= high]
+            widest = max((style.width(text, self.size) for text in formatter.format_ticks(ticks)), default=0.0)
+            pitch = 72 * box.width / self.axis.figure.dpi * (ticks[1] - ticks[0]) / (high - low) if ticks[1:] else 0.0
+            if widest + TICK_GAP * self.size <= pitch:
+                return ticks
+        return ticks[:1]
+
+
+def space_ticks(page: Figure | SubFigure) -> None:
+    """Give the axes of a page ticks whose labels do not touch. Logarithmic axes and ticks that were set stay."""
+    for ax in page.findobj(Axes):
+        assert isinstance(ax, Axes)
+        if isinstance(ax.xaxis.get_major_locator(), MaxNLocator):
+            ax.xaxis.set_major_locator(Spaced())

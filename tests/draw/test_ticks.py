@@ -5,7 +5,8 @@ import itertools
 import pytest
 from matplotlib.figure import Figure
 
-from smc_mujoco.draw import style, ticks
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import style
 
 pytestmark = pytest.mark.quick
 
@@ -16,11 +17,11 @@ def test_labels_do_not_touch(width, low, high):
     with style.page(3.5):
         page = Figure(figsize=(width, 1.0))
         ax = page.add_axes((0.1, 0.4, 0.8, 0.5), xlim=(low, high))
-        ticks.space(page)
+        pages.space_ticks(page)
         page.draw_without_rendering()
     shown = [tick.label1 for tick in ax.xaxis.get_major_ticks() if low <= tick.get_loc() <= high]
     boxes = sorted((label.get_window_extent() for label in shown), key=lambda box: box.x0)
-    assert 1 <= len(boxes) <= ticks.MOST + 1
+    assert 1 <= len(boxes) <= pages.MAX_TICKS + 1
     assert len(boxes) >= 2 or width == 1.0
     assert all(one.x1 < other.x0 for one, other in itertools.pairwise(boxes))
 
@@ -31,6 +32,6 @@ def test_ticks_that_were_set_and_logarithmic_axes_stay():
     one.set_xticks([0.1, 0.2])
     other.set(xscale="log", xlim=(1.0, 1e4))
     before = other.get_xticks()
-    ticks.space(page)
+    pages.space_ticks(page)
     assert one.get_xticks() == pytest.approx([0.1, 0.2])
     assert other.get_xticks() == pytest.approx(before)

@@ -6,10 +6,13 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from smc_mujoco.draw.film import replay, scene
+from smc_mujoco.draw.film import scene
 from smc_mujoco.draw.states import shapes
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
+from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation.batch import ScenarioBatch
+from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -125,8 +128,39 @@ class Puppet:
 
 def motion(trace: Trace, times: np.ndarray) -> Motion | None:
     """Return how joints without a channel move, at times in s; None if there are none, or if that is not known."""
-    poses = None if Puppet(trace.scenario).whole else replay.poses(trace, times)
-    return None if poses is None else Motion(times, poses)
+    found = None if Puppet(trace.scenario).whole else poses(trace, times)
+    return None if found is None else Motion(times, found)
+
+
+def poses(trace: Trace, times: np.ndarray) -> np.ndarray | None:
+    """Return qpos at times in s, (times, nq), each at the physics step before; after a failure the last one.
+
+    A trace has the channels only, so the run is simulated again.
+
+    None: the law or a signal does not compile, and the run would take long.
+    """
+    prepared = prepare(trace.scenario)
+    if prepared.why_not:
+        return None
+    scenario = trace.scenario.resolved
+    total, jump = scenario.samples * scenario.steps, scenario.jump_step
+    wanted: list[int] = np.clip(np.floor(times / scenario.physics_step + 1e-6).astype(int), 0, total).tolist()
+    found: dict[int, np.ndarray] = {}
+    ends: list[int] = sorted({*wanted, *([jump] if 0 < jump < total else [])})
+    step = 0
+    with callback.installed():
+        batch = ScenarioBatch([prepared], threads=1)
+        qpos = batch.batch.bind("qpos")
+        last = qpos[0].copy()
+        for end in ends:
+            batch.advance(end - step, lambda steps: None)
+            step = end
+            if step == jump:
+                batch.set_parameters(step, [0])
+            if batch.records["failure"][0] == state.FINE:
+                last = qpos[0].copy()
+            found[end] = last
+    return np.array([found[end] for end in wanted])
 
 
 def places(puppets: Sequence[Puppet], reaches: Sequence[np.ndarray], turn: np.ndarray) -> np.ndarray:

@@ -27,11 +27,6 @@ MUTANTS: dict[str, Callable[[Component], Component]] = {
 KEPT, BLIND = "kept by every mutant", "refuted, and no mutant changes its numbers"
 
 
-def mutants(law: Component) -> dict[str, Component]:
-    """Return the mutants of a law: with the wrong sign, without gain, without memory, and as a relay."""
-    return {name: mutant(law) for name, mutant in MUTANTS.items()}
-
-
 def survivors(
     paper: str | Path | Paper,
     only: Iterable[str | int] | None = None,

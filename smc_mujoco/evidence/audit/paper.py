@@ -30,8 +30,17 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue as laws_known
 from smc_mujoco.control.source import STUDY
-from smc_mujoco.evidence.audit.threshold import Threshold
-from smc_mujoco.evidence.audit.verdict import DERIVED, EXISTENTIAL, NAMED, OURS, PAPER, UNIVERSAL, WHOSE, Statement
+from smc_mujoco.evidence.audit.verdict import (
+    DERIVED,
+    EXISTENTIAL,
+    NAMED,
+    OURS,
+    PAPER,
+    UNIVERSAL,
+    WHOSE,
+    Statement,
+    Threshold,
+)  # fmt: skip
 from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
@@ -345,7 +354,7 @@ def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
     texts = {field: _text(_typed(field, data.get(field, ""), str, "a text")) for field in TEXTS}
     for field in TEXTS[:3]:
         if not texts[field].strip():
-            raise ScenarioError(f"no {field}: write one, as {field} = {_example(field)}")
+            raise ScenarioError(f"no {field}: write one, as in the template of `smc-mujoco papers --new FOLDER`")
     _one_of("read", texts["read"], READ)
     parts: dict[str, Any] = {
         "fields": _fields("runs", texts.pop("runs")),
@@ -574,11 +583,6 @@ def _typed(field: str, value: Any, kind: Any, cure: str) -> Any:
 def _text(value: Any) -> Any:
     """Return a text with single spaces, and any other value as it is."""
     return " ".join(value.split()) if isinstance(value, str) else value
-
-
-def _example(field: str) -> str:
-    examples = {"title": "Sliding order and sliding accuracy in sliding mode control", "authors": "A. Levant"}
-    return f'"{examples.get(field, "International Journal of Control 58(6), 1993, pp. 1247-1263")}"'
 
 
 def duration_of(paper: Paper, entry: Entry | None, changes: Mapping[str, Any]) -> float:

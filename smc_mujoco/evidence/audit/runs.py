@@ -21,8 +21,7 @@ from smc_mujoco.common.errors import find
 from smc_mujoco.common.files import from_json
 from smc_mujoco.control.component import Component
 from smc_mujoco.evidence.audit.paper import Entry, Paper, duration_of
-from smc_mujoco.evidence.audit.threshold import Threshold
-from smc_mujoco.evidence.audit.verdict import Check, check
+from smc_mujoco.evidence.audit.verdict import Check, Threshold, check
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.run import stream

@@ -204,10 +204,8 @@ def _saturated(document: dict, loop: Loop, terms: list[float], law: SimpleNamesp
         conditions.append(_condition("coupling", weakest))
     if not loop.switches:
         conditions.append(_condition("local", loop.steep * loop.c - A - B))
-    V = {"v^2": loop.M / 2.0, "sigma": 1.0 / (1.0 if law.name == "terminal" else loop.c), "cos x - 1": A}
-    if law.name == "classical":
-        V["sigma"] = 1.0 / law.c
-    return _part("saturated PD", conditions, V=V | {"x^2": -B / 2.0, "x^4": -C / 4.0, "springs": kc / 2.0})
+    V = {"v^2": loop.M / 2.0, "sigma": 1.0 / loop.c, "cos x - 1": A, "x^2": -B / 2.0, "x^4": -C / 4.0}
+    return _part("saturated PD", conditions, V=V | {"springs": kc / 2.0})
 
 
 def _restoring(document: dict, loop: Loop, terms: list[float], checker: Any) -> dict:
@@ -276,7 +274,7 @@ def _start(scenario: Scenario, loop: Loop) -> tuple[float, float]:
 def _levels(document: dict, loop: Loop, law: SimpleNamespace, found: search.Levels, scenario: Scenario) -> dict:
     """Return the levels of W as data."""
     x, v = scenario.resolved.x0[0], scenario.resolved.v0[0]
-    top = float(_cells(found, np.array([x]), np.array([v + loop.c * x]))[0])
+    top = _cell(found, *_start(scenario, loop))
     conditions = [_condition("actuator", _room(document, law)), _condition("start", found.outer - top)]
     data = {"x": found.x.tolist(), "s": found.s.tolist(), "W": found.W.tolist(), "start": [x, v]}
     data |= {"inner": found.inner, "outer": found.outer, "bound": found.bound} | (
@@ -285,14 +283,13 @@ def _levels(document: dict, loop: Loop, law: SimpleNamespace, found: search.Leve
     return _part("level sets", conditions, **data)
 
 
-def _cells(found: search.Levels, x: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Return the largest corner of the cells of states, 1 outside of the grid."""
-    sign = np.where(x >= 0.0, 1.0, -1.0)
-    x, s = x * sign, s * sign
-    i = np.clip(np.searchsorted(found.x, x, side="right") - 1, 0, found.x.size - 2)
-    j = np.clip(np.searchsorted(found.s, s, side="right") - 1, 0, found.s.size - 2)
-    corners = [found.W[i + a, j + b] for a in (0, 1) for b in (0, 1)]
-    return np.where((x < found.x[-1]) & (np.abs(s) < found.s[-1]), np.max(corners, axis=0), 1.0)
+def _cell(found: search.Levels, x: float, s: float) -> float:
+    """Return the largest corner of the cell of a state, 1 outside of the grid."""
+    x, s = (x, s) if x >= 0.0 else (-x, -s)
+    if x >= found.x[-1] or abs(s) >= found.s[-1]:
+        return 1.0
+    i, j = (int(np.searchsorted(edges, at, side="right")) - 1 for edges, at in ((found.x, x), (found.s, s)))
+    return float(found.W[i : i + 2, j : j + 2].max())
 
 
 def _super_twisting(document: dict, loop: Loop, terms: list[float], law: SimpleNamespace) -> dict:

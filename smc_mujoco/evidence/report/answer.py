@@ -160,11 +160,6 @@ def losses(found: Cells, metrics: Sequence[str], law: str = words.PAPER) -> list
     return sorted(lost, key=lambda loss: -loss.times)
 
 
-def counts(findings: "Findings") -> dict[str, int]:
-    """Return verdict -> how many of the paper's own sentences have it, where some do."""
-    return totals(findings.claims)
-
-
 def overall(findings: "Findings", metric: str) -> list[Place]:
     """Return the laws' places over all runs, best first."""
     rows = [place for place in findings.places if place.metric == metric and not place.plant]
@@ -203,8 +198,7 @@ def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
         of, lost, alone = (sum(getattr(row, name) for row in own) for name in ("of", "lost", "alone"))
         parts.append(f"its observer-free law is beaten in {lost} of {of} comparisons and wins in {alone or 'none'}")
     if findings.claims:
-        found = [f"{n} {'are' if n != 1 else 'is'} {verdict}" for verdict, n in counts(findings).items()]
-        parts.append(f"of its {len(findings.claims)} checked claims, {joined(found)}")
+        parts.append(f"of its {len(findings.claims)} checked claims, {_verdicts(findings)}")
     return f"The paper: {'; '.join(parts)}." if parts else ""
 
 
@@ -298,7 +292,11 @@ def _paper(findings: "Findings", metrics: Sequence[str]) -> str:
 def _claims(findings: "Findings") -> str:
     if not findings.claims:
         return ""
-    parts = [f"{n} {'are' if n != 1 else 'is'} {verdict}" for verdict, n in counts(findings).items()]
     flips = sum(claim.flips for claim in findings.claims)
     depend = f"; {flips} of these verdicts depend on the gains" if flips else ""
-    return f"Of {len(findings.claims)} claims of the paper that were checked, {joined(parts)}{depend}."
+    return f"Of {len(findings.claims)} claims of the paper that were checked, {_verdicts(findings)}{depend}."
+
+
+def _verdicts(findings: "Findings") -> str:
+    """Return how many of the paper's own sentences have each verdict."""
+    return joined(f"{n} {'are' if n != 1 else 'is'} {verdict}" for verdict, n in totals(findings.claims).items())

@@ -20,7 +20,6 @@ from smc_mujoco.evidence.audit import runs as claim_runs
 from smc_mujoco.evidence.audit.audit import claims, evaluations
 from smc_mujoco.evidence.audit.paper import Entry, paper
 from smc_mujoco.evidence.audit.runs import Runs
-from smc_mujoco.evidence.audit.threshold import Threshold
 from smc_mujoco.evidence.audit.verdict import (
     EXISTENTIAL,
     NAMED,
@@ -30,6 +29,7 @@ from smc_mujoco.evidence.audit.verdict import (
     SUPPORTED,
     UNIVERSAL,
     Beside,
+    Threshold,
     check,
     combined,
     judged,

@@ -6,7 +6,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.law import law_function
-from smc_mujoco.evidence.audit.mutants import BLIND, KEPT, evaluations, mutants, survivors
+from smc_mujoco.evidence.audit.mutants import BLIND, KEPT, MUTANTS, evaluations, survivors
 from smc_mujoco.evidence.audit.paper import new
 
 DATA = """
@@ -63,11 +63,10 @@ def winding(y, gains, memory):
 
 def test_mutants_reverse_the_command_drop_it_forget_or_switch():
     scenario = smc.Scenario(plant="duffing", law=winding(), duration=0.05)
-    true, *broken = smc.run(
-        [scenario, *(smc.Scenario(plant="duffing", law=law, duration=0.05) for law in mutants(winding()).values())]
-    )
+    laws = [make(winding()) for make in MUTANTS.values()]
+    true, *broken = smc.run([scenario, *(smc.Scenario(plant="duffing", law=law, duration=0.05) for law in laws)])
     wrong, without, forgetful, relay = broken
-    assert list(mutants(winding())) == ["wrong sign", "zero gain", "no memory", "relay"]
+    assert list(MUTANTS) == ["wrong sign", "zero gain", "no memory", "relay"]
     assert true.u[0, 0] == -wrong.u[0, 0] < 0.0
     assert not without.u.any()
     assert set(np.unique(relay.u)) == {-6.0}

@@ -13,8 +13,7 @@ from smc_mujoco.evidence.audit import evidence, template
 from smc_mujoco.evidence.audit.audit import claims
 from smc_mujoco.evidence.audit.paper import CODE, FILE, new, paper
 from smc_mujoco.evidence.audit.runs import Runs
-from smc_mujoco.evidence.audit.threshold import Threshold
-from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Beside, Check
+from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Beside, Check, Threshold
 
 pytestmark = pytest.mark.quick
 
