@@ -114,9 +114,9 @@ class Panel(NamedTuple):
 
     @property
     def unitless(self) -> bool:
-        """Whether the unit depends on the law: that of s, for some laws and plants."""
-        plant = self.traces[0].scenario.plant
-        rates = all(_is_rate(trace.scenario.law) for trace in self.traces)
+        """Whether the unit depends on the law: that of s. The s of twisting is e, and that of PID is a force."""
+        plant, laws = self.traces[0].scenario.plant, [trace.scenario.law for trace in self.traces]
+        rates = all(law.relative_degree == 1 and not _is_baseline(law) for law in laws)
         return self.quantity == "s" and (plant.free > 0 or not rates)
 
     @property
@@ -141,11 +141,6 @@ class Panel(NamedTuple):
             return f"{letter}{' on q' * (not group.driven)}{self.unit}"
         kind = {"rad": "angle", "m": "position"}[group.unit]
         return f"{KINDS.get(name, kind if group.driven else f'free {kind}')} {letter}{self.unit}"
-
-
-def _is_rate(law: Law) -> bool:
-    """Return whether a law's s has the unit of a velocity; that of twisting is e, and that of PID a force."""
-    return law.relative_degree == 1 and not _is_baseline(law)
 
 
 def _is_baseline(law: Law) -> bool:

@@ -56,7 +56,9 @@ def pareto(
         ax.set_ylabel("variation: TV / (u_max T), summed over conditions (1/s)")
         ax.tick_params(which="both", length=0)
         ax.margins(0.04, 0.06)
-        if ax.get_ylim()[1] > 0.1 * (limit := _most(best[0])):
+        of = best[0].definition
+        limit = 2 / of.control_period * len(of.conditions)  # of a command from bound to bound at every sample, 1/s
+        if ax.get_ylim()[1] > 0.1 * limit:
             dashed = {"color": style.RULE, "lw": style.points(1.0), "ls": (0, (4, 3))}
             ax.axhline(limit, **dashed)
             handles.append(Line2D([], [], **dashed, label="from bound to bound at every sample"))
@@ -83,8 +85,3 @@ def _front(ax: Axes, tuned: Tuned, mark: str, colour: str) -> Line2D:
     ax.plot([chosen.tracking], [max(chosen.variation, MIN_VARIATION)], color=colour, marker=mark, zorder=3, **_ring())
     label = f"{words}: J = {tuned.objective:.3g} s²"
     return Line2D([], [], color=colour, lw=style.points(3), marker=mark, ms=style.points(7), mec="none", label=label)
-
-
-def _most(tuned: Tuned) -> float:
-    """Return the variation of a command that goes from bound to bound at every sample of every condition, 1/s."""
-    return 2 / tuned.definition.control_period * len(tuned.definition.conditions)

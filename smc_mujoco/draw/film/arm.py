@@ -5,7 +5,6 @@ All are drawn over the rendered picture, so they cost little and no link hides t
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -111,16 +110,6 @@ class Trail:
         picture[y, x] = (picture[y, x] * (1.0 - cover) + self.colour * cover).astype(np.uint8)
 
 
-class Blow(NamedTuple):
-    """A blow on a body of a machine."""
-
-    machine: int
-    body: str
-    force: np.ndarray  # (3,) N, its peak
-    time: float  # s
-    width: float  # s
-
-
 class Overlay:
     """What is drawn over the pictures of arms.
 
@@ -158,11 +147,7 @@ class Overlay:
         ]
         sizes = [np.linalg.norm(one, axis=1).max() for one in self.forces if one is not None]
         self.newton = LONGEST / max(sizes, default=1.0) if max(sizes, default=0.0) else 0.0  # m
-        self.blows = [
-            Blow(k, push.body, np.array([push.x, push.y, push.z]), push.time, push.width)
-            for k, trace in enumerate(traces)
-            for push in style.pushes([trace])
-        ]
+        self.blows = [(k, push) for k, trace in enumerate(traces) for push in style.pushes([trace])]
 
     def share(self, trace: Trace) -> np.ndarray:
         """Return the torques as shares of their limits, (frames, joints), -1 .. 1: means over a frame."""
@@ -183,12 +168,13 @@ class Overlay:
                 at = bodies(k, self.traces[k].scenario.plant.tip)
                 ends = self.project(np.array([at, at - self.newton * force[frame]]))
                 self.arrow(image, ends[0], ends[1], style.REACTION, f"{size:.0f} N", after=True)
-        for blow in self.blows:
+        for k, blow in self.blows:
             if self.edges[frame] <= blow.time + blow.width + SHOWN and time >= blow.time:
-                way = blow.force / np.linalg.norm(blow.force)
-                end = bodies(blow.machine, blow.body) - REACH * way
+                peak = np.array([blow.x, blow.y, blow.z])
+                way = peak / np.linalg.norm(peak)
+                end = bodies(k, blow.body) - REACH * way
                 ends = self.project(np.array([end - STRUCK * way, end]))
-                self.arrow(image, ends[0], ends[1], style.REACTION, f"{np.linalg.norm(blow.force):.0f} N", after=False)
+                self.arrow(image, ends[0], ends[1], style.REACTION, f"{np.linalg.norm(peak):.0f} N", after=False)
         for k in range(len(self.traces)):
             self.gauges(draw, k, frame)
         return np.asarray(image)
@@ -221,7 +207,8 @@ class Overlay:
     def gauges(self, draw: ImageDraw.ImageDraw, k: int, frame: int) -> None:
         """Draw the bars of a machine, and how far its tip is off its path."""
         s, (left, top, right, bottom), font = self.scale, self.room[k].tolist(), style.font(LETTERS * self.scale)
-        words, letters = error_words(1e3 * self.errors[k][frame]), style.font(NUMBER * s, bold=True)
+        off, letters = 1e3 * self.errors[k][frame], style.font(NUMBER * s, bold=True)  # mm
+        words = f"tip {off:.{1 if off < 9.95 else 0}f} mm"
         if self.shares is None:
             draw.text(((left + right) / 2, (top + bottom) / 2), words, style.INK, letters, anchor="mm")
             return
@@ -239,11 +226,6 @@ class Overlay:
         if right - left > wide + 1:
             draw.text((left + wide + 6 * s, zero), "tip", style.MUTED, style.font(NUMBER * s), anchor="lb")
             draw.text((left + wide + 6 * s, zero + 2 * s), words.removeprefix("tip "), style.INK, letters, anchor="lt")
-
-
-def error_words(millimetres: float) -> str:
-    """Return how far a tip is off its path in words."""
-    return f"tip {millimetres:.{1 if millimetres < 9.95 else 0}f} mm"
 
 
 def bars_width(joints: int) -> float:

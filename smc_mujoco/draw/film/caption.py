@@ -66,7 +66,8 @@ class Caption:
         self.key = wrapped(parts, inside - self.note_room, KEY * scale)
         self.beside = not row  # machines behind each other have their labels at the left
         words = [{state.words for state in each if state} for each in states] or [set()] * len(traces)
-        badges = [max((self.badge_width(text) for text in each), default=0.0) for each in words]
+        letters, margin = BADGE * scale, 1.2 * BADGE * scale  # px, of a badge, which shows a machine's state
+        badges = [max((style.width(text, letters, bold=True) + margin for text in each), default=0.0) for each in words]
         self.gauges = [gauges(trace.scenario) and not each for trace, each in zip(traces, words, strict=True)]
         badges = [max(wide, STRIP * scale * on) for wide, on in zip(badges, self.gauges, strict=True)]
         self.badge = np.array([badges, [1.6 * BADGE * scale * any(badges)] * len(traces)]).T  # width and height, px
@@ -104,10 +105,6 @@ class Caption:
     def width(self, text: str) -> float:
         """Return the width of a label, px."""
         return style.width(text, LABEL * self.scale, bold=True) + 1.4 * LABEL * self.scale
-
-    def badge_width(self, text: str) -> float:
-        """Return the width of a badge, which shows a machine's state, px."""
-        return style.width(text, BADGE * self.scale, bold=True) + 1.2 * BADGE * self.scale
 
     def place(self, boxes: np.ndarray) -> None:
         """Place the labels under machines in a row, else at the left of each; `boxes` are their places, (n, 4) px.

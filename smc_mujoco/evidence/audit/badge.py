@@ -5,6 +5,7 @@ from html import escape
 from pathlib import Path
 
 from smc_mujoco.common.files import ended, replacing
+from smc_mujoco.draw import style
 from smc_mujoco.evidence.audit.verdict import ANSWERS, NOT_TESTABLE, PARTLY, REFUTED, SUPPORTED, Claim, totals
 
 COLOURS = {SUPPORTED: "#2b7a3d", PARTLY: "#8a6100", REFUTED: "#b3322b", NOT_TESTABLE: "#6a6a6a"}  # white on each: 5:1
@@ -31,7 +32,7 @@ def svg(name: str, claims: Sequence[Claim]) -> str:
     about = f"{fields[0][0]}: {', '.join(text for text, _ in fields[1:])}"
     boxes, texts, x = [], [], 0.0
     for text, colour in fields:
-        length = width(text)
+        length = style.width(text, SIZE)  # DejaVu Sans is as wide as Verdana
         wide = round(length + 2 * MARGIN)
         boxes.append(f'<rect x="{x:g}" width="{wide}" height="{HEIGHT}" fill="{colour}"/>')
         shown, middle = escape(text), x + wide / 2
@@ -50,11 +51,3 @@ def svg(name: str, claims: Sequence[Claim]) -> str:
         f'<g clip-path="url(#r)">{"".join(boxes)}<rect {size} fill="url(#s)"/></g>'
         f'<g fill="#fff" text-anchor="middle" font-family="{FONT}" font-size="{SIZE}">{"".join(texts)}</g></svg>\n'
     )
-
-
-def width(text: str) -> float:
-    """Return the width of a text, px, in the font of badges; DejaVu Sans stands for Verdana, which is as wide."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import TextPath
-
-    return float(TextPath((0, 0), text, size=SIZE, prop=FontProperties(family="DejaVu Sans")).get_extents().x1)

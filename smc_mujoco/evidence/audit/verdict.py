@@ -19,7 +19,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from smc_mujoco.common import files, html
+from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, find, shown
 
 SUPPORTED, PARTLY, REFUTED, NOT_TESTABLE = VERDICTS = ("supported", "partly supported", "refuted", "not testable")
@@ -253,10 +253,6 @@ class Claim(Statement):
         about = f"{self.id}: {self.text} ({self.where}): {self.verdict}{', flips with the gains' * self.flips}"
         note = ". ".join(filter(None, (self.source, self.measured, f"It holds if: {self.holds_if}", self.note)))
         return html.table(("gains", "", "measured", "value", "asked"), lines, about, note, range(3, 5), most=24)
-
-    def plain(self) -> dict[str, Any]:
-        """Return the claim as JSON data; numbers that JSON lacks become "Infinity", "-Infinity" and "NaN"."""
-        return files.plain(dataclasses.asdict(self))
 
 
 class Claims(list[Claim]):

@@ -6,11 +6,8 @@ z = (q1, q2, q1', q2') is the state, z*(t) and u*(t) a trajectory from hanging t
 motion linearised along it, and P(t) the solution of its Riccati equation -P' = A'P + P A - P b b'P / R + Q, which ends
 in that of the upright equilibrium. After the trajectory all of them stay as they are there, and the same law balances.
 
-With u = u* - s this is the linear-quadratic regulator along the trajectory. The entry's feedback is 1.5 s near the
-trajectory and bends where |s| nears phi. On the board's undisturbed machine |s| / phi is below 0.002, so the score is
-that of the trajectory, and any feedback that holds the machine on it scores the same. `FEEDBACKS` has three others, as
-control experiments: the same slope without a bend, the regulator itself, and a layer so narrow that the law switches.
-All of them are clipped at the motor's 6 N m.
+The entry's feedback is 1.5 s near the trajectory and bends where |s| nears phi; u = u* - s is the linear-quadratic
+regulator. `FEEDBACKS` has three others, as control experiments. docs/boards.md tells what they say about the entry.
 
 `trajectories/` has z*, u*, z*'' and b'P/R of each robot, and how they were found; benchmarks/swing_up.py finds them
 again. The entry's velocities are those of a Savitzky-Golay filter of 5 positions; the published entries use measured

@@ -161,16 +161,11 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
     bounded = document["disturbance"] > 0.0 or not parts[0]["holds"]
     if single and bounded and law.name != "terminal" and _room(document, law) >= 0.0:
         box = (reaching["X"], reaching["S"]) if reaching else None
-        proven = functools.partial(_proven, document, checker)
+        e, f = checker.equation(plant), checker.feedback(document["law"], document["u_max"])
+        proven = functools.partial(checker.falls, e, f, checker.arb(document["disturbance"]))
         if found := search.levels(loop, reach, _start(scenario, loop), proven, box):
             parts.append(_levels(document, loop, law, found, scenario))
     return parts
-
-
-def _proven(document: dict, checker: Any, box: tuple[float, ...], corners: tuple[float, ...]) -> bool:
-    """Return whether the checker can prove that W falls in a cell."""
-    e, f = checker.equation(document["plant"]), checker.feedback(document["law"], document["u_max"])
-    return checker.falls(e, f, checker.arb(document["disturbance"]), box, corners)
 
 
 def _room(document: dict, law: SimpleNamespace) -> float:

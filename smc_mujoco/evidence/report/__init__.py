@@ -39,7 +39,6 @@ def report(
       plan: how much of everything, instead of `quick`.
       records: a folder with records of rigs, CSV or npz files, which their twins repeat; see docs/rigs.md.
       laws: names of further laws, beside those of the plan; each needs tuned gains on every plant of the plan.
-
       relevant: the least relevant difference, as a share of the larger value, see `leaderboard`; by default 0.03.
 
     Raises:

@@ -215,20 +215,12 @@ def _fields(model: mujoco.MjModel, plant: Plant) -> dict[str, list[list[float]]]
 
     All fields are linear in the mass, so the page can compute them for any mass.
     """
-    found: dict[str, list[list[float]]] = {}
-    for factor in (1.0, 2.0):
-        for name, values in _written(model, plant, factor).items():
-            found.setdefault(name, []).append(values.ravel().tolist())
-    return found
-
-
-def _written(model: mujoco.MjModel, plant: Plant, factor: float) -> dict[str, np.ndarray]:
-    """Return field -> its values if the plant's mass is multiplied by a factor."""
-    found: dict[str, np.ndarray] = {}
-    for name, at, value, adds in plant.fields(model, plant.values({"mass": factor})):
-        values = found.setdefault(name, field_array(model, name).astype(float).copy())
-        values[at] = values[at] + value if adds else value
-    return found
+    written: list[dict[str, np.ndarray]] = [{}, {}]
+    for found, factor in zip(written, (1.0, 2.0), strict=True):
+        for name, at, value, adds in plant.fields(model, plant.values({"mass": factor})):
+            values = found.setdefault(name, field_array(model, name).astype(float).copy())
+            values[at] = values[at] + value if adds else value
+    return {name: [found[name].ravel().tolist() for found in written] for name in written[0]}
 
 
 def _skins(plant: Plant) -> list[dict[str, Any]]:
@@ -286,7 +278,7 @@ def _gains(law: Component, plant: Plant, own: bool) -> dict[str, float]:
 
 
 def _ranges(one: Component, plant: Plant, values: Mapping[str, float]) -> dict[str, list[float]]:
-    """Return gain -> least and largest value of its slider, for the gains of a component that are to be chosen."""
+    """Return gain -> least and largest value of its slider, for gains to be chosen: no exponent or initial value."""
     known: Mapping[str, tuple[float, float]] = {}
     with contextlib.suppress(ScenarioError):
         scales = search_space.scales(plant, defaults.default_u_max(plant), with_model=one.requires_model)
@@ -296,11 +288,6 @@ def _ranges(one: Component, plant: Plant, values: Mapping[str, float]) -> dict[s
     for name, value in values.items():
         if name in known:
             ranges[name] = [min(known[name][0], value), max(known[name][1], value)]
-        elif 0.0 < value < math.inf and _to_choose(one, name):
+        elif 0.0 < value < math.inf and not (one.template and one.template.gains[name].held):
             ranges[name] = [value / FACTOR, value * FACTOR]
     return ranges
-
-
-def _to_choose(one: Component, name: str) -> bool:
-    """Return whether a gain is to be chosen. An initial value or an exponent, for example, is not."""
-    return one.template is None or not one.template.gains[name].held

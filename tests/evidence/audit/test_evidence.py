@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import from_json
+from smc_mujoco.draw import style
 from smc_mujoco.evidence.audit import badge, evidence
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED
@@ -178,7 +179,7 @@ def test_a_badge_has_a_field_for_each_verdict_that_occurs(tmp_path):
     ends = [float(one.attrib["x"]) + float(one.attrib["width"]) for one in boxes]
     assert ends == [*(float(one.attrib["x"]) for one in boxes[1:]), float(root.attrib["width"])]
     for box, word in zip(boxes, shown, strict=True):
-        assert float(box.attrib["width"]) > badge.width(word) + badge.MARGIN
+        assert float(box.attrib["width"]) > style.width(word, badge.SIZE) + badge.MARGIN
     with pytest.raises(ScenarioError, match=r"end the name in \.svg"):
         badge.save("a", [], tmp_path / "badge.png")
 
