@@ -707,8 +707,9 @@ import smc_mujoco as smc
 run = smc.Scenario(plant="duffing", law="none", duration=20_000.0, control_period=0.1, physics_step=1e-3)
 scene = smc.Scene(title="Long", conditions={"nominal": {"long": run}})
 if __name__ == "__main__":
-    import threading, time
+    import signal, threading, time
     from smc_mujoco.cli import scene as show
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # also where tests run in the background
     simulate = show.simulate
     def announced(*arguments):
         threading.Timer(0.3, lambda: print("simulating", flush=True)).start()

@@ -236,8 +236,9 @@ def test_long_words_stay_in_the_picture(plant):
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no process groups to interrupt")
 def test_ctrl_c_ends_a_film_as_itself_and_leaves_nothing(tmp_path):
     code = """
-import sys
+import signal, sys
 import smc_mujoco as smc
+signal.signal(signal.SIGINT, signal.default_int_handler)  # also where tests run in the background
 trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=100.0))
 smc.film([trace], sys.argv[1], size=(320, 180), report=lambda n: print(n, flush=True))
 """
