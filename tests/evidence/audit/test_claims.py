@@ -34,6 +34,7 @@ from smc_mujoco.evidence.audit.verdict import (
     combined,
     judged,
     ratio,
+    summary,
     verdict,
 )
 from smc_mujoco.evidence.commands import tables
@@ -467,6 +468,17 @@ def test_an_overview_has_a_line_a_claim(only, capsys):
     text = capsys.readouterr().out
     for part in ("partly supported, flips", "● ", "no = 3 (< 2 asked)", "Nothing to see.", "1 not testable"):
         assert part in text
+
+
+def test_the_line_of_totals_says_what_was_read_of_the_paper_s_own_sentences(only):
+    only(entry("3"), entry("18", found=[NO]), entry("19"))
+    own, lost, question = claims(gains="study")
+    own, lost = (dataclasses.replace(one, whose="paper", read="abstract") for one in (own, lost))
+    line = summary([own, lost, dataclasses.replace(question, whose="ours", read="full text")])
+    assert (
+        line
+        == "the paper's own sentences (abstract read): ● 1 supported, ○ 1 refuted; questions beside it: ● 1 supported"
+    )
 
 
 def test_a_time_that_never_comes_is_told_apart_from_what_has_no_bound():
