@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import smc_mujoco as smc
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.mutants import survivors
 from smc_mujoco.evidence.audit.paper import paper, shipped
+from smc_mujoco.evidence.papers.acary_2012.claims import observed_twisting_60
 from smc_mujoco.evidence.papers.aldana_lopez_2019.claims import BAND, classical_bound, least_bound
+from smc_mujoco.evidence.papers.huber_2014.claims import implicit_twisting
 from smc_mujoco.evidence.papers.measures import LATE, exponent, late, late_step, settled
 from smc_mujoco.evidence.papers.perez_ventura_2017.claims import predicted
 from smc_mujoco.simulation.trace import Trace
@@ -120,3 +123,46 @@ def test_the_predicted_cycle_of_super_twisting_balances_its_harmonics():
     half, _ = quad(lambda angle: math.sin(angle) ** 1.5, 0.0, math.pi)
     gain = 2.0 / math.pi * half * k1 / math.sqrt(amplitude) + 4.0 * k2 / (math.pi * amplitude * 1j * omega)
     assert gain * (1.0 / (1j * omega * (1.0 + 1j * omega * lag) ** 2)) == pytest.approx(-1.0, rel=1e-6)
+
+
+# laws
+
+FREE = {"alpha": 0.0, "beta": 0.0, "delta": 0.0}  # of a Duffing oscillator: a mass of 1 kg
+
+
+def test_implicit_twisting_has_both_signs_at_the_end_of_the_period():
+    h, rng = 0.05, np.random.default_rng(1)
+    starts = rng.uniform((-0.2, -1.0), (0.2, 1.0), (40, 2))
+    fields = {"plant": smc.plant("duffing", **FREE), "law": implicit_twisting, "u_max": math.inf}
+    runs = [smc.Scenario(x0=x, v0=v, duration=h, control_period=h, physics_step=h, **fields) for x, v in starts]
+    G, beta = (implicit_twisting.defaults[name] for name in ("G", "beta"))
+    gains = np.array([G * (1.0 + beta * h / 2.0), G * beta])
+    for (e, de), trace in zip(starts, smc.run(runs), strict=True):
+        v = trace.u[0, 0]
+        ends = np.array([e + 1.5 * h * de + h * h * v, de + h * v])
+        least, largest = (v + gains @ np.where(abs(ends) > 1e-9, np.sign(ends), free) for free in (-1.0, 1.0))
+        assert least <= 1e-9
+        assert largest >= -1e-9
+
+
+def test_the_observer_of_equation_60_solves_its_equation_and_predicts_a_period_ahead():
+    from scipy.optimize import brentq
+
+    h, (k1, k2, k3, k4) = 0.02, (observed_twisting_60.defaults[f"k{i}"] for i in range(1, 5))
+    trace = smc.run(
+        smc.Scenario(
+            plant=smc.plant("duffing", **FREE), law=observed_twisting_60, x0=0.5, v0=0.3, duration=2.0,
+            control_period=h, physics_step=h, u_max=math.inf,
+        )
+    )  # fmt: skip
+    position = velocity = 1.0
+    for x, u, shown in zip(trace.x[:-1, 0], trace.u[:-1, 0], trace.s[:-1, 0], strict=True):
+        b = x - position
+        assert shown == pytest.approx(b, abs=1e-9)
+        sign, error = b / (h * h * k3), 0.0
+        if abs(sign) > 1.0:
+            sign = math.copysign(1.0, b)
+            left = lambda z, b=b: z * (1.0 + h * k2 + h * h * k4) + h * k1 * math.sqrt(z) + h * h * k3 - abs(b)  # noqa: E731
+            error = sign * brentq(left, 0.0, abs(b), xtol=1e-15)
+        velocity += h * (k3 * sign + k4 * error) + h * u
+        position = x - error + h * velocity
