@@ -55,8 +55,6 @@ if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure, SubFigure
 
-    from smc_mujoco.draw.page import Size
-
 WORST_SHARE = 1 / 6  # of the bound on u: the disturbance of the worst case, if no class is given; chosen
 KEPT = ("value", "median", "unit", "found_by", "tried", "metric", "outside", "seed")  # of a worst case, in its file
 MAX_BLOCKS = 12  # plants times conditions that have a table each; of more, each plant has one over its conditions
@@ -198,23 +196,17 @@ class Compared(Tables):
                 }
 
     def plot(
-        self,
-        path: str | os.PathLike[str] | None = None,
-        metrics: Sequence[str] = (),
-        title: str | None = None,
-        size: "Size" = None,
-        format: str | None = None,
-        fig: "Figure | SubFigure | None" = None,
+        self, path: str | os.PathLike[str] | None = None, metrics: Sequence[str] = (), **options: Any
     ) -> "Figure | SubFigure":
         """Draw the medians with their intervals by condition, as `smc.plot` does with a table.
 
         Args:
-          path, title, size, format, fig: as in `smc.figure`.
+          path, options: path, title, size, format and fig of `smc.figure`.
           metrics: names of metrics. Default: settling time, ultimate bound and variation of u.
         """
         from smc_mujoco.draw import board
 
-        return board.plot(self.table, path, metrics or board.METRICS, title, size, format, fig)
+        return board.plot(self.table, path, metrics or board.METRICS, **options)
 
 
 def compare(

@@ -114,16 +114,12 @@ def margins(
         from smc_mujoco.analysis.margins import KINDS, save, save_csv
         from smc_mujoco.analysis.margins import margins as search
         from smc_mujoco.cli import tables
-        from smc_mujoco.common.files import ended, writable
+        from smc_mujoco.common.files import ended
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
         from smc_mujoco.simulation.conditions import PLANTS
 
-    json, terminal = options.json_file(json)
-    if out:
-        writable(ended(out, ".csv"))
-    if json:
-        writable(ended(json, ".json"))
+    json, terminal = options.json_file(json, out and ended(out, ".csv"))
     machines = [options.plant(text) for text in options.names(plants, QUICK["plants"] if quick else PLANTS)]
     chosen = options.laws(law, QUICK["laws"] if quick else gain_sets.LAWS)
     kind = options.names(kinds, QUICK["kinds"] if quick else KINDS)
@@ -183,15 +179,13 @@ def worst(
     """
     with held_back():
         from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
-        from smc_mujoco.common.files import ended, writable, write_json
+        from smc_mujoco.common.files import write_json
         from smc_mujoco.control import gain_sets
         from smc_mujoco.draw.page import files
         from smc_mujoco.simulation.grid import case
         from smc_mujoco.studies.worst_case import WorstCases, worst_case
 
-    json, terminal = options.json_file(json)
-    for file in (*(files(out) if out else ()), *([ended(json, ".json")] if json else [])):
-        writable(file)
+    json, terminal = options.json_file(json, *(files(out) if out else ()))
     apart = [text.partition("=") for text in parameter or ()]
     known = {"delay": delay, "mass": mass, "friction": friction}
     within = Uncertainty(
@@ -211,7 +205,7 @@ def worst(
     terminal.print(found)
     terminal.note(f"{sum(one.tried for one in found)} runs, {options.gains_used(chosen, gains)}", "dim")
     if json:
-        terminal.wrote(write_json(ended(json, ".json"), [one.about() for one in found]))
+        terminal.wrote(write_json(json, [one.about() for one in found]))
     if out:
         found.figure(out)
         terminal.wrote(*files(out))
@@ -257,17 +251,14 @@ def accuracy(
     Example: smc-mujoco accuracy duffing --condition coulomb --law classical,twisting,super_twisting,observer_free
     """
     with held_back():
-        from smc_mujoco.common.files import ended, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
         from smc_mujoco.control.law import laws as known
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.accuracy import accuracy as measure
 
-    json, terminal = options.json_file(json)
     pictures = files(out) if out else []
-    for file in (*pictures, *([ended(json, ".json")] if json else [])):
-        writable(file)
+    json, terminal = options.json_file(json, *pictures)
     machines = [options.plant(text) for text in options.names(plants)]
     chosen = known(machines[0]) if law == ["all"] else options.laws(law, gain_sets.LAWS)
     try:
@@ -313,16 +304,12 @@ def basin(
     with held_back():
         from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED
         from smc_mujoco.analysis.region_of_attraction import basin as search
-        from smc_mujoco.common.files import ended, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.draw import region
 
-    json, terminal = options.json_file(json)
     if out:
         region.checked(out)
-        writable(out)
-    if json:
-        writable(ended(json, ".json"))
+    json, terminal = options.json_file(json, out)
     chosen = options.law(law)
     with bar(f"{law} on {plant}") as drawn:
         found = search(
@@ -396,24 +383,15 @@ def chatter(
         from smc_mujoco.analysis.gains_for import design
         from smc_mujoco.analysis.step_halving import step_halving
         from smc_mujoco.cli import tables
-        from smc_mujoco.common.files import ended, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
+        from smc_mujoco.draw.page import files
         from smc_mujoco.metrics.limit_cycle import of_trace
         from smc_mujoco.simulation.grid import case
         from smc_mujoco.simulation.run import run
 
-    json, terminal = options.json_file(json)
-    if json:
-        writable(ended(json, ".json"))
-    if out:
-        from smc_mujoco.draw.page import files
-
-        pictures = files(out)
-        for file in pictures:
-            writable(file)
-    else:
-        pictures = []
+    pictures = files(out) if out else []
+    json, terminal = options.json_file(json, *pictures)
     chosen = options.laws(law, gain_sets.LAWS)
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
     cases = [case(options.plant(plant), law, condition, duration, gains, changes=fields) for law in chosen]

@@ -1,11 +1,12 @@
 """Options and arguments that several commands have, and functions that parse them."""
 
 import contextlib
+import importlib
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -25,41 +26,24 @@ FIELD = re.compile(r"\w+\s*=")  # of a scenario, in a condition
 OWN_GAINS = "With your own gains: pid(kp=50, ki=1). Of a file: my_law.py, or gains.json of `smc-mujoco tune --out`."
 
 
-def _completing(list_known: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
-    """Return a function that completes the last name of a text such as "a,b" or "a+b" for a shell."""
+def _completing(module: str, name: str) -> Callable[[str], list[str]]:
+    """Return a function that completes the last name of a text such as "a,b" for a shell.
+
+    Args:
+      module, name: of the names to choose from, or of the function that returns them.
+    """
 
     def complete(incomplete: str) -> list[str]:
-        last = re.split("[,+]", incomplete)[-1]
-        return [incomplete + name[len(last) :] for name in list_known() if name.startswith(last)]
+        found = getattr(importlib.import_module(f"smc_mujoco.{module}"), name)
+        known: Any = found() if callable(found) else found
+        before, comma, last = incomplete.rpartition(",")
+        return [f"{before}{comma}{one}" for one in known if one.startswith(last)]
 
     return complete
 
 
-def _known_plants() -> Iterable[str]:
-    from smc_mujoco.mechanisms.plant import plants
-
-    return plants()
-
-
-def _known_laws() -> Iterable[str]:
-    from smc_mujoco.control.law import known_laws
-
-    return known_laws()
-
-
-def _known_conditions() -> Iterable[str]:
-    from smc_mujoco.simulation.conditions import NAMED
-
-    return NAMED
-
-
-def _known_scenes() -> Iterable[str]:
-    from smc_mujoco.studies.scene import scenes
-
-    return scenes()
-
-
-PLANTS, LAWS, CONDITIONS, SCENES = map(_completing, (_known_plants, _known_laws, _known_conditions, _known_scenes))
+PLANTS, LAWS = _completing("mechanisms.plant", "plants"), _completing("control.law", "known_laws")
+CONDITIONS, SCENES = _completing("simulation.conditions", "NAMED"), _completing("studies.scene", "scenes")
 
 Columns = Annotated[
     str | None,
@@ -178,14 +162,20 @@ def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> lis
     return found
 
 
-def json_file(json: Path | None) -> "tuple[Path | None, Terminal]":
-    """Return where a command is to write the result for --json, and its console, which prints the result for "-"."""
-    from smc_mujoco.cli.terminal import Terminal
+def json_file(json: Path | None, *others: Path | None) -> "tuple[Path | None, Terminal]":
+    """Return where a command is to write the result for --json, and its console, which prints the result for "-".
 
-    if str(json) != "-":
-        return json, Terminal()
-    terminal = Terminal(prints="result.json")
-    return terminal.printed, terminal
+    Args:
+      others: what it writes besides. That all can be written is found out before minutes are spent.
+    """
+    from smc_mujoco.cli.terminal import Terminal
+    from smc_mujoco.common.files import ended, writable
+
+    terminal = Terminal(prints="result.json" * (str(json) == "-"))
+    path = terminal.printed or (json and ended(json, ".json"))
+    for file in filter(None, (*others, path)):
+        writable(file)
+    return path, terminal
 
 
 def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
