@@ -55,13 +55,10 @@ def test_help_lists_every_public_name_once_and_those_of_a_first_script_first(kno
 
 
 def test_the_reference_has_every_public_name_and_each_entry_once(known):
-    page = known.filled((DOCS / "api.md").read_text())
-    named = re.findall(r"^::: smc_mujoco\.(\S+)$", page, re.MULTILINE)
-    public = {f"{module}.{name}".removeprefix("smc_mujoco.") for name, module in smc._ORIGINS.items()}
-    assert public <= set(named)
+    named = re.findall(r"^::: (\S+)$", "".join(known.reference().values()), re.MULTILINE)
+    assert {f"{module}.{name}" for name, module in smc._ORIGINS.items()} <= set(named)
     assert len(named) == len(set(named))
-    (returned,) = re.findall(r"^## Types that are returned$(.*?)^## ", page, re.MULTILINE | re.DOTALL)
-    for module, _, name in (path.rpartition(".") for path in re.findall(r"^::: (\S+)$", returned, re.MULTILINE)):
+    for module, _, name in (path.rpartition(".") for path in known.entries()["Types that are returned"]):
         assert isinstance(getattr(importlib.import_module(module), name), type)
 
 
@@ -193,7 +190,7 @@ def test_a_page_has_the_equation_and_the_units_of_a_plant(generator, name):
     assert rest.strip(" .\n")
 
 
-def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_path):
+def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_path, known):
     pytest.importorskip("mkdocs", reason="mkdocs is not installed: make docs does")
     pytest.importorskip("mkdocstrings_handlers.python")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", CONFIGURATION, "-d", tmp_path]
@@ -202,7 +199,7 @@ def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_p
     assert (done.returncode, [line for line in done.stderr.splitlines() if not line.startswith("INFO")]) == (0, [])
     built = {path.relative_to(tmp_path).as_posix(): path.read_text() for path in tmp_path.rglob("*.html")}
     pages = {f"{folder}/{name}" for folder, names in (("laws", smc.laws()), ("plants", smc.plants())) for name in names}
-    pages |= {name.removesuffix(".md") for name in NAV} | {"404", "surfaces", "estimators"}
+    pages |= {name.removesuffix(".md") for name in [*NAV, *known.reference()]} | {"404", "surfaces", "estimators"}
     notebooks = {f"notebooks/{path.stem}" for path in (DOCS / "notebooks").glob("*.ipynb")}
     pages |= notebooks
     for name in notebooks:

@@ -11,7 +11,6 @@ ROOT = Path(__file__).parents[2]
 GALLERY = "videos/gallery"
 HERE = "<!-- README's first screen -->"
 CATALOGUE = "catalogue.md"  # its tables name all plants and laws
-BOOST = {"mathematics.md": 2.0, "run_study.md": 1.5, "api.md": 0.3}  # in search
 GROUP = "Catalogue"  # where the contents show their pages
 HEADER = "smc_mujoco/exchange/c/smc_law.h"  # to which pages link
 
@@ -23,13 +22,15 @@ import notebooks  # noqa: E402
 from mathml import font, typeset  # noqa: E402
 
 PAGES: list[catalogue.Page] = []  # of this build
+BOOST = {"mathematics.md": 2.0, "run_study.md": 1.5} | dict.fromkeys(known.reference(), 0.3)  # in search
 
 
 def on_config(config):
-    """Put the notebooks and the pages of laws and plants into the contents."""
+    """Put the notebooks and the pages of laws, plants and the reference into the contents."""
     start = next(entry["Start"] for entry in config.nav if "Start" in entry)
     below = [f"notebooks/{name}.md" for name in notebooks.names()]
     start[start.index(notebooks.LISTED)] = {"Notebooks": [notebooks.LISTED, *below]}
+    next(entry["API"] for entry in config.nav if "API" in entry).extend(known.reference())
     place = next(entry[GROUP] for entry in config.nav if GROUP in entry)
     PAGES.clear()
     for section, groups in catalogue.pages().items():
@@ -49,7 +50,7 @@ def on_files(files, config):
     files.append(File.generated(config, HEADER, abs_src_path=str(ROOT / HEADER)))
     for page in PAGES:
         files.append(File.generated(config, f"{page.path}.md", content=page.text))
-    for path, content in notebooks.pages().items():
+    for path, content in (notebooks.pages() | known.reference()).items():
         files.append(File.generated(config, path, content=content))
     for name in ("site.css", "iframe-worker.js"):
         files.append(File.generated(config, f"assets/{name}", abs_src_path=str(ROOT / "docs" / "site" / name)))

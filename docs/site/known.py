@@ -11,17 +11,72 @@ from smc_mujoco.studies import scene
 
 TASKS = re.compile(r"^    ([A-Z][a-z ,]+): ((?:.|\n {8})+)$", re.MULTILINE)  # of the package's docstring
 
+OTHERS = {  # title -> names of modules that are no public names
+    "Types that are returned": """
+    studies.compare.Compared
+    studies.advice.Advice
+    analysis.tuning.result.Tuned
+    analysis.gains_for.Design
+    evidence.rigs.identify.Identified
+    studies.accuracy.AccuracyTable
+    analysis.chattering.Chattering
+    analysis.step_halving.StepChange
+    studies.worst_case.WorstCase
+    evidence.audit.audit.Audit
+    evidence.audit.verdict.Claim
+    """,
+    "Arms, boards, the paper, tests": """
+    evidence.papers.gaber.scenarios
+    studies.arms
+    studies.arms.scenario
+    studies.arms.gained
+    studies.arms.hybrid
+    evidence.boards
+    evidence.boards.entries.entry
+    evidence.boards.entries.on_board
+    evidence.boards.scoring.criteria
+    evidence.boards.scoring.score
+    evidence.boards.simulator.robustness
+    evidence.boards.standings.board
+    evidence.boards.standings.experiments
+    testing.plugin.step_response
+    testing.plugin.smc_golden
+    testing.response.StepResponse
+    evidence.audit.mutants.mutants
+    evidence.audit.mutants.survivors
+    """,
+}
+
 
 def tasks() -> dict[str, list[str]]:
     """Return task -> the public names that `help(smc)` lists for it."""
     return {task: re.findall(r"\w+", names) for task, names in TASKS.findall(smc.__doc__ or "")}
 
 
-def reference() -> Iterator[str]:
-    """Yield the public names by task, as mkdocstrings reads them."""
-    for task, names in tasks().items():
-        origins = [f"::: {smc._ORIGINS[name]}.{name}" for name in names if name in smc._ORIGINS]
-        yield "\n".join([f"## {task}\n", *origins, ""])
+def entries() -> dict[str, list[str]]:
+    """Return title -> the names on a page of the reference, with their modules."""
+    found = {
+        task: [f"{smc._ORIGINS[name]}.{name}" for name in its if name in smc._ORIGINS] for task, its in tasks().items()
+    }
+    return found | {title: [f"smc_mujoco.{name}" for name in its.split()] for title, its in OTHERS.items()}
+
+
+def reference() -> dict[str, str]:
+    """Return path -> a page of the reference, as mkdocstrings reads it."""
+    titled = {title: "\n".join(f"::: {name}" for name in its) for title, its in entries().items()}
+    return {path(title): f"# {title}\n\n{names}\n" for title, names in titled.items()}
+
+
+def path(title: str) -> str:
+    """Return the file of a page of the reference."""
+    return f"api/{re.sub(r'[^a-z]+', '_', title.lower())}.md"
+
+
+def contents() -> Iterator[str]:
+    """Yield the pages of the reference, with a link to each name."""
+    for title, names in entries().items():
+        links = (f"[`{name.rpartition('.')[2]}`]({path(title)}#{name})" for name in names)
+        yield f"- [{title}]({path(title)}): {', '.join(links)}"
 
 
 def definitions() -> Iterator[str]:
@@ -57,7 +112,7 @@ def _plain(text: str) -> str:
 
 
 SHOWN = {
-    "<!-- every public name -->": reference,
+    "<!-- every public name -->": contents,
     "<!-- every metric -->": definitions,
     "<!-- what holds instead of each claim -->": instead,
     "<!-- every scene -->": questions,
