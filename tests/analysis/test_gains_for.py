@@ -59,6 +59,7 @@ def test_a_frequency_decides_the_speed():
 
 
 @pytest.mark.filterwarnings("ignore:classical with these gains")
+@pytest.mark.slow
 def test_an_amplitude_and_a_frequency_decide_size_and_speed():
     wanted, fields = 60.0, {"u_max": 10.0, **LAG}
     both = smc.gains_for(FAST, "duffing", amplitude=5e-3, frequency=wanted, **fields)

@@ -146,7 +146,7 @@ def test_implicit_twisting_has_both_signs_at_the_end_of_the_period():
 
 
 def test_the_observer_of_equation_60_solves_its_equation_and_predicts_a_period_ahead():
-    from scipy.optimize import brentq
+    from scipy.optimize import root_scalar
 
     h, (k1, k2, k3, k4) = 0.02, (observed_twisting_60.defaults[f"k{i}"] for i in range(1, 5))
     trace = smc.run(
@@ -163,6 +163,6 @@ def test_the_observer_of_equation_60_solves_its_equation_and_predicts_a_period_a
         if abs(sign) > 1.0:
             sign = math.copysign(1.0, b)
             left = lambda z, b=b: z * (1.0 + h * k2 + h * h * k4) + h * k1 * math.sqrt(z) + h * h * k3 - abs(b)  # noqa: E731
-            error = sign * brentq(left, 0.0, abs(b), xtol=1e-15)
+            error = sign * root_scalar(left, bracket=(0.0, abs(b)), xtol=1e-15).root
         velocity += h * (k3 * sign + k4 * error) + h * u
         position = x - error + h * velocity
