@@ -23,8 +23,8 @@ class Bar:
     def reached(self, done: float, whole: float) -> None:
         """Set the work done and the whole work, which may change from call to call."""
 
-    def says(self, text: str) -> None:
-        """Change the text beside the bar."""
+    def says(self, text: str, work: float = 0.0) -> None:
+        """Change the text beside the bar, and add work that is done."""
 
 
 @contextlib.contextmanager
@@ -64,7 +64,7 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
         task, drawn = progress.add_task(what, total=whole), Bar()
         drawn.advance = lambda work: progress.advance(task, work)
         drawn.reached = lambda done, whole: progress.update(task, completed=done, total=whole)
-        drawn.says = lambda text: progress.update(task, description=text)
+        drawn.says = lambda text, work=0.0: progress.update(task, description=text, advance=work)
         yield drawn
 
 
@@ -87,10 +87,10 @@ class LogBar(Bar):
         self.done, self.whole = done, whole
         self._draw()
 
-    def says(self, text: str) -> None:
-        """Change the text beside the bar."""
+    def says(self, text: str, work: float = 0.0) -> None:
+        """Change the text beside the bar, and add work that is done."""
         self.what = text
-        self._draw()
+        self.advance(work)
 
     def _draw(self) -> None:
         """Show the bar as it is, unless it was shown less than a period ago."""
@@ -168,8 +168,7 @@ class Counter:
     def stepped(self, steps: int) -> None:
         """Add simulated steps."""
         self.steps += steps
-        self.bar.advance(steps)
-        self.bar.says(str(self))
+        self.bar.says(str(self), steps)
 
     def __str__(self) -> str:
         spent = time.monotonic() - self.start
