@@ -130,6 +130,8 @@ def undefined(source: Path, symbol: str) -> str:
 def _sentence(source: Path, symbol: str, command: str, output: str) -> str:
     """Return the first error in a compiler's output, with a cure."""
     error, name = ERROR.search(output), source.name
+    if "No space left" in output:
+        return f"{name} cannot be compiled, as no temporary file can be written: make room, or set TMPDIR"
     what, file = (error["what"], Path(error["file"]).name) if error else ("", "")
     if (f"'{symbol}'" in what and "undeclared" in what) or re.search(rf"ndefined \w+.*\b_?{symbol}\b", output):
         return undefined(source, symbol)
