@@ -291,13 +291,13 @@ for words in (["list"], ["laws"], ["laws", "brand_new"]):
 
 def test_a_new_law_is_walked_by_the_tests_of_the_catalogue(added):
     files = [*map(str, (ROOT / "tests" / "control").glob("test_laws*.py"))]
-    files += [str(ROOT / "tests" / name) for name in ("cli/test_law_pages.py", "simulation/test_references.py")]
+    files += [str(ROOT / "tests" / "cli" / "test_law_pages.py")]
     out = python(added, "-m", "pytest", "-p", "added_law", "-p", "no:cacheprovider", "--collect-only",
                  "-k", "brand_new", *files)  # fmt: skip
     cases = [line for line in out.splitlines() if "::" in line]
-    assert len(cases) >= 10
+    assert len(cases) >= 3  # and the tests that walk the catalogue in one case
     found = {case.partition("::")[0].removeprefix("tests/") for case in cases}
-    assert {"cli/test_law_pages.py", "simulation/test_references.py"} < found
+    assert "cli/test_law_pages.py" in found
     assert any(name.startswith("control/test_laws") for name in found)
 
 
