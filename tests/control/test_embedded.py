@@ -12,7 +12,7 @@ from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.control.surface import surface
 from smc_mujoco.simulation import reference
 
-PLANTS = ("inverted_pendulum", "van_der_pol", "duffing", "pendulum_network", "inverted_pendulum_network")
+PLANTS = ("van_der_pol", "duffing", "inverted_pendulum_network")
 FORMS = ("observer_free_table", "observer_free_taylor", "observer_free_single", "observer_free_q15")
 LAM, K1 = 6.0, 2.5
 HALF = np.linspace(0.0, 12.0, 6001)

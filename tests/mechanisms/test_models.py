@@ -5,7 +5,6 @@ from collections import namedtuple
 from types import SimpleNamespace
 
 import mujoco
-import numba
 import numpy as np
 import pytest
 from helpers.episodes import dm_control_suite
@@ -86,17 +85,6 @@ def worst_error(p, model, rng, trials=20):
         acc, size = expected(p, x, v, u)
         worst = max(worst, np.abs(acceleration(model, data, x, v, u) - acc).max() / size)
     return worst
-
-
-def test_nominal_compiles_to_the_same_numbers():
-    for p in (p for p in catalogue().values() if not isinstance(p.nominal, NominalModel)):
-        parameters = believed(p)
-        compiled = numba.njit(p.nominal)
-        rng = np.random.default_rng(0)
-        x, v = rng.uniform(-2, 2, p.n), rng.uniform(-3, 3, p.n)
-        for i in range(p.n):
-            expected = p.nominal(x, v, i, parameters)
-            np.testing.assert_allclose(compiled(x, v, i, parameters), expected, rtol=1e-14, err_msg=p.name)
 
 
 @CASES

@@ -156,14 +156,14 @@ def differentiation(n, noise):
             seed=seed,
         )
         for h in periods
-        for seed in range(3)
+        for seed in range(3 if noise else 1)
         for law, velocity in shows[: n + 1]
     ]
     errors = []
     for k, trace in enumerate(smc.run(scenarios)):
         true = np.sin(trace.t + trace.scenario.seed + k % (n + 1) * math.pi / 2)
         errors += late(trace.s[:, 0] - true)
-    return periods, np.reshape(errors, (len(periods), 3, n + 1))
+    return periods, np.reshape(errors, (len(periods), -1, n + 1))
 
 
 @pytest.mark.parametrize("n", [1, 2])

@@ -628,6 +628,14 @@ def test_a_start_outside_a_joint_s_range_is_refused(bounded):
         assert smc.Scenario(plant=free, law="none").resolved.x0 == (1.2,)
 
 
+def test_a_model_whose_limits_are_off_has_no_constraint(bounded):
+    """Its geoms do not touch."""
+    for on in ("", '<option><flag contact="disable"/></option>'):
+        assert not bounded(more=on).smooth
+    for off in ("limit", "constraint"):
+        assert bounded(more=f'<option><flag {off}="disable"/></option>').smooth
+
+
 def test_a_start_may_be_as_far_beyond_a_range_as_a_limit_gives_way(bounded):
     plant = bounded()
     for x0 in (MOST + 5e-4, LEAST - 5e-4):

@@ -373,7 +373,7 @@ def scattered(number):
 
 
 def test_scattered_encoders_give_the_same_bits_in_both_loops_and_together():
-    scenarios = [scattered(number) for number in range(30)]
+    scenarios = [scattered(number) for number in range(20)]
     for i, (s, trace) in enumerate(zip(scenarios, smc.run(scenarios), strict=True)):
         assert trace.failure is None
         same(trace, reference.run(s) if i % 4 else smc.run(s, threads=1))
