@@ -169,14 +169,6 @@ def words(error: BaseException) -> str:
         return f"{type(error).__name__}, whose message cannot be read"
 
 
-def attribute(value: object, name: str) -> Any:
-    """Return an attribute of a user's object; None if there is none, or if reading it raises."""
-    try:
-        return getattr(value, name, None)
-    except Exception:
-        return None
-
-
 def name(what: str, value: object) -> str:
     """Return `value` if it is a name, 1 to MAX_NAME printable characters, else raise ScenarioError naming `what`."""
     if not isinstance(value, str) or not value.isprintable() or not value.strip():

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, attribute, shown
+from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
@@ -88,7 +88,7 @@ class Agent:
 
 def _episode(environment: Any) -> Episode:
     """Return the Episode of an environment."""
-    for owner in (attribute(environment, "task"), attribute(environment, "unwrapped")):
+    for owner in (getattr(environment, "task", None), getattr(environment, "unwrapped", None)):
         if isinstance(owner, Episode):
             return owner
     cure = "give one of smc_mujoco.suite, or a single one of smc_mujoco.gym"

@@ -54,7 +54,8 @@ def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume
         if not resume:
             (folder / FILE).unlink(missing_ok=True)
         scenarios = found
-        key = _of_folder(folder / FILE, {identity(one): _about(one) for one in filter(own, found)})
+        laws = {identity(one): one for one in filter(own, found)}
+        key = _of_folder(folder / FILE, {name: _about(one) for name, one in laws.items()})
     elif isinstance(wanted, str):
         raise ScenarioError(f"noise_key is {shown(wanted)}: give a whole number, or {DRAWN!r}")
     else:
