@@ -178,6 +178,10 @@ def test_a_scene_runs_from_the_wheel_in_any_folder(binaries, tmp_path):
     assert any(path.is_file() for path in out.rglob("*"))
 
 
+def test_pytest_has_the_plugin_of_the_wheel(binaries, tmp_path):
+    assert "--smc-film" in run(binaries / "python", "-m", "pytest", "--help", cwd=tmp_path).stdout
+
+
 LAWS = """
 import pytest
 import smc_mujoco as smc
@@ -188,6 +192,7 @@ def test_my_law_settles(step_response, phi):
 """
 
 
+@pytest.mark.slow
 def test_a_user_s_test_passes_with_a_good_law_and_fails_readably_with_a_bad_one(binaries, tmp_path):
     (tmp_path / "test_law.py").write_text(LAWS)
     plain = {name: "" for name in CLEAN if name.startswith("PYTEST_")}

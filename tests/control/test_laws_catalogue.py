@@ -17,8 +17,6 @@ from smc_mujoco.control.law import catalogue
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.metrics.catalogue import ultimate_bound
 
-pytestmark = pytest.mark.quick
-
 LAWS = pytest.mark.parametrize("name", smc.laws())
 ACTING = pytest.mark.parametrize("name", [name for name in smc.laws() if name != "none"])
 GENERAL = [name for name, law in catalogue().items() if name != "none" and not law.plants]
