@@ -188,6 +188,7 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
 def test_shells_complete_the_last_name():
     assert options.PLANTS("duffing,inverted_pendulum_") == ["duffing,inverted_pendulum_network"]
     assert options.CONDITIONS("enc") == ["encoder"]
+    assert options.CONDITIONS("friction,noise+enc") == ["friction,noise+encoder"]
     assert options.LAWS("pid,super_twisting_u") == ["pid,super_twisting_unclamped"]
     assert "furuta" in options.SCENES("fur")
 

@@ -27,7 +27,7 @@ OWN_GAINS = "With your own gains: pid(kp=50, ki=1). Of a file: my_law.py, or gai
 
 
 def _completing(module: str, name: str) -> Callable[[str], list[str]]:
-    """Return a function that completes the last name of a text such as "a,b" for a shell.
+    """Return a function that completes the last name of a text such as "a,b" or "a+b" for a shell.
 
     Args:
       module, name: of the names to choose from, or of the function that returns them.
@@ -36,8 +36,8 @@ def _completing(module: str, name: str) -> Callable[[str], list[str]]:
     def complete(incomplete: str) -> list[str]:
         found = getattr(importlib.import_module(f"smc_mujoco.{module}"), name)
         known: Any = found() if callable(found) else found
-        before, comma, last = incomplete.rpartition(",")
-        return [f"{before}{comma}{one}" for one in known if one.startswith(last)]
+        last = re.split("[,+]", incomplete)[-1]
+        return [incomplete + one[len(last) :] for one in known if one.startswith(last)]
 
     return complete
 
