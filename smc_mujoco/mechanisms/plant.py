@@ -99,6 +99,8 @@ class Plant:
       placed: parameter -> its value in the geometry of the contacts, which another value would not fit.
       direct: whether disturbances act on its joints, not on the bodies that they carry.
       smooth: whether its model has no limits, contacts, dry friction and equality constraints.
+      uncertain: parameter -> lowest and highest value that a user may have, as factors or, of those in `added`, numbers
+        that are added: the parameters that `smc.worst_case` varies where no class is given.
       dry: names of the parameters that are dry friction. A plant with one that is not 0 is not smooth.
       unmodelled: why there is no nominal model, or "".
       friction: that of its joints by its source, to give to a scenario, whose default is none; or None.
@@ -132,6 +134,7 @@ class Plant:
     added: Mapping[str, str] = dataclasses.field(default_factory=dict)
     direct: bool = False
     smooth: bool = True
+    uncertain: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
     dry: tuple[str, ...] = ()
     unmodelled: str = ""
     friction: Any = None  # a hardware.part.Friction

@@ -20,7 +20,7 @@ import numpy as np
 from smc_mujoco.analysis.differences import RELEVANT, share_that_matters
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.tuning import search
-from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, usual
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, taken, whole
 from smc_mujoco.common.errors import number as checked
 from smc_mujoco.common.extras import package
@@ -55,7 +55,6 @@ if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure, SubFigure
 
-WORST_SHARE = 1 / 6  # of the bound on u: the disturbance of the worst case, if no class is given; chosen
 KEPT = ("value", "median", "unit", "found_by", "tried", "metric", "outside", "seed")  # of a worst case, in its file
 MAX_BLOCKS = 12  # plants times conditions that have a table each; of more, each plant has one over its conditions
 
@@ -248,8 +247,8 @@ def compare(
       seeds: runs of a law on each plant in each condition; each has another start and other noise, the same for every
         law, and the next of the law's sets of gains.
       tune: whether to tune laws without gains for a plant; otherwise they run with their defaults.
-      worst: whether to search the worst case of each law on each plant too, see `worst_case`: a class, or True for
-        disturbances up to a sixth of the bound on u.
+      worst: whether to search the worst case of each law on each plant too: a class, or True for the default one of
+        `worst_case`.
       executor: where runs are computed, as in `study`; None for this machine.
       out: folder for gains and runs.
       metrics: names of metrics, for which lower is better, or "settles".
@@ -324,8 +323,7 @@ def _attacked(
     scenario: Scenario, worst: bool | Uncertainty, folder: Path, threads: int | None, progress: bool
 ) -> WorstCase:
     """Return the worst case of a scenario, from the file of an earlier call if there is one."""
-    bound = WORST_SHARE * float(np.max(scenario.resolved.u_max))
-    within = worst if isinstance(worst, Uncertainty) else Uncertainty(disturbance=bound)
+    within = worst if isinstance(worst, Uncertainty) else usual(scenario)
 
     def load(path: Path) -> WorstCase:
         data = read_json(path)

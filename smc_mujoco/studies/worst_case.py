@@ -12,13 +12,13 @@ adversary than another: `analysis.worst_case` describes both. What it finds is a
 import dataclasses
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from smc_mujoco.analysis.worst_case.search import Search
-from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, outside
+from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, outside, usual
 from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.progress import bar
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from smc_mujoco.draw.page import Size
 
 METRIC = "rms_error"
-STEPS = 1_250_000  # physics steps times channels of the search in the default budget: 5 s of a core for a plain plant
+STEPS = 1_250_000  # physics steps of the search in the default budget, for a plant of one channel: 5 s of a core
 MIN_RUNS, MAX_RUNS = 32, 1024  # of the default budget
 MOST_RUNS = 1_000_000
 PANELS = "error", "d", "u", "phase"  # of a figure
@@ -61,6 +61,7 @@ class WorstCase:
       metric: its name.
       outside: why the theorem of the law does not cover the class; "" if nothing is known against it.
       seed: of the search.
+      sets: number of sets of the machine's parameters that the adversary chose from.
     """
 
     value: float
@@ -75,6 +76,7 @@ class WorstCase:
     metric: str
     outside: str
     seed: int
+    sets: int = 1
 
     def __repr__(self) -> str:
         return f"WorstCase({self})"
@@ -84,8 +86,14 @@ class WorstCase:
         label = CATALOGUE[self.metric].label
         return (
             f"{s.law.name} on {s.plant.name}: {label} {self.words}, median of random members "
-            f"{self.shown(self.median)}; {self.within.words(s.plant)}"
+            f"{self.shown(self.median)}; {self.class_words}"
         )
+
+    @property
+    def class_words(self) -> str:
+        """The class in words."""
+        sets = [f"any of {self.sets} sets of parameters"] if self.sets > 1 else []
+        return ", ".join([*sets, self.within.words(self.nominal.plant)])
 
     def shown(self, value: float) -> str:
         """Return a value of the metric as text: "fails" where a run failed."""
@@ -126,7 +134,7 @@ class WorstCase:
         from smc_mujoco.draw.figure import figure
 
         traces = run([self.nominal, self.scenario])
-        title = title or f"{traces[0].scenario.plant.name}: the worst of {self.within.words(self.nominal.plant)}"
+        title = title or f"{traces[0].scenario.plant.name}: the worst of {self.class_words}"
         labels = "as given", f"worst found, {CATALOGUE[self.metric].label} {self.words}"
         return figure(traces, path, labels, title, PANELS, size, format, fig)
 
@@ -151,7 +159,7 @@ class WorstCases(Tables, list[WorstCase]):
         """Plant, metric and class."""
         one = self[0]
         unit = f" in {one.unit}" * bool(one.unit)
-        return f"{one.nominal.plant.name}: {CATALOGUE[one.metric].label}{unit}, {one.within.words(one.nominal.plant)}"
+        return f"{one.nominal.plant.name}: {CATALOGUE[one.metric].label}{unit}, {one.class_words}"
 
     @property
     def tables(self) -> list[Tabular]:
@@ -184,7 +192,7 @@ class WorstCases(Tables, list[WorstCase]):
 
 
 def worst_case(
-    scenario: Scenario,
+    scenario: Scenario | Sequence[Scenario],
     metric: str = METRIC,
     within: Uncertainty | None = None,
     budget: int | None = None,
@@ -195,27 +203,32 @@ def worst_case(
     """Search for the worst that may happen to a scenario within a class of uncertainty.
 
     Args:
-      scenario: its plant, law and conditions. The class adds to its disturbances, noise, delay and parameters.
+      scenario: its plant, law and conditions. The class adds to its disturbances, noise, delay and parameters. Of
+        several scenarios, such as those of a rig's sets of parameters, the adversary chooses one; the first is the
+        nominal one.
       metric: name of any metric; more is worse. Default: the rms error from a quarter of the run on.
-      within: the class, such as smc.Uncertainty(disturbance=2.0, mass=(0.7, 1.3)).
+      within: the class, such as smc.Uncertainty(disturbance=2.0, mass=(0.7, 1.3)). Default: what the
+        plant declares as `uncertain`, such as an arm's payload, or else disturbances up to a sixth of the force of the
+        weakest drive; and friction within 50 %.
       budget: number of runs of the search; random members get as many. A larger budget continues the same search.
         Default: as many as take about 10 s of one core together, by the number of physics steps.
       seed: of the random members and of the search.
       threads, progress: as in `run`. The result does not depend on threads.
 
     Raises:
-      ScenarioError: no class, or one that the plant cannot have; an unknown metric, or one that the plant has not.
+      ScenarioError: a class that the plant cannot have; an unknown metric, or one that the plant has not.
     """
-    if not isinstance(scenario, Scenario):
-        raise ScenarioError(f"worst_case attacks a Scenario, not {shown(scenario)}: give smc.Scenario(...)")
+    scenarios = _listed(scenario)
+    scenario = scenarios[0]
+    within = usual(scenario) if within is None else within
     if not isinstance(within, Uncertainty):
         raise ScenarioError(f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)")
     entry = find("metric", metric, CATALOGUE)
     if why := entry.refusal(scenario.plant):
         raise ScenarioError(why)
-    budget = default_budget(scenario) if budget is None else whole("budget", budget, 1, MOST_RUNS)
+    budget = default_budget(scenario, within) if budget is None else whole("budget", budget, 1, MOST_RUNS)
     seed = whole("seed", seed, 0, 2**53 - 1)
-    members = Members(scenario, within)
+    members = Members(scenarios, within)
     work = 2 * budget * scenario.work
     with bar(f"worst case of {scenario.law.name} on {scenario.plant.name}", work, shown=progress) as drawn:
         drawing, search = (Search(members, entry, budget, threads, drawn.advance) for _ in range(2))
@@ -239,9 +252,29 @@ def worst_case(
         metric=metric,
         outside=outside(scenario, within),
         seed=seed,
+        sets=len(scenarios),
     )
 
 
-def default_budget(scenario: Scenario) -> int:
-    """Return how many runs a search has if no budget is given."""
-    return min(max(MIN_RUNS, STEPS // scenario.work), MAX_RUNS)
+def _listed(given: object) -> list[Scenario]:
+    """Return the scenario, or the scenarios, to attack.
+
+    Raises:
+      ScenarioError: none, or several that differ in more than parameters.
+    """
+    found: Any = list(given) if isinstance(given, list | tuple) else [given]
+    if not found or not all(isinstance(one, Scenario) for one in found):
+        raise ScenarioError(f"worst_case attacks a Scenario, not {shown(given)}: give smc.Scenario(...)")
+    scenarios: list[Scenario] = found
+    if len({(one.samples, one.control_period, one.plant.n) for one in scenarios}) > 1:
+        raise ScenarioError("worst_case attacks one run on several sets of parameters: give all the same duration")
+    return scenarios
+
+
+def default_budget(scenario: Scenario, within: Uncertainty) -> int:
+    """Return how many runs a search has if no budget is given.
+
+    A physics step costs half as much more for each channel, and again with dry friction, which MuJoCo solves for.
+    """
+    channels, rubs = 1 + scenario.plant.n, bool(scenario.friction or scenario.plant.dry or within.friction[1])
+    return min(max(MIN_RUNS, 4 * STEPS // (scenario.samples * scenario.steps * channels * (2 + rubs))), MAX_RUNS)

@@ -8,6 +8,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.worst_case.strategies import recorded
+from smc_mujoco.analysis.worst_case.uncertainty import usual
 from smc_mujoco.simulation import reference, serialise
 from smc_mujoco.simulation.signals import Relay
 from smc_mujoco.studies.worst_case import WorstCases
@@ -97,6 +98,29 @@ def test_it_finds_the_worst_of_a_linear_loop():
     assert worst.value >= 0.5 * gain * 0.95  # the 5 % that a second searcher may find more
 
 
+def test_the_adversary_chooses_the_set_of_parameters_and_the_scale_of_friction():
+    friction = smc.Coulomb(0.2), smc.Viscous(0.5)
+    sets = [scenario(mismatch={"M": factor}, friction=friction) for factor in (1.0, 3.0, 0.4)]
+    worst = smc.worst_case(sets, within=smc.Uncertainty(friction_scale=(0.0, 2.0)), budget=6)
+    made = [
+        dataclasses.replace(one, friction=(smc.Coulomb(0.2 * scale), smc.Viscous(0.5 * scale)))
+        for one, scale in itertools.product(sets, (0.0, 2.0))
+    ]
+    assert worst.value == max(smc.score(trace)["rms_error"] for trace in smc.run(made))
+    assert worst.scenario in made
+    assert "any of 3 sets of parameters, friction x 0 to 2" in str(worst)
+
+
+def test_the_class_where_none_is_given_is_what_the_machine_leaves_open():
+    assert usual(scenario()) == smc.Uncertainty(disturbance=1.0)
+    arm = smc.plant("panda")
+    own = usual(smc.Scenario(plant=arm, law="none", friction=arm.friction))
+    assert own == smc.Uncertainty(parameters=arm.uncertain, friction_scale=(0.5, 1.5))
+    assert (own.disturbance, own.parameters["payload"]) == (0.0, (0.0, 2.0))
+    rig = smc.rig("qube_servo").scenario("none")  # a voltage: its force is that of the motor at rest
+    assert usual(rig).disturbance == pytest.approx(10.0 * 0.0470184 / 10.069624549988971 / 6)
+
+
 def test_a_failed_run_is_the_worst():
     @smc.law_function
     def fragile(y, gains, memory):
@@ -115,8 +139,10 @@ def test_a_failed_run_is_the_worst():
         (lambda: smc.Uncertainty(disturbance=-1.0), "disturbance is -1"),
         (lambda: smc.worst_case(scenario(), within=smc.Uncertainty(parameters={"zz": (1, 2)})), "zz"),
         (lambda: smc.worst_case(scenario(), "speed", CLASSES["force"]), "unknown metric"),
-        (lambda: smc.worst_case(scenario()), "within is None"),
+        (lambda: smc.worst_case(scenario(), within=2.0), "within is 2.0"),
         (lambda: smc.worst_case("duffing", within=CLASSES["force"]), "attacks a Scenario"),
+        (lambda: smc.worst_case([scenario(), scenario(duration=3.0)]), "the same duration"),
+        (lambda: smc.worst_case(scenario(), within=smc.Uncertainty(friction_scale=(0, 2))), "has no friction here"),
     ],
 )
 def test_bad_values_get_a_sentence(make, part):

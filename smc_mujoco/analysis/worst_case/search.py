@@ -3,8 +3,8 @@
 A search tries the same in the same order, whatever its budget:
 
 1. constant forces, and relays that switch with the sign of s, of e and of e': an adversary who sees the loop;
-2. relays of blends of these, forces that switch once, and waves about the frequency at which the loop swings;
-3. the corners of the constants of the class, at most 16, each with both constant forces and a relay of e';
+2. the corners of the constants of the class, at most 16, each with both constant forces and a relay of e';
+3. relays of blends of these, forces that switch once, and waves about the frequency at which the loop swings;
 4. in turns, changes of the worst members of different origin: a piece of a force turned round, a switch shifted,
    constants moved; and an evolution of the worst member by separable CMA-ES (R. Ros & N. Hansen, PPSN X, 2008; package
    cmaes), which adds straight lines between knots to its force and cuts the sum off at the bound.
@@ -87,7 +87,7 @@ class Search:
     def search(self, rng: np.random.Generator, known: Sequence[Tried]) -> None:
         """Try the strategies of the module, beginning with members that were run before."""
         self.tried += [one._replace(origin=-1 - i) for i, one in enumerate(known)]
-        for batch in itertools.chain(self._known(), self._corners(), self._changed(rng)):
+        for batch in itertools.chain(self._simple(), self._corners(), self._timed(), self._changed(rng)):
             self.run(batch)
             if self.runs >= self.budget or self.worst.key == FAILED:
                 return
@@ -121,13 +121,16 @@ class Search:
         value, error = self.metric.worst(groups), CATALOGUE["rms_error"].worst(groups)
         return (self.metric.absent if math.isnan(value) else value), error
 
-    def _known(self) -> Iterator[list[Case]]:
-        """Yield what is known to be bad, with the constants of the class in the middle of their ranges."""
-        within, slope, bare = self.members.within, self.members.slope, self.members.bare
+    def _simple(self) -> Iterator[list[Case]]:
+        """Yield constant forces and relays, with the constants of the class in the middle of their ranges."""
         if self.members.forced:
             steady = [self._forced(*one) for one in strategies.constants(self.members.samples)]
-            relays = [*strategies.relays(within.disturbance, slope)]
-            yield [*steady, *(Case(bare.named(kind), relay) for kind, relay in relays)]
+            relays = strategies.relays(self.members.within.disturbance, self.members.slope)
+            yield [*steady, *(Case(self.members.bare.named(kind), relay) for kind, relay in relays)]
+
+    def _timed(self) -> Iterator[list[Case]]:
+        """Yield what suits the frequency at which the loop swings, with the constants in the middle as well."""
+        within, slope, bare = self.members.within, self.members.slope, self.members.bare
         if self.members.forced and self.swing:
             relays = [*strategies.blends(self.swing, within.disturbance, slope)]
             timed = itertools.chain(strategies.steps(self.members.samples), strategies.waves(self.swing))
@@ -147,13 +150,14 @@ class Search:
 
     def _corners(self) -> Iterator[list[Case]]:
         """Yield the corners of the constants, spread evenly over all of them if there are more than CORNERS."""
-        m = len(self.members.constants)
-        if not m:
+        ends = self.members.ends
+        if not ends:
             return
-        count = min(2**m, CORNERS)
-        numbers = [round(i * (2**m - 1) / (count - 1)) for i in range(count)]
-        for number in numbers:
-            shares = np.array([float(number >> i & 1) for i in range(m)])
+        corners = math.prod(map(len, ends))
+        count = min(corners, CORNERS)
+        for i in range(count):
+            places = np.unravel_index(round(i * (corners - 1) / (count - 1)), [*map(len, ends)], order="F")
+            shares = np.array([its[place] for its, place in zip(ends, places, strict=True)])
             corner = dataclasses.replace(self.members.bare, shares=shares, kind="corner")
             if not self.members.forced:
                 yield [Case(corner)]

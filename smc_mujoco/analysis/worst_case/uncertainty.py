@@ -4,7 +4,7 @@
 
 A member of a class is one choice within all of its bounds. `Members` makes scenarios of members. A member has
 
-    shares      one number in [0, 1] for each constant that may differ: delay, mass, parameters, friction, x0
+    shares      one number in [0, 1] for each constant that may differ: set, delay, mass, parameters, friction, x0
     force       |force_k| <= 1, a number for each control sample: the disturbance over its bound
     noise       |noise_jk| <= 1, numbers for each time that an error of measurement is held: position, velocity
 """
@@ -12,7 +12,7 @@ A member of a class is one choice within all of its bounds. `Members` makes scen
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -34,6 +34,8 @@ MOVED = 0.5  # of the constants move in a change of constants; chosen
 DRIFT = 0.3  # standard deviation by which a constant moves, of its range; chosen
 JITTER_SHARES = 8  # of the control period, in which jitter is counted; chosen
 ROUNDING = 1e-12  # of the largest force: a smaller change of slope is none
+USUAL_SHARE = 1 / 6  # of the force that the drives can give: the disturbance where no class is given; chosen
+USUAL_SCALE = (0.5, 1.5)  # of the friction that a scenario has, where no class is given; chosen
 
 Range = tuple[float, float]
 
@@ -55,6 +57,7 @@ class Uncertainty:
       parameters: name -> lowest and highest factor on other parameters of the plant, or what is added to one of
         `plant.added`: {"payload": (0.0, 2.0)}.
       friction: lowest and highest dry friction, N or N m, beside the scenario's own.
+      friction_scale: lowest and highest factor on the friction of the scenario and on the dry friction of its plant.
       x0: how far each channel may start from the scenario's x0, as a share of it.
 
     Raises:
@@ -71,6 +74,7 @@ class Uncertainty:
     mass: Range = (1.0, 1.0)
     parameters: Mapping[str, Range] = frozen({})
     friction: Range = (0.0, 0.0)
+    friction_scale: Range = (1.0, 1.0)
     x0: float = 0.0
 
     def __post_init__(self):
@@ -82,6 +86,7 @@ class Uncertainty:
             put(slope=number("Uncertainty's slope", self.slope, above=0.0))
         put(delay=_range("delay", self.delay, 0.0), friction=_range("friction", self.friction, 0.0))
         put(mass=_range("mass", self.mass, 0.0, strict=True))
+        put(friction_scale=_range("friction_scale", self.friction_scale, 0.0))
         if not isinstance(self.parameters, Mapping):
             raise ScenarioError(f"Uncertainty's parameters are {shown(self.parameters)}: give a range for each name")
         ranges = {str(name): _range(name, value, -math.inf) for name, value in self.parameters.items()}
@@ -94,7 +99,7 @@ class Uncertainty:
     def free(self) -> bool:
         """Whether the class has more than one member."""
         bounds = self.disturbance, self.position_noise, self.velocity_noise, self.jitter, self.x0
-        ranges = self.delay, self.mass, self.friction, *self.parameters.values()
+        ranges = self.delay, self.mass, self.friction, self.friction_scale, *self.parameters.values()
         return any(bounds) or any(low < high for low, high in ranges)
 
     def words(self, plant: Plant) -> str:
@@ -105,18 +110,37 @@ class Uncertainty:
         held = f" held for {self.hold:g} s"
         parts += [f"position errors <= {self.position_noise:g} {x}{held}"] if self.position_noise else []
         parts += [f"velocity errors <= {self.velocity_noise:g} {x}/s{held}"] if self.velocity_noise else []
-        ranges = {"delay (s)": self.delay, f"friction ({u})": self.friction, "mass x": self.mass, **self.parameters}
+        ranges = {"delay (s)": self.delay, f"friction ({u})": self.friction, "friction x": self.friction_scale}
+        ranges |= {"mass x": self.mass, **self.parameters}
         parts += [f"{name} {low:g} to {high:g}" for name, (low, high) in ranges.items() if low < high]
         parts += [f"jitter <= {self.jitter:g} s"] if self.jitter else []
         parts += [f"x0 within {100 * self.x0:g} %"] if self.x0 else []
         return ", ".join(parts)
 
 
+def usual(scenario: Scenario) -> Uncertainty:
+    """Return the class where none is given: what the plant declares, else a disturbance; and friction, if it has some.
+
+    The disturbance is up to a sixth of the force of the weakest drive.
+    """
+    declared = scenario.plant.uncertain
+    return Uncertainty(
+        disturbance=0.0 if declared else USUAL_SHARE * strength(scenario),
+        parameters=declared,
+        friction_scale=USUAL_SCALE if scenario.friction or _dry(scenario.plant) else (1.0, 1.0),
+    )
+
+
+def strength(scenario: Scenario) -> float:
+    """Return the largest force that every drive can hold, N or N m."""
+    return min(scenario.limits) * scenario.drive.gain
+
+
 def outside(scenario: Scenario, within: Uncertainty) -> str:
     """Return how a class goes beyond the theorem of the law, in words; "" if nothing is known of that."""
     found, d, u = [], within.disturbance, EFFORT[scenario.plant.units[0]]
-    if d >= (most := min(scenario.limits)):
-        found.append(f"no law with |u| <= {most:g} {u} holds |d| = {d:g} {u}")
+    if d >= (most := strength(scenario)):
+        found.append(f"no law holds |d| = {d:g} {u} with drives of {most:.3g} {u}")
     admits = {} if scenario.law.template is None else scenario.law.template.admits
     for gains in [SimpleNamespace(**one.gains) for one in scenario.law.of_channels(scenario.plant.driven)][:1]:
         if d and "d" in admits and d >= (bound := admits["d"](gains)):
@@ -163,29 +187,37 @@ class Member:
 
 
 class Members:
-    """The members of a class around one scenario.
+    """The members of a class around one scenario, or around the same scenario on several sets of parameters.
 
     Attributes:
-      constants: name -> function of a scenario and a share in [0, 1] that returns the scenario with this constant.
+      constants: name -> function of a scenario and a share in [0, 1] that returns the scenario with this constant. The
+        first, "set", returns another scenario, where there are several.
+      ends: the shares that a corner of the class may have, for each constant.
       slope: most change of the disturbance between two samples, N or N m; 0: it may jump.
-      bare: the member without force or noise, with its constants in the middle.
+      bare: the member without force or noise, with the first set, and its other constants in the middle.
 
     Raises:
       ScenarioError: the plant does not have what the class changes.
     """
 
-    def __init__(self, scenario: Scenario, within: Uncertainty):
+    def __init__(self, scenarios: Sequence[Scenario], within: Uncertainty):
+        scenario, count = scenarios[0], len(scenarios)
         self.scenario, self.within, self.h = scenario, within, scenario.control_period
         self.samples = scenario.samples
         self.forced = within.disturbance > 0.0
         self.slope = 0.0 if within.slope is None else within.slope * self.h
-        self.constants = dict(_constants(scenario, within))
+        sets: dict[str, Put] = {"set": lambda _, share: scenarios[min(int(share * count), count - 1)]}
+        self.constants = (sets if count > 1 else {}) | dict(_constants(scenario, within))
+        self.ends = [[0.0, 1.0] for _ in self.constants]
         self.held = max(1, round(within.hold / self.h))  # samples for which an error of measurement is held
         self.times = -(-self.samples // self.held) if within.position_noise or within.velocity_noise else 0
         if self.times and any(scenario.noise.errors):
             cure = "the adversary chooses them: leave them out"
             raise ScenarioError(f"the scenario has errors of measurement, {scenario.noise.errors}, and {cure}")
-        self.bare = Member(np.full(len(self.constants), 0.5), np.zeros(0), np.zeros((2, self.times)))
+        middle = np.full(len(self.constants), 0.5)
+        if count > 1:
+            self.ends[0], middle[0] = [(i + 0.5) / count for i in range(count)], 0.0
+        self.bare = Member(middle, np.zeros(0), np.zeros((2, self.times)))
         for share in (0.0, 1.0):
             self.placed(np.full(len(self.constants), share))
 
@@ -299,6 +331,11 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[tuple[str, P
             yield name, _of_range(bounds, functools.partial(_changed, name=name))
     if within.friction != (0.0, 0.0):
         yield "friction", _of_range(within.friction, rougher)
+    if within.friction_scale != (1.0, 1.0):
+        if not (scenario.friction or _dry(scenario.plant)):
+            cure = "give it some, such as friction=smc.Coulomb(0.1), or a class with friction=(0.0, 0.1)"
+            raise ScenarioError(f"friction_scale of {scenario.plant.name}, which has no friction here: {cure}")
+        yield "friction x", _of_range(within.friction_scale, _scaled)
     for i in range(scenario.plant.n if within.x0 else 0):
         yield f"x0[{i}]", _of_range((-within.x0, within.x0), functools.partial(_started, i=i))
 
@@ -335,6 +372,19 @@ def rougher(scenario: Scenario, level: float) -> Scenario:
     others = tuple(part for part in scenario.friction if not isinstance(part, Coulomb))
     before = sum(part.level for part in scenario.friction if isinstance(part, Coulomb))
     return dataclasses.replace(scenario, friction=(*others, Coulomb(before + level)))
+
+
+def _dry(plant: Plant) -> list[str]:
+    """Return the parameters of the plant's own dry friction that are not 0."""
+    return [name for name in plant.dry if plant.parameters[name]]
+
+
+def _scaled(scenario: Scenario, factor: float) -> Scenario:
+    """Return the scenario with a factor on its friction, and on the dry friction of its plant."""
+    made = dataclasses.replace(scenario, friction=tuple(part.scaled(factor) for part in scenario.friction))
+    for name in _dry(scenario.plant):
+        made = _changed(made, factor, name)
+    return made
 
 
 def later(scenario: Scenario, level: float) -> Scenario:

@@ -2,7 +2,7 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -10,6 +10,10 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import held_back
+
+if TYPE_CHECKING:
+    from smc_mujoco.control.law import Law
+    from smc_mujoco.simulation.scenario import Scenario
 
 QUICK = {  # of `margins --quick`
     "plants": ["inverted_pendulum", "duffing"],
@@ -138,7 +142,12 @@ def margins(
 
 @errors_as_sentences()
 def worst(
-    plant: options.PlantName,
+    plant: Annotated[
+        str,
+        typer.Argument(
+            metavar="PLANT|RIG", autocompletion=options.PLANTS, help="A plant, FILE.xml:joint+joint, or a rig's sets."
+        ),
+    ],
     law: options.Laws = None,
     disturbance: Annotated[float, typer.Option(help="Bound on |d|, N or N m, on every driven joint.")] = 0.0,
     slope: Annotated[float | None, typer.Option(help="Bound on |d'|, per second; default: d may jump.")] = None,
@@ -149,6 +158,9 @@ def worst(
     jitter: Annotated[float, typer.Option(help="Largest delay of a control sample, s.")] = 0.0,
     mass: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Factor on the mass, as 0.7:1.3.")] = None,
     friction: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Dry friction, N or N m, as 0:0.1.")] = None,
+    friction_scale: Annotated[
+        str | None, typer.Option(metavar="LOW:HIGH", help="Factor on the friction that there is, as 0.5:2.")
+    ] = None,
     parameter: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME=LOW:HIGH", help="Another parameter, as alpha=0.8:1.2. May be repeated."),
@@ -168,7 +180,9 @@ def worst(
 ) -> None:
     """Find the worst that can happen to laws within bounds that you give: an adversary instead of random seeds.
 
-    You say what is uncertain, and nothing else: a bound on the disturbance, ranges of mass, delay and friction. The
+    You say what is uncertain, and nothing else: a bound on the disturbance, ranges of mass, delay and friction. If you
+    say nothing, it is what the plant declares, such as an arm's payload, or else a disturbance up to a sixth of what
+    the weakest drive gives. Of a rig, such as qube_servo, the adversary also chooses one of its sets of parameters. The
     search is the same for every law: constant forces, forces that switch with the sign of s, of e or of its rate, waves
     at the frequency of the loop, all corners of the ranges, and an evolution from the worst of these. The column worst
     found has the error of the worst run, the column median that of as many random members of the class. Laws are
@@ -176,31 +190,31 @@ def worst(
     a lower bound: there may be worse.
 
     Example: smc-mujoco worst duffing --law classical,super_twisting,observer_free --disturbance 2 --mass 0.7:1.3
+
+    Example: smc-mujoco worst panda --law computed_torque_sliding --gains default --parameter payload=0:2
     """
     with held_back():
         from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
         from smc_mujoco.common.files import write_json
-        from smc_mujoco.control import gain_sets
         from smc_mujoco.draw.page import files
-        from smc_mujoco.simulation.grid import case
         from smc_mujoco.studies.worst_case import WorstCases, worst_case
 
     json, terminal = options.json_file(json, *(files(out) if out else ()))
     apart = [text.partition("=") for text in parameter or ()]
-    known = {"delay": delay, "mass": mass, "friction": friction}
-    within = Uncertainty(
-        disturbance=disturbance,
-        slope=slope,
-        position_noise=position_noise,
-        velocity_noise=velocity_noise,
-        hold=hold,
-        jitter=jitter,
-        x0=spread,
-        parameters={name: options.low_and_high(f"--parameter {name}", text) for name, _, text in apart},
-        **{name: options.low_and_high(f"--{name}", text) for name, text in known.items() if text},
-    )
-    chosen, machine = options.laws(law, gain_sets.LAWS), options.plant(plant)
-    cases = [case(machine, one, condition, duration, gains) for one in chosen]
+    ranges = {"delay": delay, "mass": mass, "friction": friction, "friction_scale": friction_scale}
+    bounds = {
+        "disturbance": disturbance,
+        "slope": slope,
+        "position_noise": position_noise,
+        "velocity_noise": velocity_noise,
+        "jitter": jitter,
+        "x0": spread,
+        "parameters": {name: options.low_and_high(f"--parameter {name}", text) for name, _, text in apart},
+        **{name: options.low_and_high(f"--{name}", text) for name, text in ranges.items() if text},
+    }
+    given: dict[str, Any] = {name: bound for name, bound in bounds.items() if bound}
+    within = Uncertainty(hold=hold, **given) if given else None
+    chosen, cases = _attacked(plant, options.laws(law), condition, duration, gains)
     found = WorstCases(worst_case(one, metric, within, budget, seed, threads, progress=True) for one in cases)
     terminal.print(found)
     terminal.note(f"{sum(one.tried for one in found)} runs, {options.gains_used(chosen, gains)}", "dim")
@@ -209,6 +223,24 @@ def worst(
     if out:
         found.figure(out)
         terminal.wrote(*files(out))
+
+
+def _attacked(
+    plant: str, laws: "list[str | Law]", condition: str, duration: float, gains: str
+) -> "tuple[list[str | Law], list[list[Scenario]]]":
+    """Return the laws to attack, and the scenarios of each: one on a plant, one for each set of parameters of a rig."""
+    from smc_mujoco.common import annexes
+    from smc_mujoco.control import gain_sets
+    from smc_mujoco.simulation.grid import case
+
+    rigs = annexes.module("smc_mujoco.evidence.rigs.rig", "a rig") if annexes.installed("evidence") else None
+    if rigs and plant in rigs.rigs():
+        twin, ensemble = rigs.rig(plant), annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig")
+        chosen = laws or list(twin.laws)
+        own = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
+        return chosen, [ensemble.runs(twin, [one], 1, own, duration) for one in chosen]
+    chosen = laws or list(gain_sets.LAWS)
+    return chosen, [[case(options.plant(plant), one, condition, duration, gains)] for one in chosen]
 
 
 @errors_as_sentences()

@@ -27,6 +27,8 @@ class Viscous(Friction):
       b: N m s/rad, N s/m on a slide; 0 or more.
     """
 
+    forces = ("b",)
+
     b: float
 
     def __post_init__(self) -> None:
@@ -47,6 +49,8 @@ class Coulomb(Friction):
     Attributes:
       level: N m, N on a slide; 0 (none) or more.
     """
+
+    forces = ("level",)
 
     level: float
 
@@ -90,6 +94,7 @@ class LuGre(Friction):
 
     bristles = True
     stateful = True  # the bend of the bristles
+    forces = "coulomb", "static"
 
     coulomb: float
     static: float

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import number
+from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
@@ -68,6 +68,19 @@ class Friction(Part):
     """Base of frictions, which resist a channel's joint beside the plant's own damping."""
 
     bristles: ClassVar[bool] = False  # whether it holds a joint at rest by bristles; at most one friction may
+    forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
+
+    def scaled(self, factor: float) -> "Friction":
+        """Return this friction with a factor on its force.
+
+        Raises:
+          ScenarioError: its class does not name its `forces`.
+        """
+        if not self.forces:
+            raise ScenarioError(f"{type(self).__name__} cannot be scaled: name its fields that are forces in `forces`")
+        values = {name: getattr(self, name) for name in self.forces}
+        given = {name: np.asarray(value) for name, value in values.items() if value is not None}
+        return dataclasses.replace(self, **{name: (factor * value).tolist() for name, value in given.items()})
 
     def check(self, plant: Plant) -> None:
         """Raise ScenarioError if it does not suit the plant."""

@@ -50,6 +50,8 @@ class ServoFriction(Sliding):
       alpha: how steeply they fall, greater than 0.
     """
 
+    forces = ("kv", "kc", "kcs", *LOADED)
+
     kv: PerJoint = 0.0
     kc: PerJoint = 0.0
     km: PerJoint = 0.0

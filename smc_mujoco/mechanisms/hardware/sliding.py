@@ -144,6 +144,8 @@ class Sigmoid(Sliding):
         to which dry friction tends. 0: nothing holds it, and friction is F alone.
     """
 
+    forces = "p1", "hold"
+
     p1: PerJoint
     p2: PerJoint
     p3: PerJoint = 0.0

@@ -162,6 +162,7 @@ PANDA = Plant(
     lane=(1.1, 0.0, 0.0),
     contacts={"table": table, "wall": wall},
     added={"payload": "kg", "delta": ""},
+    uncertain={"payload": (0.0, 2.0), "delta": (0.0, 1.0)},  # kg, as in the study of arms; both published sets
     direct=True,
     tip="tip",
     friction=FRICTION,
