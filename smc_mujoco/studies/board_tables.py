@@ -5,7 +5,7 @@
 
 import dataclasses
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from smc_mujoco.analysis.bootstrap import Interval
@@ -47,19 +47,23 @@ def heading(board: Any) -> str:
     return metric.label + (f" ({unit})" if unit not in ("", "1") else "")
 
 
-def tables(boards: Iterable[Any]) -> list[Tabular]:
-    """Return a table for each group of runs, with what each metric's board says below, and a key below the last."""
+def tables(boards: Iterable[Any], worst: Mapping[str, Mapping[str, Any]]) -> list[Tabular]:
+    """Return a table for each group of runs, with what each metric's board says below, and a key below the last.
+
+    Args:
+      worst: plant -> law -> its worst case, for a last column.
+    """
     groups: dict[str, list[Any]] = {}
     for board in boards:
         groups.setdefault(board.about, []).append(board)
-    made = [_table(name, own) for name, own in groups.items()]
+    made = [_table(name, own, worst.get(own[0].group.get("plant", ""), {})) for name, own in groups.items()]
     if not made:
         return [NO_BOARDS]
     words = key([board for own in groups.values() for board in own])
     return [*made[:-1], dataclasses.replace(made[-1], notes=(*made[-1].notes, words))]
 
 
-def _table(name: str, boards: Sequence[Any]) -> Tabular:
+def _table(name: str, boards: Sequence[Any], worst: Mapping[str, Any]) -> Tabular:
     """Return the table of one group of runs."""
     found = sources(boards)
     known = ["gains"] * any(found.values())
@@ -69,12 +73,15 @@ def _table(name: str, boards: Sequence[Any]) -> Tabular:
             left = [Cell(entry.law, colour=style.law_colour(entry.law)), *([kinds(found[entry.law])] * len(known))]
             row = laws.setdefault(entry.law, [*left, *[""] * len(boards)])
             row[len(left) + i] = _cell(board, entry)
+    for law, one in worst.items():
+        laws[law].append(Cell(one.shown(one.value), f"median {one.shown(one.median)}"))
+    units = [f"worst found ({one.unit})" for one in worst.values()][:1]
     largest = max(boards, key=lambda board: len(board.blocks))
     name = ", ".join(filter(None, [name, largest.name(largest.blocks[0]) if len(largest.blocks) == 1 else ""]))
     samples = {block.sample: largest.name(block) for block in reversed(largest.blocks)}
     several = "; ".join(f"{sample} ({block}{' ...' * (len(largest.blocks) > 2)})" for sample, block in samples.items())
     return Tabular(
-        headings=["law", *known, *map(heading, boards)],
+        headings=["law", *known, *map(heading, boards), *units],
         rows=list(laws.values()),
         title=f"{name}: {several if len(samples) > 1 else largest.blocks[0].sample}",
         notes=_verdicts(boards),

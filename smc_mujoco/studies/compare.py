@@ -10,24 +10,23 @@ It is made of parts that can be used alone: `fair_gains`, `smc.grid`, `smc.study
 
 import dataclasses
 import functools
+import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from smc_mujoco.analysis.differences import RELEVANT, share_that_matters
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.tuning import search
-from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, usual
+from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, taken, whole
 from smc_mujoco.common.errors import number as checked
 from smc_mujoco.common.extras import package
-from smc_mujoco.common.files import read_json, replacing, write_json
+from smc_mujoco.common.files import replacing
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Tables, Tabular
-from smc_mujoco.common.text import joined, number
+from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template, written
 from smc_mujoco.control.law import Law, catalogue, fits, known_laws
@@ -35,27 +34,24 @@ from smc_mujoco.control.properties import suitable
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.simulation import coerce, serialise
+from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition, applicable, find_condition
 from smc_mujoco.simulation.grid import case, check_apart, crossed, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.run import run
-from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies import executors, run_key
-from smc_mujoco.studies.cache import cached
+from smc_mujoco.studies import executors
 from smc_mujoco.studies.fair_gains import Candidate, fair_gains
 from smc_mujoco.studies.leaderboard import METRICS, Boards, leaderboard
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, study
 from smc_mujoco.studies.table import Table
-from smc_mujoco.studies.worst_case import WorstCase, worst_case
+from smc_mujoco.studies.worst_case import WorstCase, kept
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure, SubFigure
 
-KEPT = ("value", "median", "unit", "found_by", "tried", "metric", "outside", "seed")  # of a worst case, in its file
 MAX_BLOCKS = 12  # plants times conditions that have a table each; of more, each plant has one over its conditions
 
 
@@ -92,7 +88,8 @@ class Compared(Tables):
         """A board for each metric on each plant in each condition, or on each plant if these are more than 12."""
         blocks = set(zip(self.table.column("plant").tolist(), self.table.column("condition").tolist(), strict=True))
         by = ("plant", "condition") if len(blocks) <= MAX_BLOCKS else ("plant",)
-        return leaderboard(self.table, self.metrics, by, defaults=self.defaults, relevant=self.relevant)
+        options: dict[str, Any] = {"defaults": self.defaults, "relevant": self.relevant, "worst": self.worst}
+        return leaderboard(self.table, self.metrics, by, **options)
 
     @functools.cached_property
     def traces(self) -> list[Trace]:
@@ -138,10 +135,10 @@ class Compared(Tables):
             yield Tabular(
                 headings=["law", "gains", f"worst found ({first.unit})", f"median ({first.unit})", "found by"],
                 rows=[
-                    (law, each.nominal.law.source.kind, number(each.value), number(each.median), each.found_by)
+                    (law, each.nominal.law.source.kind, each.shown(each.value), each.shown(each.median), each.found_by)
                     for law, each in ordered
                 ],
-                title=f"{plant}: {what}, worst of {first.tried} runs within {first.within.words(first.nominal.plant)}",
+                title=f"{plant}: {what}, worst of {first.tried} runs within {first.class_words}",
                 notes=["The median is that of random members of the class. The true worst case may be worse."],
                 left=2,
                 stacked=True,
@@ -163,7 +160,8 @@ class Compared(Tables):
         """Return a pandas DataFrame with a row for each law, plant, condition and metric.
 
         Its columns are plant, condition, law, gains (their source), metric, unit, median, low and high (the interval),
-        failed (runs without a value), runs, best (whether no law is better) and winner. All runs are in
+        failed (runs without a value), runs, best (whether no law is better), winner, and worst_found: the rms error of
+        the worst run that an adversary found on the plant, NaN if none was asked for. All runs are in
         `table.data.to_pandas()`.
 
         Raises:
@@ -177,6 +175,7 @@ class Compared(Tables):
     def _rows(self) -> Iterator[dict[str, Any]]:
         """Yield the rows of `to_pandas`."""
         for board in self.leaderboard:
+            worst = self.worst.get(board.group.get("plant", ""), {})
             for entry in board.entries:
                 low, high = entry.interval.low, entry.interval.high
                 yield {
@@ -192,6 +191,7 @@ class Compared(Tables):
                     "runs": entry.runs,
                     "best": entry.rank.best,
                     "winner": board.winner == entry.law,
+                    "worst_found": worst[entry.law].value if worst else math.nan,
                 }
 
     def plot(
@@ -302,7 +302,8 @@ def compare(
 
     def attacked(plant: Plant, law: Law) -> WorstCase:
         scenario = case(plant, law, "nominal", duration, starts=starts)
-        return _attacked(scenario, worst, folder, threads, progress)
+        within, path = None if worst is True else worst, folder / "worst" / f"{plant.name}-{law.name}.json"
+        return kept(path, scenario, within or None, None, threads, progress)
 
     worst_cases = {
         plant.name: {one.law.name: attacked(plant, one.law) for one in candidates[plant.name]}
@@ -316,30 +317,6 @@ def compare(
         relevant=relevant,
         out=folder,
         worst=worst_cases,
-    )
-
-
-def _attacked(
-    scenario: Scenario, worst: bool | Uncertainty, folder: Path, threads: int | None, progress: bool
-) -> WorstCase:
-    """Return the worst case of a scenario, from the file of an earlier call if there is one."""
-    within = worst if isinstance(worst, Uncertainty) else usual(scenario)
-
-    def load(path: Path) -> WorstCase:
-        data = read_json(path)
-        known = serialise.restore(data.pop("scenario"))
-        return WorstCase(**data, scenario=dataclasses.replace(known, law=scenario.law), nominal=scenario, within=within)
-
-    def save(found: WorstCase, path: Path) -> None:
-        kept = {name: getattr(found, name) for name in KEPT}
-        write_json(path, kept | {"strategies": dict(found.strategies), "scenario": serialise.describe(found.scenario)})
-
-    return cached(
-        folder / "worst" / f"{scenario.plant.name}-{scenario.law.name}.json",
-        [run_key.key(scenario), dataclasses.asdict(within)],
-        lambda: worst_case(scenario, within=within, threads=threads, progress=progress),
-        save,
-        load,
     )
 
 

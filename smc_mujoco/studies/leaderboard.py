@@ -35,11 +35,15 @@ from smc_mujoco.analysis.ranking import (
 )
 from smc_mujoco.analysis.signed_rank import least_p
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
+from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies import board_tables
+
+if TYPE_CHECKING:
+    from smc_mujoco.studies.worst_case import WorstCase
 
 FEW_TIMES = 0.5  # ratio below which values are called so many times less, not so many percent; chosen
 MAX_NAMES = 4  # of plants or conditions in a verdict
@@ -338,7 +342,13 @@ def _distinct(runs: int) -> str:
 
 
 class Boards(Tables, list[Board]):
-    """Boards: a list that terminals, notebooks and `print` show as tables, with a verdict on each board."""
+    """Boards: a list that terminals, notebooks and `print` show as tables, with a verdict on each board.
+
+    Attributes:
+      worst: plant -> law -> the worst case found, for a column of the plant's tables; empty for none.
+    """
+
+    worst: "Mapping[str, Mapping[str, WorstCase]]" = frozen({})
 
     @property
     def tables(self) -> list[Tabular]:
@@ -347,7 +357,7 @@ class Boards(Tables, list[Board]):
         A cell has a median with its interval. The median is marked if no law is better in any block, no run failed, and
         there are enough runs for a winner.
         """
-        return board_tables.tables(self)
+        return board_tables.tables(self, self.worst)
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -364,6 +374,7 @@ def leaderboard(
     seed: int = 0,
     defaults: bool = False,
     relevant: float = RELEVANT,
+    worst: "Mapping[str, Mapping[str, WorstCase]] | None" = None,
 ) -> Boards:
     """Compare the laws of a table in each metric within each group.
 
@@ -381,6 +392,7 @@ def leaderboard(
       defaults: whether a winner may be named over laws whose gains are their defaults.
       relevant: the least relevant difference, as a share of the larger value; at least what the sensor of a condition
         resolves is relevant too.
+      worst: plant -> law -> its `worst_case`, for a column of the tables.
 
     Raises:
       ScenarioError: no runs, an unknown metric or group, two runs in a cell, or laws without a common cell.
@@ -390,6 +402,7 @@ def leaderboard(
     known = {SETTLES: ""} | {name: metric.unit for name, metric in CATALOGUE.items()}
     units = {name: find("metric", name, known) for name in metrics}
     boards, seed = Boards(), whole("seed", seed, 0, 2**53 - 1)
+    boards.worst = worst or {}
     by_row = {name: cells.values(table, name) for name in units}
     groups = list(cells.groups(table, by))
     every = groups if set(by) == set(cells.GROUPS) else list(cells.groups(table, cells.GROUPS))

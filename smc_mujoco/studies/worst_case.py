@@ -13,6 +13,7 @@ import dataclasses
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from smc_mujoco.analysis.worst_case.search import Search
 from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, outside, usual
 from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
+from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import number
@@ -29,6 +31,8 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.studies import run_key
+from smc_mujoco.studies.cache import cached
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -106,8 +110,9 @@ class WorstCase:
 
     def about(self) -> dict[str, Any]:
         """Return it as JSON data. `scenario` is what a trace's file has, too."""
-        values = {name: getattr(self, name) for name in ("value", "median", "unit", "found_by", "tried", "metric")}
-        rest = {"strategies": dict(self.strategies), "outside": self.outside, "seed": self.seed}
+        names = "value", "median", "unit", "found_by", "tried", "metric", "outside", "seed", "sets"
+        values = {name: getattr(self, name) for name in names}
+        rest = {"strategies": dict(self.strategies)}
         within = dataclasses.asdict(self.within)
         return values | rest | {"within": within, "scenario": serialise.describe(self.scenario)}
 
@@ -253,6 +258,36 @@ def worst_case(
         outside=outside(scenario, within),
         seed=seed,
         sets=len(scenarios),
+    )
+
+
+def kept(
+    path: Path,
+    scenario: Scenario,
+    within: Uncertainty | None = None,
+    budget: int | None = None,
+    threads: int | None = None,
+    progress: bool = False,
+) -> WorstCase:
+    """Return the `worst_case` of a scenario, from the file of an earlier call if there is one."""
+    within = usual(scenario) if within is None else within
+
+    def load(file: Path) -> WorstCase:
+        data = read_json(file)
+        known = serialise.restore(data.pop("scenario"))
+        return WorstCase(**data, scenario=dataclasses.replace(known, law=scenario.law), nominal=scenario, within=within)
+
+    def save(found: WorstCase, file: Path) -> None:
+        about = found.about()
+        del about["within"]
+        write_json(file, about)
+
+    return cached(
+        path,
+        [run_key.key(scenario), dataclasses.asdict(within), budget],
+        lambda: worst_case(scenario, METRIC, within, budget, threads=threads, progress=progress),
+        save,
+        load,
     )
 
 

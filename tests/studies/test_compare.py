@@ -15,7 +15,7 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.units import FORCE, RATE, Gain
-from smc_mujoco.studies import compare, executors, fair_gains, worst_case
+from smc_mujoco.studies import executors, fair_gains, worst_case
 
 SHORT = {"duration": 0.5, "budget": 48, "progress": False}
 PLANTS = ["duffing", "inverted_pendulum"]
@@ -171,7 +171,7 @@ def test_one_command_tunes_runs_tables_and_draws(tmp_path, monkeypatch, capsys):
 
 
 def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(worst_case, "default_budget", lambda scenario: 8)
+    monkeypatch.setattr(worst_case, "default_budget", lambda scenario, within: 8)
     within, laws = smc.Uncertainty(disturbance=0.5), [smc.law("classical", k=5.0), smc.law("pid", kp=20.0)]
     made = smc.compare(laws, "duffing", "nominal", 1, worst=within, out=tmp_path, **SHORT)
     for found in made.worst["duffing"].values():
@@ -180,7 +180,10 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
     assert "duffing: rms error, worst of 16 runs within |d| <= 0.5 N" in text
     assert all(number(each.value) in text for each in made.worst["duffing"].values())
     assert "worst found (m)" in made.to_latex()
-    monkeypatch.setattr(compare, "worst_case", None)
+    column = {row[0].text: row[-1] for row in made.leaderboard.tables[0].rows}
+    assert column == {law: (one.shown(one.value), f"median {one.shown(one.median)}", False, "", "")
+                      for law, one in made.worst["duffing"].items()}  # fmt: skip
+    monkeypatch.setattr(worst_case, "worst_case", None)
     again = smc.compare(laws, "duffing", "nominal", 1, worst=within, out=tmp_path, **SHORT)
     assert again.worst["duffing"]["pid"].scenario == made.worst["duffing"]["pid"].scenario
 
