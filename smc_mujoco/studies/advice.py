@@ -19,14 +19,17 @@ from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw.style import law_colour
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.conventions import Metric
 from smc_mujoco.studies.board_tables import spread
 from smc_mujoco.studies.leaderboard import size_in_words
 from smc_mujoco.studies.table import Table
+from smc_mujoco.studies.worst_case import METRIC, WorstCase
 
 NAMED = 6  # names of laws that the screening left out
+ROBUST = "robust"  # the need whose number is not of the runs: the worst that an adversary finds
 NEEDS: Mapping[str, Metric] = {metric.need: metric for metric in metrics() if metric.need}
+NEEDS |= {ROBUST: dataclasses.replace(CATALOGUE[METRIC], need=ROBUST, label=f"worst found {CATALOGUE[METRIC].label}")}
 TIES = {"no-overshoot": "overshoot", "frugal": "energy of u"}  # what orders laws that tie, least first, in words
 
 
@@ -46,7 +49,8 @@ class Choice:
       settles: share of its runs that settle.
       reliable: whether it settles in nearly all runs of every condition.
       fit: whether it settles often enough to be advised.
-      medians: need -> median over the conditions, with its interval.
+      medians: need -> median over the conditions, with its interval; of "robust" the largest over the conditions.
+      worst: what an adversary found in each condition, for the need "robust"; else empty.
     """
 
     law: Component
@@ -56,6 +60,12 @@ class Choice:
     reliable: bool
     fit: bool
     medians: Mapping[str, Interval]
+    worst: tuple[WorstCase, ...] = ()
+
+    @property
+    def worst_found(self) -> WorstCase:
+        """The worst of them."""
+        return max(self.worst, key=lambda one: one.value)
 
     @property
     def gains(self) -> str:
@@ -199,13 +209,17 @@ class Advice(Tables):
         name, median = choice.law.name, choice.medians[need]
         rivalled = len(self.compared) > 1 and name in self.compared
         best = rivalled and not self.better(name, need) and not self._fails(name, need)
+        if need == ROBUST:
+            one = choice.worst_found
+            return Cell(one.shown(one.value), f"median {one.shown(one.median)}", best)
         return Cell(number(median.median), spread(median, need) * (median.low < median.high), best)
 
     @property
     def key(self) -> str:
         """The meaning of the table's signs."""
         of = f" of {len(self.conditions)} conditions" if len(self.conditions) > 1 else ""
-        text = f"place by failed runs, then by mean rank, and medians{of}, with 95 % intervals over {self.samples}. "
+        medians = f", and medians{of}, with 95 % intervals over {self.samples}" * self._by_runs
+        text = f"place by failed runs, then by mean rank{medians}. "
         text += f"*: no finalist is better{' in any condition' if of else ''}, and every run has a value."
         if sources := in_words({choice.law.name: [choice.law.source] for choice in self.choices}):
             text += f" {sources[:1].upper()}{sources[1:]}."
@@ -236,8 +250,15 @@ class Advice(Tables):
         return [f"{law} {count}" for law, count in named if 1 < count < seeds]
 
     @property
+    def _by_runs(self) -> bool:
+        """Whether a need is compared by runs, not only by what an adversary found."""
+        return self.needs != (ROBUST,)
+
+    @property
     def _too_few(self) -> bool:
         """Whether no comparison can tell two laws apart, with the samples that there are."""
+        if ROBUST in self.needs:
+            return False
         least = 2 * least_p(int(self.comparison.samples.max()))
         return least > (1 - self.comparison.level) / len(self.blocks)
 
@@ -249,6 +270,8 @@ class Advice(Tables):
         parts = [self._use(), self._because(), *self._instead(), self._second(), self._sure(), self._left_out()]
         if self.barred:
             parts = [self._refusal(), self._left_out()]
+        if ROBUST in self.needs:
+            parts.insert(2 - bool(self.barred), self._robust())
         return list(filter(None, parts))
 
     def _refusal(self) -> str:
@@ -256,6 +279,18 @@ class Advice(Tables):
         one = len(self.barred) == 1
         why = f"No law is advised over {joined(self.barred)}, whose gains are {'its' if one else 'their'} defaults"
         return f"{why}: tune {'it' if one else 'them'}, or ask for it with defaults=True (--defaults)."
+
+    def _robust(self) -> str:
+        """Return what the adversary did, and which law the median of its random runs puts first."""
+        one, found = self.choices[0].worst_found, [choice for choice in self.choices if choice.fit] or self.choices
+        least = min(found, key=lambda choice: choice.worst_found.median)
+        text = f"Robust is by the worst found in {one.tried} runs of each law in each condition, half of them random, "
+        text += f"within {one.class_words}; there may be worse."
+        if least is self.choices[0]:
+            return text
+        median = f"{number(least.worst_found.median)} {one.unit}"
+        worst = f"its worst found is {least.worst_found.words}"
+        return f"{text} The median of the random runs would put {least.law.name} first, with {median}: {worst}."
 
     def _use(self) -> str:
         first, others = self.choices[0], self.compared[1:]
@@ -273,10 +308,8 @@ class Advice(Tables):
             return f"No law can be called the best: {self.samples} are too few for {comparisons}."
         if self.all_level:
             every = f"all {len(self.compared)} finalists" if len(others) > 1 else "both laws"
-            return (
-                f"No law can be called the best: {every} are level in every comparison of {self.samples}. Use the one "
-                "that you know."
-            )
+            where = f"in every comparison of {self.samples}" if self._by_runs else "in the worst that was found"
+            return f"No law can be called the best: {every} are level {where}. Use the one that you know."
         return f"Use {law}."
 
     @property
@@ -377,6 +410,10 @@ class Advice(Tables):
         a, b = (self.comparison.laws.index(name) for name in (first, rival))
         parts = []
         for need in self.needs:
+            if need == ROBUST:
+                one, other = (next(c for c in self.choices if c.law.name == name) for name in (first, rival))
+                parts.append(f"robust {self._number(one, need)} to {self._number(other, need)}")
+                continue
             blocks = [k for k, block in enumerate(self.blocks) if block[0] == need]
             least = max(blocks, key=lambda k: self.comparison.p[k, a, b])
             effect = self.comparison.effect(least, first, rival, winner=False)
@@ -395,7 +432,10 @@ class Advice(Tables):
         if several.any() and not several.all():
             ones = [law for law, its in zip(self.comparison.laws, several.tolist(), strict=True) if not its]
             gains = f"over sets of gains, but for these gains of {joined(ones)}"
-        return f"This holds {gains}, over starts and noise."
+        attacked = " What an adversary found is of the best set of gains, from the first start." * (
+            ROBUST in self.needs
+        )
+        return f"This holds {gains}, over starts and noise.{attacked}"
 
     def _left_out(self) -> str:
         if not self.others:
@@ -410,6 +450,8 @@ class Advice(Tables):
         return f"{NEEDS[need].label} {self._number(choice, need)}"
 
     def _number(self, choice: Choice, need: str) -> str:
+        if need == ROBUST:
+            return choice.worst_found.words
         median = choice.medians[need].median
         return number(median) + (
             f" {NEEDS[need].unit_for(self.plant.unit, self.effort)}" if math.isfinite(median) else ""

@@ -23,8 +23,13 @@ run with each in turn, so that the answer holds over the gains that a tuning may
 
 A law dominates another if it is better in some block and worse in none. Laws with fewer runs that fail come first, then
 laws by mean rank, but none before a law that dominates it. Laws that tie with the one whose turn it is are ordered
-among themselves: less overshoot first, then less energy of u. The first law is advised, unless all are level."""
+among themselves: less overshoot first, then less energy of u. The first law is advised, unless all are level.
 
+"robust" is the one need that is not a metric of these runs. An adversary attacks each law in each condition, with few
+runs in the screening and with the default budget of `worst_case`, over all conditions, in the finals. A law is better
+if the worst found for it is less by more than the least relevant difference. There is no test, as nothing is drawn."""
+
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -33,10 +38,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
-from smc_mujoco.analysis.bootstrap import median_of
+from smc_mujoco.analysis.bootstrap import Interval, median_of
 from smc_mujoco.analysis.differences import RELEVANT, share_that_matters
 from smc_mujoco.analysis.paired_runs import SETTLES
-from smc_mujoco.analysis.ranking import Comparison, Rank, block_ranks, compare, ranked, ranks, samples_of
+from smc_mujoco.analysis.ranking import (
+    Comparison,
+    Limits,
+    Rank,
+    block_ranks,
+    compare,
+    corrected,
+    ranked,
+    ranks,
+    samples_of,
+)
+from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, usual
 from smc_mujoco.common.errors import ScenarioError, number, unknown, whole
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
@@ -48,16 +64,18 @@ from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
 from smc_mujoco.simulation.grid import case, check_moving, crossed, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
-from smc_mujoco.studies.advice import NEEDS, Advice, Choice, ties
+from smc_mujoco.studies.advice import NEEDS, ROBUST, Advice, Choice, ties
 from smc_mujoco.studies.fair_gains import Candidate, fair_gains
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
+from smc_mujoco.studies.worst_case import DURATION, WorstCase, default_budget, kept
 
 USUAL = ("fast", "accurate", "calm")  # what is compared where nothing is asked
 CONDITIONS = ("nominal", "noise", "sine")  # where none is given
 NO_VELOCITY = "no-velocity"
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
+GLANCE = 16  # runs of an adversary in the screening, and as many random ones; chosen
 MIN_SETTLED = 0.5  # of the share of runs that settle under the law that settles in the most; chosen
 
 
@@ -90,6 +108,7 @@ def which(
     defaults: bool = False,
     relevant: float = RELEVANT,
     noise_key: int | str = DRAWN,
+    within: Uncertainty | None = None,
 ) -> Advice:
     """Advise a law for a plant: compare all laws that suit, with gains for the plant, and say how sure the answer is.
 
@@ -97,11 +116,11 @@ def which(
       plant: a name, a Plant, or your own MJCF and its joints, as "arm.xml:shoulder,elbow".
       conditions: names, texts or Conditions, see `condition`. Default: nominal, noise and sine.
       needs: what to compare: "fast", "accurate" (at the end), "on-track" (on the way), "calm", "gentle", "frugal",
-        "no-overshoot"; by default fast, accurate and calm. And what every law must have: "no-velocity", "continuous"
-        and the other names in `smc_mujoco.control.properties.PROPERTIES`.
+        "no-overshoot", "robust" (in the worst case); by default fast, accurate and calm. And what every law must have:
+        "no-velocity", "continuous" and the other names in `smc_mujoco.control.properties.PROPERTIES`.
       laws: the laws to compare, by name or with your own gains. Default: all that suit.
       seeds: of the finals, the number of runs of a law in a condition. Default: 24.
-      duration: of a run, s. Default: 5, or 3 if quick.
+      duration: of a run, s. Default: 5, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`.
       out: folder for gains and runs. Another call takes from there what it needs again.
       quick: fewer seeds and finalists, shorter runs, a third of the evaluations of a tuning.
@@ -110,6 +129,7 @@ def which(
       defaults: whether a law may be advised over rivals whose gains are their defaults.
       relevant: the least relevant difference, as a share of the larger value, see `leaderboard`.
       noise_key: as in `compare`.
+      within: the class for the need "robust". Default: that of `worst_case`.
 
     Raises:
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
@@ -117,6 +137,7 @@ def which(
     extent, machine, folder = QUICK if quick else FULL, as_plant(plant), Path(out)
     relevant = share_that_matters(relevant)
     seeds = whole("seeds", extent.seeds if seeds is None else seeds, 1, 10_000)
+    attacked_for = DURATION if duration is None else duration
     duration = extent.duration if duration is None else number("duration", duration, above=0.0)
     compared, properties = _needs(needs, machine)
     asked = [find_condition(one) for one in _conditions(conditions, machine, duration)]
@@ -132,20 +153,30 @@ def which(
     if len(candidates) < len(found):
         raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")
 
-    def ran(names: Sequence[str], numbers: range, part: str) -> Contest:
+    within = within or usual(tried[0])
+    first = dataclasses.replace(tried[0], duration=attacked_for)
+    budget = max(GLANCE, default_budget(first, within) // (len(asked) * (3 if quick else 1)))
+
+    def attacked(name: str, part: str, runs: int) -> tuple[WorstCase, ...]:
+        cases = [case(machine, candidates[name].law, one, attacked_for, starts=starts) for one in asked]
+        files = [folder / "worst" / f"{part}-{i}-{machine.name}-{name}.json" for i in range(len(asked))]
+        return tuple(kept(file, one, within, runs, threads, progress) for file, one in zip(files, cases, strict=True))
+
+    def ran(names: Sequence[str], numbers: range, part: str, attacks: int) -> Contest:
         laws = [candidates[name] for name in names]
         runs = crossed([machine], lambda _: laws, asked, numbers, duration, starts)
         fair: dict[str, Any] = {"noise_key": noise_key, "replay": True}
         table = study(runs, folder / part, threads=threads, progress=progress, **fair)
-        return _contest(table, machine, compared, relevant)
+        worst = {name: attacked(name, part, attacks) for name in names} if ROBUST in compared else {}
+        return _contest(table, machine, compared, relevant, worst)
 
     names, others = list(candidates), []
     if len(names) > extent.finalists:
-        screening = ran(names, range(extent.screening), "screening")
+        screening = ran(names, range(extent.screening), "screening", GLANCE)
         first = {rank.law for rank in screening.order[: extent.finalists]} | set(screening.specialists)
         others = [rank.law for rank in screening.order if rank.law not in first]
         names = [name for name in names if name in first]
-    finals = ran(names, range(extent.screening, extent.screening + seeds), "finals")
+    finals = ran(names, range(extent.screening, extent.screening + seeds), "finals", budget)
     return Advice(
         plant=machine,
         conditions=tuple(one.name for one in asked),
@@ -234,7 +265,8 @@ class Contest(NamedTuple):
     """Runs of laws and what follows from them.
 
     `comparison`: of the laws that are fit, or of all if none is. `order`: all laws, best first; those that are not fit
-    come last and have NaN for a rank. `specialists`: the law with the best mean rank on each need.
+    come last and have NaN for a rank. `specialists`: the law with the best mean rank on each need. `worst`: law -> what
+    an adversary found in each condition, if that is asked.
     """
 
     table: Table
@@ -242,14 +274,21 @@ class Contest(NamedTuple):
     order: list[Rank]
     fit: set[str]
     specialists: list[str]
+    worst: Mapping[str, tuple[WorstCase, ...]]
 
 
-def _contest(table: Table, plant: Plant, needs: Sequence[str], relevant: float) -> Contest:
+def _contest(
+    table: Table, plant: Plant, needs: Sequence[str], relevant: float, worst: Mapping[str, tuple[WorstCase, ...]]
+) -> Contest:
     """Compare laws over all needs and conditions."""
     (group,) = paired_runs.groups(table, by=("plant",))
     fit, ran = _fit(group, table), paired_runs.scenarios(table, group)
     parts, floors = [], []
     for need in needs:
+        if need == ROBUST:
+            parts.append(_of_adversary(group, worst, 1 if len(needs) == 1 else group.rows.shape[2]))
+            floors += [paired_runs.floor(scenario, NEEDS[need].unit) for scenario in ran]
+            continue
         scores = group.scores(paired_runs.values(table, NEEDS[need].name))
         if not scores.blocks:
             raise ScenarioError(f"need {need!r} has no number in any run on {plant.name}: leave it out")
@@ -259,13 +298,36 @@ def _contest(table: Table, plant: Plant, needs: Sequence[str], relevant: float) 
     joint = ({law: np.concatenate([part[i][law] for part in parts]) for law in laws} for i in range(3))
     values, outcomes, sets = joint
     comparison = compare(values, floors, outcomes=outcomes, sets=sets, relevant=relevant)
+    if worst:
+        comparison = _untested(comparison, np.repeat([need == ROBUST for need in needs], len(group.blocks)))
     by_need = np.split(block_ranks(comparison), len(needs), axis=1)
     specialists = [comparison.laws[int(own.mean(axis=1).argmin())] for own in by_need]
     nan = math.nan
     unfit = [Rank(law, nan, nan, best=False) for law in group.laws if law not in laws]
     return Contest(
-        table, comparison, [*_order(comparison, _restraint(group, ran, table, plant)), *unfit], fit, specialists
+        table, comparison, [*_order(comparison, _restraint(group, ran, table, plant)), *unfit], fit, specialists, worst
     )
+
+
+def _of_adversary(
+    group: paired_runs.Group, worst: Mapping[str, tuple[WorstCase, ...]], columns: int
+) -> tuple[dict[str, np.ndarray], ...]:
+    """Return scores, outcomes and sets of laws, (conditions, columns) each, with what was found in the first column."""
+    shape = len(group.blocks), columns
+    scores = {law: np.full(shape, math.nan) for law in group.laws}
+    for law, cells in scores.items():
+        cells[:, 0] = [one.value for one in worst[law]]
+    nothing = dict.fromkeys(group.laws, np.zeros(shape, np.int64))
+    return scores, nothing, nothing
+
+
+def _untested(comparison: Comparison, found: np.ndarray) -> Comparison:
+    """Return the comparison where a law is better without a test in the blocks of what an adversary `found`."""
+    p = comparison.p.copy()
+    p[found] = np.where(comparison.differences[found][..., 0] > comparison.shifts[found], 0.0, 1.0)
+    tested = dataclasses.replace(comparison, p=p[~found])
+    limits = Limits(0.0, 0.0) if found.all() else corrected([tested], comparison.level)
+    return dataclasses.replace(comparison, p=p, limits=limits)
 
 
 def _restraint(group: paired_runs.Group, ran: Sequence, table: Table, plant: Plant) -> dict[str, tuple[float, ...]]:
@@ -312,8 +374,11 @@ def _choices(finals: Contest, candidates: Mapping[str, Candidate], needs: Sequen
     """Return the finalists with all that is said of them, best first."""
     (group,) = paired_runs.groups(finals.table, by=("plant",))
     settled, choices = _settled(group, finals.table), []
-    scores = {need: group.scores(paired_runs.values(finals.table, NEEDS[need].name)) for need in needs}
+    by_runs = [need for need in needs if need != ROBUST]
+    scores = {need: group.scores(paired_runs.values(finals.table, NEEDS[need].name)) for need in by_runs}
     for rank in finals.order:
+        worst = finals.worst.get(rank.law, ())
+        medians = {ROBUST: Interval(max(one.value for one in worst), math.nan, math.nan, 1)} if worst else {}
         choice = Choice(
             law=candidates[rank.law].law,
             remark=candidates[rank.law].remark,
@@ -321,10 +386,12 @@ def _choices(finals: Contest, candidates: Mapping[str, Candidate], needs: Sequen
             settles=float(settled[group.laws.index(rank.law)].mean()),
             reliable=bool((settled[group.laws.index(rank.law)] >= RELIABLE).all()),
             fit=rank.law in finals.fit,
-            medians={
+            medians=medians
+            | {
                 need: median_of(own.values[rank.law], samples=samples_of(own.sets[rank.law]))
                 for need, own in scores.items()
             },
+            worst=worst,
         )
         choices.append(choice)
     return tuple(choices)

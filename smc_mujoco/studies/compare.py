@@ -46,7 +46,7 @@ from smc_mujoco.studies.leaderboard import METRICS, Boards, leaderboard
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, study
 from smc_mujoco.studies.table import Table
-from smc_mujoco.studies.worst_case import WorstCase, kept
+from smc_mujoco.studies.worst_case import DURATION, WorstCase, kept
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
@@ -252,7 +252,7 @@ def compare(
       executor: where runs are computed, as in `study`; None for this machine.
       out: folder for gains and runs.
       metrics: names of metrics, for which lower is better, or "settles".
-      duration: of a run, s. Default: 10, or 3 if quick.
+      duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
       budget: largest number of sets of gains that a tuning tries. Default: 768, or a third of it if quick and no law
@@ -272,6 +272,7 @@ def compare(
     """
     extent = QUICK if quick else FULL
     count, relevant = whole("seeds", seeds, 1, MAX_ITEMS), share_that_matters(relevant)
+    attacked_for = DURATION if duration is None else duration
     duration = extent.duration if duration is None else checked("duration", duration, above=0.0)
     tries = search.BUDGET // (3 if quick else 1) if budget is None else whole("budget", budget, 1, MAX_ITEMS)
     where = executors.checked("local" if executor is None else executor)
@@ -301,7 +302,7 @@ def compare(
     table = study(runs, folder, not fresh, where, threads, progress, traces, noise_key, replay=True)
 
     def attacked(plant: Plant, law: Law) -> WorstCase:
-        scenario = case(plant, law, "nominal", duration, starts=starts)
+        scenario = case(plant, law, "nominal", attacked_for, starts=starts)
         within, path = None if worst is True else worst, folder / "worst" / f"{plant.name}-{law.name}.json"
         return kept(path, scenario, within or None, None, threads, progress)
 

@@ -15,7 +15,7 @@ table, over initial states and noise, and over the gains with which the laws ran
 import dataclasses
 import math
 from collections.abc import Collection, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 

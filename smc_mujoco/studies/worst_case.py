@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from smc_mujoco.draw.page import Size
 
 METRIC = "rms_error"
+DURATION = 8.0  # s, of attacked runs where none is given: the error counts from a quarter on, when laws have settled
 STEPS = 1_250_000  # physics steps of the search in the default budget, for a plant of one channel: 5 s of a core
 MIN_RUNS, MAX_RUNS = 32, 1024  # of the default budget
 MOST_RUNS = 1_000_000

@@ -103,6 +103,35 @@ def test_the_answer_says_what_why_and_how_sure(advice):
     assert f"ahead with {effect.ahead} of 16 runs" in sure
 
 
+def test_robust_goes_by_the_worst_found_and_tells_the_median_too(folder, monkeypatch):
+    monkeypatch.setattr(adviser, "GLANCE", 9)
+    monkeypatch.setattr(adviser, "default_budget", lambda scenario, within: 9)
+    options = {"laws": ["classical", FAST, SLOW], "within": smc.Uncertainty(disturbance=2.0), "out": folder}
+    made = smc.which("duffing", needs="robust", conditions="nominal", duration=2.5, seeds=6, **options)
+    alone = {
+        one.law.name: smc.worst_case(
+            smc.Scenario(plant="duffing", law=one.law, duration=2.5), within=options["within"], budget=9
+        )
+        for one in made.choices
+    }
+    assert [one.law.name for one in made.choices] == sorted(alone, key=lambda law: alone[law].value)
+    assert [one.worst_found.value for one in made.choices] == [alone[one.law.name].value for one in made.choices]
+    first, second, third = (one.law.name for one in made.choices)
+    assert made.wins(first, second) == made.wins(second, third) == [("robust", "nominal")]
+    assert made.wins(third, second) == made.wins(second, first) == []
+    said = text(made)
+    assert f"Robust: worst found rms error {alone[first].words}; no finalist is better." in said
+    assert "worst found in 18 runs of each law in each condition, half of them random, within |d| <= 2 N" in said
+    slow = alone["slow"]
+    assert slow.median < alone[first].median
+    median = f"would put slow first, with {number(slow.median)} m: its worst found is {slow.words}."
+    assert f"The median of the random runs {median}" in said
+    assert made.tables[0].rows[0][3][:3] == (number(alone[first].value), f"median {number(alone[first].median)}", True)
+    both = smc.which("duffing", needs="fast,robust", conditions="nominal", duration=2.5, seeds=6, **options)
+    tested = ranking.compare({law: both.comparison.cells[i, :1] for i, law in enumerate(both.comparison.laws)})
+    assert both.comparison.limits == tested.limits  # what has no test is in no family of tests
+
+
 def with_cells(advice, restraint=None, **cells):
     """Advice on the same runs with other scores: law -> medians of fast and calm, each under nominal and noise."""
     spread = np.linspace(0.99, 1.01, 24)

@@ -169,7 +169,7 @@ def worst(
     metric: Annotated[str, typer.Option(help="The metric that is to be large; any of `smc.score`.")] = "rms_error",
     gains: options.Gains = "tuned",
     condition: options.Condition = "nominal",
-    duration: Annotated[float, typer.Option(help="Duration of the runs, s.")] = 8.0,
+    duration: Annotated[float, typer.Option(help="Duration of the runs, s; errors count from a quarter on.")] = 8.0,
     budget: Annotated[int | None, typer.Option(min=1, help="Runs of a search; default: about 10 s a law.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search.")] = 0,
     out: Annotated[

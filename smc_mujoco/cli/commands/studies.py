@@ -21,8 +21,8 @@ def which(
     needs: Annotated[
         str | None,
         typer.Option(
-            help="What to compare, as a,b: fast, accurate, on-track, calm, gentle, frugal, no-overshoot; default "
-            "fast,accurate,calm. And what the law must have: no-velocity, continuous, two-gains, finite-time, ..., "
+            help="What to compare, as a,b: fast, accurate, on-track, calm, gentle, frugal, no-overshoot, robust; "
+            "default fast,accurate,calm. And what the law must have: no-velocity, continuous, finite-time, ..., "
             "as for `smc-mujoco laws --needs`."
         ),
     ] = None,
@@ -40,6 +40,9 @@ def which(
     out: Annotated[Path, typer.Option(help="Folder for gains and runs; a later call reuses them.")] = Path("which"),
     defaults: options.Defaults = False,
     noise_key: options.NoiseKey = None,
+    disturbance: Annotated[
+        float | None, typer.Option(help="For robust: bound on |d|, N or N m; default that of `smc-mujoco worst`.")
+    ] = None,
     threads: options.Threads = None,
 ) -> None:
     """Advise a law for a plant: which to use, with which gains, why, the second choice, and how sure that is.
@@ -51,12 +54,18 @@ def which(
     corrected for all comparisons. If no law is better than another, the answer says so. If you stop the command, it
     continues when you start it again.
 
+    The need robust is not of these runs: an adversary attacks each finalist within a bound on the disturbance, and the
+    worst that it finds is compared, see `smc-mujoco worst`. The answer tells the median of random disturbances beside.
+
     Example: smc-mujoco which duffing --condition noise,coulomb --needs calm,fast
+
+    Example: smc-mujoco which duffing --condition nominal --needs robust --disturbance 2
 
     Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition "worn: sensor=Encoder(counts=4096)" --needs accurate
     """
     with held_back():
         from smc_mujoco.analysis.differences import RELEVANT
+        from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
         from smc_mujoco.studies.adviser import which as advise
 
     terminal = Terminal()
@@ -75,6 +84,7 @@ def which(
         defaults=defaults,
         relevant=RELEVANT if relevant is None else relevant,
         noise_key=options.key(noise_key),
+        within=None if disturbance is None else Uncertainty(disturbance=disturbance),
     )
     terminal.print(advice)
     runs = f"{len(advice.table)} runs of the finalists are in {printable(str(out / 'finals' / 'results.parquet'))}"
