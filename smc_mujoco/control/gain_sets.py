@@ -10,7 +10,7 @@
 - tracking: the same for the laws of LAWS, without that cost.
 - default: the law's own.
 
-`tuned_gains/` has a file for each set that was tuned. `make gains` computes them again.
+`tuned_gains/` has a file for each set. `make gains` computes those that were tuned again.
 """
 
 import dataclasses
@@ -45,49 +45,14 @@ FORMS["super_twisting_unclamped"] = "super_twisting"
 FORMS["proper_conditioned_super_twisting"] = "proper_super_twisting"  # the same law while u is not saturated
 SAME = FORMS | {"conditioned_super_twisting": "super_twisting"}  # in the set "study"
 
+
+def file(gains: str) -> Path:
+    """Return the package's file of a set."""
+    return Path(__file__).parent / "tuned_gains" / f"{gains}.json"
+
+
 # The set "study": plant -> law -> gains. Super-twisting was tuned with w_max = u_max, and runs with it.
-STUDY: dict[str, dict[str, dict[str, float]]] = {
-    "inverted_pendulum": {
-        "observer_free": {"lam": 4.364, "k1": 9.708},
-        "classical": {"k": 1.945, "c": 12.0},
-        "boundary_layer": {"k": 6.0, "c": 9.06, "phi": 2.096},
-        "adaptive": {"gamma": 104.7, "c": 12.0, "k0": 0.0},
-        "adaptive_leak": {"gamma": 20.31, "c": 12.0, "leak": 8.865, "deadzone": 0.2114, "k0": 0.0},
-        "super_twisting": {"k1": 2.489, "k2": 16.92, "c": 10.04, "w_max": 6.0},
-    },
-    "van_der_pol": {
-        "observer_free": {"lam": 6.0, "k1": 1.976},
-        "classical": {"k": 6.0, "c": 2.849},
-        "boundary_layer": {"k": 5.763, "c": 2.768, "phi": 0.01578},
-        "adaptive": {"gamma": 66.11, "c": 2.853, "k0": 0.0},
-        "adaptive_leak": {"gamma": 7.738, "c": 2.821, "leak": 0.9379, "deadzone": 0.03367, "k0": 0.0},
-        "super_twisting": {"k1": 4.567, "k2": 45.47, "c": 2.16, "w_max": 6.0},
-    },
-    "duffing": {
-        "observer_free": {"lam": 6.0, "k1": 3.076},
-        "classical": {"k": 3.91, "c": 3.576},
-        "boundary_layer": {"k": 6.0, "c": 3.975, "phi": 0.5429},
-        "adaptive": {"gamma": 600.0, "c": 4.371, "k0": 0.0},
-        "adaptive_leak": {"gamma": 13.87, "c": 4.256, "leak": 2.979, "deadzone": 0.009447, "k0": 0.0},
-        "super_twisting": {"k1": 8.073, "k2": 0.3443, "c": 4.061, "w_max": 6.0},
-    },
-    "pendulum_network": {
-        "observer_free": {"lam": 2.922, "k1": 6.19},
-        "classical": {"k": 0.9747, "c": 5.944},
-        "boundary_layer": {"k": 6.0, "c": 6.705, "phi": 2.577},
-        "adaptive": {"gamma": 1.294, "c": 6.718, "k0": 0.0},
-        "adaptive_leak": {"gamma": 24.32, "c": 9.468, "leak": 9.259, "deadzone": 0.3184, "k0": 0.0},
-        "super_twisting": {"k1": 1.87, "k2": 1.145, "c": 6.256, "w_max": 6.0},
-    },
-    "inverted_pendulum_network": {
-        "observer_free": {"lam": 3.961, "k1": 9.362},
-        "classical": {"k": 1.73, "c": 11.11},
-        "boundary_layer": {"k": 6.0, "c": 8.705, "phi": 2.328},
-        "adaptive": {"gamma": 2.189, "c": 9.408, "k0": 0.0},
-        "adaptive_leak": {"gamma": 28.47, "c": 11.36, "leak": 11.46, "deadzone": 0.153, "k0": 0.0},
-        "super_twisting": {"k1": 1.95, "k2": 1.057, "c": 9.086, "w_max": 6.0},
-    },
-}
+STUDY: dict[str, dict[str, dict[str, float]]] = read_json(file("study"))
 
 
 def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> Component:
@@ -194,11 +159,6 @@ def paper_plant(plant: object) -> str:
         f"plant is {shown(plant)}, and the paper's study has conditions and gains only for {', '.join(STUDY)}: "
         "give one of these, or give smc.study your own scenarios"
     )
-
-
-def file(gains: str) -> Path:
-    """Return the package's file of a set that was tuned."""
-    return Path(__file__).parent / "tuned_gains" / f"{gains}.json"
 
 
 def _known(plant: str, name: str, gains: str) -> TunedGains | None:
