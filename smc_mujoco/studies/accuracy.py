@@ -127,17 +127,14 @@ def load(path: str | os.PathLike) -> AccuracyTable:
 def _loaded(entry: dict[str, Any]) -> Accuracy:
     """Return the row in a file."""
     fields = _tuples(entry)
-    for name in QUANTITIES:
-        fields[name] = Scaling(**_tuples(entry[name]))
-    return Accuracy(**fields)
+    return Accuracy(**fields | {name: Scaling(**fields[name]) for name in QUANTITIES})
 
 
-def _tuples(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a mapping with tuples for lists, also for lists of lists."""
-    return {
-        name: tuple(tuple(one) if isinstance(one, list) else one for one in value) if isinstance(value, list) else value
-        for name, value in entry.items()
-    }
+def _tuples(data: Any) -> Any:
+    """Return data of a file with tuples for its lists."""
+    if isinstance(data, dict):
+        return {name: _tuples(value) for name, value in data.items()}
+    return tuple(map(_tuples, data)) if isinstance(data, list) else data
 
 
 def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:
