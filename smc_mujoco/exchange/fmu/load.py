@@ -125,7 +125,7 @@ class FmuLaw(Uncompiled):
         _end(_begun.get(address, 0))  # the instance of a run whose memory was set to 0, to begin again
         if self.once:
             self._make_room()
-        made = Slave(str(extracted(self)), names, self.outputs, self.fixed(gains), y.t)
+        made = Slave(str(extracted(self.path, self.digest)), names, self.outputs, self.fixed(gains), y.t)
         _running[place], _begun[address] = Running(self, made, y.t, [0.0, 0.0]), place
         owner: Any = memory if memory.base is None else memory.base
         weakref.finalize(owner, _end, place)
@@ -168,13 +168,9 @@ def _end(place: int) -> None:
         return
 
 
-def extracted(law: FmuLaw) -> Path:
-    """Return the folder with an FMU's extracted files. It is the same in each call."""
-    return _extracted(law.path, law.digest)
-
-
 @functools.lru_cache(maxsize=64)
-def _extracted(path: str, digest: str) -> Path:
+def extracted(path: str, digest: str) -> Path:
+    """Return the folder with an FMU's extracted files, from its path and the hash that it had."""
     try:
         found = hashlib.sha256(Path(path).read_bytes()).hexdigest()
     except OSError:
@@ -225,7 +221,8 @@ def law_from_fmu(
     """
     with extra("fmu", "smc.law_from_fmu"):
         import fmpy  # noqa: F401
-    file = _file(path)
+    with reading(path, "functional mock-up unit", "give the path of an .fmu file") as file:
+        file.open("rb").close()
     timeout = number("timeout", timeout, above=0.0, most=MAX_TIMEOUT)
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     about = _description(file, digest)
@@ -270,16 +267,9 @@ def _pace(law: FmuLaw) -> str:
 
     if law.period is not None:
         return f"{law.period:g} s"
-    about = fmpy.read_model_description(str(extracted(law)), validate=False)
+    about = fmpy.read_model_description(str(extracted(law.path, law.digest)), validate=False)
     inside = getattr(about.coSimulation, "fixedInternalStepSize", None)
     return f"every control period{f'; inside, it runs every {float(inside):g} s' if inside else ''}"
-
-
-def _file(path: str | os.PathLike[str]) -> Path:
-    """Return the path of an existing file."""
-    with reading(path, "functional mock-up unit", "give the path of an .fmu file") as file:
-        file.open("rb").close()
-        return file
 
 
 def _description(file: Path, digest: str) -> Any:
@@ -292,7 +282,7 @@ def _description(file: Path, digest: str) -> Any:
         with zipfile.ZipFile(file) as archive:
             if (wanted := "modelDescription.xml") not in archive.namelist():
                 raise ScenarioError(f"{file.name} is not an FMU, as there is no {wanted} in it: {CURE}")
-        folder = _extracted(str(file.resolve()), digest)
+        folder = extracted(str(file.resolve()), digest)
         about = fmpy.read_model_description(str(folder), validate=False)
     except ScenarioError:
         raise
@@ -432,7 +422,12 @@ def _period(about: Any) -> float | None:
 
 def _try(law: FmuLaw, gains: Iterable[float], timeout: float) -> None:
     """Try an FMU in a separate process, with these gains."""
-    order = {"folder": str(extracted(law)), "inputs": dict(law.inputs), "outputs": law.outputs, "step": law.period}
+    order = {
+        "folder": str(extracted(law.path, law.digest)),
+        "inputs": dict(law.inputs),
+        "outputs": law.outputs,
+        "step": law.period,
+    }
     try:
         tried(slave.__name__, order | {"fixed": law.fixed(gains)}, timeout)
     except Failed as failed:

@@ -141,7 +141,7 @@ def test_another_process_takes_the_law_from_the_file(folder):
     first, second = smc.run([scenario(law), scenario(copy)])
     np.testing.assert_array_equal(first.u, second.u)
     smc.export_fmu("classical", path)
-    load._extracted.cache_clear()
+    load.extracted.cache_clear()
     changed = smc.run(scenario(law))
     assert "FMU 'sent.fmu' is gone or has changed: call smc.law_from_fmu again" in str(changed.failure)
 
