@@ -20,7 +20,6 @@ import numpy as np
 
 from smc_mujoco.analysis.worst_case.search import Search
 from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, outside, usual
-from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.progress import bar
@@ -36,8 +35,6 @@ from smc_mujoco.studies.cache import cached
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
-
-    from smc_mujoco.draw.page import Size
 
 METRIC = "rms_error"
 DURATION = 8.0  # s, of attacked runs where none is given: the error counts from a quarter on, when laws have settled
@@ -118,31 +115,22 @@ class WorstCase:
         return values | rest | {"within": within, "scenario": serialise.describe(self.scenario)}
 
     def _repr_html_(self) -> str:
-        rows = sorted(self.strategies.items(), key=lambda pair: -pair[1])
-        return html.table(
-            ["strategy", f"largest {CATALOGUE[self.metric].label}" + f" ({self.unit})" * bool(self.unit)],
-            [(kind, self.shown(value)) for kind, value in rows],
-            str(self),
-            "; ".join(filter(None, [f"{self.tried} runs, half of them random", self.outside])),
-            range(1, 2),
-            len(rows),
+        unit = f" ({self.unit})" * bool(self.unit)
+        table = Tabular(
+            headings=["strategy", f"largest {CATALOGUE[self.metric].label}{unit}"],
+            rows=[(kind, self.shown(v)) for kind, v in sorted(self.strategies.items(), key=lambda pair: -pair[1])],
+            title=str(self),
+            notes=[f"{self.tried} runs, half of them random", *([self.outside] if self.outside else [])],
         )
+        return table._repr_html_()
 
-    def figure(
-        self,
-        path: str | os.PathLike | None = None,
-        title: str | None = None,
-        size: "Size" = None,
-        format: str | None = None,
-        fig: "Figure | SubFigure | None" = None,
-    ) -> "Figure | SubFigure":
+    def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
         """Draw the worst run beside the scenario as it was given; arguments as in `smc.figure`."""
         from smc_mujoco.draw.figure import figure
 
-        traces = run([self.nominal, self.scenario])
-        title = title or f"{traces[0].scenario.plant.name}: the worst of {self.class_words}"
         labels = "as given", f"worst found, {CATALOGUE[self.metric].label} {self.words}"
-        return figure(traces, path, labels, title, PANELS, size, format, fig)
+        title = f"{self.nominal.plant.name}: the worst of {self.class_words}"
+        return figure(run([self.nominal, self.scenario]), path, labels, **{"title": title, "panels": PANELS} | options)
 
     plot = figure
 
