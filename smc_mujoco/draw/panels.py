@@ -49,17 +49,14 @@ FLAT = 0.02  # of a panel's height: x that stays within it rests; chosen
 ZOOM = 1.3, 0.5  # of the time until all rest: what panels over time show, if that is less than this part of the run
 ROUNDING, DECADES = 1e-9, 20.0  # rad or m: smaller errors are drawn at it; least ratio of a logarithmic axis, chosen
 JUMP = 2.0  # a reference jumps where its rate is more than this many times the 99 % quantile; chosen
-ALIKE = {"spread": "x", "e": "x", "worst": "x", "joint": "x", "settling": "x", "largest": "u", "applied": "u"} | {
-    "reaction": "force", "d": "force",
-}  # quantity -> the one that has its unit  # fmt: skip
-WORDS = {
-    "force": "delivered",
-    "reaction": "reaction",
-    "spread": "max − min x",
-}  # quantity -> its words, without a letter
-KINDS = {"v": "velocity", "u": "control", "s": "sliding variable", "e": "error", "d": "disturbance"} | {
-    "applied": "control"
+ALIKE = {  # quantity -> the one that has its unit
+    **dict.fromkeys(("spread", "e", "worst", "joint", "settling"), "x"),
+    **dict.fromkeys(("largest", "applied"), "u"),
+    **dict.fromkeys(("reaction", "d"), "force"),
 }
+WORDS = {"force": "delivered", "reaction": "reaction", "spread": "max − min x"}  # quantity -> its words, no letter
+KINDS = {"v": "velocity", "u": "control", "s": "sliding variable", "e": "error", "d": "disturbance"}
+KINDS["applied"] = "control"
 OF_ARMS = {  # quantities of several joints, one number a sample -> what an axis says
     "tip": "tip off its path (mm)",
     "contact": "force of contact (N)",

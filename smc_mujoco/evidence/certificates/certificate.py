@@ -223,7 +223,7 @@ class Certificate:
     @property
     def surface(self) -> float:
         """The slope c of the law's surface s = v + c x, 1/s."""
-        return loops.slope(self.data)
+        return loops.loop_of(self.data)[0].c
 
     def _part(self, theorem: str, holding: bool = False) -> Mapping[str, Any] | None:
         return next(

@@ -62,11 +62,6 @@ def loop_of(data: Mapping[str, Any]) -> tuple[Loop, list[float], SimpleNamespace
     return _loop(M, terms, law, data["u_max"], data["disturbance"]), terms, law
 
 
-def slope(data: Mapping[str, Any]) -> float:
-    """Return c of the surface s = v + c x, 1/s."""
-    return loop_of(data)[0].c
-
-
 def energy(data: Mapping[str, Any], x: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return V of "saturated PD" at states of one pendulum or cart: M v^2 / 2 + int_0^x (sigma(c y) - phi(y)) dy."""
     loop, _, _ = loop_of(data)

@@ -412,13 +412,11 @@ class Rig:
         """
         if min(fit.values()) >= 100.0 - FAR_BETTER or "rad" not in self.scenario("none").plant.units:
             return
-        references = (self.columns.reference, *self.columns.others)
-        each = [
-            tuple(name for name in (x, *references[i : i + 1]) if name in record) for i, x in enumerate(self.columns.x)
-        ]
-        references = tuple(name for name in (self.columns.reference, *self.columns.others) if name in record)
-        sets = (self.columns.angles, *((name,) for name in (*self.columns.x, *references)), *each, references)
-        suspects = [names for names in dict.fromkeys(sets) if names]
+        joints, references = self.columns.x, (self.columns.reference, *self.columns.others)
+        each = [(x, *references[i : i + 1]) for i, x in enumerate(joints)]
+        sets = (self.columns.angles, *((name,) for name in (*joints, *references)), *each, references)
+        there = [tuple(name for name in names if name in record) for names in sets]
+        suspects = [names for names in dict.fromkeys(there) if names]
         others = self.fits([records.in_radians(record, self.columns, names) for names in suspects])
         best = max(range(len(suspects)), key=lambda i: min(others[i].values()))
         if min(others[best].values()) > max(FAR_BETTER, min(fit.values()) + FAR_BETTER):
