@@ -84,12 +84,17 @@ class AccuracyTable(Tables, list[Accuracy]):
     """Accuracies of laws, for each plant and condition the most accurate law first. They are shown as tables."""
 
     @property
+    def groups(self) -> dict[str, list[Accuracy]]:
+        """The rows of each plant and condition, by both names."""
+        found: dict[str, list[Accuracy]] = {}
+        for row in self:
+            found.setdefault(f"{row.plant}, {row.condition}", []).append(row)
+        return found
+
+    @property
     def tables(self) -> list[Tabular]:
         """A table for each plant and condition, with remarks on its laws."""
-        groups: dict[str, list[Accuracy]] = {}
-        for row in self:
-            groups.setdefault(f"{row.plant}, {row.condition}: |e| in {row.unit}", []).append(row)
-        made = [_table(title, rows) for title, rows in groups.items()]
+        made = [_table(f"{title}: |e| in {rows[0].unit}", rows) for title, rows in self.groups.items()]
         return [*made[:-1], *(dataclasses.replace(one, notes=[*one.notes, KEY]) for one in made[-1:])]
 
     def to_pandas(self) -> "pandas.DataFrame":

@@ -176,7 +176,7 @@ def accuracies(found: "AccuracyTable") -> Figure:
     layout: dict[str, Any] = {"annotations": []}
     laws: set[str] = set()
     for panel, (title, rows) in zip(grid, groups.items(), strict=True):
-        layout["annotations"].append(panel.title(f"{words.pretty(title.partition(':')[0])}, {rows[0].unit}"))
+        layout["annotations"].append(panel.title(f"{words.pretty(title)}, {rows[0].unit}"))
         for row in rows:
             data += [trace | panel.trace for trace in _accuracy(row, row.law not in laws)]
             laws.add(row.law)

@@ -41,4 +41,4 @@ def sentences(table: AccuracyTable) -> Iterator[str]:
     for title, rows in table.groups.items():
         promised = [row.s for row in rows if row.s.theory is not None]
         kept = sum(one.as_promised for one in promised)
-        yield f"{title.partition(':')[0]}: {kept} of {len(promised)} laws have the order of s that theory promises."
+        yield f"{title}: {kept} of {len(promised)} laws have the order of s that theory promises."
