@@ -25,8 +25,6 @@ from smc_mujoco.studies import run_key
 from smc_mujoco.studies.leaderboard import METRICS, Board, Boards, leaderboard
 from smc_mujoco.studies.study import study as run_study
 
-pytestmark = pytest.mark.quick
-
 INF = math.inf
 FEW = 199  # resamples
 
