@@ -2,14 +2,11 @@
 
 import io
 
-import pytest
 from rich.console import Console
 
 import smc_mujoco as smc
 from smc_mujoco.cli import tables
 from smc_mujoco.draw.film import arrows, caption
-
-pytestmark = pytest.mark.quick
 
 VOLTS = smc.run(
     smc.Scenario(
