@@ -47,8 +47,8 @@ def writable(path: str | os.PathLike[str]) -> None:
     path = Path(path)
     if os.path.isdir(path):  # unlike Path.is_dir, False also for a name that is too long
         raise ScenarioError(f"cannot write {path}: it is a folder, give the file in it a name")
-    with _writing(path), tempfile.TemporaryFile(dir=path.parent):
-        pass
+    with _writing(path), tempfile.TemporaryFile(dir=path.parent), contextlib.suppress(FileNotFoundError):
+        _part(path).lstat()  # raises for a name that is too long
 
 
 @contextlib.contextmanager
@@ -206,6 +206,11 @@ def read_json(path: Path) -> Any:
     return from_json(path.read_text(encoding="utf-8"))
 
 
+def _part(path: Path) -> Path:
+    """Return the name of a new file beside `path`."""
+    return path.with_name(f".{path.stem}.{uuid.uuid4().hex}{path.suffix}")
+
+
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary file beside `path`. It replaces `path` if the block succeeds, and is deleted otherwise.
@@ -213,7 +218,7 @@ def replacing(path: Path) -> Iterator[Path]:
     Raises:
       ScenarioError: the folder cannot be made or written.
     """
-    part = path.with_name(f".{path.stem}.{uuid.uuid4().hex}{path.suffix}")
+    part = _part(path)
     with _writing(path):
         part.touch(exist_ok=False)
         try:

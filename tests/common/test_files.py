@@ -7,6 +7,8 @@ import math
 import os
 import tempfile
 import zipfile
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,11 +27,14 @@ from smc_mujoco.analysis.region_of_attraction import Basin
 from smc_mujoco.analysis.region_of_attraction import load as load_map
 from smc_mujoco.analysis.tuning import result
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.common.files import from_json, plain, reading, replacing, to_json
+from smc_mujoco.common.files import from_json, plain, reading, replacing, to_json, writable
 from smc_mujoco.evidence.audit.audit import document
+from smc_mujoco.evidence.audit.paper import new
 from smc_mujoco.evidence.audit.verdict import Claim
+from smc_mujoco.evidence.report import rigs
 from smc_mujoco.evidence.rigs import records
 from smc_mujoco.simulation import serialise
+from smc_mujoco.studies import scene
 from smc_mujoco.studies.cache import cached
 from smc_mujoco.testing import golden
 
@@ -178,6 +183,15 @@ def test_what_is_no_regular_file_is_not_opened(ending, tmp_path):
                 load(path)
         with pytest.raises(smc.ScenarioError, match=r"File name too long|no .* at"):
             load(tmp_path / f"{'a' * 300}{ending}")
+
+
+@pytest.mark.parametrize("name", ["é" * 300, "a\0b", "x/" * 3000], ids=["long", "nul", "deep"])
+def test_a_name_that_no_file_can_have_is_one_sentence(name):
+    calls: list[Callable[[str], object]] = [smc.audit, writable, scene.find, lambda name: rigs.read(Path(name))]
+    calls += [lambda name: smc.law_from_c(f"{name}.c"), lambda name: smc.live("duffing", out=name)]
+    for call in (*calls, lambda name: new(Path(name))):
+        with pytest.raises(smc.ScenarioError):
+            call(name)
 
 
 def test_an_archive_that_unpacks_to_too_much_is_refused_before(tmp_path):
