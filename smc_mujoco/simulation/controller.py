@@ -17,7 +17,7 @@ exception, is marked in its record and gets no more control. The other simulatio
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 from numba import njit
 
@@ -34,22 +34,12 @@ LAST_STAGE = 1.0 - 1e-8  # of a step: where RK4's last stage evaluates signals, 
 MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 
 
-class Arrays(NamedTuple):
-    """Arrays of one mjData, as pointers to their numbers."""
-
-    qpos: object
-    qvel: object
-    ctrl: object
-    xfrc_applied: object
-    qfrc_applied: object
-    sensordata: object
-    xipos: object
-    xanchor: object
-    xaxis: object
-    actuator_force: object
-    qfrc_constraint: object
-    qfrc_bias: object
-    qfrc_spring: object
+# Arrays of one mjData, as pointers to their numbers.
+Arrays = namedtuple(
+    "Arrays",
+    """qpos qvel ctrl xfrc_applied qfrc_applied sensordata xipos xanchor xaxis actuator_force qfrc_constraint qfrc_bias
+    qfrc_spring""",
+)
 
 
 @njit(error_model="numpy")

@@ -7,12 +7,14 @@ refused instead of being read wrongly.
 
 import ctypes
 import functools
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 import mujoco
 from mujoco.introspect import ast_nodes, structs
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.simulation.controller import Arrays
 
 SCALARS = {
     "mjtNum": ctypes.c_double,
@@ -36,24 +38,8 @@ class LayoutError(ScenarioError):
         super().__init__(f"mujoco {mujoco.__version__} {problem}: install mujoco 3.17")
 
 
-class Offsets(NamedTuple):
-    """Bytes from the start of mjModel to nuserdata, and from the start of mjData to the other fields, all pointers."""
-
-    nuserdata: int
-    qpos: int
-    qvel: int
-    ctrl: int
-    qfrc_applied: int
-    xfrc_applied: int
-    userdata: int
-    sensordata: int
-    xipos: int
-    xanchor: int
-    xaxis: int
-    qfrc_bias: int
-    qfrc_spring: int
-    actuator_force: int
-    qfrc_constraint: int
+# Bytes from the start of mjModel to nuserdata, and from the start of mjData to the other fields, all pointers.
+Offsets = namedtuple("Offsets", ("nuserdata", "userdata", *Arrays._fields))
 
 
 def _ctype(node: object) -> Any:
