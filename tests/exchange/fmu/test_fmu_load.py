@@ -344,10 +344,10 @@ def test_an_fmu_that_cannot_be_a_law_is_one_sentence(foreign, tmp_path, pair, sa
 
 def test_an_fmu_that_unpacks_to_too_much_is_refused_before(foreign, tmp_path):
     bomb = shutil.copy(foreign, tmp_path / "bomb.fmu")
-    with zipfile.ZipFile(bomb, "a", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(bomb, "a", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for i in range(6):
             archive.writestr(f"zeros{i}", bytes(100_000_000))
-    with pytest.raises(smc.ScenarioError, match=r"bomb.fmu is .*\(it unpacks from 1 MB to .* files of 600 MB in all"):
+    with pytest.raises(smc.ScenarioError, match=r"bomb.fmu is .*\(it unpacks from \d MB to .* files of 600 MB in all"):
         smc.law_from_fmu(bomb, constants={"mode": 0.0})
 
 

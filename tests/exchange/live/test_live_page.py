@@ -390,6 +390,7 @@ def test_it_fits_a_phone(seen, page, scheme):
     page.emulate_media(color_scheme="light")
 
 
+@pytest.mark.slow
 def test_the_page_of_three_plants_is_small(folder):
     sizes = {path.name: len(gzip.compress(path.read_bytes(), 6)) for path in folder.rglob("*") if path.is_file()}
     assert 1e6 < sum(sizes.values()) < MOST
