@@ -72,12 +72,17 @@ def _versions() -> dict[str, str]:
     return packages | {"arithmetic": arithmetic()}
 
 
+OPTIONAL = frozenset(  # fields that the description of an ideal run may lack
+    ("friction", "contact", "actuator", "sensor", "mechanism", "model", "surface", "feedforward", "noise_key")
+)
+
+
 def restore(data: dict) -> Scenario:
     """Return the scenario that `describe` wrote. A law or signal that is not installed here loses its code.
 
     Recorded scenarios skip validation rules added after they were recorded.
     """
-    fields = {name: data[name] for name in Scenario.fields() if name in data}  # an ideal run's file may lack parts
+    fields = {name: data[name] for name in Scenario.fields() if name in data or name not in OPTIONAL}
     fields |= {name: restored(fields[name]) for name, restored in RESTORED.items() if fields.get(name)}
     fields["law"] = component.law(data["law"], data.get("source"))
     exact = Scenario.recorded(**fields)
