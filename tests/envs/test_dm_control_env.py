@@ -9,7 +9,6 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-import wild
 from dm_env import StepType, test_utils
 from helpers.episodes import (
     EVERY,
@@ -352,10 +351,6 @@ def test_bad_input_is_one_sentence():
         (lambda: suite.load("duffing").task.setting.command(["left"]), "action is \\['left'\\]"),
         (lambda: suite.load("duffing").task.setting.command([[0.0], [0.0, 1.0]]), "of shape \\(1,\\)"),
         (lambda: smc.agent("classical", 3), "environment is 3: give one of smc_mujoco.suite"),
-        (
-            lambda: smc.agent("classical", wild.Awkward()),
-            r"environment is <wild.Awkward .*: give one",
-        ),
         (lambda: smc.agent("clasical", suite.load("duffing")), "did you mean 'classical'"),
     ):
         with pytest.raises(smc.ScenarioError, match=words) as raised:
