@@ -47,7 +47,7 @@ def heading(board: Any) -> str:
     return metric.label + (f" ({unit})" if unit not in ("", "1") else "")
 
 
-def tables(boards: Iterable[Any], worst: Mapping[str, Mapping[str, Any]]) -> list[Tabular]:
+def tables(boards: Iterable[Any], worst: Mapping[str, Mapping[str, Any]] | None = None) -> list[Tabular]:
     """Return a table for each group of runs, with what each metric's board says below, and a key below the last.
 
     Args:
@@ -56,7 +56,7 @@ def tables(boards: Iterable[Any], worst: Mapping[str, Mapping[str, Any]]) -> lis
     groups: dict[str, list[Any]] = {}
     for board in boards:
         groups.setdefault(board.about, []).append(board)
-    made = [_table(name, own, worst.get(own[0].group.get("plant", ""), {})) for name, own in groups.items()]
+    made = [_table(name, own, (worst or {}).get(own[0].group.get("plant", ""), {})) for name, own in groups.items()]
     if not made:
         return [NO_BOARDS]
     words = key([board for own in groups.values() for board in own])

@@ -15,6 +15,7 @@ from smc_mujoco.evidence.audit.verdict import totals
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.scores import Place, Score
 from smc_mujoco.studies.adviser import MIN_SETTLED
+from smc_mujoco.studies.worst_case import WorstCases
 
 if TYPE_CHECKING:
     from smc_mujoco.evidence.report.stages import Findings
@@ -187,7 +188,24 @@ def pick(findings: "Findings", metric: str, plant: str = "") -> Pick | None:
     return Pick(best.law, best.median, best.wins, best.losses, best.of, others)
 
 
+def attacked(findings: "Findings") -> dict[str, WorstCases]:
+    """Return plant -> the worst cases found there, the least bad law first."""
+    plants = dict.fromkeys(one.nominal.plant.name for one in findings.worst)
+    return {plant: WorstCases(one for one in findings.worst if one.nominal.plant.name == plant) for plant in plants}
+
+
 # sentences
+
+
+def robust(found: WorstCases) -> str:
+    """Return which law is the most robust on a plant, and what the worst case says of the one with the least median."""
+    first, least = found[0], min(found, key=lambda one: one.median)
+    text = f"{words.law(first.nominal.law.name)} on {words.plant(first.nominal.plant.name)}, worst found {first.words}"
+    text += f" (median {first.shown(first.median)})"
+    if least is not first:
+        text += f"; by the median {words.law(least.nominal.law.name)} would be first with {least.shown(least.median)} "
+        text += f"{least.unit}, and its worst found is {least.words}"
+    return f"{text}."
 
 
 def verdict(findings: "Findings", metrics: Sequence[str]) -> str:

@@ -30,6 +30,8 @@ class Plan(Extent):
       quick: whether margins and claims are quick.
       relevant: the least relevant difference, see `leaderboard`.
       kinds: of margins, searched for all plants and laws.
+      attacked: plants on which an adversary searches the worst case of each law.
+      attacks: runs of its search; None for 10 s of processor time a law and plant.
       compared: those kinds that are searched under every set of gains.
       basins: plants with maps of their regions of attraction: on 2 cores a map of 1000 states takes 12 s.
       basin_laws: laws of these maps.
@@ -51,6 +53,8 @@ class Plan(Extent):
     seeds: int = GRID.seeds
     relevant: float = RELEVANT
     kinds: tuple[str, ...] = ("delay", "disturbance", "friction", "mass", "noise")
+    attacked: tuple[str, ...] = scenarios.PLANTS
+    attacks: int | None = None
     compared: tuple[str, ...] = ("disturbance",)
     basins: tuple[str, ...] = ("inverted_pendulum", "van_der_pol", "duffing")
     basin_laws: tuple[str, ...] = scenarios.LAWS
@@ -72,6 +76,8 @@ QUICK = Plan(
     **vars(QUICK_GRID),
     quick=True,
     kinds=("delay", "disturbance"),
+    attacked=("duffing",),
+    attacks=20,
     compared=(),
     basins=("inverted_pendulum",),
     points=(16, 16),

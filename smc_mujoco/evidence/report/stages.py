@@ -27,6 +27,7 @@ from smc_mujoco.evidence.report import about, films, oscillation, precision, rig
 from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.evidence.report.scores import Place, Score
 from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.grid import grid as make_grid
 from smc_mujoco.simulation.run import run
 from smc_mujoco.studies.accuracy import AccuracyTable
@@ -34,6 +35,7 @@ from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.noise_key import DRAWN, own
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
+from smc_mujoco.studies.worst_case import DURATION, WorstCase, kept
 
 FIELD_POINTS = 121  # of a map of V', along each axis
 ON_SURFACE = 1e-6  # |s| up to this is s = 0, as in the claim on V'
@@ -80,6 +82,7 @@ class Findings:
     claims: tuple[Claim, ...]
     fields: tuple[Field, ...]
     fronts: tuple[Front, ...]
+    worst: tuple[WorstCase, ...]
     margins: tuple[Margin, ...]
     by_set: Mapping[str, tuple[Margin, ...]]
     oscillations: tuple[oscillation.Oscillation, ...]
@@ -112,7 +115,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
     repeated = rigs.repeated(work, records)  # first, as bad files are refused
     table = grid(work)
     claims = judged_claims(work, table)
-    margins = all_margins(work)
+    worst, margins = worst_cases(work), all_margins(work)
     by_set, basins, scenes = margins_by_set(work, margins), all_basins(work), all_scenes(work)
     machines = rigs.machines(work)
     oscillations = oscillation.oscillations(work)
@@ -125,6 +128,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
             claims=claims,
             fields=fields(plan),
             fronts=fronts(plan),
+            worst=worst,
             margins=margins,
             by_set=by_set,
             oscillations=oscillations,
@@ -160,6 +164,18 @@ def judged_claims(work: Work, table: Table) -> tuple[Claim, ...]:
             lambda claims, path: write_json(path, [dataclasses.asdict(claim) for claim in claims]),
             lambda path: tuple(Claim(**entry) for entry in read_json(path)),
         )
+
+
+def worst_cases(work: Work) -> tuple[WorstCase, ...]:
+    """Return the worst case that is found of each law, within the class that is usual on its plant."""
+    plan = work.plan
+
+    def compute(pair: tuple[str, str], report: Report) -> WorstCase:
+        plant, law = pair
+        scenario = case(plant, law, "nominal", DURATION, GAINS)
+        return kept(work.folder / f"worst-{plant}-{law}.json", scenario, None, plan.attacks, work.threads)
+
+    return tuple(work.each("worst", "searches", [(p, law) for p in plan.attacked for law in plan.laws], compute))
 
 
 def all_margins(work: Work) -> tuple[Margin, ...]:

@@ -37,6 +37,7 @@ TINY = dataclasses.replace(
     seeds=2,
     duration=0.3,
     kinds=("delay",),
+    attacks=2,
     compared=("delay",),
     basins=("duffing",),
     basin_laws=("observer_free", "classical"),
@@ -441,6 +442,20 @@ def test_a_law_that_seldom_settles_is_not_one_to_take(findings):
     assert picked(findings, calm, other, settling("idle", 0.39), settling("pid", 0.8)).law == "pid"
     calm = place("idle", wins=1)
     assert picked(findings, calm, other, settling("idle", 0.41), settling("pid", 0.8)).law == "idle"
+
+
+def test_the_first_screen_tells_the_worst_found_beside_the_median(text, findings):
+    (found,) = answer.attacked(findings).values()
+    assert {one.nominal.law.name for one in found} == set(TINY.laws)
+    first, *_, last = found
+    assert first.value < last.value
+    said = answer.robust(found)
+    assert said.startswith(f"{words.law(first.nominal.law.name)} on Duffing, worst found {first.words} (median ")
+    screen = text[text.index('class="answer"') : text.index('class="picks"')]
+    assert said in screen
+    rows = text[text.index('id="worst-cases"') :]
+    for one in found:
+        assert f'data-v="{one.value}">{one.shown(one.value)}</td><td class="number" data-v="{one.median}">' in rows
 
 
 def test_the_first_screen_says_for_each_plant_and_need_what_to_use(text, findings):
