@@ -217,19 +217,18 @@ def test_a_push_gives_its_impulse_to_its_body():
         smc.Scenario(plant=plant, law="none", disturbance=smc.Push("bub"))
 
 
-@pytest.mark.parametrize(
-    ("law", "said"),
-    [
+def test_a_failing_law_ends_its_own_run_with_the_reason():
+    reasons = [
         (short, "instead of two vectors u, s of 2 numbers each, at t = 0 s"),
         (late, "law 'late' returned u = nan, s = 0.5"),
         (beyond, "law 'beyond' raised IndexError"),
         (tipped, "law 'tipped' raised ValueError (there is no tip, or the law has no model: give the plant a tip"),
-    ],
-)
-def test_a_failing_law_ends_its_own_run_with_the_reason(law, said):
+    ]
     common = {"plant": "double_pendulum", "duration": 0.03}
-    failed, other = smc.run([smc.Scenario(law=law, **common), smc.Scenario(law="classical", **common)])
-    assert said in str(failed.failure)
+    laws = [law for law, _ in reasons]
+    *failed, other = smc.run([smc.Scenario(law=law, **common) for law in (*laws, "classical")])
+    for trace, (_, said) in zip(failed, reasons, strict=True):
+        assert said in str(trace.failure)
     assert other.failure is None
 
 

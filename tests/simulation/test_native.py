@@ -121,6 +121,7 @@ import sys
 
 import numba
 import smc_mujoco as smc
+from smc_mujoco.simulation import native
 
 gains = {"k": 3.0}
 
@@ -143,7 +144,7 @@ if __name__ == "__main__":
     import pair
 
     numba.config.CACHE_DIR = sys.argv[1]
-    smc.run(scenario(getattr(pair, sys.argv[2])))
+    native.component(getattr(pair, sys.argv[2])())
 """
 
 
