@@ -261,12 +261,13 @@ class Long(KeyboardInterrupt):
 
 @contextlib.contextmanager
 def alarm(seconds: float) -> Iterator[None]:
-    """Raise Long in what takes longer, again and again."""
+    """Raise Long in what takes longer, again and again, where Ctrl-C would stop it."""
 
     def ring(*_: object) -> None:
         raise Long
 
-    signal.signal(signal.SIGALRM, ring)
+    signal.signal(signal.SIGINT, ring)
+    signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
     signal.setitimer(signal.ITIMER_REAL, seconds, 1.0)
     try:
         yield

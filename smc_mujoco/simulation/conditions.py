@@ -108,7 +108,10 @@ class Condition:
         """Return the text that `parse` reads, or the name alone for a condition of the suite."""
         if self.name in NAMED or callable(self.fields):
             return self.name
-        texts = [f"{name}={_text(value)}" for name, value in self.fields.items()]
+        try:
+            texts = [f"{name}={_text(value)}" for name, value in self.fields.items()]
+        except Exception:  # from the repr of a value that no scenario takes; an error tells of it
+            texts = [f"{name}={shown(value)}" for name, value in self.fields.items()]
         return f"{self.name}: {', '.join(texts)}"
 
 
