@@ -126,6 +126,7 @@ def test_every_plant_of_the_study_has_its_equation_here():
 @pytest.mark.parametrize("law", sorted(SMOOTH))
 def test_seconds_of_the_closed_loop_follow_the_equation(plant, law):
     scenario, states = long(plant)[law]
+    assert scenario.jump is not None
     assert scenario.jump.time == scenario.duration / 2
     assert (scenario.resolved.physics_step, scenario.resolved.integrator) == (1e-3, "RK4")
     x, v = error(smc.run(scenario), states)

@@ -17,7 +17,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.metrics import catalogue as m
 from smc_mujoco.metrics import limit_cycle
-from smc_mujoco.metrics.conventions import scale
+from smc_mujoco.metrics.conventions import scale, turns
 from smc_mujoco.simulation.trace import Trace
 
 pytestmark = pytest.mark.quick
@@ -445,6 +445,11 @@ def test_small_teeth_on_a_cycle_are_no_reversals_and_large_ones_are():
     slow, teeth = np.cos(2 * np.pi * t), np.where(np.arange(t.size) % 2, 1.0, -1.0)
     assert m.reversal_rate(run(t, slow + 0.2 * teeth)) == m.reversal_rate(run(t, slow))
     assert m.reversal_rate(run(t, teeth)) == pytest.approx(1000.0, abs=1.0)
+
+
+def test_a_way_back_that_ends_the_run_is_a_reversal():
+    assert turns(np.array([0.0, 1.0, 0.5, 0.2]), 0.0) == 1
+    assert turns(np.array([0.0, 0.3, 1.0]), 0.0) == 0
 
 
 def test_what_creeps_or_decays_does_not_hunt():
