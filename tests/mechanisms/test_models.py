@@ -92,12 +92,12 @@ def test_the_model_obeys_its_equation_with_its_own_and_with_other_parameters(nam
     rng = np.random.default_rng(1)
     p = sized(name, n)
     assert worst_error(p, p.load(), rng) < 1e-9
-    for _ in range(2):
-        other = changed(name, n, rng)
+    others = [changed(name, n, rng) for _ in range(2)]
+    for other in others:
         assert worst_error(other, other.load(), rng) < 1e-9
     model = p.load()  # a jump writes fields into a running simulation: nothing else may need refreshing
-    write(model, other.fields(model, other.values({})))
-    assert worst_error(other, model, rng) < 1e-9
+    write(model, others[0].fields(model, others[0].values({})))
+    assert worst_error(others[0], model, rng) < 1e-9
 
 
 def test_a_long_chain_obeys_its_equation():

@@ -54,6 +54,20 @@ def test_callback_equals_plain_loop_in_every_condition_of_the_study():
         assert_same(trace, reference.run(scenario))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("plant", smc.paper.GAINS)
+def test_callback_equals_plain_loop_under_every_law_of_the_study_in_every_condition(plant):
+    """The whole product, of which the test above has a part."""
+    scenarios = [
+        shortened(smc.paper.scenario(plant, law, condition, seed=7), 0.05)
+        for law in STUDIED
+        for condition in smc.paper.CONDITIONS
+    ]
+    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
+        assert trace.failure is None
+        assert_same(trace, reference.run(scenario))
+
+
 def test_callback_equals_plain_loop_under_every_law():
     """To rounding, as compiled powers and compiled models may differ from Python's by one."""
     ways = itertools.cycle(itertools.product(("none", "nominal"), ("measured", "levant")))
@@ -61,8 +75,26 @@ def test_callback_equals_plain_loop_under_every_law():
     for i, law in enumerate(smc.laws()):
         plants = [name for name in smc.plants() if law in smc.laws(name)]
         model, velocity = next(ways)
-        common = {"duration": 0.03, "noise": smc.Noise(0.01, 0.05), "model": model, "velocity": velocity}
-        scenarios.append(smc.Scenario(plant=plants[i % len(plants)], law=law, **common))
+        scenarios.append(noisy(plants[i % len(plants)], law, model, velocity))
+    assert_close(scenarios)
+
+
+@pytest.mark.slow
+@PLANTS
+def test_callback_equals_plain_loop_under_every_law_of_a_plant(plant):
+    """The whole product, of which the test above has a part."""
+    ways = itertools.product(smc.laws(plant), ("none", "nominal"), ("measured", "levant"))
+    assert_close([noisy(plant, *way) for way in ways])
+
+
+def noisy(plant, law, model, velocity):
+    """A short run of a law under noise."""
+    common = {"duration": 0.03, "noise": smc.Noise(0.01, 0.05)}
+    return smc.Scenario(plant=plant, law=law, model=model, velocity=velocity, **common)
+
+
+def assert_close(scenarios):
+    """Compare runs of the callback with those of the plain loop, to rounding."""
     for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
         other = reference.run(scenario)
         assert trace.failure is None
