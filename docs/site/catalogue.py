@@ -429,8 +429,11 @@ def _capital(text: str, plant: Plant) -> str:
 
 def units(plant: Plant) -> list[str]:
     """Return the unit of each parameter, from the comment beside or above them in the module that has them."""
-    lines = inspect.getsource(sys.modules[(explained_by(plant) or plant).build.__module__]).splitlines()
-    at = next(i for i, line in enumerate(lines) if re.search(r"(?:^[A-Z\d_]+ = |^ +parameters=)\{", line))
+    named = explained_by(plant) or plant
+    alike = (one for one in plants().values() if one.parameters == named.parameters)  # one may have another's
+    sources = (inspect.getsource(sys.modules[one.build.__module__]).splitlines() for one in (named, *alike))
+    has = re.compile(r"(?:^[A-Z\d_]+ = |^ +parameters=)\{").search
+    lines, at = next((lines, i) for lines in sources for i, line in enumerate(lines) if has(line))
     comment = lines[at].partition("#")[2] or lines[at - 1].partition("#")[2]
     return [unit.strip() for unit in comment.split(",")]
 

@@ -134,8 +134,8 @@ def _of_annex(kind: str) -> Callable[[str], list[Law]]:
     return lambda path: [getattr(annexes.module(home, f"law {path}"), f"law_from_{kind}")(path)()]
 
 
-READERS = {".py": _of_python, ".json": _of_tuning, ".fmu": _of_annex("fmu")}  # by suffix
-READERS |= dict.fromkeys((".c", ".so"), _of_annex("c"))
+READERS = {".py": _of_python, ".json": _of_tuning}  # by suffix
+READERS |= {**dict.fromkeys((".c", ".so"), _of_annex("c")), ".fmu": _of_annex("fmu")}
 
 
 def _reader(text: str) -> Callable[[str], list[Any]] | None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import to_json
-from smc_mujoco.draw.film import replay
+from smc_mujoco.draw.film import puppet
 from smc_mujoco.draw.states import shapes
 from smc_mujoco.mechanisms.hardware.part import joint_ids, joint_names
 from smc_mujoco.simulation import model as assembly
@@ -83,7 +83,7 @@ def posed(trace: Trace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     channels = first.jnt_qposadr[joint_ids(first)]
     step = max(1, round(1.0 / (RATE * trace.scenario.control_period)))
     samples = np.flatnonzero(np.isfinite(trace.x).all(axis=1))[::step]
-    whole = replay.poses(trace, trace.t[samples]) if first.nq > len(channels) else None
+    whole = puppet.poses(trace, trace.t[samples]) if first.nq > len(channels) else None
     if whole is None:
         whole = np.tile(assembly.start(first, trace.scenario)[0], (len(samples), 1))
     whole[:, channels] = trace.x[samples]

@@ -354,7 +354,7 @@ def test_residuals_are_what_was_measured_less_what_was_predicted(tmp_path, monke
     residual_figure("A", t, measured, {"twin": predicted}, {"twin": {"x": 87.6}}, {"x": "m"}, tmp_path / "a")
     left, right = drawn[0].axes
     assert [line.get_ydata().tolist() for line in left.lines] == [[1.0, 2.0, 6.0], [2.0, 4.0, 4.0]]
-    assert right.lines[0].get_ydata().tolist() == [-1.0, -2.0, 2.0]
+    assert list(right.lines[-1].get_ydata()) == [-1.0, -2.0, 2.0]
     assert right.get_title(loc="left") == "residual, rms: twin 1.73"
     assert left.get_title(loc="left") == "fit: twin 87.6 %"
 
