@@ -13,8 +13,6 @@ from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.metrics.catalogue import steady_error
 
-pytestmark = pytest.mark.quick
-
 H = 1e-3  # s, control period
 SMALL = 1e-4  # of the plant's x0: there tanh is linear to 1e-8
 PLANTS = [smc.plant(name) for name in scenarios.PLANTS]

@@ -14,8 +14,6 @@ from helpers.runs import assert_same
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.contact import Contact
 
-pytestmark = pytest.mark.quick
-
 GRAV, STATES = 9.81, 1000
 # a, m, and alpha, rad, of the link before; d, m: Franka Emika, modified Denavit-Hartenberg parameters
 FRAMES = (

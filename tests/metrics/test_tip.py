@@ -13,8 +13,6 @@ from smc_mujoco.mechanisms.plant import Field
 from smc_mujoco.metrics import tip
 from smc_mujoco.studies import arms as tasks
 
-pytestmark = pytest.mark.quick
-
 
 @pytest.fixture(scope="module")
 def trace():
