@@ -241,7 +241,10 @@ def load(path: str | os.PathLike[str]) -> Basin:
 
 
 def _axis(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
-    axis = np.array(values, float)
+    try:
+        axis = np.array(values, float)
+    except (TypeError, ValueError, OverflowError):
+        axis = np.array(np.nan)
     if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all():
         raise ScenarioError(f"{name} is {shown(values)}: give one or more finite numbers")
     return axis

@@ -241,7 +241,7 @@ def test_too_short_a_duration_is_one_sentence_and_a_longer_one_is_mapped(early):
     assert maps.of(dataclasses.replace(short, duration=least), [0.1], [0.1], early=early).outcome.shape == (1, 1)
 
 
-@pytest.mark.parametrize("x", [[], [math.nan], [[1.0]]])
+@pytest.mark.parametrize("x", [[], [math.nan], [[1.0]], ["a"], [[1.0], 2.0]])
 def test_positions_that_are_none_are_refused(x):
     with pytest.raises(smc.ScenarioError, match="give one or more finite numbers"):
         maps.of(base("duffing", WEAK), x, [0.0])
