@@ -50,10 +50,10 @@ def figure(
 
     x, u and s are drawn until all comes to rest, |x - r| over the whole run on a logarithmic axis. Each run of a
     network has a row with a line for each channel, and there is the spread max x - min x. Each driven joint of your own
-    model has small panels of x and its reference, of the error and of u. Joints without an actuator, and channels in
-    another unit, have their own panels. Realistic mechanisms have panels of the actuator's force and of the reaction of
-    friction and contacts; diamonds show where friction holds them. The end of a failed run and the instant at which a
-    plant changes are marked. Curves that coincide are dashed in turn.
+    model has small panels of x and its reference, of u, and of the error if a reference moves. Joints without an
+    actuator, and channels in another unit, have their own panels. Realistic mechanisms have panels of the actuator's
+    force and of the reaction of friction and contacts; diamonds show where friction holds them. The end of a failed run
+    and the instant at which a plant changes are marked. Curves that coincide are dashed in turn.
 
     Args:
       traces: one or several traces.
@@ -259,7 +259,7 @@ def _level(frame: Axes, rows: Sequence[Row]) -> None:
 
 
 def _draw_small(page, cell: SubplotSpec, small, colours, changes, span: tuple[float, float]) -> None:
-    """Draw a row for each channel: x with its reference, the error, and u; `span` as of `_draw_over_time`."""
+    """Draw a row of small panels for each channel; `span` as of `_draw_over_time`."""
     rows = cell.subgridspec(len(small), max(map(len, small)))
     for i, row in enumerate(small):
         for k, panel in enumerate(row):

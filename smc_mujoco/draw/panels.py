@@ -167,9 +167,10 @@ def overview(traces: Sequence[Trace]) -> list[Panel]:
 
 
 def small(traces: Sequence[Trace], group: Group) -> list[tuple[Panel, ...]]:
-    """Return small panels for each channel of a group: x with its reference, the error and, of a driven one, u."""
+    """Return small panels for each channel of a group: x with its reference, e if a reference moves, u if driven."""
     chosen = np.linspace(0, len(group.channels) - 1, min(len(group.channels), MAX_SMALL)).round().astype(int)
-    names, rows = ("x", "e", "u") if group.driven else ("x", "e"), []
+    moving = any(np.ptp(trace.r, axis=0).any() for trace in traces)
+    names, rows = ["x", *["e"] * moving, *["u"] * group.driven], []
     for i in (group.channels[k] for k in chosen):
         one = dataclasses.replace(group, channels=(i,))
         parts = [cut(trace, one) for trace in traces]
@@ -208,7 +209,7 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
     if not plant.direct:
         return [Panel(name, *each) for each in driven for name in ("spread", "settling")]
     if plant.n == plant.driven == 2:
-        return [panel for group, _ in groups for x, _, u in small(traces, group) for panel in (x, u)]
+        return [panel for group, _ in groups for row in small(traces, group) for panel in (row[0], row[-1])]
     return [Panel(name, *each) for each in driven for name in ("settling", "largest")]
 
 

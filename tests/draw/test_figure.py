@@ -487,3 +487,13 @@ def test_small_commands_have_ticks_in_the_unit_of_their_label():
     assert ax.get_ylabel() == "u (mN)"
     place, text = next((p, t.get_text()) for p, t in zip(ax.get_yticks(), ax.get_yticklabels(), strict=True) if p > 0)
     assert float(text) == pytest.approx(1e3 * place)
+
+
+def test_small_panels_show_the_error_only_where_a_reference_moves():
+    still, moving = (
+        smc.run(smc.Scenario(plant="double_pendulum", law="none", reference=reference, duration=0.05))
+        for reference in (smc.Constant(0.1), smc.Sine(0.1, 3.0))
+    )
+    group = next(iter(style.split([still])))
+    assert {"".join(panel.quantity for panel in row) for row in panels.small([still], group)} == {"xu"}
+    assert {"".join(panel.quantity for panel in row) for row in panels.small([still, moving], group)} == {"xeu"}
