@@ -21,7 +21,7 @@ def attempt(order: Mapping[str, Any], say: Callable) -> Any:
     say("working")
     kind = order["kind"]
     if kind == "fill":
-        return len([bytearray(2**26) for _ in range(1000)])
+        return len([bytes(2**26) for _ in range(1000)])
     if kind == "write":
         with Path(order["file"]).open("wb") as file:
             file.truncate(guard.DISK + 1)

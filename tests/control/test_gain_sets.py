@@ -105,7 +105,6 @@ def test_shipped_gains_cost_what_their_record_says(gain_set, law):
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_the_first_start_of_a_shipped_search_comes_out_again():
     known = gains.tuned("duffing", "observer_free")
     (end,) = search.tune("duffing", "observer_free", 2 * search.START, known.seed).ends

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+from helpers.models import unnamed
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.fidelity import deviation
@@ -147,15 +148,7 @@ def test_a_smaller_reach_has_a_smaller_deviation(name):
 def test_everything_is_named_and_the_channels_stay_where_they_were(name, other):
     p = catalogue()[name]
     model, _ = built(p, other)
-    kinds = {
-        "geom": model.ngeom,
-        "body": model.nbody,
-        "site": model.nsite,
-        "tendon": model.ntendon,
-        "actuator": model.nu,
-    }
-    for sort, count in kinds.items():
-        assert all(getattr(model, sort)(i).name for i in range(count)), sort
+    assert unnamed(model) == []
     assert model.nv == p.n
     driven = [model.actuator(i).name for i in range(model.nu) if not model.actuator(i).name.startswith("passive:")]
     assert driven == [model.actuator(i).name for i in range(p.n)]

@@ -291,12 +291,7 @@ def test_grid_warns_of_gains_for_other_parameters():
 
 
 def test_start_is_set_by_condition_or_starts():
-    for search in (
-        smc.grid,
-        smc.margins,
-        smc.tune,
-        smc.basin,
-    ):
+    for search in (smc.grid, smc.margins, smc.tune, smc.basin):
         far = smc.condition("far", x0=1.0)
         fields = {"conditions": far} if search in (smc.grid, smc.tune) else {"condition": far}
         more = {} if search is smc.basin else {"starts": smc.starts(x0=0.5)}

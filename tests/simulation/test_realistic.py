@@ -798,12 +798,7 @@ def test_defaults_follow_the_fields_that_are_given():
 
 
 def test_every_realism_brings_its_defaults():
-    for field in (
-        "contact",
-        "mechanism",
-        "actuator",
-        "friction",
-    ):
+    for field in ("contact", "mechanism", "actuator", "friction"):
         value = {"contact": "stops", "mechanism": "springs", "actuator": smc.DCMotor(), "friction": LUGRE}[field]
         made = dataclasses.replace(scenario(), **{field: value})
         assert (made.resolved.integrator, made.resolved.physics_step) == ("implicitfast", REALISTIC_STEP)

@@ -64,23 +64,14 @@ def test_one_scenario_gives_a_trace_and_many_give_a_list_in_their_order():
 
 
 def test_any_iterable_of_scenarios_will_do():
-    for kind in (
-        list,
-        tuple,
-        iter,
-        lambda many: (s for s in many),
-    ):
+    for kind in (list, tuple, iter, lambda many: (s for s in many)):
         many = [scenario(seed=seed) for seed in range(3)]
         assert [trace.scenario for trace in smc.run(kind(many))] == many
         assert sorted(index for index, _ in smc.stream(kind(many))) == [0, 1, 2]
 
 
 def test_no_scenarios_give_no_traces():
-    for nothing in (
-        [],
-        (),
-        iter(()),
-    ):
+    for nothing in ([], (), iter(())):
         assert smc.run(nothing, progress=True) == []
 
 
@@ -105,13 +96,7 @@ def test_the_model_of_a_run_has_no_picture_to_paint():
 
 
 def test_what_is_no_scenario_is_refused():
-    for thing in (
-        None,
-        5,
-        "duffing",
-        smc.plant("duffing"),
-        {}.get,
-    ):
+    for thing in (None, 5, "duffing", smc.plant("duffing"), {}.get):
         with pytest.raises(smc.ScenarioError, match="Scenario"):
             smc.run(thing)
         with pytest.raises(smc.ScenarioError, match="Scenario"):
@@ -119,15 +104,7 @@ def test_what_is_no_scenario_is_refused():
 
 
 def test_a_bad_number_of_threads_is_refused():
-    for threads in (
-        0,
-        -1,
-        True,
-        1.5,
-        "2",
-        math.nan,
-        [2],
-    ):
+    for threads in (0, -1, True, 1.5, "2", math.nan, [2]):
         with pytest.raises(smc.ScenarioError, match="threads is"):
             smc.run([scenario()], threads=threads)
 

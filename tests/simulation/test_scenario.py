@@ -193,14 +193,7 @@ def test_a_state_of_the_wrong_length_is_refused(field):
 
 
 def test_a_state_is_one_number_or_one_a_channel():
-    for value in (
-        0.5,
-        [0.5],
-        np.array([0.5, 0.5, 0.5]),
-        (0.5,) * 3,
-        [np.float32(0.5)] * 3,
-        np.array(0.5),
-    ):
+    for value in (0.5, [0.5], np.array([0.5, 0.5, 0.5]), (0.5,) * 3, [np.float32(0.5)] * 3, np.array(0.5)):
         made = scenario(plant=smc.plant("pendulum_network", n=3), x0=value, v0=value)
         assert made.resolved.x0 == made.resolved.v0 == (0.5, 0.5, 0.5)
 

@@ -181,15 +181,8 @@ def test_a_gust_pushes_a_pendulum_by_the_cosine_of_its_angle(name, angle):
 
 def test_a_gust_turns_a_hinge_by_its_arm():
     """Against MuJoCo's own torque of a force of 1 N at the body's centre of mass, which is off all axes."""
-    for axis, force in (
-        ("x", "y"),
-        ("y", "x"),
-        ("z", "x"),
-    ):
-        for sign in (
-            1,
-            -1,
-        ):
+    for axis, force in (("x", "y"), ("y", "x"), ("z", "x")):
+        for sign in (1, -1):
             turn = " ".join(str(sign * (name == axis)) for name in "xyz")
             mjcf = f"""<mujoco><worldbody><body pos=".1 .2 .3"><joint name="q" axis="{turn}"/>
         <geom type="sphere" size=".1" pos=".2 .3 .4" mass="1"/></body></worldbody>
@@ -323,12 +316,7 @@ def test_a_time_series_has_its_values_at_its_times_and_the_slope_behind_them():
 
 
 def test_a_recorded_run_is_all_there_wherever_decimal_times_put_its_end():
-    for dt in (
-        1e-3,
-        2e-3,
-        5e-3,
-        1e-2,
-    ):
+    for dt in (1e-3, 2e-3, 5e-3, 1e-2):
         for start, count in ((3, 7), (10, 100), (0, 999), (70, 30)):
             series = TimeSeries([float(f"{i * dt:.6g}") for i in range(start, start + count)], [1.0] * count)
             on = [k for k in range(start + count + 3) if path(series, [k * dt])[0]]
@@ -347,12 +335,7 @@ def test_a_time_series_lives_as_long_as_its_scenario():
 
 
 def test_a_copy_of_a_signal_is_equal_and_runs_alike():
-    for again in (
-        copy.copy,
-        copy.deepcopy,
-        lambda s: pickle.loads(pickle.dumps(s)),
-        dataclasses.replace,
-    ):
+    for again in (copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s)), dataclasses.replace):
         for signal in EVERY:
             other = again(signal)
             assert other == signal
@@ -414,12 +397,7 @@ def test_a_user_s_series_has_parameters_beside_its_data():
 
 
 def test_data_that_compiled_code_would_misread_are_refused(monkeypatch):
-    for data in (
-        np.zeros(3),
-        np.zeros((3, 2)),
-        np.zeros((2, 3), int),
-        np.zeros((3, 2)).T,
-    ):
+    for data in (np.zeros(3), np.zeros((3, 2)), np.zeros((2, 3), int), np.zeros((3, 2)).T):
         monkeypatch.setattr(Staircase, "data", data)
         refused(lambda: native.values_of(Staircase()), "Staircase", data.shape)
 
@@ -496,13 +474,7 @@ def test_a_csv_file_that_is_not_sound_is_refused_with_its_line(file):
 
 
 def test_what_is_no_path_is_refused():
-    for wrong in (
-        None,
-        5,
-        1.5,
-        [1.0],
-        b"wind.csv",
-    ):
+    for wrong in (None, 5, 1.5, [1.0], b"wind.csv"):
         refused(lambda wrong=wrong: TimeSeries.from_csv(wrong), repr(wrong), "CSV")
 
 
@@ -524,10 +496,7 @@ def test_an_exported_trace_disturbs_another_run(tmp_path):
 
 
 def test_a_signal_survives_json():
-    for signal in (
-        *EVERY,
-        BLOW,
-    ):
+    for signal in (*EVERY, BLOW):
         made = scenario(disturbance=[signal, Constant(1.0)], reference=signal if signal in LED else LED[0])
         assert serialise.restore(json.loads(json.dumps(serialise.describe(made)))) == made
 

@@ -215,28 +215,13 @@ def test_folders_on_the_way_are_made(trace, tmp_path):
 
 
 def test_a_trace_is_saved_under_npz_only(trace, tmp_path):
-    for name in (
-        "a.csv",
-        "a.npy",
-        "a.NPZ",
-        "run.v1",
-        "a.npz.bak",
-    ):
+    for name in ("a.csv", "a.npy", "a.NPZ", "run.v1", "a.npz.bak"):
         refused(lambda name=name: trace.save(tmp_path / name), name, ".npz")
         assert names(tmp_path) == []
 
 
 def test_a_trace_is_exported_to_four_formats_only(trace, tmp_path):
-    for name in (
-        "a.npz",
-        "a.txt",
-        "a",
-        "a.CSV",
-        ".csv",
-        "csv",
-        "a.csv.gz",
-        "",
-    ):
+    for name in ("a.npz", "a.txt", "a", "a.CSV", ".csv", "csv", "a.csv.gz", ""):
         refused(lambda name=name: trace.export(tmp_path / name if name else ""), ".csv, .mat, .mcap or .parquet")
         assert names(tmp_path) == []
 
@@ -315,14 +300,7 @@ def test_a_folder_is_no_trace(tmp_path):
 
 
 def test_what_is_no_archive_is_no_trace(tmp_path):
-    for content in (
-        b"",
-        b"PK",
-        b"PK\3\4" + bytes(100),
-        b"hello",
-        bytes(1000),
-        b"\x93NUMPY",
-    ):
+    for content in (b"", b"PK", b"PK\3\4" + bytes(100), b"hello", bytes(1000), b"\x93NUMPY"):
         (tmp_path / "a.npz").write_bytes(content)
         refused(lambda: smc.load(tmp_path / "a.npz"), "a.npz")
 
@@ -343,12 +321,7 @@ def test_pickled_objects_are_not_loaded(tmp_path):
 
 
 def test_a_truncated_file_is_no_trace(trace, tmp_path):
-    for part in (
-        0.1,
-        0.5,
-        0.9,
-        0.999,
-    ):
+    for part in (0.1, 0.5, 0.9, 0.999):
         path = trace.save(tmp_path / "a.npz")
         path.write_bytes(path.read_bytes()[: int(part * path.stat().st_size)])
         refused(lambda path=path: smc.load(path), "a.npz")
@@ -457,13 +430,7 @@ def test_a_member_that_is_no_array_is_no_trace(trace, tmp_path):
 
 
 def test_a_description_that_is_no_json_is_no_trace(trace, tmp_path):
-    for about in (
-        "[" * 10**5,
-        "{",
-        "NaN",
-        "9" * 5000,
-        '"\ud800"',
-    ):
+    for about in ("[" * 10**5, "{", "NaN", "9" * 5000, '"\ud800"'):
         text = np.array(about)
         header = f"{{'descr': '{text.dtype.str}', 'fortran_order': False, 'shape': ()}}"
         path = with_member(trace, tmp_path, "about", array(header, text.tobytes()))

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.commands import assert_refused
 from helpers.compiler import needs_compiler
 from helpers.sources import strange
 from numba import njit
@@ -384,12 +385,7 @@ def test_without_a_compiler_it_is_written_all_the_same(monkeypatch):
     ],
 )
 def test_a_mistake_in_the_command_is_one_sentence(capsys, words, said):
-    with pytest.raises(SystemExit) as end:
-        cli.main(["export-c", *words])
-    printed = capsys.readouterr()
-    assert (end.value.code, printed.out) == (2, "")
-    assert printed.err.startswith(f"smc-mujoco: {said}")
-    assert len(printed.err.splitlines()) == 1
+    assert_refused(capsys, ["export-c", *words], said)
 
 
 def test_the_command_writes_the_one_law_of_a_file(tmp_path, capsys):

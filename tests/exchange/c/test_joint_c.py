@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from helpers import arms
+from helpers.commands import assert_refused
 from helpers.compiler import needs_compiler
 from helpers.runs import assert_same
 from helpers.sources import strange
@@ -303,12 +304,7 @@ def test_a_mistake_in_the_command_is_one_sentence(capsys):
         (["pid", "--joints", "3"], "law 'pid' is of one channel: leave --joints 3 out"),
         (["unit_vector", "--gains", "c=1 a"], "--gains is 'c=1 a': give names and numbers"),
     ):
-        with pytest.raises(SystemExit) as end:
-            cli.main(["export-c", *words])
-        printed = capsys.readouterr()
-        assert (end.value.code, printed.out) == (2, "")
-        assert printed.err.startswith(f"smc-mujoco: {said}")
-        assert len(printed.err.splitlines()) == 1
+        assert_refused(capsys, ["export-c", *words], said)
 
 
 REFUSED = {

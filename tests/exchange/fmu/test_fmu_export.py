@@ -14,6 +14,7 @@ import pytest
 fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', is not installed")
 
 from fmpy.validation import validate_fmu  # noqa: E402
+from helpers.commands import assert_refused  # noqa: E402
 from helpers.compiler import needs_compiler  # noqa: E402
 from helpers.fmu import Importer  # noqa: E402
 from helpers.pages import ROOT, titled  # noqa: E402
@@ -473,8 +474,4 @@ def test_a_mistake_in_the_command_is_one_sentence(capsys):
         (["super_twisting", "--gains", "k1"], "--gains is 'k1': give names and numbers"),
         (["none.py"], "no file 'none.py': give a file with a law in it"),
     ):
-        with pytest.raises(SystemExit) as end:
-            cli.main(["export-fmu", *words])
-        printed = capsys.readouterr()
-        assert (end.value.code, printed.out) == (2, "")
-        assert printed.err.startswith(f"smc-mujoco: {said}")
+        assert_refused(capsys, ["export-fmu", *words], said)

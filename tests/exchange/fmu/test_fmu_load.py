@@ -16,6 +16,7 @@ import pytest
 fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', is not installed")
 
 from helpers import fmu as helper  # noqa: E402
+from helpers.commands import assert_refused  # noqa: E402
 from helpers.compiler import needs_compiler  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
@@ -417,11 +418,7 @@ def test_the_command_ends_in_one_sentence(foreign, capsys):
         (["--constants", "mode=4"], "controller.fmu: the step from t = 0 s fails (the licence has ended)"),
         (["--constants", "mode=on"], "--constants: mode is 'on': give a number, as mode=0"),
     ):
-        with pytest.raises(SystemExit) as end:
-            cli.main(["check-fmu", str(foreign), *words])
-        printed = capsys.readouterr()
-        assert (end.value.code, printed.out) == (2, "")
-        assert printed.err.startswith(f"smc-mujoco: {said}")
+        assert_refused(capsys, ["check-fmu", str(foreign), *words], said)
 
 
 def test_a_slave_says_which_variable_it_could_not_set(foreign, tmp_path):

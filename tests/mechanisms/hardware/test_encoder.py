@@ -475,13 +475,7 @@ def test_an_encoder_may_read_once():
 
 
 def test_only_an_encoder_is_a_sensor():
-    for value in (
-        4096,
-        "encoder",
-        smc.Noise(0.1),
-        [smc.Encoder()],
-        smc.Encoder,
-    ):
+    for value in (4096, "encoder", smc.Noise(0.1), [smc.Encoder()], smc.Encoder):
         with pytest.raises(smc.ScenarioError, match=r"^sensor is .*: give smc.Encoder\(counts=...\) or None$"):
             scenario(value)
 

@@ -148,14 +148,7 @@ def test_lugre_slides_at_its_coulomb_level(name, v0):
 
 
 def test_lugre_is_the_formula_of_its_docstring():
-    for v in (
-        -2.0,
-        -0.02,
-        0.003,
-        0.0,
-        0.01,
-        1.0,
-    ):
+    for v in (-2.0, -0.02, 0.003, 0.0, 0.01, 1.0):
         model = bare("duffing", LUGRE)
         data = mujoco.MjData(model)
         data.qvel[0], data.act[0] = v, 4e-5
