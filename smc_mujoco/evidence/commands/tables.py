@@ -78,16 +78,14 @@ def print_claims(claims: Sequence[Claim], console: Console, full: bool) -> None:
 
 
 def _claims_overview(claims: Sequence[Claim]) -> Table:
-    """Return a table with a line per claim: its verdicts, and the check that decides for the last set of gains."""
+    """Return a table of claims: verdicts by set of gains, the words, and the check that decides for the last set."""
     sets = list(claims[0].verdicts) if claims else []
     shown = sets if len(sets) > 1 else []
+    words = f"claim, verdict, whose (what was read)\ndecided by, {sets[-1]} gains" if sets else "claim"
     table = Table(
-        Column("id", justify="right", style="cyan", no_wrap=True, vertical="top"),
-        Column("claim", ratio=2),
-        Column("whose, read"),
-        Column("verdict", no_wrap=True),
+        Column("id", justify="right", style="cyan", no_wrap=True),
         *(Column(name, justify="center", no_wrap=True) for name in shown),
-        Column(f"decided by, {sets[-1]} gains" if sets else "decided by", ratio=3),
+        Column(words),
         box=box.SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
         show_edge=False,
@@ -95,9 +93,9 @@ def _claims_overview(claims: Sequence[Claim]) -> Table:
     )
     for claim in claims:
         marks = [MARKS[claim.verdicts[name]] for name in shown]
-        words = Text(f" {claim.verdict}{', flips' * claim.flips}", style=COLOURS[claim.verdict])
-        decided = Text(claim.decided(sets[-1]))
-        table.add_row(claim.id, Text(claim.text), claim.source, MARKS[claim.verdict] + words, *marks, decided)
+        verdict = f"{claim.verdict}{', flips' * claim.flips}", COLOURS[claim.verdict]
+        lines = Text.assemble((claim.text, "bold"), "\n", MARKS[claim.verdict], " ", verdict, f"; {claim.source}\n")
+        table.add_row(claim.id, *marks, lines.append(claim.decided(sets[-1]), "dim"))
     return table
 
 

@@ -460,7 +460,7 @@ def test_a_claim_is_shown_in_full(terminal):
         assert part in done.stdout
 
 
-def test_an_overview_has_a_line_a_claim(only, capsys):
+def test_an_overview_has_three_lines_a_claim(only, capsys):
     from rich.console import Console
 
     only(entry("3", found={"study": [YES], "tuned": [NO]}), entry("18", found=[], note="Nothing to see."))
