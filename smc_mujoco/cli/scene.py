@@ -60,9 +60,9 @@ def perform(
         terminal.note(f"{label}: {sentence}", wrap=True)
     if scene.facts:
         terminal.print()
-    terminal.note(f"{scene.sentence(traces)}\n", "bold", wrap=True)
-    with clock("traces"):
+    with clock("traces"):  # first, so that runs are kept if the scene's own answer fails
         written = save(traces, out, export)
+    terminal.note(f"{scene.sentence(traces)}\n", "bold", wrap=True)
     with clock("figures"):
         written += figures(scene, traces, out)
     if filming:

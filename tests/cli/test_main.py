@@ -189,6 +189,16 @@ scene = smc.Scene(title="Asked [/s]", conditions={"calm": {"only": run}}, answer
     assert re.search(r"^only .*\n\nonly does not rest\.\n\nwrote$", out, re.MULTILINE)
 
 
+def test_what_a_scene_s_answer_raises_is_shown_as_it_is_and_its_runs_are_kept(call, undrawn, folder):
+    (folder / "fails.py").write_text("""import smc_mujoco as smc
+run = smc.Scenario(plant="duffing", law="none", duration=0.01)
+scene = smc.Scene(title="Fails", conditions={"calm": {"only": run}}, answer=lambda runs: runs.nothing)
+""")
+    with pytest.raises(AttributeError, match="nothing"):
+        call("run", "fails.py", "--no-film", "--out", "out")
+    assert [path.name for path in (folder / "out" / "fails").iterdir()] == ["calm-only.npz"]
+
+
 def test_run_hands_the_speed_and_the_camera_to_the_film(call, undrawn, scene, folder, monkeypatch):
     asked = {}
     monkeypatch.setattr(film, "missing", lambda: None)

@@ -221,10 +221,12 @@ def test_a_sentence_begins_with_a_capital_or_a_label_and_ends_with_a_full_stop()
     assert scene(lambda runs: "Is it?").sentence(traces) == "Is it?"
 
 
-@pytest.mark.parametrize(
-    ("answer", "says"),
-    [(lambda runs: 3, "is 3"), (lambda runs: " ", "returns text"), (lambda runs: runs.nothing, "AttributeError")],
-)
+def test_what_the_answer_of_a_scene_raises_reaches_its_author():
+    with pytest.raises(AttributeError, match="nothing"):
+        scene(lambda runs: runs.nothing).sentence(single(a=0.2).traces)
+
+
+@pytest.mark.parametrize(("answer", "says"), [(lambda runs: 3, "is 3"), (lambda runs: " ", "returns text")])
 def test_an_answer_that_is_none_is_refused_in_a_sentence(answer, says):
     with pytest.raises(smc.ScenarioError, match=f"the answer of scene 'Two' .*{says}"):
         scene(answer).sentence(single(a=0.2).traces)
