@@ -28,6 +28,9 @@ boards. Both are corrected by S. Holm's method (Scandinavian Journal of Statisti
 - Pairs. The family is all pairs of laws in all blocks. The probability that any law is wrongly called better than
   another is at most 1 - level, besides the statements about winners.
 
+A block without a test has one value of each law, in which nothing was drawn: a law is better there if its value is less
+by more than the least relevant difference. It belongs to neither family.
+
 A law with a run that failed, or has no value, wins nothing. In every order the laws with fewer such runs come first.
 """
 
@@ -107,6 +110,7 @@ class Comparison:
       shifts: (blocks, laws, laws), the least relevant difference of a law that is better than another.
       p: (blocks, laws, laws), one-sided p-value, not corrected, that a law is better than another; 1 of itself.
       sets: (laws, blocks), number of sets of gains of a law's runs.
+      untested: (blocks,), whether laws are compared without a test; p is 0 or 1 there.
       limits: of the p-values, after the correction.
     """
 
@@ -121,6 +125,7 @@ class Comparison:
     shifts: np.ndarray
     p: np.ndarray
     sets: np.ndarray
+    untested: np.ndarray
     limits: Limits
 
     @functools.cached_property
@@ -229,6 +234,7 @@ def compare(
     sets: Mapping[str, ArrayLike] | None = None,
     relevant: float = RELEVANT,
     limits: Limits | None = None,
+    untested: ArrayLike = False,
 ) -> Comparison:
     """Compare every law with every other in every block.
 
@@ -239,38 +245,27 @@ def compare(
       outcomes: law -> a number per cell, equal if the law had the same result from two seeds. Default: all runs differ.
       sets: law -> a number per cell, equal if the law had the same gains. Default: one set of gains.
       limits: of the p-values, where the blocks belong to a larger family. Default: those of these blocks.
+      untested: one for all blocks, or one for each, see `Comparison`.
 
     Raises:
       ScenarioError: no laws, or laws with different cells.
     """
     laws, cells = _cells(scores)
-    k, blocks, seeds = cells.shape
-    own_sets = (
-        np.zeros(cells.shape, np.int64)
-        if sets is None
-        else np.array([np.atleast_2d(sets[law]) for law in laws], np.int64)
-    )
-    did = None if outcomes is None else np.array([np.atleast_2d(outcomes[law]) for law in laws])
-    floors = np.broadcast_to(np.asarray(floors, float), blocks)
-    differences, relative = np.full((blocks, k, k, seeds), math.nan), np.zeros((blocks, k, k), bool)
-    counts = np.ones((k, blocks), int)
-    relevant = share_that_matters(relevant)
-    for block in range(blocks):
-        there = ~np.isnan(cells[0, block])
-        counts[:, block] = [np.unique(own[there]).size for own in own_sets[:, block]]
-        ratios = np.zeros((k, k), bool) if shares else _ratios_make_sense(cells[:, block], floors[block], relevant)
-        for a in range(k - 1):
-            found = _pairwise(cells[a, block], cells[a + 1 :, block], ratios[a, a + 1 :])
-            if did is not None:
-                for row, rival in enumerate(did[a + 1 :, block]):
-                    found[row, ~first_of_kind(np.stack([did[a, block], rival])[:, None], there[None])[0]] = math.nan
-            for row, rival in enumerate(own_sets[a + 1 :, block]):
-                found[row] = _by_sample(found[row], own_sets[a, block], rival)
-            differences[block, a, a + 1 :], differences[block, a + 1 :, a] = found, -found
-        relative[block] = ratios
+    blocks, relevant = range(cells.shape[1]), share_that_matters(relevant)
+    floors = np.broadcast_to(np.asarray(floors, float), len(blocks))
+    untested = np.broadcast_to(np.asarray(untested, bool), len(blocks))
+    numbers = np.zeros(cells.shape, np.int64) if sets is None else _numbers(sets, laws).astype(np.int64)
+    did = None if outcomes is None else _numbers(outcomes, laws)
+    there = ~np.isnan(cells[0])
+    counts = [[np.unique(own[k, there[k]]).size for k in blocks] for own in numbers]
+    ratios = [_ratios_make_sense(cells[:, k], floors[k], relevant) for k in blocks]
+    relative = np.array(ratios) & (not shares)
+    each = [_differences(cells[:, k], relative[k], None if did is None else did[:, k], numbers[:, k]) for k in blocks]
+    differences = np.stack(each)
     shifts = _shifts(_centres(cells, shares), floors, relative, relevant, shares)
-    p = p_values(differences - shifts[..., None])
-    p[:, *np.diag_indices(k)] = 1.0
+    beyond = differences - shifts[..., None]
+    p = np.where(untested[:, None, None], 1.0 - np.any(beyond > 0.0, axis=3), p_values(beyond))
+    p[:, *np.diag_indices(len(laws))] = 1.0
     comparison = Comparison(
         laws=laws,
         cells=cells,
@@ -282,10 +277,36 @@ def compare(
         relative=relative,
         shifts=shifts,
         p=p,
-        sets=counts,
+        sets=np.array(counts),
+        untested=untested,
         limits=limits or Limits(0.0, 0.0),
     )
     return comparison if limits else dataclasses.replace(comparison, limits=corrected([comparison], level))
+
+
+def _numbers(of: Mapping[str, ArrayLike], laws: Sequence[str]) -> np.ndarray:
+    """Return the numbers of all laws, (laws, blocks, seeds)."""
+    return np.array([np.atleast_2d(of[law]) for law in laws])
+
+
+def _differences(cells: np.ndarray, relative: np.ndarray, did: np.ndarray | None, sets: np.ndarray) -> np.ndarray:
+    """Return `Comparison.differences` of one block, (laws, laws, seeds).
+
+    Args:
+      cells, sets: (laws, seeds).
+      relative: (laws, laws).
+      did: (laws, seeds), the outcomes; None if all runs differ.
+    """
+    k, there = len(cells), ~np.isnan(cells[:1])
+    differences = np.full((k, *cells.shape), math.nan)
+    for a in range(k - 1):
+        found = _pairwise(cells[a], cells[a + 1 :], relative[a, a + 1 :])
+        for b, row in enumerate(found, a + 1):
+            if did is not None:
+                row[~first_of_kind(did[[a, b]][:, None], there)[0]] = math.nan
+            row[:] = _by_sample(row, sets[a], sets[b])
+        differences[a, a + 1 :], differences[a + 1 :, a] = found, -found
+    return differences
 
 
 def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray]:
@@ -415,9 +436,9 @@ def corrected(comparisons: Sequence[Comparison], level: float = 0.95) -> Limits:
     pairs, winners = [], []
     for one in comparisons:
         if len(one.laws) > 1:
-            pairs.append(np.minimum(one.p, one.p.transpose(0, 2, 1))[:, *np.triu_indices(len(one.laws), 1)].ravel())
-            diagonal = np.eye(len(one.laws), dtype=bool)
-            winners.append(np.where(diagonal, 0.0, one.p).max(axis=2).min(axis=1))
+            p, diagonal = one.p[~one.untested], np.eye(len(one.laws), dtype=bool)
+            pairs.append(np.minimum(p, p.transpose(0, 2, 1))[:, *np.triu_indices(len(one.laws), 1)].ravel())
+            winners.append(np.where(diagonal, 0.0, p).max(axis=2).min(axis=1))
     error = 1.0 - confidence(level)
     return Limits(*(_holm(np.concatenate([*each, []]), error / 2) for each in (pairs, winners)))
 

@@ -37,6 +37,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.text import number
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics.channel_groups import Group, cut, groups
 
@@ -106,6 +107,10 @@ class Metric:
     def fits(self, group: Group) -> bool:
         """Return whether the metric applies to a group by itself."""
         return (group.driven or not self.command) and (len(group.channels) > 1 or not self.network)
+
+    def text(self, value: float) -> str:
+        """Return a value as text; inf is "never" of a time, else "fails"."""
+        return "fails" if value == math.inf and self.unit != "s" else number(value)
 
     def unit_for(self, x: str, u: str = "") -> str:
         """Return the unit for positions in x, "rad" or "m" (as `plant.unit`), and commands in u; "": of a force."""

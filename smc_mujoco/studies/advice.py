@@ -19,23 +19,12 @@ from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw.style import law_colour
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
-from smc_mujoco.metrics.conventions import Metric
-from smc_mujoco.studies.board_tables import spread
 from smc_mujoco.studies.leaderboard import size_in_words
+from smc_mujoco.studies.needs import NEEDS, TIES, ties
 from smc_mujoco.studies.table import Table
-from smc_mujoco.studies.worst_case import METRIC, WorstCase
+from smc_mujoco.studies.worst_case import WorstCase
 
 NAMED = 6  # names of laws that the screening left out
-ROBUST = "robust"  # the need whose number is not of the runs: the worst that an adversary finds
-NEEDS: Mapping[str, Metric] = {metric.need: metric for metric in metrics() if metric.need}
-NEEDS |= {ROBUST: dataclasses.replace(CATALOGUE[METRIC], need=ROBUST, label=f"worst found {CATALOGUE[METRIC].label}")}
-TIES = {"no-overshoot": "overshoot", "frugal": "energy of u"}  # what orders laws that tie, least first, in words
-
-
-def ties(plant: Plant) -> list[Metric]:
-    """Return the metrics that order laws which tie on a plant."""
-    return [NEEDS[need] for need in TIES if not NEEDS[need].refusal(plant)]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -177,7 +166,7 @@ class Advice(Tables):
     @property
     def rule(self) -> str:
         """The order of laws that tie, in words."""
-        words = [words for need, words in TIES.items() if NEEDS[need] in ties(self.plant)]
+        words = [words for need, words in TIES.items() if NEEDS[need].metric in ties(self.plant)]
         return f"laws that tie stand in the order of {', then of '.join(words)}, less first"
 
     # the table
@@ -191,7 +180,7 @@ class Advice(Tables):
     @property
     def tables(self) -> list[Tabular]:
         """One table with a row for each finalist, above the answer; marked where no finalist is better."""
-        of = [NEEDS[need] for need in self.needs]
+        of = [NEEDS[need].metric for need in self.needs]
         units = [f"{metric.need}: {metric.label} ({metric.unit_for(self.plant.unit, self.effort)})" for metric in of]
         rows = []
         for choice in self.choices:
@@ -205,20 +194,17 @@ class Advice(Tables):
         return [Tabular(headings=["law", "place", "settles", *units], rows=rows, title=self.title, notes=notes)]
 
     def _cell(self, choice: Choice, need: str) -> Cell:
-        """Return a median with its interval, marked if no finalist is better in any condition and no run fails."""
-        name, median = choice.law.name, choice.medians[need]
+        """Return a median, marked if no finalist is better in any condition and no run fails."""
+        name, asked = choice.law.name, NEEDS[need]
         rivalled = len(self.compared) > 1 and name in self.compared
         best = rivalled and not self.better(name, need) and not self._fails(name, need)
-        if need == ROBUST:
-            one = choice.worst_found
-            return Cell(one.shown(one.value), f"median {one.shown(one.median)}", best)
-        return Cell(number(median.median), spread(median, need) * (median.low < median.high), best)
+        return Cell(asked.metric.text(choice.medians[need].median), asked.below(choice), best)
 
     @property
     def key(self) -> str:
         """The meaning of the table's signs."""
         of = f" of {len(self.conditions)} conditions" if len(self.conditions) > 1 else ""
-        medians = f", and medians{of}, with 95 % intervals over {self.samples}" * self._by_runs
+        medians = f", and medians{of}, with 95 % intervals over {self.samples}" * (not self._untested)
         text = f"place by failed runs, then by mean rank{medians}. "
         text += f"*: no finalist is better{' in any condition' if of else ''}, and every run has a value."
         if sources := in_words({choice.law.name: [choice.law.source] for choice in self.choices}):
@@ -250,47 +236,31 @@ class Advice(Tables):
         return [f"{law} {count}" for law, count in named if 1 < count < seeds]
 
     @property
-    def _by_runs(self) -> bool:
-        """Whether a need is compared by runs, not only by what an adversary found."""
-        return self.needs != (ROBUST,)
+    def _untested(self) -> bool:
+        """Whether all laws are compared without a test, by what an adversary found."""
+        return bool(self.comparison.untested.all())
 
     @property
     def _too_few(self) -> bool:
         """Whether no comparison can tell two laws apart, with the samples that there are."""
-        if ROBUST in self.needs:
-            return False
         least = 2 * least_p(int(self.comparison.samples.max()))
-        return least > (1 - self.comparison.level) / len(self.blocks)
+        return not self.comparison.untested.any() and least > (1 - self.comparison.level) / len(self.blocks)
 
     # the answer
 
     @property
     def answer(self) -> list[str]:
         """The advice in sentences: what to use and why, what to use for one need, the second choice, how sure it is."""
-        parts = [self._use(), self._because(), *self._instead(), self._second(), self._sure(), self._left_out()]
-        if self.barred:
-            parts = [self._refusal(), self._left_out()]
-        if ROBUST in self.needs:
-            parts.insert(2 - bool(self.barred), self._robust())
-        return list(filter(None, parts))
+        remarks = [NEEDS[need].remark(self.choices) for need in self.needs]
+        advice = [self._use(), self._because(), *remarks, *self._instead(), self._second(), self._sure()]
+        parts = [self._refusal(), *remarks] if self.barred else advice
+        return list(filter(None, [*parts, self._left_out()]))
 
     def _refusal(self) -> str:
         """Return why no law is advised over rivals with default gains."""
         one = len(self.barred) == 1
         why = f"No law is advised over {joined(self.barred)}, whose gains are {'its' if one else 'their'} defaults"
         return f"{why}: tune {'it' if one else 'them'}, or ask for it with defaults=True (--defaults)."
-
-    def _robust(self) -> str:
-        """Return what the adversary did, and which law the median of its random runs puts first."""
-        one, found = self.choices[0].worst_found, [choice for choice in self.choices if choice.fit] or self.choices
-        least = min(found, key=lambda choice: choice.worst_found.median)
-        text = f"Robust is by the worst found in {one.tried} runs of each law in each condition, half of them random, "
-        text += f"within {one.class_words}; there may be worse."
-        if least is self.choices[0]:
-            return text
-        median = f"{number(least.worst_found.median)} {one.unit}"
-        worst = f"its worst found is {least.worst_found.words}"
-        return f"{text} The median of the random runs would put {least.law.name} first, with {median}: {worst}."
 
     def _use(self) -> str:
         first, others = self.choices[0], self.compared[1:]
@@ -308,7 +278,7 @@ class Advice(Tables):
             return f"No law can be called the best: {self.samples} are too few for {comparisons}."
         if self.all_level:
             every = f"all {len(self.compared)} finalists" if len(others) > 1 else "both laws"
-            where = f"in every comparison of {self.samples}" if self._by_runs else "in the worst that was found"
+            where = "in the worst that was found" if self._untested else f"in every comparison of {self.samples}"
             return f"No law can be called the best: {every} are level {where}. Use the one that you know."
         return f"Use {law}."
 
@@ -410,11 +380,13 @@ class Advice(Tables):
         a, b = (self.comparison.laws.index(name) for name in (first, rival))
         parts = []
         for need in self.needs:
-            if need == ROBUST:
-                one, other = (next(c for c in self.choices if c.law.name == name) for name in (first, rival))
-                parts.append(f"robust {self._number(one, need)} to {self._number(other, need)}")
-                continue
             blocks = [k for k, block in enumerate(self.blocks) if block[0] == need]
+            if self.comparison.untested[blocks].all():
+                one, other = (
+                    self._number(choice, need) for choice in self.choices if choice.law.name in (first, rival)
+                )
+                parts.append(f"{need} {one} to {other}")
+                continue
             least = max(blocks, key=lambda k: self.comparison.p[k, a, b])
             effect = self.comparison.effect(least, first, rival, winner=False)
             where = f" under {self.blocks[least][1]}, where it leads least," * (len(blocks) > 1)
@@ -427,15 +399,16 @@ class Advice(Tables):
     @property
     def _holds(self) -> str:
         """What the answer holds for, in words."""
+        if self._untested:
+            return "Laws are compared without a test, as nothing is drawn."
         several = self.comparison.sets.max(axis=1) > 1
         gains = "over sets of gains" if several.all() else "for these gains"
         if several.any() and not several.all():
             ones = [law for law, its in zip(self.comparison.laws, several.tolist(), strict=True) if not its]
             gains = f"over sets of gains, but for these gains of {joined(ones)}"
-        attacked = " What an adversary found is of the best set of gains, from the first start." * (
-            ROBUST in self.needs
-        )
-        return f"This holds {gains}, over starts and noise.{attacked}"
+        others = [need for need in self.needs if not NEEDS[need].tested]
+        this = f"Except for {joined(others)}, this" if others else "This"
+        return f"{this} holds {gains}, over starts and noise."
 
     def _left_out(self) -> str:
         if not self.others:
@@ -447,15 +420,13 @@ class Advice(Tables):
 
     def _value(self, choice: Choice, need: str) -> str:
         """Return a median in words, such as "settling time 0.92 s"."""
-        return f"{NEEDS[need].label} {self._number(choice, need)}"
+        return f"{NEEDS[need].metric.label} {self._number(choice, need)}"
 
     def _number(self, choice: Choice, need: str) -> str:
-        if need == ROBUST:
-            return choice.worst_found.words
-        median = choice.medians[need].median
-        return number(median) + (
-            f" {NEEDS[need].unit_for(self.plant.unit, self.effort)}" if math.isfinite(median) else ""
-        )
+        """Return a median with its unit."""
+        metric, median = NEEDS[need].metric, choice.medians[need].median
+        unit = f" {metric.unit_for(self.plant.unit, self.effort)}" if math.isfinite(median) else ""
+        return metric.text(median) + unit
 
     def _where(self, conditions: Sequence[str]) -> str:
         return "" if len(conditions) == len(self.conditions) else f" under {joined(conditions)}"

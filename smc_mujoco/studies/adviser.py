@@ -29,7 +29,6 @@ among themselves: less overshoot first, then less energy of u. The first law is 
 runs in the screening and with the default budget of `worst_case`, over all conditions, in the finals. A law is better
 if the worst found for it is less by more than the least relevant difference. There is no test, as nothing is drawn."""
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -38,20 +37,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
-from smc_mujoco.analysis.bootstrap import Interval, median_of
 from smc_mujoco.analysis.differences import RELEVANT, share_that_matters
-from smc_mujoco.analysis.paired_runs import SETTLES
-from smc_mujoco.analysis.ranking import (
-    Comparison,
-    Limits,
-    Rank,
-    block_ranks,
-    compare,
-    corrected,
-    ranked,
-    ranks,
-    samples_of,
-)
+from smc_mujoco.analysis.paired_runs import SETTLES, Scores
+from smc_mujoco.analysis.ranking import Comparison, Rank, block_ranks, compare, ranked, ranks
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, usual
 from smc_mujoco.common.errors import ScenarioError, number, unknown, whole
 from smc_mujoco.control import gain_sets, source
@@ -64,11 +52,12 @@ from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
 from smc_mujoco.simulation.grid import case, check_moving, crossed, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
-from smc_mujoco.studies.advice import NEEDS, ROBUST, Advice, Choice, ties
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.studies.advice import Advice, Choice
 from smc_mujoco.studies.fair_gains import Candidate, fair_gains
+from smc_mujoco.studies.needs import NEEDS, ROBUST, Need, Runs, ties
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import study
-from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import DURATION, WorstCase, default_budget, kept
 
 USUAL = ("fast", "accurate", "calm")  # what is compared where nothing is asked
@@ -134,58 +123,52 @@ def which(
     Raises:
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
     """
-    extent, machine, folder = QUICK if quick else FULL, as_plant(plant), Path(out)
-    relevant = share_that_matters(relevant)
+    extent, machine = QUICK if quick else FULL, as_plant(plant)
     seeds = whole("seeds", extent.seeds if seeds is None else seeds, 1, 10_000)
-    attacked_for = DURATION if duration is None else duration
-    duration = extent.duration if duration is None else number("duration", duration, above=0.0)
     compared, properties = _needs(needs, machine)
-    asked = [find_condition(one) for one in _conditions(conditions, machine, duration)]
+    length = extent.duration if duration is None else number("duration", duration, above=0.0)
+    attacked_for = DURATION if duration is None else length
+    asked = [find_condition(one) for one in _conditions(conditions, machine, length)]
     if NO_VELOCITY in properties:
         asked = [_without_velocity(one) for one in asked]
-    tried = [case(machine, "none", one, duration, starts=starts) for one in asked]
+    tried = [case(machine, "none", one, length, starts=starts) for one in asked]
     for scenario in tried:  # refuses what cannot be compared before gains are searched
         check_moving([scenario])
-    efforts = {scenario.efforts[0] for scenario in tried}
-    chosen = _suited(machine, [name for name in properties if name != NO_VELOCITY], laws)
-    found = fair_gains(machine, chosen, folder / "gains", extent.budget, starts, threads, progress)
+    folder, relevant, properties = Path(out), share_that_matters(relevant), [n for n in properties if n != NO_VELOCITY]
+    options: dict[str, Any] = {"threads": threads, "progress": progress}
+    chosen = _suited(machine, properties, laws)
+    found = fair_gains(machine, chosen, folder / "gains", extent.budget, starts, **options)
     candidates = {candidate.law.name: candidate for candidate in found}
     if len(candidates) < len(found):
         raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")
 
-    within = within or usual(tried[0])
-    first = dataclasses.replace(tried[0], duration=attacked_for)
-    budget = max(GLANCE, default_budget(first, within) // (len(asked) * (3 if quick else 1)))
-
-    def attacked(name: str, part: str, runs: int) -> tuple[WorstCase, ...]:
-        cases = [case(machine, candidates[name].law, one, attacked_for, starts=starts) for one in asked]
-        files = [folder / "worst" / f"{part}-{i}-{machine.name}-{name}.json" for i in range(len(asked))]
-        return tuple(kept(file, one, within, runs, threads, progress) for file, one in zip(files, cases, strict=True))
-
-    def ran(names: Sequence[str], numbers: range, part: str, attacks: int) -> Contest:
-        laws = [candidates[name] for name in names]
-        runs = crossed([machine], lambda _: laws, asked, numbers, duration, starts)
-        fair: dict[str, Any] = {"noise_key": noise_key, "replay": True}
-        table = study(runs, folder / part, threads=threads, progress=progress, **fair)
-        worst = {name: attacked(name, part, attacks) for name in names} if ROBUST in compared else {}
-        return _contest(table, machine, compared, relevant, worst)
+    def contest(names: Sequence[str], numbers: range, part: str, budget: int | None = None) -> Contest:
+        its = [candidates[name] for name in names]
+        runs = crossed([machine], lambda _: its, asked, numbers, length, starts)
+        table = study(runs, folder / part, noise_key=noise_key, replay=True, **options)
+        (group,) = paired_runs.groups(table, by=("plant",))
+        worst, cases = {}, [[case(machine, one.law, on, attacked_for, starts=starts) for on in asked] for one in its]
+        if ROBUST in compared:
+            worst = _worst(cases, within, budget, 3 if quick else 1, folder / "worst" / part, **options)
+        return _contest(Runs(table, group, worst), machine, compared, relevant)
 
     names, others = list(candidates), []
     if len(names) > extent.finalists:
-        screening = ran(names, range(extent.screening), "screening", GLANCE)
+        screening = contest(names, range(extent.screening), "screening", GLANCE)
         first = {rank.law for rank in screening.order[: extent.finalists]} | set(screening.specialists)
         others = [rank.law for rank in screening.order if rank.law not in first]
         names = [name for name in names if name in first]
-    finals = ran(names, range(extent.screening, extent.screening + seeds), "finals", budget)
+    finals = contest(names, range(extent.screening, extent.screening + seeds), "finals")
+    efforts = {scenario.efforts[0] for scenario in tried}
     return Advice(
         plant=machine,
         conditions=tuple(one.name for one in asked),
         needs=compared,
-        wanted=tuple(PROPERTIES[name].words for name in properties if name != NO_VELOCITY),
-        choices=_choices(finals, candidates, compared),
+        wanted=tuple(PROPERTIES[name].words for name in properties),
+        choices=_choices(finals, candidates),
         others=tuple(others),
         comparison=finals.comparison,
-        table=finals.table,
+        table=finals.runs.table,
         effort=efforts.pop() if len(efforts) == 1 else "",
         untuned=() if defaults else tuple(one.law.name for one in found if one.law.source.kind == source.DEFAULT),
     )
@@ -209,9 +192,9 @@ def _needs(needs: str | Sequence[str], plant: Plant) -> tuple[tuple[str, ...], t
             raise unknown("need", name, [*NEEDS, *PROPERTIES])
     compared = [name for name in names if name in NEEDS]
     for name in compared:
-        if why := NEEDS[name].refusal(plant):
+        if why := NEEDS[name].metric.refusal(plant):
             raise ScenarioError(f"need {name!r} cannot be compared on {plant.name}: {why}")
-    compared = compared or [name for name in USUAL if not NEEDS[name].refusal(plant)]
+    compared = compared or [name for name in USUAL if not NEEDS[name].metric.refusal(plant)]
     return tuple(compared), tuple(name for name in names if name in PROPERTIES)
 
 
@@ -261,85 +244,102 @@ def _some(found: list, plant: Plant, properties: Sequence[str]) -> list[Componen
 # the comparison
 
 
+def _worst(
+    cases: Sequence[Sequence[Scenario]],
+    within: Uncertainty | None,
+    budget: int | None,
+    parts: int,
+    path: Path,
+    **options: Any,
+) -> dict[str, list[WorstCase]]:
+    """Return law -> what an adversary finds in each condition, by default within the class of the first.
+
+    Args:
+      cases: of each law, a scenario for each condition.
+      budget: runs of a search. Default: as many in all conditions together as one part of the default of `worst_case`.
+      parts: number of parts of that default.
+      path: beginning of the names of the files that are kept.
+      options: threads and progress, as in `run`.
+    """
+    first = cases[0][0]
+    within = within or usual(first)
+    budget = budget or max(GLANCE, default_budget(first, within) // (len(cases[0]) * parts))
+    found: dict[str, list[WorstCase]] = {}
+    for i, one in (numbered for its in cases for numbered in enumerate(its)):
+        file = Path(f"{path}-{i}-{one.plant.name}-{one.law.name}.json")
+        found.setdefault(one.law.name, []).append(kept(file, one, within, budget, **options))
+    return found
+
+
 class Contest(NamedTuple):
     """Runs of laws and what follows from them.
 
-    `comparison`: of the laws that are fit, or of all if none is. `order`: all laws, best first; those that are not fit
-    come last and have NaN for a rank. `specialists`: the law with the best mean rank on each need. `worst`: law -> what
-    an adversary found in each condition, if that is asked.
+    `scores`: need -> the scores of all laws. `comparison`: of the laws that are fit, or of all if none is. `order`: all
+    laws, best first; those that are not fit come last and have NaN for a rank. `settled`: share of runs that settle,
+    (laws, conditions). `specialists`: the law with the best mean rank on each need.
     """
 
-    table: Table
+    runs: Runs
+    scores: Mapping[str, Scores]
     comparison: Comparison
     order: list[Rank]
+    settled: np.ndarray
     fit: set[str]
     specialists: list[str]
-    worst: Mapping[str, tuple[WorstCase, ...]]
 
 
-def _contest(
-    table: Table, plant: Plant, needs: Sequence[str], relevant: float, worst: Mapping[str, tuple[WorstCase, ...]]
-) -> Contest:
+def _contest(runs: Runs, plant: Plant, needs: Sequence[str], relevant: float) -> Contest:
     """Compare laws over all needs and conditions."""
-    (group,) = paired_runs.groups(table, by=("plant",))
-    fit, ran = _fit(group, table), paired_runs.scenarios(table, group)
-    parts, floors = [], []
-    for need in needs:
-        if need == ROBUST:
-            parts.append(_of_adversary(group, worst, 1 if len(needs) == 1 else group.rows.shape[2]))
-            floors += [paired_runs.floor(scenario, NEEDS[need].unit) for scenario in ran]
-            continue
-        scores = group.scores(paired_runs.values(table, NEEDS[need].name))
-        if not scores.blocks:
-            raise ScenarioError(f"need {need!r} has no number in any run on {plant.name}: leave it out")
-        parts.append(scores[1:])
-        floors += [paired_runs.floor(ran[k], NEEDS[need].unit) for k in scores.blocks]
+    table, group = runs.table, runs.group
+    rows = paired_runs.values(table, SETTLES)[group.rows]
+    settled = 1.0 - np.nanmean(np.where(group.rows >= 0, rows, np.nan), axis=2)
+    fit = _fit(group.laws, settled)
     laws = [law for law in group.laws if law in fit] or group.laws
-    joint = ({law: np.concatenate([part[i][law] for part in parts]) for law in laws} for i in range(3))
-    values, outcomes, sets = joint
-    comparison = compare(values, floors, outcomes=outcomes, sets=sets, relevant=relevant)
-    if worst:
-        comparison = _untested(comparison, np.repeat([need == ROBUST for need in needs], len(group.blocks)))
+    scores = {need: NEEDS[need].scores(runs) for need in needs}
+    for need, own in scores.items():
+        if not own.blocks:
+            raise ScenarioError(f"need {need!r} has no number in any run on {plant.name}: leave it out")
+    blocks = [(NEEDS[need], k) for need, own in scores.items() for k in own.blocks]
+    ran = paired_runs.scenarios(table, group)
+    comparison = compare(
+        _joined([own.values for own in scores.values()], laws, math.nan),
+        [paired_runs.floor(ran[k], need.metric.unit) for need, k in blocks],
+        outcomes=_joined([own.outcomes for own in scores.values()], laws),
+        sets=_joined([own.sets for own in scores.values()], laws),
+        relevant=relevant,
+        untested=[not need.tested for need, _ in blocks],
+    )
     by_need = np.split(block_ranks(comparison), len(needs), axis=1)
     specialists = [comparison.laws[int(own.mean(axis=1).argmin())] for own in by_need]
-    nan = math.nan
-    unfit = [Rank(law, nan, nan, best=False) for law in group.laws if law not in laws]
-    return Contest(
-        table, comparison, [*_order(comparison, _restraint(group, ran, table, plant)), *unfit], fit, specialists, worst
-    )
+    order = _order(comparison, _restraint(runs, ran, plant))
+    order += [Rank(law, math.nan, math.nan, best=False) for law in group.laws if law not in laws]
+    return Contest(runs, scores, comparison, order, settled, fit, specialists)
 
 
-def _of_adversary(
-    group: paired_runs.Group, worst: Mapping[str, tuple[WorstCase, ...]], columns: int
-) -> tuple[dict[str, np.ndarray], ...]:
-    """Return scores, outcomes and sets of laws, (conditions, columns) each, with what was found in the first column."""
-    shape = len(group.blocks), columns
-    scores = {law: np.full(shape, math.nan) for law in group.laws}
-    for law, cells in scores.items():
-        cells[:, 0] = [one.value for one in worst[law]]
-    nothing = dict.fromkeys(group.laws, np.zeros(shape, np.int64))
-    return scores, nothing, nothing
+def _joined(parts: Sequence[Mapping[str, np.ndarray]], laws: Sequence[str], fill: float = -1) -> dict[str, np.ndarray]:
+    """Return law -> the blocks of all parts, (blocks, columns). Parts with fewer columns are filled up."""
+    columns = max(each.shape[1] for part in parts for each in part.values())
+    return {
+        law: np.concatenate(
+            [
+                np.pad(one, ((0, 0), (0, columns - one.shape[1])), constant_values=fill)
+                for one in (part[law] for part in parts)
+            ]
+        )
+        for law in laws
+    }
 
 
-def _untested(comparison: Comparison, found: np.ndarray) -> Comparison:
-    """Return the comparison where a law is better without a test in the blocks of what an adversary `found`."""
-    p = comparison.p.copy()
-    p[found] = np.where(comparison.differences[found][..., 0] > comparison.shifts[found], 0.0, 1.0)
-    tested = dataclasses.replace(comparison, p=p[~found])
-    limits = Limits(0.0, 0.0) if found.all() else corrected([tested], comparison.level)
-    return dataclasses.replace(comparison, p=p, limits=limits)
-
-
-def _restraint(group: paired_runs.Group, ran: Sequence, table: Table, plant: Plant) -> dict[str, tuple[float, ...]]:
+def _restraint(runs: Runs, ran: Sequence, plant: Plant) -> dict[str, tuple[float, ...]]:
     """Return the mean rank of each law on each of the metrics that order laws which tie, less is first."""
-    found = []
+    found, laws = [], runs.group.laws
     for metric in ties(plant):
-        scores = group.scores(paired_runs.values(table, metric.name))
+        scores = Need(metric).scores(runs)
         if scores.blocks:
-            centres = np.array([np.nanmedian(scores.values[law], axis=1) for law in group.laws])
+            centres = np.array([np.nanmedian(scores.values[law], axis=1) for law in laws])
             floors = np.array([paired_runs.floor(ran[k], metric.unit) for k in scores.blocks])
             found.append(ranked(centres, floors).mean(axis=1))
-    return {law: tuple(float(mean[i]) for mean in found) for i, law in enumerate(group.laws)}
+    return {law: tuple(float(mean[i]) for mean in found) for i, law in enumerate(laws)}
 
 
 def _order(comparison: Comparison, restraint: Mapping[str, tuple[float, ...]]) -> list[Rank]:
@@ -358,40 +358,25 @@ def _order(comparison: Comparison, restraint: Mapping[str, tuple[float, ...]]) -
     return ordered
 
 
-def _settled(group: paired_runs.Group, table: Table) -> np.ndarray:
-    """Return the share of runs that settle, (laws, conditions)."""
-    return 1.0 - np.nanmean(np.where(group.rows >= 0, paired_runs.values(table, SETTLES)[group.rows], np.nan), axis=2)
-
-
-def _fit(group: paired_runs.Group, table: Table) -> set[str]:
+def _fit(laws: Sequence[str], settled: np.ndarray) -> set[str]:
     """Return the laws that settle in enough runs of every condition."""
-    share = _settled(group, table)
-    enough = np.all(share >= MIN_SETTLED * share.max(axis=0), axis=1)
-    return {law for law, one in zip(group.laws, enough.tolist(), strict=True) if one}
+    enough = np.all(settled >= MIN_SETTLED * settled.max(axis=0), axis=1)
+    return {law for law, one in zip(laws, enough.tolist(), strict=True) if one}
 
 
-def _choices(finals: Contest, candidates: Mapping[str, Candidate], needs: Sequence[str]) -> tuple[Choice, ...]:
+def _choices(finals: Contest, candidates: Mapping[str, Candidate]) -> tuple[Choice, ...]:
     """Return the finalists with all that is said of them, best first."""
-    (group,) = paired_runs.groups(finals.table, by=("plant",))
-    settled, choices = _settled(group, finals.table), []
-    by_runs = [need for need in needs if need != ROBUST]
-    scores = {need: group.scores(paired_runs.values(finals.table, NEEDS[need].name)) for need in by_runs}
-    for rank in finals.order:
-        worst = finals.worst.get(rank.law, ())
-        medians = {ROBUST: Interval(max(one.value for one in worst), math.nan, math.nan, 1)} if worst else {}
-        choice = Choice(
+    shares = dict(zip(finals.runs.group.laws, finals.settled, strict=True))
+    return tuple(
+        Choice(
             law=candidates[rank.law].law,
             remark=candidates[rank.law].remark,
             rank=rank,
-            settles=float(settled[group.laws.index(rank.law)].mean()),
-            reliable=bool((settled[group.laws.index(rank.law)] >= RELIABLE).all()),
+            settles=float(shares[rank.law].mean()),
+            reliable=bool((shares[rank.law] >= RELIABLE).all()),
             fit=rank.law in finals.fit,
-            medians=medians
-            | {
-                need: median_of(own.values[rank.law], samples=samples_of(own.sets[rank.law]))
-                for need, own in scores.items()
-            },
-            worst=worst,
+            medians={need: NEEDS[need].median(scores, rank.law) for need, scores in finals.scores.items()},
+            worst=tuple(finals.runs.worst.get(rank.law, ())),
         )
-        choices.append(choice)
-    return tuple(choices)
+        for rank in finals.order
+    )

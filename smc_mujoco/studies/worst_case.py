@@ -24,7 +24,6 @@ from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import number
 from smc_mujoco.draw.style import law_colour
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import serialise
@@ -99,7 +98,7 @@ class WorstCase:
 
     def shown(self, value: float) -> str:
         """Return a value of the metric as text: "fails" where a run failed."""
-        return "fails" if value == math.inf and self.unit != "s" else number(value)
+        return CATALOGUE[self.metric].text(value)
 
     @property
     def words(self) -> str:

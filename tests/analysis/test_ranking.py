@@ -814,3 +814,17 @@ def test_a_law_that_fails_more_often_does_not_tie():
     assert compare({"fails": failing, "works": np.linspace(0.9, 1.1, 16)}).best == [("works",)]
     found = compare({"fails": np.where(np.isinf(failing), np.inf, 1.0), "works": np.ones(16)})
     assert not found.tied[0, 1]
+
+
+def test_a_block_without_a_test_is_decided_by_the_least_relevant_difference_and_is_in_no_family():
+    tested = {"a": np.linspace(1.0, 1.1, 16), "b": np.linspace(1.2, 1.3, 16), "c": np.linspace(1.0, 1.1, 16)}
+    alone = {"a": [1.0], "b": [1.02], "c": [1.04]}
+    scores = {law: np.full((2, 16), math.nan) for law in tested}
+    for law, rows in scores.items():
+        rows[0], rows[1, :1] = tested[law], alone[law]
+    found = compare(scores, untested=[False, True])
+    assert found.limits == compare(tested).limits
+    better = [(found.laws[i], found.laws[k]) for i, k in np.argwhere(found.better[1])]
+    assert better == [("a", "c")]  # 3 % of the larger value are relevant
+    assert compare(alone, untested=True).better.sum() == 1
+    assert not compare(alone).better.any()

@@ -25,7 +25,7 @@ from smc_mujoco.control.law import catalogue, law_function
 from smc_mujoco.control.properties import searched
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
 from smc_mujoco.studies import adviser, fair_gains
-from smc_mujoco.studies.advice import NEEDS
+from smc_mujoco.studies.needs import NEEDS, Runs
 
 FAST, SLOW = smc.law("observer_free", lam=6.0, k1=2.0), smc.law("observer_free", lam=6.0, k1=5.0).named("slow")
 COMMON = {"duration": 2.5, "seeds": 16, "conditions": ["nominal", "noise"]}
@@ -130,6 +130,12 @@ def test_robust_goes_by_the_worst_found_and_tells_the_median_too(folder, monkeyp
     both = smc.which("duffing", needs="fast,robust", conditions="nominal", duration=2.5, seeds=6, **options)
     tested = ranking.compare({law: both.comparison.cells[i, :1] for i, law in enumerate(both.comparison.laws)})
     assert both.comparison.limits == tested.limits  # what has no test is in no family of tests
+    assert text(made).endswith("Laws are compared without a test, as nothing is drawn.")
+    assert "Except for robust, this holds over sets of gains, but for these gains of" in text(both)
+    alike = options | {"starts": smc.starts(spread=0.0), "laws": [FAST, SLOW]}
+    one = smc.which("duffing", needs="fast,robust", conditions="nominal", duration=2.5, seeds=6, **alike)
+    assert one.comparison.cells.shape == (2, 2, 1)  # every seed is the same run
+    assert one.wins("observer_free", "slow") == [("robust", "nominal")]
 
 
 def with_cells(advice, restraint=None, **cells):
@@ -257,7 +263,7 @@ def test_an_answer_over_sets_of_gains_counts_them(advice):
 def test_restraint_ranks_laws_by_overshoot_and_by_energy_of_u(advice):
     (group,) = adviser.paired_runs.groups(advice.table, by=("plant",))
     ran = adviser.paired_runs.scenarios(advice.table, group)
-    found = adviser._restraint(group, ran, advice.table, advice.plant)
+    found = adviser._restraint(Runs(advice.table, group, {}), ran, advice.plant)
     assert set(found) == set(group.laws)
     energies = {law: np.median(advice.table.select(law=law).column("energy")) for law in group.laws}
     overshoots = {law: np.median(advice.table.select(law=law).column("overshoot")) for law in group.laws}
@@ -458,7 +464,7 @@ def test_needs_are_metrics_to_compare_and_properties_to_have():
     assert "observer_free" in names
     assert not names & {"none", "classical", "observer_free_q15", "hierarchical"}
     assert all(law.continuous and len(searched(law)) in (1, 2) for law in map(catalogue().__getitem__, names))
-    assert (NEEDS["fast"].name, NEEDS["calm"].name) == ("settling_time", "tv_rate")
+    assert (NEEDS["fast"].metric.name, NEEDS["calm"].metric.name) == ("settling_time", "tv_rate")
 
 
 def test_without_a_velocity_sensor_velocity_is_differentiated(folder):
