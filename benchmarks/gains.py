@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning.search import BUDGET, RULE, START
+from smc_mujoco.analysis.tuning.search import BUDGET, RULE, SPARE, START
 from smc_mujoco.common.files import read_json, replacing, to_json
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS
@@ -36,7 +36,7 @@ def tune(task: Task) -> dict[str, Any]:
     """Search for the gains of a law on a plant, and return their record."""
     gains, plant, law = task
     first_page = gains == "tuned" and law in gain_sets.LAWS
-    budget = BUDGET if first_page else START * len(smc.law(law).gains)
+    budget = BUDGET if first_page else START * len(smc.law(law).gains) + SPARE
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "no set of gains tried", smc.ScenarioWarning)
         return smc.tune(plant, law, budget, objective=gain_sets.OBJECTIVES[gains], threads=1).record()

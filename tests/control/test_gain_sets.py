@@ -44,7 +44,9 @@ def test_a_search_of_this_rule_has_as_many_sets_as_runs_and_tells_whether_its_st
         assert known.objective == min(known.ends)
         assert 1 <= len(known.sets) <= search.SETS
         ended = known.converged and len(known.sets) == search.SETS
-        assert ended or known.evaluations > search.BUDGET - search.START * len(known.sets[0])  # no start is left
+        assert ended or known.evaluations > search.BUDGET - search.SPARE - search.START * len(
+            known.sets[0]
+        )  # none is left
         assert len({tuple(one.values()) for one in known.sets}) == len(known.sets)
         assert known.evaluations <= search.BUDGET
         assert known.best in known.front

@@ -29,6 +29,9 @@ WRITTEN = (
 AGREEING, AGREEMENT = 3, 0.01  # a search has converged when so many of its starts end so close to the best J
 NEAR_OPTIMAL = 0.03  # of the best J; as much as a metric must differ to be relevant
 SETS = 24  # near-optimal sets of gains that a search hands on: the runs of a law in a study
+# Numbers of sets that laws may have. Each divides those before it, so that runs of two laws, which use their sets in
+# turn, make as many independent samples as the law with fewer sets has.
+COUNTS = (SETS, 12, 6, 3, 1)
 
 
 class Evaluation(NamedTuple):
@@ -161,7 +164,7 @@ class Tuned(Tables):
 
     @property
     def sets(self) -> list[Evaluation]:
-        """At most 24 near-optimal evaluations, whose gains the runs of a law use in turn: the best, then the others.
+        """24, 12, 6, 3 or 1 near-optimal evaluations, whose gains runs use in turn: the best, then the others.
 
         They cover the near-optimal gains: each is the one that is farthest, in log gains, from those taken before.
         Then those after the best are shuffled, so that the first few are not the most extreme ones.
@@ -169,7 +172,7 @@ class Tuned(Tables):
         near = self.near_optimal
         logs = np.log10([one.gains for one in near])
         taken, distances = [0], np.linalg.norm(logs - logs[0], axis=1)
-        while len(taken) < min(SETS, len(near)):
+        while len(taken) < next(count for count in COUNTS if count <= len(near)):
             taken.append(int(np.argmax(distances)))
             distances = np.minimum(distances, np.linalg.norm(logs - logs[taken[-1]], axis=1))
         order = np.random.default_rng(self.seed).permutation(taken[1:])

@@ -16,14 +16,16 @@ evaluations for each gain:
 The first two are cheap: they use Euler's method at 1 ms if the plant's own method is RK4, which costs a third. Only the
 accurate evaluations of the descents count as results.
 
-The search has converged when three starts end within 1 % of the best J. It ends when it has converged and knows 24
-near-optimal sets of gains, or when the budget is spent. Near-optimal is every set within 3 % of the best J. A careful
-user could have ended with any of them, so runs of a law use them in turn, see `gain_sets`.
+The search has converged when three starts end within 1 % of the best J. Starts end when it has converged and knows 24
+near-optimal sets of gains, or when the budget has no room for another. Near-optimal is every set within 3 % of the best
+J. A careful user could have ended with any of them, so runs of a law use them in turn, see `gain_sets`. If fewer are
+known after the starts, the rest of the budget draws gains at random about those that are: a law with few sets would be
+a small sample, which no rival can beat.
 
 Gains are rounded to four digits, so the printed gains are those that were run. A set that was evaluated before costs no
 budget. `search_space` gives the box from which starts are drawn; a descent may leave it by a decade. `Tuned.at_bound`
-names gains that are at the limit of that. No start depends on the budget, so a search with a larger budget repeats a
-shorter one and continues, and is never worse. `objective` defines what is minimised.
+names gains that are at the limit of that. No start depends on the budget, so a search with a larger budget repeats the
+starts of a shorter one. `objective` defines what is minimised.
 """
 
 import dataclasses
@@ -66,16 +68,19 @@ SCREENED, EVOLVED = 1 / 8, 1 / 2  # of them; the rest descend
 SPREAD = 0.3  # decades: first standard deviation of the evolution; chosen
 RADII = (0.2, 0.1)  # decades: first radius of the trust region in each of a start's descents; chosen
 LAST_RADIUS = 0.005  # decades
-BUDGET = 768  # evaluations: three starts of a law of four gains, six of one of two
+SPARE = 96  # evaluations that starts after the first leave for further near-optimal sets; chosen
+BUDGET = 768 + SPARE  # evaluations: three starts of a law of four gains, six of one of two
+WIDER, NARROWER = 1.5, 1.5**-0.5  # factors on the step of draws, after a near-optimal set and another: a third are
 DIGITS = 4  # of a gain
 MAX_CANDIDATES = 1_000_000  # candidates
 RULE = (
     f"CMA-ES and COBYQA from several starts, in the logarithm of the gains: each start has {START} evaluations a gain."
     " An eighth screens a Latin hypercube, within 1.5 decades about the gains' scale by dimension, forces up to u_max,"
     " and a half evolves from the best of them by CMA-ES, both under Euler's method at 1 ms. The rest descends from the"
-    " best of these by COBYQA under RK4. Both may leave the box by a decade. The search ends when"
+    " best of these by COBYQA under RK4. Both may leave the box by a decade. Starts end when"
     f" {AGREEING} starts end within {100 * AGREEMENT:g} % of the best and {SETS} sets of gains within"
-    f" {100 * NEAR_OPTIMAL:g} % of it are known, or the budget is spent"
+    f" {100 * NEAR_OPTIMAL:g} % of it are known, or when {SPARE} evaluations are left. These are random steps from"
+    " the sets that are known, until they are as many"
 )
 Report = Callable[[int], None]
 
@@ -266,14 +271,29 @@ def _search(ledger: _Ledger, start: Box, searched: Box, seed: int) -> tuple[floa
     """
     ends: list[float] = []
     whole_start = START * len(start)
-    while not ends or ledger.left >= whole_start:
+    while not ends or ledger.left >= whole_start + SPARE:
         random, size, first = np.random.default_rng([seed, len(ends)]), min(whole_start, ledger.left), ledger.screened
         logs, cost = _drawn(ledger, start, random, int(SCREENED * size))
         logs = _evolved(ledger, searched, random, logs, cost, int(EVOLVED * size))
         ends.append(_descend(ledger, searched, logs, size - (ledger.screened - first)))
         if converged(ends) and len(near_optimal(ledger.evaluations)) >= SETS:
             break
+    _spread(ledger, searched, np.random.default_rng([seed, len(ends)]))
     return tuple(ends)
+
+
+def _spread(ledger: _Ledger, box: Box, random: np.random.Generator) -> None:
+    """Draw gains about the near-optimal ones, until enough of these are known or the budget is spent."""
+    low, high = np.log10(list(box.values())).T
+    step = RADII[-1]  # decades, standard deviation
+    for _ in range(ledger.left):
+        near = near_optimal(ledger.evaluations)
+        if len(near) >= SETS or near[0].failed:
+            return
+        logs = np.log10(near[random.integers(len(near))].gains) + step * random.standard_normal(len(low))
+        cost = ledger.cost(np.clip(logs, low, high))
+        found = cost <= near[0].objective * (1.0 + NEAR_OPTIMAL)
+        step = max(step * (WIDER if found else NARROWER), LAST_RADIUS)
 
 
 def _drawn(ledger: _Ledger, box: Box, random: np.random.Generator, size: int) -> tuple[np.ndarray, float]:

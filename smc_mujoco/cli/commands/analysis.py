@@ -29,7 +29,7 @@ def tune(
     objective: Annotated[
         str, typer.Option(help="balanced: error, and variation of u; tracking: only error.")
     ] = "balanced",
-    budget: Annotated[int, typer.Option(min=1, help="How many sets of gains to try at most.")] = 768,
+    budget: Annotated[int, typer.Option(min=1, help="How many sets of gains to try at most.")] = 864,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search and of the noise.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Also write gains, history and provenance to a .json file.")] = None,
     front: Annotated[

@@ -8,13 +8,15 @@ import re
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis import ranking
 from smc_mujoco.analysis.tuning import search, search_space
 from smc_mujoco.analysis.tuning.objective import FAILED, Objective
 from smc_mujoco.analysis.tuning.result import SETS, Evaluation
-from smc_mujoco.analysis.tuning.search import START, compare, load, tune
+from smc_mujoco.analysis.tuning.search import SPARE, START, compare, load, tune
 from smc_mujoco.cli import main
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.units import Gain, Unit
@@ -56,8 +58,9 @@ def test_the_same_seed_gives_the_same_gains_to_the_last_bit_at_any_thread_count(
     assert other.history[-1].gains not in {e.gains for e in found.history}
 
 
-def test_a_larger_budget_repeats_the_starts_of_a_smaller_one_and_is_never_worse():
-    runs = [tune("duffing", "observer_free", budget=k * 2 * START, objective=LEAN) for k in (1, 3)]
+def test_a_larger_budget_repeats_the_starts_of_a_smaller_one_and_is_never_worse(monkeypatch):
+    monkeypatch.setattr(search, "_spread", lambda *_: None)
+    runs = [tune("duffing", "observer_free", budget=k * 2 * START + SPARE, objective=LEAN) for k in (1, 3)]
     longest = runs[-1]
     assert [len(one.ends) for one in runs] == [1, 3]
     for one in runs:
@@ -101,7 +104,26 @@ def test_a_search_ends_when_it_has_converged_and_knows_enough_sets_of_gains(monk
     monkeypatch.setattr(search, "near_optimal", lambda history: history[:SETS])
     assert len(tune("duffing", "observer_free", objective=LEAN).ends) == 2
     monkeypatch.setattr(search, "near_optimal", lambda history: history[: SETS - 1])
-    assert len(tune("duffing", "observer_free", budget=6 * START, objective=LEAN).ends) == 3
+    assert len(tune("duffing", "observer_free", budget=6 * START + SPARE, objective=LEAN).ends) == 3
+
+
+def test_a_search_that_knows_few_sets_ends_with_random_steps_from_these_within_its_bounds():
+    """J is near-optimal within 0.05 decades of the origin, where three sets are known, far closer to each other."""
+
+    class Ledger:
+        left, evaluations = SPARE, [Evaluation((10.0**z, 10.0**-z), 1.0, 1.0, 0.0) for z in (0.0, 1e-4, -1e-4)]
+
+        def cost(self, logs):
+            J = 1.0 + 12.0 * float(logs @ logs)
+            self.evaluations.append(Evaluation(tuple((10.0**logs).tolist()), J, J, 0.0))
+            return J
+
+    ledger = Ledger()
+    search._spread(ledger, {"a": (0.5, 1.05), "b": (0.5, 2.0)}, np.random.default_rng(0))
+    near = search.near_optimal(ledger.evaluations)
+    assert len(near) == SETS
+    assert np.ptp(np.log10([one.gains for one in near]), axis=0).min() > 0.02  # a hundred times as far apart
+    assert max(one.gains[0] for one in ledger.evaluations) <= 1.05 * (1 + 1e-12)
 
 
 def test_sets_are_near_optimal_distinct_and_cover_what_is_near_optimal(found):
@@ -117,6 +139,19 @@ def test_sets_are_near_optimal_distinct_and_cover_what_is_near_optimal(found):
     assert max(b - a for a, b in itertools.pairwise(places)) <= 0.06  # 0.75 decades in 24 sets
     assert [one.gains for one in sets[1:]] != sorted(one.gains for one in sets[1:])
     assert tuned.record()["sets"] == [one.gains for one in sets]
+
+
+def test_runs_of_two_laws_make_as_many_samples_as_the_law_with_fewer_sets_has(found):
+    """Sets that runs use in turn link their runs: 8 and 13 of them would make a single sample."""
+    few, many = (dataclasses.replace(found, history=_near(k)).sets for k in (8, 13))
+    runs = range(24)
+    linked = ranking.linked(*(np.array([k % len(sets) for k in runs]).tobytes() for sets in (few, many)))
+    assert linked is not None
+    assert len(set(linked)) == len(few) == 6
+
+
+def _near(count):
+    return tuple(Evaluation((1.0 + k / 100, 1.0), 1.0, 1.0, 0.0) for k in range(count))
 
 
 def test_what_is_not_integrated_by_rk4_is_run_as_it_is_in_both_rounds():
@@ -380,7 +415,7 @@ def test_the_command_prints_gains_and_writes_what_it_found(call, tmp_path):
     tuned = load(tmp_path / "k.json")
     assert code == 0
     assert f"{tuned.gains['k']:g}" in out
-    assert f"objective {tuned.objective:.4g} s², with the law's own gains {tuned.before:.4g} s²; 2 sets" in out
+    assert f"objective {tuned.objective:.4g} s², with the law's own gains {tuned.before:.4g} s²; 3 sets" in out
     assert tuned.definition == Objective(weight=0.0, u_max=6.0)
     assert ("no set of gains" in err) == (tuned.objective > tuned.before)
 
