@@ -77,6 +77,7 @@ class LawOptions(SurfaceOptions, total=False):
 
 
 OPTIONS = {"law": LawOptions, "surface": SurfaceOptions, "estimator": Options}
+QUANTITIES = {"accuracy": ("s", "e"), "admits": ("d", "d'")}  # option -> what it may give a number for
 
 
 class GainWarning(UserWarning):
@@ -418,6 +419,21 @@ def decorated(kind: str, function: Callable | None, options: Mapping) -> "Callab
     return decorate if function is None else decorate(function)
 
 
+def _check_words(words: Mapping[str, Any]) -> None:
+    """Check what a decorator says of a component to figures, tables and measurements, which read it long after."""
+    for option in ("label", "short", "family"):
+        if not isinstance(words.get(option, ""), str):
+            raise ScenarioError(f"{option} is {shown(words[option])}: give a text")
+    for option, known in QUANTITIES.items():
+        if not isinstance(given := words.get(option, {}), Mapping) or not given.keys() <= {*known}:
+            names = " and ".join(map(repr, known))
+            raise ScenarioError(f"{option} is {shown(given)}: give numbers, or functions of the gains, for {names}")
+    if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(words.get("colour", ""))):
+        raise ScenarioError(f"colour is {shown(words['colour'])}: give one like '#0072B2'")
+    if words.get("finite_time", "") not in FINITE:
+        raise ScenarioError(f"finite_time is {shown(words['finite_time'])}: give 's', 'e' or ''")
+
+
 def template(
     kind: str,
     gains: Mapping[str, float | Gain] | None = None,
@@ -434,10 +450,7 @@ def template(
     memory, relative_degree = whole("memory", memory, 1, 10_000), whole("relative_degree", relative_degree, 1, 10)
     if isinstance(plants, str):
         raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")
-    if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(words.get("colour", ""))):
-        raise ScenarioError(f"colour is {shown(words['colour'])}: give one like '#0072B2'")
-    if words.get("finite_time", "") not in FINITE:
-        raise ScenarioError(f"finite_time is {shown(words['finite_time'])}: give 's', 'e' or ''")
+    _check_words(words)
     for sign, names in (("positive", positive), ("nonnegative", nonnegative)):
         for name in names:
             if name not in stated:

@@ -38,10 +38,13 @@ def test_option_of_no_such_component_is_one_sentence(decorator):
         decorator(**{option: ()})
 
 
-@pytest.mark.parametrize("option", [{"colour": "red"}, {"colour": 3}])
-def test_word_that_cannot_be_drawn_is_refused(option):
-    with pytest.raises(smc.ScenarioError, match=next(iter(option))):
-        smc.law_function(**option)
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("colour", "red"), ("colour", 3), ("label", 3), ("family", 3), ("accuracy", 3), ("admits", {"x": 1.0})],
+)
+def test_word_that_cannot_be_drawn_and_bound_of_nothing_are_refused(option, value):
+    with pytest.raises(smc.ScenarioError, match=f"^{option} is .*: give "):
+        smc.law_function(**{option: value})
 
 
 @pytest.mark.parametrize("value", [{"shoulder": 1.0}, {1.0, 2.0}])
