@@ -48,7 +48,7 @@ NAMES = {
     "s": ("s", "sigma", "sliding", "sliding_variable"),
 }
 INPUTS = tuple(n for n in Measurement._fields if n not in ("has_surface", "s", "v_eq"))
-CLOSE = 1e-6  # relative difference below which two periods are equal
+PERIOD_TOLERANCE = 1e-6  # relative difference below which two periods are equal
 MAX_TIMEOUT = 86_400.0  # s: a day
 CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
 
@@ -121,7 +121,7 @@ class FmuLaw(Uncompiled):
         """Start an instance, which ends when the memory of the run is freed. Return its number."""
         place = next(_numbers)
         names = [theirs for _, theirs in self.inputs]
-        address = memory.__array_interface__["data"][0]
+        address = memory.ctypes.data
         _end(_begun.get(address, 0))  # the instance of a run whose memory was set to 0, to begin again
         if self.once:
             self._make_room()
@@ -151,9 +151,9 @@ def steps(period: float | None, dt: float) -> tuple[int, float]:
     if period is None:
         return 1, dt
     slower, faster = period / dt, dt / period
-    if abs(slower - round(slower)) < CLOSE * slower and round(slower) >= 1:
+    if abs(slower - round(slower)) < PERIOD_TOLERANCE * slower and round(slower) >= 1:
         return round(slower), round(slower) * dt
-    if abs(faster - round(faster)) < CLOSE * faster:
+    if abs(faster - round(faster)) < PERIOD_TOLERANCE * faster:
         return 1, dt / round(faster)
     raise ScenarioError(
         f"the FMU steps every {period:g} s and the law runs every {dt:g} s: give control_period={period:g}"
@@ -172,10 +172,10 @@ def _end(place: int) -> None:
 def extracted(path: str, digest: str) -> Path:
     """Return the folder with an FMU's extracted files, from its path and the hash that it had."""
     try:
-        found = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        now = hashlib.sha256(Path(path).read_bytes()).hexdigest()
     except OSError:
-        found = ""
-    if found != digest:
+        now = ""
+    if now != digest:
         raise ScenarioError(f"FMU {Path(path).name!r} is gone or has changed: call smc.law_from_fmu again")
     folder = build.fresh("-fmu")
     with zipfile.ZipFile(path) as archive:
@@ -380,12 +380,12 @@ def _without_meaning(file: str, strange: Sequence[str], known: Mapping[str, Any]
 def _by_name(theirs: Iterable[str], ours: Iterable[str]) -> dict[str, str]:
     """Return our name -> the FMU's, for its variables whose name, after the last dot, is ours or one of NAMES."""
     words = {name.rsplit(".", 1)[-1].casefold(): name for name in theirs}
-    found = {}
+    meanings = {}
     for name in ours:
         word = next((word for word in (name, *NAMES.get(name, ())) if word in words), None)
         if word is not None:
-            found[name] = words.pop(word)
-    return found
+            meanings[name] = words.pop(word)
+    return meanings
 
 
 def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
