@@ -59,13 +59,10 @@ def run(
     sets the control callback meanwhile.
     """
     many = list(_prepared([scenarios] if isinstance(scenarios, Scenario) else scenarios))
-    found: list[Trace | None] = [None] * len(many)
     work = sum(one.scenario.work for one in many)
     with bar(f"{len(many)} run{'s' * (len(many) != 1)}", work, shown=progress) as drawn:
-        for index, trace in stream(many, threads, drawn.advance):
-            found[index] = trace
-    traces = [trace for trace in found if trace is not None]
-    return traces[0] if isinstance(scenarios, Scenario) else traces
+        traces = dict(stream(many, threads, drawn.advance))
+    return traces[0] if isinstance(scenarios, Scenario) else [traces[i] for i in range(len(many))]
 
 
 def stream(
@@ -124,11 +121,12 @@ def _batches(group: Sequence[tuple[int, Prepared]], threads: int) -> Iterator[li
     batch: list[tuple[int, Prepared]] = []
     size = 0
     for index, prepared in group:
-        if len(batch) >= threads and size + prepared.bytes > BATCH_BYTES:
+        needed = prepared.bytes
+        if len(batch) >= threads and size + needed > BATCH_BYTES:
             yield batch
             batch, size = [], 0
         batch.append((index, prepared))
-        size += prepared.bytes
+        size += needed
     if batch:
         yield batch
 
