@@ -4,11 +4,12 @@ A scenario takes one drive, or a Lag and another drive in series, and a Backlash
 
 The callback simulates Lag and RateLimit (`DriveStep`) and gives MuJoCo the mean of their force over each physics step.
 So the velocities at the ends of the steps are those of the equations, whatever the step is, and any integrator may be
-used. A state that MuJoCo integrates would give each step the force of its end. Such a lead of half a step takes away a
-part of the delay that a limit cycle depends on: behind one lag, most of it.
+used; only a RateLimit behind a Lag is not exact, see there. A state that MuJoCo integrates would give each step the
+force of its end. Such a lead of half a step takes away a part of the delay that a limit cycle depends on: behind one
+lag, most of it.
 
 MuJoCo simulates a DCMotor and its current, under implicitfast. It gets such a voltage that the mean of the current over
-a step is right for a held u, see `drive_step`.
+a step is right for a held voltage, see `drive_step`.
 """
 
 # pyright: reportIncompatibleVariableOverride=false
@@ -30,7 +31,7 @@ WINDING = slice(0, 2)  # of actuator_gainprm: resistance, ohm, and torque consta
 SUDDEN = 1e-12  # s: a winding with a shorter time constant counts as instantaneous, else MuJoCo divides by about 0
 MIN_RESISTANCE = 1e-9  # ohm: with less, the voltage of a command is lost in rounding
 LONGEST_STEP = 1e9  # time constants: a shorter lag counts as this
-SHORT_STEP = 1e-3  # time constants: the series of `_current_weight` errs by less than 1e-12 below it
+SHORT_STEP = 1e-3  # time constants: the series of `_current_weight` errs by less than 2e-12 below it
 MIN_CONSTANT = 1e-9  # N m/A at the joint, of the weakest motor
 TIME_CONSTANT = 0  # of actuator_dynprm, s
 COMMANDS = ("torque", "voltage")
@@ -70,7 +71,8 @@ class Lag(Drive):
 class RateLimit(Drive):
     """A force that follows u no faster than `rate`, from 0: f(t + h) = u clipped to f(t) +- rate h.
 
-    The mean force over each physics step is exact for a held u.
+    The mean force over each physics step is exact for a held u. Behind a Lag it errs in the steps in which the force
+    meets the lag's output, at most by the change of that output in the step: little, if the step is short beside tau.
 
     Attributes:
       rate: N m/s (N/s), greater than 0; math.inf for no limit.
@@ -171,7 +173,7 @@ class DCMotor(Drive):
 
     @property
     def stall(self) -> float:
-        """The most torque that voltage and current allow at rest, N m (N)."""
+        """The largest torque that voltage and current allow at rest, N m (N)."""
         return min(self.voltage * self.constant / self.resistance, self.constant * self.current)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
@@ -260,8 +262,8 @@ def drive_step(actuator: tuple[Actuator, ...], step: float) -> DriveStep | None:
     if windings:
         (b,) = windings
         last = 1.0 - _current_weight(b)
-        held = _passed(a, b) / -math.expm1(-b) if lags else 0.0
-        return made._replace(force_first=(1.0 - last) * held, force_second=last, second_first=held)
+        remaining = _passed(a, b) / -math.expm1(-b) if lags else 0.0
+        return made._replace(force_first=(1.0 - last) * remaining, force_second=last, second_first=remaining)
     if len(lags) < 2:
         return made
     b = lags[1]

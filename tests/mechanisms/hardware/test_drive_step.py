@@ -126,6 +126,25 @@ def test_a_rate_limit_follows_the_lag():
     assert trace.force[1:, 0] == pytest.approx(np.diff(np.interp(trace.t, fine, total)) / H, abs=2e-3)
 
 
+@pytest.mark.parametrize(("tau", "rate"), [(1e-4, 1e3), (1e-3, 100.0), (1e-3, 2e3), (0.01, 20.0)])
+def test_a_rate_limit_behind_a_lag_errs_by_less_than_the_lag_moves_in_a_step(tau, rate):
+    """It is exact where the force is limited, or follows the lag, all the step."""
+    step, parts = 1e-3, 2000
+    u, first, gap = np.random.default_rng(0).normal(size=(3, 500))
+    second = first + gap * np.repeat([0.0, 0.01, 0.1, 1.0, 3.0], 100)
+    mean, last, _ = drive_step((smc.Lag(tau), smc.RateLimit(rate)), step)(u, first, second)
+    force, total, above, below = second, 0.0, 0, 0
+    for t in step * np.arange(1, parts + 1) / parts:
+        lagged, before = u + (first - u) * np.exp(-t / tau), force
+        force = np.clip(lagged, before - rate * step / parts, before + rate * step / parts)
+        total, above, below = total + 0.5 * (before + force) / parts, above + (lagged > force), below + (lagged < force)
+    error, whole = np.abs(mean - total), (above + below == 0) | (above == parts) | (below == parts)
+    np.testing.assert_allclose(last, lagged, rtol=1e-12)
+    assert 100 < whole.sum() < 500
+    assert error[whole].max() < 1e-3
+    assert (error <= np.abs(last - first) + 1e-3).all()
+
+
 def moved(s, u):
     """x of the scenario's Duffing block behind its Lag and its DCMotor, by SciPy, under the commands of its samples."""
     lag, motor = s.actuator
