@@ -283,8 +283,8 @@ class Template:
     def doc(self) -> str:
         """The docstring of the function's module if the module has the function's name, else the function's."""
         module = inspect.getmodule(self.function)
-        own = module is not None and module.__name__.rsplit(".", 1)[-1] == self.name
-        return inspect.cleandoc((module.__doc__ if own and module else self.function.__doc__) or self.name)
+        named_alike = module is not None and module.__name__.rsplit(".", 1)[-1] == self.name
+        return inspect.cleandoc((module.__doc__ if named_alike and module else self.function.__doc__) or self.name)
 
     def order(self, quantity: str, gains: Mapping[str, Value]) -> float | None:
         """Return theory's order of accuracy of "s" or "e" with these gains; None if the law does not state it."""

@@ -82,11 +82,11 @@ def component(kind: str, text: str, known: Mapping[str, Template], example: str)
 def _parts(kind: str, text: str, example: str) -> tuple[str, dict[str, Value]]:
     """Return what stands before the brackets of a text, and the gains in them."""
     try:
-        found = GAINS.fullmatch(text.strip())
-        call = found and ast.parse(f"f({found['gains'] or ''})", mode="eval").body
-        if not found or not isinstance(call, ast.Call) or call.args:
+        matched = GAINS.fullmatch(text.strip())
+        call = matched and ast.parse(f"f({matched['gains'] or ''})", mode="eval").body
+        if not matched or not isinstance(call, ast.Call) or call.args:
             raise ValueError
-        return found["head"], {str(word.arg): _value(word.value) for word in call.keywords}
+        return matched["head"], {str(word.arg): _value(word.value) for word in call.keywords}
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ScenarioError(f"{kind} {shown(text)} cannot be read: write it as {example}") from None
 
@@ -110,8 +110,8 @@ def _with(made: Law, gains: Mapping[str, float | Sequence[float]]) -> Law:
 def _of_python(path: str) -> list[Law]:
     """Return the laws that a file of Python makes with @smc.law_function, with their default gains."""
     values = execute(Path(path)).values()
-    own = {value.name: value for value in values if isinstance(value, Template) and value.kind == "law"}
-    made = [each() for name, each in own.items() if each is not known_laws().get(name)]
+    templates = {value.name: value for value in values if isinstance(value, Template) and value.kind == "law"}
+    made = [each() for name, each in templates.items() if each is not known_laws().get(name)]
     if not made:
         raise ScenarioError(f"{path} has no law: write @smc.law_function above a function (y, gains, memory)")
     return made

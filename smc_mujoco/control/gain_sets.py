@@ -86,7 +86,7 @@ def general() -> tuple[str, ...]:
 
 def general_laws(plants: Sequence[str | Plant], gains: str) -> list[str]:
     """List the general laws that have gains in a set on each of these plants, those of LAWS first."""
-    found, why = [], None
+    names, why = [], None
     for name in general():
         try:
             for plant in plants:
@@ -94,10 +94,10 @@ def general_laws(plants: Sequence[str | Plant], gains: str) -> list[str]:
         except ScenarioError as error:
             why = error
         else:
-            found.append(name)
-    if not found and why:
+            names.append(name)
+    if not names and why:
         raise why
-    return found
+    return names
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -113,15 +113,15 @@ def coriolis(y, w):
 def _coriolis(y, w):
     def compiled(y, w):
         n = len(y.x)
-        given, found = np.empty(n), np.zeros(n)
+        given, forces = np.empty(n), np.zeros(n)
         for i in range(n):
             given[i] = w[i]
         if y.dynamics != 0:
-            asked = requests_at(y.dynamics, 0)
-            call(int(asked.coriolis), given.ctypes.data, int(asked.parameters), 0, found.ctypes.data)
+            request = requests_at(y.dynamics, 0)
+            call(int(request.coriolis), given.ctypes.data, int(request.parameters), 0, forces.ctypes.data)
             for i in range(n):
-                found[i] /= asked.unit
-        return found
+                forces[i] /= request.unit
+        return forces
 
     return compiled
 
@@ -140,13 +140,13 @@ def jacobian(y):
 @overload(jacobian)
 def _jacobian(y):
     def compiled(y):
-        found = np.zeros((3, len(y.x)))
+        rows = np.zeros((3, len(y.x)))
         if y.dynamics == 0:
             raise ValueError
-        asked = requests_at(y.dynamics, 0)
-        if call(int(asked.jacobian), 0, int(asked.parameters), 0, found.ctypes.data) != 0:
+        request = requests_at(y.dynamics, 0)
+        if call(int(request.jacobian), 0, int(request.parameters), 0, rows.ctypes.data) != 0:
             raise ValueError
-        return found
+        return rows
 
     return compiled
 
@@ -154,11 +154,11 @@ def _jacobian(y):
 @njit
 def product(M, w):
     """Return M w, added in the same order in Python and compiled. `M @ w` does not promise that."""
-    found = np.zeros(len(w))
+    total = np.zeros(len(w))
     for i in range(len(w)):
         for j in range(len(w)):
-            found[i] += M[i, j] * w[j]
-    return found
+            total[i] += M[i, j] * w[j]
+    return total
 
 
 @njit
@@ -208,10 +208,10 @@ def saturate(a):
 @njit
 def tanh(a):
     """Return the hyperbolic tangents of a vector. The bits are the same in Python and compiled, unlike numpy's."""
-    found = np.empty(len(a))
+    values = np.empty(len(a))
     for i in range(len(a)):
-        found[i] = math.tanh(a[i])
-    return found
+        values[i] = math.tanh(a[i])
+    return values
 
 
 @njit

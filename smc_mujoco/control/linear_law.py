@@ -200,10 +200,10 @@ def _system(K: Any) -> System:
 def _matrices(a: Any, b: Any, c: Any, d: Any, dt: Any) -> System:
     """Return matrices as arrays of two axes; a number is a matrix of 1 x 1, and a list is the column b or a row."""
     try:
-        found = [np.asarray(each) for each in (a, b, c, d)]
-        if any(np.iscomplexobj(each) for each in found):
+        arrays = [np.asarray(each) for each in (a, b, c, d)]
+        if any(np.iscomplexobj(each) for each in arrays):
             raise ValueError
-        a, b, c, d = (each.astype(float) for each in found)
+        a, b, c, d = (each.astype(float) for each in arrays)
         b = b[:, None] if b.ndim == 1 else b
         a, b, c, d = (np.atleast_2d(each) for each in (a, b, c, d))
         if not a.size:

@@ -64,10 +64,10 @@ PROPERTIES: Mapping[str, Property] = {
 
 def families() -> dict[str, list[str]]:
     """Return family -> the names of its laws."""
-    found: dict[str, list[str]] = {}
+    members: dict[str, list[str]] = {}
     for name, law in catalogue().items():
-        found.setdefault(law.family, []).append(name)
-    return dict(sorted(found.items()))
+        members.setdefault(law.family, []).append(name)
+    return dict(sorted(members.items()))
 
 
 def suitable(needs: Iterable[str] = (), family: str | None = None, plant: Plant | str | None = None) -> list[Template]:
@@ -101,15 +101,15 @@ def _reads(function: object, position: int, seen: set[object]) -> set[str]:
         assert isinstance(tree, ast.FunctionDef)
     except (AssertionError, OSError, SyntaxError, ValueError):
         return set(Measurement._fields)
-    name, found, known = tree.args.args[position].arg, set(), 0
+    name, fields, known = tree.args.args[position].arg, set(), 0
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == name:
-            found.add(node.attr)
+            fields.add(node.attr)
             known += 1
         elif isinstance(node, ast.Call):
             for i, argument in enumerate(node.args):
                 if isinstance(argument, ast.Name) and argument.id == name:
-                    found |= _reads(function.__globals__.get(ast.unparse(node.func)), i, seen)
+                    fields |= _reads(function.__globals__.get(ast.unparse(node.func)), i, seen)
                     known += 1
     uses = sum(isinstance(node, ast.Name) and node.id == name for node in ast.walk(tree))
-    return found if uses == known else set(Measurement._fields)
+    return fields if uses == known else set(Measurement._fields)

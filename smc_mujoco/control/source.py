@@ -115,15 +115,15 @@ def in_words(sources: Mapping[str, Iterable[Source]], short: bool = False) -> st
       short: whether to leave out the searches.
     """
     known = {law: [source for source in its if source.kind != NONE] for law, its in sources.items()}
-    found = {law: kinds(its) for law, its in known.items()}
+    words = {law: kinds(its) for law, its in known.items()}
     if short:
-        return by_words(found)
+        return by_words(words)
     searches: dict[str, dict[str, list[Search]]] = {}
     for law, its in known.items():
         if some := [source.search for source in its if source.search]:
-            searches.setdefault(found[law], {})[law] = some
+            searches.setdefault(words[law], {})[law] = some
     return by_words(
-        {law: f"{its} ({_searched(searches[its])})" if its in searches else its for law, its in found.items()}
+        {law: f"{its} ({_searched(searches[its])})" if its in searches else its for law, its in words.items()}
     )
 
 

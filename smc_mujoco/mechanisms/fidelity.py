@@ -26,7 +26,7 @@ def deviation(plant: Plant | str, mechanism: str, reach: float | None = None) ->
     """
     plant = as_plant(plant)
     variant = find(f"mechanism of {plant.name}", mechanism, plant.mechanisms)
-    most = number("reach", max(map(abs, plant.x0)) if reach is None else reach, above=0.0)
+    reach = number("reach", max(map(abs, plant.x0)) if reach is None else reach, above=0.0)
     spec = plant.spec()
     variant.edit(spec)
     model = compiled(spec)
@@ -35,7 +35,7 @@ def deviation(plant: Plant | str, mechanism: str, reach: float | None = None) ->
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
     error = size = 0.0
-    for x, v in _states(plant.n, most):
+    for x, v in _states(plant.n, reach):
         f = np.array([plant.nominal(x, v, i, values)[0] for i in range(plant.n)])
         data.qpos[:], data.qvel[:] = x, v
         mujoco.mj_forward(model, data)

@@ -16,9 +16,9 @@ from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.mechanisms.hardware.part import initial_pose
 from smc_mujoco.mechanisms.plant import Plant
 
-CLOSE = 1e-9  # m and rad, of the tip
-MOST = 200  # steps
-LONGEST = 0.3  # rad or m, of a step
+TOLERANCE = 1e-9  # m and rad, of the tip
+MAX_STEPS = 200  # steps
+MAX_MOVE = 0.3  # rad or m, of a step
 
 
 @dataclasses.dataclass
@@ -75,15 +75,15 @@ class Tip:
 
 def solve(tip: Tip, points: np.ndarray, start: Sequence[float]) -> np.ndarray:
     """Return joint positions, (N, n), at which the tip is at points, (N, 3), m. Each search begins at the last."""
-    x, found, away = np.array(start, float), [], np.zeros(3)
+    x, path, away = np.array(start, float), [], np.zeros(3)
     for i, point in enumerate(points):
-        for _ in range(MOST):
+        for _ in range(MAX_STEPS):
             away, J = tip.error(x, point)
             size = float(away @ away)
-            if size < CLOSE**2:
+            if size < TOLERANCE**2:
                 break
             move = J.T @ np.linalg.solve(J @ J.T + (0.01 * size + 1e-14) * np.eye(len(away)), away)
-            move *= min(1.0, LONGEST / float(np.abs(move).max() + 1e-300))
+            move *= min(1.0, MAX_MOVE / float(np.abs(move).max() + 1e-300))
             x = np.clip(x + move, tip.low, tip.high)
         else:
             there = ", ".join(f"{each:.4g}" for each in point)
@@ -93,5 +93,5 @@ def solve(tip: Tip, points: np.ndarray, start: Sequence[float]) -> np.ndarray:
                 f"the tip of {tip.plant.name} does not reach ({there}) m, point {i} of {len(points)} on its path: it "
                 f"stays {stays} away; give points within reach, or another x0"
             )
-        found.append(x)
-    return np.array(found)
+        path.append(x)
+    return np.array(path)

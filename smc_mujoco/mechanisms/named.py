@@ -16,12 +16,12 @@ MODEL = re.compile(r"(?P<path>.*\.xml)(?::(?P<joints>.*))?", re.DOTALL)
 
 def as_plant(value: object) -> Plant:
     """Return a plant: itself, by its name, or from "FILE.xml:joint,joint"."""
-    found = from_text(value) if isinstance(value, str) else value
-    if not isinstance(found, Plant):
+    made = from_text(value) if isinstance(value, str) else value
+    if not isinstance(made, Plant):
         raise ScenarioError(
-            f"plant is {shown(found)}: give a name that smc.plants() lists, smc.plant(...), or FILE.xml:joint,joint"
+            f"plant is {shown(made)}: give a name that smc.plants() lists, smc.plant(...), or FILE.xml:joint,joint"
         )
-    return found
+    return made
 
 
 def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:

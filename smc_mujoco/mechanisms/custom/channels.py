@@ -10,7 +10,7 @@ import mujoco
 from smc_mujoco.common.errors import ScenarioError, find, number, shown, taken
 from smc_mujoco.mechanisms.custom.mjcf import pick
 
-BEYOND = 1e-3  # rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
+MAX_EXCESS = 1e-3  # rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
 SIMPLE = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
 
 Range = tuple[str, float, float]  # joint, least and largest position, rad or m
@@ -93,11 +93,11 @@ def channel(joint: object, value: object) -> Channel:
 
 def suggested(channels: Pairs) -> dict[str, tuple]:
     """Return field -> what each channel suggests to scenarios, None where nothing; only fields that one suggests."""
-    found = {name: tuple(getattr(channel, name) for _, channel in channels) for name in SUGGESTED}
+    fields = {name: tuple(getattr(channel, name) for _, channel in channels) for name in SUGGESTED}
     bare = [joint for joint, channel in channels if channel.law is None]
     if 0 < len(bare) < len(channels):
         raise ScenarioError(f"channel {bare[0]!r} has no law and others have: give each one, or none")
-    return {name: values for name, values in found.items() if any(value is not None for value in values)}
+    return {name: values for name, values in fields.items() if any(value is not None for value in values)}
 
 
 def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
@@ -137,7 +137,7 @@ def starts(
 def check_ranges(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> None:
     """Raise ScenarioError for a start outside a joint's range."""
     for (joint, low, high), x in zip(ranges, x0, strict=False):
-        if not low - BEYOND <= x <= high + BEYOND:
+        if not low - MAX_EXCESS <= x <= high + MAX_EXCESS:
             raise ScenarioError(
                 f"x0 of joint {joint!r} of {plant} is {x:g}, outside its range from {low:g} to {high:g}: "
                 "give another x0"
@@ -146,10 +146,10 @@ def check_ranges(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> No
 
 def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:
     """Return joint, least and largest position of each channel, rad or m; empty where none has limits."""
-    found = []
+    rows = []
     for joint in map(model.joint, joints):
         low, high = joint.range if joint.limited[0] else (-math.inf, math.inf)
-        found.append((joint.name, float(low), float(high)))
+        rows.append((joint.name, float(low), float(high)))
     flags = mujoco.mjtDisableBit
     off = model.opt.disableflags & (flags.mjDSBL_LIMIT.value | flags.mjDSBL_CONSTRAINT.value)
-    return () if off or not any(math.isfinite(low) for _, low, _ in found) else tuple(found)
+    return () if off or not any(math.isfinite(low) for _, low, _ in rows) else tuple(rows)

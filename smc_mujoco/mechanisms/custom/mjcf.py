@@ -29,7 +29,7 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 FOLDERS = ("meshdir", "texturedir", "assetdir")  # where a <compiler> may say that assets lie
 XML = (".xml", ".mjcf", ".urdf")
 DIGITS = 17  # of numbers in the XML of an MjSpec: enough for any float64
-SAME = 1e-12  # relative and absolute: change of a model's numbers when it is written and read, which is rounding
+ROUNDING = 1e-12  # relative and absolute: change of a model's numbers when it is written and read
 
 RESERVED = ("smc:", PLAY, ROTOR)  # prefixes of names of this package's parts
 NAMED = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")  # kinds of object that these parts add
@@ -139,10 +139,10 @@ def _of_text(text: str, assets: Mapping[str, bytes]) -> Source:
 
 def _of_spec(spec: mujoco.MjSpec) -> Source:
     """Return the source of an MjSpec as it is now: its XML with all digits, and the files that it names."""
-    own = spec.copy()
+    copied = spec.copy()
     try:
-        model = mjcb.compiled(own)
-        text = _full_precision_xml(own)
+        model = mjcb.compiled(copied)
+        text = _full_precision_xml(copied)
     except (ValueError, mujoco.FatalError) as error:
         raise broken("the MjSpec", str(error)) from None
     made = _of_text(text, _assets(spec, text))
@@ -164,8 +164,8 @@ def _assets(spec: mujoco.MjSpec, text: str) -> dict[str, bytes]:
     assets = dict(spec.assets)
     for name in _files(elements):
         places = [Path(spec.modelfiledir) / sub / name for sub in sorted(inner)]
-        if name not in assets and (found := [place for place in places if place.is_file()]):
-            assets[name] = found[0].read_bytes()
+        if name not in assets and (there := [place for place in places if place.is_file()]):
+            assets[name] = there[0].read_bytes()
     return assets
 
 
@@ -189,7 +189,7 @@ def _difference(model: mujoco.MjModel, again: mujoco.MjModel) -> str:
     """Return the first field in which two models differ by more than rounding, or ""."""
     for name in fields(model):
         one, other = getattr(model, name), getattr(again, name)
-        if one.shape != other.shape or not np.allclose(one, other, rtol=SAME, atol=SAME, equal_nan=True):
+        if one.shape != other.shape or not np.allclose(one, other, rtol=ROUNDING, atol=ROUNDING, equal_nan=True):
             return name
     return ""
 

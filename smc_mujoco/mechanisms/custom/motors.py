@@ -36,29 +36,31 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
     """Return the motor that drives a joint."""
     number, wanted = model.joint(joint).id, channel.actuator
     bounds = [tuple(map(float, model.jnt_actfrcrange[number]))] if model.jnt_actfrclimited[number] else []
-    own = [i for i in range(model.nactuator) if model.actuator_trntype[i] in MOTOR]
-    own = [i for i in own if model.actuator_trnid[i, 0] == number]
+    actuators = [i for i in range(model.nactuator) if model.actuator_trntype[i] in MOTOR]
+    actuators = [i for i in actuators if model.actuator_trnid[i, 0] == number]
     if channel.motor:
         if wanted is not None:
             raise ScenarioError(f"channel {joint!r} has motor=True and actuator {shown(wanted)}: give one of the two")
         takes = f"joint {joint!r} of {label} takes"
-        return Motor(joint, _limit(takes, "widen its actuatorfrcrange", *bounds, _together(model, own)), tuple(own))
+        return Motor(
+            joint, _limit(takes, "widen its actuatorfrcrange", *bounds, _together(model, actuators)), tuple(actuators)
+        )
     if wanted is not None:
         chosen = pick(label, "actuator", wanted, [model.actuator(i).name for i in range(model.nactuator)])
-        if chosen not in own:
+        if chosen not in actuators:
             raise ScenarioError(f"actuator {wanted!r} of {label} does not drive joint {joint!r} alone: {CURE}")
-        own = [chosen]
-    if not own:
+        actuators = [chosen]
+    if not actuators:
         raise ScenarioError(f"no actuator of {label} drives joint {joint!r} alone: {CURE}")
-    names = [model.actuator(i).name or f"number {i}" for i in own]
-    if len(own) > 1:
+    names = [model.actuator(i).name or f"number {i}" for i in actuators]
+    if len(actuators) > 1:
         raise ScenarioError(
             f"joint {joint!r} of {label} has the actuators {', '.join(names)}: name one with smc.Channel(actuator=...)"
         )
-    if why := _no_motor(model, own[0]):
+    if why := _no_motor(model, actuators[0]):
         raise ScenarioError(f"actuator {names[0]!r} of joint {joint!r} {why}, and a law commands a force: {CURE}")
     gives = f"actuator {names[0]!r} gives joint {joint!r} of {label}"
-    return Motor(joint, _limit(gives, CURE, *bounds, _of_actuator(model, own[0])), tuple(own))
+    return Motor(joint, _limit(gives, CURE, *bounds, _of_actuator(model, actuators[0])), tuple(actuators))
 
 
 def _no_motor(model: mujoco.MjModel, i: int) -> str:
@@ -92,8 +94,8 @@ def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
     if model.actuator_ctrllimited[i] and clamped:
         low, high = sorted(float(gain * end) for end in model.actuator_ctrlrange[i])
     if model.actuator_forcelimited[i]:
-        least, most = model.actuator_forcerange[i]
-        low, high = (float(min(max(end, least), most)) for end in (low, high))
+        lowest, highest = model.actuator_forcerange[i]
+        low, high = (float(min(max(end, lowest), highest)) for end in (low, high))
     low, high = sorted((float(gear * low), float(gear * high)))
     return low, high
 

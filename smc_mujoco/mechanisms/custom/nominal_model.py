@@ -123,7 +123,7 @@ class NominalModel:
     def dynamics(self, x: np.ndarray, v: np.ndarray, p: Any) -> Dynamics:
         """Return M, h and g of all channels, at their x and v, (n,) each."""
         model, places, data, _ = prepared(self, frozen(vars(p)))
-        dense, found = np.zeros((model.nv, model.nv)), {}
+        dense, forces = np.zeros((model.nv, model.nv)), {}
         with _lock:
             data.qpos[:], data.qvel[:], data.ctrl[:] = model.qpos0, 0.0, 0.0
             data.qpos[places.qpos] = x
@@ -133,13 +133,13 @@ class NominalModel:
                 data.qvel[places.qvel] = velocity
                 mujoco.mj_fwdVelocity(model, data)
                 mujoco.mj_fwdActuation(model, data)
-                found[name] = (data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator)[places.qvel]
-        return Dynamics(dense[np.ix_(places.qvel, places.qvel)], found["h"], found["g"])
+                forces[name] = (data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator)[places.qvel]
+        return Dynamics(dense[np.ix_(places.qvel, places.qvel)], forces["h"], forces["g"])
 
     def coriolis(self, x: np.ndarray, v: np.ndarray, w: np.ndarray, p: Any) -> np.ndarray:
         """Return C(x, v) w, (n,), with the C of Christoffel's symbols."""
         model, places, data, _ = prepared(self, frozen(vars(p)))
-        found = np.zeros(len(x))
+        forces = np.zeros(len(x))
         with _lock:
             data.qpos[:], data.qvel[:] = model.qpos0, 0.0
             data.qpos[places.qpos] = x
@@ -147,19 +147,19 @@ class NominalModel:
             for sign in (1.0, -1.0):
                 data.qvel[places.qvel] = v + sign * w
                 mujoco.mj_fwdVelocity(model, data)
-                found += sign * 0.25 * data.qfrc_bias[places.qvel]
-        return found
+                forces += sign * 0.25 * data.qfrc_bias[places.qvel]
+        return forces
 
     def jacobian(self, x: np.ndarray, p: Any, tip: str) -> np.ndarray:
         """Return how the position of a site, the tip, depends on the channels, (3, n)."""
         model, places, data, _ = prepared(self, frozen(vars(p)))
-        found = np.zeros((3, model.nv))
+        rows = np.zeros((3, model.nv))
         with _lock:
             data.qpos[:] = model.qpos0
             data.qpos[places.qpos] = x
             mujoco.mj_fwdPosition(model, data)
-            mujoco.mj_jacSite(model, data, found, None, model.site(tip).id)
-        return found[:, places.qvel]
+            mujoco.mj_jacSite(model, data, rows, None, model.site(tip).id)
+        return rows[:, places.qvel]
 
     def native_dynamics(self, parameters: Mapping[str, float], tip: str, at_rest: bool = True) -> Native:
         """Return the C function of `dynamics` for one simulation, whose values `coriolis` and `jacobian` use, too.
@@ -282,24 +282,24 @@ def native_dynamics() -> Function:
     full = _called("mj_fullM", 1)
 
     def native(y, p, m, out):
-        own, read = dynamics_at(p, 0), seen_at(y, 0)
-        n, nv, model, data = int(own.n), int(own.nv), int(own.model), int(own.data)
-        biases, alone = int(own.bias), own.alone != 0.0
-        x, v, state = pointer(read.x), pointer(read.v), carray(pointer(int(own.state)), (2 * n,))
-        qpos, qvel = carray(pointer(int(own.qpos)), (1 << 40,)), carray(pointer(int(own.qvel)), (nv,))
-        bias, passive = carray(pointer(biases), (nv,)), carray(pointer(int(own.passive)), (nv,))
-        actuator, table = carray(pointer(int(own.actuator)), (nv,)), carray(integers(int(own.places)), (2 * n,))
-        dense, output = carray(pointer(int(own.dense)), (nv, nv)), carray(pointer(out), (n * n + 2 * n,))
+        at, read = dynamics_at(p, 0), seen_at(y, 0)
+        n, nv, model, data = int(at.n), int(at.nv), int(at.model), int(at.data)
+        biases, alone = int(at.bias), at.alone != 0.0
+        x, v, state = pointer(read.x), pointer(read.v), carray(pointer(int(at.state)), (2 * n,))
+        qpos, qvel = carray(pointer(int(at.qpos)), (1 << 40,)), carray(pointer(int(at.qvel)), (nv,))
+        bias, passive = carray(pointer(biases), (nv,)), carray(pointer(int(at.passive)), (nv,))
+        actuator, table = carray(pointer(int(at.actuator)), (nv,)), carray(integers(int(at.places)), (2 * n,))
+        dense, output = carray(pointer(int(at.dense)), (nv, nv)), carray(pointer(out), (n * n + 2 * n,))
         for j in range(n):
             state[j], state[n + j] = x[j], v[j]
             qpos[table[j]] = x[j]
         positions(model, data, biases, alone)
-        full(model, data, int(own.dense))
+        full(model, data, int(at.dense))
         for i in range(n):
             for j in range(n):
                 output[n * i + j] = dense[table[n + i], table[n + j]]
         first = 0
-        if own.at_rest == 0.0:  # without g
+        if at.at_rest == 0.0:  # without g
             first = 1
             for j in range(n):
                 output[n * n + n + j] = math.nan
@@ -321,20 +321,20 @@ def native_coriolis() -> Function:
     rates, newton_euler, velocity = _called("mj_comVel"), _called("mj_rne", 2), _called("mj_fwdVelocity")
 
     def native(y, p, m, out):
-        own = dynamics_at(p, 0)
-        n, nv, model, data = int(own.n), int(own.nv), int(own.model), int(own.data)
+        at = dynamics_at(p, 0)
+        n, nv, model, data = int(at.n), int(at.nv), int(at.model), int(at.data)
         w, output = carray(pointer(y), (n,)), carray(pointer(out), (n,))
-        state, qvel = carray(pointer(int(own.state)), (2 * n,)), carray(pointer(int(own.qvel)), (nv,))
-        bias, table = carray(pointer(int(own.bias)), (nv,)), carray(integers(int(own.places)), (2 * n,))
+        state, qvel = carray(pointer(int(at.state)), (2 * n,)), carray(pointer(int(at.qvel)), (nv,))
+        bias, table = carray(pointer(int(at.bias)), (nv,)), carray(integers(int(at.places)), (2 * n,))
         for j in range(n):
             output[j] = 0.0
         for part in range(2):
             sign = 1.0 - 2.0 * part
             for j in range(n):
                 qvel[table[n + j]] = state[n + j] + sign * w[j]
-            if own.alone != 0.0:
+            if at.alone != 0.0:
                 rates(model, data)
-                newton_euler(model, data, 0, int(own.bias))
+                newton_euler(model, data, 0, int(at.bias))
             else:
                 velocity(model, data)
             for j in range(n):
@@ -350,13 +350,13 @@ def native_jacobian() -> Function:
     of_site = _called("mj_jacSite", 3)
 
     def native(y, p, m, out):
-        own = dynamics_at(p, 0)
-        n, nv, site = int(own.n), int(own.nv), int(own.site)
-        output, table = carray(pointer(out), (3, n)), carray(integers(int(own.places)), (2 * n,))
-        moves = carray(pointer(int(own.moves)), (3, nv))
+        at = dynamics_at(p, 0)
+        n, nv, site = int(at.n), int(at.nv), int(at.site)
+        output, table = carray(pointer(out), (3, n)), carray(integers(int(at.places)), (2 * n,))
+        moves = carray(pointer(int(at.moves)), (3, nv))
         if site < 0:
             return 1
-        of_site(int(own.model), int(own.data), int(own.moves), 0, site)
+        of_site(int(at.model), int(at.data), int(at.moves), 0, site)
         for i in range(3):
             for j in range(n):
                 output[i, j] = moves[i, table[n + j]]
@@ -375,14 +375,14 @@ def native() -> Function:
     actuation, accelerations, solve = map(_called, ("mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM"), (0, 0, 3))
 
     def native(y, p, m, out):
-        read, own = seen_at(y, 0), nominal_at(p, 0)
-        i, n, driven, nv = read.i, int(own.n), int(own.driven), int(own.nv)
+        read, at = seen_at(y, 0), nominal_at(p, 0)
+        i, n, driven, nv = read.i, int(at.n), int(at.driven), int(at.nv)
         x, v, u = pointer(read.x), pointer(read.v), pointer(read.u)
-        model, data = int(own.model), int(own.data)
-        qpos, qvel = carray(pointer(int(own.qpos)), (1 << 40,)), carray(pointer(int(own.qvel)), (1 << 40,))
-        ctrl, qacc = carray(pointer(int(own.ctrl)), (1 << 40,)), carray(pointer(int(own.acceleration)), (nv,))
-        table, seen = carray(integers(int(own.places)), (2 * n + driven,)), carray(pointer(int(own.seen)), (2 * n,))
-        solved = carray(pointer(int(own.solved)), (2 * nv,))
+        model, data = int(at.model), int(at.data)
+        qpos, qvel = carray(pointer(int(at.qpos)), (1 << 40,)), carray(pointer(int(at.qvel)), (1 << 40,))
+        ctrl, qacc = carray(pointer(int(at.ctrl)), (1 << 40,)), carray(pointer(int(at.acceleration)), (nv,))
+        table, seen = carray(integers(int(at.places)), (2 * n + driven,)), carray(pointer(int(at.seen)), (2 * n,))
+        solved = carray(pointer(int(at.solved)), (2 * nv,))
         fresh = False
         for j in range(n):
             if seen[j] != x[j] or seen[n + j] != v[j]:  # NaN, the initial value, differs from everything
@@ -399,7 +399,7 @@ def native() -> Function:
         for j in range(nv):
             solved[nv + j] = 0.0
         solved[nv + table[n + i % driven]] = 1.0
-        solve(model, data, int(own.solved), int(own.solved) + 8 * nv, 1)
+        solve(model, data, int(at.solved), int(at.solved) + 8 * nv, 1)
         output = carray(pointer(out), (2,))
         output[0], output[1] = qacc[table[n + i]], solved[table[n + i]]
         return 0

@@ -22,6 +22,7 @@ from smc_mujoco.mechanisms.plant import Field
 
 BRASS = (0.80, 0.62, 0.28, 1.0)
 MIN_INERTIA = 1e-9  # kg m^2 (kg): a lighter rotor is lost in rounding
+MIN_ARM = 1e-6  # m, from a hinge to the centre of mass: a shorter one gives its pointer no direction
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,9 +73,6 @@ class Backlash(Actuator):
         yield Field("tendon_range", [model.tendon(PLAY + name).id for name in names], (-self.gap / 2, self.gap / 2))
         yield Field("dof_armature", rotors, self.rotor_inertia, adds=True)
         yield Field("dof_damping", rotors, self.rotor_damping)
-
-
-MIN_ARM = 1e-6  # m, from a hinge to the centre of mass: a shorter one gives its pointer no direction
 
 
 def _add_rotor(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, rigid: mujoco.MjModel, pose: mujoco.MjData) -> None:

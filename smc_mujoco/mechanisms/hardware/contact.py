@@ -37,7 +37,9 @@ DEPTH = 0.005  # m per m/s of a blow: chosen, so that 2 m/s goes 1 cm deep; e is
 # within 5 % if e >= 0.5; it is up to 9 % too low at e = 0.2, and up to 12 % at 0.1.
 DEPTH_OF_BOBS = 0.0015
 MAX_RESTITUTION = 0.98  # largest restitution: above, a blow could gain energy, by the integrator's error of 1e-3 of it
-DEAD = 0.01  # smallest restitution, used for smaller ones: below, the dashpot is too stiff for a step of 1 ms
+MIN_RESTITUTION = (
+    0.01  # smallest restitution, used for smaller ones: below, the dashpot is too stiff for a step of 1 ms
+)
 MAX_FRICTION = 10.0  # chosen; rubber on rubber reaches 2
 # Constant impedances d: FIRM for blows against a fixed obstacle, SPRINGY for blows between bobs and for sliding. The
 # spring carries 1 - d of a steady load. With FIRM a body that leans on an obstacle rests within 0.1 mm; at 0.99 it
@@ -114,7 +116,7 @@ def _takes(build: Callable[[int], mujoco.MjSpec], n: int, edit: Callable[[mujoco
 
 def damping_ratio(restitution: float) -> float:
     """Return the damping ratio zeta of a spring and dashpot with this restitution, 0.01 .. 1."""
-    aim = -0.5 * math.log(max(restitution, DEAD))  # wanted `_loss`, which grows with zeta: 0 at 0, 1 at 1
+    aim = -0.5 * math.log(max(restitution, MIN_RESTITUTION))  # wanted `_loss`, which grows with zeta: 0 at 0, 1 at 1
     low, high = 0.0, 1.0 + aim
     high *= high
     while high - low > 1e-12 * high:
@@ -139,7 +141,7 @@ def solref(restitution: float, impedance: float) -> tuple[float, float]:
     with R = A' (1 - d) / d. Its estimate A' of A is the mean over three directions, here A / 3. So the spring and the
     dashpot act with the share A / (d A + (1 - d) A').
     """
-    e = max(restitution, DEAD)
+    e = max(restitution, MIN_RESTITUTION)
     zeta = max(damping_ratio(e), 1e-6)  # MuJoCo divides by it
     share = 1.0 / (impedance + (1.0 - impedance) / 3.0)
     depth = DEPTH_OF_BOBS if impedance == SPRINGY else DEPTH

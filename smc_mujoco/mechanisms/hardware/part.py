@@ -141,9 +141,9 @@ def driven_ids(model: mujoco.MjModel) -> np.ndarray:
 
 def joint_ids(model: mujoco.MjModel) -> np.ndarray:
     """Return the indices of the channels' joints, (n,): first the driven ones, then those that are only measured."""
-    found = driven_ids(model)
+    first = driven_ids(model)
     measured = model.sensor_objid[model.sensor_type == mujoco.mjtSensor.mjSENS_JOINTPOS]
-    return np.array([*found, *(joint for joint in measured if joint not in found)], int)
+    return np.array([*first, *(joint for joint in measured if joint not in first)], int)
 
 
 @functools.lru_cache(maxsize=32)

@@ -81,8 +81,8 @@ class ServoFriction(Sliding):
                 more += p.keq * load * load
             elif abs(motor) < abs(load):
                 more += p.kmq * motor * motor
-        held = dry + more
-        return math.copysign(dry + near * more, v) + p.kv * v, -held, held
+        limit = dry + more
+        return math.copysign(dry + near * more, v) + p.kv * v, -limit, limit
 
 
 class Servo(NamedTuple):

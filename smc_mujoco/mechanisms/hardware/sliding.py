@@ -37,7 +37,7 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Plant
 
 SLOW = 1e-4  # rad/s or m/s, chosen: a joint that becomes slower than this sticks
 BRISTLE = 200.0  # rad/s, chosen: natural frequency of a stuck joint, which two steps of 1 ms resolve; critically damped
-MOST_EXPONENT = 700.0  # exp of more overflows
+MAX_EXPONENT = 700.0  # exp of more overflows
 
 PerJoint = float | Sequence[float]  # one number for all channels, or one for each
 
@@ -159,8 +159,8 @@ class Sigmoid(Sliding):
 
     @staticmethod
     def value(v, motor, load, p):
-        rest = p.p1 / (1.0 + math.exp(min(-p.p2 * p.p3, MOST_EXPONENT)))
-        f = p.p1 / (1.0 + math.exp(min(-p.p2 * (v + p.p3), MOST_EXPONENT))) - rest
+        rest = p.p1 / (1.0 + math.exp(min(-p.p2 * p.p3, MAX_EXPONENT)))
+        f = p.p1 / (1.0 + math.exp(min(-p.p2 * (v + p.p3), MAX_EXPONENT))) - rest
         if math.isnan(p.hold):
             return f, -rest, p.p1 - rest
         return f, -p.hold, p.hold
