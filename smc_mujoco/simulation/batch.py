@@ -75,8 +75,8 @@ class ScenarioBatch:
         for i in indices:
             values = self.untouched | assembly.field_values(self.compiled, self.scenarios[i], step)
             for name, value in values.items():
-                held = self.fields[name][i] if name in self.fields else field_array(self.model, name)
-                if np.any(held != value):
+                before = self.fields[name][i] if name in self.fields else field_array(self.model, name)
+                if np.any(before != value):
                     self.fields[name] = self.batch.expand(name)
                     self.fields[name][i] = value
                     derived.append(i)
@@ -98,8 +98,8 @@ class ScenarioBatch:
         """Step the simulations that still run, in slices, so that the progress bar moves and Ctrl-C works."""
         size = len(self.scenarios) * self.scenarios[0].plant.n
         while steps:
-            most = USER_MODEL_STEPS if self.scenarios[0].plant.own else SLICE_STEPS // size
-            count = min(steps, max(1, most))
+            longest = USER_MODEL_STEPS if self.scenarios[0].plant.own else SLICE_STEPS // size
+            count = min(steps, max(1, longest))
             calls = count * self.scenarios[0].stages
             self.attempt(lambda alive, count=count: self.batch.step(alive, nstep=count), calls)
             report(count * size)

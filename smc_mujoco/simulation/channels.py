@@ -52,8 +52,8 @@ def channels(model: mujoco.MjModel) -> np.ndarray:
             raise ScenarioError(f"actuator {model.actuator(i).name!r} does not drive a joint with gear 1: give it one")
     joints, drives = joint_ids(model).tolist(), drive_ids(model).tolist()
     drives += [-1] * (len(joints) - len(drives))
-    found = [_channel(model, data, drive, joint) for drive, joint in zip(drives, joints, strict=True)]
-    return np.array([tuple(one[name] for name in CHANNEL.names or ()) for one in found], CHANNEL)
+    rows = [_channel(model, data, drive, joint) for drive, joint in zip(drives, joints, strict=True)]
+    return np.array([tuple(one[name] for name in CHANNEL.names or ()) for one in rows], CHANNEL)
 
 
 def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int) -> dict[str, int]:
@@ -70,7 +70,7 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
     component = int(np.argmax(np.abs(axis)))
     friction = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, PASSIVE + model.joint(joint).name)
     xfrc, sign = 6 * body + component + 3 * hinge, int(np.sign(axis[component]))
-    found = {
+    indices = {
         "qpos": model.jnt_qposadr[joint],
         "qvel": model.jnt_dofadr[joint],
         "ctrl": model.actuator_ctrladr[drive] if drive >= 0 else -1,
@@ -87,10 +87,10 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
     }
     if hinge:
         along = int(component == 0)  # across the axis
-        found |= {"push": 6 * body + along, "along": along, "tip": 3 * body, "anchor": 3 * joint}
+        indices |= {"push": 6 * body + along, "along": along, "tip": 3 * body, "anchor": 3 * joint}
     for field, kind in _SENSORS.items():
         there = np.flatnonzero((model.sensor_type == kind) & (model.sensor_objid == joint))
         if not len(there):
             raise ScenarioError(f"the joint of {name} has no {kind.name[7:].lower()} sensor: add one")
-        found[field] = model.sensor_adr[there[0]]
-    return found
+        indices[field] = model.sensor_adr[there[0]]
+    return indices

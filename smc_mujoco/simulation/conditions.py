@@ -157,13 +157,13 @@ def find_condition(value: Condition | str) -> Condition:
 
 def applicable(names: Iterable[str], plants: Sequence[Plant], duration: float) -> list[str]:
     """Return the names of conditions of the suite that have numbers for every plant."""
-    found = []
+    fitting = []
     for name in names:
         with contextlib.suppress(ScenarioError):
             for plant in plants:
                 NAMED[name].on(plant, duration)
-            found.append(name)
-    return found
+            fitting.append(name)
+    return fitting
 
 
 def parse(text: str) -> Condition:
@@ -196,13 +196,13 @@ def from_file(path: Path) -> list[Condition]:
     """Return the conditions in a text file, one per line. Empty lines and lines that begin with # are skipped."""
     with reading(path, "file of conditions", "give a text file, a condition a line") as file:
         lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
-    found = []
+    conditions = []
     for count, line in enumerate(lines, 1):
         try:
-            found += [find_condition(line)] if line and not line.startswith("#") else []
+            conditions += [find_condition(line)] if line and not line.startswith("#") else []
         except ScenarioError as error:
             raise ScenarioError(f"line {count} of {str(path)!r}: {error}") from None
-    return found
+    return conditions
 
 
 def _value(node: ast.expr) -> Any:
@@ -240,12 +240,12 @@ def _call(node: ast.Call) -> Any:
 
 def _keywords(node: ast.Call) -> dict[str, Any]:
     """Return keyword -> value of a call, and refuse a keyword that stands twice."""
-    found: dict[str, Any] = {}
+    keywords: dict[str, Any] = {}
     for word in node.keywords:
-        if str(word.arg) in found:
+        if str(word.arg) in keywords:
             raise ScenarioError(f"condition has {word.arg} twice, in {shown(ast.unparse(node))}: give it once")
-        found[str(word.arg)] = _value(word.value)
-    return found
+        keywords[str(word.arg)] = _value(word.value)
+    return keywords
 
 
 def _kinds() -> dict[str, Any]:

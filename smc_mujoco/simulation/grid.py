@@ -207,6 +207,6 @@ def listed(what: str, values: object) -> list:
     """Return one or several values as a list."""
     if isinstance(values, str | Plant | Component | Template | Condition):
         return [values]
-    if isinstance(values, bytes | Mapping) or not isinstance(values, Iterable) or not (found := taken(what, values)):
+    if isinstance(values, bytes | Mapping) or not isinstance(values, Iterable) or not (items := taken(what, values)):
         raise ScenarioError(f"{what} is {shown(values)}: give several, such as a list")
-    return found
+    return items

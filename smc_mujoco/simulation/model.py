@@ -79,10 +79,10 @@ _mechanisms: weakref.WeakValueDictionary[Hashable, Mechanism] = weakref.WeakValu
 def mechanism(scenario: Scenario) -> Mechanism:
     """Return the Mechanism of a scenario. It is compiled once, as long as any scenario that is prepared needs it."""
     key = structure(scenario)
-    if (found := _mechanisms.get(key)) is None:
+    if (shared := _mechanisms.get(key)) is None:
         made = model(scenario, USERDATA, scenery=False)
-        found = _mechanisms[key] = Mechanism(made, channels(made))
-    return found
+        shared = _mechanisms[key] = Mechanism(made, channels(made))
+    return shared
 
 
 def spec(scenario: Scenario) -> mujoco.MjSpec:
@@ -159,13 +159,13 @@ def put_values(made: mujoco.MjModel, compiled: mujoco.MjModel, scenario: Scenari
 
 def field_values(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
     """Return model field -> its values from a physics step on, for every field that the scenario sets."""
-    plant, found = scenario.plant, {}
+    plant, written = scenario.plant, {}
     fields = plant.fields if scenario.mechanism == "equation" else plant.mechanisms[scenario.mechanism].fields
     of_parts = (part.fields(compiled) for part in parts(scenario))
     for name, at, value, adds in itertools.chain(fields(compiled, plant.values(scenario.factors(step))), *of_parts):
-        values = found.setdefault(name, field_array(compiled, name).copy())
+        values = written.setdefault(name, field_array(compiled, name).copy())
         values[at] = values[at] + value if adds else value
-    return found
+    return written
 
 
 def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:

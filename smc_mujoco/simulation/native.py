@@ -137,8 +137,8 @@ def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
             noise = carray(pointer(m), (memory,))
             ok, result = attempt(body, (now.t, values(p), noise, now.seed, now.channel, now.stream))
         elif sees:
-            held = carray(pointer(m), (memory,))
-            ok, result = attempt(body, (now.t, values(p), held, now.e, now.de, now.s))
+            kept = carray(pointer(m), (memory,))
+            ok, result = attempt(body, (now.t, values(p), kept, now.e, now.de, now.s))
         elif series:
             data = series_at(p + behind, 0)
             table = carray(pointer(int(data.address)), (rows, int(data.count)))

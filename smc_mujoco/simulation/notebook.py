@@ -36,34 +36,34 @@ def scenario(s: Any) -> Html:
     return fields(words, "Scenario", f"by default: {note}" if note else "")
 
 
-def trace(found: Any) -> Html:
+def trace(run: Any) -> Html:
     """Return what was run, how it ended, and small figures of x with its reference, and of u."""
-    s = found.scenario
+    s = run.scenario
     about = {
         "plant": _words("plant", s.plant, s),
         "law": str(s.law),
         "gains": str(s.law.source),
-        "samples": f"{len(found.t)}, every {s.control_period:g} s",
+        "samples": f"{len(run.t)}, every {s.control_period:g} s",
     }
-    last = np.flatnonzero(np.isfinite(found.x).all(axis=1))
-    if found.failure:
-        about["failed"] = found.failure
+    last = np.flatnonzero(np.isfinite(run.x).all(axis=1))
+    if run.failure:
+        about["failed"] = run.failure
     elif len(last) and s.plant.n <= MAX_CHANNELS:
-        ends = (f"{x:.3g} {unit}" for x, unit in zip(found.x[last[-1]], s.plant.units, strict=True))
+        ends = (f"{x:.3g} {unit}" for x, unit in zip(run.x[last[-1]], s.plant.units, strict=True))
         about["ends at x"] = ", ".join(ends)
-    return Html(f"{fields(about, 'Trace')}<div>{''.join(_panels(found))}</div>")
+    return Html(f"{fields(about, 'Trace')}<div>{''.join(_panels(run))}</div>")
 
 
-def _panels(found: Any) -> list[Html]:
+def _panels(run: Any) -> list[Html]:
     """Return a panel of x for each unit, and one of u for each unit of the driven channels."""
-    s, plant, panels = found.scenario, found.scenario.plant, []
+    s, plant, panels = run.scenario, run.scenario.plant, []
     for unit in dict.fromkeys(plant.units):
-        channels = [i for i, own in enumerate(plant.units) if own == unit][:MAX_CHANNELS]
-        reference = found.r[:, channels[0]] if np.nan_to_num(found.r[:, channels]).any() else None
-        panels.append(panel(found.t, list(found.x[:, channels].T), f"x ({unit})", reference))
+        channels = [i for i, each in enumerate(plant.units) if each == unit][:MAX_CHANNELS]
+        reference = run.r[:, channels[0]] if np.nan_to_num(run.r[:, channels]).any() else None
+        panels.append(panel(run.t, list(run.x[:, channels].T), f"x ({unit})", reference))
     for unit in dict.fromkeys(s.efforts[: plant.driven]):
-        channels = [i for i, own in enumerate(s.efforts[: plant.driven]) if own == unit][:MAX_CHANNELS]
-        panels.append(panel(found.t, list(found.u[:, channels].T), f"u ({unit})"))
+        channels = [i for i, each in enumerate(s.efforts[: plant.driven]) if each == unit][:MAX_CHANNELS]
+        panels.append(panel(run.t, list(run.u[:, channels].T), f"u ({unit})"))
     return panels
 
 

@@ -70,7 +70,7 @@ def offsets() -> Offsets:
 
 def checked(model: mujoco.MjModel, data: mujoco.MjData) -> Offsets:
     """Return the introspected offsets, each compared with a live model and its data."""
-    found = {}
+    offsets = {}
     places = {"mjModel": ["nuserdata"], "mjData": Offsets._fields[1:]}
     for (struct, names), live in zip(places.items(), (model, data), strict=True):
         kind = _ctype(structs.STRUCTS[struct])
@@ -81,5 +81,5 @@ def checked(model: mujoco.MjModel, data: mujoco.MjData) -> Offsets:
             there = ctypes.c_int64.from_address(live._address + field.offset).value
             if there != (shown if live is model else shown.ctypes.data):
                 raise LayoutError(f"does not have {struct}.{name} at byte {field.offset}, where introspection puts it")
-            found[name] = field.offset
-    return Offsets(**found)
+            offsets[name] = field.offset
+    return Offsets(**offsets)

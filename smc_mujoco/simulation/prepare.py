@@ -219,18 +219,18 @@ def _functions(prepared: Prepared, nominal: Native | None, buffer: state.Buffer)
     """Return the functions of a record that all channels share, but law and reference."""
     s, compiled = prepared.scenario.resolved, prepared.functions
     assert compiled is not None
-    n, found = s.plant.n, {}
+    n, functions = s.plant.n, {}
     for name, made, part in (("estimator", compiled.estimator, s.velocity), ("surface", compiled.surface, s.surface)):
         if part is not None:
-            found[name] = _function(made, part.gains.values(), buffer, part.memory, n)
+            functions[name] = _function(made, part.gains.values(), buffer, part.memory, n)
     if nominal is not None:
-        found["dynamics" if s.law.joint else "nominal"] = _function(nominal, nominal.values, buffer)
+        functions["dynamics" if s.law.joint else "nominal"] = _function(nominal, nominal.values, buffer)
     elif compiled.nominal is not None:
-        found["nominal"] = _function(compiled.nominal, s.plant.parameters.values(), buffer)
+        functions["nominal"] = _function(compiled.nominal, s.plant.parameters.values(), buffer)
     if s.feedforward is not None:
-        found["feedforward"] = _function(compiled.feedforward, native.values_of(s.feedforward), buffer)
+        functions["feedforward"] = _function(compiled.feedforward, native.values_of(s.feedforward), buffer)
     errors = zip(("position_error", "velocity_error"), compiled.errors, s.noise.errors, strict=True)
-    return found | {name: _function(made, native.values_of(one), buffer) for name, made, one in errors if one}
+    return functions | {name: _function(made, native.values_of(one), buffer) for name, made, one in errors if one}
 
 
 def _circumstances(s: Resolved) -> dict[str, Any]:
@@ -285,15 +285,15 @@ def _joint_measurement(
     stored = joint_law.stored_dtype(s.plant.n)
     head = buffer.reserve(stored.itemsize // 8)
     places = {name: state.Place(head + offset // 8) for name, (_, offset, *_) in (stored.fields or {}).items()}
-    found: dict[str, Any] = {"joint": places | {"head": head}}
+    fields: dict[str, Any] = {"joint": places | {"head": head}}
     if nominal is not None:
-        found["requests"] = {
+        fields["requests"] = {
             "coriolis": native_coriolis().address,
             "jacobian": native_jacobian().address,
             "parameters": functions["dynamics"]["parameters"],
             "unit": s.drive.gain,
         }
-    return found
+    return fields
 
 
 def _native_nominal(s: Resolved) -> Native | None:

@@ -163,10 +163,10 @@ class Loop:
         past = step - self.scenario.delay_steps
         if past >= 0 and past % self.scenario.steps >= self.late(past // self.scenario.steps):
             self.arrived = self.commands[past // self.scenario.steps]
-        asked = self.arrived
+        command = self.arrived
         if self.drive_step:
-            asked, self.first, self.second = self.drive_step(asked, self.first, self.second)
-        data.ctrl[self.channels["ctrl"][self.driven]] = (self.scale * asked)[self.driven]
+            command, self.first, self.second = self.drive_step(command, self.first, self.second)
+        data.ctrl[self.channels["ctrl"][self.driven]] = (self.scale * command)[self.driven]
 
     def late(self, k: int) -> int:
         """Return by how many physics steps sample k is late."""
@@ -274,7 +274,9 @@ class Loop:
             if isinstance(signal, Push):
                 continue
             if signal.random:
-                d = [evaluate(signal, t, own, self.scenario.noise_seed, i, stream)[0] for i, own in enumerate(memory)]
+                d = [
+                    evaluate(signal, t, state, self.scenario.noise_seed, i, stream)[0] for i, state in enumerate(memory)
+                ]
             elif signal.sees:
                 d = self.look(signal, data, t, memory[0])
             else:
@@ -452,8 +454,8 @@ class OnRequest:
     @property
     def nominal(self) -> NominalModel | None:
         """The nominal model of all joints, if the plant has one and the law may use it."""
-        found = self.scenario.plant.nominal
-        return found if isinstance(found, NominalModel) and self.scenario.resolved.model == "nominal" else None
+        model = self.scenario.plant.nominal
+        return model if isinstance(model, NominalModel) and self.scenario.resolved.model == "nominal" else None
 
 
 def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
@@ -464,7 +466,7 @@ def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
     values = Values(**plant.parameters)
     if isinstance(plant.nominal, NominalModel):
         try:
-            found = plant.nominal.dynamics(x, v, values)
+            terms = plant.nominal.dynamics(x, v, values)
         except RAISES as error:
             raise raised(f"the nominal model of {plant.name}", error) from error
     else:
@@ -472,8 +474,8 @@ def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
             np.array([nominal(plant, x, rate, i, values, np.zeros(n)) for i in range(n)], float)
             for rate in (v, np.zeros(n))
         )
-        found = Dynamics(np.diag(1.0 / moving[:, 1]), -moving[:, 0] / moving[:, 1], -resting[:, 0] / resting[:, 1])
-    return Dynamics(found.M / gain, (found.h + drag * v) / gain, found.g / gain)
+        terms = Dynamics(np.diag(1.0 / moving[:, 1]), -moving[:, 0] / moving[:, 1], -resting[:, 0] / resting[:, 1])
+    return Dynamics(terms.M / gain, (terms.h + drag * v) / gain, terms.g / gain)
 
 
 def evaluate(signal: Signal, t: float, *state: Any) -> list[float]:

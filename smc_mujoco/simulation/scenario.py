@@ -429,10 +429,10 @@ def _steps(s: Scenario) -> int:
 
     Behind a drive it is one of which the input delay is a whole number of steps, if up to four times as many do.
     """
-    least = math.ceil(s.control_period / longest_step(s) - 1e-9)
+    fewest = math.ceil(s.control_period / longest_step(s) - 1e-9)
     delay = s.input_delay / s.control_period
-    fitting = (n for n in range(least, 4 * least + 1) if abs(math.remainder(delay * n, 1.0)) < 1e-6)
-    return next(fitting, least) if s.actuator else least
+    fitting = (n for n in range(fewest, 4 * fewest + 1) if abs(math.remainder(delay * n, 1.0)) < 1e-6)
+    return next(fitting, fewest) if s.actuator else fewest
 
 
 def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
@@ -494,10 +494,11 @@ def check_clock(s: Resolved) -> None:
 def check_signals(s: Resolved) -> None:
     """Check that the signals can be disturbances and a reference, and that none is shorter than a step."""
     for d in s.disturbance:
-        most = max(MAX_STEPS, s.work)  # knots in all channels
-        if isinstance(d, OrnsteinUhlenbeck) and s.plant.n * s.duration / d.dt > most:
-            least = s.plant.n * s.duration / most
-            raise ScenarioError(f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give {least:.3g} s or more")
+        shortest = s.plant.n * s.duration / max(MAX_STEPS, s.work)  # s between knots, of all channels
+        if isinstance(d, OrnsteinUhlenbeck) and d.dt < shortest:
+            raise ScenarioError(
+                f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give {shortest:.3g} s or more"
+            )
         if isinstance(d, Impulse) and d.width < s.physics_step:
             raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
     for name, signal in [*(("disturbance", d) for d in s.disturbance), ("feedforward", s.feedforward)]:

@@ -26,6 +26,9 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import PerChannel, Recorded, Signal
 
 DEPENDENT = ("model", "physics_step", "integrator", "velocity", "u_max", "x0", "v0", "reference")  # None where left out
+OPTIONAL = frozenset(  # fields that the description of an ideal run may lack
+    ("friction", "contact", "actuator", "sensor", "mechanism", "model", "surface", "feedforward", "noise_key")
+)
 T = TypeVar("T")
 
 
@@ -70,11 +73,6 @@ def _versions() -> dict[str, str]:
     """Return the versions of the packages that a trace depends on, and how the machine rounds. It takes 5 ms."""
     packages = {"smc_mujoco": __version__} | {name: version(name) for name in ("mujoco", "numba", "numpy")}
     return packages | {"arithmetic": arithmetic()}
-
-
-OPTIONAL = frozenset(  # fields that the description of an ideal run may lack
-    ("friction", "contact", "actuator", "sensor", "mechanism", "model", "surface", "feedforward", "noise_key")
-)
 
 
 def restore(data: dict) -> Scenario:

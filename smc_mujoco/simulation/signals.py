@@ -273,7 +273,7 @@ class Relay(Signal):
     Attributes:
       amplitude: N or N m.
       s, rate, error: weights of the law's s, of e' and of e.
-      slope: most change between two control samples, N or N m; 0: no limit.
+      slope: largest change between two control samples, N or N m; 0: no limit.
     """
 
     amplitude: float

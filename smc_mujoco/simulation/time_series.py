@@ -20,7 +20,7 @@ SECONDS = ("s", "sec", "second", "seconds")
 
 @njit(error_model="numpy")
 def last_before(data, t, end, early):
-    """Return the last of the points 0 .. end - 1 whose time, data[0, i] times `early`, is not after t, else 0."""
+    """Return the index below `end` of the last point whose time, data[0, i] times `early`, is not after t; else 0."""
     low, high = 0, end
     while high - low > 1:
         middle = (low + high) // 2

@@ -127,11 +127,11 @@ class Trace:
 
     def _units(self, name: str) -> list[str]:
         """Return the unit of an array for each channel, (n,)."""
-        found = []
+        units = []
         for x, u in zip(self.scenario.plant.units, self.scenario.efforts, strict=True):
             known = {"x": x, "r": x, "v": f"{x}/s", "u": u, "applied": u, "s": ""}
-            found.append(known.get(name, EFFORT[x]))
-        return found
+            units.append(known.get(name, EFFORT[x]))
+        return units
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         """Return the `columns` as a stream of Arrow's C interface: what polars.from_dataframe and duckdb take."""
@@ -169,7 +169,7 @@ class Trace:
             import xarray  # pyright: ignore[reportMissingImports]
 
         units = {"t": ["s"]} | {name: self._units(name) for name in ARRAYS[1:]}
-        attrs = {name: {"units": own[0] if len(set(own)) == 1 else "by channel"} for name, own in units.items()}
+        attrs = {name: {"units": each[0] if len(set(each)) == 1 else "by channel"} for name, each in units.items()}
         about = {"scenario": to_json(serialise.describe(self.scenario))}
         return xarray.Dataset(
             {name: (("t", "channel"), getattr(self, name), attrs[name]) for name in ARRAYS[1:]},
@@ -310,7 +310,7 @@ def _member(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = Non
     if not fits:
         raise ScenarioError(f"its {name} is {dtype} of shape {shape}, which does not fit its scenario")
     with archive.open(f"{name}.npy") as stream:
-        found = npy.read_array(stream, allow_pickle=False)
+        array = npy.read_array(stream, allow_pickle=False)
         if stream.read(1):  # the checksum is compared at the end
             raise ScenarioError(f"its {name} is longer than it says")
-    return found
+    return array

@@ -115,5 +115,5 @@ def cartesian_path(
     if len(start) != plant.n:
         raise ScenarioError(f"x0 has {len(start)} values for {plant.n} channels: give {plant.n}")
     tip = Tip(plant, joint_names(plant), site, body, orientation)
-    found = solve(tip, wanted, start)
-    return [Waypoints(knots.tolist(), found[:, i].tolist()) for i in range(plant.n)]
+    joints = solve(tip, wanted, start)
+    return [Waypoints(knots.tolist(), joints[:, i].tolist()) for i in range(plant.n)]
