@@ -24,7 +24,7 @@ from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.state import LOGGED
 from smc_mujoco.simulation.trace import Trace
 
-RATE = 100.0  # Hz, most of poses: screens show 60; chosen
+RATE = 100.0  # Hz, of poses at most: screens show 60; chosen
 GROUPS = 3  # groups of geoms that MuJoCo draws by default
 GEOM = mujoco.mjtGeom
 

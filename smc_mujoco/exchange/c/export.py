@@ -138,7 +138,7 @@ def _fixed_point(law: Component) -> str:
         "TABLE": rows([str(n) for n in q15.TABLE]),
     }
     text = (build.HERE / "q15.c").read_text(encoding="utf-8").rstrip()
-    return re.sub(r"@(\w+)@", lambda found: str(words[found[1]]), text)
+    return re.sub(r"@(\w+)@", lambda match: str(words[match[1]]), text)
 
 
 def _facts(law: Component, slots: int, joints: int, single: bool) -> str:

@@ -69,15 +69,15 @@ def _arrays(code: str) -> str:
     return re.sub(pattern, r"const \1 = [\n\2\n];", code, flags=re.DOTALL | re.MULTILINE)
 
 
-def _head(found: re.Match[str]) -> str:
+def _head(match: re.Match[str]) -> str:
     """Rewrite a function's head, without its types and the pointers to its results."""
-    names = [re.split(r"[\s*]", argument)[-1] for argument in found[2].split(",") if argument.strip() != "void"]
-    return f"function {found[1]}({', '.join(name for name in names if not re.fullmatch(r'out_[0-9]+', name))})"
+    names = [re.split(r"[\s*]", argument)[-1] for argument in match[2].split(",") if argument.strip() != "void"]
+    return f"function {match[1]}({', '.join(name for name in names if not re.fullmatch(r'out_[0-9]+', name))})"
 
 
-def _body(found: re.Match[str]) -> str:
+def _body(match: re.Match[str]) -> str:
     """Rewrite a function's body: results go to local variables and are returned together."""
-    body = found[1]
+    body = match[1]
     if results := sorted(set(re.findall(r"\*(out_\d+) = ", body)), key=lambda name: int(name[4:])):
         body = re.sub(r"\*(out_\d+) = ", r"\1 = ", body)
         body = re.sub(r"\breturn;", f"return [{', '.join(results)}];", body)
@@ -85,17 +85,17 @@ def _body(found: re.Match[str]) -> str:
     return f"\n{{\n{body}\n}}"
 
 
-def _call(found: re.Match[str]) -> str:
+def _call(match: re.Match[str]) -> str:
     """Rewrite the call of a function with several results."""
-    targets = ", ".join(target.strip().removeprefix("&") for target in found[4].split(","))
-    return f"{found[1]}[{targets}] = {found[2]}({found[3].strip()});"
+    targets = ", ".join(target.strip().removeprefix("&") for target in match[4].split(","))
+    return f"{match[1]}[{targets}] = {match[2]}({match[3].strip()});"
 
 
-def _word(found: re.Match[str]) -> str:
+def _word(match: re.Match[str]) -> str:
     """Rewrite a name."""
-    word = found[0]
+    word = match[0]
     if word in {"NAN", "INFINITY"}:
         return {"NAN": "NaN", "INFINITY": "Infinity"}[word]
-    if word in MATHEMATICAL and found.string[found.end() : found.end() + 1] == "(":
+    if word in MATHEMATICAL and match.string[match.end() : match.end() + 1] == "(":
         return f"Math.{OTHER_NAMES.get(word, word)}"
     return f"{word}$" if word in RESERVED else word

@@ -295,10 +295,10 @@ def _about(
     if facts.get("smc_law_real", 8) != 8 and not facts["glue"]:
         raise ScenarioError(f"{file} is a library of single precision: give its .c file, or build it of doubles")
     text = facts.get("smc_law_gains")
-    own = {} if text is None else parsed_gains(text, f"{file}'s smc_law_gains")
-    named = as_gains(gains, own)
+    stated = {} if text is None else parsed_gains(text, f"{file}'s smc_law_gains")
+    named = as_gains(gains, stated)
     for name in () if text is None else named:
-        errors.find(f"gain of {file}", name, own)
+        errors.find(f"gain of {file}", name, stated)
     for name, gain in named.items():
         if isinstance(gain.default, tuple) and len(gain.default) != joints:
             each = f", or {joints}" * bool(joints)
@@ -320,5 +320,5 @@ def _about(
 def _first_comment(path: Path) -> str | None:
     """Return the comment at the top of a C file."""
     text = path.read_text(encoding="utf-8", errors="replace") if path.suffix == ".c" else ""
-    found = re.match(r"\s*/\*+(.*?)\*/", text, re.DOTALL)
-    return re.sub(r"^ ?\* ?", "", found[1], flags=re.MULTILINE).strip() if found else None
+    comment = re.match(r"\s*/\*+(.*?)\*/", text, re.DOTALL)
+    return re.sub(r"^ ?\* ?", "", comment[1], flags=re.MULTILINE).strip() if comment else None

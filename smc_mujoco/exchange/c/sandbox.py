@@ -144,10 +144,10 @@ def _sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
     if done.returncode == 0:
         return ""
     what, places = "it does not end as without sanitizers", []
-    if found := UNDEFINED.search(done.stderr):
-        what, places = found["what"], [found]
-    elif found := ACCESS.search(done.stderr):
-        what = ", ".join(filter(None, found.group("what", "size")))
+    if report := UNDEFINED.search(done.stderr):
+        what, places = report["what"], [report]
+    elif report := ACCESS.search(done.stderr):
+        what = ", ".join(filter(None, report.group("what", "size")))
         places = [frame for frame in FRAME.finditer(done.stderr) if Path(frame["file"]).exists()]
     name = Path(places[0]["file"]).name if places else library.path.name
     where = f"line {places[0]['line']}" if places else library.symbol
@@ -215,10 +215,10 @@ class Requests:
                 return 1
             return 0
 
-        def product(w, own, memory, out) -> int:
+        def product(w, parameters, memory, out) -> int:
             return answer(out, coriolis, w[:joints])
 
-        def tip(nothing, own, memory, out) -> int:
+        def tip(nothing, parameters, memory, out) -> int:
             return answer(out, jacobian)
 
         self.joints, self.functions = joints, (ON_REQUEST(product), ON_REQUEST(tip))

@@ -427,14 +427,14 @@ class Function:
         pointers, stores = [], []
         for target, kind in zip(targets, kinds, strict=True):
             if shape(kind):
-                found = self.temporary(kind)
-                pointers.append(found.pointer)
-                stores.append((target, found))
+                array = self.temporary(kind)
+                pointers.append(array.pointer)
+                stores.append((target, array))
             else:
                 pointers.append(f"&{self.destination(target, kind)}")
         yield call_to(beginning, ", ".join(pointers))
-        for target, found in stores:
-            yield from self.store(target, found)
+        for target, array in stores:
+            yield from self.store(target, array)
 
     def destination(self, target: ast.expr, kind: str) -> str:
         """Return a target in C, to which a value of a kind is assigned."""
@@ -551,8 +551,8 @@ class Function:
                 raise refuse(target, "real numbers for elements of an array of whole numbers")
         if shape(value.kind) and not self.fits(value.kind, place.kind):
             raise refuse(target, f"an array of {', '.join(shape(value.kind))} numbers for one of another shape")
-        own = [re.escape(place.text), rf"\w+\[{ROW} \* {SLOTS} \+ \w+\]"]  # elements of the same joint
-        others = re.sub("|".join(own), "", value.text)
+        same = [re.escape(place.text), rf"\w+\[{ROW} \* {SLOTS} \+ \w+\]"]  # elements of the same joint
+        others = re.sub("|".join(same), "", value.text)
         if re.search(rf"\b{place.text.partition('[')[0]}\b", others):  # reads elements that the loop has changed
             kept = self.temporary(value.kind)
             yield from self.fill(kept, value)
@@ -653,15 +653,15 @@ class Function:
         finally:
             shapes, calls = self.frames.pop()
         if not shapes:
-            return value._replace(text=TOKEN.sub(lambda found: calls[int(found[1])].text, value.text))
+            return value._replace(text=TOKEN.sub(lambda match: calls[int(match[1])].text, value.text))
         names = {}
 
-        def moved(found: re.Match[str]) -> str:
-            if found[1] not in names:
-                call = calls[int(found[1])]
-                names[found[1]] = self.new_name("number")
-                self.move(f"const {TYPES[call.kind]} {names[found[1]]} = {call.text};", node)
-            return names[found[1]]
+        def moved(match: re.Match[str]) -> str:
+            if match[1] not in names:
+                call = calls[int(match[1])]
+                names[match[1]] = self.new_name("number")
+                self.move(f"const {TYPES[call.kind]} {names[match[1]]} = {call.text};", node)
+            return names[match[1]]
 
         text = ALONE.sub("\\1", value.text)  # a name needs no parentheses
         return Value(TOKEN.sub(moved, text), value.kind + shapes[0], value.level)
@@ -784,8 +784,8 @@ class Function:
         if not isinstance(value, np.ndarray):
             return literal(value, self.program.single, node)
         made = self.program.array(ast.unparse(node).replace(".", "_"), value)
-        found = array_at(made.text, f"{made.kind}[{len(value)}]")
-        return found if made.kind == "real" else found._replace(pointer="")  # of 16 bits, so that functions get a copy
+        array = array_at(made.text, f"{made.kind}[{len(value)}]")
+        return array if made.kind == "real" else array._replace(pointer="")  # of 16 bits, so that functions get a copy
 
     def _subscript(self, node: ast.Subscript) -> Value:
         constants, joints = self.resolve(node.value), self.program.joints
@@ -959,9 +959,9 @@ class Function:
             raise refuse(node, "several results within an expression")
         if not shape(kinds[0]):
             return Value(f"{beginning})", kinds[0])
-        found = self.temporary(kinds[0])
-        self.move(call_to(beginning, found.pointer), node)
-        return found
+        array = self.temporary(kinds[0])
+        self.move(call_to(beginning, array.pointer), node)
+        return array
 
     def built_in(self, function: Any, values: list[Value], node: ast.Call) -> Value | None:
         """Translate a call of a function of Python, math or numpy; return None for another function."""
@@ -1013,10 +1013,10 @@ class Function:
         """Translate coriolis and jacobian, which the caller of the law provides."""
         name, dimensions = ON_REQUEST[function]
         y, *rest = [self.argument(a) for a in node.args]
-        found = self.temporary("real" + "".join(f"[{n}]" for n in dimensions))
+        array = self.temporary("real" + "".join(f"[{n}]" for n in dimensions))
         arguments = [f"{y.text}->plant", *(one.text for one in rest)]
-        self.move(f"{y.text}->{name}({', '.join(arguments)}, {found.pointer});", node)
-        return found
+        self.move(f"{y.text}->{name}({', '.join(arguments)}, {array.pointer});", node)
+        return array
 
     def listed(self, function: Any, node: ast.Call) -> Value:
         """Translate np.array of a list of numbers."""
@@ -1026,10 +1026,10 @@ class Function:
         if any(shape(item.kind) for item in items):
             raise refuse(node, "an array of arrays")
         kind = functools.reduce(wider, (item.kind for item in items))
-        found = self.temporary(f"{kind}[{len(items)}]")
+        array = self.temporary(f"{kind}[{len(items)}]")
         for i, item in enumerate(items):
-            self.move(f"{found.pointer}[{i}] = {item.text};", node)
-        return found
+            self.move(f"{array.pointer}[{i}] = {item.text};", node)
+        return array
 
     def sized(self, function: Any, node: ast.Call) -> Value:
         """Translate len, and arrays of one number."""
@@ -1084,18 +1084,18 @@ class Function:
 
     def shared(self, node: ast.expr) -> set[str]:
         """Return the names of arrays with which the value of an expression may share its numbers."""
-        found, parts = set[str](), list[ast.expr]()
+        names, parts = set[str](), list[ast.expr]()
         match node:
             case ast.Name() | ast.Subscript() if self.is_array(node):
-                found = {root(node)}
+                names = {root(node)}
             case ast.Attribute() | ast.Subscript(value=ast.Attribute()):  # of y or gains
-                found = {ast.unparse(node)}
+                names = {ast.unparse(node)}
             case ast.IfExp():
                 parts = [node.body, node.orelse]
             case ast.Call():
                 parts = [node.args[i] for i in shared_arguments(self.resolve(node.func))]
-                found = {a.id for a in parts if isinstance(a, ast.Name) and self.kinds.get(a.id) in ARGUMENTS}
-        return found.union(*map(self.shared, parts))
+                names = {a.id for a in parts if isinstance(a, ast.Name) and self.kinds.get(a.id) in ARGUMENTS}
+        return names.union(*map(self.shared, parts))
 
 
 # reading Python

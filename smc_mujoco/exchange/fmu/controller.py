@@ -85,7 +85,7 @@ class Variable(NamedTuple):
       description: in words.
       unit: None if it has none, or if that is unknown.
       start: its value at the start.
-      least: the smallest value that can be set; -inf for any value.
+      minimum: the smallest value that can be set; -inf for any value.
       positive: whether it must be greater than 0.
     """
 
@@ -94,7 +94,7 @@ class Variable(NamedTuple):
     description: str
     unit: Unit | None = None
     start: float = 0.0
-    least: float = -math.inf
+    minimum: float = -math.inf
     positive: bool = False
 
 
@@ -155,8 +155,8 @@ def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> li
     listed += [bounded(f"u_max{place}", bound) for place, bound in zip(places, controller.u_max, strict=True)]
     for kind, part in controller.parts.items():
         for name, value in part.gains.items():
-            own = places if kind == "law" and name not in part.shared else ("",)
-            listed += [parameter(kind, part, name, at(value, i), place) for i, place in enumerate(own)]
+            indices = places if kind == "law" and name not in part.shared else ("",)
+            listed += [parameter(kind, part, name, at(value, i), place) for i, place in enumerate(indices)]
     listed.append(Variable("dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, controller.period))
     for kind, (slots, _) in code.items():
         for i in range(max(1, controller.joints)):
@@ -209,11 +209,11 @@ def parameter(kind: str, part: Component, name: str, value: float, index: str = 
     gain = part.template.gains[name] if part.template and name in part.template.gains else None
     unit = gain.unit_at({key: at(one, 0) for key, one in part.gains.items()}) if gain else None
     positive = bool(gain and gain.positive)
-    least = 0.0 if gain and (gain.positive or gain.nonnegative) else -math.inf
-    limits = ", greater than 0" if positive else ", at least 0" if least == 0.0 else ""
+    minimum = 0.0 if gain and (gain.positive or gain.nonnegative) else -math.inf
+    limits = ", greater than 0" if positive else ", at least 0" if minimum == 0.0 else ""
     finite = value if math.isfinite(value) else math.copysign(UNBOUNDED, value)
     words = f"gain {name} of the {kind} {part.name}{limits}"
-    return Variable(f"{kind}.{plain(name)}{index}", "SMC_PARAMETER", words, unit, finite, least, positive)
+    return Variable(f"{kind}.{plain(name)}{index}", "SMC_PARAMETER", words, unit, finite, minimum, positive)
 
 
 # C
@@ -276,7 +276,7 @@ def source(listed: Sequence[Variable], helpers: Iterable[str], body: Iterable[st
         "",
         "const smc_variable smc_variables[] = {",
         *(
-            f'    {{"{one.name}", {one.kind}, {one.start!r}, {_c_number(one.least)}, {int(one.positive)}}},'
+            f'    {{"{one.name}", {one.kind}, {one.start!r}, {_c_number(one.minimum)}, {int(one.positive)}}},'
             for one in listed
         ),
         "};",
@@ -333,7 +333,7 @@ def body(listed: Sequence[Variable], controller: Controller, code: Mapping[str, 
             return absent
         return f"value[{place(name + controller.places[0])}{' + j' * bool(many)}]"
 
-    def for_each(lines: Iterator[str]) -> Iterator[str]:
+    def for_each(lines: Iterable[str]) -> Iterable[str]:
         if not many:
             return lines
         return itertools.chain(["for (int j = 0; j < SMC_JOINTS; j++) {"], (f"    {line}" for line in lines), ["}"])
@@ -353,13 +353,11 @@ def body(listed: Sequence[Variable], controller: Controller, code: Mapping[str, 
         yield f"y.has_surface = 1.0, y.s = out[0], y.v_eq = {value('v_eq')} = out[1];"
     yield from _call("law", "&y", "law_memory")
     yield from for_each(
-        iter(
-            (
-                f"const double u = fmin(fmax(out{each}, -y.limit{j}), y.limit{j}), s = out{other};",
-                f"{value('u')} = u, {value('s')} = s;",
-                f"if (!(isfinite(out{each}) && isfinite(s) && fabs(u) < {MAX_CONTROL!r})) return SMC_NOT_FINITE;",
-            )
-        )
+        [
+            f"const double u = fmin(fmax(out{each}, -y.limit{j}), y.limit{j}), s = out{other};",
+            f"{value('u')} = u, {value('s')} = s;",
+            f"if (!(isfinite(out{each}) && isfinite(s) && fabs(u) < {MAX_CONTROL!r})) return SMC_NOT_FINITE;",
+        ]
     )
     yield "return 0;"
 
@@ -371,9 +369,9 @@ def _tables(listed: Sequence[Variable], controller: Controller, code: Mapping[st
         yield f"const double {kind}_gains[] = {{"
         for name in part.gains:
             shared = f"{kind}.{plain(name)}"
-            own = [shared] * max(1, controller.joints * (kind == "law"))
-            own = own if shared in names else [shared + place for place in controller.places]
-            yield from (f"    number(value[{place(one)}])," for one in own)
+            elements = [shared] * max(1, controller.joints * (kind == "law"))
+            elements = elements if shared in names else [shared + place for place in controller.places]
+            yield from (f"    number(value[{place(one)}])," for one in elements)
         yield from ("    0.0,",) if not part.gains else ()
         yield "};"
         first = place(f"{kind}.memory[1{',1' * bool(controller.joints)}]")

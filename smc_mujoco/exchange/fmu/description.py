@@ -61,13 +61,13 @@ def _power(name: str, n: float) -> str:
 def base_units(unit: Unit, joint: str) -> dict[str, int] | None:
     """Return SI base unit -> its exponent in a unit; None if an exponent is not whole."""
     (_, force), (_, position) = JOINTS[joint]
-    found: dict[str, float] = {}
+    powers: dict[str, float] = {}
     for parts, n in ((force, unit.force), (position, unit.position), ({"s": 1}, unit.time)):
         for name, each in parts.items():
-            found[name] = found.get(name, 0.0) + n * each
-    if any(n != int(n) for n in found.values()):
+            powers[name] = powers.get(name, 0.0) + n * each
+    if any(n != int(n) for n in powers.values()):
         return None
-    return {name: int(n) for name, n in found.items() if n}
+    return {name: int(n) for name, n in powers.items() if n}
 
 
 def model_description(
@@ -138,8 +138,8 @@ def _variable(reference: int, one: Variable, joint: str) -> xml.Element:
         about["initial"] = initial
     if one.unit is not None and any(one.unit):
         about["unit"] = unit_name(one.unit, joint)
-    if math.isfinite(one.least):
-        about["min"] = repr(one.least)
+    if math.isfinite(one.minimum):
+        about["min"] = repr(one.minimum)
     if one.kind not in ("SMC_CLOCK", "SMC_COMPUTED"):
         about["start"] = repr(one.start)
     return xml.Element("Float64", about)

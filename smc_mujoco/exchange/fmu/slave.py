@@ -84,19 +84,19 @@ class Slave:
     def _set(self, groups: Sequence[Group], values: Sequence[float]) -> None:
         """Set variables to the values at their places."""
         for kind, names, references, places in groups:
-            own = [_of_type(kind, values[place]) for place in places]
+            typed = [_of_type(kind, values[place]) for place in places]
             setter = ("setInteger" if self.two else "setInt64") if kind == "Enumeration" else f"set{kind}"
-            what = ", ".join(f"{name} = {value:g}" for name, value in zip(names, own, strict=True))
-            self._called(f"setting {what}", getattr(self.fmu, setter), references, own)
+            what = ", ".join(f"{name} = {value:g}" for name, value in zip(names, typed, strict=True))
+            self._called(f"setting {what}", getattr(self.fmu, setter), references, typed)
 
     def _get(self, groups: Sequence[Group]) -> list[float]:
         """Return the values of variables in the order of their places."""
-        found = [0.0] * sum(len(group.places) for group in groups)
+        values = [0.0] * sum(len(group.places) for group in groups)
         for kind, names, references, places in groups:
             read = self._called(f"reading {', '.join(names)}", getattr(self.fmu, f"get{kind}"), references)
             for place, value in zip(places, read, strict=True):
-                found[place] = float(value)
-        return found
+                values[place] = float(value)
+        return values
 
     def _called(self, what: str, function: Any, *arguments: Any, **named: Any) -> Any:
         """Call a function of FMPy. Raise Fault if it fails, with the FMU's own words, or changes our arithmetic."""
@@ -148,10 +148,10 @@ def _run(order: Mapping[str, Any], say: Callable) -> None:
         r, dr = 0.1 * math.sin(k * length), 0.1 * math.cos(k * length)
         seen = {"t": k * length, "dt": length, "x": x, "v": v, "r": r, "dr": dr, "ddr": -r, "e": x - r, "de": v - dr}
         seen |= {"a": -r, "g": 1.0, "gq": 1.0, "limit": MAX_COMMAND, "model": 1.0}
-        found = slave.step([seen.get(name, 0.0) for name in order["inputs"]], k * length, length)
-        if not all(map(math.isfinite, found)):
-            raise Fault(f"{order['outputs'][0]} is {found[0]:g} after {k + 1} steps")
-        v += length * min(max(found[0], -MAX_COMMAND), MAX_COMMAND)
+        outputs = slave.step([seen.get(name, 0.0) for name in order["inputs"]], k * length, length)
+        if not all(map(math.isfinite, outputs)):
+            raise Fault(f"{order['outputs'][0]} is {outputs[0]:g} after {k + 1} steps")
+        v += length * min(max(outputs[0], -MAX_COMMAND), MAX_COMMAND)
         x += length * v
         if abs(x) > MAX_POSITION:
             x, v = math.copysign(MAX_POSITION, x), 0.0

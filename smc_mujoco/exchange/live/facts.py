@@ -61,12 +61,12 @@ def checked(names: Sequence[str | Plant]) -> list[Plant]:
     for name in names:
         if isinstance(name, str) and name not in catalogue():
             raise unknown("plant", name, plants())
-    found = [as_plant(name) for name in dict.fromkeys(names)]
-    for plant in found:
+    chosen = [as_plant(name) for name in dict.fromkeys(names)]
+    for plant in chosen:
         if why := _why_not(plant):
             known = ", ".join(plants())
             raise ScenarioError(f"the live page cannot show {plant.name}, which {why}: choose from {known}")
-    return found
+    return chosen
 
 
 def facts(chosen: Sequence[Plant], offered: Sequence[Component], own: Sequence[Component]) -> dict[str, Any]:
@@ -166,8 +166,8 @@ def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], own: Sequence
 
 def _opening(own: Sequence[str], offered: Sequence[str]) -> list[str]:
     """Return the names of at most two laws with which the page opens: the user's, then START, then the first ones."""
-    found = [*own, *(name for name in START if name in offered), *(name for name in offered if name != "none")]
-    return list(dict.fromkeys(found))[:2]
+    names = [*own, *(name for name in START if name in offered), *(name for name in offered if name != "none")]
+    return list(dict.fromkeys(names))[:2]
 
 
 def _mjcf(plant: Plant) -> Path:
@@ -216,11 +216,11 @@ def _fields(model: mujoco.MjModel, plant: Plant) -> dict[str, list[list[float]]]
     All fields are linear in the mass, so the page can compute them for any mass.
     """
     written: list[dict[str, np.ndarray]] = [{}, {}]
-    for found, factor in zip(written, (1.0, 2.0), strict=True):
+    for fields, factor in zip(written, (1.0, 2.0), strict=True):
         for name, at, value, adds in plant.fields(model, plant.values({"mass": factor})):
-            values = found.setdefault(name, field_array(model, name).astype(float).copy())
+            values = fields.setdefault(name, field_array(model, name).astype(float).copy())
             values[at] = values[at] + value if adds else value
-    return {name: [found[name].ravel().tolist() for found in written] for name in written[0]}
+    return {name: [fields[name].ravel().tolist() for fields in written] for name in written[0]}
 
 
 def _skins(plant: Plant) -> list[dict[str, Any]]:
@@ -228,7 +228,7 @@ def _skins(plant: Plant) -> list[dict[str, Any]]:
 
     A vertex follows the bodies of the skin's bones, each with a weight.
     """
-    model, found = compiled(plant.spec()), []
+    model, skins = compiled(plant.spec()), []
     for i in range(model.nskin):
         first, count = model.skin_vertadr[i], model.skin_vertnum[i]
         face, faces = model.skin_faceadr[i], model.skin_facenum[i]
@@ -237,7 +237,7 @@ def _skins(plant: Plant) -> list[dict[str, Any]]:
         for column, bone in enumerate(bones):
             at = slice(model.skin_bonevertadr[bone], model.skin_bonevertadr[bone] + model.skin_bonevertnum[bone])
             weights[model.skin_bonevertid[at], column] = model.skin_bonevertweight[at]
-        found.append(
+        skins.append(
             {
                 "rgba": model.mat_rgba[model.skin_matid[i]].tolist(),
                 "vertices": model.skin_vert[first : first + count].round(5).ravel().tolist(),
@@ -253,7 +253,7 @@ def _skins(plant: Plant) -> list[dict[str, Any]]:
                 ],
             }
         )
-    return found
+    return skins
 
 
 def _part(model: mujoco.MjModel, field: Field) -> dict[str, Any]:

