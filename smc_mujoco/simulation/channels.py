@@ -12,7 +12,7 @@ from smc_mujoco.mechanisms.plant import DIRECTLY
 # Indices of a channel in mjData, -1 if it has no such thing:
 #   qpos, qvel, x_sensor and v_sensor (in sensordata), ctrl, force (in actuator_force)
 #   xfrc: of a generalised force d in xfrc_applied, which enters there with `sign`
-#   push: of a horizontal force on the body in xfrc_applied; on that of a hinge along the world's axis `along`, 0 or 1
+#   push: of a horizontal force on the body in xfrc_applied, for a hinge along the axis `along` of the world, 0 or 1
 #   tip, anchor: of the ends of that force's lever arm, in xipos and xanchor, and of the axis in xaxis; -1 for a slide
 #   friction, brake: of a friction in actuator_force, and in ctrl if the callback computes it
 #   direct: in qfrc_applied, in users' models, whose disturbances act on the joint itself
