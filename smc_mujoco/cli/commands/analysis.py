@@ -236,9 +236,9 @@ def _attacked(
     rigs = annexes.module("smc_mujoco.evidence.rigs.rig", "a rig") if annexes.installed("evidence") else None
     if rigs and plant in rigs.rigs():
         twin, ensemble = rigs.rig(plant), annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig")
-        chosen = laws or list(twin.laws)
         own = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
-        return chosen, [ensemble.runs(twin, [one], 1, own, duration) for one in chosen]
+        cases = [ensemble.runs(twin, [one], 1, own, duration) for one in laws or twin.laws]
+        return [runs[0].law for runs in cases], cases
     chosen = laws or list(gain_sets.LAWS)
     return chosen, [[case(options.plant(plant), one, condition, duration, gains)] for one in chosen]
 

@@ -31,7 +31,7 @@ def runs(
 
     Args:
       rig: a rig with an ensemble.
-      laws: laws or their names; None: the rig's own.
+      laws: laws or their names; a name of one of the rig's laws means that one. None: the rig's laws.
       seeds, gains, duration: as in `smc.grid`.
       starts: as in `smc.grid`; None: within 20 % of the rig's x0.
 
@@ -43,7 +43,9 @@ def runs(
             f"{rig.name} has only one parameter set: choose a rig with an ensemble, such as qube_servo, or identify it "
             "from records and draw other sets with Identified.drawn"
         )
-    if not (chosen := list(rig.laws if laws is None else laws)):
+    shipped = {law.name: law for law in rig.laws}
+    given = rig.laws if laws is None else laws
+    if not (chosen := [shipped.get(one, one) if isinstance(one, str) else one for one in given]):
         raise ScenarioError(f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)")
     found, around = [], starts or Starts(x0=rig.x0)
     for name, member in rig.members().items():

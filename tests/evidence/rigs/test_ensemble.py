@@ -54,6 +54,19 @@ def test_a_rig_has_laws_and_a_start_of_its_own():
         ensemble.runs(smc.rig("realaigym_acrobot"))
 
 
+def test_a_law_by_name_has_the_gains_of_the_rig_and_every_place_says_so(tmp_path):
+    pid = next(law for law in PENDULUM.laws if law.name == "pid")
+    its = {run.law.name: run.law for run in ensemble.runs(PENDULUM, ["pid", "twisting"], seeds=1, duration=0.1)}
+    assert (its["pid"], its["pid"].source.kind, its["twisting"].source.kind) == (pid, "shipped", "default")
+    words = ["worst", PENDULUM.name, "--law", "pid,twisting", "--budget", "1", "--duration", "0.1"]
+    done = CliRunner().invoke(app, [*words, "--json", str(tmp_path / "worst.json")])
+    assert done.exit_code == 0, done.output
+    said = {one["scenario"]["source"]["kind"] for one in json.loads((tmp_path / "worst.json").read_text())}
+    assert said == {"shipped", "default"}
+    assert "gains: pid shipped (" in done.output
+    assert "twisting default" in done.output
+
+
 def test_a_board_of_a_voltage_is_in_volts(tmp_path):
     fields = {"actuator": smc.DCMotor(command="voltage"), "duration": 0.2}
     runs = [
