@@ -16,6 +16,7 @@ from smc_mujoco.simulation.trace import ARRAYS, Trace
 WINDOW = 0.01, 40  # of a mean: share of the run, and fewest samples; chosen, see `window`
 STILL = 2e-3  # of the largest value: smaller steps between samples do not count as moves
 REVERSALS = 6  # this many in a row are chattering, if each follows within a quarter of a window
+TREND = 0.5  # share of variance along a straight line, above which y moves rather than chatters; chosen
 POINTS = 250  # parts of a line, of which the least and the largest value are kept
 
 
@@ -86,7 +87,8 @@ def stretches(y: np.ndarray, width: int) -> list[slice]:
     with opposite signs. Reversals are close, within n samples, if neither the time between a reversal's moves nor the
     time to the next reversal is longer. y chatters where at least REVERSALS of them in a row are close within a quarter
     of `width`. The stretch includes the reversals before and after that are close within `width`, from the first move
-    to the last, and extends to an end of y if that is as close. The rule is symmetric in time.
+    to the last, and extends to the end of y if that is as close. It extends to the start only if that is within the
+    quarter: what is held there longer does not chatter yet. Else the rule is symmetric in time.
     """
     step = np.diff(y)
     moves = np.flatnonzero(np.abs(step) > STILL * np.abs(y).max())
@@ -104,7 +106,7 @@ def stretches(y: np.ndarray, width: int) -> list[slice]:
     for part in sequences(width):
         a, b = first[part[0]] + 1, last[part[-1]] + 1
         if ((seeds >= a) & (seeds <= b)).any():
-            result.append(slice(a if a > width else 0, b if b < len(y) - width else len(y)))
+            result.append(slice(a if a > width // 4 else 0, b if b < len(y) - width else len(y)))
     return result
 
 
@@ -112,14 +114,31 @@ def smooth(y: np.ndarray, width: int) -> np.ndarray:
     """Return y (K+1,), replaced where it chatters by its mean over `width` samples with triangular weights.
 
     The weights result from averaging twice over half the width, which suppresses a periodic signal far better than one
-    average. Within half a width of the ends of a stretch the value is that of the nearest whole triangle. In a stretch
+    average. Within half a width of the ends of a stretch the value is that of the nearest whole triangle; where y moves
+    there, as a noisy one does before it settles, it is that of the longest triangle about the sample. In a stretch
     shorter than the width the triangle is as long as the stretch.
     """
     line = y.astype(float)
     for part in stretches(y, width):
         half = min(width // 2, (part.stop - part.start + 1) // 2)
-        line[part] = np.pad(running(running(line[part], half), half), half - 1, "edge")
+        means = np.pad(triangles(line[part], half), half - 1, "edge")
+        for values, mean in ((line[part], means), (line[part][::-1], means[::-1])):  # from each end
+            if moves(values[: 2 * half - 1]):
+                mean[: half - 1] = [triangles(values[: 2 * k - 1], k)[0] for k in range(1, half)]
+        line[part] = means
     return line
+
+
+def moves(y: np.ndarray) -> bool:
+    """Return whether y (K,) follows a straight line more than it varies about it."""
+    from scipy.signal import detrend
+
+    return bool(detrend(y).var() < (1.0 - TREND) * y.var())
+
+
+def triangles(y: np.ndarray, half: int) -> np.ndarray:
+    """Return the means of y (K,) with the weights 1, 2, ... half, ... 2, 1, (K - 2 half + 2,)."""
+    return running(running(y, half), half)
 
 
 def running(y: np.ndarray, width: int) -> np.ndarray:

@@ -347,9 +347,21 @@ def test_chattering_to_the_end_of_a_run_ends_in_a_whole_mean():
 @pytest.mark.parametrize("seed", range(4))
 def test_the_line_is_the_same_read_backwards(seed):
     rng = np.random.default_rng(seed)
-    u = switching(rng.choice([1, 3, 8, 20, 39, 41, 80], 300, p=[0.3, 0.3, 0.2, 0.1, 0.04, 0.03, 0.03]))
+    lengths = rng.choice([1, 3, 8, 20, 39, 41, 80], 300, p=[0.3, 0.3, 0.2, 0.1, 0.04, 0.03, 0.03])
+    u = switching([*[1] * 9, *lengths, *[1] * 9])  # a long hold is no chattering at the start, but is at the end
     u += np.sin(np.arange(len(u)) / 50) + rng.normal(0.0, 0.02, len(u))
     np.testing.assert_allclose(decimate.smooth(u[::-1], 40)[::-1], decimate.smooth(u, 40), atol=1e-12)
+
+
+def test_a_noisy_ramp_starts_and_ends_where_it_does_and_a_first_hold_is_drawn():
+    k, noise = np.arange(2001), np.random.default_rng(0).normal(0.0, 0.03, 2001)
+    for y in (np.exp(-k / 40) + noise, np.exp((k - 2000) / 40) + noise):  # as s in the first and last 0.1 s
+        line = decimate.smooth(y, 100)
+        truth = y - noise
+        assert np.abs(line - truth).max() < 0.13  # the nearest whole mean is 0.65 off
+        assert np.abs(line - truth).mean() < 0.02
+    u = switching([45, *[1, 2, 2, 1] * 200])
+    assert (decimate.smooth(u, 100)[:45] == -6.0).all()
 
 
 def test_steps_without_chatter_and_swings_slower_than_the_window_are_their_own_lines():
