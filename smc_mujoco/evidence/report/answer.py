@@ -5,7 +5,7 @@ Everything here is counted from `Findings.scores`.
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.differences import ROUNDING
@@ -15,7 +15,7 @@ from smc_mujoco.evidence.audit.verdict import totals
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.scores import Place, Score
 from smc_mujoco.studies.adviser import MIN_SETTLED
-from smc_mujoco.studies.worst_case import WorstCases
+from smc_mujoco.studies.worst_case import WorstCase, WorstCases
 
 if TYPE_CHECKING:
     from smc_mujoco.evidence.report.stages import Findings
@@ -197,15 +197,20 @@ def attacked(findings: "Findings") -> dict[str, WorstCases]:
 # sentences
 
 
-def robust(found: WorstCases) -> str:
-    """Return which law is the most robust on a plant, and what the worst case says of the one with the least median."""
-    first, least = found[0], min(found, key=lambda one: one.median)
-    text = f"{words.law(first.nominal.law.name)} on {words.plant(first.nominal.plant.name)}, worst found {first.words}"
-    text += f" (median {first.shown(first.median)})"
-    if least is not first:
-        text += f"; by the median {words.law(least.nominal.law.name)} would be first with {least.shown(least.median)} "
-        text += f"{least.unit}, and its worst found is {least.words}"
-    return f"{text}."
+def robust(attacked: Mapping[str, WorstCases]) -> str:
+    """Return which law has the smallest error in the worst case on each plant, and where it is not first by median."""
+    first = [found[0] for found in attacked.values()]
+    least = [min(found, key=lambda one: one.median) for found in attacked.values()]
+    others = [one for one in least if one not in first]
+    text = f"smallest rms error found: {'; '.join(map(_both, first))}."
+    return text + f" By the median these would be first: {'; '.join(map(_both, others))}." * bool(others)
+
+
+def _both(one: WorstCase) -> str:
+    """Return law, plant, worst found and median."""
+    median = f"{one.shown(one.median)} {one.unit * (one.median < math.inf)}".strip()
+    law, plant = words.law(one.nominal.law.name), words.plant(one.nominal.plant.name)
+    return f"{law} on {plant} {one.words} (median {median})"
 
 
 def verdict(findings: "Findings", metrics: Sequence[str]) -> str:

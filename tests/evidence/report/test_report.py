@@ -28,6 +28,7 @@ from smc_mujoco.evidence.report.plan import QUICK, Bars
 from smc_mujoco.evidence.report.scores import Place, Score
 from smc_mujoco.simulation.run import run
 from smc_mujoco.studies.cache import cached
+from smc_mujoco.studies.worst_case import WorstCases
 
 TINY = dataclasses.replace(
     QUICK,
@@ -445,18 +446,24 @@ def test_a_law_that_seldom_settles_is_not_one_to_take(findings):
 
 
 def test_the_first_screen_tells_the_worst_found_beside_the_median(text, findings):
-    (found,) = answer.attacked(findings).values()
+    attacked = answer.attacked(findings)
+    (found,) = attacked.values()
     assert {one.nominal.law.name for one in found} == set(TINY.laws)
     first, *_, last = found
     assert first.value < last.value
-    said = answer.robust(found)
-    assert said.startswith(f"{words.law(first.nominal.law.name)} on Duffing, worst found {first.words} (median ")
+    said = answer.robust(attacked)
+    best = f"{words.law(first.nominal.law.name)} on Duffing {first.words} (median {first.shown(first.median)} m)"
+    assert said == f"smallest rms error found: {best}."
     screen = text[text.index('class="answer"') : text.index('class="picks"')]
     assert said in screen
     rows = text[text.index('id="worst-cases"') :]
     for one in found:
         for value in (one.value, one.median):
             assert re.search(rf'data-v="{value}"><a [^>]*>{re.escape(one.shown(value))}</a></td>', rows)
+    calm = dataclasses.replace(last, median=first.median / 2)
+    both = f"{words.law(last.nominal.law.name)} on Duffing {last.words} (median {calm.shown(calm.median)} m)"
+    told = answer.robust({"duffing": WorstCases([first, calm])})
+    assert told == f"{said} By the median these would be first: {both}."
 
 
 def test_the_first_screen_says_for_each_plant_and_need_what_to_use(text, findings):
