@@ -5,6 +5,7 @@ import json
 import re
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import smc_mujoco as smc
 from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.audit.paper import paper
+from smc_mujoco.evidence.certificates.loops import SINGLE
 
 CLAIMS = paper("gaber").claims
 PAGE = (ROOT / "docs" / "what_the_author_may_claim.md").read_text(encoding="utf-8")
@@ -52,6 +54,21 @@ def test_numbers_of_the_page_are_those_of_certificates():
     shown |= told("smc-mujoco certify inverted_pendulum_network")
     tables = "\n".join(line for line in PAGE.partition("## Claim by claim")[0].splitlines() if line.startswith("|"))
     assert set(re.findall(DECIMALS, tables)) - {"0.2"} <= shown
+
+
+def test_comparisons_of_sentences_hold_with_the_tuned_gains():
+    def loop(plant, law):
+        component, found = gain_sets.law(plant, law), smc.plant(plant)
+        return SINGLE[plant](SimpleNamespace(**found.parameters)), SimpleNamespace(**component.gains)
+
+    (_, weight, *_), classical = loop("inverted_pendulum", "classical")
+    assert "weaker than the" in CLAIMS["28"].instead
+    assert classical.k < weight
+    (M, _, slope, _, D, _), ours = loop("duffing", "observer_free")
+    assert "lam)^2 < 4 M (lam k1 - phi'(0)) with tuned gains" in CLAIMS["35"].instead
+    assert (D + ours.lam) ** 2 < 4.0 * M * (ours.lam * ours.k1 - slope)
+    assert "boundary_layer has the same bound of u" in CLAIMS["12"].instead
+    assert loop("duffing", "boundary_layer")[1].k == ours.lam
 
 
 def test_the_series_of_order_7_falls_where_claim_55_says():
