@@ -1,6 +1,7 @@
 """How the house is built: imports point one way, light ones come first, and one file adds one thing."""
 
 import ast
+import functools
 import os
 import re
 import shutil
@@ -49,10 +50,16 @@ def label(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
+@functools.cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text())
+
+
+@functools.cache
 def imported(path: Path) -> set[str]:
     """Dotted names of our modules that a file imports, anywhere in it."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(parsed(path)):
         match node:
             case ast.Import():
                 found |= {alias.name for alias in node.names}
@@ -267,7 +274,7 @@ def explained_elsewhere(path: Path, node: ast.FunctionDef | ast.ClassDef) -> boo
 def test_everything_public_is_explained():
     silent = []
     for path in FILES:
-        tree = ast.parse(path.read_text())
+        tree = parsed(path)
         bare = path.parent.name == "plants"
         if (path.name != "__init__.py" or path.stat().st_size) and not (ast.get_docstring(tree) or bare):
             silent.append(label(path))

@@ -1,12 +1,13 @@
 """Playback speed: slow where things move fast and at blows, faster where they rest, real time where asked."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.draw import states
+from smc_mujoco.draw import states, style
 from smc_mujoco.draw.film import pace
 from smc_mujoco.simulation.trace import ARRAYS
 
@@ -86,6 +87,12 @@ def test_impacts_are_slowest(monkeypatch):
     assert at(trace, (first,)) == [0.125]
     monkeypatch.setattr(states, "in_contact", lambda trace: np.zeros(trace.x.shape, bool))
     assert at(trace, (first,)) == [0.25]
+
+
+def test_frames_whose_middle_is_near_that_of_a_push_are_slowest(base, monkeypatch):
+    monkeypatch.setattr(style, "pushes", lambda runs: [SimpleNamespace(time=2.0, width=0.1)])
+    grid, found = pace.speeds([moving(base, np.zeros_like)], FPS)
+    assert (FPS * grid[found == 0.125]).round().tolist() == [60, 61, 62]  # of middles 2.017, 2.05 and 2.083 s
 
 
 def test_a_diverged_run_does_not_make_the_others_rest(base):

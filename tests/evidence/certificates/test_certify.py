@@ -344,8 +344,8 @@ def escapes(plant, count, duration):
     made = certificate(plant, disturbance=d0)
     x, v = starts(made, count, rng)
     left = np.zeros(count, bool)
-    for k, (x, v) in enumerate(steps(made, x, v, forces(count, d0, rng), duration)):  # noqa: B020
-        if k % 10 == 0:
+    for k, (x, v) in enumerate(steps(made, x, v, forces(count, d0, rng), duration, dt=2e-3)):  # noqa: B020
+        if k % 5 == 0:
             left |= ~made.contains(x, v)
     bound = part(made.data, LEVELS)["bound"] if d0 else 1e-3
     return int(left.sum()), int((np.abs(x) > bound).sum())
