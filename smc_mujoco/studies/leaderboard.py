@@ -259,12 +259,10 @@ class Board(Tables):
     def _gains(self, laws: Collection[str]) -> str:
         """Return what limits the results of laws that win, after commas: their search, and "for these gains"."""
         others = [one.law for one in self.entries if one.law in laws and one.about_defaults]
-        whose = (
-            f"{joined(others)} " * (len(laws) > 1)
-            + f"with gains searched about {'its' if len(others) == 1 else 'their'}"
-        )
-        rule = f", {whose} defaults and not by the rule" * bool(others)
-        return rule + ", for these gains" * all(block.sets == 1 for block in self.blocks)
+        names, its = f"{joined(others)} " * (len(laws) > 1), "its" if len(others) == 1 else "their"
+        limits = [f"{names}with gains searched about {its} defaults and not by the rule"] * bool(others)
+        limits += ["for these gains"] * all(block.sets == 1 for block in self.blocks)
+        return "".join(f", {one}" for one in limits)
 
     @property
     def why(self) -> str:

@@ -46,7 +46,7 @@ BEGIN = 2  # random members that the search also changes, the worst of them
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class WorstCase:
+class WorstCase(Tables):
     """The worst member of a class that was found for a scenario.
 
     Attributes:
@@ -113,7 +113,9 @@ class WorstCase:
         within = dataclasses.asdict(self.within)
         return values | rest | {"within": within, "scenario": serialise.describe(self.scenario)}
 
-    def _repr_html_(self) -> str:
+    @property
+    def tables(self) -> list[Tabular]:
+        """One table: the largest value among the members that each strategy made."""
         unit = f" ({self.unit})" * bool(self.unit)
         table = Tabular(
             headings=["strategy", f"largest {CATALOGUE[self.metric].label}{unit}"],
@@ -121,7 +123,7 @@ class WorstCase:
             title=str(self),
             notes=[f"{self.tried} runs, half of them random", *([self.outside] if self.outside else [])],
         )
-        return table._repr_html_()
+        return [table]
 
     def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
         """Draw the worst run beside the scenario as it was given; arguments as in `smc.figure`."""

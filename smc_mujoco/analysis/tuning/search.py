@@ -119,13 +119,9 @@ def tune(
       ScenarioWarning: a gain of unknown unit, which is searched about its default; the law's own gains are better than
         any that were tried, or all chatter more than is wanted.
     """
+    given = {"conditions": conditions, "starts": starts, "chattering": chattering}
     goal = objective if isinstance(objective, Objective) else find("objective", objective, OBJECTIVES)
-    if conditions is not None:
-        goal = dataclasses.replace(goal, conditions=conditions)  # pyright: ignore[reportArgumentType]
-    if starts is not None:
-        goal = dataclasses.replace(goal, starts=starts)
-    if chattering is not None:
-        goal = dataclasses.replace(goal, chattering=chattering)
+    goal = dataclasses.replace(goal, **{name: value for name, value in given.items() if value is not None})
     budget = whole("budget", budget, 1, MAX_CANDIDATES)
     whole("seed", seed, 0, 10**9)
     cases = goal.scenarios(plant, coerce.law(law), seed)
@@ -135,14 +131,8 @@ def tune(
     reach = goal.starts.reach(dataclasses.replace(cases[0], x0=None))
     scales = search_space.scales(plant, bound, cases[0].model == "nominal", reach)
     start = search_space.box(law, scales)
-    if about := list(search_space.without_unit(law)):
-        warnings.warn(
-            f"{law.name}'s {joined(about)} {'have' if len(about) > 1 else 'has'} no unit, and so a search about "
-            f"{'their defaults' if len(about) > 1 else 'its default'} in place of the rule of all laws: write the unit,"
-            f' as in gains={{"{about[0]}": Gain({law.gains[about[0]]:g}, RATE)}}, see smc_mujoco.control.units',
-            ScenarioWarning,
-            users_frame(),
-        )
+    if search_space.without_unit(law):
+        _warn(_about_defaults(law))
     tracking, variation = goal.terms(run(cases, threads))
     before = tracking + goal.weight * variation + goal.excess(cases[0])
     with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as drawn:
@@ -151,18 +141,14 @@ def tune(
         ends = _search(ledger, start, searched, seed)
     best = min(ledger.evaluations, key=lambda e: e.objective)
     if best.objective > before:
-        warnings.warn(
+        _warn(
             f"no set of gains tried for {law.name} on {plant.name} is better than the law's own, with an objective of "
-            f"{best.objective:.3g} s² instead of {before:.3g} s²: give a larger budget",
-            ScenarioWarning,
-            users_frame(),
+            f"{best.objective:.3g} s² instead of {before:.3g} s²: give a larger budget"
         )
     if ledger.excess(best.gains):
-        warnings.warn(
+        _warn(
             f"all gains tried for {law.name} on {plant.name} are predicted to chatter with more than "
-            f"{goal.chattering:g}: give a larger budget, or a larger chattering",
-            ScenarioWarning,
-            users_frame(),
+            f"{goal.chattering:g}: give a larger budget, or a larger chattering"
         )
     return Tuned(
         law=_with(law, tuple(start), best.gains),
@@ -181,6 +167,21 @@ def tune(
         searched=searched,
         versions=versions(),
     ).sourced()
+
+
+def _warn(words: str) -> None:
+    warnings.warn(words, ScenarioWarning, users_frame())
+
+
+def _about_defaults(law: Component) -> str:
+    """Return the warning of a law with gains of unknown unit, which are searched about their defaults."""
+    about = list(search_space.without_unit(law))
+    have, whose = ("have", "their defaults") if len(about) > 1 else ("has", "its default")
+    return (
+        f"{law.name}'s {joined(about)} {have} no unit, and so a search about {whose} in place of the rule of all laws: "
+        f'write the unit, as in gains={{"{about[0]}": Gain({law.gains[about[0]]:g}, RATE)}}, see '
+        "smc_mujoco.control.units"
+    )
 
 
 @dataclasses.dataclass
