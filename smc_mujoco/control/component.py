@@ -378,7 +378,7 @@ def by_channel(laws: "Sequence[Component]") -> Component:
 
 
 def at(value: Value, i: int) -> float:
-    """Return a gain's value in channel i. Of too short a tuple it is the last one, which a scenario refuses."""
+    """Return a gain's value in channel i. A tuple that is too short, which a scenario refuses, gives its last value."""
     return value[min(i, len(value) - 1)] if isinstance(value, tuple) else value
 
 

@@ -228,7 +228,9 @@ def contact(name: str, value: Contact | str | None, s: Any) -> Contact:
     """Return a contact that the plant offers, from itself or its kind; none from None."""
     made = Contact("none") if value is None else Contact(value) if isinstance(value, str) else value
     if not isinstance(made, Contact):
-        raise ScenarioError(f"{name} is {shown(made)}: give smc.Contact(...) or one of {', '.join(s.plant.contacts)}")
+        raise ScenarioError(
+            f"{name} is {shown(made)}: give smc.Contact(...) or one of {', '.join(['none', *s.plant.contacts])}"
+        )
     made.check(s.plant)
     return made
 

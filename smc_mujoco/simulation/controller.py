@@ -531,7 +531,7 @@ def _log(sim, data, k):
             sample.applied = 0.0
         else:
             applied, limit = data.ctrl[channel.ctrl] / sim.scale, pointer(sim.limits)[i]
-            # scaled and back, it may be an ulp beyond the limit
+            # the quotient may round to just beyond the limit
             sample.applied = min(max(applied, -limit), limit) if sim.has_drives == 0 else state.arrived
         sample.d = _disturbance(data, channel)
         sample.force, sample.reaction = state.force / sim.steps, state.reaction / sim.steps

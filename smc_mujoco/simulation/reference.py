@@ -138,7 +138,7 @@ class Loop:
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.channels["qpos"]], data.qvel[self.channels["qvel"]]
                 reached = self.arrived if self.drive_step else data.ctrl[self.channels["ctrl"]] / self.scale
-                applied = np.zeros(len(x))  # scaled and back: an ulp beyond
+                applied = np.zeros(len(x))  # the quotient may round to just beyond the limit
                 applied[self.driven] = np.clip(reached[self.driven], -self.limits, self.limits)
                 sample = (x, v, self.commands[-1], applied, self.s, d, self.r, *self.forces / self.scenario.steps)
                 for name, values in zip(LOG.names or (), sample, strict=True):

@@ -161,7 +161,7 @@ class Buffer:
         return made
 
     def as_tuple(self, dtype: np.dtype, values: Mapping[str, Any]) -> tuple:
-        """Return the values of a record in the order of its fields: an address for a Place, 0 for one not named."""
+        """Return the values of a record's fields in their order: an address for a Place, 0 without a value."""
         fields = []
         for name in dtype.names or ():
             value = values.get(name, 0)

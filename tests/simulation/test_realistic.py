@@ -656,7 +656,7 @@ def test_what_does_not_fit_is_refused_in_one_sentence():
         ({"actuator": smc.Coulomb(0.1)}, "actuator is Coulomb(level=0.1): give one"),
         ({"actuator": (smc.DCMotor(), smc.Lag(0.1))}, "actuator has DCMotor(resistance=0.299"),
         ({"actuator": (smc.Backlash(0.1), smc.Backlash(0.1))}, "actuator has a Backlash twice"),
-        ({"contact": 3}, "contact is 3: give smc.Contact(...) or one of "),
+        ({"contact": 3}, "contact is 3: give smc.Contact(...) or one of none, "),
         ({"contact": smc.Coulomb(0.1)}, "contact is Coulomb"),
         ({"contact": "wal"}, "'wal'"),
         ({"contact": smc.Contact("bobs")}, "'bobs'"),

@@ -30,7 +30,7 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 WINDING = slice(0, 2)  # of actuator_gainprm: resistance, ohm, and torque constant, N m/A at the joint
 SUDDEN = 1e-12  # s: a winding with a shorter time constant counts as instantaneous, else MuJoCo divides by about 0
 MIN_RESISTANCE = 1e-9  # ohm: with less, the voltage of a command is lost in rounding
-LONGEST_STEP = 1e9  # time constants: a shorter lag counts as this
+MAX_TIME_CONSTANTS = 1e9  # of a lag in a physics step: more count as this many
 SHORT_STEP = 1e-3  # time constants: the series of `_current_weight` errs by less than 2e-12 below it
 MIN_CONSTANT = 1e-9  # N m/A at the joint, of the weakest motor
 TIME_CONSTANT = 0  # of actuator_dynprm, s
@@ -250,7 +250,7 @@ def drive_step(actuator: tuple[Actuator, ...], step: float) -> DriveStep | None:
     of the step.
     """
     drives = [part for part in actuator if part.drives]
-    lags = [min(step / part.tau, LONGEST_STEP) for part in drives if isinstance(part, Lag) and part.tau]
+    lags = [min(step / part.tau, MAX_TIME_CONSTANTS) for part in drives if isinstance(part, Lag) and part.tau]
     rate = next((part.rate for part in drives if isinstance(part, RateLimit)), None)
     windings = [step / part.delay for part in drives if isinstance(part, DCMotor) and part.delay]
     if not lags and not windings and rate is None:
