@@ -32,6 +32,9 @@ A block without a test has one value of each law, in which nothing was drawn: a 
 by more than the least relevant difference. It belongs to neither family.
 
 A law with a run that failed, or has no value, wins nothing. In every order the laws with fewer such runs come first.
+
+A law is among the best if no other is better. A law that is not beaten only because two laws have too few samples,
+though the other's median is relevantly lower, is not among them.
 """
 
 import dataclasses
@@ -45,7 +48,7 @@ from numpy.typing import ArrayLike
 
 from smc_mujoco.analysis.bootstrap import confidence, middle
 from smc_mujoco.analysis.differences import RELEVANT, ROUNDING, least_difference, share_that_matters
-from smc_mujoco.analysis.signed_rank import interval, p_values
+from smc_mujoco.analysis.signed_rank import interval, least_p, p_values
 from smc_mujoco.common.errors import ScenarioError, shown
 
 
@@ -156,6 +159,12 @@ class Comparison:
         return lower & (lacking[:, :, None] <= lacking[:, None, :])
 
     @functools.cached_property
+    def _relevantly_lower(self) -> np.ndarray:
+        """Whether the median of a law is lower than another's by what is relevant, (blocks, laws, laws)."""
+        lowered = self.centres - least_difference(self.centres, self.floors, self.relevant)
+        return lowered.T[:, None, :] > self.centres.T[:, :, None]
+
+    @functools.cached_property
     def winners(self) -> list[str | None]:
         """The law of each block that is better than every other, if there is one."""
         found = []
@@ -187,18 +196,26 @@ class Comparison:
 
         Neither is better in any block, or fails less often there, and no median is relevantly lower.
         """
-        least = least_difference(self.centres, self.floors, self.relevant).T
-        centre = self.centres.T
-        lower = centre[:, None, :] - least[:, None, :] > centre[:, :, None]
         lacking = self.without_value.T
         fails_less = lacking[:, :, None] < lacking[:, None, :]
-        differs = np.any(lower | self.better | fails_less, axis=0)
+        differs = np.any(self._relevantly_lower | self.better | fails_less, axis=0)
         return ~np.logical_or(differs, differs.T)
+
+    @functools.cached_property
+    def undecided(self) -> np.ndarray:
+        """Whether a law is not beaten for want of samples alone, (laws, blocks).
+
+        The median of another law is relevantly lower, and no more of its runs fail, but the two have too few samples
+        for any test.
+        """
+        few = np.vectorize(least_p)(self.samples) > self.limits.pair
+        few[self.untested] = False
+        return np.any(self._relevantly_lower & self._eligible & few, axis=1).T & ~self.beaten
 
     @property
     def best(self) -> list[tuple[str, ...]]:
-        """The laws of each block that are not beaten."""
-        return [tuple(np.array(self.laws)[~row].tolist()) for row in self.beaten.T]
+        """The laws of each block that are not beaten, with enough samples to tell."""
+        return [tuple(np.array(self.laws)[row].tolist()) for row in ~(self.beaten | self.undecided).T]
 
     @property
     def pairs(self) -> int:
@@ -456,7 +473,7 @@ def ranks(comparison: Comparison) -> list[Rank]:
     lacking = comparison.without_value.sum(axis=1)
     order = [tuple(row) for row in zip(lacking.tolist(), mean.round(9).tolist(), strict=True)]
     places = [sum(other < one for other in order) + (1 + order.count(one)) / 2 for one in order]
-    best = [not any(row) for row in comparison.beaten.tolist()]
+    best = [not any(row) for row in (comparison.beaten | comparison.undecided).tolist()]
     rows = [Rank(*row) for row in zip(comparison.laws, mean.tolist(), places, best, strict=True)]
     return sorted(rows, key=lambda rank: (rank.place, rank.law))
 

@@ -123,10 +123,10 @@ class Advice(Tables):
                 found[rival] = its
         return dict(sorted(found.items(), key=lambda item: -len(item[1])))
 
-    def _fails(self, law: str, need: str) -> bool:
-        """Whether a law has runs without a value on a need."""
-        lacking = self.comparison.without_value[self.comparison.laws.index(law)].tolist()
-        return any(count for (asked, _), count in zip(self.blocks, lacking, strict=True) if asked == need)
+    def _any(self, of: np.ndarray, law: str, need: str) -> bool:
+        """Whether numbers (laws, blocks) of the comparison are not all 0 for a law on a need."""
+        row = of[self.comparison.laws.index(law)].tolist()
+        return any(value for (asked, _), value in zip(self.blocks, row, strict=True) if asked == need)
 
     def dominated(self, law: str) -> list[str]:
         """Return the finalists that are better than a law in some block, and worse in none."""
@@ -197,8 +197,8 @@ class Advice(Tables):
         """Return a median, marked if no finalist is better in any condition and no run fails."""
         name, asked = choice.law.name, NEEDS[need]
         rivalled = len(self.compared) > 1 and name in self.compared
-        best = rivalled and not self.better(name, need) and not self._fails(name, need)
-        return Cell(asked.metric.text(choice.medians[need].median), asked.below(choice), best)
+        doubted = rivalled and self._any(self.comparison.undecided | self.comparison.beaten, name, need)
+        return Cell(asked.metric.text(choice.medians[need].median), asked.below(choice), rivalled and not doubted)
 
     @property
     def key(self) -> str:
@@ -207,6 +207,8 @@ class Advice(Tables):
         medians = f", and medians{of}, with 95 % intervals over {self.samples}" * (not self._untested)
         text = f"place by failed runs, then by mean rank{medians}. "
         text += f"*: no finalist is better{' in any condition' if of else ''}, and every run has a value."
+        if self.comparison.undecided.any():
+            text += " A law is not marked where samples are too few to tell."
         if sources := in_words({choice.law.name: [choice.law.source] for choice in self.choices}):
             text += f" {sources[:1].upper()}{sources[1:]}."
         if any(self.dominated(name) for name in self.compared):
@@ -313,7 +315,8 @@ class Advice(Tables):
         """Return how a law does on a need, and who is better."""
         value, better = self._value(choice, need), self.better(choice.law.name, need)
         if not better:
-            return f"{need.capitalize()}: {value}; no finalist is better."
+            few = ", as far as so few sets of gains tell" * self._any(self.comparison.undecided, choice.law.name, need)
+            return f"{need.capitalize()}: {value}; no finalist is better{few}."
         by_where: dict[str, list[str]] = {}
         for name, conditions in better.items():
             by_where.setdefault(self._where(conditions), []).append(name)

@@ -104,7 +104,8 @@ class Block:
       plant, condition: their names.
       medians: law -> median over the seeds; for "settles" the share of runs that do not settle.
       lacking: law -> number of runs that failed or have no value.
-      best: the laws without such a run that no other law is better than.
+      best: the laws without such a run that no other law is better than, with enough samples to tell.
+      undecided: the laws that no other is better than only because there are too few samples, see `ranking`.
       lead: how the law in front compares with its closest rival; None for one law, for "settles", or if it has runs
         without a value.
       seeds: number of seeds in which every law ran.
@@ -120,6 +121,7 @@ class Block:
     medians: Mapping[str, float]
     lacking: Mapping[str, int]
     best: tuple[str, ...]
+    undecided: tuple[str, ...]
     ahead: str | None
     lead: Lead | None
     seeds: int
@@ -205,7 +207,7 @@ class Board(Tables):
 
     def losses(self, law: str) -> list[str]:
         """Return the names of the blocks in which another law is better, or in which this one has runs that fail."""
-        return [self.name(block) for block in self.blocks if law not in block.best]
+        return [self.name(block) for block in self.blocks if law not in (*block.best, *block.undecided)]
 
     def name(self, block: Block) -> str:
         """Return the name of a block within the board: its condition, its plant, or both."""
@@ -273,7 +275,8 @@ class Board(Tables):
             return f"none is named over {joined(barred)} with default gains"
         if all(not block.best for block in self.blocks) and all(all(block.lacking.values()) for block in self.blocks):
             return f"every law has runs that {'never end' if self.unit == 's' else 'fail'}"
-        return self.too_few or ("" if self.best else "each loses to another, or fails")
+        undecided = ", or has too few samples to tell" * any(block.undecided for block in self.blocks)
+        return self.too_few or ("" if self.best else f"each loses to another, or fails{undecided}")
 
     @property
     def barred(self) -> list[str]:
@@ -484,6 +487,7 @@ def _block(group: cells.Group, found: Comparison, at: int, k: int, untuned: tupl
         medians=dict(zip(found.laws, found.centres[:, at].tolist(), strict=True)),
         lacking=dict(zip(found.laws, found.without_value[:, at].tolist(), strict=True)),
         best=found.best[at],
+        undecided=tuple(law for law, one in zip(found.laws, found.undecided[:, at].tolist(), strict=True) if one),
         ahead=found.winners[at],
         lead=_lead(found, at),
         seeds=group.seeds[k],

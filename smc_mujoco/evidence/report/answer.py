@@ -41,9 +41,8 @@ class Standing(NamedTuple):
 class Pick(NamedTuple):
     """The law to take for a metric on a plant, or on all plants, over the conditions.
 
-    `law`: "" where all laws are level. `median`: of the conditions' medians, NaN over all plants. `wins`, `losses`: in
-    how many of the `of` cells it wins, and in how many another law is better, or it has runs that fail. `level`: the
-    other laws that are beaten in no more cells.
+    `law`: "" where all laws are level. `median`: of the conditions' medians, NaN over all plants. `wins`, `losses`: as
+    of a `Place`. `level`: the other laws that lose no more cells.
     """
 
     law: str
@@ -113,7 +112,7 @@ def standings(findings: "Findings", metric: str) -> list[Standing]:
     found = {key: scores for key, scores in cells(findings.scores).items() if key[2] == metric}
     best = Counter(law for key in found for law in leaders(found, *key))
     alone = Counter(winner(found, *key) for key in found)
-    lost = Counter(s.law for scores in found.values() for s in scores if not s.best)
+    lost = Counter(s.law for scores in found.values() for s in scores if s.beaten)
     rows = [Standing(law, best[law], alone[law], lost[law], len(found)) for law in findings.laws]
     return sorted(rows, key=lambda row: (-row.alone, row.lost, -row.best))
 
@@ -140,7 +139,7 @@ def losses(found: Cells, metrics: Sequence[str], law: str = words.PAPER) -> list
     lost: list[Loss] = []
     for (plant, condition, metric), scores in found.items():
         own = next((s for s in scores if s.law == law), None)
-        if metric not in metrics or own is None or own.best:
+        if metric not in metrics or own is None or not own.beaten:
             continue
         best = min((s for s in scores if s.best), key=lambda s: s.median, default=None)
         if best is not None and math.isfinite(best.median):
@@ -229,7 +228,7 @@ def first(findings: "Findings", metrics: Sequence[str]) -> str:
     """Return whether there is one best law."""
     standing = [standings(findings, metric) for metric in metrics]
     winners = [{row.law for row in rows if row.alone == row.of} for rows in standing]
-    unbeaten = [{row.law for row in rows if not row.lost} for rows in standing]
+    unbeaten = [{row.law for row in rows if row.best == row.of} for rows in standing]
     if winner := set.intersection(*winners) if winners else set():
         return f"{words.law(winner.pop())} wins in every respect compared here, on every plant in every condition."
     if common := set.intersection(*unbeaten) if unbeaten else set():
@@ -247,7 +246,7 @@ def leads(findings: "Findings", metric: str) -> str:
     if top.alone == top.of:
         return f"{words.law(top.law)} wins on {what} in every one of {top.of} cells."
     if not top.alone:
-        level = [words.law(row.law) for row in standing if not row.lost]
+        level = [words.law(row.law) for row in standing if row.best == row.of]
         unbeaten = f"; none is better than {joined(level)} in any" if 0 < len(level) <= NAMED else ""
         return f"no winner on {what} in any of {top.of} cells{unbeaten}."
     plants = [

@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 class Score(NamedTuple):
     """A law's median in a cell over the seeds, with its 95 % interval; inf is never.
 
-    `best`: no other law is better there, and no run failed, see `ranking`; several laws may be. `wins`: it is better
-    than every other, `lead` says by how much. `seeds`: of the runs, `runs`: how many of them are distinct, `sample`:
+    `best`: no other law is better there, and no run failed, see `ranking`; several laws may be. `beaten`: another law
+    is better, or runs failed; neither where samples are too few to tell. `wins`: it is better than every other, `lead`
+    says by how much. `seeds`: of the runs, `runs`: how many of them are distinct, `sample`:
     the size of the sample in words, `failed`: how many runs failed. `floor`: what the sensor does not resolve.
     `barred`: no winner is named there, over laws with default gains.
     """
@@ -40,6 +41,7 @@ class Score(NamedTuple):
     low: float
     high: float
     best: bool
+    beaten: bool
     wins: bool
     lead: str
     seeds: int
@@ -56,7 +58,8 @@ class Place(NamedTuple):
     `mean`: its mean rank over the cells, 1 is the best. `failed`: how many of its runs failed or have no value; laws
     with fewer come first. `best`: no law is better in any cell. `median`: of the cells' medians, NaN where units
     differ; of "settles" the share of runs that settle. `wins`, `losses`: in how many of the `of` cells it wins, and in
-    how many another law is better or it has runs that fail. `why`: why there is no winner, "" if there can be one.
+    how many another law is better, it has runs that fail, or samples are too few to tell. `why`: why there is no
+    winner, "" if there can be one.
     """
 
     plant: str
@@ -99,6 +102,7 @@ def scores(table: "Table", relevant: float = RELEVANT) -> tuple[Score, ...]:
                     low=interval.low,
                     high=interval.high,
                     best=law in block.best,
+                    beaten=law not in (*block.best, *block.undecided),
                     wins=wins,
                     lead=block.lead.words if wins and block.lead else "",
                     seeds=block.seeds,
@@ -134,7 +138,7 @@ def _places(board: Board) -> list[Place]:
             best=entry.rank.best,
             median=entry.interval.median,
             wins=len(board.wins(entry.law)),
-            losses=len(board.losses(entry.law)),
+            losses=sum(entry.law not in block.best for block in board.blocks),
             of=len(board.blocks),
             why=board.why,
         )
