@@ -3,11 +3,17 @@
 import pytest
 
 from smc_mujoco.evidence.audit.paper import paper
-from tests.evidence.papers.test_quick_verdicts import TIMINGS, golden, quick_verdicts
+from tests.evidence.papers.test_quick_verdicts import TIMINGS, golden, quick_verdicts, runs_made_once
 
 SEARCHES = ["12", "20", "24", "61", "T"]  # of millions of steps each; with stubbed runs they are in test_gaber.py
 OTHERS = [id for id in paper("gaber").claims if ("gaber", id) not in TIMINGS and id not in SEARCHES]
 PARTS = [pytest.param(OTHERS[k::6], id=str(k)) for k in range(6)]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def once():
+    with runs_made_once():
+        yield
 
 
 @pytest.mark.parametrize("ids", [*PARTS, pytest.param(SEARCHES, id="searches", marks=pytest.mark.slow)])
