@@ -154,11 +154,11 @@ def print_page(template: Template, console: Console, package: str = "") -> None:
 
 def _gains(template: Template) -> Iterable[str]:
     """Yield a line for each gain: its default and its range."""
-    width = max((len(name) for name in template.defaults), default=0)
-    for name, value in template.defaults.items():
-        least = "  > 0" if name in template.positive else "  >= 0" if name in template.nonnegative else ""
-        yield f"{name:{width}} = {value:<8g}{least}".rstrip()
-    if not template.defaults:
+    width = max(map(len, template.gains), default=0)
+    for name, gain in template.gains.items():
+        allowed = "  > 0" if gain.positive else "  >= 0" if gain.nonnegative else ""
+        yield f"{name:{width}} = {gain.default:<8g}{allowed}".rstrip()
+    if not template.gains:
         yield "none"
 
 

@@ -270,16 +270,6 @@ class Template:
         return {name: gain.default for name, gain in self.gains.items()}
 
     @property
-    def positive(self) -> frozenset[str]:
-        """Gains that must be greater than 0."""
-        return frozenset(name for name, gain in self.gains.items() if gain.positive)
-
-    @property
-    def nonnegative(self) -> frozenset[str]:
-        """Gains that must be at least 0."""
-        return frozenset(name for name, gain in self.gains.items() if gain.nonnegative)
-
-    @property
     def doc(self) -> str:
         """The docstring of the function's module if the module has the function's name, else the function's."""
         module = inspect.getmodule(self.function)
