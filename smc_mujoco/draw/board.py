@@ -2,7 +2,7 @@
 
 import itertools
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -63,13 +63,7 @@ def plot(
     colours = dict(zip(laws, style.law_colours(laws), strict=True))
     marks = dict(zip(laws, itertools.cycle(MARKS), strict=False))
     with style.page(width):
-        key: list[Handle] = []
-        known = sources(table)
-        gains, shared = pages.gained([known.get(law, ()) for law in laws])
-        for law, source in zip(laws, gains, strict=True):
-            look = {"marker": marks[law], "ms": style.points(6), "mec": "none", "lw": style.points(1.5)}
-            key.append(Line2D([], [], color=colours[law], label=style.law_name(law) + source, **look))
-        key.append(Line2D([], [], color=style.MUTED, lw=style.points(1.5), label="95 % interval of the median"))
+        key, shared = _key(table, colours, marks)
         tall = [0.5 + LINE * (len(laws) + 1) * len(_there(table, plant, conditions)) for plant in plants]
         space = pages.head(width, key) + style.points(0.6)
         page = pages.blank(width, height or space + style.points(sum(tall)), fig)
@@ -93,6 +87,16 @@ def plot(
         pages.set_head(page, width, title or "Medians by condition", key, shared)
         pages.write(page, paths)
     return page
+
+
+def _key(table: Columns, colours: Mapping[str, str], marks: Mapping[str, str]) -> tuple[list[Handle], str]:
+    """Return the entries of the legend, law by law, and where all gains come from if that is the same."""
+    known, key = sources(table), []
+    gains, shared = pages.gained([known.get(law, ()) for law in colours])
+    for law, source in zip(colours, gains, strict=True):
+        look = {"marker": marks[law], "ms": style.points(6), "mec": "none", "lw": style.points(1.5)}
+        key.append(Line2D([], [], color=colours[law], label=style.law_name(law) + source, **look))
+    return [*key, Line2D([], [], color=style.MUTED, lw=style.points(1.5), label="95 % interval of the median")], shared
 
 
 def _there(table: Columns, plant: str, conditions: Sequence[str]) -> list[str]:

@@ -79,11 +79,26 @@ def figure(
     traces = style.same_plant(traces)
     names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
     traces = [finite(trace) for trace in traces]
-    narrow = width < pages.NARROW
     chosen = (
         _default(traces, width) if panels is None else [find("panel", name, NAMES) for name in taken("panels", panels)]
     )
-    shown = drawing.horizon(traces)
+    with style.page(width):
+        page = _composed(traces, names, colours, chosen, (width, height), title, fig)
+        pages.write(page, paths)
+    return page
+
+
+def _composed(
+    traces: Sequence[Trace],
+    names: Sequence[str],
+    colours: Sequence[str],
+    chosen: Sequence[str],
+    size: tuple[float, float | None],
+    title: str | None,
+    fig: Figure | SubFigure | None,
+) -> Figure | SubFigure:
+    """Return a page with the chosen panels of traces."""
+    (width, height), shown = size, drawing.horizon(traces)
     early = [drawing.until(trace, shown) for trace in traces]
     overview = _overview(early, chosen)
     small = _small(early) if "channels" in chosen else []
@@ -91,49 +106,43 @@ def figure(
     groups = [Panel("x", *each) for each in style.split(traces).items()]
     places = _parted(groups)
     rests = [drawing.rests(trace) for trace in traces] if "phase" in beside else []
-    with style.page(width):
-        key, gains = _key(traces, names, colours, [*overview, *(panel for row in small for panel in row)], any(rests))
-        column = [name for name in beside for _ in (places if name == "phase" else "x")]
-        row = style.points(ROW)
-        space = pages.head(width, key)
-        last = Panel("u", *next(iter(style.split(traces).items())))
-        heights = [_height(panel) for panel in overview], [_height(last) if n == "end" else HEIGHTS[n] for n in column]
-        parts = [0.62 * len(small), *map(sum, heights)]
-        rows = sum(parts) if narrow else max(parts[0], parts[1], 4.0 if beside else 1.0)
-        page = pages.blank(width, height or max(0.5625 * width * (not narrow), space + row * rows + 0.5), fig)
-        pitch = 72 * (page.bbox.height / page.dpi - space - 0.4) / (rows if narrow else max(parts[1], 1))
-        there = [i for i, part in enumerate(parts) if part]
-        if narrow:  # one below the other
-            several = [parts[0]] * bool(small) + [*heights[0], *heights[1]]
-            grid = page.add_gridspec(len(several), 1, height_ratios=several)
-            rest = [grid[i] for i in range(len(several))]
-            cell = rest.pop(0) if small else None
-            cells, others = rest[: len(overview)], rest[len(overview) :]
-        else:
-            grid = page.add_gridspec(1, len(there), width_ratios=[(2.6, 1.7, 1.0)[i] for i in there])
-            cell = grid[0] if small else None
-            cells, others = (
-                [] if not each else _column(grid[there.index(i + 1)], each) for i, each in enumerate(heights)
-            )
-        changes = style.marks(traces, names)
-        if cell is not None:
-            _draw_small(page, cell, small, colours, changes, (shown, end(traces)))
-        if overview:
-            _draw_over_time(
-                page,
-                cells,
-                overview,
-                drawing.titles(overview, [pitch * part for part in heights[0]]),
-                names,
-                colours,
-                changes,
-                (shown, end(traces)),
-            )
-        _draw_beside(page, others, column, (groups[0], *places), names, colours, rests)
-        pages.set_head(page, width, title or style.plant_name(traces[0].scenario.plant), key, gains)
-        pages.space_ticks(page)
-        pages.write(page, paths)
+    key, gains = _key(traces, names, colours, [*overview, *(panel for row in small for panel in row)], any(rests))
+    column = [name for name in beside for _ in (places if name == "phase" else "x")]
+    space, narrow = pages.head(width, key), width < pages.NARROW
+    last = Panel("u", *next(iter(style.split(traces).items())))
+    heights = [_height(panel) for panel in overview], [_height(last) if n == "end" else HEIGHTS[n] for n in column]
+    parts = [0.62 * len(small), *map(sum, heights)]
+    rows = sum(parts) if narrow else max(parts[0], parts[1], 4.0 if beside else 1.0)
+    tall = height or max(0.5625 * width * (not narrow), space + style.points(ROW) * rows + 0.5)
+    page = pages.blank(width, tall, fig)
+    pitch = 72 * (page.bbox.height / page.dpi - space - 0.4) / (rows if narrow else max(parts[1], 1))
+    first, cells, others = _cells(page, narrow, parts, heights)
+    changes, span = style.marks(traces, names), (shown, end(traces))
+    if first is not None:
+        _draw_small(page, first, small, colours, changes, span)
+    if overview:
+        words = drawing.titles(overview, [pitch * part for part in heights[0]])
+        _draw_over_time(page, cells, overview, words, names, colours, changes, span)
+    _draw_beside(page, others, column, (groups[0], *places), names, colours, rests)
+    pages.set_head(page, width, title or style.plant_name(traces[0].scenario.plant), key, gains)
+    pages.space_ticks(page)
     return page
+
+
+def _cells(
+    page: Figure | SubFigure, narrow: bool, parts: Sequence[float], heights: tuple[Sequence[float], Sequence[float]]
+) -> tuple[SubplotSpec | None, list[SubplotSpec], list[SubplotSpec]]:
+    """Return the cells of the small panels, of those over time and of those beside, as high as their parts."""
+    if narrow:  # one below the other
+        several = [*parts[:1], *heights[0], *heights[1]] if parts[0] else [*heights[0], *heights[1]]
+        grid = page.add_gridspec(len(several), 1, height_ratios=several)
+        rest = [grid[i] for i in range(len(several))]
+        first = rest.pop(0) if parts[0] else None
+        return first, rest[: len(heights[0])], rest[len(heights[0]) :]
+    there = [i for i, part in enumerate(parts) if part]
+    grid = page.add_gridspec(1, len(there), width_ratios=[(2.6, 1.7, 1.0)[i] for i in there])
+    over, beside = ([] if not each else _column(grid[there.index(i)], each) for i, each in enumerate(heights, 1))
+    return grid[0] if parts[0] else None, over, beside
 
 
 def _height(panel: Panel) -> float:
@@ -360,11 +369,7 @@ def signals(
             words = style.cropped(f"{style.law_name(of_law[law])}{source}", 0.55 * room, points(11), bold=True)
             ax.set_title(words, color=colours[law], parse_math=False)
         for i, condition in enumerate(conditions):
-            changes = style.jumps([cells[key] for key in cells if key[1] == condition][:1], [condition])
-            words = ", ".join([condition, *(f"{change} at {time:g} s" for time, change in changes.items())])
-            place = (0.5, 1.0), (0, points(22)), "axes fraction", "offset points"
-            look = {"ha": "center", "fontsize": points(13), "parse_math": False}
-            axes[0, i].annotate(style.cropped(words, 0.85 * room, points(13)), *place, **look)
+            _name_condition(axes[0, i], condition, next(cells[key] for key in cells if key[1] == condition), room)
             axes[-1, i].set_xlabel("time (s)")
         axes[0, 0].set_ylim(drawing.limits(control.traces, "u"))
         key = _meaning([control])
@@ -373,6 +378,15 @@ def signals(
         pages.set_head(page, width, title or f"{style.plant_name(traces[0].scenario.plant)}: control", key, shared)
         pages.write(page, paths)
     return page
+
+
+def _name_condition(ax: Axes, condition: str, trace: Trace, room: float) -> None:
+    """Print a condition above the axes of its column, with the changes of a plant; `room` in points."""
+    changes, size = style.jumps([trace], [condition]), style.points(13)
+    words = ", ".join([condition, *(f"{change} at {time:g} s" for time, change in changes.items())])
+    place = (0.5, 1.0), (0, style.points(22)), "axes fraction", "offset points"
+    look = {"ha": "center", "fontsize": size, "parse_math": False}
+    ax.annotate(style.cropped(words, 0.85 * room, size), *place, **look)
 
 
 def _key(

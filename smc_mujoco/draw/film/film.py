@@ -191,8 +191,7 @@ def frames(
     arms = arm.is_arm(traces)
     timelines = [[None] * len(times) if arms else states.timeline(trace, times, hold) for trace in traces]
     row = scene.in_a_row(traces[0].scenario, scene.turn(traces[0].scenario, chosen))
-    below = arm.room(traces, size[0] / len(traces) / scale) if arms else None
-    words = arm.key(traces) if arms else None
+    below, words = (arm.room(traces, size[0] / len(traces) / scale), arm.key(traces)) if arms else (None, None)
     caption = Caption(traces, names, colours, title, above, scale, scales, timelines, row, below, words)
     charts = Charts(traces, names, colours, (size[0], low), scale)
     motions = [motion(trace, times) for trace in traces]
