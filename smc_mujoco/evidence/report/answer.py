@@ -201,15 +201,15 @@ def robust(attacked: Mapping[str, WorstCases]) -> str:
     first = [found[0] for found in attacked.values()]
     least = [min(found, key=lambda one: one.median) for found in attacked.values()]
     others = [one for one in least if one not in first]
-    text = f"smallest rms error found: {'; '.join(map(_both, first))}."
-    return text + f" By the median these would be first: {'; '.join(map(_both, others))}." * bool(others)
+    text = f"smallest rms error found (in brackets its median): {'; '.join(map(_both, first))}."
+    return text + f" First by the median alone: {'; '.join(map(_both, others))}." * bool(others)
 
 
 def _both(one: WorstCase) -> str:
     """Return law, plant, worst found and median."""
     median = f"{one.shown(one.median)} {one.unit * (one.median < math.inf)}".strip()
     law, plant = words.law(one.nominal.law.name), words.plant(one.nominal.plant.name)
-    return f"{law} on {plant} {one.words} (median {median})"
+    return f"{law} on {plant} {one.words} ({median})"
 
 
 def verdict(findings: "Findings", metrics: Sequence[str]) -> str:

@@ -453,8 +453,8 @@ def test_the_first_screen_tells_the_worst_found_beside_the_median(text, findings
     first, *_, last = found
     assert first.value < last.value
     said = answer.robust(attacked)
-    best = f"{words.law(first.nominal.law.name)} on Duffing {first.words} (median {first.shown(first.median)} m)"
-    assert said == f"smallest rms error found: {best}."
+    best = f"{words.law(first.nominal.law.name)} on Duffing {first.words} ({first.shown(first.median)} m)"
+    assert said == f"smallest rms error found (in brackets its median): {best}."
     screen = text[text.index('class="answer"') : text.index('class="picks"')]
     assert said in screen
     rows = text[text.index('id="worst-cases"') :]
@@ -462,9 +462,9 @@ def test_the_first_screen_tells_the_worst_found_beside_the_median(text, findings
         for value in (one.value, one.median):
             assert re.search(rf'data-v="{value}"><a [^>]*>{re.escape(one.shown(value))}</a></td>', rows)
     calm = dataclasses.replace(last, median=first.median / 2)
-    both = f"{words.law(last.nominal.law.name)} on Duffing {last.words} (median {calm.shown(calm.median)} m)"
+    both = f"{words.law(last.nominal.law.name)} on Duffing {last.words} ({calm.shown(calm.median)} m)"
     told = answer.robust({"duffing": WorstCases([first, calm])})
-    assert told == f"{said} By the median these would be first: {both}."
+    assert told == f"{said} First by the median alone: {both}."
 
 
 def test_the_first_screen_says_for_each_plant_and_need_what_to_use(text, findings):
