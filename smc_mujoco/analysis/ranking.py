@@ -28,8 +28,8 @@ boards. Both are corrected by S. Holm's method (Scandinavian Journal of Statisti
 - Pairs. The family is all pairs of laws in all blocks. The probability that any law is wrongly called better than
   another is at most 1 - level, besides the statements about winners.
 
-A block without a test has one value of each law, in which nothing was drawn: a law is better there if its value is less
-by more than the least relevant difference. It belongs to neither family.
+A block without a test has one value of each law, which is no sample: a law is better there if its value is less by more
+than the least relevant difference. It belongs to neither family.
 
 A law with a run that failed, or has no value, wins nothing. In every order the laws with fewer such runs come first.
 

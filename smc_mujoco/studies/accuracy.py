@@ -200,22 +200,22 @@ def accuracy(
     """
     h = _longest_first(periods)
     numbers = listed("seeds", seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_SEEDS)))
-    cells = [
+    setups = [
         _setup(as_plant(plant), find_condition(condition), law, h, numbers, gains, duration, starts)
         for plant in listed("plants", plants)
         for condition in listed("conditions", conditions)
         for law in listed_laws(laws)
     ]
-    _warn_of_defaults(cells, gains)
-    scenarios = [scenario for cell in cells for scenario in cell.scenarios]
+    _warn_of_defaults(setups, gains)
+    scenarios = [scenario for setup in setups for scenario in setup.scenarios]
     runs: dict[int, Run] = {}
     counted = summed(report, 0.0, sum(scenario.work for scenario in scenarios))
     for k, trace in stream(scenarios, threads, counted):
         runs[k] = _measured(trace)
     rows, first = [], 0
-    for cell in cells:
-        rows.append(_row(cell, [runs[first + k] for k in range(len(cell.scenarios))]))
-        first += len(cell.scenarios)
+    for setup in setups:
+        rows.append(_row(setup, [runs[first + k] for k in range(len(setup.scenarios))]))
+        first += len(setup.scenarios)
     groups: dict[tuple[str, str], list[Accuracy]] = {}
     for row in rows:
         groups.setdefault((row.plant, row.condition), []).append(row)
@@ -331,9 +331,11 @@ def _has_gains(plant: Plant, law: str, gains: str) -> bool:
     return True
 
 
-def _warn_of_defaults(cells: Sequence[Setup], gains: str) -> None:
+def _warn_of_defaults(setups: Sequence[Setup], gains: str) -> None:
     """Warn of laws that have no gains in the set that was asked for."""
-    pairs = {f"{cell.scenarios[0].law.name} on {cell.scenarios[0].plant.name}": None for cell in cells if cell.lacking}
+    pairs = {
+        f"{setup.scenarios[0].law.name} on {setup.scenarios[0].plant.name}": None for setup in setups if setup.lacking
+    }
     if pairs:
         warnings.warn(
             f"no gains in set {gains!r} for {', '.join(pairs)}: these have their default gains; tune them, or give "
@@ -343,19 +345,19 @@ def _warn_of_defaults(cells: Sequence[Setup], gains: str) -> None:
         )
 
 
-def _row(cell: Setup, runs: Sequence[Run]) -> Accuracy:
+def _row(setup: Setup, runs: Sequence[Run]) -> Accuracy:
     """Return the row of a law from its runs, in the order of `Setup.scenarios`."""
-    base, halved = cell.scenarios[0], runs[-1]
+    base, halved = setup.scenarios[0], runs[-1]
     counted = runs[:-1]
     failures = [run.failure for run in counted if run.failure]
-    shape = cell.starts, len(cell.periods), PARTS
+    shape = setup.starts, len(setup.periods), PARTS
     floor = RESOLUTION * (max(map(abs, base.resolved.x0)) or 1.0)
     outside = _outside(base)
     law = base.law
     scalings = {}
     for name in QUANTITIES:
         parts = np.reshape([run.parts[name] for run in counted], shape)
-        reasons = dict(_reasons(cell, counted))
+        reasons = dict(_reasons(setup, counted))
         if failures:
             reasons["always"] = f"{len(failures)} of {len(counted)} runs failed, the first: {one_line(failures[0])}"
         if change := _step_change(parts[0, -1, -1], halved.parts[name][-1], floor):
@@ -363,14 +365,14 @@ def _row(cell: Setup, runs: Sequence[Run]) -> Accuracy:
         theory = None if outside or law.template is None else law.template.order(name, law.gains)
         if outside:
             reasons["always"] = "; ".join(filter(None, [reasons.get("always"), outside]))
-        scalings[name] = scaling(parts, cell.periods, theory, floor, reasons)
+        scalings[name] = scaling(parts, setup.periods, theory, floor, reasons)
     return Accuracy(
         plant=base.plant.name,
         condition=base.condition or "",
         law=law.name,
-        gains=kinds(one.law.source for one in cell.scenarios),
+        gains=kinds(one.law.source for one in setup.scenarios),
         unit=base.plant.units[0],
-        periods=cell.periods,
+        periods=setup.periods,
         runs=len(counted),
         failed=len(failures),
         floor=floor,
@@ -393,9 +395,9 @@ def _outside(scenario: Scenario) -> str:
     return ""
 
 
-def _reasons(cell: Setup, runs: Sequence[Run]) -> Iterator[tuple[str, str]]:
+def _reasons(setup: Setup, runs: Sequence[Run]) -> Iterator[tuple[str, str]]:
     """Yield what may keep a law from the order that theory promises: name -> words."""
-    laws = [scenario.law for scenario in cell.scenarios]
+    laws = [scenario.law for scenario in setup.scenarios]
     unmet = {words for law in laws if law.template for words in law.template.unmet(law.gains)}
     if unmet:
         yield "conditions", f"the gains violate {joined(sorted(unmet))}"

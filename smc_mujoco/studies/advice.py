@@ -403,7 +403,7 @@ class Advice(Tables):
     def _holds(self) -> str:
         """What the answer holds for, in words."""
         if self._untested:
-            return "Laws are compared without a test, as nothing is drawn."
+            return "There is no test, as the worst found is one value of a law and no sample."
         several = self.comparison.sets.max(axis=1) > 1
         gains = "over sets of gains" if several.all() else "for these gains"
         if several.any() and not several.all():

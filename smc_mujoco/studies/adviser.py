@@ -27,7 +27,7 @@ among themselves: less overshoot first, then less energy of u. The first law is 
 
 "robust" is the one need that is not a metric of these runs. An adversary attacks each law in each condition, with few
 runs in the screening and with the default budget of `worst_case`, over all conditions, in the finals. A law is better
-if the worst found for it is less by more than the least relevant difference. There is no test, as nothing is drawn."""
+if the worst found for it is less by more than the least relevant difference. There is no test, as that is no sample."""
 
 import math
 from collections.abc import Mapping, Sequence

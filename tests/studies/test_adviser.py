@@ -130,7 +130,7 @@ def test_robust_goes_by_the_worst_found_and_tells_the_median_too(folder, monkeyp
     both = smc.which("duffing", needs="fast,robust", conditions="nominal", duration=2.5, seeds=6, **options)
     tested = ranking.compare({law: both.comparison.cells[i, :1] for i, law in enumerate(both.comparison.laws)})
     assert both.comparison.limits == tested.limits  # what has no test is in no family of tests
-    assert text(made).endswith("Laws are compared without a test, as nothing is drawn.")
+    assert text(made).endswith("There is no test, as the worst found is one value of a law and no sample.")
     assert "Except for robust, this holds over sets of gains, but for these gains of" in text(both)
     alike = options | {"starts": smc.starts(spread=0.0), "laws": [FAST, SLOW]}
     one = smc.which("duffing", needs="fast,robust", conditions="nominal", duration=2.5, seeds=6, **alike)
