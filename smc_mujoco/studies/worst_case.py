@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
 METRIC = "rms_error"
 DURATION = 8.0  # s, of attacked runs where none is given: the error counts from a quarter on, when laws have settled
-STEPS = 1_250_000  # physics steps of the search in the default budget, for a plant of one channel: 5 s of a core
-MIN_RUNS, MAX_RUNS = 32, 1024  # of the default budget
+STEPS = 1_250_000  # physics steps of the search in the default budget, for a plant of one channel: 4 s of a core
+MIN_RUNS, MAX_RUNS = 24, 1024  # of the default budget
 MOST_RUNS = 1_000_000
 PANELS = "error", "d", "u", "phase"  # of a figure
 HEADINGS = "law", "worst found", "median", "place by median", "found by"
@@ -299,7 +299,7 @@ def _listed(given: object) -> list[Scenario]:
 def default_budget(scenario: Scenario, within: Uncertainty) -> int:
     """Return how many runs a search has if no budget is given.
 
-    A physics step costs half as much more for each channel, and again with dry friction, which MuJoCo solves for.
+    A physics step costs half as much more for each channel, and twice as much with dry friction, which MuJoCo solves.
     """
     channels, rubs = 1 + scenario.plant.n, bool(scenario.friction or scenario.plant.dry or within.friction[1])
-    return min(max(MIN_RUNS, 4 * STEPS // (scenario.samples * scenario.steps * channels * (2 + rubs))), MAX_RUNS)
+    return min(max(MIN_RUNS, 2 * STEPS // (scenario.samples * scenario.steps * channels * (1 + rubs))), MAX_RUNS)

@@ -123,7 +123,12 @@ class Certificate:
         part = self._part("level sets", holding=True)
         if part is None:
             return None
-        return 0.0 if "P" in part else part["bound"]
+        return 0.0 if self.rests else part["bound"]
+
+    @property
+    def rests(self) -> bool:
+        """Whether runs that begin in the level sets come to rest: without a disturbance, or if the law switches."""
+        return not self.data["disturbance"] or loops.loop_of(self.data)[0].switches
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
@@ -148,8 +153,9 @@ class Certificate:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What is proven, and what is not, a sentence for each theorem."""
-        return tuple(self._sentence(part) for part in self.data["parts"])
+        """What is proven and what is not, a sentence for each theorem; then what no theorem is about."""
+        left_out = "; ".join(f"{name} ({what})" if what else name for name, what in self.leaves_out.items())
+        return *(self._sentence(part) for part in self.data["parts"]), f"no theorem here is about {left_out}"
 
     def _sentence(self, part: Mapping[str, Any]) -> str:
         """Return what a theorem says of this plant, or which of its conditions fail, by how much."""
@@ -158,9 +164,9 @@ class Certificate:
         failing = [one for one in self.conditions if one.theorem == theorem and not one.holds]
         if theorem == "level sets":
             wide = f"starts up to |x| = {number(self._widest(part))} {x} at rest"
-            ends = f"end in |x| <= {number(part['bound'])} {x} {under}" if d0 else "come to rest"
+            ends = "come to rest" if self.rests else f"end in |x| <= {number(part['bound'])} {x}"
             outside = "; the scenario's start is not among them" * bool(failing)
-            return f"proven by level sets: {wide} {ends}{outside}"
+            return f"proven by level sets: {wide} {ends} {under}{outside}"
         if failing:
             why = ", ".join(
                 f"{one.name} {number(one.margin)} {one.unit}".strip() + f" ({one.words})" for one in failing
@@ -177,7 +183,7 @@ class Certificate:
             gains = self.data["law"]["gains"]
             after = part["X"] ** (1.0 - gains["p"]) / (gains["b"] * (1.0 - gains["p"]))
             return f"proven by reaching: on s = 0 in {where} x is 0 after {number(after)} s, {under}"
-        rate = f" and |d'| <= {self.data['slope']:g} {EFFORT[x]}/s"
+        rate = f" and |d'| <= {self.data['slope']:g} {EFFORT[x]}/s" * bool(self.data["slope"])
         where = f"|x| <= {number(part['X'])} {x}"
         return f"proven by super-twisting: from a set in {where} s = 0 is reached, {under}{rate}"
 

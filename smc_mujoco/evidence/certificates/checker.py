@@ -48,7 +48,7 @@ def equal(stated, derived, what):
 def margins(part, derived):
     """Refuse conditions other than these, with other margins (None: checked elsewhere), or a wrong `holds`."""
     told = {one["name"]: one["margin"] for one in part["conditions"]}
-    need(list(told) == list(derived), f"the conditions of {part['theorem']}")
+    need([one["name"] for one in part["conditions"]] == list(derived), f"the conditions of {part['theorem']}")
     for name in (name for name, value in derived.items() if value is not None):
         equal(told[name], derived[name], f"the margin of {name}")
     need(part["holds"] is all(margin >= 0 for margin in told.values()), f"whether {part['theorem']} holds")
@@ -77,6 +77,7 @@ def feedback(law, u_max):
     if name == "boundary_layer":
         return Space(kind="sat", K=g.k, a=g.k / g.phi, c=g.c, g=g, room=room(g.k), theorems=(0, 2))
     if name in ("classical", "terminal"):
+        need(name == "classical" or (g.b > 0 and g.bound >= 0 and bool(0.5 < g.p < 1)), "1/2 < p < 1 on v + b [x]^p")
         c, rest, first = (g.c, 0, 0) if name == "classical" else (arb(1), g.bound, 1)  # the first of its theorems
         return Space(kind="sgn", K=g.k, a=None, c=c, g=g, room=room(g.k + rest), theorems=(first, 3))
     if name == "super_twisting":
@@ -87,8 +88,8 @@ def feedback(law, u_max):
     else:
         need(name == "pid" and g.ki == 0, f"law {name}")
         k1, k2 = g.kp, g.kd
-    need(k2 > 0, "a linear law without damping")  # its bound is part of the law
-    return Space(kind="sat", K=u_max and arb(u_max), a=k2, c=k1 / k2, g=g, room=arb(0), theorems=(0, 2))
+    K = u_max and arb(u_max)  # the actuator's bound is part of a linear law
+    return Space(kind="sat", K=K, a=k2, c=k1 / k2, g=g, room=arb(0), theorems=(0, 2))
 
 
 def phi(e, x):
@@ -155,8 +156,8 @@ def restoring(told, e, f):
 def levels(doc, part, e, f):
     """Check a bilinear W on a grid of (x, s): |d| <= d0 cannot keep W from falling between two of its levels.
 
-    Then what starts where W <= outer ends where W <= inner, in |x| <= bound. If d0 = 0 and sigma is continuous, a form
-    z' P z of z = (x, s) also falls where it is at most 1, which is around that set: then x ends at 0.
+    Then what starts where W <= outer ends where W <= inner, in |x| <= bound. It comes to rest if sigma is sgn and s = 0
+    is reached from that set, or if d0 = 0 and a form z' P z of z = (x, s) falls where it is at most 1, around that set.
     """
     d0, xs, ss, W, inner, outer = arb(doc["disturbance"]), *(part[key] for key in ("x", "s", "W", "inner", "outer"))
     middle, border = ss.index(0), min([*W[-1], *(row[0] for row in W), *(row[-1] for row in W)])
@@ -168,18 +169,19 @@ def levels(doc, part, e, f):
     for i, (x0, x1) in enumerate(pairwise(xs)):
         for j, (s0, s1) in enumerate(pairwise(ss)):
             corners = W[i][j], W[i + 1][j], W[i][j + 1], W[i + 1][j + 1]
-            if min(corners) <= inner:
-                held += [(x0, s0), (x1, s0), (x0, s1), (x1, s1)]
+            held += [(x0, s0), (x1, s0), (x0, s1), (x1, s1)] if min(corners) <= inner else []
             if max(corners) >= inner and min(corners) <= outer:
                 need(falls(e, f, d0, (x0, x1, s0, s1), corners), f"W at x {x0} to {x1}, s {s0} to {s1}")
-        a, b = W[i][middle], W[i + 1][middle]
-        if f.kind == "sgn" and max(a, b) >= inner and min(a, b) <= outer:
-            need(b > a, f"sliding at x {x0} to {x1}")  # where s stays 0, x' = -c x
+        a, b = W[i][middle], W[i + 1][middle]  # where s stays 0, x' = -c x
+        need(f.kind != "sgn" or b > a or max(a, b) < inner or min(a, b) > outer, f"sliding at x {x0} to {x1}")
     need(part["bound"] == max(x for x, _ in held), "the bound")
     x, s = (1 if x >= 0 else -1) * arb(x), (1 if x >= 0 else -1) * (v + f.c * x)
     i, j = (sum(bool(z >= edge) for edge in edges) - 1 for z, edges in ((x, xs), (s, ss)))
     at = max(*W[i][j : j + 2], *W[i + 1][j : j + 2]) if x < xs[-1] and abs(s) < ss[-1] else 1
-    if d0 == 0 and f.kind != "sgn":
+    if f.kind == "sgn":
+        (box,) = (one for one in doc["parts"] if one["theorem"] == "reaching")
+        need(all(x <= box["X"] and abs(s) <= box["S"] for x, s in held), "an inner set from which s = 0 is reached")
+    elif d0 == 0:
         quadratic(part["P"], e, f, held)
     return {"actuator": f.room, "start": arb(outer) - at}
 
@@ -222,8 +224,7 @@ def reaching(doc, part, e, f):
     need(e.n == 1 and X >= 0 and (S == 0 if terminal else bool(S >= 0 and f.c * X >= S)), "|s| <= c X")
 
     def push(a, b, s):
-        x = hull(a, b)
-        D = e.E + e.F * x * x
+        x, D = hull(a, b), e.E + e.F * hull(a, b) ** 2
         if not terminal:
             return abs(phi(e, x) + (e.M * f.c - D) * (s - f.c * x)) + d0
         v, vs = (g.b * hull(a**power if a > 0 else 0, b**power) for power in (g.p, 2 * g.p - 1))
@@ -272,7 +273,9 @@ def check(doc):
     try:
         need(doc["format"] == FORMAT and doc["seal"] == seal(doc) and set(doc["leaves_out"]) >= LEAVES_OUT, "the seal")
         e, f = equation(doc["plant"]), feedback(doc["law"], doc["u_max"])
-        need(e.M > 0 and f.c > 0 and doc["disturbance"] >= 0, "the plant and the law")
+        strong = f.kind is None or ((f.K is None or f.K > 0) and (f.a is None or f.a > 0))
+        unit = "rad" if "pendulum" in doc["plant"]["name"] else "m"
+        need(e.M > 0 and f.c > 0 and strong and doc["disturbance"] >= 0 and doc["unit"] == unit, "plant, law and unit")
         theorems, known = [part["theorem"] for part in doc["parts"]], list(THEOREMS)[slice(*f.theorems)]
         need(0 < len(theorems) == len(set(theorems)) and set(theorems) <= set(known), "a theorem of this law")
         for part in doc["parts"]:

@@ -31,7 +31,7 @@ def draw(certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike
         raise ScenarioError(f"the certificate of {certificate.law} on {certificate.plant} has no region to draw")
     paths = [] if path is None else [checked(path)]
     with style.page(SIZE[0]):
-        bounded = part is not None and data["disturbance"] > 0.0
+        bounded = part is not None and not certificate.rests
         page = pages.blank(SIZE[0] if bounded else 0.62 * SIZE[0], SIZE[1], None)
         axes = page.subplots(1, 2 if bounded else 1, squeeze=False).ravel()
         x, v = _plane(certificate, part, traces)
@@ -87,7 +87,7 @@ def _region(ax: Any, certificate: Any, part: Any, X: np.ndarray, V: np.ndarray) 
     ax.contour(X, V, W, levels[1:-1], colors=[BLUES[2]], linewidths=style.points(0.7))
     ax.contour(X, V, W, levels[-1:], colors=[BLUES[0]], linewidths=style.points(1.6))
     ax.contourf(X, V, W, [-1.0, part["inner"]], colors=[BLUES[0]], alpha=0.8)
-    for side in (-1.0, 1.0) if certificate.data["disturbance"] else ():
+    for side in () if certificate.rests else (-1.0, 1.0):
         ax.axvline(side * part["bound"], color=style.INK, linewidth=style.points(0.8), linestyle=(0, (4, 3)))
 
 
@@ -103,16 +103,16 @@ def _legend(page: Any, certificate: Any, part: Any, runs: bool) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    unit, d0 = certificate.data["unit"], certificate.data["disturbance"]
     handles: list[Any] = [Line2D([], [], color=BLUES[1], label="level sets of V, which never rises")]
     if part is not None:
-        told = f"certified: ends in |x| ≤ {part['bound']:.3g} {unit}" if d0 else "certified: comes to rest"
+        ends = f"ends in |x| ≤ {part['bound']:.3g} {certificate.data['unit']}"
+        told = "certified: " + ("comes to rest" if certificate.rests else ends)
         handles = [
             Patch(facecolor=BLUES[2], edgecolor=BLUES[0], alpha=0.5, label=told),
             Line2D([], [], color=BLUES[2], label="level sets of W, which falls"),
             Patch(facecolor=BLUES[0], label="innermost level"),
         ]
-        handles += [Line2D([], [], color=style.INK, linestyle=(0, (4, 3)), label="bound")] if d0 else []
+        handles += [Line2D([], [], color=style.INK, linestyle=(0, (4, 3)), label="bound")] * (not certificate.rests)
     if runs:
         handles.append(Line2D([], [], color=style.REACTION, label="run"))
     page.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=style.points(9.5))

@@ -12,6 +12,7 @@ else a machine does is in `Certificate.leaves_out`.
 import functools
 import itertools
 import math
+from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any
 
@@ -31,8 +32,9 @@ REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 3.0 * max(map(abs, pla
 TIGHT = 1e-4  # share by which a margin is stated below the true one
 BOXES = (64, 256, 1024, 4096)  # tried in turn
 ROUNDED = 0.98  # factor on the largest set that a condition allows: chosen
-LINEAR = ("lqr", "pid")
-LAWS = ("observer_free", "boundary_layer", *LINEAR, "classical", "terminal", "super_twisting")
+HALVINGS = 40  # of a set's size, in search of the largest
+LAWS = ("observer_free", "boundary_layer", "lqr", "pid", "classical", "terminal", "super_twisting")
+Judge = Callable[[str, dict], dict[str, Any] | None]  # theorem, its data -> its margins, None where it is refused
 PLANTS = ("inverted_pendulum", "duffing", "van_der_pol", "pendulum_network", "inverted_pendulum_network")
 
 
@@ -151,29 +153,36 @@ def _class(within: Uncertainty | None) -> tuple[float, float]:
 def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
     """Return the theorems of a law on a plant with their data."""
     plant, (loop, terms, law) = document["plant"], loop_of(document)
+    e, f = checker.equation(plant), checker.feedback(document["law"], document["u_max"])
+
+    def judge(theorem: str, data: dict) -> dict[str, Any] | None:
+        """Return the margins of a theorem's conditions, or None if the checker refuses the data."""
+        try:
+            return checker.THEOREMS[theorem](document, data, e, f)
+        except checker.Refused:
+            return None
+
+    def attracts(P: np.ndarray) -> bool:
+        try:
+            checker.quadratic([P[0, 0], P[0, 1], P[1, 1]], e, f, ())
+        except checker.Refused:
+            return False
+        return True
+
     if law.name == "super_twisting":
-        return [_super_twisting(document, loop, terms, law)]
-    parts = [_saturated(document, loop, terms, law, checker)]
-    single, reach = plant["n"] == 1, REACH[scenario.plant.unit](scenario.plant)
-    reaching = _reaching(document, loop, law, reach) if single and law.name in ("classical", "terminal") else None
-    if reaching:
+        return [_super_twisting(document, loop, law, judge)]
+    parts = [_saturated(document, loop, terms, judge)]
+    single, reach, box = plant["n"] == 1, REACH[scenario.plant.unit](scenario.plant), None
+    if single and law.name in ("classical", "terminal"):
+        reaching = _reaching(0.5 * loop.c if law.name == "classical" else 0.0, reach, judge)
+        box = reaching["X"], reaching["S"]
         parts.append(reaching)
     bounded = document["disturbance"] > 0.0 or not parts[0]["holds"]
-    if single and bounded and law.name != "terminal" and _room(document, law) >= 0.0:
-        box = (reaching["X"], reaching["S"]) if reaching else None
-        e, f = checker.equation(plant), checker.feedback(document["law"], document["u_max"])
+    if single and bounded and law.name != "terminal" and f.room >= 0:
         proven = functools.partial(checker.falls, e, f, checker.arb(document["disturbance"]))
-        if found := search.levels(loop, reach, _start(scenario, loop), proven, box):
-            parts.append(_levels(document, loop, law, found, scenario))
+        if found := search.levels(loop, reach, _start(scenario, loop), proven, attracts, box):
+            parts.append(_levels(float(f.room), found, scenario, _start(scenario, loop)))
     return parts
-
-
-def _room(document: dict, law: SimpleNamespace) -> float:
-    """Return u_max less the largest |u| of the law."""
-    u_max = document["u_max"]
-    if u_max is None or law.name in LINEAR:
-        return 0.0
-    return u_max - (law.lam if law.name == "observer_free" else law.k + getattr(law, "bound", 0.0))
 
 
 def _part(theorem: str, conditions: list[dict], **data: Any) -> dict:
@@ -181,30 +190,30 @@ def _part(theorem: str, conditions: list[dict], **data: Any) -> dict:
     return {"theorem": theorem, "holds": holds, "conditions": conditions} | data
 
 
-def _condition(name: str, margin: float, **data: Any) -> dict:
+def _condition(name: str, margin: Any, **data: Any) -> dict:
     return {"name": name, "margin": float(margin)} | data
 
 
-def _saturated(document: dict, loop: Loop, terms: list[float], law: SimpleNamespace, checker: Any) -> dict:
+def _judged(theorem: str, data: dict, judge: Judge) -> dict:
+    """Return a theorem with the margins that the checker derives from its data."""
+    margins = judge(theorem, data) or {}  # what is refused here is refused as a whole in the end
+    return _part(theorem, [_condition(name, margin) for name, margin in margins.items()], **data)
+
+
+def _saturated(document: dict, loop: Loop, terms: list[float], judge: Judge) -> dict:
     """Return the theorem of a saturated PD law: V and its conditions."""
-    A, B, C, E, F = terms
-    plant, kc = document["plant"], document["plant"]["parameters"].get("kc", 0.0)
-    conditions = [
-        _condition("damping", -abs(F) if F else E),
-        _restoring(document, loop, terms, checker),
-        _condition("actuator", _room(document, law)),
-    ]
-    if plant["n"] > 1:  # x sin x >= -0.217 x^2, so a real spring's torque may pull apart
-        weakest = kc if plant["mechanism"] == "equation" else -0.2172336282112216 * abs(kc)
-        conditions.append(_condition("coupling", weakest))
-    if not loop.switches:
-        conditions.append(_condition("local", loop.steep * loop.c - A - B))
+    A, B, C, _, _ = terms
     V = {"v^2": loop.M / 2.0, "sigma": 1.0 / loop.c, "cos x - 1": A, "x^2": -B / 2.0, "x^4": -C / 4.0}
-    return _part("saturated PD", conditions, V=V | {"springs": kc / 2.0})
+    V["springs"] = document["plant"]["parameters"].get("kc", 0.0) / 2.0
+    for told in _restoring(loop, terms):
+        if margins := judge("saturated PD", {"V": V, "conditions": [None, told]}):
+            conditions = [_condition(*one) if one[0] != told["name"] else told for one in margins.items()]
+            return _part("saturated PD", conditions, V=V)
+    raise ScenarioError("found no boxes that prove that the law is stronger than the plant: give other gains")
 
 
-def _restoring(document: dict, loop: Loop, terms: list[float], checker: Any) -> dict:
-    """Return the condition that the law's force exceeds the plant's, with boxes from 0 to infinity."""
+def _restoring(loop: Loop, terms: list[float]) -> Iterator[dict]:
+    """Yield the condition that the law's force exceeds the plant's, with ever more boxes from 0 to infinity."""
     A, B, C, _, _ = terms
     tail = math.sqrt(max(B, 0.0) / -C) * 1.01 + 0.1 if C < 0.0 else 1.0
     tail = max(tail, 2.0 * math.pi if A else 0.0)
@@ -213,19 +222,12 @@ def _restoring(document: dict, loop: Loop, terms: list[float], checker: Any) -> 
     least = min(1.0, float(share.min()), 1.0 if loop.switches else 1.0 - (A + B) / (loop.steep * loop.c))
     if least < 0.0 or C > 0.0 or (C == 0.0 and B > 0.0):
         at = float(x[share.argmin()]) if share.min() < 0.0 else _far(loop)
-        return _condition("restoring", _share(loop, at), at=at)
+        yield _condition("restoring", _share(loop, at), at=at)
+        return
     margin = least - TIGHT * max(abs(least), 0.1) * (least < 1.0)
-    e, f = checker.equation(document["plant"]), checker.feedback(document["law"], document["u_max"])
-    told = _condition("restoring", margin)
     for count in BOXES:
         edges = [float(f"{edge:.9g}") for edge in tail * np.linspace(0.0, 1.0, count + 1) ** 2]
-        told["boxes"] = [*map(list, itertools.pairwise(edges)), [edges[-1], None]]
-        try:
-            checker.restoring(told, e, f)
-        except checker.Refused:
-            continue
-        return told
-    raise ScenarioError(f"found no boxes that prove a margin of {margin:g}: give other gains")
+        yield _condition("restoring", margin, boxes=[*map(list, itertools.pairwise(edges)), [edges[-1], None]])
 
 
 def _far(loop: Loop) -> float:
@@ -240,24 +242,13 @@ def _share(loop: Loop, x: float) -> float:
     return 1.0 - float(loop.phi(np.array(x))) / float(loop.sigma(np.array(loop.c * x)))
 
 
-def _reaching(document: dict, loop: Loop, law: SimpleNamespace, reach: float) -> dict:
-    """Return the largest set where s = 0 is surely reached, X = 0 if there is none."""
-    room = law.k - loop.d0
-    classical = law.name == "classical"
-
-    def push(x):
-        x = np.asarray(x)
-        if classical:  # at the corner (x, -c x / 2), where v = -1.5 c x
-            return np.abs(loop.phi(x) - (loop.M * loop.c - loop.D(x)) * 1.5 * loop.c * x)
-        term = law.b**2 * law.p * x ** (2.0 * law.p - 1.0)
-        return np.abs(loop.phi(x) + loop.D(x) * law.b * x**law.p + np.minimum(term, law.bound) - loop.M * term)
-
-    x = reach * np.linspace(0.0, 1.0, 20001) ** 2
-    within = np.maximum.accumulate(push(x)) < room
-    X = 0.9 * float(x[within].max(initial=0.0))
-    S = 0.5 * loop.c * X if law.name == "classical" else 0.0
-    conditions = [_condition("reaching", room - float(push(X))), _condition("actuator", _room(document, law))]
-    return _part("reaching", conditions, X=X, S=S)
+def _reaching(lean: float, reach: float, judge: Judge) -> dict:
+    """Return the largest set |x| <= X, |s| <= lean X where s = 0 is surely reached; X = 0 if there is none."""
+    low, high = 0.0, reach
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if judge("reaching", {"X": middle, "S": lean * middle}) else (low, middle)
+    return _judged("reaching", {"X": ROUNDED * low, "S": ROUNDED * lean * low}, judge)
 
 
 def _start(scenario: Scenario, loop: Loop) -> tuple[float, float]:
@@ -266,16 +257,12 @@ def _start(scenario: Scenario, loop: Loop) -> tuple[float, float]:
     return x, v + loop.c * x
 
 
-def _levels(document: dict, loop: Loop, law: SimpleNamespace, found: search.Levels, scenario: Scenario) -> dict:
+def _levels(room: float, found: search.Levels, scenario: Scenario, start: tuple[float, float]) -> dict:
     """Return the levels of W as data."""
-    x, v = scenario.resolved.x0[0], scenario.resolved.v0[0]
-    top = _cell(found, *_start(scenario, loop))
-    conditions = [_condition("actuator", _room(document, law)), _condition("start", found.outer - top)]
-    data = {"x": found.x.tolist(), "s": found.s.tolist(), "W": found.W.tolist(), "start": [x, v]}
-    data |= {"inner": found.inner, "outer": found.outer, "bound": found.bound} | (
-        {"P": list(found.P)} if found.P else {}
-    )
-    return _part("level sets", conditions, **data)
+    conditions = [_condition("actuator", room), _condition("start", found.outer - _cell(found, *start))]
+    data = {"x": found.x.tolist(), "s": found.s.tolist(), "W": found.W.tolist()}
+    data |= {"start": [scenario.resolved.x0[0], scenario.resolved.v0[0]]} | ({"P": list(found.P)} if found.P else {})
+    return _part("level sets", conditions, **data, inner=found.inner, outer=found.outer, bound=found.bound)
 
 
 def _cell(found: search.Levels, x: float, s: float) -> float:
@@ -287,60 +274,40 @@ def _cell(found: search.Levels, x: float, s: float) -> float:
     return float(found.W[i : i + 2, j : j + 2].max())
 
 
-def _super_twisting(document: dict, loop: Loop, terms: list[float], law: SimpleNamespace) -> dict:
+def _super_twisting(document: dict, loop: Loop, law: SimpleNamespace, judge: Judge) -> dict:
     """Return the largest set that Moreno & Osorio's quadratic form proves."""
-    d0, slope, M, c = document["disturbance"], document["slope"], loop.M, loop.c
+    d0, slope, best = document["disturbance"], document["slope"], None
     if slope is None:
-        raise ScenarioError(
-            "super_twisting needs a bound of d': give one, as in smc.Uncertainty(disturbance=1.0, slope=2.0)"
-        )
-    A, B, C, E, F = terms
-    u_max = math.inf if document["u_max"] is None else document["u_max"]
-    w_max = math.inf if law.w_max is None else law.w_max
-    best: tuple[float, dict] | None = None
+        cure = "give one, as in smc.Uncertainty(disturbance=1.0, slope=2.0)"
+        raise ScenarioError(f"super_twisting needs a bound of d': {cure}")
+
+    def holds(data: dict) -> bool:
+        margins = judge("super-twisting", data)
+        return margins is not None and min(map(float, margins.values())) > 0.0
+
     for L in law.k2 * np.linspace(0.05, 0.95, 19):
-        P = _form(law.k1 / M, law.k2, L, M) if slope < L else None
+        P = _form(law.k1 / loop.M, law.k2, L, loop.M) if slope < L else None
         if P is None:
             continue
-        Q = np.linalg.inv(P)
-
-        def margins(q, Q=Q, L=L):
-            z1, z2 = math.sqrt(q * Q[0, 0]), math.sqrt(q * Q[1, 1])
-            X = z1 * z1 / c * (1.0 + 1e-9)
-            v, x = z1 * z1 + c * X, np.linspace(-X, X, 101)
-            D = np.array([E, E + F * X * X])[:, None]
-            rate = np.abs(A * np.cos(x) + B + 3.0 * C * x * x - c * (M * c - D)).max()
-            lean = np.abs(M * c - D).max()
-            growth = rate * v + lean * (law.k1 * z1 + z2) / M + 2.0 * abs(F) * X * v * v + slope
-            w = z2 + np.abs(loop.phi(x)).max() + lean * v + d0
-            return X, L - growth, min(u_max - w - law.k1 * z1, w_max - w)
-
         low, high = 1e-12, 1e6
-        if min(margins(low)[1:]) <= 0.0:
-            continue
-        for _ in range(80):
+        for _ in range(HALVINGS):
             middle = math.sqrt(low * high)
-            low, high = (middle, high) if min(margins(middle)[1:]) > 0.0 else (low, middle)
-        X, _, _ = margins(low * ROUNDED)
-        if best is None or best[0] < X:
-            best = X, {"P": [P[0, 0], P[0, 1], P[1, 1]], "L": float(L), "q": low * ROUNDED, "X": X}
+            low, high = (middle, high) if holds(_ellipse(P, L, middle, loop.c)) else (low, middle)
+        data = _ellipse(P, L, ROUNDED * low, loop.c)
+        if holds(data) and (best is None or best["X"] < data["X"]):
+            best = data
     if best is None:
         raise ScenarioError(
             f"found no quadratic form for super_twisting with k1 = {law.k1:g}, k2 = {law.k2:g}, |d| <= {d0:g} and "
             f"|d'| <= {slope:g}: give larger gains, or a smaller disturbance"
         )
-    return _measured(document, best[1])
+    return _judged("super-twisting", best, judge)
 
 
-def _measured(document: dict, data: dict) -> dict:
-    """Return the theorem of super-twisting with the margins that the checker derives, as it encloses them."""
-    from smc_mujoco.evidence.certificates import checker
-
-    names = ("integral", "slope", "actuator")
-    derived = checker.super_twisting(
-        document, data, checker.equation(document["plant"]), checker.feedback(document["law"], document["u_max"])
-    )
-    return _part("super-twisting", [_condition(name, float(derived[name])) for name in names], **data)
+def _ellipse(P: np.ndarray, L: float, q: float, c: float) -> dict:
+    """Return the data of the set z' P z <= q, z1 = [s]^(1/2), where |x| <= X = max |s| / c."""
+    X = q * float(np.linalg.inv(P)[0, 0]) / c * (1.0 + 1e-9)
+    return {"P": [P[0, 0], P[0, 1], P[1, 1]], "L": float(L), "q": q, "X": X}
 
 
 def _form(k1: float, k2: float, L: float, M: float) -> np.ndarray | None:

@@ -22,6 +22,7 @@ from scipy.optimize import brentq
 from smc_mujoco.evidence.certificates.loops import Loop
 
 Proven = Callable[[tuple[float, ...], tuple[float, ...]], bool]
+Attracts = Callable[[np.ndarray], bool]
 CELLS, FINE = 110, 8.0  # on each side of 0, in x and in s, and in half a target: chosen
 SWEEPS, SETTLED = 500, 1e-9  # of a solution
 SMOOTHINGS = (2, 8, 24)  # of W, which blunt its edges: chosen
@@ -46,7 +47,7 @@ def rest(loop: Loop, reach: float) -> float:
     return float(found)
 
 
-def form(loop: Loop, reach: float) -> np.ndarray | None:
+def form(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | None:
     """Return P of a set z' P z <= 1, z = (x, s), around all worst cases of the loop that is linear between its rests.
 
     None if there are none. Without a disturbance it is a set where the form falls.
@@ -54,7 +55,7 @@ def form(loop: Loop, reach: float) -> np.ndarray | None:
     if loop.switches:
         return None
     if not loop.d0:
-        return _attracted(loop, reach)
+        return _attracted(loop, reach, attracts)
     at = rest(loop, reach)
     if not 0.0 < at < reach:
         return None
@@ -71,7 +72,7 @@ def form(loop: Loop, reach: float) -> np.ndarray | None:
     return None if best is None else np.linalg.inv(best)
 
 
-def _attracted(loop: Loop, reach: float) -> np.ndarray | None:
+def _attracted(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | None:
     """Return P of the largest set z' P z <= 1 on which the form of the loop's linearisation surely falls; or None."""
     h = 1e-6 * reach
     push, D0 = float(loop.phi(np.array(h))) / h, float(loop.D(np.zeros(())))
@@ -83,24 +84,8 @@ def _attracted(loop: Loop, reach: float) -> np.ndarray | None:
     low, high = 1e-9, (0.9 * reach) ** 2
     for _ in range(60):
         middle = (low * high) ** 0.5
-        low, high = (middle, high) if _falls(loop, P / middle, push, D0) else (low, middle)
-    return P / (0.9 * low) if _falls(loop, P / (0.9 * low), push, D0) else None
-
-
-def _falls(loop: Loop, P: np.ndarray, push: float, D0: float) -> bool:
-    """Return whether a form falls where it is at most 1, whatever phi / x, D and sigma / s are there at once."""
-    Q = np.linalg.inv(P)
-    x, s = np.sqrt(np.diag(Q))
-    far = float(loop.phi(np.array(x))) / x
-    pushes = (min(push, far) - abs(push - far), max(push, far) + abs(push - far))
-    for one in pushes:
-        for D in (D0, float(loop.D(np.array(x)))):
-            for gain in (float(loop.sigma(np.array(s))) / s, loop.steep):
-                A = np.array([[-loop.c, 1.0], [0.0, loop.c - (D + gain) / loop.M]])
-                A[1, 0] = (one + D * loop.c) / loop.M - loop.c**2
-                if np.linalg.eigvalsh(A.T @ P + P @ A).max() >= 0.0:
-                    return False
-    return True
+        low, high = (middle, high) if attracts(P / middle) else (low, middle)
+    return P / (0.9 * low) if attracts(P / (0.9 * low)) else None
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,7 +108,12 @@ class Levels:
 
 
 def levels(
-    loop: Loop, reach: float, start: tuple[float, float], proven: Proven, target: tuple[float, float] | None = None
+    loop: Loop,
+    reach: float,
+    start: tuple[float, float],
+    proven: Proven,
+    attracts: Attracts,
+    target: tuple[float, float] | None = None,
 ) -> Levels | None:
     """Return the levels with the smallest bound, or the largest region without disturbance; None if the search fails.
 
@@ -131,9 +121,10 @@ def levels(
       reach: largest |x| of the grid.
       start: (x, s); levels that contain it are preferred.
       proven: says of a cell, (x0, x1, s0, s1), and of W at its corners 00, 10, 01, 11, whether W surely falls there.
+      attracts: says of P whether z' P z surely falls where it is at most 1.
       target: half-widths in x and s of a box to reach, for a law that switches.
     """
-    P = form(loop, reach)
+    P = form(loop, reach, attracts)
     if P is None and (target is None or not min(target)):
         return None
     small = np.array(target) if P is None else np.sqrt(np.diag(np.linalg.inv(P)))
@@ -147,7 +138,7 @@ def levels(
         W = times(loop, x, s, np.clip((size / scale - 1.0) / RAMP, 0.0, 1.0))
         for count in SMOOTHINGS:
             smooth = np.round(_smooth(W, count, loop.switches), 7)
-            grid = _Grid(loop, x, s, smooth, size if not loop.d0 and P is not None else None)
+            grid = _Grid(loop, x, s, smooth, size if P is None or not loop.d0 else None)
             tried.append((grid, grid.window()))
     for grid, window in sorted(tried, key=lambda one: one[0].worth(one[1], start)):
         if window and grid.bound(window) and (window := grid.surely(window, proven)):

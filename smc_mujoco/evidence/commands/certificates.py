@@ -97,8 +97,6 @@ def certify(
     terminal.print(tables.certificate(made))
     for sentence in made.sentences:
         terminal.note(f"{sentence[0].upper()}{sentence[1:]}.", "bold", wrap=True)
-    left_out = "; ".join(f"{name} ({what})" for name, what in made.leaves_out.items())
-    terminal.note(f"No theorem here is about: {left_out}.", wrap=True)
     if found:
         unit = made.data["unit"]
         terminal.note(

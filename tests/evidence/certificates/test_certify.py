@@ -121,6 +121,14 @@ def test_other_laws_have_their_theorems(plant, law):
     assert made.stable == (plant == "duffing" and law != "super_twisting")
 
 
+def test_classical_comes_to_rest_from_a_set_under_a_disturbance():
+    made = certificate("inverted_pendulum", "classical", 1.0)
+    assert (made.bound, made.stable) == (None, False)  # its own start lies outside
+    assert "come to rest under every |d| <= 1 N m" in made.sentences[2]
+    near = smc.certify(scenario("inverted_pendulum", "classical", x0=0.07), smc.Uncertainty(disturbance=1.0))
+    assert near.bound == 0.0
+
+
 def test_super_twisting_needs_an_integral_faster_than_the_disturbance():
     for slope, why in ((None, "bound of d'"), (9.0, "no quadratic form")):
         with pytest.raises(smc.ScenarioError, match=why):
@@ -160,6 +168,9 @@ def test_what_has_no_theorem_is_one_sentence(changes, word):
 # the checker
 
 
+SATURATED, LEVELS = "saturated PD", "level sets"
+
+
 def set_margin(theorem, name, change):
     def mutate(data):
         (one,) = (one for one in part(data, theorem)["conditions"] if one["name"] == name)
@@ -188,12 +199,37 @@ def without(i):
     return lambda items: items[:i] + items[i + 1 :]
 
 
+def negative(theorem_left_out, gain):
+    """A mutant of a gain below 0, without the theorem that asks most of it and with the margins that it then has."""
+
+    def mutate(data):
+        data["law"]["gains"][gain] *= -1.0
+        data["parts"] = [one for one in data["parts"] if one["theorem"] != theorem_left_out]
+        room = data["u_max"] - data["law"]["gains"]["k"] - data["law"]["gains"]["bound"]
+        set_margin(SATURATED, "actuator", lambda _: room)(data)
+
+    return mutate
+
+
+def told_twice(data):
+    saturated = part(data, SATURATED)
+    saturated["conditions"].append({"name": "restoring", "margin": 0.5})
+    saturated["holds"] = True
+
+
+def farther(data):
+    """Let the inner set grow beyond that from which s = 0 is reached."""
+    levels = part(data, LEVELS)
+    levels["inner"], W = 0.5 * levels["outer"], np.array(levels["W"])
+    low = np.minimum.reduce([W[:-1, :-1], W[1:, :-1], W[:-1, 1:], W[1:, 1:]])
+    levels["bound"] = max(x for x, row in zip(levels["x"][1:], low, strict=True) if row.min() <= levels["inner"])
+
+
 def raised(W):
     W[30][110] += 0.05
     return W
 
 
-SATURATED, LEVELS = "saturated PD", "level sets"
 MUTANTS = {
     "sign of damping": set_margin(SATURATED, "damping", times(-1)),
     "sign of restoring": set_margin(SATURATED, "restoring", times(-1)),
@@ -223,6 +259,7 @@ MUTANTS = {
     "a larger disturbance": put("disturbance", change=times(1.5)),
     "another start": put("parts", LEVELS, "start", change=lambda _: [2.9, 5.0]),
     "sampling not left out": put("leaves_out", change=lambda told: {k: v for k, v in told.items() if k != "sampling"}),
+    "another unit": put("unit", change=lambda _: "rad"),
     "another mechanism": put("plant", "mechanism", change=lambda _: "springs"),
     "two carts": put("plant", "n", change=lambda _: 2),
 }
@@ -244,6 +281,10 @@ OTHERS = {
     "no damping that is told as damping": ("van_der_pol", "observer_free", set_margin(SATURATED, "damping", abs)),
     "a form that is too narrow": ("van_der_pol", "observer_free", put("parts", LEVELS, "P", 0, change=times(9))),
     "a form that does not fall": ("van_der_pol", "observer_free", put("parts", LEVELS, "P", 1, change=times(-9))),
+    "a condition told twice": ("inverted_pendulum", "classical", told_twice),
+    "a farther inner set": ("inverted_pendulum", "classical", farther),
+    "a surface that leads away": ("duffing", "terminal", negative("reaching", "b")),
+    "a term that feeds the motion": ("duffing", "terminal", negative("reaching", "bound")),
     "a set that is too large": ("duffing", "classical", put("parts", "reaching", "X", change=times(1.3))),
     "a higher strip": ("duffing", "classical", put("parts", "reaching", "S", change=times(1.001))),
     "a longer surface": ("duffing", "terminal", put("parts", "reaching", "X", change=times(1.001))),

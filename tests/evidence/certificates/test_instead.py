@@ -52,6 +52,7 @@ def test_numbers_of_sentences_are_those_of_their_certificates(command):
 def test_numbers_of_the_page_are_those_of_certificates():
     shown = set().union(*map(told, [*COMMANDS, "smc-mujoco certify inverted_pendulum --disturbance 1"]))
     shown |= told("smc-mujoco certify inverted_pendulum_network")
+    shown |= told("smc-mujoco certify inverted_pendulum --law classical --disturbance 1")
     tables = "\n".join(line for line in PAGE.partition("## Claim by claim")[0].splitlines() if line.startswith("|"))
     assert set(re.findall(DECIMALS, tables)) - {"0.2"} <= shown
 
