@@ -4,7 +4,8 @@
     python benchmarks/gains.py --all        # all of them, within 90 minutes on two cores
 
 Every law by the same rule. Those of the report's first page have the full budget; all others, and the set "tracking",
-have that of one start. Gains are stored as soon as their search ends, so it may be stopped at any time.
+have that of one start. Gains are stored as soon as their search ends, so it may be stopped at any time. A file has the
+gains of one rule: those of another are left out when the first new ones are stored.
 """
 
 import argparse
@@ -15,10 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.search import BUDGET, RULE, SPARE, START
 from smc_mujoco.common.files import read_json, replacing, to_json
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS
+from smc_mujoco.simulation.scenario import U_MAX
 
 PROCESSES = 2
 Task = tuple[str, str, str]  # set, plant and law
@@ -36,7 +39,8 @@ def tune(task: Task) -> dict[str, Any]:
     """Search for the gains of a law on a plant, and return their record."""
     gains, plant, law = task
     first_page = gains == "tuned" and law in gain_sets.LAWS
-    budget = BUDGET if first_page else START * len(smc.law(law).gains) + SPARE
+    searched = search_space.box(smc.law(law), search_space.scales(smc.plant(plant), U_MAX, with_model=False))
+    budget = BUDGET if first_page else START * len(searched) + SPARE
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "no set of gains tried", smc.ScenarioWarning)
         return smc.tune(plant, law, budget, objective=gain_sets.OBJECTIVES[gains], threads=1).record()
@@ -44,11 +48,15 @@ def tune(task: Task) -> dict[str, Any]:
 
 def store(path: Path, plant: str, law: str, record: dict[str, Any]) -> None:
     """Put a record into the file of a set, which has one line for each law on each plant."""
-    data = read_json(path) if path.exists() else {"rules": [], "plants": {}}
-    if record["rule"] not in data["rules"]:
-        data["rules"].append(record["rule"])
-    data["plants"].setdefault(plant, {})[law] = record | {"rule": data["rules"].index(record["rule"])}
+    data = known(path)
+    data["plants"].setdefault(plant, {})[law] = {name: value for name, value in record.items() if name != "rule"}
     write(path, data)
+
+
+def known(path: Path) -> dict[str, Any]:
+    """Return what the file of a set has by the rule of today."""
+    data = read_json(path) if path.exists() else {}
+    return data if data.get("rule") == RULE else {"rule": RULE, "plants": {}}
 
 
 def write(path: Path, data: dict[str, Any]) -> None:
@@ -58,16 +66,14 @@ def write(path: Path, data: dict[str, Any]) -> None:
         for plant, laws in sorted(data["plants"].items())
     )
     with replacing(path) as file:
-        text = f'{{"rules": {to_json(data["rules"], 1)},\n"plants": {{\n' + ",\n".join(plants) + "\n}}\n"
+        text = f'{{"rule": {to_json(data["rule"])},\n"plants": {{\n' + ",\n".join(plants) + "\n}}\n"
         file.write_text(text, encoding="utf-8")
 
 
 def wanted(again: bool) -> Iterator[Task]:
     """Yield the tasks to do: all of them, or those whose gains are missing or have another rule."""
     for gains, plant, law in tasks():
-        data = read_json(gain_sets.file(gains)) if gain_sets.file(gains).exists() else {"rules": [], "plants": {}}
-        record = data["plants"].get(plant, {}).get(law)
-        if again or record is None or data["rules"][record["rule"]] != RULE:
+        if again or law not in known(gain_sets.file(gains))["plants"].get(plant, {}):
             yield gains, plant, law
 
 

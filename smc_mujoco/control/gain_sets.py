@@ -4,10 +4,10 @@
     law("duffing", "classical", "study")       # as first chosen
 
 - study: a first tuning of the paper's laws to the same bound |u| <= 6. It is never changed in the light of results.
-- tuned: the near-optimal gains of a search by `tuning`, for every general law, with a cost of the variation of u. The
-  laws of LAWS have up to 24 sets of gains: run i of a study uses its own set, so that gains are part of the sample.
-  `tuned(...).converged` tells whether the starts of the search agree. All other laws have the gains of one start.
-- tracking: the same for the laws of LAWS, without that cost.
+- tuned: the near-optimal gains of a search by `tuning`, for every general law, with a cost of the variation of u: up to
+  24 sets of gains. Run i of a study uses its own set, so that gains are part of the sample. `tuned(...).converged`
+  tells whether the starts of the search agree. The laws of LAWS have a search of several starts, all others of one.
+- tracking: the same for the laws of LAWS, of one start, without that cost.
 - default: the law's own.
 
 `tuned_gains/` has a file for each set. `make gains` computes those that were tuned again.
@@ -179,7 +179,7 @@ def _collection(gains: str) -> dict[tuple[str, str], TunedGains]:
     """Return the gains of a set in this package, by plant and law."""
     data = read_json(file(gains))
     return {
-        (plant, name): _restored(record | {"rule": data["rules"][record["rule"]]})
+        (plant, name): _restored(record | {"rule": data["rule"]})
         for plant, laws in data["plants"].items()
         for name, record in laws.items()
     }
