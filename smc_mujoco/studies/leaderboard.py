@@ -311,15 +311,21 @@ def size_in_words(effect: Effect) -> str:
     """Return how much less a law has than a rival, with the interval, such as "12 % less (8 to 16 %)"."""
     if effect.low == effect.high == float(effect.relative):
         return "no difference"
+    endless = math.isinf(effect.high) and effect.low == (0.0 if effect.relative else -math.inf)
     if not effect.relative:
         ends = (number(-value) for value in (effect.high, effect.low))
-        return f"{number(abs(effect.value))} {'less' if effect.value <= 0 else 'more'} ({' to '.join(ends)} less)"
-    if effect.high < FEW_TIMES:
+        words, span = (
+            f"{number(abs(effect.value))} {'less' if effect.value <= 0 else 'more'}",
+            f"{' to '.join(ends)} less",
+        )
+    elif effect.high < FEW_TIMES:
         times = [number(1 / value) if value else "inf" for value in (effect.value, effect.high, effect.low)]
-        return f"{times[0]} times less ({times[1]} to {times[2]} times)"
-    low, high = (_percent(1 - value) for value in (effect.high, effect.low))
-    value = 1 - effect.value
-    return f"{_percent(abs(value))} % {'less' if value >= 0 else 'more'} ({low} to {high} %{' less' * (value < 0)})"
+        words, span = f"{times[0]} times less", f"{times[1]} to {times[2]} times"
+    else:
+        value, (low, high) = 1 - effect.value, (_percent(1 - value) for value in (effect.high, effect.low))
+        words = f"{_percent(abs(value))} % {'less' if value >= 0 else 'more'}"
+        span = f"{low} to {high} %{' less' * (value < 0)}"
+    return f"{words} ({'too few for an interval' if endless else span})"
 
 
 def _percent(share: float) -> str:

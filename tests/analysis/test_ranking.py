@@ -14,7 +14,7 @@ from smc_mujoco import grid
 from smc_mujoco.analysis import paired_runs as cells
 from smc_mujoco.analysis.bootstrap import Interval, median_interval, median_of, share_interval
 from smc_mujoco.analysis.differences import RELEVANT, coarse, exceeds, least_difference
-from smc_mujoco.analysis.ranking import Rank, _holm, compare, samples_of
+from smc_mujoco.analysis.ranking import Effect, Rank, _holm, compare, samples_of
 from smc_mujoco.analysis.ranking import ranks as places
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.tabular import plain
@@ -22,7 +22,7 @@ from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.metrics.catalogue import metrics as every_metric
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies.leaderboard import METRICS, Board, Boards, leaderboard
+from smc_mujoco.studies.leaderboard import METRICS, Board, Boards, leaderboard, size_in_words
 from smc_mujoco.studies.study import study as run_study
 
 INF = math.inf
@@ -429,6 +429,21 @@ def test_a_law_that_is_clearly_better_wins():
         scores["better"][np.isinf(scores["better"])] = 0.01
         wins += compare(scores).best == [("better",)] * 3
     assert wins >= 45
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "relative", "words"),
+    [
+        (0.71, 0.6, 0.8, True, "29 % less (20 to 40 %)"),
+        (1.2, 1.1, 1.3, True, "20 % more (-30 to -10 % less)"),
+        (0.01, 0.005, 0.02, True, "100 times less (50.0 to 200 times)"),
+        (-2e-4, -3e-4, -1e-4, False, "2.0e-4 less (1.0e-4 to 3.0e-4 less)"),
+        (0.71, 0.0, math.inf, True, "29 % less (too few for an interval)"),
+        (-2e-4, -math.inf, math.inf, False, "2.0e-4 less (too few for an interval)"),
+    ],
+)
+def test_a_difference_has_its_interval_or_says_that_there_is_none(value, low, high, relative, words):
+    assert size_in_words(Effect(value, low, high, relative, 1, 1, True)) == words
 
 
 def test_over_several_conditions_only_what_holds_in_each_is_told():
