@@ -294,6 +294,11 @@ def test_metrics_are_plain_floats(step_response):
 
 def test_a_failing_test_attaches_its_figure_and_with_smc_film_its_film(pytester, monkeypatch):
     pytester.makepyfile(test_my_laws=HEAD + BAD.replace("phi=2.0", "phi=2.0, duration=0.1"))
+    pytester.makeconftest("""
+        import functools
+        import smc_mujoco.draw.film.film as film
+        film.film = functools.partial(film.film, size=(320, 180))  # pixels take most of the time
+    """)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), *sys.path]))
     # in a separate process: a renderer that this one forgets would be opened twice
     said = pytester.runpytest_subprocess(*PLUGIN, "--smc-film").stdout.str()

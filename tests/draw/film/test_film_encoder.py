@@ -65,10 +65,14 @@ def test_after_an_error_no_more_pictures_are_made():
     def broken(picture):
         raise OSError("Broken pipe")
 
-    with pytest.raises(OSError, match="Broken pipe"), in_thread(broken) as write:
-        for k in range(1000):
-            made.append(k)
-            write(PICTURE)
+    def make():
+        with in_thread(broken) as write:
+            for k in range(1000):
+                made.append(k)
+                write(PICTURE)
+
+    with pytest.raises(OSError, match="Broken pipe"):
+        make()
     assert len(made) < AHEAD + 5
 
 
