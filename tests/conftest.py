@@ -55,6 +55,17 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items[:] = [item for item in items if item in first]
 
 
+@pytest.fixture
+def coarse_grid(monkeypatch):
+    """Seek limit cycles on a sixth of the grid's points, and gains at a quarter of the speeds.
+
+    What is found there is refined as ever; a law with several cycles may lose one.
+    """
+    monkeypatch.setattr("smc_mujoco.analysis.chattering.FREQUENCIES", 24)
+    monkeypatch.setattr("smc_mujoco.analysis.chattering.AMPLITUDES", 15)
+    monkeypatch.setattr("smc_mujoco.analysis.gains_for.SPEEDS", tuple(10.0 ** (0.4 * k - 1.0) for k in range(6)))
+
+
 @pytest.fixture(autouse=True, scope="session")
 def fixed_noise_key():
     """Draw the same noise key for every study, so that tests have the same numbers each time."""

@@ -90,6 +90,7 @@ def test_ranges_hold_the_cycles_of_fresh_loops():
     assert (np.sum(held, axis=0) >= 18).all()
 
 
+@pytest.mark.usefixtures("coarse_grid")
 @pytest.mark.parametrize(
     "name", [pytest.param("classical, two lags", marks=pytest.mark.slow), "classical, 10 ms, 1 ms"]
 )

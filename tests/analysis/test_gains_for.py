@@ -9,9 +9,11 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.gains_for import _strength
 from smc_mujoco.metrics.limit_cycle import of_trace
 
+COARSELY = pytest.mark.usefixtures("coarse_grid")
 LAG = {"actuator": smc.Lag(0.01)}
 
 
+@COARSELY
 def test_super_twisting_gets_the_largest_gains_in_the_proportion_of_its_theorem():
     design = smc.gains_for("super_twisting", "duffing", amplitude=1e-3, **LAG)
     assert 0.99e-3 < design.chattering.amplitude_range[1] <= 1e-3
@@ -24,6 +26,7 @@ def test_super_twisting_gets_the_largest_gains_in_the_proportion_of_its_theorem(
     assert 4.0 < design.disturbance <= 6.0  # N, as u is at most 6 N
 
 
+@COARSELY
 def test_forces_among_the_gains_stay_at_the_actuators_limit():
     design = smc.gains_for(smc.law("classical", k=0.5, c=2.5), "duffing", amplitude=1.0, u_max=2.0, **LAG)
     assert design.law.gains["k"] == pytest.approx(2.0)
@@ -38,6 +41,7 @@ def test_forces_among_the_gains_stay_at_the_limit_of_every_channel():
     assert _strength(base) == pytest.approx(least / 2.0)
 
 
+@COARSELY
 def test_a_law_that_does_not_chatter_gets_the_largest_gains_there_are():
     design = smc.gains_for("boundary_layer", "duffing", amplitude=1e-3, u_max=10.0, **LAG)
     assert not design.chattering
@@ -48,7 +52,7 @@ def test_a_law_that_does_not_chatter_gets_the_largest_gains_there_are():
 FAST = smc.law("classical", k=1.0, c=20.0)
 
 
-@pytest.mark.slow
+@COARSELY
 def test_a_frequency_decides_the_speed():
     wanted, fields = 60.0, {"u_max": 10.0, **LAG}
     with pytest.warns(smc.ScenarioWarning, match="does not hold duffing, even without a disturbance"):
@@ -58,14 +62,26 @@ def test_a_frequency_decides_the_speed():
     assert design.law.gains["c"] == pytest.approx(20.0 * design.speed)
 
 
+@COARSELY
 @pytest.mark.filterwarnings("ignore:classical with these gains")
-@pytest.mark.slow
 def test_an_amplitude_and_a_frequency_decide_size_and_speed():
     wanted, fields = 60.0, {"u_max": 10.0, **LAG}
     both = smc.gains_for(FAST, "duffing", amplitude=5e-3, frequency=wanted, **fields)
     assert 4.9e-3 < both.chattering.amplitude_range[1] <= 5e-3
     assert both.chattering.frequency <= wanted
     assert both.law.gains["k"] == pytest.approx(both.size * both.speed**2)
+
+
+@COARSELY
+def test_a_frequency_that_no_speed_has_is_refused_with_the_least_there_is():
+    with pytest.raises(smc.ScenarioError, match=r"oscillates at 66.* Hz at least"):
+        smc.gains_for("classical", "duffing", frequency=5.0, **LAG)
+
+
+@pytest.mark.slow
+def test_speeds_at_which_a_law_has_no_cycle_do_not_count():
+    with pytest.raises(smc.ScenarioError, match="oscillates at 18 Hz at least"):
+        smc.gains_for("super_twisting", "duffing", frequency=10.0, **LAG)
 
 
 @smc.law_function(gains={"k": 1.0})
@@ -78,10 +94,6 @@ def without_units(y, gains, memory):
     [
         ("classical", {}, "needs a wanted amplitude, a frequency or both"),
         ("classical", {"amplitude": -1.0}, "amplitude is -1"),
-        ("classical", {"frequency": 5.0}, "oscillates at 66.* Hz at least"),
-        pytest.param(  # ten times as fast it has no cycle
-            "super_twisting", {"frequency": 10.0}, "oscillates at 18 Hz at least", marks=pytest.mark.slow
-        ),
         ("classical", {"frequency": 100.0, "u_max": 0.005}, "are 800 times what u_max allows, .* at most 100 times"),
         (without_units(), {"amplitude": 1e-3}, "knows no unit of without_units's gain 'k'"),
         (

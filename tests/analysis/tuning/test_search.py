@@ -474,13 +474,14 @@ def test_a_notebook_shows_the_gains_with_their_bounds(found):
 
 
 LAGGING = smc.condition("lagging", actuator=smc.Lag(0.01))
-LAGGED = Objective(conditions=(LAGGING,), duration=1.0)
+LAGGED = Objective(conditions=(LAGGING,), duration=0.5)
 
 
 def predicted(tuned) -> float:
     return smc.chattering(tuned.law, plant=tuned.plant, actuator=smc.Lag(0.01)).amplitude
 
 
+@pytest.mark.usefixtures("coarse_grid")
 def test_gains_are_tuned_within_a_bound_on_predicted_chattering():
     free = tune("duffing", "classical", 20, objective=LAGGED)
     bound = tune("duffing", "classical", 20, objective=LAGGED, chattering=1e-4)
