@@ -268,12 +268,14 @@ class Relay(Signal):
 
     It sees the true error e, its rate and the law's s at a control sample, and is held until the next one. A positive
     `rate` alone pushes along the motion, which feeds the loop as much energy as |d| <= amplitude can. With a `slope`
-    above 0 it changes by at most this from sample to sample. All channels get what channel 0 gets.
+    above 0 it changes by at most this from sample to sample. Before `start` it is 0. All channels get what channel 0
+    gets.
 
     Attributes:
       amplitude: N or N m.
       s, rate, error: weights of the law's s, of e' and of e.
       slope: largest change between two control samples, N or N m; 0: no limit.
+      start: s.
     """
 
     amplitude: float
@@ -281,14 +283,16 @@ class Relay(Signal):
     rate: float = 0.0
     error: float = 0.0
     slope: float = 0.0
+    start: float = 0.0
 
     memory = 1  # its force now
-    natural = ("slope",)
+    natural = ("slope", "start")
     sees = True
 
     @staticmethod
     def value(t, p, memory, e, de, s):
         goal = p.amplitude if p.s * s + p.rate * de + p.error * e > 0.0 else -p.amplitude
+        goal = 0.0 if t < p.start else goal
         step = goal - memory[0]
         memory[0] = goal if p.slope == 0.0 else memory[0] + min(max(step, -p.slope), p.slope)
         return memory[0], 0.0, 0.0

@@ -73,11 +73,19 @@ def test_a_relay_replays_from_its_record_to_the_last_bit():
     relay = Relay(2.0, s=0.3, rate=1.0, error=-0.2)
     base = scenario(plant=smc.plant("pendulum_network", n=2), law="super_twisting")
     run = smc.run(dataclasses.replace(base, disturbance=relay))
-    force = 2.0 * recorded(run, relay)
+    force = 2.0 * recorded(run, relay, np.zeros(0))
     np.testing.assert_array_equal(run.d, np.column_stack([force, force]))
     replay = smc.run(dataclasses.replace(base, disturbance=smc.Held(run.t, force)))
     for name in ("x", "v", "u", "s", "d"):
         np.testing.assert_array_equal(getattr(replay, name), getattr(run, name))
+
+
+def test_a_relay_that_starts_late_goes_on_from_another_force():
+    relay = Relay(2.0, rate=1.0, start=0.5)
+    run = smc.run(scenario(duration=1.0, disturbance=(smc.Held([0.0, 0.5, 1.0], [1.0, 0.0, 0.0]), relay)))
+    np.testing.assert_array_equal(run.d[:, 0], 2.0 * recorded(run, relay, np.full(1001, 0.5)))
+    assert set(run.d[:500, 0]) == {1.0}
+    assert set(run.d[500:, 0]) == {-2.0}
 
 
 def test_it_finds_the_worst_of_a_linear_loop():

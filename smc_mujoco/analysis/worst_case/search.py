@@ -4,7 +4,8 @@ A search tries the same in the same order, whatever its budget:
 
 1. constant forces, and relays that switch with the sign of s, of e and of e': an adversary who sees the loop;
 2. the corners of the constants of the class, at most 16, each with both constant forces and a relay of e';
-3. relays of blends of these, forces that switch once, and waves about the frequency at which the loop swings;
+3. relays of blends of these, forces that switch once, and waves about the frequency at which the loop swings; and the
+   worst of all until then, with a force along the motion from some time on, as feeds a pendulum that has fallen;
 4. in turns, changes of the worst members of different origin: a piece of a force turned round, a switch shifted,
    constants moved; and an evolution of the worst member by separable CMA-ES (R. Ros & N. Hansen, PPSN X, 2008; package
    cmaes), which adds straight lines between knots to its force and cuts the sum off at the bound.
@@ -87,7 +88,7 @@ class Search:
     def search(self, rng: np.random.Generator, known: Sequence[Tried]) -> None:
         """Try the strategies of the module, beginning with members that were run before."""
         self.tried += [one._replace(origin=-1 - i) for i, one in enumerate(known)]
-        for batch in itertools.chain(self._simple(), self._corners(), self._timed(), self._changed(rng)):
+        for batch in itertools.chain(self._simple(), self._corners(), self._timed(), self._fed(), self._changed(rng)):
             self.run(batch)
             if self.runs >= self.budget or self.worst.key == FAILED:
                 return
@@ -104,9 +105,10 @@ class Search:
             if self.swing is None and (relay.rate > 0.0 if relay else not self.members.forced):
                 self.swing = trace
             if relay:
-                member = dataclasses.replace(member, force=strategies.recorded(trace, relay))
+                member = dataclasses.replace(member, force=strategies.recorded(trace, relay, member.force))
             found[i] = Tried(member, self._key(trace), first + i if origin < 0 else origin)
-            if relay and (relay.slope or trace.scenario.clock.jitter):  # it did not see, or do, quite what is recorded
+            exact = relay is None or not (relay.slope or relay.start or trace.scenario.clock.jitter)
+            if not exact:  # the relay did not see, or do, quite what is recorded
                 again.append(Case(member))
                 found[i] = None
         done = [one for one in found if one]
@@ -142,6 +144,15 @@ class Search:
                 yield [Case(bare.named("no error"))]
             found = strategies.errors(self.swing, self.members.times, self.members.held) if self.swing else ()
             yield [Case(dataclasses.replace(base, noise=noise, kind=kind)) for kind, noise in found]
+
+    def _fed(self) -> Iterator[list[Case]]:
+        """Yield the worst member so far, with a force along the motion from some time on."""
+        if self.members.forced and not self.members.slope:
+            worst, end = self.worst, self.members.samples * self.members.h
+            kind, then = worst.member.kind, "sign of e'"
+            member = worst.member.named(kind if kind == then else f"{kind}, then {then}")
+            relays = [Relay(self.members.within.disturbance, rate=1.0, start=share * end) for share in strategies.STEPS]
+            yield [Case(member, relay, worst.origin) for relay in relays]
 
     def _forced(self, kind: str, force: np.ndarray) -> Case:
         """Return a member with a force, or one of the class that is near to it."""

@@ -16,6 +16,7 @@ from smc_mujoco.simulation.trace import Trace
 SIGHTS = {"sign of s": "s", "sign of e": "error", "sign of e'": "rate"}  # strategy -> what a relay looks at
 LEADS = (-1.2, -0.6, 0.6, 1.2)  # rad, by which blends of e' and e lead e' in phase; chosen
 STEPS = (0.25, 0.5, 0.75)  # of a run, at which a force switches once; chosen
+EARLY_STEPS = (1 / 32, 1 / 16, 1 / 8)  # of a run, as well: while the loop still moves from its start; chosen
 PITCHES = (0.5, 0.8, 1.0, 1.25, 2.0)  # frequencies of waves over that of the loop; chosen
 FASTEST = 0.1  # of the control frequency: a faster oscillation of the loop is chattering; chosen
 
@@ -27,8 +28,8 @@ def constants(samples: int) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def steps(samples: int) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield forces that change their sign once, by which time a law with an integral is used to the first one."""
-    for share, sign in itertools.product(STEPS, (1.0, -1.0)):
+    """Yield forces that change their sign once: in the first swing, or when a law with an integral is used to them."""
+    for share, sign in itertools.product((*STEPS, *EARLY_STEPS), (1.0, -1.0)):
         yield "one switch", np.where(np.arange(samples + 1) < share * samples, sign, -sign)
 
 
@@ -55,8 +56,11 @@ def seen(trace: Trace) -> dict[str, np.ndarray]:
     return {"s": trace.s[:, 0], "rate": trace.v[:, 0] - dr, "error": trace.x[:, 0] - r}
 
 
-def recorded(trace: Trace, relay: Relay) -> np.ndarray:
-    """Return the force of a relay over its bound during a run, (samples + 1,). After a failure it is held."""
+def recorded(trace: Trace, relay: Relay, before: np.ndarray) -> np.ndarray:
+    """Return the force of a relay over its bound during a run, (samples + 1,). After a failure it is held.
+
+    Until the relay starts it is `before`, (samples + 1,), or (0,) for one that starts at 0.
+    """
     parts = seen(trace)
     aim = relay.s * parts["s"] + relay.rate * parts["rate"] + relay.error * parts["error"]
     goals = np.where(np.nan_to_num(aim) > 0.0, relay.amplitude, -relay.amplitude)
@@ -65,7 +69,8 @@ def recorded(trace: Trace, relay: Relay) -> np.ndarray:
         for i, goal in enumerate(goals.tolist()):
             force += min(max(goal - force, -relay.slope), relay.slope)
             goals[i] = force
-    return goals / abs(relay.amplitude)
+    goals /= abs(relay.amplitude)
+    return np.where(trace.t < relay.start, before, goals) if relay.start else goals
 
 
 def frequency(trace: Trace) -> float:

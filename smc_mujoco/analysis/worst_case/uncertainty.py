@@ -229,11 +229,12 @@ class Members:
         return made
 
     def scenario_of(self, member: Member, relay: Relay | None = None) -> Scenario:
-        """Return the scenario of a member, an ordinary one; or of a relay in place of the member's force."""
-        made = self.placed(member.shares)
-        if relay or len(member.force):
-            signal = relay or self.signal(self.within.disturbance * member.force)
-            made = dataclasses.replace(made, disturbance=(*made.disturbance, signal))
+        """Return the scenario of a member, an ordinary one; or of a relay in place of its force, from a start on."""
+        made, force = self.placed(member.shares), self.within.disturbance * member.force
+        if relay:
+            force = np.where(np.arange(len(force)) * self.h < relay.start, force, 0.0)
+        signals = ([self.signal(force)] if force.any() else []) + ([relay] if relay else [])
+        made = dataclasses.replace(made, disturbance=(*made.disturbance, *signals))
         if self.times:
             made = dataclasses.replace(made, noise=dataclasses.replace(made.noise, **self.errors(member.noise)))
         return made
