@@ -1,6 +1,7 @@
 """The gains of the sets "tuned" and "tracking", found again: smc_mujoco/control/tuned_gains.
 
     python benchmarks/gains.py              # those that are missing, or that another rule found
+    python benchmarks/gains.py my_law       # only those of some laws
     python benchmarks/gains.py --all        # all of them, within 90 minutes on two cores
 
 Every law by the same rule. Those of the report's first page have the full budget; all others, and the set "tracking",
@@ -80,10 +81,12 @@ def wanted(again: bool) -> Iterator[Task]:
 def main() -> None:
     """Tune what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("laws", nargs="*", help="only these laws")
     parser.add_argument("--all", action="store_true", help="tune again what is there")
-    again = parser.parse_args().all
+    asked = parser.parse_args()
     with ProcessPoolExecutor(PROCESSES) as pool:
-        running = {pool.submit(tune, task): task for task in wanted(again)}
+        todo = (task for task in wanted(asked.all) if not asked.laws or task[-1] in asked.laws)
+        running = {pool.submit(tune, task): task for task in todo}
         for done in as_completed(running):
             (gains, plant, law), record = running[done], done.result()
             store(gain_sets.file(gains), plant, law, record)

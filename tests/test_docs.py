@@ -66,12 +66,15 @@ def test_each_marker_is_in_one_page_and_stands_for_a_row_of_each_thing(known):
     pages = "".join(path.read_text() for path in DOCS.glob("*.md"))
     assert [marker for marker in known.SHOWN if pages.count(marker) != 1] == []
     claims = [claim.id for claim in paper("gaber").claims.values() if claim.instead]
-    things = ([f"`{m.name}`" for m in metrics()], [f"`{name}`" for name in scene.scenes()], [f"{i}:" for i in claims])
-    for lines, names in zip((known.definitions(), known.questions(), known.instead()), things, strict=True):
+    quoted = [[f"`{name}`" for name in names] for names in (smc.plants(), [m.name for m in metrics()], scene.scenes())]
+    tables = known.machines(), known.definitions(), known.questions(), known.instead()
+    for lines, names in zip(tables, [*quoted, [f"{i}:" for i in claims]], strict=True):
         head, *rows = list(lines)
         assert [row.split()[1] for row in rows] == names
         assert {row.count("|") for row in rows} == {head.partition("\n")[0].count("|")}
         assert min(map(len, rows)) > 40
+    laws = [*smc.laws(), *smc.joint_laws()]
+    assert sorted(re.findall(r"`(\w+)`", "".join(known.kinds()))) == sorted(laws)
 
 
 def test_numbers_that_the_mathematics_tell_are_what_their_code_prints(tmp_path, monkeypatch):

@@ -175,11 +175,6 @@ def test_relative_links_and_pictures_lead_somewhere(page):
         assert path.stat().st_size > 0, path
 
 
-def test_the_tables_name_every_plant_and_law():
-    assert rows("catalogue.md", "plants") == set(smc.plants())
-    assert rows("catalogue.md", "laws") == set(smc.laws())
-
-
 def test_the_pages_list_what_a_law_measures():
     from smc_mujoco.control.law import Measurement
 

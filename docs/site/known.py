@@ -4,8 +4,14 @@ import inspect
 import re
 from collections.abc import Iterator
 
+import catalogue
+
 import smc_mujoco as smc
+from smc_mujoco.control.joint_law import catalogue as joint_laws
+from smc_mujoco.control.properties import families
+from smc_mujoco.draw import style
 from smc_mujoco.evidence.audit.paper import paper
+from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies import scene
 
@@ -79,6 +85,22 @@ def contents() -> Iterator[str]:
         yield f"- [{title}]({path(title)}): {', '.join(links)}"
 
 
+def machines() -> Iterator[str]:
+    """Yield a table of the plants, with the words at the top of their files."""
+    yield "| plant | what it is |\n|---|---|"
+    for name, plant in plants().items():
+        title, _, known = catalogue.equation(catalogue.described(plant))
+        words = " ".join(known.split("\n\n")[0].split()).rstrip(" .")
+        yield _row(f"`{name}`", _plain(", ".join(filter(None, (title, words)))))
+
+
+def kinds() -> Iterator[str]:
+    """Yield a table of the laws by family."""
+    yield "| family | laws |\n|---|---|"
+    for family, names in (families() | {"many joints": list(joint_laws())}).items():
+        yield _row(style.in_words(family), ", ".join(f"`{name}`" for name in names))
+
+
 def definitions() -> Iterator[str]:
     """Yield a table of the metrics, as their docstrings define them."""
     yield "| metric | unit | definition |\n|---|---|---|"
@@ -113,6 +135,8 @@ def _plain(text: str) -> str:
 
 SHOWN = {
     "<!-- every public name -->": contents,
+    "<!-- every plant -->": machines,
+    "<!-- every law -->": kinds,
     "<!-- every metric -->": definitions,
     "<!-- what holds instead of each claim -->": instead,
     "<!-- every scene -->": questions,
