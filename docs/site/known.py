@@ -48,7 +48,6 @@ OTHERS = {  # title -> names of modules that are no public names
     testing.plugin.step_response
     testing.plugin.smc_golden
     testing.response.StepResponse
-    evidence.audit.mutants.mutants
     evidence.audit.mutants.survivors
     """,
 }
