@@ -18,6 +18,10 @@ from smc_mujoco.simulation.trace import Trace
 TOLERANCE = 0.1  # relative change of amplitude or frequency above which a number of chattering is marked: chosen
 MARK = "*"  # behind such a number
 NOTE = f"{MARK} half the physics step changes it by more than {100.0 * TOLERANCE:g} %: give a shorter physics_step"
+UNTRIED = (
+    "chattering without RK4 was not compared with that of half the physics step, which may change it by more than "
+    f"{100.0 * TOLERANCE:g} %: see step_halving"
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,6 +45,11 @@ class StepChange:
     def mark(self) -> str:
         """What stands behind the run's numbers of chattering in a table: "*" or nothing."""
         return MARK if self.marked else ""
+
+
+def depends_on_step(scenario: Scenario) -> bool:
+    """Return whether chattering may depend on the physics step: whether the integrator is not RK4."""
+    return scenario.resolved.integrator != "RK4"
 
 
 def halved(scenario: Scenario) -> Scenario:

@@ -10,6 +10,7 @@ from typing import Any
 
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.common.tabular import Cell, Tabular
 from smc_mujoco.common.text import number
 from smc_mujoco.control.source import Source, in_words, kinds
@@ -108,6 +109,7 @@ def key(boards: Sequence[Any]) -> str:
         ". Marked: no law is better, and no run failed. A winner is better than every other law in a paired test"
         f"{several}; {relevance(boards)}."
     )
+    words += f" {UNTRIED[:1].upper()}{UNTRIED[1:]}." * any(board.by_step for board in boards)
     gains = in_words(sources(boards))
     return f"{words} {gains[:1].upper()}{gains[1:]}." if gains else words
 

@@ -34,6 +34,7 @@ from smc_mujoco.analysis.ranking import (
     samples_of,
 )
 from smc_mujoco.analysis.signed_rank import least_p
+from smc_mujoco.analysis.step_halving import depends_on_step
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Tables, Tabular
@@ -165,6 +166,7 @@ class Board(Tables):
       level: level of intervals and tests.
       relevant: share of a value that is relevant.
       resolution: the largest difference that a sensor does not resolve, in the unit of the board.
+      by_step: whether it is about chattering without RK4, which half the physics step may change.
     """
 
     group: Mapping[str, str]
@@ -179,6 +181,7 @@ class Board(Tables):
     level: float
     relevant: float
     resolution: float
+    by_step: bool
 
     @property
     def best(self) -> tuple[str, ...]:
@@ -445,6 +448,7 @@ def leaderboard(
                 level=found.level,
                 relevant=found.relevant,
                 resolution=max(floors),
+                by_step=metric.startswith("chattering") and any(map(depends_on_step, filter(None, ran))),
             )
             boards.append(board)
     return boards

@@ -821,6 +821,15 @@ def real(tmp_path_factory):
     return run_study(scenarios, tmp_path_factory.mktemp("study"))
 
 
+def test_a_board_of_chattering_says_where_no_run_was_compared_with_half_its_step(tmp_path):
+    said = {}
+    for condition in ("nominal", "coulomb"):
+        runs = grid("duffing", ["classical", "twisting"], condition, 1, duration=0.5)
+        boards = leaderboard(run_study(runs, tmp_path / condition), ["itae", "chattering_amplitude"])
+        said[condition] = [board.by_step for board in boards], "half the physics step" in " ".join(str(boards).split())
+    assert said == {"nominal": ([False, False], False), "coulomb": ([False, True], True)}
+
+
 def test_no_board_of_real_runs_has_a_verdict_that_contradicts_it(real):
     names = [metric.name for metric in every_metric()]
     named = checked(leaderboard(real, [*METRICS, *names], resamples=FEW))
