@@ -17,7 +17,6 @@ from smc_mujoco.common.errors import ScenarioError, shown
 
 MAX_SIZE = 2 * 10**9  # bytes of a file that is read: chosen
 MAX_UNPACKED, MAX_RATIO, MAX_MEMBERS = 500_000_000, 20, 10_000  # of an archive: bytes, per byte packed, files; chosen
-ARCHIVES = (".npz", ".fmu", ".pt", ".pt2", ".pth", ".ts")  # suffixes
 WORDS = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}  # numbers that JSON lacks
 
 
@@ -122,7 +121,7 @@ def _bounded(file: Path) -> None:
     size = file.stat().st_size
     if size > MAX_SIZE:
         raise ScenarioError(f"it has {size / 1e6:,.0f} MB, more than {MAX_SIZE / 1e6:,.0f} MB")
-    if file.suffix not in ARCHIVES or not zipfile.is_zipfile(file):
+    if not zipfile.is_zipfile(file):
         return
     with zipfile.ZipFile(file) as archive:
         members = archive.infolist()

@@ -46,7 +46,7 @@ def timed(
       OSError: there is no such program.
     """
     pipe = subprocess.PIPE if output else subprocess.DEVNULL
-    process = subprocess.Popen(
+    with subprocess.Popen(
         command,
         cwd=cwd,
         stdin=subprocess.DEVNULL,
@@ -56,13 +56,11 @@ def timed(
         errors="replace",
         env=os.environ | {"LC_ALL": "C"},
         start_new_session=True,
-    )
-    try:
-        printed = process.communicate(timeout=timeout)
-    except subprocess.TimeoutExpired:
-        raise TimedOut from None
-    finally:
-        _kill(process)  # what it started too, which may run on after it
-        if process.poll() is None or (process.stdout and not process.stdout.closed):
-            process.communicate()
+    ) as process:  # whose pipes are closed after the block, though a process that left the session may hold them
+        try:
+            printed = process.communicate(timeout=timeout)
+        except subprocess.TimeoutExpired:
+            raise TimedOut from None
+        finally:
+            _kill(process)  # what it started too, which may run on after it
     return subprocess.CompletedProcess(command, process.returncode, *printed)

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 import types
 from pathlib import Path
 
@@ -62,6 +63,15 @@ def test_without_process_groups_a_late_command_dies_with_its_children(monkeypatc
     assert command == ["taskkill", "/F", "/T", "/PID"]
     with pytest.raises(ProcessLookupError):  # it has ended, and was waited for
         os.kill(int(number), 0)
+
+
+@pytest.mark.skipif(not hasattr(os, "setsid"), reason="it is about systems that have it")
+def test_a_command_is_late_in_time_though_a_process_of_another_session_holds_its_pipes():
+    leaves = "import os, time; os.fork() or (os.setsid(), time.sleep(20))"
+    begun = time.monotonic()
+    with pytest.raises(process.TimedOut):
+        process.timed([sys.executable, "-c", leaves], 0.5)
+    assert time.monotonic() - begun < 15.0
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="it is about systems with fcntl")

@@ -10,6 +10,7 @@ import functools
 import gc
 import hashlib
 import itertools
+import keyword
 import math
 import os
 import re
@@ -301,7 +302,10 @@ def _description(file: Path, digest: str) -> Any:
             "export it with one of letters, digits and _"
         )
     here = fmpy.platform if str(about.fmiVersion).startswith("2") else fmpy.platform_tuple
-    if not list((folder / "binaries" / here).glob(f"{about.coSimulation.modelIdentifier}.*")):
+    binaries = folder / "binaries" / here
+    if not any(one.stem == about.coSimulation.modelIdentifier for one in binaries.glob("*")):
+        if binaries.exists():
+            raise ScenarioError(f"{file.name} has no binary of its modelIdentifier in {binaries.name}: export it again")
         places = sorted(each.name for each in (folder / "binaries").glob("*")) if (folder / "binaries").exists() else []
         cure = (
             "compile its sources with FMPy, fmpy compile" if (folder / "sources").is_dir() else "export it for this one"
@@ -399,6 +403,7 @@ def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
         except (TypeError, ValueError):
             continue
         ours = re.sub(r"\W+", "_", variable.name).strip("_")
+        ours += "_" * keyword.iskeyword(ours)
         if not ours.isidentifier() or ours.startswith("_") or ours in gains or math.isnan(start):
             continue
         start = math.copysign(math.inf, start) if abs(start) >= UNBOUNDED else start

@@ -324,7 +324,7 @@ def changed(foreign: Path, folder: Path, *pairs: tuple[str, str]) -> Path:
         (("CoSimulation", "ModelExchange"), "changed.fmu is for Model Exchange only: export it for Co-Simulation"),
         (('fmiVersion="2.0"', FMI1),
          "changed.fmu is of FMI 1.0"),
-        (('modelIdentifier="controller"', 'modelIdentifier="other"'), "changed.fmu has a binary for "),
+        (('modelIdentifier="controller"', 'modelIdentifier="other"'), "changed.fmu has no binary of its modelIdentifier in "),
         (("<fmiModelDescription", "<fmi"), "changed.fmu is not an FMU ("),
         (('name="torque" valueReference="4" causality="output"', 'name="torque" valueReference="4"'),
          "changed.fmu has no output: export it with the command as an output"),
@@ -343,12 +343,17 @@ def test_an_fmu_that_cannot_be_a_law_is_one_sentence(foreign, tmp_path, pair, sa
     assert "\n" not in str(error.value)
 
 
+def test_a_parameter_that_is_a_word_of_python_is_a_gain(foreign, tmp_path):
+    file = changed(foreign, tmp_path, ('name="gain.k"', 'name="lambda"'))
+    assert smc.law_from_fmu(file, **RENAMED, isolate=False).defaults == {"lambda_": 8.0}
+
+
 def test_an_fmu_that_unpacks_to_too_much_is_refused_before(foreign, tmp_path):
-    bomb = shutil.copy(foreign, tmp_path / "bomb.fmu")
+    bomb = shutil.copy(foreign, tmp_path / "bomb.FMU")  # whatever its suffix
     with zipfile.ZipFile(bomb, "a", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         for i in range(6):
             archive.writestr(f"zeros{i}", bytes(100_000_000))
-    with pytest.raises(smc.ScenarioError, match=r"bomb.fmu is .*\(it unpacks from \d MB to .* files of 600 MB in all"):
+    with pytest.raises(smc.ScenarioError, match=r"bomb.FMU is .*\(it unpacks from \d MB to .* files of 600 MB in all"):
         smc.law_from_fmu(bomb, constants={"mode": 0.0})
 
 
