@@ -212,6 +212,7 @@ def test_a_user_s_test_passes_with_a_good_law_and_fails_readably_with_a_bad_one(
 # what only extras bring, as it is imported
 OPTIONAL = (
     "dm_control",
+    "dm_env",
     "mediapy",
     "imageio_ffmpeg",
     "IPython",

@@ -19,7 +19,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from dm_env import specs
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.extras import MissingPackageError, cure, extra
@@ -31,6 +30,7 @@ with extra("dm", "smc_mujoco.envs.dm_control_env"):
     from dm_control.mujoco import Physics
     from dm_control.mujoco.wrapper import MjModel
     from dm_control.rl import control
+    from dm_env import specs
 
 # Names of dm_control's suite -> names here.
 TASK_KWARGS = {"random": "random", "time_limit": "duration"}

@@ -21,7 +21,8 @@ def register_when_imported() -> None:
     if getattr(sys.modules.get(LIBRARY), "envs", None) is not None:  # set once gymnasium has registered its own ids
         register()
     else:
-        sys.meta_path.insert(0, Importer())
+        others = [finder for finder in sys.meta_path if type(finder).__module__ != __name__]  # not one before a reload
+        sys.meta_path[:] = [Importer(), *others]
 
 
 class Importer:

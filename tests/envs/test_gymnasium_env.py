@@ -454,6 +454,7 @@ def test_importing_gymnasium_after_the_package_registers_the_plants():
     code = """
 import importlib.util, sys
 import smc_mujoco
+importlib.reload(smc_mujoco)
 print(importlib.util.find_spec("gymnasium") is not None, "gymnasium" in sys.modules)
 import gymnasium
 print("smc/CartPole-v0" in gymnasium.registry)
