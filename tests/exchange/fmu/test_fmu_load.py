@@ -324,7 +324,7 @@ def changed(foreign: Path, folder: Path, *pairs: tuple[str, str]) -> Path:
         (("CoSimulation", "ModelExchange"), "changed.fmu is for Model Exchange only: export it for Co-Simulation"),
         (('fmiVersion="2.0"', FMI1),
          "changed.fmu is of FMI 1.0"),
-        (('modelIdentifier="controller"', 'modelIdentifier="other"'), "changed.fmu has no binary of its modelIdentifier in "),
+        (('modelIdentifier="controller"', 'modelIdentifier="other"'), "changed.fmu has no binary of its "),
         (("<fmiModelDescription", "<fmi"), "changed.fmu is not an FMU ("),
         (('name="torque" valueReference="4" causality="output"', 'name="torque" valueReference="4"'),
          "changed.fmu has no output: export it with the command as an output"),
