@@ -311,29 +311,25 @@ class Board(Tables):
 
 
 def size_in_words(effect: Effect) -> str:
-    """Return how much less a law has than a rival, with the interval, such as "12 % less (8 to 16 %)"."""
+    """Return how much less or more a law has than a rival, with the interval, such as "12 % less (8 to 16 %)"."""
     if effect.low == effect.high == float(effect.relative):
         return "no difference"
     endless = math.isinf(effect.high) and effect.low == (0.0 if effect.relative else -math.inf)
-    if not effect.relative:
-        ends = (number(-value) for value in (effect.high, effect.low))
-        words, span = (
-            f"{number(abs(effect.value))} {'less' if effect.value <= 0 else 'more'}",
-            f"{' to '.join(ends)} less",
-        )
-    elif effect.high < FEW_TIMES:
+    if effect.relative and effect.high < FEW_TIMES:
         times = [number(1 / value) if value else "inf" for value in (effect.value, effect.high, effect.low)]
         words, span = f"{times[0]} times less", f"{times[1]} to {times[2]} times"
     else:
-        value, (low, high) = 1 - effect.value, (_percent(1 - value) for value in (effect.high, effect.low))
-        words = f"{_percent(abs(value))} % {'less' if value >= 0 else 'more'}"
-        span = f"{low} to {high} %{' less' * (value < 0)}"
+        saved = [float(effect.relative) - value for value in (effect.value, effect.high, effect.low)]
+        less = saved[0] >= 0
+        value, *ends = saved if less else [0.0 - saved[k] for k in (0, 2, 1)]
+        shown, unit = (_percent, " %") if effect.relative else (number, "")
+        words, span = f"{shown(value)}{unit} {'less' if less else 'more'}", f"{' to '.join(map(shown, ends))}{unit}"
     return f"{words} ({'too few for an interval' if endless else span})"
 
 
 def _percent(share: float) -> str:
     """Return a share in percent, with two digits where it is small."""
-    return "-inf" if math.isinf(share) else f"{100 * share:.2g}" if abs(share) < 0.0995 else f"{100 * share:.0f}"
+    return f"{share:g}" if math.isinf(share) else f"{100 * share:.2g}" if abs(share) < 0.0995 else f"{100 * share:.0f}"
 
 
 def _counted(names: Sequence[str]) -> str:
