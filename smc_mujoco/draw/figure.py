@@ -101,7 +101,9 @@ def _composed(
     (width, height), shown = size, drawing.horizon(traces)
     early = [drawing.until(trace, shown) for trace in traces]
     overview = _overview(early, chosen)
-    small = _small(early) if "channels" in chosen else []
+    each = style.split(early) if "channels" in chosen else ()
+    small = [row for group in each for row in drawing.small(early, group)]
+    small.sort(key=lambda row: row[0].channel or 0)
     beside = [name for name in chosen if name in BESIDE]
     groups = [Panel("x", *each) for each in style.split(traces).items()]
     places = _parted(groups)
@@ -188,12 +190,6 @@ def _parted(found: Sequence[Panel]) -> list[Panel]:
     """Return the panels, divided into one for each joint of a robot: these have nothing in common."""
     direct = any(panel.traces[0].scenario.plant.direct for panel in found)
     return [one for panel in found for one in (drawing.by_channel(panel) if direct else [panel])]
-
-
-def _small(traces: Sequence[Trace]) -> list[tuple[Panel, ...]]:
-    """Return the small panels of all groups, channel by channel."""
-    rows = [row for group in style.split(traces) for row in drawing.small(traces, group)]
-    return sorted(rows, key=lambda row: row[0].channel or 0)
 
 
 def _time(span: tuple[float, float]) -> str:
@@ -372,10 +368,10 @@ def signals(
             _name_condition(axes[0, i], condition, next(cells[key] for key in cells if key[1] == condition), room)
             axes[-1, i].set_xlabel("time (s)")
         axes[0, 0].set_ylim(drawing.limits(control.traces, "u"))
-        key = _meaning([control])
         if room > points(250):
             shared = "; ".join(filter(None, ["at the right: total variation per second over the last 20 %", shared]))
-        pages.set_head(page, width, title or f"{style.plant_name(traces[0].scenario.plant)}: control", key, shared)
+        title = title or f"{style.plant_name(traces[0].scenario.plant)}: control"
+        pages.set_head(page, width, title, _meaning([control]), shared)
         pages.write(page, paths)
     return page
 
