@@ -132,8 +132,10 @@ def test_a_rate_limit_behind_a_lag_errs_by_less_than_the_lag_moves_in_a_step(tau
     step, parts = 1e-3, 2000
     u, first, gap = np.random.default_rng(0).normal(size=(3, 500))
     second = first + gap * np.repeat([0.0, 0.01, 0.1, 1.0, 3.0], 100)
-    mean, last, _ = drive_step((smc.Lag(tau), smc.RateLimit(rate)), step)(u, first, second)
-    force, total, above, below = second, 0.0, 0, 0
+    advance = drive_step((smc.Lag(tau), smc.RateLimit(rate)), step)
+    assert advance is not None
+    mean, last, _ = advance(u, first, second)
+    lagged, force, total, above, below = first, second, 0.0, 0, 0
     for t in step * np.arange(1, parts + 1) / parts:
         lagged, before = u + (first - u) * np.exp(-t / tau), force
         force = np.clip(lagged, before - rate * step / parts, before + rate * step / parts)
