@@ -54,10 +54,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if not os.environ.get("COLUMNS", "80").strip("0"):
         del os.environ["COLUMNS"]  # a terminal without a width sets it to 0
     if threading.current_thread() is threading.main_thread():  # ends as Ctrl-C does, and leaves no half-written files
-        signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
+        signal.signal(signal.SIGTERM, _end)
     choose_gl()  # before a command imports mujoco, which fails if MUJOCO_GL does not name a backend
     warnings.showwarning = lambda message, *_, **__: print(f"smc-mujoco: {printable(str(message))}", file=sys.stderr)
     app(arguments, prog_name="smc-mujoco")
+
+
+def _end(*_: object) -> None:
+    """End as Ctrl-C does, also in a shell's background job, which ignores Ctrl-C."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.raise_signal(signal.SIGINT)
 
 
 def play(scene: str) -> None:

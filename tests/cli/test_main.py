@@ -752,10 +752,11 @@ def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(call, folder
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGTERM for a process")
-def test_a_process_that_is_told_to_end_says_so_as_after_ctrl_c(tmp_path):
+@pytest.mark.parametrize("shell", [(), ("sh", "-c", 'trap "" INT; exec "$@"', "sh")], ids=["shown", "background"])
+def test_a_process_that_is_told_to_end_says_so_as_after_ctrl_c(tmp_path, shell):
     (tmp_path / "long.py").write_text(LONG)
     process = subprocess.Popen(
-        [sys.executable, "long.py", "--no-film"],
+        [*shell, sys.executable, "long.py", "--no-film"],
         cwd=tmp_path,
         env=environment(),
         stdout=subprocess.PIPE,
