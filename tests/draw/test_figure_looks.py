@@ -235,13 +235,15 @@ def test_curves_that_coincide_are_all_seen(one):
     assert panels.dashes([(one.t, zero), (one.t, np.where(one.t < 0.1 * one.t[-1], 1.0, 0.0))], (0.0, 1.0)) == ["-"] * 2
 
 
-def test_each_joint_of_an_arm_has_its_reference_and_its_error(arm):
-    page = figure(arm)
+def test_each_joint_of_an_arm_has_its_reference_and_its_error_if_that_moves(arm):
+    assert [ax.get_ylabel() for ax in figure(arm).axes][:3] == ["j0 x (rad)", "j0 u (N·m)", "j1 x (rad)"]
+    moving = dataclasses.replace(arm[0], r=arm[0].r + arm[0].t[:, None])
+    page = figure([moving])
     labels = [ax.get_ylabel() for ax in page.axes]
     assert labels[:4] == ["j0 x (rad)", "j0 e (rad)", "j0 u (N·m)", "j1 x (rad)"]
     assert labels[-1] == "|x − r| (rad)"
     x, e = page.axes[:2]
-    np.testing.assert_allclose(curves(e)[-1].get_ydata(), (arm[0].x - arm[0].r)[:, 0])
+    np.testing.assert_allclose(curves(e)[-1].get_ydata(), (moving.x - moving.r)[:, 0])
     assert [line.get_gid() for line in x.lines].count(panels.REFERENCE) == 1
     asked = [ax.get_ylabel() for ax in figure(arm, panels=["spread", "s", "phase"]).axes]
     assert asked == [
