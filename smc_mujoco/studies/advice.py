@@ -339,8 +339,12 @@ class Advice(Tables):
             if not better:
                 continue
             name = min(better, key=lambda one: (-len(better[one]), known[one].medians[need].median))
-            costs = [other for other in self.needs if other != need and self.better(name, other).get(first.law.name)]
             other = known[name]
+            costs = [
+                one
+                for one in self.needs
+                if self.better(name, one).get(first.law.name) and other.medians[one].median > first.medians[one].median
+            ]
             changes = [f"{self._value(other, one)} instead of {self._number(first, one)}" for one in (need, *costs)]
             text = f"If only {need} counts: {other.law}, with {changes[0]}"
             sentences.append(text + f"; it costs {joined(changes[1:])}." if costs else text + ".")
@@ -378,7 +382,7 @@ class Advice(Tables):
         return f"How sure: {'; '.join(filter(None, parts))}. {self._holds}"
 
     def _against(self, rival: str) -> str:
-        """Return how the first law compares with a rival on each need, in the condition in which it leads least."""
+        """Return how the first law compares with a rival on each need, in the condition in which it does worst."""
         first = self.compared[0]
         a, b = (self.comparison.laws.index(name) for name in (first, rival))
         parts = []
@@ -392,7 +396,7 @@ class Advice(Tables):
                 continue
             least = max(blocks, key=lambda k: self.comparison.p[k, a, b])
             effect = self.comparison.effect(least, first, rival, winner=False)
-            where = f" under {self.blocks[least][1]}, where it leads least," * (len(blocks) > 1)
+            where = f" under {self.blocks[least][1]}, where it does worst," * (len(blocks) > 1)
             if math.isfinite(effect.value):
                 samples = "sets of gains" if effect.sets else "runs"
                 ahead = f"ahead with {effect.ahead} of {effect.samples} {samples}"

@@ -98,7 +98,7 @@ def test_the_answer_says_what_why_and_how_sure(advice):
     a, b = (comparison.laws.index(name) for name in ("observer_free", "slow"))
     least = max(blocks, key=lambda k: comparison.p[k, a, b])
     effect = comparison.effect(least, "observer_free", "slow", winner=False)
-    where = f"fast under {advice.blocks[least][1]}, where it leads least, {100 * (1 - effect.value):.0f} % less"
+    where = f"fast under {advice.blocks[least][1]}, where it does worst, {100 * (1 - effect.value):.0f} % less"
     assert f"observer_free against slow: {where} (" in sure
     assert f"ahead with {effect.ahead} of 16 runs" in sure
 

@@ -185,17 +185,26 @@ class Paper:
         return find_condition(text)
 
     def law(self, plant: str, law: str, gains: str) -> Component:
-        """Return a law with the gains that a set has for a plant, or else with its own.
+        """Return a law with the gains that a set has for a plant. A law of the paper's folder has its own for the rest.
 
         Raises:
-          ScenarioError: an unknown law, set or gain.
+          ScenarioError: an unknown law, set or gain, or a set that lacks gains of a law of the library.
         """
         of_set = find("set of gains", gains, self.sets)
         if of_set is None:
             if law in self.laws or law not in (*gain_sets.LAWS, *gain_sets.SAME):
                 gains = "default"
             return self._bound(law, {}) if law in self.laws else gain_sets.law(self.plant(plant), law, gains)
-        return self._bound(law, {**of_set.get("", {}).get(law, {}), **of_set.get(plant, {}).get(law, {})})
+        values = {**of_set.get("", {}).get(law, {}), **of_set.get(plant, {}).get(law, {})}
+        made = self._bound(law, values)
+        known = {} if law in self.laws else find("law", law, laws_known()).gains
+        lacking = [f"{gain} = {one.default:g}" for gain, one in known.items() if not one.held and gain not in values]
+        if lacking:
+            raise ScenarioError(
+                f"the gains {gains!r} of {law} lack some, whose defaults are not the paper's: write in [gains.{gains}] "
+                f"what the paper has for {', '.join(lacking)}"
+            )
+        return made
 
     def _bound(self, law: str, gains: Mapping[str, float]) -> Component:
         """Return a law with these gains, and its own for the rest."""

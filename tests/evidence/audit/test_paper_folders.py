@@ -162,6 +162,11 @@ BROKEN = [
     (MINIMAL + "[gains.tuned]\npid = { kp = 1 }", SMALL, "gains.tuned is a set of the suite"),
     ('sets = ["mine"]\n' + MINIMAL, SMALL, "unknown set of gains in sets 'mine'"),
     (
+        MINIMAL + 'plants = ["duffing"]\nlaws = ["twisting"]\n[gains.paper]\ntwisting = { r1 = 5 }',
+        SMALL,
+        "write in .gains.paper. what the paper has for r2 = 2.3",
+    ),
+    (
         MINIMAL + 'plants = ["duffing"]\nlaws = ["pid"]\n[gains.paper]\npid = { kq = 1 }',
         SMALL,
         "claim 1: unknown gain of pid 'kq'",
