@@ -46,6 +46,7 @@ MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 
 REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
 JITTER_STEPS = 4  # physics steps in the clock's jitter, at least; chosen: it takes five values or more
 SHORT_LAG = 0.2  # control periods: a shorter lag needs no shorter physics step, see `longest_step`
+MAX_DEFAULT_STEPS = 100_000  # per control period, if no physics step is given
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 MAX_ANGLE = 3.0 * math.pi  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
@@ -429,7 +430,8 @@ def _steps(s: Scenario) -> int:
 
     Behind a drive it is one of which the input delay is a whole number of steps, if up to four times as many do.
     """
-    fewest = math.ceil(s.control_period / longest_step(s) - 1e-9)
+    longest = max(longest_step(s), s.control_period / MAX_DEFAULT_STEPS)  # what this is too long for is refused later
+    fewest = math.ceil(s.control_period / longest - 1e-9)
     delay = s.input_delay / s.control_period
     fitting = (n for n in range(fewest, 4 * fewest + 1) if abs(math.remainder(delay * n, 1.0)) < 1e-6)
     return next(fitting, fewest) if s.actuator else fewest

@@ -589,3 +589,11 @@ def test_what_belongs_elsewhere_is_sent_there(tmp_path):
         smc.plot(smc.run(scenario))  # pyright: ignore[reportArgumentType]
     with pytest.raises(smc.ScenarioError, match=r"traces is Table.*: smc\.plot draws a table"):
         smc.figure(smc.study([scenario], tmp_path))  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize(
+    ("field", "words"), [({"control_period": 1e306}, "duration"), ({"clock": smc.Clock(1e-310)}, "jitter")]
+)
+def test_a_period_that_would_need_countless_default_steps_is_refused_at_once(field, words):
+    with pytest.raises(smc.ScenarioError, match=words):
+        smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01, actuator=[smc.Lag(0.01)], **field))
