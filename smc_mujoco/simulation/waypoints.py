@@ -13,6 +13,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.time_series import TimeSeries, last_before
 
 STEP = 0.01  # s between the knots of a path in space: chosen; the tip leaves its path by micrometres between them
+MAX_PIECES = 1_000_000  # of a path in space: minutes of computing
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -109,7 +110,10 @@ def cartesian_path(
         )
     path = [Waypoints(times, array[:, i].tolist()) for i in range(3)]
     step, first, last = number("step", step, above=0.0), path[0].times[0], path[0].times[-1]
-    knots = np.linspace(first, last, max(2, int(np.ceil((last - first) / step - 1e-9)) + 1))
+    pieces = (last - first) / step
+    if pieces > MAX_PIECES:
+        raise ScenarioError(f"step {step:g} s divides {last - first:g} s into {pieces:.3g} pieces: give a longer step")
+    knots = np.linspace(first, last, max(2, int(np.ceil(pieces - 1e-9)) + 1))
     wanted = np.array([[Waypoints.value(t, None, one.data)[0] for one in path] for t in knots])
     start = plant.x0 if x0 is None else tuple(number("x0", x) for x in x0)
     if len(start) != plant.n:

@@ -181,3 +181,8 @@ def test_bad_input_is_one_sentence():
     for make, said in REFUSED.values():
         with pytest.raises(smc.ScenarioError, match=re.escape(said)):
             make()
+
+
+def test_a_path_of_countless_pieces_is_refused_at_once():
+    with pytest.raises(smc.ScenarioError, match="step 1e-09 s divides 1 s into"):
+        smc.cartesian_path("panda", [0.0, 1.0], [[0.5, 0.0, 0.5], [0.4, 0.0, 0.5]], body="link7", step=1e-9)
