@@ -5,6 +5,7 @@ import contextlib
 import copy
 import ctypes
 import dataclasses
+import faulthandler
 import importlib
 import itertools
 import json
@@ -502,6 +503,16 @@ def test_a_law_of_python_that_exits_fails_its_own_run_alone():
     first, second = plainly([scenario(made(leaves)), scenario()])
     assert first.failure == "law 'leaves' raised SystemExit (3) in channel 0, at t = 0 s"
     assert second.failure is None
+
+
+def test_a_singular_nominal_model_ends_a_run_of_python_instead_of_hanging_it():
+    """MuJoCo's warning about a singular inertia, given inside of a control callback of Python, never returns."""
+    faulthandler.dump_traceback_later(60.0, exit=True)
+    try:
+        trace = reference.run(scenario("none", plant=smc.plant("double_pendulum", r1=1e9)))
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+    assert trace.failure == "the plant diverged (|x| or |v| above 1e+06, or NaN), at t = 0.001 s"
 
 
 def sour_estimator(y, gains, memory):

@@ -206,6 +206,7 @@ def prepared(
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
     mujoco.mj_resetData(model, data)
+    data.warning.number[:] = 1  # MuJoCo tells only the first; telling it inside a control callback would never end
     joints = joint_ids(model)
     places = Places(model.jnt_qposadr[joints], model.jnt_dofadr[joints], model.actuator_ctrladr[drive_ids(model)])
     return model, places, data, []
