@@ -212,7 +212,9 @@ def in_words(name: str) -> str:
 
 
 def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
-    """Return one label per trace: the given ones, else the laws' labels, with the differences between runs of one law.
+    """Return one label per trace: the given ones, else the laws' labels, with what differs between runs of one law.
+
+    Machines with other parameters have these in their labels, whatever their laws.
 
     Runs of one law without differences are numbered.
     """
@@ -221,29 +223,37 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
             raise ScenarioError(f"labels are {shown(given)} for {len(traces)} traces: give one string a trace")
         return [label if isinstance(label, str) else shown(label) for label in given]
     names = [law_name(trace.scenario.law) for trace in traces]
-    alike = [[trace for trace, other in zip(traces, names, strict=True) if other == name] for name in names]
-    words = [differences(trace, others) for trace, others in zip(traces, alike, strict=True)]
+    words = [
+        differences(trace, [one for one, other in zip(traces, names, strict=True) if other == name], traces)
+        for trace, name in zip(traces, names, strict=True)
+    ]
     names = [f"{name}: {what}" if what else name for name, what in zip(names, words, strict=True)]
     return [n if names.count(n) == 1 else f"{n} {names[:i].count(n) + 1}" for i, n in enumerate(names)]
 
 
-def differences(trace: Trace, others: Sequence[Trace]) -> str:
-    """Return how a run differs from others of its law, such as "k1 = 6, no noise"; "" if it does not."""
-    words = []
-    tables = [_settings(other) for other in others]
-    for name, value in _settings(trace).items():
-        if any(table.get(name) != value for table in tables):
-            words.append(_setting(name, value))
-    return ", ".join(words)
+def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -> str:
+    """Return how a run differs from those of its law, and its machine from all, as "k1 = 6, no noise, m = 0.7"."""
+    return ", ".join(
+        _setting(name, value)
+        for settings, group in ((_settings, alike), (_machine, others))
+        for name, value in settings(trace).items()
+        if any(settings(other).get(name) != value for other in group)
+    )
 
 
 def _settings(trace: Trace) -> Mapping[str, object]:
-    """Return the gains of a run, the parameters of its plant and the fields of its scenario."""
-    scenario, gains = trace.scenario, dict(trace.scenario.law.gains)
+    """Return the gains of a run, and the fields of its scenario."""
+    scenario = trace.scenario
     fields = {field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)}
-    del fields["law"], fields["plant"]
-    plant = {f"plant's {name}" if name in gains else name: v for name, v in scenario.plant.parameters.items()}
-    return gains | plant | fields
+    kept = {name: value for name, value in fields.items() if name not in ("law", "plant", "mismatch")}
+    return dict(scenario.law.gains) | kept
+
+
+def _machine(trace: Trace) -> Mapping[str, object]:
+    """Return the true parameters of a run's machine."""
+    scenario = trace.scenario
+    values = vars(scenario.plant.values(scenario.mismatch))
+    return {f"plant's {name}" if name in scenario.law.gains else name: value for name, value in values.items()}
 
 
 def distinct(names: Sequence[str]) -> list[str]:

@@ -97,4 +97,6 @@ def test_labels_tell_runs_of_one_law_apart_by_the_parameters_of_their_plants():
     labels = style.labels(smc.run(runs), None)
     assert labels == ["PID: delta = 0.2", "PID: delta = 0.5"]
     assert style.distinct(labels) == ["delta = 0.2", "delta = 0.5"]
+    heavy = smc.Scenario(plant="duffing", law="classical", mismatch={"mass": 1.3}, duration=0.01)
+    assert style.labels(smc.run([runs[0], heavy]), None) == ["PID: M = 1", "Classical: M = 1.3"]
     assert style.distinct(["PID: k = 1", "LQR"]) == ["PID: k = 1", "LQR"]

@@ -11,6 +11,7 @@ from PIL import Image, ImageDraw
 
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import windows
+from smc_mujoco.draw.film import arrows
 from smc_mujoco.metrics import tip
 from smc_mujoco.simulation.trace import Trace
 
@@ -23,11 +24,9 @@ ROOM = SPACE + HEIGHT + 1.6 * LETTERS  # px, of bars with their numbers
 LOST = 0.015  # m that a tip is off its path where a ghost shows the reference; chosen: nearer ones hide the ghost
 LONGEST = 0.6  # m, of the arrow of the largest force
 STRUCK = 0.4  # m, of the arrow of a blow
-SHAFT, HEAD = 4.0, 9.0  # px: width of an arrow's shaft, and half of that of its head
-SLENDER = 2.2  # length of an arrow's head, in halves of its width
+SHAFT = 4.0  # px, width of an arrow's shaft
 REACH = 0.09  # m, of a blow's arrow from the middle of its body
 SHOWN = 0.12  # s for which a blow is shown after its end
-FINER = 3  # pixels that an arrow is drawn with for each of the picture
 Project = Callable[[np.ndarray], np.ndarray]  # points (m, 3) -> (m, 2) px
 
 
@@ -183,20 +182,10 @@ class Overlay:
         self, image: Image.Image, start: np.ndarray, end: np.ndarray, colour: str, words: str, after: bool
     ) -> None:
         """Draw an arrow with smooth edges between two points, px, and words beyond its end, or before its start."""
-        s, length = self.scale, float(np.linalg.norm(end - start))
-        if length > 1.0:
-            along = (end - start) / length
-            across = np.array([-along[1], along[0]])
-            head = min(SLENDER * HEAD * s, 0.7 * length)
-            half, neck, wide = 0.5 * SHAFT * s, end - head * along, head / SLENDER
-            rim = [start + half * across, neck + half * across, neck + wide * across, end]
-            rim += [neck - wide * across, neck - half * across, start - half * across]
-            corner, far = np.floor(np.min(rim, axis=0)).astype(int), np.ceil(np.max(rim, axis=0)).astype(int) + 1
-            size = tuple((far - corner).tolist())
-            mask = Image.new("L", tuple(FINER * side for side in size))
-            shape = [tuple(FINER * (point - corner)) for point in rim]
-            ImageDraw.Draw(mask).polygon(shape, 255)
-            image.paste(colour, tuple(corner.tolist()), mask.resize(size, Image.Resampling.BOX))
+        s = self.scale
+        if np.linalg.norm(end - start) > 1.0:
+            line, rgb = np.linspace(start, end, 40), np.array(style.rgb(colour)) / 255
+            arrows.paint(image, arrows.outline(line, SHAFT * s), (*rgb, 1.0))
         draw, font = ImageDraw.Draw(image), style.font(NUMBER * s, bold=True)
         place = end if after else start
         gap = 6 * s * np.sign((end - start)[0] or 1.0) * (1 if after else -1)

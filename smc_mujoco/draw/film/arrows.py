@@ -3,14 +3,16 @@
 An arrow is the mean over the time of a frame. A bar behind the control's is its range, which shows how far a control
 swings that switches faster than the film. Behind a drive they are those of its force, and a pale arrow is the command.
 Arrows lie along a pendulum's arc, beyond the bob; and along the rail, above the cart, or before it if it carries
-something.
+something. At a hinge of a user's model, whose links may have any shape, they bend around its axis, and are drawn over
+the picture, so that no link hides them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from PIL import Image, ImageDraw
 
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import Envelope, windows
@@ -26,6 +28,11 @@ LONG = 0.5  # m: longer pendulums have arrows as thick as one of this length
 OFF_ARC, OFF_RAIL = 1.6, 2.2  # thicknesses between a body and its nearest arrow
 THICKNESS, SHORT = 0.035, 0.008  # m, at a slide, and at most that part of its rail
 OWN_LENGTH, OWN_THICKNESS = 0.25, 0.012  # at an own model's slides, of its extent
+OWN_RADIUS, SWEEP = 0.15, 1.3  # at its hinges: radius of a bent arrow, of the extent, and angle of the longest, rad
+BENT, BESIDE = 0.12, 0.3  # width of a bent arrow, and distance of the next, in radii
+RAISED = 0.5  # how much the direction of a bent arrow's middle is raised from that to the camera
+HEAD, LONG_HEAD = 2.25, 2.2  # of a flat arrow: half the head's width, in shafts, and its length, in halves
+FINER = 3  # pixels with which a flat arrow is drawn for each of the picture
 NETWORK = 1.6  # times as long for the pendulums of a network: they swing past each other, and are seen from the side
 MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
 SLENDER = 0.2  # thickest shaft of a short arrow, of its length
@@ -56,6 +63,7 @@ class Mount(NamedTuple):
       unit: length of the longest arrow at a slide, m; its factor at a hinge, over HINGE of the pendulum's.
       thick: thickness at a slide, m.
       front: direction to the camera, (3,), of arrows before a slide that carries something; None for those above it.
+      radius: of bent arrows, m; 0 for straight ones.
     """
 
     joint: int
@@ -63,6 +71,7 @@ class Mount(NamedTuple):
     thick: float
     front: np.ndarray | None
     beyond: bool = False
+    radius: float = 0.0
 
 
 def mounts(
@@ -78,9 +87,10 @@ def mounts(
     turning = NETWORK if plant.n > 1 and not own else 1.0
     if plant.n == 1 and not own and "l" in plant.parameters and (usual := catalogue().get(plant.name)):
         turning = max(1.0, usual.parameters["l"] / plant.parameters["l"])  # no smaller on a short rod
-    before = front if own or plant.free else None
+    before, radius = front if own or plant.free else None, OWN_RADIUS * extent
     return [
-        Mount(j, length if slide else turning, thick, before, beyond) for j, slide in zip(joints, slides, strict=True)
+        Mount(j, length if slide else turning, thick, before, beyond, 0.0 if slide else radius)
+        for j, slide in zip(joints, slides, strict=True)
     ]
 
 
@@ -195,6 +205,50 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, mou
     mujoco.mjv_connector(geom, kind, width if arrow.head else 0.5 * width, foot + low * along, foot + end * along)
     geom.specular, geom.objtype = 0.0, mujoco.mjtObj.mjOBJ_UNKNOWN  # mjv_initGeom leaves that of an earlier shape
     scene.ngeom += 1
+
+
+def bend(
+    image: Image.Image, project: Callable[[np.ndarray], np.ndarray], data: mujoco.MjData, mount: Mount, arrow: Arrow
+) -> None:
+    """Draw an arrow that bends around a hinge's axis over a picture; `project` is from (m, 3) m to (m, 2) px."""
+    axis, middle = data.xaxis[mount.joint], data.xanchor[mount.joint]
+    right = np.cross(axis, mount.front + np.array([0.0, 0.0, RAISED]))
+    if not np.linalg.norm(right):
+        return
+    right /= np.linalg.norm(right)
+    near = np.cross(right, axis)
+
+    def around(low: float, high: float) -> np.ndarray:
+        angle = np.linspace(low, high, 40)[:, None]
+        return project(middle + mount.radius * (np.cos(angle) * near + np.sin(angle) * right))
+
+    low, high = (SWEEP * arrow.size * np.clip(end, -1.0, 1.0) for end in (arrow.low, arrow.high))
+    centre = project(middle[None])
+    radius = np.linalg.norm(around(0.0, 2.0 * np.pi) - centre, axis=1).max()
+    line = centre + (1.0 + BESIDE * arrow.layer) * (around(low, high) - centre)
+    paint(image, outline(line, arrow.size * BENT * radius, arrow.head), arrow.rgba)
+
+
+def outline(line: np.ndarray, width: float, head: bool = True) -> np.ndarray:
+    """Return the outline, (points, 2) px, of an arrow along a line (m, 2) px whose shaft is `width` px wide."""
+    way = np.append(0.0, np.linalg.norm(np.diff(line, axis=0), axis=1).cumsum())
+    width = min(width, SLENDER * way[-1])
+    long = min(LONG_HEAD * HEAD * width, 0.7 * way[-1]) * head
+    shaft = np.column_stack([np.interp(np.linspace(0.0, way[-1] - long, len(line)), way, part) for part in line.T])
+    along = np.gradient(shaft, axis=0)
+    across = 0.5 * width * along[:, ::-1] * (-1, 1) / np.linalg.norm(along, axis=1)[:, None]
+    wing = long / LONG_HEAD / (0.5 * width) * across[-1]
+    return np.concatenate([shaft + across, [shaft[-1] + wing, line[-1], shaft[-1] - wing], (shaft - across)[::-1]])
+
+
+def paint(image: Image.Image, rim: np.ndarray, rgba: Sequence[float]) -> None:
+    """Fill an outline, (points, 2) px, with smooth edges."""
+    corner, far = np.floor(rim.min(axis=0)).astype(int), np.ceil(rim.max(axis=0)).astype(int) + 1
+    size = tuple((far - corner).tolist())
+    mask = Image.new("L", tuple(FINER * side for side in size))
+    ImageDraw.Draw(mask).polygon([tuple(FINER * point) for point in rim - corner], round(255 * rgba[3]))
+    colour = tuple(round(255 * part) for part in rgba[:3])
+    image.paste(colour, tuple(corner.tolist()), mask.resize(size, Image.Resampling.BOX))
 
 
 def half(model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray) -> float:

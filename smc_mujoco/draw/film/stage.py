@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
+from PIL import Image
 
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film import arm, arrows, camera, scene
@@ -21,6 +22,7 @@ from smc_mujoco.simulation.trace import Trace
 FILLED = 0.7  # part of the width that the places of machines in a row take at least; chosen
 SAME = 1e-9  # of a camera's distance, that rounding may change
 OWN = 0.75  # share of the law's colour in that of an own model's links, where several laws are shown; chosen
+UNPAINTED = np.array([0.5, 0.5, 0.5, 1.0], np.float32)  # MuJoCo's own colour of geoms
 BLANK = 8  # of 255: colours that differ by less are one; chosen
 SEEN = 2e-4  # least part of a picture that shows something, such as 120 px of 1280 x 460; chosen
 GROUPS = 3  # groups of geoms that MuJoCo draws by default
@@ -123,12 +125,14 @@ class Stage:
         self.changed = True
 
     def set_colour(self, k: int, colour: str) -> None:
-        """Colour the accent of machine k; of a user's own model all links, if there are several machines."""
+        """Colour the accent of machine k; of a user's own model all links, of a single one those without a colour."""
         if self.colours[k] == colour:
             return
         rgb, links = np.array(style.rgb(colour)) / 255, self.links[k]
         if self.own:
-            if len(self.colours) > 1 or colour == style.FAILED:
+            if len(self.colours) == 1 and colour != style.FAILED:
+                links = links[(self.paint[links] == UNPAINTED).all(axis=1)]
+            if len(links):
                 self.model.geom_matid[links] = -1
                 self.model.geom_rgba[links] = self.paint[links]
                 self.model.geom_rgba[links, :3] = OWN * rgb + (1.0 - OWN) * self.paint[links, :3]
@@ -166,10 +170,18 @@ class Stage:
             for k in np.flatnonzero(self.aimed):
                 self.ghost(shown, self.links[k])
             for k, i, arrow in drawn:
-                arrows.draw(shown, self.model, self.data, self.mounts[k][i], arrow)
+                if not self.mounts[k][i].radius:
+                    arrows.draw(shown, self.model, self.data, self.mounts[k][i], arrow)
 
         whole, self.changed = self.changed, False
-        return self.canvas.draw(add, whole)
+        picture = self.canvas.draw(add, whole)
+        bent = [(self.mounts[k][i], arrow) for k, i, arrow in drawn if self.mounts[k][i].radius]
+        if not bent:
+            return picture
+        image = Image.fromarray(picture)
+        for mount, arrow in bent:
+            arrows.bend(image, self.project, self.data, mount, arrow)
+        return np.asarray(image)
 
     def project(self, points: np.ndarray) -> np.ndarray:
         """Return where points (m, 3) m are in the picture, (m, 2) px."""

@@ -96,6 +96,23 @@ def test_arrows_of_a_foreign_cart_are_seen_and_all_of_its_rail_is_in_the_picture
         assert scene.mounts[0][0].unit == pytest.approx(0.25 * plant.load().stat.extent)
 
 
+def test_the_torque_of_a_foreign_hinge_bends_around_its_axis_before_its_body(tmp_path):
+    """The body is wide and centred on a vertical axis: an arrow along the arc of its centre has no place."""
+    (tmp_path / "one.xml").write_text("""
+      <mujoco><worldbody><body pos="0 0 .5"><joint name="j" axis="0 0 1"/>
+        <geom type="cylinder" size=".3 .1"/><geom size=".1" pos=".5 0 0"/></body></worldbody>
+      <actuator><motor joint="j"/></actuator></mujoco>""")
+    trace = smc.run(smc.Scenario(plant=smc.plant_from(tmp_path / "one.xml", ["j"]), law="none", duration=0.1))
+    with Stage([trace], ["#0072B2"], (640, 360), camera.Room(20, 20, 620, 340)) as scene:
+        centre = scene.project(scene.data.xanchor[:1])[0]
+        for push in (0.8, -0.8):
+            red = scene.render([(0, 0, Arrow(0.0, push, (1.0, 0.0, 0.0, 1.0)))])[..., 0] > 250
+            x = np.nonzero(red)[1]
+            assert red.sum() > 100
+            assert np.abs(x.mean() - centre[0]) < 100
+            assert (x.mean() > centre[0]) == (push > 0.0)  # seen from the front, the near side goes right
+
+
 def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():
     plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.3, x0=(1.79, 0.0), v0=(2.0, 0.0)))
