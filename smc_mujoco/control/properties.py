@@ -63,10 +63,10 @@ PROPERTIES: Mapping[str, Property] = {
 
 
 def families() -> dict[str, list[str]]:
-    """Return family -> the names of its laws."""
+    """Return family -> the names of its laws; those that name no family are "other"."""
     members: dict[str, list[str]] = {}
     for name, law in catalogue().items():
-        members.setdefault(law.family, []).append(name)
+        members.setdefault(law.family or "other", []).append(name)
     return dict(sorted(members.items()))
 
 

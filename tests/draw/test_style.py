@@ -1,6 +1,7 @@
 """The colours of laws are told apart, by every eye: measured, not looked at."""
 
 import itertools
+import random
 
 import numpy as np
 import pytest
@@ -26,12 +27,8 @@ SEEN = {  # linear sRGB as it looks to whom: G. M. Machado et al., IEEE TVCG 15(
 # 60 cm. Source: M. Stone, D. Szafir and V. Setlur, "An engineering model for color difference as a function of size",
 # Color and Imaging Conference 2014; these are the smallest marks of that study.
 NOTICEABLE = 0.5 * (np.array([10.16, 10.68, 10.70]) + 3.0 * np.array([1.50, 3.08, 5.74]))
-# What fails: pairs of laws whose colours half of all observers do not tell apart. Lines are thinner than such marks.
+# What fails: pairs of stated colours that half of all observers do not tell apart. Lines are thinner than such marks.
 MISTAKEN_STATED = {"no green": {("conditioned_super_twisting", "observer_free")}}
-MISTAKEN = {
-    ("discrete_reaching", "power_rate"), ("discrete_reaching", "prescribed_convergence"), ("extended_state", "pid"),
-    ("hierarchical", "terminal"), ("observer_free", "proper_super_twisting"),
-}  # fmt: skip
 XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.072175], [0.0193339, 0.119192, 0.9503041]])
 
 
@@ -59,11 +56,19 @@ def test_the_colours_of_laws_are_apart_and_apart_from_all_else_that_is_drawn(eye
 
 def test_a_law_has_one_colour_in_every_picture():
     laws = sorted(smc.laws())
-    colours = {law: style.law_colour(law) for law in laws}
-    pairs = itertools.combinations(laws, 2)
-    assert {(a, b) for a, b in pairs if mistaken(colours[a], colours[b], "all cones")} == MISTAKEN
     for few in (laws, laws[::-1], *itertools.combinations(laws, 2)):
         assert style.law_colours(few) == [style.law_colour(law) for law in few]
+
+
+def test_laws_are_mistaken_for_each_other_less_than_half_as_often_as_with_colours_at_random():
+    """Five pairs of 49 laws are. Colours of the same lightness and strength, drawn at random, have about 20."""
+    laws = smc.laws()
+    drawn = random.Random(0).choices(style._grid(0), k=len(laws))
+    pairs, chance = (
+        sum(mistaken(*pair, "all cones") for pair in itertools.combinations(colours, 2))
+        for colours in ([style.law_colour(law) for law in laws], drawn)
+    )
+    assert 2 * pairs < chance
 
 
 def test_laws_that_would_be_mistaken_for_each_other_differ_in_one_picture():
@@ -71,7 +76,7 @@ def test_laws_that_would_be_mistaken_for_each_other_differ_in_one_picture():
     same = [law for law in mine if style.law_colour(law) == style.law_colour(mine[0])][:2]
     given = style.law_colours([*same, "observer_free", "observer_free"])
     assert [given[0], given[2]] == [style.law_colour(same[0]), "#0072B2"]
-    assert min(style.distance(*pair) for pair in itertools.combinations(given, 2)) > 0.1
+    assert min(style.distance(*pair) for pair in itertools.combinations(given, 2)) > style.ALIKE
 
 
 def test_law_colours_never_repeat_in_one_picture():
