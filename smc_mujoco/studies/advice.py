@@ -5,12 +5,11 @@ Every sentence is made from the numbers of the comparison, so it changes when th
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from smc_mujoco.analysis.bootstrap import Interval
-from smc_mujoco.analysis.ranking import Comparison, Rank
+from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.signed_rank import least_p
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import joined, number
@@ -20,46 +19,10 @@ from smc_mujoco.control.source import in_words
 from smc_mujoco.draw.style import law_colour
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.studies.leaderboard import size_in_words
-from smc_mujoco.studies.needs import NEEDS, TIES, ties
+from smc_mujoco.studies.needs import NEEDS, TIES, Choice, ties
 from smc_mujoco.studies.table import Table
-from smc_mujoco.studies.worst_case import WorstCase
 
 NAMED = 6  # names of laws that the screening left out
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Choice:
-    """A finalist.
-
-    Attributes:
-      law: with its gains for the plant.
-      remark: what is to be said of the gains besides their source.
-      rank: its mean rank over the blocks, and its place; NaN if it is not compared.
-      settles: share of its runs that settle.
-      reliable: whether it settles in nearly all runs of every condition.
-      fit: whether it settles often enough to be advised.
-      medians: need -> median over the conditions, with its interval; of "robust" the largest over the conditions.
-      worst: what an adversary found in each condition, for the need "robust"; else empty.
-    """
-
-    law: Component
-    remark: str
-    rank: Rank
-    settles: float
-    reliable: bool
-    fit: bool
-    medians: Mapping[str, Interval]
-    worst: tuple[WorstCase, ...] = ()
-
-    @property
-    def worst_found(self) -> WorstCase:
-        """The worst of them."""
-        return max(self.worst, key=lambda one: one.value)
-
-    @property
-    def gains(self) -> str:
-        """Where the gains come from, in words."""
-        return f"gains: {self.law.source}" + f"; {self.remark}" * bool(self.remark)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -53,9 +53,9 @@ from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable,
 from smc_mujoco.simulation.grid import case, check_moving, crossed, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.advice import Advice, Choice
+from smc_mujoco.studies.advice import Advice
 from smc_mujoco.studies.fair_gains import Candidate, fair_gains
-from smc_mujoco.studies.needs import NEEDS, ROBUST, Need, Runs, ties
+from smc_mujoco.studies.needs import NEEDS, ROBUST, Choice, Need, Runs, ties
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.worst_case import DURATION, WorstCase, default_budget, kept

@@ -22,11 +22,11 @@ MIN_INTERVAL_RUNS = 6  # with fewer runs no interval of a median covers 95 %, se
 NO_BOARDS = Tabular(headings=["no boards: no metric applies"], rows=[])
 
 
-def size(value: float, metric: str, digits: int = 3) -> str:
+def size(value: float, metric: str) -> str:
     """Return a median as text: "" for NaN, and a share in percent."""
     if math.isnan(value):
         return ""
-    return f"{100 * value:.0f}" if metric == SETTLES else number(value, digits)
+    return f"{100 * value:.0f}" if metric == SETTLES else CATALOGUE[metric].text(value)
 
 
 def spread(interval: Interval, metric: str) -> str:

@@ -255,8 +255,8 @@ def compare(
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
-      budget: largest number of sets of gains that a tuning tries. Default: 864, or a third of it if quick and no law
-        has gains of the package.
+      budget: largest number of sets of gains that a tuning tries. Default: that of `tune`, or a third of it if quick
+        and no law has gains of the package.
       quick: shorter runs and searches; by default three plants and three conditions.
       defaults: whether a winner may be named over laws whose gains are their defaults.
       relevant: the least relevant difference, as a share of the larger value.

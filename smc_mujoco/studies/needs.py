@@ -3,14 +3,15 @@
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import Interval, median_of
 from smc_mujoco.analysis.paired_runs import Group, Scores
-from smc_mujoco.analysis.ranking import samples_of
+from smc_mujoco.analysis.ranking import Rank, samples_of
+from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.conventions import Metric
@@ -28,6 +29,41 @@ class Runs(NamedTuple):
     table: Table
     group: Group
     worst: Mapping[str, Sequence[WorstCase]]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Choice:
+    """A finalist.
+
+    Attributes:
+      law: with its gains for the plant.
+      remark: what is to be said of the gains besides their source.
+      rank: its mean rank over the blocks, and its place; NaN if it is not compared.
+      settles: share of its runs that settle.
+      reliable: whether it settles in nearly all runs of every condition.
+      fit: whether it settles often enough to be advised.
+      medians: need -> median over the conditions, with its interval; of "robust" the largest over the conditions.
+      worst: what an adversary found in each condition, for the need "robust"; else empty.
+    """
+
+    law: Component
+    remark: str
+    rank: Rank
+    settles: float
+    reliable: bool
+    fit: bool
+    medians: Mapping[str, Interval]
+    worst: tuple[WorstCase, ...] = ()
+
+    @property
+    def worst_found(self) -> WorstCase:
+        """The worst of them."""
+        return max(self.worst, key=lambda one: one.value)
+
+    @property
+    def gains(self) -> str:
+        """Where the gains come from, in words."""
+        return f"gains: {self.law.source}" + f"; {self.remark}" * bool(self.remark)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,12 +86,12 @@ class Need:
         """Return a law's median over the conditions."""
         return median_of(scores.values[law], samples=samples_of(scores.sets[law]))
 
-    def below(self, choice: Any) -> str:
-        """Return what a table shows below the median of an `advice.Choice`: its interval, if that has a width."""
+    def below(self, choice: Choice) -> str:
+        """Return what a table shows below the median of a finalist: its interval, if that has a width."""
         median = choice.medians[self.metric.need]
         return spread(median, self.metric.name) * (median.low < median.high)
 
-    def remark(self, choices: Sequence[Any]) -> str:
+    def remark(self, choices: Sequence[Choice]) -> str:
         """Return what an answer says of the need besides, the first of the choices being advised."""
         return ""
 
@@ -78,12 +114,12 @@ class Robust(Need):
         """Return the largest value over the conditions."""
         return Interval(float(scores.values[law].max()), math.nan, math.nan, 1)
 
-    def below(self, choice: Any) -> str:
+    def below(self, choice: Choice) -> str:
         """Return the median of the random members of the class."""
         one = choice.worst_found
         return f"median {one.shown(one.median)}"
 
-    def remark(self, choices: Sequence[Any]) -> str:
+    def remark(self, choices: Sequence[Choice]) -> str:
         """Return what the adversary did, and which law the median of its random runs puts first."""
         one, fit = choices[0].worst_found, [choice for choice in choices if choice.fit] or choices
         least = min(fit, key=lambda choice: choice.worst_found.median)

@@ -301,5 +301,7 @@ def default_budget(scenario: Scenario, within: Uncertainty) -> int:
 
     A physics step costs half as much more for each channel, and twice as much with dry friction, which MuJoCo solves.
     """
-    channels, rubs = 1 + scenario.plant.n, bool(scenario.friction or scenario.plant.dry or within.friction[1])
+    plant = scenario.plant
+    rubs = bool(scenario.friction or within.friction[1]) or any(plant.parameters[name] for name in plant.dry)
+    channels = 1 + plant.n
     return min(max(MIN_RUNS, 2 * STEPS // (scenario.samples * scenario.steps * channels * (1 + rubs))), MAX_RUNS)

@@ -91,11 +91,12 @@ def test_printed_median_lies_in_its_printed_interval(values):
 
     low, median, high = values
     interval = Interval(median, low, high, 20)
-    middle = board_tables.size(median, "itae")
-    for ends in (spread(interval, "itae").split("–"), words.interval(median, low, high).split(" – ")):
+    middle = board_tables.size(median, "settling_time")
+    for ends in (spread(interval, "settling_time").split("–"), words.interval(median, low, high).split(" – ")):
         if any(ends):
             assert size(ends[0]) <= size(middle) <= size(ends[1])
     assert middle == words.number(median)
+    assert board_tables.size(math.inf, "itae") == "fails"
 
 
 def test_only_what_no_law_beats_is_bold(boards):

@@ -29,7 +29,9 @@ def tune(
     objective: Annotated[
         str, typer.Option(help="balanced: error, and variation of u; tracking: only error.")
     ] = "balanced",
-    budget: Annotated[int, typer.Option(min=1, help="How many sets of gains to try at most.")] = 864,
+    budget: Annotated[
+        int | None, typer.Option(min=1, help="Sets of gains to try at most; default: several starts of the search.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search and of the noise.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Also write gains, history and provenance to a .json file.")] = None,
     front: Annotated[
@@ -63,7 +65,7 @@ def tune(
     tuned = search.tune(
         options.plant(plant),
         law,
-        budget,
+        search.BUDGET if budget is None else budget,
         seed,
         objective,
         threads,
