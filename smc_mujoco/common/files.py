@@ -63,14 +63,24 @@ def _writing(path: Path) -> Iterator[None]:
         raise ScenarioError(f"cannot write {path}: {why}; choose another folder or make room") from error
 
 
+def without_room(why: object) -> ScenarioError:
+    """Return the error for temporary files that cannot be written."""
+    return ScenarioError(f"no temporary file can be written ({why}): make room, or set TMPDIR")
+
+
 @contextlib.contextmanager
-def no_room() -> Iterator[None]:
-    """Turn an OSError in the block, which writes temporary files, into a ScenarioError."""
+def no_room(*numbers: int) -> Iterator[None]:
+    """Turn an OSError in the block, which writes temporary files, into a ScenarioError.
+
+    Args:
+      numbers: the only errors, as in `errno`, that are turned. Default: all.
+    """
     try:
         yield
     except OSError as error:
-        why = error.strerror or error
-        raise ScenarioError(f"no temporary file can be written ({why}): make room, or set TMPDIR") from error
+        if numbers and error.errno not in numbers:
+            raise
+        raise without_room(error.strerror or error) from error
 
 
 @contextlib.contextmanager

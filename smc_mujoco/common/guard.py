@@ -20,6 +20,7 @@ from typing import Any
 MEMORY = 4 * 2**30  # bytes that a trial may have: chosen
 DISK = 10**9  # bytes of a file that a trial writes: chosen
 MAX_PROGRESS = 10**7  # bytes of a report: chosen
+BLOCK = 2**16  # bytes, as many as a file system gives a file at once, or more
 FAULT, END = "Fault", "unloading"  # a line that begins so names a fault; the last line of a trial that passes
 ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps), by which other simulations compute too"
 # Signal -> its usual cause. The causes of other signals are reads, writes and divisions.
@@ -69,9 +70,11 @@ def tried(module: str, order: Mapping[str, Any], timeout: float) -> Any:
             code = None
         report = folder / "report"
         text = report.read_bytes()[:MAX_PROGRESS].decode(errors="replace") if report.exists() else ""
-    lines = ["loading", *text.splitlines()]
-    if lines[-1] == END and code == 0:
-        return json.loads(lines[-2])
+        lines = ["loading", *text.splitlines()]
+        if lines[-1] == END and code == 0:
+            return json.loads(lines[-2])
+        with files.no_room():  # a report that could not be written is no fault of the module
+            (folder / "block").write_bytes(bytes(BLOCK))
     stages = [line for line in lines if not line.startswith(f"{FAULT} ")]
     raise Failed(stages[-1], lines[-1].removeprefix(f"{FAULT} ") if lines[-1] != stages[-1] else "", code, timeout)
 

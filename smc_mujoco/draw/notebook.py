@@ -2,7 +2,6 @@
 
 import dataclasses
 import os
-import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +11,7 @@ from matplotlib.figure import Figure, SubFigure
 
 from smc_mujoco.common import html, progress
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.files import reading
+from smc_mujoco.common.files import reading, scratch
 from smc_mujoco.draw import page
 from smc_mujoco.draw.film import encoder, film
 from smc_mujoco.draw.film.camera import Camera, checked
@@ -128,8 +127,8 @@ def embedded(what: object, labels=None, title=None, size=SIZE, fps=film.FPS, spe
         what = frames(_traces(what), labels, title, size, fps, speed, camera)
     if why := film.missing():
         raise ScenarioError(why)
-    with tempfile.TemporaryDirectory() as folder, progress.bar("film", len(what)) as bar:
-        path = Path(folder, "film.mp4")
+    with scratch() as folder, progress.bar("film", len(what)) as bar:
+        path = folder / "film.mp4"
         what.write(path, bar.advance)
         return html.embedded(path.read_bytes(), KINDS[".mp4"], what.size[0])
 

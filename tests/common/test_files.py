@@ -222,6 +222,22 @@ def test_without_room_for_temporary_files_there_is_one_sentence(make, tmp_path, 
         make()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="a compiler that is a shell script")
+@pytest.mark.parametrize(
+    "compile_", [lambda: smc.export_fmu("pid", "a.fmu"), lambda: smc.law_to_c("pid"), lambda: smc.law_from_c("law.c")]
+)
+def test_a_compiler_without_room_for_its_files_is_not_blamed(compile_, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("law.c").write_text("")
+    full = Path("full")
+    full.write_text("#!/bin/sh\necho 'a.c:9:1: fatal error: error writing: No space left on device' >&2\nexit 1\n")
+    full.chmod(0o755)
+    monkeypatch.setenv("CC", str(full.resolve()))
+    with pytest.raises(smc.ScenarioError) as refused:
+        compile_()
+    assert str(refused.value) == "no temporary file can be written (No space left on device): make room, or set TMPDIR"
+
+
 @pytest.mark.parametrize("damage", ["", "[", "5", "[[]]", "[" * 10**5, '[{"plant": 1}]'])
 def test_a_damaged_part_of_a_kept_report_is_computed_again(damage, tmp_path):
     odd, made = margin(0.1, 0.2), []

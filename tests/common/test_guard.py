@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+import smc_mujoco as smc
 from smc_mujoco.common import guard
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the code of these trials is for POSIX")
@@ -32,6 +33,8 @@ def attempt(order: Mapping[str, Any], say: Callable) -> Any:
                 signal.pause()
             children.append(child)
         return children
+    if kind == "exit":
+        os._exit(1)
     if kind == "deep":
         raise guard.Fault(f"is wrong:\n {order['kind']}")
     return order
@@ -54,6 +57,19 @@ def test_a_trial_has_limits(kind, said, tmp_path):
         guard.tried(__name__, {"kind": kind, "file": str(tmp_path / "large")}, 60.0)
     assert (failed.value.stage, failed.value.code) == ("working", 0)
     assert not [path for path in tmp_path.iterdir() if path.stat().st_size > 0]
+
+
+def test_a_trial_without_room_for_its_report_blames_no_module():
+    import resource
+
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (guard.BLOCK // 2, limits[1]))
+        with pytest.raises(smc.ScenarioError) as refused:
+            guard.tried(__name__, {"kind": "exit"}, 60.0)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert str(refused.value) == "no temporary file can be written (File too large): make room, or set TMPDIR"
 
 
 def test_what_a_trial_starts_ends_with_it():

@@ -5,7 +5,6 @@ Films are WebM (VP9), which every browser plays and no patent covers. They are s
 
 import dataclasses
 import io
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,7 +12,7 @@ import numpy as np
 
 from smc_mujoco.common import extras, gl
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.files import replacing
+from smc_mujoco.common.files import replacing, scratch
 from smc_mujoco.draw import decimate
 from smc_mujoco.draw.film import film as video
 from smc_mujoco.draw.film.encoder import sigint_blocked
@@ -95,8 +94,8 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whol
         raise ScenarioError(why)
     shown, poster = video.clock(traces, FPS), io.BytesIO()
     count = len(shown.times)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "film.webm")
+    with scratch() as folder:
+        path = folder / "film.webm"
         writer = imageio_ffmpeg.write_frames(
             path, SIZE, fps=FPS, codec="libvpx-vp9", output_params=VP9, macro_block_size=2, ffmpeg_log_level="error"
         )

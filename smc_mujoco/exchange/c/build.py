@@ -7,12 +7,14 @@ import os
 import re
 import shlex
 import shutil
+import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.files import no_room, without_room
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.law import Measurement
@@ -35,6 +37,9 @@ STRICT = tuple(
     f"-Werror={name}" for name in ("incompatible-pointer-types", "implicit-function-declaration", "int-conversion")
 )
 ERROR = re.compile(r"^(?P<file>[^:\n]+):(?:(?P<line>\d+):)?(?:\d+:)? (?:fatal )?error: (?P<what>.*)$", re.MULTILINE)
+NO_ROOM = re.compile(  # what compilers and linkers say
+    "No space left on device|Disk quota exceeded|File too large|File size limit exceeded|Cannot create temporary file"
+)
 WARNING = re.compile(r"^[^:\n]+:\d+:(?:\d+:)? warning: .*$", re.MULTILINE)
 # Lines of `nm -f sysv`, without the number that the compiler appends to a static variable's name.
 FUNCTION = re.compile(r"^(\S+) *\|([0-9a-f]+)\| +T +\| +FUNC\|", re.MULTILINE)
@@ -50,7 +55,8 @@ def folder() -> Path:
 
     No file is deleted earlier: a new file could get its inode number, and the loader would take it for the old one.
     """
-    path, owner = tempfile.mkdtemp(prefix="smc_mujoco-"), os.getpid()
+    with no_room():
+        path, owner = tempfile.mkdtemp(prefix="smc_mujoco-"), os.getpid()
 
     @atexit.register
     def remove() -> None:
@@ -74,6 +80,19 @@ def compiler() -> list[str]:
         return [command]
 
 
+def run_compiler(command: Sequence[str], timeout: float) -> subprocess.CompletedProcess[str]:
+    """Run the command of a compiler, for at most `timeout` seconds.
+
+    Raises:
+      ScenarioError: it cannot write its files.
+      TimedOut, OSError: as `process.timed`.
+    """
+    done = timed(command, timeout)
+    if done.returncode and (why := NO_ROOM.search(done.stderr)):
+        raise without_room(why[0])
+    return done
+
+
 def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> tuple[Path, list[str]]:
     """Compile a C file with the glue that calls its function `symbol`. Return the library and the warnings."""
     path, target, command = str(source.resolve()), fresh(".so"), compiler()
@@ -84,7 +103,7 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
     macros = [f'-DSMC_SOURCE="{path}"', f"-DSMC_SYMBOL={symbol}", *LAYOUT, "-I", str(HERE)]
     files = [str(HERE / "glue.c"), "-o", str(target)]
     try:
-        done = timed([*command, *FLAGS, *OWN_NAMES, *STRICT, *macros, *files, *flags, "-lm"], timeout)
+        done = run_compiler([*command, *FLAGS, *OWN_NAMES, *STRICT, *macros, *files, *flags, "-lm"], timeout)
     except TimedOut:
         raise ScenarioError(
             f"{source.name} takes {command[0]} more than {timeout:g} s to compile: make it shorter, or give timeout="
@@ -104,7 +123,7 @@ def replayer(command: tuple[str, ...]) -> Path | None:
     target = fresh(".exe")
     line = [*command, *SANITIZERS, *LAYOUT, str(HERE / "replay.c"), "-o", str(target), "-ldl"]
     try:
-        if timed(line, 60.0).returncode or timed([str(target)], 60.0).returncode:
+        if run_compiler(line, 60.0).returncode or timed([str(target)], 60.0).returncode:
             return None
     except (TimedOut, OSError):
         return None
@@ -130,8 +149,6 @@ def undefined(source: Path, symbol: str) -> str:
 def _sentence(source: Path, symbol: str, command: str, output: str) -> str:
     """Return the first error in a compiler's output, with a cure."""
     error, name = ERROR.search(output), source.name
-    if "No space left" in output:
-        return f"{name} cannot be compiled, as no temporary file can be written: make room, or set TMPDIR"
     what, file = (error["what"], Path(error["file"]).name) if error else ("", "")
     if (f"'{symbol}'" in what and "undeclared" in what) or re.search(rf"ndefined \w+.*\b_?{symbol}\b", output):
         return undefined(source, symbol)

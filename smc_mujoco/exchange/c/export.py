@@ -13,6 +13,7 @@ import re
 import textwrap
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown, whole
+from smc_mujoco.common.files import no_room
 from smc_mujoco.common.jit import AtAddress
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.common.version import __version__
@@ -208,9 +209,10 @@ def _tools(command: tuple[str, ...]) -> tuple[str, str]:
 def _measured(code: str) -> str:
     """Return the bytes of code and of constants in words, or why they are not measured."""
     source, target, command = build.fresh(".c"), build.fresh(".o"), build.compiler()
-    source.write_text(code, encoding="utf-8")
+    with no_room():
+        source.write_text(code, encoding="utf-8")
     try:
-        done = timed([*command, *SIZE_FLAGS, "-c", str(source), "-o", str(target)], 60.0)
+        done = build.run_compiler([*command, *SIZE_FLAGS, "-c", str(source), "-o", str(target)], 60.0)
         version, tool = _tools(tuple(command))
         table = timed([tool, "-A", str(target)], 60.0).stdout
     except (OSError, TimedOut):

@@ -20,7 +20,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.common.files import ended, no_room, replacing, scratch
-from smc_mujoco.common.process import TimedOut, timed
+from smc_mujoco.common.process import TimedOut
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
@@ -218,7 +218,7 @@ def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
                 (folder / name).write_text(text, encoding="utf-8")
         compiled = [str(folder / name) for name in sources if name.endswith(".c")]
         try:
-            done = timed([*command, *build.FLAGS, *HIDDEN, *compiled, "-o", str(target), "-lm"], 120.0)
+            done = build.run_compiler([*command, *build.FLAGS, *HIDDEN, *compiled, "-o", str(target), "-lm"], 120.0)
         except (OSError, TimedOut):
             raise ScenarioError(
                 f"the FMU cannot be compiled, as there is no C compiler {command[0]!r}: install one, set CC, or leave "

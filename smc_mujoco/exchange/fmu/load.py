@@ -6,6 +6,7 @@ FMU is first tried in a separate process, which may crash or hang.
 """
 
 import dataclasses
+import errno
 import functools
 import gc
 import hashlib
@@ -25,7 +26,7 @@ import numpy as np
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, one_line, shown, unknown
 from smc_mujoco.common.extras import extra
-from smc_mujoco.common.files import reading
+from smc_mujoco.common.files import no_room, reading
 from smc_mujoco.common.guard import Failed, tried
 from smc_mujoco.common.jit import Uncompiled
 from smc_mujoco.control.component import Template
@@ -179,7 +180,7 @@ def extracted(path: str, digest: str) -> Path:
     if now != digest:
         raise ScenarioError(f"FMU {Path(path).name!r} is gone or has changed: call smc.law_from_fmu again")
     folder = build.fresh("-fmu")
-    with zipfile.ZipFile(path) as archive:
+    with zipfile.ZipFile(path) as archive, no_room(errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         archive.extractall(folder)
     return folder
 
