@@ -327,7 +327,7 @@ def margins(
         if not any(base.resolved.x0):
             cure = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
             raise ScenarioError(f"{base.plant.name} starts at 0, and a margin is a share of the start: {cure}")
-    return of(bases, [kinds] if isinstance(kinds, str) else list(kinds), COARSE if quick else FINE, threads, report)
+    return of(bases, listed("kinds", kinds), COARSE if quick else FINE, threads, report)
 
 
 def of(

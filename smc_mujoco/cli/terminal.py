@@ -11,11 +11,15 @@ from pathlib import Path
 from rich.console import Console
 
 from smc_mujoco.common.errors import ScenarioError, printable
+from smc_mujoco.common.scripts import users_traceback
 
 
 @contextlib.contextmanager
 def errors_as_sentences() -> Iterator[None]:
-    """Print one sentence instead of a traceback on an error that the user can correct, and on Ctrl-C, and exit."""
+    """Print one sentence instead of a traceback on an error that the user can correct, and on Ctrl-C, and exit.
+
+    An exception of the user's script ends with the script's part of the traceback, and exit code 1.
+    """
     try:
         yield
     except ScenarioError as error:
@@ -23,12 +27,17 @@ def errors_as_sentences() -> Iterator[None]:
     except BrokenPipeError:  # the reader has closed the pipe, as head does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
-    except OSError as error:
-        _fail(f"{error.filename or 'a file'}: {error.strerror or error}; choose another folder or make room")
-    except MemoryError:
-        _fail("out of memory: give fewer or shorter runs")
     except KeyboardInterrupt:
         _fail("stopped. Run the same command again to go on.", 130)
+    except Exception as error:
+        if lines := users_traceback(error):
+            print(lines, end="", file=sys.stderr)
+            raise SystemExit(1) from None
+        if isinstance(error, OSError):
+            _fail(f"{error.filename or 'a file'}: {error.strerror or error}; choose another folder or make room")
+        if isinstance(error, MemoryError):
+            _fail("out of memory: give fewer or shorter runs")
+        raise
 
 
 def _fail(sentence: str, code: int = 2) -> None:

@@ -6,19 +6,34 @@ import traceback
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import reading
 
 
 def execute(path: Path) -> dict:
     """Return what a user's script defines. It can import modules beside it.
 
+    Any other exception of the script is passed on as it is.
+
     Raises:
-      ScenarioError: the script raises anything.
+      ScenarioError: the file is no Python, or the script raises one. It says where.
     """
+    with reading(path, "Python file", "fix it") as file:
+        compile(file.read_bytes(), str(path), "exec", dont_inherit=True)
     sys.path.insert(0, str(path.resolve().parent))
     try:
         return runpy.run_path(str(path))
-    except Exception as error:  # whatever a user's script raises
+    except ScenarioError as error:
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
         where = f"{path}, line {lines[-1]}" if lines else str(path)
-        what = str(error) if isinstance(error, ScenarioError) else f"{type(error).__name__}: {error}; fix the file"
-        raise ScenarioError(f"{where}: {what}") from error
+        raise ScenarioError(f"{where}: {error}") from error
+
+
+def users_traceback(error: BaseException) -> str:
+    """Return the traceback of an exception that a script raised, without what called it; "" for any other exception."""
+    step, inside = error.__traceback__, False
+    while step is not None:
+        code = step.tb_frame.f_code
+        if inside and "runpy" not in code.co_filename:
+            return "".join(traceback.format_exception(type(error), error, step))
+        inside, step = inside or code is execute.__code__, step.tb_next
+    return ""

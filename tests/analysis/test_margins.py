@@ -294,6 +294,7 @@ def test_what_holds_no_margins_is_refused(text, tmp_path):
         ((["duffin"], ["classical"], ["delay"], "study"), "did you mean 'duffing'"),
         ((["duffing"], ["classic"], ["delay"], "study"), "did you mean 'classical'"),
         ((["duffing"], ["classical"], ["delays"], "study"), "did you mean 'delay'"),
+        ((["duffing"], ["classical"], {"delay": 1.0}, "study"), "give several, such as a list"),
         ((["duffing"], ["classical"], ["delay"], "best"), "unknown set of gains"),
     ],
 )

@@ -499,8 +499,8 @@ def test_a_file_without_a_scene_is_named(call, folder):
     refused(call("run", "empty.py"), "empty.py", "declares no scene")
 
 
+TRACEBACK = "Traceback (most recent call last):"
 SCENES = {
-    "a typing mistake": ("smc.Scen(title='T', conditions={})", "Scen"),
     "a name that is not there": ("smc.Scene(title='T', conditions={'a': {'b': ok(plant='dufing')}})", "'duffing'"),
     "a gain that is not there": ("smc.law('classical', kk=1.0)", "kk"),
     "a value out of range": ("smc.Scene(title='T', conditions={'a': {'b': ok(duration=-1.0)}})", "duration"),
@@ -516,7 +516,6 @@ SCENES = {
     "no such metric": ("smc.Scene(title='T', answers=('ripples',), conditions={'a': {'b': ok()}})", "'ripple'"),
     "facts without labels": ("smc.Scene(title='T', facts=['so'], conditions={'a': {'b': ok()}})", "facts"),
     "no such figure": ("smc.Scene(title='T', figure='pie', conditions={'a': {'b': ok()}})", "'pie'"),
-    "a scene of runs": ("{'a': {'b': ok()}}[0]", "KeyError"),
 }
 
 
@@ -540,9 +539,23 @@ def test_a_file_that_is_no_python_is_named(call, folder):
     refused(call("run", "torn.py"), "torn.py", "line 2")
 
 
-def test_a_file_that_imports_what_is_not_there_is_named(call, folder):
-    (folder / "lonely.py").write_text("import nowhere_to_be_found\n")
-    refused(call("run", "lonely.py"), "lonely.py, line 1", "nowhere_to_be_found")
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("import nowhere_to_be_found", "ModuleNotFoundError: No module named 'nowhere_to_be_found'"),
+        ("open('gone.csv')", "FileNotFoundError: [Errno 2] No such file or directory: 'gone.csv'"),
+        ("raise ValueError", "ValueError"),
+    ],
+)
+def test_what_a_user_s_file_raises_is_shown_from_that_file_on(line, said, call, folder):
+    (folder / "mine.py").write_text(f"{line}\n")
+    for words in (["run", "mine.py"], ["compare", "duffing", "--law", "mine.py"]):
+        code, _, err = call(*words)
+        shown = [text for text in err.splitlines() if set(text.strip()) != {"^"}]  # which 3.13 places elsewhere
+        assert (code, shown) == (1, [TRACEBACK, '  File "mine.py", line 1, in <module>', f"    {line}", said])
+    with pytest.raises((ImportError, OSError, ValueError)) as raised:
+        smc.grid(["duffing"], ["mine.py"])
+    assert type(raised.value).__name__ == said.partition(":")[0]
 
 
 def test_a_folder_that_cannot_be_made_is_named_before_anything_runs(call, scene, folder, monkeypatch):
