@@ -138,7 +138,7 @@ def share_interval(share: float, n: int, level: float = 0.95) -> Interval:
     The share within a seed lies in [0, 1], so its variance is at most p (1 - p). With n the number of seeds the
     interval is wide enough, however many runs a seed has and however alike they are.
     """
-    number("share", share, least=0.0, most=1.0)
+    number("share", share, low=0.0, high=1.0)
     whole("n", n, 1, 10**9)
     z = NormalDist().inv_cdf((1 + confidence(level)) / 2)
     middle, half = share + z * z / (2 * n), z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
@@ -171,4 +171,4 @@ def outermost(n: int, level: float, resamples: int) -> int:
 
 def confidence(level: float) -> float:
     """Return a level of confidence. Raise ScenarioError if it is out of range."""
-    return number("level", level, least=0.5, most=0.999)
+    return number("level", level, low=0.5, high=0.999)

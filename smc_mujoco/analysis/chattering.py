@@ -136,11 +136,11 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
     if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < scenario.plant.driven:
         raise ScenarioError(f"channel is {shown(channel)}: give 0 to {scenario.plant.driven - 1}")
     loop = Loop(scenario, channel)
-    found = _stable(loop, cycles(loop))
+    waves = _stable(loop, cycles(loop))
     said = tuple(_assumptions(loop))
-    if not found:
+    if not waves:
         return _locked(scenario, channel, said) if switches(loop) else Chattering(assumptions=said)
-    return _described(loop, max(found, key=lambda wave: wave.omega), said, ranges)
+    return _described(loop, max(waves, key=lambda wave: wave.omega), said, ranges)
 
 
 def switches(loop: Loop) -> bool:
@@ -157,10 +157,10 @@ def _locked(scenario: Scenario, channel: int, said: tuple[str, ...]) -> Chatteri
     than that of the same loop with half a control period more delay.
     """
     loop = Loop(scenario, channel, 0.5 * scenario.control_period)
-    found = _stable(loop, cycles(loop))
-    if not found:
+    waves = _stable(loop, cycles(loop))
+    if not waves:
         return Chattering(assumptions=said)
-    wave = max(found, key=lambda wave: wave.omega)
+    wave = max(waves, key=lambda wave: wave.omega)
     said += ("the balance has no solution, but the law switches: a cycle locked to the samples is possible",)
     return Chattering(
         amplitude_range=(0.0, AMPLITUDE_FACTOR * wave.s + loop.count),
@@ -174,12 +174,12 @@ def cycles(loop: Loop) -> list[Wave]:
     fastest = math.pi / loop.scenario.control_period
     omegas = np.geomspace(math.tau * MIN_FREQUENCY, NYQUIST * fastest, FREQUENCIES)
     amplitudes = np.geomspace(MIN_AMPLITUDE, MAX_AMPLITUDE, AMPLITUDES)
-    found: list[tuple[float, float]] = []
+    balanced: list[tuple[float, float]] = []
     for bracket in _brackets(loop, omegas, amplitudes):
         cycle = _balanced(loop, *bracket)
-        if cycle and all(abs(cycle[0] / a - 1) + abs(cycle[1] / w - 1) > SAME for a, w in found):
-            found.append(cycle)
-    return [loop.wave(*one) for one in (found or _of_two_samples(loop, fastest, amplitudes))]
+        if cycle and all(abs(cycle[0] / a - 1) + abs(cycle[1] / w - 1) > SAME for a, w in balanced):
+            balanced.append(cycle)
+    return [loop.wave(*one) for one in (balanced or _of_two_samples(loop, fastest, amplitudes))]
 
 
 Bracket = tuple[tuple[float, float], tuple[float, float]]  # ends of a search: two omegas, and two amplitudes

@@ -35,7 +35,7 @@ def exceeds(a: ArrayLike, b: ArrayLike, resolution: ArrayLike = 0.0, relevant: f
 
 def share_that_matters(relevant: float) -> float:
     """Return the share of a value that is relevant. Raise ScenarioError if it is out of range."""
-    return number("relevant", relevant, least=0.0, most=0.5)
+    return number("relevant", relevant, low=0.0, high=0.5)
 
 
 def coarse(values: np.ndarray) -> np.ndarray:

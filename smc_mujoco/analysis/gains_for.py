@@ -118,11 +118,11 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
         if amplitude is not None:
             size = _largest(lambda q: cycle(q, speed).amplitude_range[1], amplitude, strength / speed**2)
         chosen = scaled(size, speed)
-        found = chattering(chosen, channel)
-        if frequency is not None and found.frequency > frequency:
+        predicted = chattering(chosen, channel)
+        if frequency is not None and predicted.frequency > frequency:
             raise ScenarioError(
-                f"{base.law.name} of amplitude {amplitude:g} oscillates at {found.frequency:.3g} Hz, above the wanted "
-                f"{frequency:g}: give a larger frequency, or another amplitude"
+                f"{base.law.name} of amplitude {amplitude:g} oscillates at {predicted.frequency:.3g} Hz, above the "
+                f"wanted {frequency:g}: give a larger frequency, or another amplitude"
             )
         (tolerated,) = margins.of([dataclasses.replace(chosen, duration=DURATION)], ["disturbance"])
     if math.isnan(tolerated.value):
@@ -132,7 +132,7 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
             users_frame(),
         )
     law = chosen.law.sourced(source.TUNED, source.Search(rule=RULE, evaluations=len(tried), converged=True))
-    return Design(law=law, chattering=found, disturbance=tolerated.value, size=size, speed=speed)
+    return Design(law=law, chattering=predicted, disturbance=tolerated.value, size=size, speed=speed)
 
 
 def _speed(cycle: Callable[[float], Chattering], amplitude: float | None, frequency: float, strength: float) -> float:
@@ -178,20 +178,22 @@ def _strength(base: Scenario) -> float:
     rest, p, with_model = np.zeros(plant.n), plant.values({}), base.resolved.model == "nominal"
     accelerations = (u * abs(plant.nominal(rest, rest, i, p)[1]) for i, u in enumerate(base.limits))
     force = min(accelerations) if with_model else u_max
-    most = {name: force for name in law.gains if search_space.unit(law, name) == FORCE}
-    most |= search_space.largest(law, {}, u_max)
-    sizes = [most[name] / abs(gain) for name, gain in law.gains.items() if name in most and 0.0 < abs(gain) < math.inf]
+    limits = {name: force for name in law.gains if search_space.unit(law, name) == FORCE}
+    limits |= search_space.largest(law, {}, u_max)
+    sizes = [
+        limits[name] / abs(gain) for name, gain in law.gains.items() if name in limits and 0.0 < abs(gain) < math.inf
+    ]
     return min(sizes, default=math.inf)
 
 
-def _largest(predicted: Callable[[float], float], wanted: float, most: float) -> float:
-    """Return the largest scale up to `most` whose predicted amplitude is at most the wanted one.
+def _largest(predicted: Callable[[float], float], wanted: float, limit: float) -> float:
+    """Return the largest scale up to `limit` whose predicted amplitude is at most the wanted one.
 
     The search begins at the law's own gains and moves in steps until the amplitude, NaN for no limit cycle, crosses the
     wanted one. If a limit cycle is lost on the way up, the law has become too large for the actuator, and that counts
     as crossing. The amplitude is in proportion to the scale for most laws, so that the first guess is often right.
     """
-    most = min(most, RANGE)
+    limit = min(limit, RANGE)
     low, high, oscillates = 0.0, math.inf, False
 
     def tried(scale: float) -> float:
@@ -203,19 +205,19 @@ def _largest(predicted: Callable[[float], float], wanted: float, most: float) ->
             low, oscillates = scale, not math.isnan(amplitude)
         return amplitude
 
-    amplitude = tried(min(1.0, most))
-    guess = min(1.0, most) * wanted / amplitude
+    amplitude = tried(min(1.0, limit))
+    guess = min(1.0, limit) * wanted / amplitude
     for scale in (guess, guess * (1.0 + CLOSE)):
-        if low < scale < min(high, most * (1.0 + CLOSE)):
-            tried(min(scale, most))
+        if low < scale < min(high, limit * (1.0 + CLOSE)):
+            tried(min(scale, limit))
     while not low:
         if high < 1.0 / RANGE:
             raise ScenarioError(
                 f"amplitude is {wanted:g}, and that of gains {RANGE:g} times smaller is {amplitude:.3g}: give more"
             )
         amplitude = tried(high / STEP)
-    while low < most and high == math.inf:
-        tried(min(low * STEP, most))
-    while min(high, most) > low * (1.0 + CLOSE):
+    while low < limit and high == math.inf:
+        tried(min(low * STEP, limit))
+    while min(high, limit) > low * (1.0 + CLOSE):
         tried(math.sqrt(low * high))
     return low

@@ -40,7 +40,7 @@ STEP = 1e-6  # SI units, of finite differences
 CHUNK = 50_000  # samples that a law is called for at once
 MAX_SAMPLES = 10**9  # of a period, for a describing function
 SAMPLES = 3  # of a drive, about: so many times the finest period's
-PERIODS = (12, 600)  # fewest and most of a drive
+PERIODS = (12, 600)  # smallest and largest number of a drive
 FINEST = 1000  # samples of a period; a law that runs more often is run that often here
 RESTING = 1000  # samples before, and after, the reading of an encoder moves by one count
 HARMONICS = 31  # of u that are followed through the mechanism: a triangle's peak is right to 1.3 %
@@ -250,8 +250,8 @@ class Loop:
     def _followed(self, amplitude: float, omega: float, u: np.ndarray, angles: np.ndarray) -> list[complex]:
         """Return the harmonics of e = amplitude sin(omega t) and of the mechanism's answer to those of u."""
         first = _harmonic(u, angles)
-        most = min(HARMONICS, math.ceil(math.pi / self.scenario.control_period / omega) - 1)
-        rest = [self.response(n * omega) * _harmonic(u, n * angles) / 1j for n in range(2, most + 1)]
+        highest = min(HARMONICS, math.ceil(math.pi / self.scenario.control_period / omega) - 1)
+        rest = [self.response(n * omega) * _harmonic(u, n * angles) / 1j for n in range(2, highest + 1)]
         # the phase of u's first harmonic is that which the balance gives it
         turned = 1j * amplitude / (first * self.response(omega)) if first else 0j
         return [amplitude, *(x * (turned / abs(turned)) ** n if turned else 0j for n, x in enumerate(rest, 2))]

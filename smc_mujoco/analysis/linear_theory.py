@@ -37,7 +37,7 @@ def smallest_lam(plant: Plant, k1: float) -> float:
     By Routh-Hurwitz both coefficients of (1) must be positive: lam > -D and lam k1 > -K_j for every mode. A result of 0
     confirms the paper's claim; with inf no lam is enough.
     """
-    k1, at = number("k1", k1, least=0.0), linear(plant)
+    k1, at = number("k1", k1, low=0.0), linear(plant)
     soft = -float(at.modes[0])
     stiff = soft / k1 if k1 > 0.0 else (math.inf if soft >= 0.0 else 0.0)
     return max(0.0, -at.damping, stiff)
@@ -50,7 +50,7 @@ def lam_range(plant: Plant, k1: float, control_period: float) -> tuple[float, fl
     conditions, with t and d the trace and determinant of the closed loop's E, are d > 0, t + d < 0 and 4 + 2 t + d > 0,
     all affine in lam.
     """
-    k1, at = number("k1", k1, least=0.0), linear(plant)
+    k1, at = number("k1", k1, low=0.0), linear(plant)
     low, high = 0.0, math.inf
     for stiffness in at.modes:
         e, gamma = sampled(at, stiffness, control_period)
@@ -78,8 +78,8 @@ def critical_delay(plant: Plant, lam: float, k1: float, control_period: float = 
     gives an m that is not whole: the loop is stable for all whole numbers below it, and unstable at the next. A loop
     whose gain is above 1 at the highest frequency, z = -1, tolerates less than one period.
     """
-    lam, k1 = number("lam", lam, least=0.0), number("k1", k1, least=0.0)
-    at, h = linear(plant), number("control_period", control_period, least=0.0)
+    lam, k1 = number("lam", lam, low=0.0), number("k1", k1, low=0.0)
+    at, h = linear(plant), number("control_period", control_period, low=0.0)
     if h:
         low, high = lam_range(plant, k1, h)
         return min(_sampled_crossing(at, k, lam, k1, h) for k in at.modes) if low < lam < high else 0.0
@@ -130,7 +130,7 @@ def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
 
     For one joint it is |d| / (lam k1 + K).
     """
-    lam, k1, d = number("lam", lam, least=0.0), number("k1", k1, least=0.0), number("d", d)
+    lam, k1, d = number("lam", lam, low=0.0), number("k1", k1, low=0.0), number("d", d)
     at = linear(plant)
     loop = at.stiffness + lam * k1 * np.eye(plant.n)
     return float(np.abs(np.linalg.solve(loop, np.full(plant.n, d))).max())

@@ -153,8 +153,8 @@ class Kind:
             step = QUANTA[resolution] * quantum
             levels = [rounded(level) for level in self.levels]
             return Search(levels=levels, resolution=lambda low: step, rounded=rounded, low=self.none)
-        least = self.levels[0]
-        return Search(levels=self.levels, resolution=lambda low: resolution * max(low, least), low=self.none)
+        first = self.levels[0]
+        return Search(levels=self.levels, resolution=lambda low: resolution * max(low, first), low=self.none)
 
     def expected(self, base: Scenario) -> float | None:
         """Return the largest level by linear theory; None if there is none for the law, the plant or the condition."""
@@ -191,8 +191,8 @@ def _critical_delay(base: Scenario) -> float | None:
 
 
 def _at_rest(base: Scenario) -> float | None:
-    most = TOLERATED_ERROR * (max(map(abs, base.resolved.x0)) or 1.0)
-    return theory.tolerated_force(base.plant, base.law, most, min(base.limits))
+    largest_error = TOLERATED_ERROR * (max(map(abs, base.resolved.x0)) or 1.0)
+    return theory.tolerated_force(base.plant, base.law, largest_error, min(base.limits))
 
 
 def _heavier(base: Scenario, level: float) -> Scenario:

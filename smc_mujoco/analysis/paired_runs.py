@@ -250,11 +250,11 @@ def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[S
         columns = [np.asarray(table.column(name)) for name in ("law", "source", "search")]
     except ScenarioError:
         return {}
-    found: dict[str, list[Source]] = {}
+    by_law: dict[str, list[Source]] = {}
     every = zip(*(column if rows is None else column[rows] for column in columns), strict=True)
     for law, kind, search in sorted(dict.fromkeys(every), key=str):
-        found.setdefault(law, []).append(restored({"kind": kind, "search": search and json.loads(search)}))
-    return {law: tuple(its) for law, its in found.items()}
+        by_law.setdefault(law, []).append(restored({"kind": kind, "search": search and json.loads(search)}))
+    return {law: tuple(its) for law, its in by_law.items()}
 
 
 def floor(scenario: Scenario | None, unit: str) -> float:

@@ -167,11 +167,11 @@ class Comparison:
     @functools.cached_property
     def winners(self) -> list[str | None]:
         """The law of each block that is better than every other, if there is one."""
-        found = []
+        winners = []
         for p, eligible, lacking in zip(self.p, self._eligible, self.without_value.T, strict=True):
             wins = np.all((p <= self.limits.winner) & eligible | np.eye(len(p), dtype=bool), axis=1) & (lacking == 0)
-            found.append(self.laws[int(wins.argmax())] if wins.any() and len(p) > 1 else None)
-        return found
+            winners.append(self.laws[int(wins.argmax())] if wins.any() and len(p) > 1 else None)
+        return winners
 
     @functools.cached_property
     def better(self) -> np.ndarray:
@@ -230,9 +230,9 @@ class Comparison:
         """
         a, b = self.laws.index(law), self.laws.index(rival)
         differences, relative = self.differences[block, a, b], bool(self.relative[block, a, b])
-        found = interval(-differences, self.limits.winner if winner else self.limits.pair)
+        shift = interval(-differences, self.limits.winner if winner else self.limits.pair)
         with np.errstate(over="ignore"):
-            ends = np.exp(found) if relative else np.array(found)
+            ends = np.exp(shift) if relative else np.array(shift)
         return Effect(
             *ends.tolist(),
             relative=relative,
@@ -317,12 +317,12 @@ def _differences(cells: np.ndarray, relative: np.ndarray, did: np.ndarray | None
     k, there = len(cells), ~np.isnan(cells[:1])
     differences = np.full((k, *cells.shape), math.nan)
     for a in range(k - 1):
-        found = _pairwise(cells[a], cells[a + 1 :], relative[a, a + 1 :])
-        for b, row in enumerate(found, a + 1):
+        pairs = _pairwise(cells[a], cells[a + 1 :], relative[a, a + 1 :])
+        for b, row in enumerate(pairs, a + 1):
             if did is not None:
                 row[~first_of_kind(did[[a, b]][:, None], there)[0]] = math.nan
             row[:] = _by_sample(row, sets[a], sets[b])
-        differences[a, a + 1 :], differences[a + 1 :, a] = found, -found
+        differences[a, a + 1 :], differences[a + 1 :, a] = pairs, -pairs
     return differences
 
 
@@ -367,9 +367,9 @@ def _pairwise(law: np.ndarray, rivals: np.ndarray, relative: np.ndarray) -> np.n
     """Return by how much rivals' values (rivals, seeds) are higher than a law's (seeds,); 0 if both are inf."""
     with np.errstate(invalid="ignore", divide="ignore"):
         ratios = np.log(np.abs(rivals)) - np.log(np.abs(law))
-        found = np.where(relative[:, None], ratios, rivals - law)
+        differences = np.where(relative[:, None], ratios, rivals - law)
     equal = (rivals == law) | (np.isinf(rivals) & np.isinf(law))
-    return np.where(equal, 0.0, found)
+    return np.where(equal, 0.0, differences)
 
 
 def _by_sample(differences: np.ndarray, sets: np.ndarray, rival_sets: np.ndarray) -> np.ndarray:
@@ -378,12 +378,12 @@ def _by_sample(differences: np.ndarray, sets: np.ndarray, rival_sets: np.ndarray
     labels = linked(*(of[there].tobytes() for of in (sets, rival_sets)))
     if labels is None:
         return differences
-    found = np.full(differences.shape, math.nan)
+    centres = np.full(differences.shape, math.nan)
     for sample in range(max(labels) + 1):
         own = np.sort(differences[there[np.array(labels) == sample]])
         low, high = own[(own.size - 1) // 2], own[own.size // 2]
-        found[sample] = 0.0 if low == -high else (low + high) / 2  # also of two opposite infinite values
-    return found
+        centres[sample] = 0.0 if low == -high else (low + high) / 2  # also of two opposite infinite values
+    return centres
 
 
 @functools.lru_cache(maxsize=4096)

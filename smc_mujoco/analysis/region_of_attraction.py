@@ -109,7 +109,7 @@ def basin(
     gains: str = "tuned",
     duration: float = DURATION,
     threads: int | None = None,
-    report: Report = lambda done, most: None,
+    report: Report = lambda done, needed: None,
     condition: str | Condition = "nominal",
 ) -> Basin:
     """Map the region of attraction of a law on a plant.
@@ -122,7 +122,7 @@ def basin(
       gains: set of gains, one of `gain_sets.SETS`, or "default".
       duration: of the longest runs, s.
       threads: as in `run`.
-      report: called with the work done and the most that may be needed, in simulated steps; the latter shrinks as
+      report: called with the work done and that which may be needed, in simulated steps; the latter shrinks as
         states are decided.
       condition: condition of the runs, such as "coulomb".
 
@@ -147,7 +147,7 @@ def of(
     x: Sequence[float] | np.ndarray,
     v: Sequence[float] | np.ndarray,
     threads: int | None = None,
-    report: Report = lambda done, most: None,
+    report: Report = lambda done, needed: None,
     early: bool = True,
 ) -> Basin:
     """Map the region of attraction of any scenario. Its runs differ only in their initial state.
@@ -166,11 +166,11 @@ def of(
     if moving := [one for one in base.references if not isinstance(one, Constant)]:
         raise ScenarioError(f"a map shows what comes to rest, and {shown(moving[0])} moves: give a constant reference")
     horizons = HORIZONS if early else HORIZONS[-1:]
-    least = math.ceil(MIN_SAMPLES / horizons[0])
-    if base.samples < least:
+    shortest = math.ceil(MIN_SAMPLES / horizons[0])
+    if base.samples < shortest:
         raise ScenarioError(
             f"duration {base.duration:g} s is too short to tell what comes to rest: "
-            f"give at least {least * base.control_period:g} s"
+            f"give at least {shortest * base.control_period:g} s"
         )
     x, v = _axis("x", x), _axis("v", v)
     outcome = np.full((v.size, x.size), UNDECIDED, np.int8)
@@ -178,12 +178,12 @@ def of(
     open_, done = list(np.ndindex(*outcome.shape)), 0.0
     for i, part in enumerate(horizons):
         first = dataclasses.replace(base, duration=part * base.duration)
-        most = done + len(open_) * base.work * sum(horizons[i:])
+        needed = done + len(open_) * base.work * sum(horizons[i:])
         size, left = max(32, int(BATCH_BYTES / (72 * (first.samples + 1) * first.plant.n))), []
         for begin in range(0, len(open_), size):
             some = open_[begin : begin + size]
             cases = [dataclasses.replace(first, x0=x[k], v0=v[j]) for j, k in some]
-            for index, trace in stream(cases, threads, summed(report, done, most)):
+            for index, trace in stream(cases, threads, summed(report, done, needed)):
                 verdict = judge(trace, x, v, final=part == HORIZONS[-1])
                 if verdict is None:
                     left.append(some[index])

@@ -100,20 +100,20 @@ def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str 
     Raises:
       ScenarioError: an unknown property, family or plant.
     """
-    found = suitable(needs, family, plant)
+    suiting = suitable(needs, family, plant)
     filters = [PROPERTIES[need].words for need in needs] + [f"are of the family {family}"] * (family is not None)
     kind = plant if plant is None or isinstance(plant, str) else plant.name
-    title = f"{len(found)} of {len(laws())} laws" + f" that {' and '.join(filters)}" * bool(filters)
+    title = f"{len(suiting)} of {len(laws())} laws" + f" that {' and '.join(filters)}" * bool(filters)
     title += f" for {kind}" * (kind is not None)
     if "no-velocity" in needs:
         text = 'Every law runs without a velocity sensor if the scenario estimates the velocity: velocity="levant".'
         console.print(text, highlight=False)
-    if not found:
+    if not suiting:
         console.print(f"{title}: leave out a need, --family or --plant", highlight=False)
         return
     columns = Column("name", no_wrap=True, style="cyan"), "family", "u", "arrives", "gains to choose"
     table = titled(title, *columns, show_edge=False, padding=(0, 2, 0, 0), pad_edge=False)
-    for law in found:
+    for law in suiting:
         u = "continuous" if law.continuous else "jumps"
         table.add_row(law.name, law.family, u, ARRIVES[law.finite_time], ", ".join(searched(law)) or "none")
     console.print(table, "")

@@ -73,10 +73,10 @@ class Added(Generic[T_co]):
         Raises:
           ScenarioError: it cannot be loaded, or is not what it should be.
         """
-        found = self._load() if _being_imported(self.point.module) else self._loaded
-        if isinstance(found, ScenarioError):
-            raise ScenarioError(str(found)) from found.__cause__
-        return found
+        entry = self._load() if _being_imported(self.point.module) else self._loaded
+        if isinstance(entry, ScenarioError):
+            raise ScenarioError(str(entry)) from entry.__cause__
+        return entry
 
     @functools.cached_property
     def _loaded(self) -> T_co | ScenarioError:
@@ -177,10 +177,10 @@ class Catalogue(Mapping[str, T_co]):
 
 def added(group: str, make: Callable[[EntryPoint], T]) -> dict[str, tuple[Added[T], ...]]:
     """Return name -> the entries of other packages in a group of entry points."""
-    found: dict[str, tuple[Added[T], ...]] = {}
+    by_name: dict[str, tuple[Added[T], ...]] = {}
     for point in points(group):
-        found[point.name] = (*found.get(point.name, ()), Added(point, make))
-    return found
+        by_name[point.name] = (*by_name.get(point.name, ()), Added(point, make))
+    return by_name
 
 
 def imported(kind: type[T], fits: Callable[[T], bool]) -> Callable[[EntryPoint], T]:
@@ -192,12 +192,12 @@ def imported(kind: type[T], fits: Callable[[T], bool]) -> Callable[[EntryPoint],
     """
 
     def make(point: EntryPoint) -> T:
-        found = point.load()
-        if not isinstance(found, kind) or not fits(found):
-            raise ScenarioError(f"it is {shown(found)}: give {KINDS[point.group][1]}")
-        if (own := NAME(found)) != point.name:
+        entry = point.load()
+        if not isinstance(entry, kind) or not fits(entry):
+            raise ScenarioError(f"it is {shown(entry)}: give {KINDS[point.group][1]}")
+        if (own := NAME(entry)) != point.name:
             raise ScenarioError(f"its own name is {own!r}: give the entry point the same name")
-        return found
+        return entry
 
     return make
 

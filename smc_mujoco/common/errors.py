@@ -89,10 +89,10 @@ def _abbreviates(short: str, words: list[str]) -> bool:
     return re.fullmatch(re.escape(initials) + ending, short) is not None
 
 
-def one_line(text: str, most: int = 200) -> str:
-    """Return text on one line of at most `most` characters, with a ? for each that cannot be printed."""
-    text = "".join(c if c.isprintable() else "?" for c in " ".join(text[: 2 * most].split()))
-    return text if len(text) <= most else f"{text[: most - 3]}..."
+def one_line(text: str, length: int = 200) -> str:
+    """Return text on one line of at most `length` characters, with a ? for each that cannot be printed."""
+    text = "".join(c if c.isprintable() else "?" for c in " ".join(text[: 2 * length].split()))
+    return text if len(text) <= length else f"{text[: length - 3]}..."
 
 
 def find(kind: str, name: object, known: Mapping[str, T]) -> T:
@@ -107,11 +107,11 @@ def number(
     value: object,
     *,
     above: float = -math.inf,
-    least: float = -math.inf,
-    most: float = math.inf,
+    low: float = -math.inf,
+    high: float = math.inf,
     infinite: bool = False,
 ) -> float:
-    """Return `value` as a float that is > `above`, >= `least` and <= `most`, or raise ScenarioError naming `what`.
+    """Return `value` as a float that is > `above`, >= `low` and <= `high`, or raise ScenarioError naming `what`.
 
     NaN is refused, and so are infinities unless `infinite`.
     """
@@ -126,18 +126,18 @@ def number(
         raise ScenarioError(f"{what} is {shown(value)}: give a finite number")
     if x <= above:
         raise ScenarioError(f"{what} is {x:g}: give a number greater than {above:g}")
-    if x < least:
-        raise ScenarioError(f"{what} is {x:g}: give at least {least:g}")
-    if x > most:
-        raise ScenarioError(f"{what} is {x:g}: give at most {most:g}")
+    if x < low:
+        raise ScenarioError(f"{what} is {x:g}: give at least {low:g}")
+    if x > high:
+        raise ScenarioError(f"{what} is {x:g}: give at most {high:g}")
     return x
 
 
-def whole(what: str, value: object, least: int, most: int) -> int:
-    """Return `value` as an int in [least, most], or raise ScenarioError naming `what`."""
+def whole(what: str, value: object, low: int, high: int) -> int:
+    """Return `value` as an int in [low, high], or raise ScenarioError naming `what`."""
     real = _real(value)
-    if real is None or not least <= real <= most or real != real // 1:
-        raise ScenarioError(f"{what} is {shown(value)}: give a whole number from {least} to {most}")
+    if real is None or not low <= real <= high or real != real // 1:
+        raise ScenarioError(f"{what} is {shown(value)}: give a whole number from {low} to {high}")
     return int(real)
 
 

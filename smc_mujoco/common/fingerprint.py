@@ -212,15 +212,15 @@ def _reached(space: Mapping[str, Any], names: set[str], attributes: set[str], kn
       attributes: names in the modules.
       known: ids of modules that were read already; new ones are added.
     """
-    found: list[Any] = []
+    parts: list[Any] = []
     for name in sorted(names & space.keys()):
         value = space[name]
-        found += [name, value]
+        parts += [name, value]
         own = isinstance(value, ModuleType) and value.__name__.split(".")[0] not in VERSIONED
         if own and id(value) not in known:
             known.add(id(value))
-            found += _reached(vars(value), attributes, attributes, known)
-    return found
+            parts += _reached(vars(value), attributes, attributes, known)
+    return parts
 
 
 def _cell_contents(cell: Any) -> Any:
@@ -232,10 +232,10 @@ def _cell_contents(cell: Any) -> Any:
 
 def _class_contents(kind: type) -> list[Any]:
     """Return the bases of a class, and the functions and values in its definition."""
-    found: list[Any] = [base for base in kind.__bases__ if not _versioned(base)]
+    parts: list[Any] = [base for base in kind.__bases__ if not _versioned(base)]
     for name, value in sorted(vars(kind).items()):
         content = _as_written(value.fget if isinstance(value, property) else value)
         written = name == "__call__" or not name.startswith("__")
         if written and isinstance(content, (FunctionType, *VALUES)):
-            found += [name, content]
-    return found
+            parts += [name, content]
+    return parts

@@ -37,7 +37,7 @@ def table(
     caption: object = "",
     note: object = "",
     numbers: range = range(0),
-    most: int = MAX_ROWS,
+    max_rows: int = MAX_ROWS,
 ) -> Html:
     """Return a table.
 
@@ -47,7 +47,7 @@ def table(
       caption: above the table.
       note: below it.
       numbers: the columns that are aligned to the right.
-      most: number of rows that are shown; a last line says how many are left out.
+      max_rows: number of rows that are shown; a last line says how many are left out.
     """
     width = len(headings or rows[0]) if headings or rows else 1
     sides = ["right" if i in numbers else "left" for i in range(width)]
@@ -60,10 +60,10 @@ def table(
     if headings:
         cells = _cells("th", headings, sides, "font-weight:normal;border-bottom:1px solid currentColor;")
         parts.append(f"<thead><tr>{cells}</tr></thead>")
-    lines = [f"<tr>{_cells('td', row, sides, '')}</tr>" for row in rows[:most]]
+    lines = [f"<tr>{_cells('td', row, sides, '')}</tr>" for row in rows[:max_rows]]
     wide = f'<tr><td colspan="{width}" style="{_CELL}left;opacity:0.75">'
-    if len(rows) > most:
-        lines.append(f"{wide}and {len(rows) - most} more</td></tr>")
+    if len(rows) > max_rows:
+        lines.append(f"{wide}and {len(rows) - max_rows} more</td></tr>")
     if note:
         lines.append(f"{wide}{text(note)}</td></tr>")
     return Html("".join([*parts, f"<tbody>{''.join(lines)}</tbody></table>"]))
@@ -78,7 +78,8 @@ def _cells(tag: str, values: Sequence[object], sides: Sequence[str], style: str)
 
 def fields(values: Mapping[str, object], caption: object = "", note: object = "") -> Html:
     """Return a table of names with their values."""
-    return table((), [(Html(f"<i>{text(name)}</i>"), value) for name, value in values.items()], caption, note, most=99)
+    rows = [(Html(f"<i>{text(name)}</i>"), value) for name, value in values.items()]
+    return table((), rows, caption, note, max_rows=99)
 
 
 def panel(t: np.ndarray, curves: Sequence[np.ndarray], heading: str, reference: np.ndarray | None = None) -> Html:

@@ -39,7 +39,7 @@ def catalogue_of(
 
 def subclasses(base: type[T]) -> list[type[T]]:
     """Return every class derived from a base, also users' own. A class comes before those derived from it."""
-    found = base.__subclasses__()
-    for kind in found:
-        found.extend(kind.__subclasses__())
-    return found
+    below = base.__subclasses__()
+    for kind in below:
+        below.extend(kind.__subclasses__())
+    return below

@@ -153,7 +153,7 @@ class Tabular:
         note = html.Html("<br>".join(map(html.text, self.notes)))
         numbers = range(self.left, len(self.headings))
         heads = [heading.replace("^2", "²") for heading in self.headings]
-        return html.table(heads, lines, self.title, note, numbers, most=MAX_HTML_ROWS)
+        return html.table(heads, lines, self.title, note, numbers, max_rows=MAX_HTML_ROWS)
 
     def to_latex(self) -> str:
         """Return a tabular, which needs the package booktabs, below comments with the title and the notes."""

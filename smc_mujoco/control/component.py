@@ -309,9 +309,9 @@ class Template:
                 raise unknown(f"gain of {self.name}", key, values)
             gain = self.gains[key]
             above = 0.0 if gain.positive else -math.inf
-            least = 0.0 if gain.nonnegative else -math.inf
+            low = 0.0 if gain.nonnegative else -math.inf
             infinite = bool(np.isinf(gain.default).any())
-            values[key] = _value(f"{self.name}'s {key}", value, above=above, least=least, infinite=infinite)
+            values[key] = _value(f"{self.name}'s {key}", value, above=above, low=low, infinite=infinite)
             if isinstance(values[key], tuple) and (gain.shared or self.kind != "law"):
                 raise ScenarioError(f"{self.name}'s {key} is {written(values[key])}: give one number for all channels")
         for words in self.unmet(values) if warn else ():

@@ -72,8 +72,8 @@ def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> C
     if gains == "study":
         values, search = find("law of the paper's study", SAME.get(name, name), STUDY[paper_plant(plant.name)]), None
     else:
-        found = tuned(plant, name, gains)
-        values, search = found.sets[seed % len(found.sets)], found.search
+        shipped = tuned(plant, name, gains)
+        values, search = shipped.sets[seed % len(shipped.sets)], shipped.search
     made = dataclasses.replace(base, gains={gain: values.get(gain, value) for gain, value in base.gains.items()})
     return made.sourced(source.SHIPPED if search else source.STUDY, search)
 

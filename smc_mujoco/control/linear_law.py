@@ -252,7 +252,7 @@ def _checked(K: System) -> System:
         raise ScenarioError(f"K has {n} states: give {MAX_STATES} at most, by control.balred or control.minreal")
     if K.dt is True:
         return K
-    dt = 0.0 if K.dt is None else errors.number("dt of K", K.dt, least=0.0)
+    dt = 0.0 if K.dt is None else errors.number("dt of K", K.dt, low=0.0)
     return K._replace(dt=dt or None)
 
 

@@ -85,8 +85,8 @@ def suitable(needs: Iterable[str] = (), family: str | None = None, plant: Plant 
     names = laws(plant)
     if family is not None:
         names = [name for name in names if name in find("family of laws", family, families())]
-    found = [catalogue()[name] for name in names]
-    return [law for law in found if all(one.holds(law) for one in wanted)]
+    templates = [catalogue()[name] for name in names]
+    return [law for law in templates if all(one.holds(law) for one in wanted)]
 
 
 def _reads(function: object, position: int, seen: set[object]) -> set[str]:

@@ -58,15 +58,15 @@ def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
     return Envelope((edges[:-1] + edges[1:]) / 2, low, total / count, high)
 
 
-def columns(t: np.ndarray, y: np.ndarray, most: int) -> Envelope:
+def columns(t: np.ndarray, y: np.ndarray, max_parts: int) -> Envelope:
     """Return range and mean of y in at most `most` windows of equally many samples.
 
     That number is even, so that a control which switches at every sample has the correct mean.
     """
     count = len(t) - 1
-    if count <= most:
+    if count <= max_parts:
         return Envelope(t, y, y, y)
-    edges = t[:: 2 * -(-count // (2 * most))]
+    edges = t[:: 2 * -(-count // (2 * max_parts))]
     return windows(t, y, edges if edges[-1] == t[-1] else np.append(edges, t[-1]))
 
 
@@ -76,8 +76,8 @@ def window(trace: Trace) -> int:
     If a control switches irregularly between +-1, its mean over w samples varies by about 2 / w, which makes the line
     jagged. The window is so wide that this is less than the width of the line.
     """
-    share, least = WINDOW
-    return 4 * round(max(share * trace.scenario.samples, least) / 4)
+    share, shortest = WINDOW
+    return 4 * round(max(share * trace.scenario.samples, shortest) / 4)
 
 
 def stretches(y: np.ndarray, width: int) -> list[slice]:

@@ -182,11 +182,11 @@ def by_channel(panel: Panel) -> list[Panel]:
     """Return a panel for each channel of a panel's group."""
     if len(panel.group.channels) == 1 or panel.quantity in SINGLE:
         return [panel]
-    found = []
+    panels = []
     for k, i in enumerate(panel.group.channels):
         at, one = (dataclasses.replace(panel.group, channels=(j,)) for j in (k, i))
-        found.append(Panel(panel.quantity, one, [cut(trace, at) for trace in panel.traces], i))
-    return found
+        panels.append(Panel(panel.quantity, one, [cut(trace, at) for trace in panel.traces], i))
+    return panels
 
 
 def strip(traces: Sequence[Trace]) -> list[Panel]:
@@ -592,10 +592,12 @@ def thinned(x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def lasting(traces: Sequence[Trace], name: str) -> dict[int, np.ndarray]:
     """Return the values of successful runs by their index; if there are none, of failed ones without their ends."""
     values = {k: QUANTITIES[name](trace) for k, trace in enumerate(traces)}
-    found = {k: y for k, y in values.items() if traces[k].diverged_at is None}
-    if not found:
-        found = {k: y[: max(1, int(UNDIVERGED * len(y)))] if traces[k].plant_diverged else y for k, y in values.items()}
-    return {k: y for k, y in found.items() if np.isfinite(y).all()}
+    lasted = {k: y for k, y in values.items() if traces[k].diverged_at is None}
+    if not lasted:
+        lasted = {
+            k: y[: max(1, int(UNDIVERGED * len(y)))] if traces[k].plant_diverged else y for k, y in values.items()
+        }
+    return {k: y for k, y in lasted.items() if np.isfinite(y).all()}
 
 
 def far_off(traces: Sequence[Trace], name: str) -> int | None:

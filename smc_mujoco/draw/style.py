@@ -134,11 +134,11 @@ def _palette() -> dict[str, str]:
     The baselines, which are beside other laws most often, are first.
     """
     laws = known_laws().own.values()
-    found, used = {}, [PAPER, DISTURBANCE, REACTION, FAILED, *(law.colour for law in laws if law.colour)]
+    colours, used = {}, [PAPER, DISTURBANCE, REACTION, FAILED, *(law.colour for law in laws if law.colour)]
     for law in sorted((law for law in laws if not law.colour), key=lambda law: law.family != "baseline"):
-        found[law.name] = _farthest([colour for colour in _grid(0) if colour not in used], used)[0]
-        used.append(found[law.name])
-    return found
+        colours[law.name] = _farthest([colour for colour in _grid(0) if colour not in used], used)[0]
+        used.append(colours[law.name])
+    return colours
 
 
 def _farthest(colours: Sequence[str], others: Sequence[str]) -> tuple[str, float]:
@@ -315,12 +315,12 @@ def _blow(push: Push) -> tuple[float, str]:
 
 def _by_time(events: Sequence[Sequence[tuple[float, str]]], names: Sequence[str]) -> dict[float, str]:
     """Return time in s -> what happens, from the events of each run, with the runs' labels if only some have it."""
-    found: dict[tuple[float, str], list[str]] = {}
+    who_at: dict[tuple[float, str], list[str]] = {}
     for name, happened in zip(names, events, strict=True):
         for event in dict.fromkeys(happened):
-            found.setdefault(event, []).append(name)
+            who_at.setdefault(event, []).append(name)
     words: dict[float, list[str]] = {}
-    for (time, what), who in sorted(found.items()):
+    for (time, what), who in sorted(who_at.items()):
         words.setdefault(time, []).append(what if len(who) == len(events) else f"{', '.join(who)}: {what}")
     return {time: "; ".join(parts) for time, parts in words.items()}
 
@@ -353,12 +353,12 @@ def wrapped(text: str, room: float, size: float, lines: int) -> str:
 
     A number and a short word after it, such as its unit, stay together.
     """
-    found, words = [], re.split(r"(?<!\d)\s+|\s+(?!\S{1,4}(?:\s|$))", text.strip())
-    while words and len(found) < lines - 1:
+    broken, words = [], re.split(r"(?<!\d)\s+|\s+(?!\S{1,4}(?:\s|$))", text.strip())
+    while words and len(broken) < lines - 1:
         count = next((n for n in range(len(words), 1, -1) if width(" ".join(words[:n]), size) <= room), 1)
-        found.append(cropped(" ".join(words[:count]), room, size))
+        broken.append(cropped(" ".join(words[:count]), room, size))
         words = words[count:]
-    return "\n".join([*found, cropped(" ".join(words), room, size)] if words else found)
+    return "\n".join([*broken, cropped(" ".join(words), room, size)] if words else broken)
 
 
 def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:

@@ -268,7 +268,7 @@ def _references(scenario: Resolved, samples: int) -> np.ndarray:
         return np.zeros((1, 3))
     times = (np.arange(samples) * scenario.control_period).tolist()
     several = isinstance(scenario.reference, PerChannel) or scenario.plant.rest
-    found = []
+    columns = []
     for signal in scenario.references if several else scenario.references[:1]:
         try:
             values = np.array([evaluate(signal, t) for t in times])
@@ -277,8 +277,8 @@ def _references(scenario: Resolved, samples: int) -> np.ndarray:
         if not (finite := np.isfinite(values).all(axis=1)).all():
             at = f"t = {times[np.argmin(finite)]:.6g} s"
             raise ScenarioError(f"reference {shown(signal)} is not a finite number at {at}: give another")
-        found.append(values)
-    return np.stack(found, axis=2).reshape(samples, -1)
+        columns.append(values)
+    return np.stack(columns, axis=2).reshape(samples, -1)
 
 
 def _compiled(scenario: Resolved, edit: Callable[[mujoco.MjSpec], None]) -> mujoco.MjModel:

@@ -76,8 +76,8 @@ class Task:
 
     def spread(self, plant: Plant) -> Pair:
         """Return the lowest and the highest start of the channels from rest, (n,) each, ignoring joints' ranges."""
-        most = np.abs(plant.x0 - rest(plant))
-        return -most, most
+        reach = np.abs(plant.x0 - rest(plant))
+        return -reach, reach
 
     def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
         """Return e and w for x and v, (..., n) each.
@@ -98,8 +98,8 @@ class Track(Task):
         """Return the reference: for an arm one for each joint, about its rest."""
         if not plant.rest:
             return {"reference": TRACK_REFERENCE}
-        least, most = _ranges(plant)
-        room = WITHIN * np.minimum(most - plant.rest, plant.rest - least)
+        low, high = _ranges(plant)
+        room = WITHIN * np.minimum(high - plant.rest, plant.rest - low)
         amplitudes = np.minimum(room, TRACK_REFERENCE.amplitude)[: plant.driven].tolist()
         return {
             "reference": [
@@ -125,8 +125,8 @@ class SwingUp(Task):
 
     def fits(self, plant: Plant) -> bool:
         """Return whether all that topples can hang, and u_max has one unit."""
-        down, (least, most) = toppling(plant), _ranges(plant)
-        hangs = (least[down] <= math.pi) & (most[down] >= math.pi)
+        down, (low, high) = toppling(plant), _ranges(plant)
+        hangs = (low[down] <= math.pi) & (high[down] >= math.pi)
         one = plant.free or {"rad"}.issuperset(plant.units)
         return bool(down.any() and hangs.all() and one)
 
@@ -162,8 +162,8 @@ class Synchronise(Task):
 
     def spread(self, plant: Plant) -> Pair:
         """Return the same range for every channel."""
-        most = np.full(plant.n, max(np.abs(plant.x0)))
-        return -most, most
+        reach = np.full(plant.n, max(np.abs(plant.x0)))
+        return -reach, reach
 
     def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
         """Return the distance of the channels from their mean."""
@@ -187,9 +187,9 @@ def tasks(plant: Plant | str) -> list[str]:
 
 def starts(task: Task, plant: Plant) -> Pair:
     """Return the lowest and the highest start of a plant's channels, (n,) each, within its joints' ranges."""
-    least, most = _ranges(plant)
+    lowest, highest = _ranges(plant)
     low, high = task.spread(plant)
-    return np.clip(rest(plant) + low, least, most), np.clip(rest(plant) + high, least, most)
+    return np.clip(rest(plant) + low, lowest, highest), np.clip(rest(plant) + high, lowest, highest)
 
 
 def rest(plant: Plant) -> np.ndarray:
@@ -198,7 +198,7 @@ def rest(plant: Plant) -> np.ndarray:
 
 
 def _ranges(plant: Plant) -> Pair:
-    """Return the least and the largest positions of the joints, (n,) each."""
+    """Return the lowest and the highest positions of the joints, (n,) each."""
     ranges = np.array([(low, high) for _, low, high in plant.ranges] or [(-math.inf, math.inf)] * plant.n)
     return ranges[:, 0], ranges[:, 1]
 

@@ -299,10 +299,10 @@ def plant(name: str, **parameters: float) -> Plant:
     for key, value in parameters.items():
         if key not in values:
             raise unknown(f"parameter of {name}", key, [*values, "n"])
-        above, least = (0.0, 1e-6) if key in base.positive else (-math.inf, -MAX_PARAMETER)
-        values[key] = number(f"{name}'s {key}", value, above=above, least=least, most=MAX_PARAMETER)
+        above, low = (0.0, 1e-6) if key in base.positive else (-math.inf, -MAX_PARAMETER)
+        values[key] = number(f"{name}'s {key}", value, above=above, low=low, high=MAX_PARAMETER)
     for key in (*base.dry, *base.added):
-        number(f"{name}'s {key}", values[key], least=0.0)
+        number(f"{name}'s {key}", values[key], low=0.0)
     x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))
     smooth = not any(values[key] for key in base.dry) if base.dry else base.smooth
     return dataclasses.replace(base, parameters=values, n=n, x0=x0, smooth=smooth)

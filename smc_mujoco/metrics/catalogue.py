@@ -278,8 +278,8 @@ def reversal_rate(trace: Trace) -> float:
     Only swings of at least half the ripple count; 0 for a ripple up to 1e-6 of the scale. A cycle longer than the last
     part is not seen.
     """
-    part, least = last(trace), 1e-6 * scale(trace)
-    return max(conventions.turns(e, least) for e in error(trace)[part].T) / (np.ptp(trace.t[part]) or np.inf)
+    part, threshold = last(trace), 1e-6 * scale(trace)
+    return max(conventions.turns(e, threshold) for e in error(trace)[part].T) / (np.ptp(trace.t[part]) or np.inf)
 
 
 @metric("s", network=True)

@@ -220,13 +220,13 @@ def largest(a: np.ndarray) -> np.ndarray:
     return functools.reduce(np.maximum, a.T)
 
 
-def turns(y: np.ndarray, least: float) -> int:
-    """Return how often y (K,) turns back, by half its range or more from its last extreme; 0 for a range <= `least`."""
+def turns(y: np.ndarray, threshold: float) -> int:
+    """Return how often y (K,) turns back by half its range or more; 0 for a range <= `threshold`."""
     count, going, low, high = 0, 0, y[0], y[0]
     swing = float(np.ptp(y)) / 2
     slopes = np.diff(y)
     peaks = np.flatnonzero(slopes[1:] * slopes[:-1] <= 0.0) + 1  # y is monotonic between them
-    for value in y[[0, *peaks, -1]].tolist() if 2 * swing > least else ():
+    for value in y[[0, *peaks, -1]].tolist() if 2 * swing > threshold else ():
         low, high = min(low, value), max(high, value)
         if going >= 0 and value <= high - swing:
             count, going, low, high = count + (going > 0), -1, value, value

@@ -65,12 +65,12 @@ def tip_path(plant: Plant, x: np.ndarray, factors: Mapping[str, float] | None = 
     model = plant.load(factors)
     data, site = mujoco.MjData(model), model.site(plant.tip).id
     data.qpos[:] = initial_pose(model)
-    places, found = model.jnt_qposadr[joint_ids(model)], np.empty((len(x), 3))
+    places, tip = model.jnt_qposadr[joint_ids(model)], np.empty((len(x), 3))
     for k, each in enumerate(x):
         data.qpos[places] = each
         mujoco.mj_kinematics(model, data)
-        found[k] = data.site_xpos[site]
-    return found
+        tip[k] = data.site_xpos[site]
+    return tip
 
 
 @kept
@@ -123,13 +123,13 @@ def contacts(trace: Trace) -> Contacts:
     drives, n = model.actuator_ctrladr[drive_ids(model)], scenario.plant.driven
     scale = math.prod(part.scale for part in scenario.actuator)
     pushes = [(model.body(d.body).id, d) for d in scenario.disturbance if isinstance(d, Push) and scenario.plant.direct]
-    found, wrench = Contacts(np.zeros(len(trace.t)), np.zeros(len(trace.t)), np.zeros((len(trace.t), 3))), np.zeros(6)
+    touches, wrench = Contacts(np.zeros(len(trace.t)), np.zeros(len(trace.t)), np.zeros((len(trace.t), 3))), np.zeros(6)
     moves = model.body_weldid[model.geom_bodyid] != 0
     data.qpos[:] = initial_pose(model)
     jump = _jump_sample(trace)
     for k in range(len(trace.t)):
         if np.isnan(trace.x[k]).any():  # the run has failed
-            for values in found:
+            for values in touches:
                 values[k:] = np.nan
             break
         if k == jump:
@@ -143,13 +143,13 @@ def contacts(trace: Trace) -> Contacts:
         mujoco.mj_forward(model, data)
         for i in range(data.ncon):
             mujoco.mj_contactForce(model, data, i, wrench)
-            found.force[k] += wrench[0]
-            found.depth[k] = max(found.depth[k], -data.contact.dist[i])
+            touches.force[k] += wrench[0]
+            touches.depth[k] = max(touches.depth[k], -data.contact.dist[i])
             one, other = moves[data.contact.geom[i]].astype(float)  # the normal points from the first to the other
-            found.push[k] += (other - one) * wrench[0] * data.contact.frame[i, :3]
-    for values in found:
+            touches.push[k] += (other - one) * wrench[0] * data.contact.frame[i, :3]
+    for values in touches:
         values.flags.writeable = False
-    return found
+    return touches
 
 
 def _jump_sample(trace: Trace) -> int:
@@ -175,15 +175,15 @@ def tip_scores(trace: Trace, force: float | None = None) -> dict[str, float]:
     """
     conventions.refuse(trace)
     error = tip_error(trace)
-    found = {"max_error": error.max(), "rms_error": np.sqrt((error**2).mean()), "last_error": error[-1]}
+    values = {"max_error": error.max(), "rms_error": np.sqrt((error**2).mean()), "last_error": error[-1]}
     if knows_contacts(trace.scenario):
         wanted = trace.scenario.law.gains.get("force") if force is None else number("force", force, above=0.0)
         pressed = contacts(trace)
         late = pressed.force[trace.t >= trace.t[0] + SETTLED * np.ptp(trace.t)]
-        found |= {"mean_force": late.mean()}
-        found |= {"force_error": 100.0 * (late.mean() / wanted - 1.0)} if wanted else {}
-        found |= {"force_ripple": late.std(), "touching": 100.0 * (late > 0.0).mean(), "depth": pressed.depth.max()}
-    return {name: float(value) for name, value in found.items()}
+        values |= {"mean_force": late.mean()}
+        values |= {"force_error": 100.0 * (late.mean() / wanted - 1.0)} if wanted else {}
+        values |= {"force_ripple": late.std(), "touching": 100.0 * (late > 0.0).mean(), "depth": pressed.depth.max()}
+    return {name: float(value) for name, value in values.items()}
 
 
 def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
@@ -193,14 +193,14 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
     work, the integral of |force times velocity|, J. Raises like `smc.score`.
     """
     conventions.refuse(trace)
-    found, names = {}, joint_names(trace.scenario.plant)
+    values, names = {}, joint_names(trace.scenario.plant)
     for group in groups(trace.scenario):
         for i in group.channels:
             one = dataclasses.replace(group, channels=(i,))
             part, power = cut(trace, one), np.abs(trace.force[:, i] * trace.v[:, i])
-            found[names[i]] = {m.name: float(m.formula(part)) for m in metrics() if m.fits(one)}
-            found[names[i]] |= {"peak_power": float(power.max()), "work": float(np.trapezoid(power, trace.t))}
-    return {name: found[name] for name in names}
+            values[names[i]] = {m.name: float(m.formula(part)) for m in metrics() if m.fits(one)}
+            values[names[i]] |= {"peak_power": float(power.max()), "work": float(np.trapezoid(power, trace.t))}
+    return {name: values[name] for name in names}
 
 
 def worst_joint(trace: Trace, metric: str) -> tuple[str, float]:

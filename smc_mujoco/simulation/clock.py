@@ -37,8 +37,8 @@ class Clock:
     missed: float = 0.0
 
     def __post_init__(self):
-        object.__setattr__(self, "jitter", number("Clock's jitter", self.jitter, least=0.0))
-        object.__setattr__(self, "missed", number("Clock's missed", self.missed, least=0.0, most=MAX_MISSED))
+        object.__setattr__(self, "jitter", number("Clock's jitter", self.jitter, low=0.0))
+        object.__setattr__(self, "missed", number("Clock's missed", self.missed, low=0.0, high=MAX_MISSED))
 
     @property
     def regular(self) -> bool:

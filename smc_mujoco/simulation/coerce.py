@@ -65,7 +65,7 @@ def real(**limits: Any) -> Callable[[str, float, Any], float]:
 
 def input_delay(name: str, value: float, s: Any) -> float:
     """Return a delay, s, that is not longer than the run."""
-    return number(name, value, least=0.0, most=s.duration)
+    return number(name, value, low=0.0, high=s.duration)
 
 
 def seed(name: str, value: int, s: Any) -> int:
@@ -140,14 +140,14 @@ def state(name: str, value: float | Sequence[float] | None, s: Any) -> tuple[flo
     if len(values) not in (1, n):
         raise ScenarioError(f"{name} has {len(values)} values for {n} channels: give one number or {n}")
     values = values if len(values) == n else values * n
-    return tuple(number(name, one, least=-MAX_STATE, most=MAX_STATE) for one in values)
+    return tuple(number(name, one, low=-MAX_STATE, high=MAX_STATE) for one in values)
 
 
 def physics_step(name: str, value: float | None, s: Any) -> float | None:
     """Return a step, s, that divides the control period exactly, from one that does so up to rounding."""
     if value is None:
         return None
-    h, period = number(name, value, above=0.0, least=MIN_TIME), s.control_period
+    h, period = number(name, value, above=0.0, low=MIN_TIME), s.control_period
     count = period / h
     if count < 1.0 - 1e-9 or abs(count - round(count)) > 1e-6 * count:
         raise ScenarioError(f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N")

@@ -73,7 +73,7 @@ def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by
     Warns:
       ScenarioWarning: a spread of more than 1, which may be percent.
     """
-    if number("spread", spread, least=0.0) > 1.0:
+    if number("spread", spread, low=0.0) > 1.0:
         warnings.warn(
             f"spread is {spread:g}, which moves starts by {spread:g} times x0: if it is {spread:g} %, give "
             f"{spread / 100:g}",
@@ -82,4 +82,4 @@ def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by
         )
     items = taken("x0", x0) if isinstance(x0, Sequence) and not isinstance(x0, str) else [x0]
     middle = None if x0 is None else tuple(number("x0", item) for item in items)
-    return Starts(x0=middle, spread=spread, by=number("by", by, least=0.0))
+    return Starts(x0=middle, spread=spread, by=number("by", by, low=0.0))

@@ -24,7 +24,7 @@ class Noise:
 
     def __post_init__(self):
         for name in ("position", "velocity"):
-            object.__setattr__(self, name, number(f"Noise's {name}", getattr(self, name), least=0.0))
+            object.__setattr__(self, name, number(f"Noise's {name}", getattr(self, name), low=0.0))
         for error in (self.position_error, self.velocity_error):
             known = isinstance(error, Signal | None) and not isinstance(error, PerChannel)
             if not known or (error and (error.random or error.cartesian or error.sees)):
@@ -49,7 +49,7 @@ class Jump:
     factors: Mapping[str, float]
 
     def __post_init__(self):
-        object.__setattr__(self, "time", number("Jump's time", self.time, least=0.0))
+        object.__setattr__(self, "time", number("Jump's time", self.time, low=0.0))
         object.__setattr__(self, "factors", parameter_factors("Jump", self.factors))
 
 

@@ -60,7 +60,7 @@ class Signal:
         for name, value in self.parameters().items():
             above = 0.0 if name in self.positive else -math.inf
             least = 0.0 if name in self.natural else -math.inf
-            checked = number(f"{type(self).__name__}'s {name}", value, above=above, least=least)
+            checked = number(f"{type(self).__name__}'s {name}", value, above=above, low=least)
             object.__setattr__(self, name, checked)
 
     def parameters(self) -> dict[str, float]:

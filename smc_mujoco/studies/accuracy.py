@@ -86,10 +86,10 @@ class AccuracyTable(Tables, list[Accuracy]):
     @property
     def groups(self) -> dict[str, list[Accuracy]]:
         """The rows of each plant and condition, by both names."""
-        found: dict[str, list[Accuracy]] = {}
+        rows: dict[str, list[Accuracy]] = {}
         for row in self:
-            found.setdefault(f"{row.plant}, {row.condition}", []).append(row)
-        return found
+            rows.setdefault(f"{row.plant}, {row.condition}", []).append(row)
+        return rows
 
     @property
     def tables(self) -> list[Tabular]:
@@ -228,7 +228,7 @@ def _longest_first(periods: Sequence[float]) -> tuple[float, ...]:
     Raises:
       ScenarioError: fewer than two, two that are equal, or one that is no period.
     """
-    found = {number("a period", h, above=0.0, least=MIN_TIME) for h in taken("periods", periods)}
+    found = {number("a period", h, above=0.0, low=MIN_TIME) for h in taken("periods", periods)}
     if len(found) < 2 or len(found) < len(taken("periods", periods)):
         raise ScenarioError(f"periods is {shown(periods)}: give two or more different ones in s, such as {PERIODS}")
     return tuple(sorted(found, reverse=True))

@@ -80,11 +80,11 @@ class Advice(Tables):
 
     def better(self, law: str, need: str) -> dict[str, list[str]]:
         """Return finalist -> the conditions in which it is better than a law on a need, those with most first."""
-        found = {}
+        conditions = {}
         for rival in self.compared:
             if its := [condition for asked, condition in self.wins(rival, law) if asked == need]:
-                found[rival] = its
-        return dict(sorted(found.items(), key=lambda item: -len(item[1])))
+                conditions[rival] = its
+        return dict(sorted(conditions.items(), key=lambda item: -len(item[1])))
 
     def _any(self, of: np.ndarray, law: str, need: str) -> bool:
         """Whether numbers (laws, blocks) of the comparison are not all 0 for a law on a need."""

@@ -222,13 +222,13 @@ def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> list[Componen
     if laws is None:
         left_out = {"none", *gain_sets.FORMS}  # FORMS are other implementations of laws that are there already
         return _some([law for law in suitable(properties, plant=plant) if law.name not in left_out], plant, properties)
-    found, wanted = [], [PROPERTIES[name] for name in properties]
+    chosen, wanted = [], [PROPERTIES[name] for name in properties]
     for one in listed_laws(laws):
         law = catalogue()[one] if isinstance(one, str) else one
         template = law if isinstance(law, Template) else coerce.law(law).template
         if template is None or all(each.holds(template) for each in wanted):
-            found.append(law)
-    return _some(found, plant, properties)
+            chosen.append(law)
+    return _some(chosen, plant, properties)
 
 
 def _some(found: list, plant: Plant, properties: Sequence[str]) -> list[Component | Template]:
@@ -264,11 +264,11 @@ def _worst(
     first = cases[0][0]
     within = within or usual(first)
     budget = budget or max(GLANCE, default_budget(first, within) // (len(cases[0]) * parts))
-    found: dict[str, list[WorstCase]] = {}
+    worst: dict[str, list[WorstCase]] = {}
     for i, one in (numbered for its in cases for numbered in enumerate(its)):
         file = Path(f"{path}-{i}-{one.plant.name}-{one.law.name}.json")
-        found.setdefault(one.law.name, []).append(kept(file, one, within, budget, **options))
-    return found
+        worst.setdefault(one.law.name, []).append(kept(file, one, within, budget, **options))
+    return worst
 
 
 class Contest(NamedTuple):
@@ -332,14 +332,14 @@ def _joined(parts: Sequence[Mapping[str, np.ndarray]], laws: Sequence[str], fill
 
 def _restraint(runs: Runs, ran: Sequence, plant: Plant) -> dict[str, tuple[float, ...]]:
     """Return the mean rank of each law on each of the metrics that order laws which tie, less is first."""
-    found, laws = [], runs.group.laws
+    mean_ranks, laws = [], runs.group.laws
     for metric in ties(plant):
         scores = Need(metric).scores(runs)
         if scores.blocks:
             centres = np.array([np.nanmedian(scores.values[law], axis=1) for law in laws])
             floors = np.array([paired_runs.floor(ran[k], metric.unit) for k in scores.blocks])
-            found.append(ranked(centres, floors).mean(axis=1))
-    return {law: tuple(float(mean[i]) for mean in found) for i, law in enumerate(laws)}
+            mean_ranks.append(ranked(centres, floors).mean(axis=1))
+    return {law: tuple(float(mean[i]) for mean in mean_ranks) for i, law in enumerate(laws)}
 
 
 def _order(comparison: Comparison, restraint: Mapping[str, tuple[float, ...]]) -> list[Rank]:

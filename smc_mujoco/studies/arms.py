@@ -78,12 +78,12 @@ def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
       name: of a law in GAINS.
       gains: other gains in place of those, with factors for the gains in BY_LIMIT and BY_INERTIA.
     """
-    found = dict(find("law of the arm", name, GAINS) if gains is None else gains)
+    values = dict(find("law of the arm", name, GAINS) if gains is None else gains)
     for gain in BY_LIMIT.get(name, ()):
-        found[gain] = [found[gain] * limit for limit in arm().limits]  # pyright: ignore[reportArgumentType]
+        values[gain] = [values[gain] * limit for limit in arm().limits]  # pyright: ignore[reportArgumentType]
     for gain in BY_INERTIA.get(name, ()):
-        found[gain] = [found[gain] * one for one in inertia()]  # pyright: ignore[reportArgumentType]
-    made = law(name, **found)
+        values[gain] = [values[gain] * one for one in inertia()]  # pyright: ignore[reportArgumentType]
+    made = law(name, **values)
     return made if gains else made.sourced(SHIPPED, Search(rule="random draws", evaluations=DRAWS))
 
 

@@ -66,12 +66,12 @@ def tables(boards: Iterable[Any], worst: Mapping[str, Mapping[str, Any]] | None 
 
 def _table(name: str, boards: Sequence[Any], worst: Mapping[str, Any]) -> Tabular:
     """Return the table of one group of runs."""
-    found = sources(boards)
-    known = ["gains"] * any(found.values())
+    sources_of = sources(boards)
+    known = ["gains"] * any(sources_of.values())
     laws: dict[str, list[Cell | str]] = {}
     for i, board in enumerate(boards):
         for entry in board.entries:
-            left = [Cell(entry.law, colour=style.law_colour(entry.law)), *([kinds(found[entry.law])] * len(known))]
+            left = [Cell(entry.law, colour=style.law_colour(entry.law)), *([kinds(sources_of[entry.law])] * len(known))]
             row = laws.setdefault(entry.law, [*left, *[""] * len(boards)])
             row[len(left) + i] = _cell(board, entry)
     for law, one in worst.items():
@@ -123,11 +123,11 @@ def relevance(boards: Sequence[Any]) -> str:
 
 def sources(boards: Iterable[Any]) -> dict[str, list[Source]]:
     """Return law -> where its gains come from, by name, for every law of some boards."""
-    found: dict[str, list[Source]] = {}
+    by_law: dict[str, list[Source]] = {}
     for board in boards:
         for entry in board.entries:
-            found.setdefault(entry.law, []).extend(entry.sources)
-    return dict(sorted(found.items()))
+            by_law.setdefault(entry.law, []).extend(entry.sources)
+    return dict(sorted(by_law.items()))
 
 
 def _verdicts(boards: Sequence[Any]) -> list[str]:

@@ -106,13 +106,13 @@ class Compared(Tables):
     @property
     def remarks(self) -> list[str]:
         """What is to be known of the gains: the laws with defaults, and why."""
-        found: dict[str, list[str]] = {}
+        remarked: dict[str, list[str]] = {}
         for plant, its in self.candidates.items():
             for one in its:
                 default = "default gains" * (one.law.source.kind == source.DEFAULT)
                 if words := "; ".join(filter(None, (default, one.remark))):
-                    found.setdefault(f"{one.law.name}: {words}", []).append(plant)
-        return [f"{words} (on {joined(plants)})" for words, plants in found.items()]
+                    remarked.setdefault(f"{one.law.name}: {words}", []).append(plant)
+        return [f"{words} (on {joined(plants)})" for words, plants in remarked.items()]
 
     @property
     def tables(self) -> list[Tabular]:

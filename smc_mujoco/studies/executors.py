@@ -125,9 +125,9 @@ def compute_elsewhere(
     sent: dict[Future[list[Outcome]], Batch] = {}
     plants: run_key.Hashes = {}
 
-    def collect(most: int) -> None:
+    def collect(under_way: int) -> None:
         """Finish batches until at most `most` are under way."""
-        while len(sent) > most:
+        while len(sent) > under_way:
             done = futures.wait(sent, return_when=futures.FIRST_COMPLETED).done
             # those that failed come last, so that the others are stored before an error ends the study
             for future in sorted(done, key=lambda one: one.cancelled() or one.exception() is not None):

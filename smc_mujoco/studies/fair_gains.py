@@ -76,14 +76,14 @@ def fair_gains(
       gains: the set of shipped gains.
       alike: whether laws that are tuned beside shipped gains have the budget of these.
     """
-    found = [_known(plant, law, gains) for law in laws]
-    if any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in found):
+    candidates = [_known(plant, law, gains) for law in laws]
+    if any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in candidates):
         starts = None
         budget = search.BUDGET if alike else budget
-    missing = [k for k, candidate in enumerate(found) if candidate is None]
+    missing = [k for k, candidate in enumerate(candidates) if candidate is None]
     for k in missing:
-        found[k] = _tuned(plant, laws[k], budget, starts, folder, threads, progress) if tune else _default(laws[k])
-    return [candidate for candidate in found if candidate is not None]
+        candidates[k] = _tuned(plant, laws[k], budget, starts, folder, threads, progress) if tune else _default(laws[k])
+    return [candidate for candidate in candidates if candidate is not None]
 
 
 def _known(plant: Plant, law: Component | Template, gains: str) -> Candidate | None:
@@ -151,8 +151,8 @@ def _tuned(
         chosen = chosen.sourced(its.kind, its.search)
         return Candidate(chosen, (chosen,), "its defaults, better than those tried")
     every = [dict(zip(tuned.bounds, one.gains, strict=True)) for one in tuned.sets]
-    found = (dataclasses.replace(chosen, gains=dict(chosen.gains) | own) for own in every)
-    sets = tuple(one.sourced(its.kind, its.search) for one in found)
+    tuned_laws = (dataclasses.replace(chosen, gains=dict(chosen.gains) | own) for own in every)
+    sets = tuple(one.sourced(its.kind, its.search) for one in tuned_laws)
     about = list(search_space.without_unit(chosen))
     have = "have no unit, so their" if len(about) > 1 else "has no unit, so its"
     words = f"{joined(about)} {have} search is about the defaults and not by the rule"

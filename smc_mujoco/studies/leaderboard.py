@@ -426,23 +426,23 @@ def leaderboard(
             floors = [cells.floor(ran[k], unit) for k in there]
             if all((scenario := ran[k]) is not None and scenario.amplifier for k in there):
                 unit = unit.replace("({u})", "V").replace("{u}", "V")  # noqa: PLW2901
-            found = compare(
+            comparison = compare(
                 scores.values, floors, metric == SETTLES, level, scores.outcomes, scores.sets, relevant, limits
             )
-            blocks = tuple(_block(group, found, at, k, untuned) for at, k in enumerate(there))
+            blocks = tuple(_block(group, comparison, at, k, untuned) for at, k in enumerate(there))
             mixed = "{" in unit and len({block.plant for block in blocks}) > 1
             board = Board(
                 group=group.name,
                 metric=metric,
                 unit=unit,
-                entries=_entries(found, scores.sets, sources, mixed, resamples, seed),
+                entries=_entries(comparison, scores.sets, sources, mixed, resamples, seed),
                 blocks=blocks,
                 cells=sum(block.runs for block in blocks),
                 seeds=max(block.seeds for block in blocks),
                 family=family,
-                limits=found.limits,
-                level=found.level,
-                relevant=found.relevant,
+                limits=comparison.limits,
+                level=comparison.level,
+                relevant=comparison.relevant,
                 resolution=max(floors),
                 by_step=metric.startswith("chattering") and any(map(depends_on_step, filter(None, ran))),
             )
@@ -460,7 +460,7 @@ def _family(
     relevant: float,
 ) -> tuple[Limits, int]:
     """Return the limits of the p-values of a metric, corrected for all blocks of a table, and the number of these."""
-    found = []
+    comparisons = []
     for group in blocks:
         try:
             scores = group.scores(by_row)
@@ -468,7 +468,7 @@ def _family(
             continue
         if scores.values:
             floors = [cells.floor(cells.scenarios(table, group)[k], unit) for k in scores.blocks]
-            found.append(
+            comparisons.append(
                 compare(
                     scores.values,
                     floors,
@@ -480,7 +480,7 @@ def _family(
                     Limits(0.0, 0.0),
                 )
             )
-    return corrected(found, level), sum(len(one.laws) > 1 for one in found) or 1
+    return corrected(comparisons, level), sum(len(one.laws) > 1 for one in comparisons) or 1
 
 
 def _block(group: cells.Group, found: Comparison, at: int, k: int, untuned: tuple[str, ...]) -> Block:

@@ -45,16 +45,16 @@ def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume
       ScenarioError: another key.
     """
     if wanted == DRAWN:
-        found = []
+        given = []
         for one in scenarios:
             if not isinstance(one, Scenario):
                 yield one  # which the study refuses
                 return
-            found.append(one)
+            given.append(one)
         if not resume:
             (folder / FILE).unlink(missing_ok=True)
-        scenarios = found
-        laws = {identity(one): one for one in filter(own, found)}
+        scenarios = given
+        laws = {identity(one): one for one in filter(own, given)}
         key = _of_folder(folder / FILE, {name: _about(one) for name, one in laws.items()})
     elif isinstance(wanted, str):
         raise ScenarioError(f"noise_key is {shown(wanted)}: give a whole number, or {DRAWN!r}")

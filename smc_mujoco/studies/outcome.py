@@ -90,7 +90,7 @@ class Outcome:
 
     def leaders(self, *measures: Measure) -> list[str]:
         """Return the labels that have the least value, or are level with it, in every measure and condition."""
-        level = [self._level(name, measure, "", least=True) for name in self.traces for measure in measures]
+        level = [self._level(name, measure, "", smallest=True) for name in self.traces for measure in measures]
         return [label for label in self.labels if all(label in found for found in level)]
 
     def least(self, measure: Measure, group: str = "", unit: str = "") -> str:
@@ -98,11 +98,11 @@ class Outcome:
 
         Several conditions have a winner each: "classical (10 ms, 20 ms), adaptive (50 ms)". "none" where all fail.
         """
-        return self._first(measure, group, unit, least=True)
+        return self._first(measure, group, unit, smallest=True)
 
     def most(self, measure: Measure, group: str = "", unit: str = "") -> str:
         """Return whose value is largest, as `least` does."""
-        return self._first(measure, group, unit, least=False)
+        return self._first(measure, group, unit, smallest=False)
 
     def who(self, singular: str, plural: str, holds: Callable[[Trace], bool] = settles) -> str:
         """Return for which runs something holds: "all 4 settle", "a and b settle, c does not".
@@ -179,25 +179,25 @@ class Outcome:
             raise ScenarioError(f"a measure is {shown(measure)}: give the name of a metric, or a function of a trace")
         return lambda run: math.nan if run.failure is not None else float(value(run))
 
-    def _level(self, condition: str, measure: Measure, group: str, least: bool) -> dict[str, float]:
-        """Return label -> value of the runs of a condition that have its least or largest value, or are level with it.
+    def _level(self, condition: str, measure: Measure, group: str, smallest: bool) -> dict[str, float]:
+        """Return label -> value of the runs with the smallest or largest value, or level with it, in a condition.
 
-        It is empty if all fail, or if the least value is "never".
+        It is empty if all fail, or if the smallest value is "never".
         """
-        found = self[condition].values(measure, group)[condition]
-        known = {label: value for label, value in found.items() if not math.isnan(value)}
-        if not known or (least and min(known.values()) == math.inf):
+        values = self[condition].values(measure, group)[condition]
+        known = {label: value for label, value in values.items() if not math.isnan(value)}
+        if not known or (smallest and min(known.values()) == math.inf):
             return {}
         resolution = _floor(measure, self.traces[condition][next(iter(known))], group)
-        best = (min if least else max)(known.values())
-        ends = {label: (value, best) if least else (best, value) for label, value in known.items()}
+        best = (min if smallest else max)(known.values())
+        ends = {label: (value, best) if smallest else (best, value) for label, value in known.items()}
         return {label: known[label] for label, (a, b) in ends.items() if not _exceeds(a, b, resolution)}
 
-    def _first(self, measure: Measure, group: str, unit: str, least: bool) -> str:
-        """Return in words the runs with the least or largest value of each condition."""
+    def _first(self, measure: Measure, group: str, unit: str, smallest: bool) -> str:
+        """Return in words the runs with the smallest or largest value of each condition."""
         winners: dict[tuple[str, ...], dict[str, list[float]]] = {}
         for name in self.traces:
-            level = self._level(name, measure, group, least)
+            level = self._level(name, measure, group, smallest)
             winners.setdefault(tuple(level), {})[name] = list(level.values())
         parts = []
         for labels, where in winners.items():

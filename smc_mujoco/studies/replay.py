@@ -69,13 +69,13 @@ def replay(trace: Trace) -> Replay:
 
 def replays(traces: Sequence[Trace]) -> list[Replay]:
     """Return what `replay` returns, for several traces in one go."""
-    found = [_refused(trace) for trace in traces]
-    sent = [i for i, known in enumerate(found) if known is None]
+    results = [_refused(trace) for trace in traces]
+    sent = [i for i, known in enumerate(results) if known is None]
     tasks = [(_recording(traces[i]), packed(traces[i].scenario.law)) for i in sent]
     if tasks:
         for i, result in zip(sent, _elsewhere("compared", tasks), strict=True):
-            found[i] = Replay(*result)
-    return [one or Replay(None) for one in found]
+            results[i] = Replay(*result)
+    return [one or Replay(None) for one in results]
 
 
 def _refused(trace: Trace) -> Replay | None:
@@ -137,8 +137,8 @@ def compared(tasks: Sequence[tuple[Recording, bytes]]) -> list[tuple[bool, str]]
     runs = [Playback(recording) for recording, _ in tasks]
     for run in runs:
         run.play()
-    found = _elsewhere("commanded", [(law, run.measured) for run, (_, law) in zip(runs, tasks, strict=True)])
-    return [run.verdict(commands) for run, commands in zip(runs, found, strict=True)]
+    commanded = _elsewhere("commanded", [(law, run.measured) for run, (_, law) in zip(runs, tasks, strict=True)])
+    return [run.verdict(commands) for run, commands in zip(runs, commanded, strict=True)]
 
 
 class Playback(reference.Loop):
@@ -245,13 +245,13 @@ def commanded(tasks: Sequence[tuple[bytes, list[tuple[int, Any]]]]) -> list[list
 
 
 def _commands(law: Component, measured: Sequence[tuple[int, Any]]) -> list[Any]:
-    found = []
+    commands = []
     joints = max((len(y.x) if i < 0 else i + 1 for i, y in measured), default=1)
     function = reference.PythonComponent(law, joints)
     with np.errstate(all="ignore"):
         for i, y in measured:
             try:
-                found.append(function.together(y)[0] if i < 0 else function(i, y)[0])
+                commands.append(function.together(y)[0] if i < 0 else function(i, y)[0])
             except reference.Failure:
-                found.append(None)
-    return found
+                commands.append(None)
+    return commands

@@ -64,10 +64,10 @@ def _chosen(runs: Mapping[str, Scenario]) -> list[str]:
 def _known(file: Path) -> dict[str, str | None]:
     """Return the results in a file: hash -> what differs, "" for nothing, None for a run that cannot be replayed."""
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
+        known = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return known if isinstance(known, dict) else {}
 
 
 def _results(runs: Mapping[str, Scenario], store: Store, threads: int | None) -> dict[str, str | None]:
@@ -75,9 +75,9 @@ def _results(runs: Mapping[str, Scenario], store: Store, threads: int | None) ->
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlainLoopWarning)  # the study itself has warned
         traces = run(list(runs.values()), threads=threads)
-    found: dict[str, str | None] = {}
+    results: dict[str, str | None] = {}
     for name, trace, its in zip(runs, traces, replays(traces), strict=True):
         row, scores = store.row(name), outcome(trace)
         same = all(row.get(column) == value for column, value in scores.items())
-        found[name] = OTHER_SCORES if not same else its.why if its.same is False else "" if its.same else None
-    return found
+        results[name] = OTHER_SCORES if not same else its.why if its.same is False else "" if its.same else None
+    return results

@@ -110,13 +110,13 @@ class Store:
             places: dict[Path, list[int]] = {}  # part -> indices of the names in it
             for i, name in enumerate(names):
                 places.setdefault(self.where[name][0], []).append(i)
-            found = []
+            parts = []
             for path, indices in places.items():
                 if (part := read(path)) is None:
                     raise ScenarioError(f"part {path} was removed or broken while the study ran: start it again")
-                found.append(part.take([self.where[names[i]][1] for i in indices]))
+                parts.append(part.take([self.where[names[i]][1] for i in indices]))
             order = np.argsort(np.concatenate(list(places.values())))
-            data = pa.concat_tables(found).take(order).combine_chunks()
+            data = pa.concat_tables(parts).take(order).combine_chunks()
             for name in sorted({column for one in names for column in changes.get(one, ())}):
                 pairs = zip(names, data[name].to_pylist(), strict=True)
                 column = pa.array(

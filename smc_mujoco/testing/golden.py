@@ -101,8 +101,8 @@ def _checked(response: object, tolerances: Mapping[str, float]) -> None:
 def _tolerance(name: str, value: float, tolerances: Mapping[str, float], rel: float) -> float:
     """Return a metric's tolerance in its unit: that in `tolerances`, else the share `rel` of its value; 0 for inf."""
     if name in tolerances:
-        return number(f"tolerance of {name}", tolerances[name], least=0.0)
-    share = max(number("rel", rel, least=0.0) * abs(value), MIN_TOLERANCE)
+        return number(f"tolerance of {name}", tolerances[name], low=0.0)
+    share = max(number("rel", rel, low=0.0) * abs(value), MIN_TOLERANCE)
     return float(f"{share:.2g}") if math.isfinite(value) else 0.0
 
 
@@ -125,9 +125,9 @@ def read(file: Path) -> dict[str, dict[str, Any]]:
       ScenarioError: it is not a golden file.
     """
     try:
-        found = read_json(file)
-        if isinstance(found, dict) and all(isinstance(entry, dict) for entry in found.values()):
-            return found
+        stored = read_json(file)
+        if isinstance(stored, dict) and all(isinstance(entry, dict) for entry in stored.values()):
+            return stored
         why = "it is not test -> metric -> value"
     except FileNotFoundError:
         return {}

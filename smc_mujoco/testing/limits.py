@@ -36,14 +36,14 @@ def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
     """
     compared = CATALOGUE[metric.rpartition(" ")[2]].absent if math.isnan(value) else value
     if not isinstance(limit, tuple | list):
-        most = number(f"limit of {metric}", limit, infinite=True)
-        return Limit(metric, quantity(value, unit), f"<= {quantity(most)}", compared <= most)
+        high = number(f"limit of {metric}", limit, infinite=True)
+        return Limit(metric, quantity(value, unit), f"<= {quantity(high)}", compared <= high)
     if len(limit) != 2:
         raise ScenarioError(f"limit of {metric} is {shown(limit)}: give the most, or (least, most)")
-    least, most = (number(f"limit of {metric}", end, infinite=True) for end in limit)
-    if least > most:
+    low, high = (number(f"limit of {metric}", end, infinite=True) for end in limit)
+    if low > high:
         raise ScenarioError(f"limits of {metric} are {shown(limit)}: give the lower one first")
-    return Limit(metric, quantity(value, unit), f"{quantity(least)} .. {quantity(most)}", least <= compared <= most)
+    return Limit(metric, quantity(value, unit), f"{quantity(low)} .. {quantity(high)}", low <= compared <= high)
 
 
 def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:

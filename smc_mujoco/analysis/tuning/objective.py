@@ -76,7 +76,7 @@ class Objective:
         object.__setattr__(self, "conditions", tuple(map(find_condition, conditions)))
         if not isinstance(self.starts, Starts):
             raise ScenarioError(f"starts is {shown(self.starts)}: give smc.starts(...)")
-        number("weight", self.weight, least=0.0)
+        number("weight", self.weight, low=0.0)
         for name in ("duration", "control_period", "u_max", "chattering"):
             if getattr(self, name) is not None:
                 number(name, getattr(self, name), above=0.0)

@@ -98,7 +98,7 @@ class Search:
         cases = list(cases[: self.budget - self.runs])
         first, again = self.runs, []
         self.runs += len(cases)
-        found: list[Tried | None] = [None] * len(cases)
+        tried: list[Tried | None] = [None] * len(cases)
         scenarios = [self.members.scenario_of(case.member, case.relay) for case in cases]
         for i, trace in stream(scenarios, self.threads, self.report):
             member, relay, origin = cases[i]
@@ -106,12 +106,12 @@ class Search:
                 self.swing = trace
             if relay:
                 member = dataclasses.replace(member, force=strategies.recorded(trace, relay, member.force))
-            found[i] = Tried(member, self._key(trace), first + i if origin < 0 else origin)
+            tried[i] = Tried(member, self._key(trace), first + i if origin < 0 else origin)
             exact = relay is None or not (relay.slope or relay.start or trace.scenario.clock.jitter)
             if not exact:  # the relay did not see, or do, quite what is recorded
                 again.append(Case(member))
-                found[i] = None
-        done = [one for one in found if one]
+                tried[i] = None
+        done = [one for one in tried if one]
         self.tried += done
         return done + (self.run(again) if again else [])
 

@@ -80,7 +80,7 @@ class Uncertainty:
     def __post_init__(self):
         put = vars(self).update  # the class is frozen
         for name in ("disturbance", "position_noise", "velocity_noise", "jitter", "x0"):
-            put({name: number(f"Uncertainty's {name}", getattr(self, name), least=0.0)})
+            put({name: number(f"Uncertainty's {name}", getattr(self, name), low=0.0)})
         put(hold=number("Uncertainty's hold", self.hold, above=0.0))
         if self.slope is not None:
             put(slope=number("Uncertainty's slope", self.slope, above=0.0))
@@ -138,26 +138,26 @@ def strength(scenario: Scenario) -> float:
 
 def outside(scenario: Scenario, within: Uncertainty) -> str:
     """Return how a class goes beyond the theorem of the law, in words; "" if nothing is known of that."""
-    found, d, u = [], within.disturbance, EFFORT[scenario.plant.units[0]]
-    if d >= (most := strength(scenario)):
-        found.append(f"no law holds |d| = {d:g} {u} with drives of {most:.3g} {u}")
+    reasons, d, u = [], within.disturbance, EFFORT[scenario.plant.units[0]]
+    if d >= (largest := strength(scenario)):
+        reasons.append(f"no law holds |d| = {d:g} {u} with drives of {largest:.3g} {u}")
     admits = {} if scenario.law.template is None else scenario.law.template.admits
     for gains in [SimpleNamespace(**one.gains) for one in scenario.law.of_channels(scenario.plant.driven)][:1]:
         if d and "d" in admits and d >= (bound := admits["d"](gains)):
-            found.append(f"its theorem needs |d| < {bound:.3g} {u} with these gains")
+            reasons.append(f"its theorem needs |d| < {bound:.3g} {u} with these gains")
         if d and "d'" in admits and (within.slope or math.inf) >= (bound := admits["d'"](gains)):
-            found.append(f"its theorem needs |d'| < {bound:.3g} {u}/s with these gains")
+            reasons.append(f"its theorem needs |d'| < {bound:.3g} {u}/s with these gains")
     beside = {"delay": within.delay[1], "noise": within.position_noise + within.velocity_noise, "jitter": within.jitter}
     if admits and any(beside.values()):
-        found.append(f"its theorem is without {joined(name for name, size in beside.items() if size)}")
-    return "; ".join(found)
+        reasons.append(f"its theorem is without {joined(name for name, size in beside.items() if size)}")
+    return "; ".join(reasons)
 
 
-def _range(name: str, value: object, least: float, strict: bool = False) -> Range:
+def _range(name: str, value: object, lower_bound: float, strict: bool = False) -> Range:
     """Return lowest and highest value, from a pair."""
     if not isinstance(value, tuple | list) or len(value) != 2:
         raise ScenarioError(f"Uncertainty's {name} is {shown(value)}: give the lowest and the highest, as (0.7, 1.3)")
-    low, high = (number(f"Uncertainty's {name}", one, least=least) for one in value)
+    low, high = (number(f"Uncertainty's {name}", one, low=lower_bound) for one in value)
     if strict and low <= 0.0:
         raise ScenarioError(f"Uncertainty's {name} begins at {low:g}: give factors greater than 0")
     if low > high:
@@ -193,7 +193,7 @@ class Members:
       constants: name -> function of a scenario and a share in [0, 1] that returns the scenario with this constant. The
         first, "set", returns another scenario, where there are several.
       ends: the shares that a corner of the class may have, for each constant.
-      slope: most change of the disturbance between two samples, N or N m; 0: it may jump.
+      slope: largest change of the disturbance between two samples, N or N m; 0: it may jump.
       bare: the member without force or noise, with the first set, and its other constants in the middle.
 
     Raises:
@@ -256,11 +256,11 @@ class Members:
 
     def limited(self, force: np.ndarray) -> np.ndarray:
         """Return a force of the class that is near to one: within -1 .. 1, and not too steep."""
-        force, most = np.clip(force, -1.0, 1.0), self.slope / self.within.disturbance
-        if not most or np.abs(np.diff(force)).max(initial=0.0) <= most:
+        force, change = np.clip(force, -1.0, 1.0), self.slope / self.within.disturbance
+        if not change or np.abs(np.diff(force)).max(initial=0.0) <= change:
             return force
         made = [before := float(force[0])]
-        made += [before := min(max(value, before - most), before + most) for value in force[1:].tolist()]
+        made += [before := min(max(value, before - change), before + change) for value in force[1:].tolist()]
         return np.array(made)
 
     def random(self, rng: np.random.Generator) -> Member:

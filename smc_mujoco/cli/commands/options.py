@@ -154,12 +154,12 @@ def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> lis
     """
     if texts is None:
         return list(default)
-    found = []
+    parts = []
     for text in [texts] if isinstance(texts, str) else texts:
-        found += (own := [name.strip() for name in SEPARATOR.split(text) if name.strip()])
+        parts += (own := [name.strip() for name in SEPARATOR.split(text) if name.strip()])
         if not own:
             raise ScenarioError(f"{text!r} holds no name: give names, as a,b")
-    return found
+    return parts
 
 
 def json_file(json: Path | None, *others: Path | None) -> "tuple[Path | None, Terminal]":
@@ -188,13 +188,13 @@ def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
     Raises:
       ScenarioError: a pair lacks its name or its value.
     """
-    found = {}
+    values = {}
     for pair in names(text):
         name, _, value = (part.strip() for part in pair.partition("="))
         if not (name and value):
             raise ScenarioError(f"{option} {pair!r} cannot be read: write it as {example}")
-        found[name] = value
-    return found
+        values[name] = value
+    return values
 
 
 def key(given: int | None) -> int | str:
@@ -222,8 +222,8 @@ def law(text: str) -> "str | Law":
     """
     from smc_mujoco.control import from_text
 
-    found = from_text.laws(text)
-    return found[0] if len(found) == 1 else from_text.law(text)
+    given_laws = from_text.laws(text)
+    return given_laws[0] if len(given_laws) == 1 else from_text.law(text)
 
 
 def law_with(text: str, gains: str) -> "Law":
@@ -269,15 +269,15 @@ def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
 
 def _conditions_apart(texts: Sequence[str]) -> list[str]:
     """Return the conditions in texts such as "noise,worn: friction=Coulomb(0.05), x0=0.3", each by itself."""
-    found: list[str] = []
+    chosen: list[str] = []
     for text in texts:
-        first = len(found)
+        first = len(chosen)
         for part in names(text):
-            if len(found) > first and ":" in found[-1] and ":" not in part and FIELD.match(part):
-                found[-1] += f", {part}"
+            if len(chosen) > first and ":" in chosen[-1] and ":" not in part and FIELD.match(part):
+                chosen[-1] += f", {part}"
             else:
-                found.append(part)
-    return found
+                chosen.append(part)
+    return chosen
 
 
 def compared_laws(

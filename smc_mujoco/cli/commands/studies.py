@@ -153,7 +153,7 @@ def compare(
         from smc_mujoco.studies.compare import compare as run
 
     terminal, pictures = Terminal(), files(figure) if figure else []
-    least = RELEVANT if relevant is None else relevant
+    relevant = RELEVANT if relevant is None else relevant
     for file in (*pictures, *([latex] if latex else [])):
         writable(file)
     if rig is not None:
@@ -164,7 +164,7 @@ def compare(
             )
         begin = options.starts(x0, spread)
         key = options.key(noise_key)
-        _compare_on(rig, law, seeds, duration, begin, out, fresh, executor, threads, defaults, least, key)
+        _compare_on(rig, law, seeds, duration, begin, out, fresh, executor, threads, defaults, relevant, key)
         return
     machines = [options.plant(text) for text in options.names(plants)]
     found = run(
@@ -181,7 +181,7 @@ def compare(
         gains=gains,
         quick=quick,
         defaults=defaults,
-        relevant=least,
+        relevant=relevant,
         traces=traces,
         fresh=fresh,
         noise_key=options.key(noise_key),

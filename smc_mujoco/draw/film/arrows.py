@@ -123,7 +123,7 @@ class Scale(NamedTuple):
 
 def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
     """Return the scale of the arrows for each group of driven channels."""
-    found = {}
+    by_group = {}
     for group, parts in style.split(traces).items():
         control, disturbance, reaction = (max(map(abs, panels.span(parts, y))) for y in ("applied", "d", "reaction"))
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
@@ -131,8 +131,8 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
         if group.driven:
             drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
             control = max(control, *map(abs, panels.span(parts, "force"))) if drive else control
-            found[group] = Scale(control, disturbance, longest, reaction > 1.01 * longest, drive)
-    return found
+            by_group[group] = Scale(control, disturbance, longest, reaction > 1.01 * longest, drive)
+    return by_group
 
 
 def by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale]:

@@ -34,7 +34,7 @@ def checked(chosen: Camera | None) -> Camera | None:
             f"camera is {shown(chosen)}: give the name of a camera of the model, or (azimuth, elevation) in degrees, "
             "or (azimuth, elevation, distance) with m"
         )
-    angles = number("camera's azimuth", parts[0]), number("camera's elevation", parts[1], least=-90.0, most=90.0)
+    angles = number("camera's azimuth", parts[0]), number("camera's elevation", parts[1], low=-90.0, high=90.0)
     return *angles, *(number("camera's distance", each, above=0.0) for each in parts[2:])
 
 
@@ -77,13 +77,13 @@ def fit(
     left, right, low, high = np.array([room.left - x, room.right - x, y - room.bottom, y - room.top]) * pixel(size)
     sides = [(across, left, right), (up, low, high)]
     bounds = [(np.max(p - b * z), np.min(p - a * z), a, b) for p, a, b in sides]
-    nearest = max((least - most) / (b - a) for least, most, a, b in bounds)
+    nearest = max((low - high) / (b - a) for low, high, a, b in bounds)
     if distance is None:
         distance = nearest
     else:
         zoom = np.tan(np.radians(USUAL_FOVY) / 2) / np.tan(np.radians(FOVY) / 2)
         distance = float(distance * zoom - (z.min() + z.max()) / 2)
-    centre = [(least - b * distance + most - a * distance) / 2 for least, most, a, b in bounds]
+    centre = [(low - b * distance + high - a * distance) / 2 for low, high, a, b in bounds]
     return turn @ np.array([*centre, distance])
 
 

@@ -19,7 +19,7 @@ MOVED = 0.2  # px: a shape that has moved less since it was drawn is not drawn a
 MARGIN = 3  # px around what has changed, for smoothed edges
 FIXED, SHAPE = 8000, 4000  # px that take as long as a rectangle by itself, as each shape in it; fitted to two films
 SMALL, FEW = 6.0, 2  # px: radius up to which round shapes are drawn with few stacks, as cylinders are; and their number
-FINE, LEAST = 0.35, 6  # px between an arc and its chords, and the least number of chords; chosen
+CHORD_GAP, MIN_CHORDS = 0.35, 6  # px between an arc and its chords, and the smallest number of chords; chosen
 RING = 24  # chords of a ring around an arm's link: with fewer, a link would show through it
 GEOM, SKIN, TENDON = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_SKIN, mujoco.mjtObj.mjOBJ_TENDON
 ROUND = [mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_ELLIPSOID]
@@ -49,7 +49,7 @@ class Canvas:
         if arms:  # joints hide the round ends of links
             ball = model.geom_size[model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE, 0].max(initial=0.0)
             ball /= middle * camera.pixel(size)
-            quality.numstacks = min(max(facets(ball, np.pi, quality.numstacks), LEAST), quality.numstacks)
+            quality.numstacks = min(max(facets(ball, np.pi, quality.numstacks), MIN_CHORDS), quality.numstacks)
         quality.numslices = max(facets(widest, 2 * np.pi, quality.numslices), RING * arms)
         self.renderer = gl.renderer(model, size[1], size[0])
         self.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
@@ -199,18 +199,18 @@ def around(points: np.ndarray) -> np.ndarray:
 
 def joined(areas: Sequence[Area], load: Callable[[Area], int]) -> list[Area]:
     """Return fewer rectangles that cover all: two are joined where this lowers their load, the time to draw them."""
-    found: list[Area] = []
+    covering: list[Area] = []
     for area in areas:
         new, k = area, 0
-        while k < len(found):
-            a, b, c, d = found[k]
+        while k < len(covering):
+            a, b, c, d = covering[k]
             one = min(a, new[0]), min(b, new[1]), max(c, new[2]), max(d, new[3])
             k += 1
-            if load(one) <= load(found[k - 1]) + load(new):
-                del found[k - 1]
+            if load(one) <= load(covering[k - 1]) + load(new):
+                del covering[k - 1]
                 new, k = one, 0  # it may now be close to those that were too far away
-        found.append(new)
-    return found
+        covering.append(new)
+    return covering
 
 
 def pixels(area: Area) -> int:
@@ -225,9 +225,9 @@ def roundness(model: mujoco.MjModel) -> np.ndarray:
     return np.array([size[np.isin(model.geom_type, kinds)].max(initial=0.0) for kinds in (ROUND, [*ROUND, CYLINDER])])
 
 
-def facets(radius: float, angle: float, most: int) -> int:
-    """Return how many chords of an arc, at most `most`, are within FINE of it: its radius in px, its angle in rad."""
-    return int(np.clip(np.ceil(angle * np.sqrt(radius / (8 * FINE))), min(LEAST, most), most))
+def facets(radius: float, angle: float, max_chords: int) -> int:
+    """Return how many chords of an arc are within CHORD_GAP of it: its radius in px, its angle in rad."""
+    return int(np.clip(np.ceil(angle * np.sqrt(radius / (8 * CHORD_GAP))), min(MIN_CHORDS, max_chords), max_chords))
 
 
 def outside(boxes: np.ndarray, area: Area) -> np.ndarray:

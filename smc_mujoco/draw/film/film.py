@@ -139,7 +139,7 @@ def still(
     """Write the frame at `time` in s, within the runs, as a .png. Other arguments: as `film`."""
     path = ended(path, ".png")
     end = max(float(trace.t[-1]) for trace in style.same_plant(traces))
-    now = Clock(np.array([number("time", time, least=0.0, most=end + 1e-9)]), np.ones(1))
+    now = Clock(np.array([number("time", time, low=0.0, high=end + 1e-9)]), np.ones(1))
     with contextlib.closing(frames(traces, now, labels, title, size, camera)) as pictures, replacing(path) as part:
         Image.fromarray(next(pictures)).save(part, optimize=True)
     return path

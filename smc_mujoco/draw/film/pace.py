@@ -55,7 +55,7 @@ def clock(traces: Sequence[Trace], fps: float, speed: float | None = None) -> Cl
         raise ScenarioError(f"fps is {fps:g}: give 1 to 120")
     whole = end(traces)
     if speed is not None:
-        speed = number("speed", speed, least=SPEEDS[0], most=SPEEDS[1])
+        speed = number("speed", speed, low=SPEEDS[0], high=SPEEDS[1])
         times = np.arange(int(whole * fps / speed + 1e-6) + 1) * (speed / fps)
         return Clock(times, np.full(len(times), speed))
     grid, wanted = speeds(traces, fps)
@@ -63,8 +63,8 @@ def clock(traces: Sequence[Trace], fps: float, speed: float | None = None) -> Cl
     while times[-1] < whole - 1e-9:
         now = wanted[np.searchsorted(grid, times[-1] + 1e-9, side="right") - 1]
         times.append(min(times[-1] + now / fps, whole))
-    found = np.array(times)
-    return Clock(found, wanted[np.searchsorted(grid, found + 1e-9, side="right") - 1])
+    frames = np.array(times)
+    return Clock(frames, wanted[np.searchsorted(grid, frames + 1e-9, side="right") - 1])
 
 
 def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]:
@@ -84,14 +84,14 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]
         pushed |= np.abs(grid + 0.5 / fps - push.time - 0.5 * push.width) <= IMPACT
     moved = (travel > STILL) | pushed
     moving = np.asarray(maximum_filter1d(moved, 2 * round(REST * fps) + 1, mode="nearest"), bool)
-    longest, found = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1]), np.ones(len(grid))
-    steps = [(most, SLOWEST) for most in range(SLOWEST, 0, -1)] + [(0, most) for most in range(SLOWEST, -1, -1)]
-    for most, around_pushes in steps:
-        found = np.where(moving | (powers > 0.0), 0.5 ** np.minimum(powers, most), FAST)
-        found[pushed] = 0.5**around_pushes
-        if (1.0 / found).sum() / fps <= longest:
+    longest, playback = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1]), np.ones(len(grid))
+    steps = [(slowest, SLOWEST) for slowest in range(SLOWEST, 0, -1)] + [(0, k) for k in range(SLOWEST, -1, -1)]
+    for slowest, around_pushes in steps:
+        playback = np.where(moving | (powers > 0.0), 0.5 ** np.minimum(powers, slowest), FAST)
+        playback[pushed] = 0.5**around_pushes
+        if (1.0 / playback).sum() / fps <= longest:
             break
-    return grid, found
+    return grid, playback
 
 
 def motion(runs: Sequence[Trace], edges: np.ndarray) -> np.ndarray:

@@ -78,12 +78,12 @@ class Puppet:
           ahead: lead of the rotors over their joints, (shown,) rad or m; default: none.
           rest: pose from which joints without a channel are taken, (nq,); default: that of the start.
         """
-        found = (self._start if rest is None else rest).copy()
+        pose = (self._start if rest is None else rest).copy()
         x = np.where(self.slides, np.clip(x, -self.rail / 2, self.rail / 2), x)
-        found[self._joints] = x
+        pose[self._joints] = x
         for k, place in self._rotors:
-            found[place] = x[k] if ahead is None else x[k] + ahead[k]
-        return found
+            pose[place] = x[k] if ahead is None else x[k] + ahead[k]
+        return pose
 
     def reach(self, trace: Trace, motion: Motion | None = None) -> np.ndarray:
         """Return what must be in the picture, (points, 3) m from the machine's place.
@@ -128,8 +128,8 @@ class Puppet:
 
 def motion(trace: Trace, times: np.ndarray) -> Motion | None:
     """Return how joints without a channel move, at times in s; None if there are none, or if that is not known."""
-    found = None if Puppet(trace.scenario).whole else poses(trace, times)
-    return None if found is None else Motion(times, found)
+    moved = None if Puppet(trace.scenario).whole else poses(trace, times)
+    return None if moved is None else Motion(times, moved)
 
 
 def poses(trace: Trace, times: np.ndarray) -> np.ndarray | None:
@@ -145,7 +145,7 @@ def poses(trace: Trace, times: np.ndarray) -> np.ndarray | None:
     scenario = trace.scenario.resolved
     total, jump = scenario.samples * scenario.steps, scenario.jump_step
     wanted: list[int] = np.clip(np.floor(times / scenario.physics_step + 1e-6).astype(int), 0, total).tolist()
-    found: dict[int, np.ndarray] = {}
+    qpos_at: dict[int, np.ndarray] = {}
     ends: list[int] = sorted({*wanted, *([jump] if 0 < jump < total else [])})
     step = 0
     with callback.installed():
@@ -159,15 +159,15 @@ def poses(trace: Trace, times: np.ndarray) -> np.ndarray | None:
                 batch.set_parameters(step, [0])
             if batch.records["failure"][0] == state.FINE:
                 last = qpos[0].copy()
-            found[end] = last
-    return np.array([found[end] for end in wanted])
+            qpos_at[end] = last
+    return np.array([qpos_at[end] for end in wanted])
 
 
 def places(puppets: Sequence[Puppet], reaches: Sequence[np.ndarray], turn: np.ndarray) -> np.ndarray:
     """Return where the machines stand, (machines, 3) m: side by side, on the floor."""
     scenarios = [puppet.scenario for puppet in puppets]
     step = scene.lane(scenarios, reaches, turn)
-    found = step * (np.arange(len(puppets)) - (len(puppets) - 1) / 2)[:, None]
+    middles = step * (np.arange(len(puppets)) - (len(puppets) - 1) / 2)[:, None]
     if not scenarios[0].plant.on_stage:  # the floor hides what is below it
-        found[:, 2] += [max(0.0, -float(points[:, 2].min())) for points in reaches]
-    return found
+        middles[:, 2] += [max(0.0, -float(points[:, 2].min())) for points in reaches]
+    return middles

@@ -227,13 +227,13 @@ def placed(
         seen = [points + there for points, there in zip(reaches, where, strict=True)]
         return where, seen, camera.fit(np.concatenate(seen), turn, size, room, distance)
 
-    found = fitted(where)
-    step = np.diff(camera.project(where, turn, found[2], size)[:, 0]).mean() if len(where) > 1 else 0.0
+    fit = fitted(where)
+    step = np.diff(camera.project(where, turn, fit[2], size)[:, 0]).mean() if len(where) > 1 else 0.0
     pitch = FILLED * (room.right - room.left) / len(where)
     if 0.0 < step < apart:  # else labels would not be below their machines
-        found = fitted(where * (apart / step, apart / step, 1.0))
+        fit = fitted(where * (apart / step, apart / step, 1.0))
     elif 0.0 < step < pitch and scene.in_a_row(puppets[0].scenario, turn):
         wide = fitted(where * (pitch / step, pitch / step, 1.0))
-        if (wide[2] - found[2]) @ turn[:, 2] < SAME * np.abs(found[2]).max():
+        if (wide[2] - fit[2]) @ turn[:, 2] < SAME * np.abs(fit[2]).max():
             return wide
-    return found
+    return fit

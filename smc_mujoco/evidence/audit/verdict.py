@@ -252,7 +252,7 @@ class Claim(Statement):
                 lines.append((name, "✓" if one.holds else "✗", one.what, value, f"{one.relation} {limit}"))
         about = f"{self.id}: {self.text} ({self.where}): {self.verdict}{', flips with the gains' * self.flips}"
         note = ". ".join(filter(None, (self.source, self.measured, f"It holds if: {self.holds_if}", self.note)))
-        return html.table(("gains", "", "measured", "value", "asked"), lines, about, note, range(3, 5), most=24)
+        return html.table(("gains", "", "measured", "value", "asked"), lines, about, note, range(3, 5), max_rows=24)
 
 
 class Claims(list[Claim]):
@@ -265,7 +265,7 @@ class Claims(list[Claim]):
             words = f"{MARKS[claim.verdict]} {claim.verdict}{', flips' * claim.flips}"
             rows.append((claim.id, claim.text, claim.source, html.strong(words), decided))
         heads = ("id", "claim", "whose, read", "verdict", "decided by")
-        return html.table(heads, rows, note=summary(self), most=99)
+        return html.table(heads, rows, note=summary(self), max_rows=99)
 
 
 def totals(claims: Sequence[Claim]) -> dict[str, int]:

@@ -125,7 +125,7 @@ def score(of: Trace | Mapping[str, Any] | Criteria | Row, version: str = "v2") -
     for name in wanted:
         if values.get(name) is None:
             raise ScenarioError(f"criterion {name} of board {version} is missing in {shown(values)}: give a number")
-        number(name, values[name], least=0.0, infinite=True)
+        number(name, values[name], low=0.0, infinite=True)
     if not math.isfinite(values["swing_up_time"]):
         return 0.0
     if version == "v1":

@@ -182,7 +182,7 @@ class Rig:
         changed = dict(self.quantities)
         for name, value in values.items():
             known = find(f"quantity of {self.name}", name, changed)
-            new = number(f"{self.name}'s {name}", value, least=known.least, most=known.most)
+            new = number(f"{self.name}'s {name}", value, low=known.least, high=known.most)
             if new != known.value:
                 changed[name] = dataclasses.replace(known, value=new, source=source)
         return dataclasses.replace(self, quantities=changed)
@@ -252,11 +252,11 @@ class Rig:
             raise ScenarioError(f"records of {self.name} are not replayed, as their torques are predicted: use fit")
         data = self.checked(record)
         period = self.step(data)
-        first = round((self.start if start is None else number("start", start, least=0.0)) / period)
+        first = round((self.start if start is None else number("start", start, low=0.0)) / period)
         last = len(data[self.columns.time]) - 1
         if duration is not None:
             shortest = round(records.MIN_SAMPLES * period, 9)
-            last = min(last, first + round(number("duration", duration, least=shortest) / period))
+            last = min(last, first + round(number("duration", duration, low=shortest) / period))
         if last - first < records.MIN_SAMPLES:
             raise ScenarioError(
                 f"the record of {self.name} lasts {len(data[self.columns.time]) * period:.3g} s, too short to repeat "

@@ -251,7 +251,7 @@ def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: flo
             f"cannot take a law from {shown(str(source))} on Windows: run smc_mujoco on Linux, or in WSL"
         )
     path = Path(source)
-    timeout = number("timeout", timeout, above=0.0, most=MAX_TIMEOUT)
+    timeout = number("timeout", timeout, above=0.0, high=MAX_TIMEOUT)
     if not isinstance(symbol, str) or not re.fullmatch(r"[A-Za-z_]\w*", symbol, re.ASCII):
         raise ScenarioError(f"symbol is {shown(symbol)}: give the name of a C function")
     if isinstance(flags, str) or not isinstance(flags, Sequence) or not all(isinstance(flag, str) for flag in flags):

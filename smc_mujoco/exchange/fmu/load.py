@@ -225,7 +225,7 @@ def law_from_fmu(
         import fmpy  # noqa: F401
     with reading(path, "functional mock-up unit", "give the path of an .fmu file") as file:
         file.open("rb").close()
-    timeout = number("timeout", timeout, above=0.0, most=MAX_TIMEOUT)
+    timeout = number("timeout", timeout, above=0.0, high=MAX_TIMEOUT)
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     about = _description(file, digest)
     known = {variable.name: variable for variable in about.modelVariables}

@@ -82,7 +82,7 @@ def channel(joint: object, value: object) -> Channel:
     if made.partner is None and made.partner_x0 is not None:
         raise ScenarioError(f"channel {joint!r} has a partner_x0 and no partner: give smc.Channel(partner=...) too")
     starts = {
-        name: number(f"{name} of channel {joint!r}", getattr(made, name), least=-1e6, most=1e6)
+        name: number(f"{name} of channel {joint!r}", getattr(made, name), low=-1e6, high=1e6)
         for name in ("x0", "partner_x0")
         if getattr(made, name) is not None
     }

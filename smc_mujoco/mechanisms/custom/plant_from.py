@@ -150,7 +150,7 @@ def plant_from(
     laws' if there are several.
     """
     source = mjcf.source(path, assets)
-    mjcf.tried(source, errors.number("timeout", timeout, above=0.0, most=MAX_TIMEOUT))
+    mjcf.tried(source, errors.number("timeout", timeout, above=0.0, high=MAX_TIMEOUT))
     return own_plant(source, channels, name, keyframe, tip)
 
 

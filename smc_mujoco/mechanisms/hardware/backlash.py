@@ -47,9 +47,9 @@ class Backlash(Actuator):
     rotor_damping: float = 0.0
 
     def __post_init__(self) -> None:
-        self.check_numbers("gap", least=0.0)
-        self.check_numbers("rotor_inertia", least=MIN_INERTIA)
-        self.check_numbers("rotor_damping", least=0.0)
+        self.check_numbers("gap", low=0.0)
+        self.check_numbers("rotor_inertia", low=MIN_INERTIA)
+        self.check_numbers("rotor_damping", low=0.0)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         rigid = compiled(spec.copy())

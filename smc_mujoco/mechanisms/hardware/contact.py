@@ -72,8 +72,8 @@ class Contact(Part):
     def __post_init__(self) -> None:
         if not isinstance(self.kind, str):
             raise ScenarioError(f"contact is {shown(self.kind)}: give the name of a kind, such as 'floor'")
-        self.check_numbers("friction", least=0.0, most=MAX_FRICTION)
-        self.check_numbers("restitution", least=0.0, most=MAX_RESTITUTION)
+        self.check_numbers("friction", low=0.0, high=MAX_FRICTION)
+        self.check_numbers("restitution", low=0.0, high=MAX_RESTITUTION)
 
     def check(self, plant: Plant) -> None:
         """Check that the plant offers this contact."""

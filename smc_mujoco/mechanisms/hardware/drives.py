@@ -59,7 +59,7 @@ class Lag(Drive):
     tau: float
 
     def __post_init__(self) -> None:
-        self.check_numbers("tau", least=0.0)
+        self.check_numbers("tau", low=0.0)
 
     @property
     def delay(self) -> float:
@@ -83,7 +83,7 @@ class RateLimit(Drive):
     rate: float
 
     def __post_init__(self) -> None:
-        self.check_numbers("rate", above=0.0, most=math.inf, infinite=True)
+        self.check_numbers("rate", above=0.0, high=math.inf, infinite=True)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -135,10 +135,10 @@ class DCMotor(Drive):
     def __post_init__(self) -> None:
         if self.command not in COMMANDS:
             raise unknown("command of DCMotor", self.command, COMMANDS)
-        self.check_numbers("resistance", above=0.0, least=MIN_RESISTANCE)
+        self.check_numbers("resistance", above=0.0, low=MIN_RESISTANCE)
         self.check_numbers("torque_constant", "gear", above=0.0)
-        self.check_numbers("inductance", "rotor_inertia", "cogging", "poles", least=0.0)
-        self.check_numbers("voltage", "current", above=0.0, most=math.inf, infinite=True)
+        self.check_numbers("inductance", "rotor_inertia", "cogging", "poles", low=0.0)
+        self.check_numbers("voltage", "current", above=0.0, high=math.inf, infinite=True)
         if not self.constant >= MIN_CONSTANT or not self.resistance / self.constant <= MAX_PARAMETER:
             raise ScenarioError(
                 f"DCMotor's gear {self.gear:g} times torque_constant {self.torque_constant:g} N m/A is too weak for a "

@@ -49,10 +49,10 @@ class Encoder(Part):
     def __post_init__(self):
         if not (isinstance(self.counts, float) and self.counts == math.inf):
             object.__setattr__(self, "counts", whole("Encoder's counts", self.counts, 2, 2**32))
-        self.check_numbers("bias", most=math.inf)
-        self.check_numbers("dropout", least=0.0, most=1.0)
-        self.check_numbers("period", above=0.0, most=math.inf)
-        self.check_numbers("delay", least=0.0, most=math.inf)
+        self.check_numbers("bias", high=math.inf)
+        self.check_numbers("dropout", low=0.0, high=1.0)
+        self.check_numbers("period", above=0.0, high=math.inf)
+        self.check_numbers("delay", low=0.0, high=math.inf)
 
     def quantum(self, hinge: bool) -> float:
         """One count in rad of a hinge, or m of a slide; 0 without quantisation."""

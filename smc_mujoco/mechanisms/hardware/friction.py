@@ -32,7 +32,7 @@ class Viscous(Friction):
     b: float
 
     def __post_init__(self) -> None:
-        self.check_numbers("b", least=0.0)
+        self.check_numbers("b", low=0.0)
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         yield Field("dof_damping", dof_ids(model), self.b, adds=True)
@@ -55,7 +55,7 @@ class Coulomb(Friction):
     level: float
 
     def __post_init__(self) -> None:
-        self.check_numbers("level", least=0.0)
+        self.check_numbers("level", low=0.0)
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         dofs = dof_ids(model)
@@ -104,7 +104,7 @@ class LuGre(Friction):
 
     def __post_init__(self) -> None:
         self.check_numbers("coulomb", "static", "stribeck", "stiffness", above=0.0)
-        self.check_numbers("damping", least=0.0)
+        self.check_numbers("damping", low=0.0)
         if self.static < self.coulomb:
             raise ScenarioError(
                 f"LuGre's static {self.static:g} is less than its coulomb {self.coulomb:g}: give static >= coulomb"

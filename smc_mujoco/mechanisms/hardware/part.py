@@ -38,9 +38,9 @@ class Part:
         """Replace fields by floats. None stays if it is the field's default.
 
         Args:
-          bounds: those of `errors.number`; `most` is MAX_PARAMETER by default.
+          bounds: those of `errors.number`; `high` is MAX_PARAMETER by default.
         """
-        limits: dict[str, Any] = {"most": MAX_PARAMETER} | bounds
+        limits: dict[str, Any] = {"high": MAX_PARAMETER} | bounds
         for name in names:
             value, optional = getattr(self, name), getattr(type(self), name, 0.0) is None
             if value is not None or not optional:

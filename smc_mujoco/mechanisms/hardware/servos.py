@@ -68,7 +68,7 @@ class ServoFriction(Sliding):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.check_numbers("kv", "kc", "kcs", *LOADED, least=0.0)
+        self.check_numbers("kv", "kc", "kcs", *LOADED, low=0.0)
         self.check_numbers("vs", "alpha", above=0.0)
 
     @staticmethod

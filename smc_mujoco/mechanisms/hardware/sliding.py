@@ -153,9 +153,9 @@ class Sigmoid(Sliding):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.check_numbers("p1", "hold", least=0.0)
+        self.check_numbers("p1", "hold", low=0.0)
         self.check_numbers("p2", above=0.0)
-        self.check_numbers("p3", least=-MAX_PARAMETER)
+        self.check_numbers("p3", low=-MAX_PARAMETER)
 
     @staticmethod
     def value(v, motor, load, p):

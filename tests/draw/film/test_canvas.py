@@ -90,9 +90,9 @@ def test_arcs_have_as_many_chords_as_can_be_told_apart():
     for radius, angle in ((15.0, np.pi), (60.0, 2 * np.pi)):
         count = canvas.facets(radius, angle, 99)
         gaps = [radius * (1.0 - np.cos(angle / n / 2)) for n in (count, count - 1)]
-        assert gaps[0] <= canvas.FINE < gaps[1] * 1.01
+        assert gaps[0] <= canvas.CHORD_GAP < gaps[1] * 1.01
     assert canvas.facets(1e3, np.pi, 10) == 10
-    assert canvas.facets(0.0, np.pi, 10) == canvas.LEAST
+    assert canvas.facets(0.0, np.pi, 10) == canvas.MIN_CHORDS
 
 
 def test_a_picture_in_which_nothing_moves_is_not_drawn_again(monkeypatch):
