@@ -4,9 +4,9 @@
     python benchmarks/gains.py my_law       # only those of some laws
     python benchmarks/gains.py --all        # all of them, within 90 minutes on two cores
 
-Every law by the same rule. Those of the report's first page have the full budget; all others, and the set "tracking",
-have that of one start. Gains are stored as soon as their search ends, so it may be stopped at any time. A file has the
-gains of one rule: those of another are left out when the first new ones are stored.
+Every law by the same rule. Those of the report's first page have the full budget, all others that of three starts, and
+the set "tracking" that of one start, which can end far off. Gains are stored as soon as their search ends, so it may be
+stopped at any time. A file has the gains of one rule: those of another are left out when the first new ones are stored.
 """
 
 import argparse
@@ -18,6 +18,7 @@ from typing import Any
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search_space
+from smc_mujoco.analysis.tuning.result import AGREEING
 from smc_mujoco.analysis.tuning.search import BUDGET, RULE, SPARE, START
 from smc_mujoco.common.files import read_json, replacing, to_json
 from smc_mujoco.control import gain_sets
@@ -39,9 +40,9 @@ def tasks() -> Iterator[Task]:
 def tune(task: Task) -> dict[str, Any]:
     """Search for the gains of a law on a plant, and return their record."""
     gains, plant, law = task
-    first_page = gains == "tuned" and law in gain_sets.LAWS
     searched = search_space.box(smc.law(law), search_space.scales(smc.plant(plant), U_MAX, with_model=False))
-    budget = BUDGET if first_page else START * len(searched) + SPARE
+    starts = AGREEING if gains == "tuned" else 1
+    budget = BUDGET if starts > 1 and law in gain_sets.LAWS else starts * START * len(searched) + SPARE
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "no set of gains tried", smc.ScenarioWarning)
         return smc.tune(plant, law, budget, objective=gain_sets.OBJECTIVES[gains], threads=1).record()

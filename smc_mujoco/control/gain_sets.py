@@ -6,7 +6,8 @@
 - study: a first tuning of the paper's laws to the same bound |u| <= 6. It is never changed in the light of results.
 - tuned: the near-optimal gains of a search by `tuning`, for every general law, with a cost of the variation of u: up to
   24 sets of gains. Run i of a study uses its own set, so that gains are part of the sample. `tuned(...).converged`
-  tells whether the starts of the search agree. The laws of LAWS have a search of several starts, all others of one.
+  tells whether the starts of the search agree. The laws of LAWS have a search of the full budget, all others of three
+  starts.
 - tracking: the same for the laws of LAWS, of one start, without that cost.
 - default: the law's own.
 
