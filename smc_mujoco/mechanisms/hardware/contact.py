@@ -37,9 +37,7 @@ DEPTH = 0.005  # m per m/s of a blow: chosen, so that 2 m/s goes 1 cm deep; e is
 # within 5 % if e >= 0.5; it is up to 9 % too low at e = 0.2, and up to 12 % at 0.1.
 DEPTH_OF_BOBS = 0.0015
 MAX_RESTITUTION = 0.98  # largest restitution: above, a blow could gain energy, by the integrator's error of 1e-3 of it
-MIN_RESTITUTION = (
-    0.01  # smallest restitution, used for smaller ones: below, the dashpot is too stiff for a step of 1 ms
-)
+MIN_RESTITUTION = 0.01  # used for smaller ones, whose dashpot is too stiff for a step of 1 ms
 MAX_FRICTION = 10.0  # chosen; rubber on rubber reaches 2
 # Constant impedances d: FIRM for blows against a fixed obstacle, SPRINGY for blows between bobs and for sliding. The
 # spring carries 1 - d of a steady load. With FIRM a body that leans on an obstacle rests within 0.1 mm; at 0.99 it
