@@ -337,9 +337,7 @@ def signals(
     traces = style.same_plant(traces)
     columns = style.labels(traces, labels)
     traces = [finite(trace) for trace in traces]
-    cells = {(trace.scenario.law.name, column): trace for trace, column in zip(traces, columns, strict=True)}
-    if len(cells) < len(traces):
-        raise ScenarioError("two traces of one law under one condition: give each condition its own label")
+    cells = _by_law_and_condition(traces, columns)
     group, *others = [group for group in style.split(traces) if group.driven]
     if others:
         raise ScenarioError(f"u of {traces[0].scenario.plant.name} has several units: draw it with smc.figure")
@@ -374,6 +372,14 @@ def signals(
         pages.set_head(page, width, title, _meaning([control]), shared)
         pages.write(page, paths)
     return page
+
+
+def _by_law_and_condition(traces: Sequence[Trace], conditions: Sequence[str]) -> dict[tuple[str, str], Trace]:
+    """Return law, condition -> trace; refuse two traces of one law under one condition."""
+    cells = {(trace.scenario.law.name, one): trace for trace, one in zip(traces, conditions, strict=True)}
+    if len(cells) < len(traces):
+        raise ScenarioError("two traces of one law under one condition: give each condition its own label")
+    return cells
 
 
 def _name_condition(ax: Axes, condition: str, trace: Trace, room: float) -> None:

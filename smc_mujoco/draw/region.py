@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,22 +23,14 @@ COLOURS = (*BLUES, OPEN, NOT)
 PANEL = (5.4, 5.3)  # inches on a full page, width and height of a map
 
 
-def checked(path: str | os.PathLike[str]) -> Path:
-    """Return the path, if its ending is that of a picture."""
-    path = Path(path)
-    if path.suffix[1:] not in pages.FORMATS or "\0" in path.name:
-        raise ScenarioError(f"cannot draw to {str(path)!r}: end the name in .svg, .png or .pdf")
-    return path
-
-
 def draw(
     maps: Sequence[Basin],
     path: str | os.PathLike[str] | None = None,
     size: Size = None,
     fig: "Figure | SubFigure | None" = None,
 ) -> "Figure | SubFigure":
-    """Draw maps side by side, and write them to the file `path` if it is given. `size` and `fig` are as in `figure`."""
-    paths = [] if path is None else [checked(path)]
+    """Draw maps side by side; `path`, `size` and `fig` are as in `figure`."""
+    paths = [] if path is None else pages.files(path)
     if not maps:
         raise ScenarioError("no map to draw: give at least one")
     width, height = (PANEL[0] * len(maps), None) if size is None and fig is None else pages.measure(size, fig)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from smc_mujoco.analysis.worst_case.search import Search
+from smc_mujoco.analysis.worst_case.search import Search, Tried
 from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, outside, usual
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import read_json, write_json
@@ -231,9 +231,6 @@ def worst_case(
         early = sorted(drawing.tried[:MIN_RUNS], key=lambda one: one.key, reverse=True)
         search.search(np.random.default_rng([seed, 1]), early[:BEGIN])
     worst = max(search.worst, drawing.worst, key=lambda one: one.key)
-    strategies: dict[str, float] = {}
-    for one in (*drawing.tried, *search.tried):
-        strategies[one.member.kind] = max(strategies.get(one.member.kind, -np.inf), one.key[0])
     return WorstCase(
         value=float(worst.key[0]),
         median=float(np.median([one.key[0] for one in drawing.tried])),
@@ -241,7 +238,7 @@ def worst_case(
         scenario=members.scenario_of(worst.member),
         found_by=worst.member.kind,
         tried=drawing.runs + search.runs,
-        strategies=strategies,
+        strategies=_largest_by_kind([*drawing.tried, *search.tried]),
         nominal=scenario,
         within=within,
         metric=metric,
@@ -249,6 +246,14 @@ def worst_case(
         seed=seed,
         sets=len(scenarios),
     )
+
+
+def _largest_by_kind(tried: Sequence[Tried]) -> dict[str, float]:
+    """Return strategy -> largest value among the members that it made."""
+    largest: dict[str, float] = {}
+    for one in tried:
+        largest[one.member.kind] = max(largest.get(one.member.kind, -np.inf), one.key[0])
+    return largest
 
 
 def kept(

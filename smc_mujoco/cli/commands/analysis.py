@@ -321,7 +321,7 @@ def basin(
     points: Annotated[int, typer.Option(min=2, help="Number of positions, and of velocities.")] = 50,
     gains: options.Gains = "tuned",
     duration: Annotated[float, typer.Option(help="Duration of the longest runs, s.")] = 10.0,
-    out: Annotated[Path | None, typer.Option(help="Also draw the map, to a .png or .svg file.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Also draw the map, as OUT.svg and OUT.png, or OUT.pdf.")] = None,
     json: options.Json = None,
     condition: options.Condition = "nominal",
     threads: options.Threads = None,
@@ -339,11 +339,11 @@ def basin(
         from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED
         from smc_mujoco.analysis.region_of_attraction import basin as search
         from smc_mujoco.common.progress import bar
-        from smc_mujoco.draw import region
+        from smc_mujoco.draw.page import files
+        from smc_mujoco.draw.region import draw
 
-    if out:
-        region.checked(out)
-    json, terminal = options.json_file(json, out)
+    pictures = files(out) if out else []
+    json, terminal = options.json_file(json, *pictures)
     chosen = options.law(law)
     with bar(f"{law} on {plant}") as drawn:
         found = search(
@@ -365,9 +365,9 @@ def basin(
     )
     if json:
         terminal.wrote(found.save(json))
-    if out:
-        region.draw([found], out)
-        terminal.wrote(out)
+    if pictures:
+        draw([found], out)
+        terminal.wrote(*pictures)
 
 
 @errors_as_sentences()

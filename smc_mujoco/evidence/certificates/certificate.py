@@ -276,7 +276,7 @@ class Certificate:
         """Draw the state plane: region, level sets, bound, and runs, such as the worst found.
 
         Args:
-          path: of a .svg, .png or .pdf file; None: nothing is written.
+          path: of the files PATH.svg and PATH.png, or of a .pdf; None: nothing is written.
           traces: runs of the same plant.
 
         Raises:

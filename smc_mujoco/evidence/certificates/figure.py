@@ -9,7 +9,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
-from smc_mujoco.draw.region import BLUES, checked
+from smc_mujoco.draw.region import BLUES
 from smc_mujoco.evidence.certificates import loops
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import EFFORT
@@ -29,7 +29,7 @@ def draw(certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike
     part = next((one for one in data["parts"] if one["theorem"] == "level sets"), None)
     if part is None and not certificate.stable:
         raise ScenarioError(f"the certificate of {certificate.law} on {certificate.plant} has no region to draw")
-    paths = [] if path is None else [checked(path)]
+    paths = [] if path is None else pages.files(path)
     with style.page(SIZE[0]):
         bounded = part is not None and not certificate.rests
         page = pages.blank(SIZE[0] if bounded else 0.62 * SIZE[0], SIZE[1], None)

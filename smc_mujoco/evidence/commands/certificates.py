@@ -40,7 +40,7 @@ def certify(
     out: Annotated[Path | None, typer.Option(metavar="FILE.json", help="Also write the certificate to a file.")] = None,
     figure: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Also draw the state plane, with a run, as .svg, .png or .pdf."),
+        typer.Option(help="Also draw the state plane, with a run, as FIGURE.svg and FIGURE.png, or FIGURE.pdf."),
     ] = None,
     worst: Annotated[
         bool, typer.Option("--worst", help="Also search for the worst d within its bound, some 10 s, and draw its run.")
@@ -65,8 +65,8 @@ def certify(
     with held_back():
         from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
         from smc_mujoco.common.errors import ScenarioError
-        from smc_mujoco.common.files import ended, writable, write_json
-        from smc_mujoco.draw.region import checked
+        from smc_mujoco.common.files import ended, write_json
+        from smc_mujoco.draw.page import files
         from smc_mujoco.evidence.certificates.certificate import Certificate
         from smc_mujoco.evidence.certificates.maker import certify as make
         from smc_mujoco.evidence.commands import tables
@@ -74,10 +74,8 @@ def certify(
         from smc_mujoco.simulation.run import run
         from smc_mujoco.studies.worst_case import worst_case
 
-    json, terminal = options.json_file(json)
-    for file in (out and ended(out, ".json"), figure and checked(figure), json):
-        if file:
-            writable(file)
+    pictures = files(figure) if figure else []
+    json, terminal = options.json_file(json, out and ended(out, ".json"), *pictures)
     scenario = found = None
     if check:
         if plant:
@@ -108,4 +106,5 @@ def certify(
         write_json(json, made.data)
     if figure:
         shown = found.scenario if found else scenario
-        terminal.wrote(made.figure(figure, run([shown]) if shown and shown.plant.n == 1 else ()) and figure)
+        made.figure(figure, run([shown]) if shown and shown.plant.n == 1 else ())
+        terminal.wrote(*pictures)
