@@ -28,7 +28,7 @@ from rich.table import Table
 
 import smc_mujoco as smc
 from smc_mujoco.common import mjcb
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.batch import ScenarioBatch
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.prepare import prepare
@@ -84,9 +84,9 @@ def stepping(
 def plain_batch(scenario: smc.Scenario, runs: int, threads: int = 1) -> Batch:
     """A batch of a plant's whole model, with scenery. It is stepped outside of `installed`, with MuJoCo's timers."""
     first = scenario.resolved
-    model = assembly.with_values(assembly.model(first), first)
+    model = models.with_values(models.model(first), first)
     batch = Batch(model, runs, threads)
-    batch.bind("qpos")[:], batch.bind("qvel")[:] = assembly.start(model, first)
+    batch.bind("qpos")[:], batch.bind("qvel")[:] = models.start(model, first)
     return batch
 
 

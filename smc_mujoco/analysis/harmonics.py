@@ -32,7 +32,7 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, drive_step
 from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import native
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -111,8 +111,8 @@ class Loop:
             self.scenario, actuator=closed, contact="none", x0=None, v0=None, jump=None, integrator=s.integrator
         )
         with installed(None):
-            compiled = assembly.model(ideal)
-            made = assembly.with_values(compiled, ideal)
+            compiled = models.model(ideal)
+            made = models.with_values(compiled, ideal)
             made.opt.disableflags |= JUMPING
             gear = next((part for part in s.actuator if isinstance(part, Backlash)), None)
             if gear is not None:  # the rotor is rigid on the joint here
@@ -122,7 +122,7 @@ class Loop:
                 mujoco.mj_setConst(made, mujoco.MjData(made))
             self.step = float(made.opt.timestep)
             data = mujoco.MjData(made)
-            key = assembly.start(made, dataclasses.replace(ideal, x0=0.0, v0=0.0))
+            key = models.start(made, dataclasses.replace(ideal, x0=0.0, v0=0.0))
             data.qpos[:], data.qvel[:] = key
             self.a, b = transition(made, data)
             self.b = b[:, drive_ids(made)[self.channel]] * math.prod(part.scale for part in s.actuator)

@@ -16,7 +16,7 @@ from smc_mujoco.control.design import STEP
 from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids, joint_names
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -50,10 +50,10 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     plant = as_plant(plant)
     at = Scenario(plant=plant, law="none", x0=(plant.rest or 0.0) if x is None else x, v0=0.0)
     with installed(None):
-        made = assembly.with_values(assembly.model(at), at)
+        made = models.with_values(models.model(at), at)
         made.opt.disableflags |= JUMPING
         data = mujoco.MjData(made)
-        data.qpos[:], data.qvel[:] = assembly.start(made, at)
+        data.qpos[:], data.qvel[:] = models.start(made, at)
         driven, dofs = drive_ids(made), dof_ids(made)
         _hold(made, data, driven, plant.name)
         block = rates(made, data)

@@ -19,7 +19,7 @@ from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.kept import kept
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -45,9 +45,9 @@ class Shape(NamedTuple):
 def shapes(scenario: Scenario) -> list[Shape]:
     """Return the mechanism at the start of a run, and after its jump."""
     steps = [0] if scenario.jump is None else [0, scenario.jump_step]
-    compiled = assembly.model(scenario)
+    compiled = models.model(scenario)
     return [
-        Shape(step * scenario.resolved.physics_step, assembly.with_values(compiled, scenario, step)) for step in steps
+        Shape(step * scenario.resolved.physics_step, models.with_values(compiled, scenario, step)) for step in steps
     ]
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from smc_mujoco.control.law import Law, catalogue
 from smc_mujoco.mechanisms.hardware.part import driven
 from smc_mujoco.mechanisms.plant import field_array, ready
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.reference import Loop
 from smc_mujoco.simulation.scenario import Scenario
@@ -97,13 +97,13 @@ class Live:
     def begin(self, scenario: Scenario) -> None:
         """Start the run again."""
         with installed():
-            self.loop = Pushed(scenario, assembly.mechanism(scenario))
+            self.loop = Pushed(scenario, models.mechanism(scenario))
         self.step, self.due, self.late = 0, 0.0, False
         self.build(0)
 
     def build(self, step: int) -> None:
         """Give the model on screen the true parameters that hold from a physics step on."""
-        for name, value in assembly.field_values(self.loop.compiled, self.loop.scenario, step).items():
+        for name, value in models.field_values(self.loop.compiled, self.loop.scenario, step).items():
             field_array(self.model, name)[: len(value)] = value  # sliders are the last actuators
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
 
@@ -172,7 +172,7 @@ class Live:
 class Pushed(Loop):
     """The reference loop with an additional force and torque on every body, (nbody, 6), as in xfrc_applied."""
 
-    def __init__(self, scenario: Scenario, mechanism: assembly.Mechanism):
+    def __init__(self, scenario: Scenario, mechanism: models.Mechanism):
         super().__init__(scenario, mechanism)
         self.push = np.zeros_like(self.data.xfrc_applied)
 
@@ -186,7 +186,7 @@ class Pushed(Loop):
 
 def model_with_sliders(scenario: Scenario) -> mujoco.MjModel:
     """Return the mechanism with a slider for each gain: an actuator of gear 0, which moves nothing."""
-    spec = assembly.spec(scenario)
+    spec = models.spec(scenario)
     joint = driven(spec)[0].name
     for name, gain in slider_gains(scenario.law).items():
         spec.add_actuator(

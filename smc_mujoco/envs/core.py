@@ -22,7 +22,7 @@ from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, ready
 from smc_mujoco.simulation import callback, coerce
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.reference import Failure, evaluate
@@ -89,7 +89,7 @@ class Setting:
         table = channels(self.model)
         self.qpos, self.qvel, self.ctrl = table["qpos"], table["qvel"], table["ctrl"][: plant.driven]
         self.rotors = _rotors(self.model)
-        self.rest = assembly.start(self.model, self.scenario)
+        self.rest = models.start(self.model, self.scenario)
         self.ctrl_limits = math.prod(part.scale for part in self.scenario.actuator) * np.array(self.scenario.limits)
         self.selected, self.rest_x = self.task.selected(plant), rest(plant)
         self.references = _references(self.scenario, self.scenario.samples + 1 if self.task.moving else 1)
@@ -283,9 +283,9 @@ def _references(scenario: Resolved, samples: int) -> np.ndarray:
 
 def _compiled(scenario: Resolved, edit: Callable[[mujoco.MjSpec], None]) -> mujoco.MjModel:
     """Return the model of a scenario, with its mechanism edited."""
-    spec = assembly.spec(scenario)
+    spec = models.spec(scenario)
     edit(spec)
     model = ready(spec, 0 if scenario.sliding is None else callback.USERDATA)
     model.opt.timestep = scenario.physics_step
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenario.integrator.upper()}")
-    return assembly.with_values(model, scenario)
+    return models.with_values(model, scenario)

@@ -19,7 +19,7 @@ from smc_mujoco.common.files import to_json
 from smc_mujoco.draw.film import puppet
 from smc_mujoco.draw.states import shapes
 from smc_mujoco.mechanisms.hardware.part import joint_ids, joint_names
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.state import LOGGED
 from smc_mujoco.simulation.trace import Trace
@@ -85,7 +85,7 @@ def posed(trace: Trace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     samples = np.flatnonzero(np.isfinite(trace.x).all(axis=1))[::step]
     whole = puppet.poses(trace, trace.t[samples]) if first.nq > len(channels) else None
     if whole is None:
-        whole = np.tile(assembly.start(first, trace.scenario)[0], (len(samples), 1))
+        whole = np.tile(models.start(first, trace.scenario)[0], (len(samples), 1))
     whole[:, channels] = trace.x[samples]
     places, turns = np.empty((len(samples), first.nbody, 3)), np.empty((len(samples), first.nbody, 4))
     for i, k in enumerate(samples.tolist()):

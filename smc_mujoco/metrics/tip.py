@@ -24,7 +24,7 @@ from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.channel_groups import cut, groups
 from smc_mujoco.metrics.kept import kept
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.reference import evaluate
 from smc_mujoco.simulation.signals import Push
 
@@ -116,8 +116,8 @@ def contacts(trace: Trace) -> Contacts:
         raise ScenarioError(f"the scenario of {scenario.plant.name} has no contact: give contact=")
     if unknown := _unknown(scenario):
         raise ScenarioError(f"the state of {type(unknown[0]).__name__} is not in a trace, so its contacts are unknown")
-    compiled = assembly.model(scenario)
-    model = assembly.with_values(compiled, scenario)
+    compiled = models.model(scenario)
+    model = models.with_values(compiled, scenario)
     data, joints = mujoco.MjData(model), joint_ids(model)
     positions, rates = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
     drives, n = model.actuator_ctrladr[drive_ids(model)], scenario.plant.driven
@@ -133,7 +133,7 @@ def contacts(trace: Trace) -> Contacts:
                 values[k:] = np.nan
             break
         if k == jump:
-            assembly.put_values(model, compiled, scenario, scenario.jump_step)
+            models.put_values(model, compiled, scenario, scenario.jump_step)
             mujoco.mj_setConst(model, mujoco.MjData(model))
         data.qpos[positions], data.qvel[rates], data.qfrc_applied[rates] = trace.x[k], trace.v[k], trace.d[k]
         data.ctrl[drives] = scale * trace.applied[k, :n]

@@ -12,7 +12,7 @@ from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.plant import Values, field_array
 from smc_mujoco.simulation import callback, controller, reference, state
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.prepare import Packed, Prepared, pack
 from smc_mujoco.simulation.scenario import Resolved
 from smc_mujoco.simulation.trace import Trace, from_log
@@ -36,7 +36,7 @@ class ScenarioBatch:
         self.scenarios = scenarios = [one.scenario.resolved for one in prepared]
         first, count = scenarios[0], len(scenarios)
         self.compiled, self.model = prepared[0].mechanism.model, copy.copy(prepared[0].mechanism.model)
-        set_fields = assembly.put_values(self.model, self.compiled, first, 0)
+        set_fields = models.put_values(self.model, self.compiled, first, 0)
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
         # Fields that the first scenario sets in the shared model, with the values for scenarios that do not set them.
         self.untouched = {name: field_array(self.compiled, name) for name in set_fields}
@@ -73,7 +73,7 @@ class ScenarioBatch:
         """Set the true parameters that hold from a step on."""
         derived = []
         for i in indices:
-            values = self.untouched | assembly.field_values(self.compiled, self.scenarios[i], step)
+            values = self.untouched | models.field_values(self.compiled, self.scenarios[i], step)
             for name, value in values.items():
                 before = self.fields[name][i] if name in self.fields else field_array(self.model, name)
                 if np.any(before != value):
@@ -89,8 +89,8 @@ class ScenarioBatch:
         model, data = copy.copy(self.model), mujoco.MjData(self.model)
         for i, scenario in enumerate(self.scenarios):
             if self.model.nhistory:  # of which each scenario has its own period
-                assembly.put_values(model, self.compiled, scenario, 0)
-            assembly.put_start(model, data, scenario)
+                models.put_values(model, self.compiled, scenario, 0)
+            models.put_start(model, data, scenario)
             for name, values in kept.items():
                 values[i] = getattr(data, name)
 

@@ -21,7 +21,7 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.sliding import SLOW, Sliding
 from smc_mujoco.mechanisms.plant import Dynamics, Plant, Values
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import philox, trace
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_CONTROL, MAX_STATE
@@ -50,10 +50,10 @@ class Failure(Exception):
 
 def run(scenario: Scenario) -> Trace:
     """Return the trace of a scenario, simulated in the reference loop."""
-    return simulate(scenario, assembly.mechanism(scenario))
+    return simulate(scenario, models.mechanism(scenario))
 
 
-def simulate(scenario: Scenario, mechanism: assembly.Mechanism) -> Trace:
+def simulate(scenario: Scenario, mechanism: models.Mechanism) -> Trace:
     """Return the trace of a scenario with its mechanism."""
     with installed():
         loop = Loop(scenario, mechanism)
@@ -68,15 +68,15 @@ def simulate(scenario: Scenario, mechanism: assembly.Mechanism) -> Trace:
 class Loop:
     """One simulation and its controller; `control` is the control callback."""
 
-    def __init__(self, scenario: Scenario, mechanism: assembly.Mechanism):
+    def __init__(self, scenario: Scenario, mechanism: models.Mechanism):
         self.scenario, n = scenario.resolved, scenario.plant.n
         self.compiled, table = mechanism.model, mechanism.channels
-        self.model = assembly.with_values(self.compiled, scenario)
+        self.model = models.with_values(self.compiled, scenario)
         self.data = mujoco.MjData(self.model)
         self.channels = {name: table[name].copy() for name in table.dtype.names or ()}
         self.driven, self.hinged = self.channels["ctrl"] >= 0, self.channels["tip"] >= 0  # (n,) bool
         self.rubs, self.forced = self.channels["friction"] >= 0, self.channels["force"] >= 0
-        assembly.put_start(self.model, self.data, scenario)
+        models.put_start(self.model, self.data, scenario)
         self.total = scenario.samples * scenario.steps  # physics steps
         self.calls = 0
         self.law, self.estimator = (PythonComponent(c, n) for c in (scenario.law, self.scenario.velocity))
@@ -117,7 +117,7 @@ class Loop:
 
     def set_parameters(self, step: int) -> None:
         """Give the mechanism the true parameters that hold from a step on."""
-        assembly.put_values(self.model, self.compiled, self.scenario, step)
+        models.put_values(self.model, self.compiled, self.scenario, step)
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
 
     def control(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:

@@ -20,7 +20,7 @@ import pytest
 from helpers.runs import made, plainly, same, scenario
 
 import smc_mujoco as smc
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 
 UNSTABLE = smc.plant("duffing", alpha=-1e6, beta=0.0)  # grows by e in a millisecond
 LOGGED = ("x", "v", "u", "applied", "s", "d")
@@ -92,7 +92,7 @@ def test_plants_sizes_and_durations_mix_in_one_call():
 
 def test_the_model_of_a_run_has_no_picture_to_paint():
     """MuJoCo paints textures at each compilation, in three quarters of its time."""
-    assert 0 < assembly.model(scenario()).ntexdata < 100 < scenario().plant.load().ntexdata
+    assert 0 < models.model(scenario()).ntexdata < 100 < scenario().plant.load().ntexdata
 
 
 def test_what_is_no_scenario_is_refused():

@@ -18,7 +18,7 @@ from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import Envelope, windows
 from smc_mujoco.mechanisms.plant import EFFORT, catalogue
 from smc_mujoco.metrics.channel_groups import Group, groups
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -79,7 +79,7 @@ def mounts(
 ) -> list[Mount]:
     """Return the Mount of each joint of a machine on a `rail` of that length in m; `front` points to the camera."""
     plant, own = scenario.plant, not scenario.plant.on_stage
-    extent = float(assembly.model(scenario).stat.extent) if own else 0.0
+    extent = float(models.model(scenario).stat.extent) if own else 0.0
     length, thick = (
         (OWN_LENGTH * extent, OWN_THICKNESS * extent) if own else (SLIDE * rail, min(THICKNESS, SHORT * rail))
     )

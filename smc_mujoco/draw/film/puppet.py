@@ -10,7 +10,7 @@ from smc_mujoco.draw.film import scene
 from smc_mujoco.draw.states import shapes
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.simulation import callback, state
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.batch import ScenarioBatch
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import Scenario
@@ -64,7 +64,7 @@ class Puppet:
         self.links = sorted(moved)
         own = not self.scenario.plant.on_stage
         self.whole = not own or len(self._joints) + len(self._rotors) == model.nq
-        self._start = assembly.start(model, self.scenario)[0] if own else model.qpos0
+        self._start = models.start(model, self.scenario)[0] if own else model.qpos0
 
     @property
     def shown(self) -> int:

@@ -16,7 +16,7 @@ from smc_mujoco.draw.film import arm, arrows, camera, scene
 from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.film.puppet import Motion, Puppet, places
 from smc_mujoco.mechanisms.hardware.part import joints
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.trace import Trace
 
 FILLED = 0.7  # part of the width that the places of machines in a row take at least; chosen
@@ -73,7 +73,7 @@ class Stage:
         ]
         material = self.model.geom_matid
         self.paint = np.where((material >= 0)[:, None], self.model.mat_rgba[material], self.model.geom_rgba)
-        names = [[joint.name for joint in joints(assembly.spec(scenario))] for scenario in scenarios]
+        names = [[joint.name for joint in joints(models.spec(scenario))] for scenario in scenarios]
         self.joints = [[self.model.joint(f"m{k}/{name}").id for name in each] for k, each in enumerate(names)]
         self.shape, self.colours, self.changed = [-1] * len(scenarios), [""] * len(scenarios), True
         for k, colour in enumerate(colours):

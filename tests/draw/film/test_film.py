@@ -24,7 +24,7 @@ from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre
 from smc_mujoco.mechanisms.plant import Variant
 from smc_mujoco.metrics.channel_groups import groups
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.trace import ARRAYS
 
 LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
@@ -355,9 +355,9 @@ def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
     scenario = smc.Scenario(plant=plant, law="none", x0=start, duration=0.1, **{field: name})
     model = scene.compose([scenario] * 2, np.array([[0.0, 0, 0], [0, 9, 0]]), SIZE)
     shown = {model.geom(i).name for i in range(model.ngeom)}
-    wanted = [geom.name for geom in assembly.spec(scenario).geoms if geom.name not in ("", "floor")]
+    wanted = [geom.name for geom in models.spec(scenario).geoms if geom.name not in ("", "floor")]
     assert [f"m{k}/{geom}" for k in range(2) for geom in wanted if f"m{k}/{geom}" not in shown] == []
-    assert model.nskin == 2 * len(assembly.spec(scenario).skins)
+    assert model.nskin == 2 * len(models.spec(scenario).skins)
 
 
 def stood(scenarios) -> np.ndarray:
@@ -371,7 +371,7 @@ def stood(scenarios) -> np.ndarray:
 def test_machines_side_by_side_keep_apart(plant, field, name):
     start = None if smc.plant(plant).ranges else 0.5
     scenario = smc.Scenario(plant=plant, law="none", x0=start, duration=0.1, **{field: name})
-    corners = scene.fixed_boxes(assembly.model(scenario))[..., :2]
+    corners = scene.fixed_boxes(models.model(scenario))[..., :2]
     low, high = corners.min(axis=1), corners.max(axis=1)
     step = stood([scenario] * 3)[1, :2] - stood([scenario] * 3)[0, :2]
     for by in (step, 2 * step):

@@ -22,7 +22,7 @@ from smc_mujoco.mechanisms.custom import channels as own_channels
 from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, prepared
 from smc_mujoco.mechanisms.custom.plant_from import OwnModel
-from smc_mujoco.simulation import model as assembly
+from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import reference as plain
 from smc_mujoco.simulation import scenario as scenario_module
 from smc_mujoco.studies import run_key
@@ -431,7 +431,7 @@ def test_a_keyframe_is_where_runs_start(arm):
     assert smc.run(smc.Scenario(plant=driven_otherwise, law="none", duration=0.1)).failure is None
     for part in (None, smc.Backlash(0.02)):  # which adds joints
         scenario = smc.Scenario(plant=arm(["elbow"], moving, keyframe="home"), law="none", actuator=part)
-        qpos, qvel = assembly.start(model := assembly.model(scenario), scenario)
+        qpos, qvel = models.start(model := models.model(scenario), scenario)
         assert [qpos[model.joint(joint).qposadr[0]] for joint in ("shoulder", "elbow")] == [0.2, -0.5]
         assert not qvel.any()
     with pytest.raises(smc.ScenarioError, match=r"unknown keyframe of arm.xml 'hme': did you mean 'home'"):
