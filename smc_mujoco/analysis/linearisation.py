@@ -111,8 +111,8 @@ def holding(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.nda
         raise ScenarioError(f"{plant.name} has no theory at rest: give a plant with equal joints")
 
     def force(x: np.ndarray) -> np.ndarray:
-        own = [plant.nominal(np.full(plant.n, each), still, 0, p) for each in x]
-        return np.minimum(rest.force(gains, x), u_max) - np.array([f / g for f, g in own])
+        nominal = [plant.nominal(np.full(plant.n, each), still, 0, p) for each in x]
+        return np.minimum(rest.force(gains, x), u_max) - np.array([f / g for f, g in nominal])
 
     return force
 

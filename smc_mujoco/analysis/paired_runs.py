@@ -155,8 +155,8 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
     for row in range(seeds.size):
         members.setdefault(tuple(str(columns[name][row]) for name in by), []).append(row)
     for key, rows in members.items():
-        own = {name: values[rows] for name, values in columns.items()}
-        yield _group(dict(zip(by, key, strict=True)), np.array(rows), own)
+        cell = {name: values[rows] for name, values in columns.items()}
+        yield _group(dict(zip(by, key, strict=True)), np.array(rows), cell)
 
 
 def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarray:

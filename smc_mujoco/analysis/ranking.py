@@ -274,7 +274,7 @@ def compare(
     numbers = np.zeros(cells.shape, np.int64) if sets is None else _numbers(sets, laws).astype(np.int64)
     did = None if outcomes is None else _numbers(outcomes, laws)
     there = ~np.isnan(cells[0])
-    counts = [[np.unique(own[k, there[k]]).size for k in blocks] for own in numbers]
+    counts = [[np.unique(by_block[k, there[k]]).size for k in blocks] for by_block in numbers]
     ratios = [_ratios_make_sense(cells[:, k], floors[k], relevant) for k in blocks]
     relative = np.array(ratios) & (not shares)
     each = [_differences(cells[:, k], relative[k], None if did is None else did[:, k], numbers[:, k]) for k in blocks]
@@ -380,8 +380,8 @@ def _by_sample(differences: np.ndarray, sets: np.ndarray, rival_sets: np.ndarray
         return differences
     centres = np.full(differences.shape, math.nan)
     for sample in range(max(labels) + 1):
-        own = np.sort(differences[there[np.array(labels) == sample]])
-        low, high = own[(own.size - 1) // 2], own[own.size // 2]
+        ordered = np.sort(differences[there[np.array(labels) == sample]])
+        low, high = ordered[(ordered.size - 1) // 2], ordered[ordered.size // 2]
         centres[sample] = 0.0 if low == -high else (low + high) / 2  # also of two opposite infinite values
     return centres
 

@@ -86,8 +86,8 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
         heads = [Text(f"{head}\n").append(units[name], "dim") for head, name in shown.items()]
         table = _by_label(", ".join(filter(None, (title, heading))), heads, traces.values())
         for label, trace in traces.items():
-            own = values[label][group.name] if label in values else {}
-            cells = [_shown(name, own[name]) for name in shown.values()] if own else [FAILED]
+            numbers = values[label][group.name] if label in values else {}
+            cells = [_shown(name, numbers[name]) for name in shown.values()] if numbers else [FAILED]
             table.add_row(_label(label, trace), *cells)
         tables.append(table)
     gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
@@ -125,8 +125,8 @@ def headings(scenario: Scenario) -> dict[Group, str]:
     titles = {}
     for group in each:
         n = len(group.channels)
-        own = ", ".join(names[i] for i in group.channels) if n <= MAX_NAMED_JOINTS else f"{n} joints"
-        titles[group] = f"{'driven' if group.driven else 'free'}: {own} ({group.unit})"
+        listed = ", ".join(names[i] for i in group.channels) if n <= MAX_NAMED_JOINTS else f"{n} joints"
+        titles[group] = f"{'driven' if group.driven else 'free'}: {listed} ({group.unit})"
     return titles
 
 

@@ -121,8 +121,8 @@ def reading(path: str | os.PathLike[str], kind: str, cure: str) -> Iterator[Path
     except UnicodeError:
         raise ScenarioError(f"{path} is not a {kind} (it is not text): {cure}") from None
     except Exception as error:  # damaged bytes raise any exception there is
-        own = isinstance(error, ScenarioError)
-        why = str(error) if own else ", ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
+        explained = isinstance(error, ScenarioError)
+        why = str(error) if explained else ", ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
         raise ScenarioError(f"{path} is not a {kind} ({why}): {cure}") from None
 
 

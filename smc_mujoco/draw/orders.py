@@ -79,11 +79,11 @@ def orders(
 
 def _label(law: str, rows: Sequence[Accuracy]) -> str:
     """Return a law's entry in the legend, with its order of s, and theory's, if it has a single row."""
-    own = [row.s for row in rows if row.law == law]
-    if len(own) > 1 or math.isnan(own[0].order):
+    orders = [row.s for row in rows if row.law == law]
+    if len(orders) > 1 or math.isnan(orders[0].order):
         return style.label(law)
-    promised = "" if own[0].theory is None else f" ({own[0].theory:.2g})"
-    return f"{style.label(law)}: {own[0].order:z.2f}{promised}"
+    promised = "" if orders[0].theory is None else f" ({orders[0].theory:.2g})"
+    return f"{style.label(law)}: {orders[0].order:z.2f}{promised}"
 
 
 def _draw(ax: Axes, periods: Sequence[float], scaling: Scaling, colour: str, mark: str) -> None:

@@ -66,8 +66,10 @@ def plants() -> list[str]:
     """Return the names of the plants, other packages' included, without importing one."""
     from smc_mujoco.common.catalogue import points
 
-    own = [module.name for module in pkgutil.iter_modules([str(Path(__file__).parents[1] / "mechanisms" / "plants")])]
-    return list(dict.fromkeys([*own, *(point.name for point in points("smc_mujoco.plants"))]))
+    shipped = [
+        module.name for module in pkgutil.iter_modules([str(Path(__file__).parents[1] / "mechanisms" / "plants")])
+    ]
+    return list(dict.fromkeys([*shipped, *(point.name for point in points("smc_mujoco.plants"))]))
 
 
 def camel(name: str) -> str:

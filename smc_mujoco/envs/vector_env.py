@@ -227,7 +227,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
             if len(seed) != self.num_envs:
                 raise ScenarioError(f"seed has {len(seed)} values for {self.num_envs} copies: give one number or all")
-            return [None if own is None else whole("seed", own, 0, SEEDS) for own in seed]
+            return [None if one is None else whole("seed", one, 0, SEEDS) for one in seed]
         first = whole("seed", seed, 0, SEEDS)
         return range(first, first + self.num_envs)
 

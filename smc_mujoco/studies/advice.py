@@ -82,14 +82,14 @@ class Advice(Tables):
         """Return finalist -> the conditions in which it is better than a law on a need, those with most first."""
         conditions = {}
         for rival in self.compared:
-            if its := [condition for asked, condition in self.wins(rival, law) if asked == need]:
+            if its := [condition for compared, condition in self.wins(rival, law) if compared == need]:
                 conditions[rival] = its
         return dict(sorted(conditions.items(), key=lambda item: -len(item[1])))
 
     def _any(self, of: np.ndarray, law: str, need: str) -> bool:
         """Whether numbers (laws, blocks) of the comparison are not all 0 for a law on a need."""
         row = of[self.comparison.laws.index(law)].tolist()
-        return any(value for (asked, _), value in zip(self.blocks, row, strict=True) if asked == need)
+        return any(value for (compared, _), value in zip(self.blocks, row, strict=True) if compared == need)
 
     def dominated(self, law: str) -> list[str]:
         """Return the finalists that are better than a law in some block, and worse in none."""
@@ -158,10 +158,10 @@ class Advice(Tables):
 
     def _cell(self, choice: Choice, need: str) -> Cell:
         """Return a median, marked if no finalist is better in any condition and no run fails."""
-        name, asked = choice.law.name, NEEDS[need]
+        name, entry = choice.law.name, NEEDS[need]
         rivalled = len(self.compared) > 1 and name in self.compared
         doubted = rivalled and self._any(self.comparison.undecided | self.comparison.beaten, name, need)
-        return Cell(asked.metric.text(choice.medians[need].median), asked.below(choice), rivalled and not doubted)
+        return Cell(entry.metric.text(choice.medians[need].median), entry.below(choice), rivalled and not doubted)
 
     @property
     def key(self) -> str:

@@ -128,10 +128,10 @@ def which(
     compared, properties = _needs(needs, machine)
     length = extent.duration if duration is None else number("duration", duration, above=0.0)
     attacked_for = DURATION if duration is None else length
-    asked = [find_condition(one) for one in _conditions(conditions, machine, length)]
+    tested = [find_condition(one) for one in _conditions(conditions, machine, length)]
     if NO_VELOCITY in properties:
-        asked = [_without_velocity(one) for one in asked]
-    tried = [case(machine, "none", one, length, starts=starts) for one in asked]
+        tested = [_without_velocity(one) for one in tested]
+    tried = [case(machine, "none", one, length, starts=starts) for one in tested]
     for scenario in tried:  # refuses what cannot be compared before gains are searched
         check_moving([scenario])
     folder, relevant, properties = Path(out), share_that_matters(relevant), [n for n in properties if n != NO_VELOCITY]
@@ -144,10 +144,10 @@ def which(
 
     def contest(names: Sequence[str], numbers: range, part: str, budget: int | None = None) -> Contest:
         its = [candidates[name] for name in names]
-        runs = crossed([machine], lambda _: its, asked, numbers, length, starts)
+        runs = crossed([machine], lambda _: its, tested, numbers, length, starts)
         table = study(runs, folder / part, noise_key=noise_key, replay=True, **options)
         (group,) = paired_runs.groups(table, by=("plant",))
-        worst, cases = {}, [[case(machine, one.law, on, attacked_for, starts=starts) for on in asked] for one in its]
+        worst, cases = {}, [[case(machine, one.law, on, attacked_for, starts=starts) for on in tested] for one in its]
         if ROBUST in compared:
             worst = _worst(cases, within, budget, 3 if quick else 1, folder / "worst" / part, **options)
         return _contest(Runs(table, group, worst), machine, compared, relevant)
@@ -162,7 +162,7 @@ def which(
     efforts = {scenario.efforts[0] for scenario in tried}
     return Advice(
         plant=machine,
-        conditions=tuple(one.name for one in asked),
+        conditions=tuple(one.name for one in tested),
         needs=compared,
         wanted=tuple(PROPERTIES[name].words for name in properties),
         choices=_choices(finals, candidates),
@@ -203,14 +203,14 @@ def _conditions(conditions: Any, plant: Plant, duration: float) -> Sequence[str 
     return applicable(CONDITIONS, [plant], duration) if conditions is None else listed("conditions", conditions)
 
 
-def _without_velocity(asked: Condition) -> Condition:
+def _without_velocity(condition: Condition) -> Condition:
     """Return a condition without a velocity sensor, where it says nothing of velocity itself."""
 
     def fields(plant: Plant, duration: float) -> dict[str, Any]:
-        own = asked.on(plant, duration)
+        own = condition.on(plant, duration)
         return own if own.keys() & {"velocity", "sensor"} else own | {"velocity": DIFFERENCED}
 
-    return Condition(f"{asked.name} (no velocity sensor)", fields)
+    return Condition(f"{condition.name} (no velocity sensor)", fields)
 
 
 def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> list[Component | Template]:
@@ -296,21 +296,21 @@ def _contest(runs: Runs, plant: Plant, needs: Sequence[str], relevant: float) ->
     fit = _fit(group.laws, settled)
     laws = [law for law in group.laws if law in fit] or group.laws
     scores = {need: NEEDS[need].scores(runs) for need in needs}
-    for need, own in scores.items():
-        if not own.blocks:
+    for need, each in scores.items():
+        if not each.blocks:
             raise ScenarioError(f"need {need!r} has no number in any run on {plant.name}: leave it out")
-    blocks = [(NEEDS[need], k) for need, own in scores.items() for k in own.blocks]
+    blocks = [(NEEDS[need], k) for need, each in scores.items() for k in each.blocks]
     ran = paired_runs.scenarios(table, group)
     comparison = compare(
-        _joined([own.values for own in scores.values()], laws, math.nan),
+        _joined([each.values for each in scores.values()], laws, math.nan),
         [paired_runs.floor(ran[k], need.metric.unit) for need, k in blocks],
-        outcomes=_joined([own.outcomes for own in scores.values()], laws),
-        sets=_joined([own.sets for own in scores.values()], laws),
+        outcomes=_joined([each.outcomes for each in scores.values()], laws),
+        sets=_joined([each.sets for each in scores.values()], laws),
         relevant=relevant,
         untested=[not need.tested for need, _ in blocks],
     )
     by_need = np.split(block_ranks(comparison), len(needs), axis=1)
-    specialists = [comparison.laws[int(own.mean(axis=1).argmin())] for own in by_need]
+    specialists = [comparison.laws[int(each.mean(axis=1).argmin())] for each in by_need]
     order = _order(comparison, _restraint(runs, ran, plant))
     order += [Rank(law, math.nan, math.nan, best=False) for law in group.laws if law not in laws]
     return Contest(runs, scores, comparison, order, settled, fit, specialists)

@@ -57,10 +57,10 @@ def tables(boards: Iterable[Any], worst: Mapping[str, Mapping[str, Any]] | None 
     groups: dict[str, list[Any]] = {}
     for board in boards:
         groups.setdefault(board.about, []).append(board)
-    made = [_table(name, own, (worst or {}).get(own[0].group.get("plant", ""), {})) for name, own in groups.items()]
+    made = [_table(name, each, (worst or {}).get(each[0].group.get("plant", ""), {})) for name, each in groups.items()]
     if not made:
         return [NO_BOARDS]
-    words = key([board for own in groups.values() for board in own])
+    words = key([board for each in groups.values() for board in each])
     return [*made[:-1], dataclasses.replace(made[-1], notes=(*made[-1].notes, words))]
 
 
@@ -135,4 +135,4 @@ def _verdicts(boards: Sequence[Any]) -> list[str]:
     results: dict[str, list[Any]] = {}
     for board in boards:
         results.setdefault(board.result, []).append(board)
-    return [f"{', '.join(one.label for one in own)}{own[0].where}: {result}." for result, own in results.items()]
+    return [f"{', '.join(one.label for one in alike)}{alike[0].where}: {result}." for result, alike in results.items()]

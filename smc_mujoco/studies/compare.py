@@ -285,11 +285,11 @@ def compare(
     names = (
         applicable(extent.conditions, machines, duration) if conditions is None else listed("conditions", conditions)
     )
-    asked = [find_condition(one) for one in names]
+    tested = [find_condition(one) for one in names]
     compared = {plant.name: [_asking(law) for law in _chosen(laws, plant)] for plant in machines}
     every = {id(law): law for its in compared.values() for law in its}.values()
-    check_apart(machines, [coerce.law(law) for law in every], asked)
-    crossed(machines, lambda _: [lambda _: coerce.law("none")], asked, [0], duration, starts)  # refused before tuning
+    check_apart(machines, [coerce.law(law) for law in every], tested)
+    crossed(machines, lambda _: [lambda _: coerce.law("none")], tested, [0], duration, starts)  # refused before tuning
     folder = Path(out)
     options = {"tune": tune and gains == "tuned", "gains": gains, "alike": budget is None}
     candidates = {
@@ -298,7 +298,7 @@ def compare(
         )
         for plant in machines
     }
-    runs = crossed(machines, lambda plant: candidates[plant.name], asked, range(count), duration, starts)
+    runs = crossed(machines, lambda plant: candidates[plant.name], tested, range(count), duration, starts)
     table = study(runs, folder, not fresh, where, threads, progress, traces, noise_key, replay=True)
 
     def attacked(plant: Plant, law: Law) -> WorstCase:

@@ -214,8 +214,8 @@ class Board(Tables):
 
     def name(self, block: Block) -> str:
         """Return the name of a block within the board: its condition, its plant, or both."""
-        own = {"plant": block.plant, "condition": block.condition}
-        return ", ".join(value for what, value in own.items() if what not in self.group)
+        place = {"plant": block.plant, "condition": block.condition}
+        return ", ".join(value for what, value in place.items() if what not in self.group)
 
     @property
     def kind(self) -> str:
@@ -530,15 +530,15 @@ def _entries(
     entries = []
     for rank in ranks(found):
         at = found.laws.index(rank.law)
-        own, samples = found.cells[at], samples_of(sets[rank.law])
-        n = own.shape[1] if samples is None else max(samples) + 1
+        values, samples = found.cells[at], samples_of(sets[rank.law])
+        n = values.shape[1] if samples is None else max(samples) + 1
         if found.shares:
-            interval = share_interval(float(1 - np.nanmean(own, axis=1).mean()), n, found.level)
+            interval = share_interval(float(1 - np.nanmean(values, axis=1).mean()), n, found.level)
         elif mixed:
             interval = Interval(math.nan, math.nan, math.nan, n)
         else:
-            interval = median_of(own, found.level, resamples, seed, samples)
-        failed, runs = int(found.without_value[at].sum()), int((~np.isnan(own)).sum())
+            interval = median_of(values, found.level, resamples, seed, samples)
+        failed, runs = int(found.without_value[at].sum()), int((~np.isnan(values)).sum())
         its = sources.get(rank.law, ())
         entries.append(Entry(law=rank.law, interval=interval, rank=rank, failed=failed, runs=runs, sources=its))
     return tuple(entries)

@@ -191,11 +191,13 @@ class Playback(reference.Loop):
         if self.strayed is not None:
             return False, f"the plant does not move as recorded under these commands, at t = {self.strayed:g} s"
         scale, total, first = max(float(np.nanmax(np.abs(self.recorded.u))), 1e-300), 0.0, None
-        for k, (i, y), asked in zip(self.samples_of, self.measured, commands, strict=True):
+        for k, (i, y), command in zip(self.samples_of, self.measured, commands, strict=True):
             feedforward = self.scenario.feedforward
             added = 0.0 if feedforward is None else reference.evaluate(feedforward, y.t)[0]
             at = slice(None) if i < 0 else slice(i, i + 1)
-            u = np.clip(np.atleast_1d(np.nan if asked is None else asked) + added, -self.limits[at], self.limits[at])
+            u = np.clip(
+                np.atleast_1d(np.nan if command is None else command) + added, -self.limits[at], self.limits[at]
+            )
             error = float(np.abs(u - self.recorded.u[k, : len(self.limits)][at]).max()) / scale
             total += error**2 if error > ROUNDING else 0.0
             first = k if first is None and not error <= ROUNDING else first

@@ -104,10 +104,10 @@ def _codes(s: Scenario, plants: Hashes) -> list[str]:
     known = (*dict.fromkeys(s.references), s.feedforward, *s.disturbance)
     signals = [type(signal) for signal in known if signal is not None]
     parts = [type(part) for part in (*s.friction, s.contact, *s.actuator, s.sensor)]
-    own = [kind for kind in parts if not kind.__module__.startswith(PACKAGE) and kind is not type(None)]
+    foreign = [kind for kind in parts if not kind.__module__.startswith(PACKAGE) and kind is not type(None)]
     if s.plant not in plants:
         plants[s.plant] = _plant_codes(s.plant)
-    return [fingerprint.of(thing) for thing in (*functions, *signals, *own)] + plants[s.plant]
+    return [fingerprint.of(thing) for thing in (*functions, *signals, *foreign)] + plants[s.plant]
 
 
 def _plant_codes(plant: Plant) -> list[str]:

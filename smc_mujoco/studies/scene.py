@@ -127,8 +127,8 @@ class Scene:
 @functools.cache
 def scenes() -> Catalogue[Path]:
     """Return name -> file of every scene that comes with the package, or with another one."""
-    own = {path.stem: path for path in sorted(shipped("scenes").glob("*.py"))}
-    return Catalogue(own, added("smc_mujoco.scenes", _of_package))
+    library = {path.stem: path for path in sorted(shipped("scenes").glob("*.py"))}
+    return Catalogue(library, added("smc_mujoco.scenes", _of_package))
 
 
 def _of_package(point: EntryPoint) -> Path:

@@ -135,5 +135,5 @@ class Store:
                 part = table.read(file, sealed=True)
         except ScenarioError:
             return None
-        own = part.schema.equals(self.schema, check_metadata=True) and not part["hash"].null_count
-        return part if own else None
+        complete = part.schema.equals(self.schema, check_metadata=True) and not part["hash"].null_count
+        return part if complete else None

@@ -238,8 +238,8 @@ def _attacked(
     rigs = annexes.module("smc_mujoco.evidence.rigs.rig", "a rig") if annexes.installed("evidence") else None
     if rigs and plant in rigs.rigs():
         twin, ensemble = rigs.rig(plant), annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig")
-        own = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
-        cases = [ensemble.runs(twin, [one], 1, own, duration) for one in laws or twin.laws]
+        gain_set = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
+        cases = [ensemble.runs(twin, [one], 1, gain_set, duration) for one in laws or twin.laws]
         return [runs[0].law for runs in cases], cases
     chosen = laws or list(gain_sets.LAWS)
     return chosen, [[case(options.plant(plant), one, condition, duration, gains)] for one in chosen]

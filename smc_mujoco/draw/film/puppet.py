@@ -62,9 +62,9 @@ class Puppet:
             if model.body_parentid[body] in moved:
                 moved.add(body)
         self.links = sorted(moved)
-        own = not self.scenario.plant.on_stage
-        self.whole = not own or len(self._joints) + len(self._rotors) == model.nq
-        self._start = models.start(model, self.scenario)[0] if own else model.qpos0
+        off_stage = not self.scenario.plant.on_stage
+        self.whole = not off_stage or len(self._joints) + len(self._rotors) == model.nq
+        self._start = models.start(model, self.scenario)[0] if off_stage else model.qpos0
 
     @property
     def shown(self) -> int:

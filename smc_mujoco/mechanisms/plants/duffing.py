@@ -83,8 +83,8 @@ def add_springs(spec):
 def spring_fields(model, p):
     rest = ASIDE**2 - p.alpha / p.beta if p.beta > 0.0 else 0.0
     if rest <= 0.0:
-        asked = f"alpha {p.alpha:g} with beta {p.beta:g}"
-        raise ScenarioError(f"duffing has no springs for {asked}: give beta > 0 and alpha < {ASIDE**2:g} beta")
+        given = f"alpha {p.alpha:g} with beta {p.beta:g}"
+        raise ScenarioError(f"duffing has no springs for {given}: give beta > 0 and alpha < {ASIDE**2:g} beta")
     springs = [model.tendon("front_spring").id, model.tendon("back_spring").id]
     yield from body_fields(model, p)
     yield Field("tendon_stiffness", springs, p.beta * rest)
