@@ -1,7 +1,7 @@
 """What the tests share: this package's plugin, also where it is not installed, and pytest's for testing plugins.
 
     pytest --quick            # the first case of each test, in files that are marked quick; without the slow ones
-    pytest -m "not slow"      # all but the tests that take more than about 4 s of processor time
+    pytest -m "not slow"      # all but the tests that take over about 4 s, or show what a faster one does
 
 Compiled code is kept in one folder, so that all workers, all child processes, and copies of the package that tests
 install elsewhere compile a function once.
@@ -36,6 +36,7 @@ def pytest_collection_finish() -> None:
     """Exclude the present objects from garbage collection, which would take half a second each time to visit them."""
     gc.enable()
     gc.freeze()
+    gc.set_threshold(50_000, 20, 20)  # a thirtieth of the time is in the 700 objects of the default
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
@@ -64,6 +65,16 @@ def coarse_grid(monkeypatch):
     monkeypatch.setattr("smc_mujoco.analysis.chattering.FREQUENCIES", 24)
     monkeypatch.setattr("smc_mujoco.analysis.chattering.AMPLITUDES", 15)
     monkeypatch.setattr("smc_mujoco.analysis.gains_for.SPEEDS", tuple(10.0 ** (0.4 * k - 1.0) for k in range(6)))
+
+
+@pytest.fixture(scope="module")
+def replayed_here():
+    """Replay runs of one's own laws in this process: its two processes take 2 s to start."""
+    from smc_mujoco.studies import replay
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(replay, "_elsewhere", lambda task, given: getattr(replay, task)(given))
+        yield
 
 
 @pytest.fixture(autouse=True, scope="session")

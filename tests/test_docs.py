@@ -115,6 +115,7 @@ def test_the_tutorial_s_comparison_prints_what_the_page_shows(tmp_path, monkeypa
     assert names[0] == names[1] != []
 
 
+@pytest.mark.slow
 def test_the_tutorial_s_tests_pass_and_tell_a_law_that_is_too_soft(tmp_path):
     for name, text in titled(TUTORIAL).items():
         (tmp_path / name).write_text(text)

@@ -78,6 +78,7 @@ def test_the_wheel_holds_the_package_the_models_and_the_scenes_and_nothing_else(
     assert names == shipped("smc_mujoco") | {f"smc_mujoco/{name}" for name in shipped("models", "scenes")}
 
 
+@pytest.mark.slow
 def test_the_sdist_builds_the_same_wheel(wheel, tmp_path):
     done = run(sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", tmp_path, cwd=ROOT)
     assert done.returncode == 0, done.stderr

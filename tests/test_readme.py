@@ -23,7 +23,7 @@ from smc_mujoco.cli import scene as show
 from smc_mujoco.common import gl
 from smc_mujoco.studies import fair_gains, scene
 
-pytestmark = pytest.mark.quick
+pytestmark = [pytest.mark.quick, pytest.mark.usefixtures("replayed_here")]
 
 README = PAGES[0].read_text()
 TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
@@ -52,8 +52,13 @@ RELATIVE = [pair for pair in LINKS if "://" not in pair[1] and not pair[1].start
 
 
 # What is asked for less of than a page does: as much code runs, in a tenth of the time.
-SHORTLY = Objective(duration=0.5)
-LITTLE = {"compare": {"seeds": 2, "duration": 0.3}, "tune": {"objective": SHORTLY}, "identify": {"most": 2}}
+SHORTLY, BRIEFLY = Objective(duration=0.5), Objective(conditions=("nominal",), duration=0.25)
+LITTLE = {
+    "compare": {"seeds": 2, "duration": 0.3},
+    "tune": {"objective": SHORTLY},
+    "identify": {"most": 2},
+    "worst_case": {"budget": 8},
+}
 
 
 def with_little(function: Callable, little: dict) -> Callable:
@@ -93,7 +98,7 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
     monkeypatch.setattr(search, "BUDGET", 8)  # of the tunings in `smc.compare`
-    monkeypatch.setattr(fair_gains, "Objective", lambda: SHORTLY)
+    monkeypatch.setattr(fair_gains, "Objective", lambda: BRIEFLY)
     for name, little in LITTLE.items():
         monkeypatch.setattr(smc, name, with_little(getattr(smc, name), little))
     monkeypatch.setattr(sys, "argv", ["block.py", "--no-film"])  # read by a scene that plays itself

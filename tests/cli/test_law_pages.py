@@ -292,6 +292,7 @@ for words in (["list"], ["laws"], ["laws", "brand_new"]):
         assert words in flat(out)
 
 
+@pytest.mark.slow
 def test_a_new_law_is_walked_by_the_tests_of_the_catalogue(added):
     files = [*map(str, (ROOT / "tests" / "control").glob("test_laws*.py"))]
     files += [str(ROOT / "tests" / "cli" / "test_law_pages.py")]

@@ -765,11 +765,11 @@ def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(call, folder
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGTERM for a process")
-@pytest.mark.parametrize("shell", [(), ("sh", "-c", 'trap "" INT; exec "$@"', "sh")], ids=["shown", "background"])
-def test_a_process_that_is_told_to_end_says_so_as_after_ctrl_c(tmp_path, shell):
+def test_a_process_that_is_told_to_end_says_so_as_after_ctrl_c(tmp_path):
+    """In the background, where a shell lets it ignore Ctrl-C."""
     (tmp_path / "long.py").write_text(LONG)
     process = subprocess.Popen(
-        [*shell, sys.executable, "long.py", "--no-film"],
+        ["sh", "-c", 'trap "" INT; exec "$@"', "sh", sys.executable, "long.py", "--no-film"],
         cwd=tmp_path,
         env=environment(),
         stdout=subprocess.PIPE,
@@ -814,6 +814,7 @@ def test_json_to_a_file_leaves_tables_where_they_are(capsys):
 # chatter
 
 
+@pytest.mark.usefixtures("coarse_grid")
 def test_chatter_prints_predictions_and_measurements_and_writes_files(call, folder):
     words = ["--law", "super_twisting,observer_free", "--actuator", "lag:0.01", "--gains", "default", "--duration", 3]
     code, out, _ = call("chatter", "duffing", *words, "--json", "cycles.json", "--out", "chatter.pdf")

@@ -59,7 +59,7 @@ def same(a: object, b: object) -> bool:
 
 
 @given(DATA)
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_whatever_is_written_is_json_and_comes_back(data):
     assert same(strict(to_json(data)), plain(data))
     assert same(from_json(to_json(data)), data)

@@ -124,7 +124,8 @@ def test_a_command_that_needs_no_package_imports_none(tmp_path):
     points = "".join(f"[smc_mujoco.{kind}]\nunasked = unasked:x\n" for kind in ("laws", "plants", "scenes", "papers"))
     (about / "entry_points.txt").write_text(points)
     (tmp_path / "unasked.py").write_text("raise SystemExit('imported')")
-    code = "from smc_mujoco.cli.main import main; main(['run', 'inverted_pendulum', '--no-film', '--out', 'out'])"
+    code = "from smc_mujoco.cli import scene; scene.figures = lambda *_: []; from smc_mujoco.cli.main import main; "
+    code += "main(['run', 'inverted_pendulum', '--no-film', '--out', 'out'])"
     paths = os.pathsep.join(map(str, (tmp_path, ROOT)))
     command = [sys.executable, "-W", "error", "-c", code]
     done = subprocess.run(

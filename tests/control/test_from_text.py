@@ -64,6 +64,7 @@ def test_a_tuning_is_its_law_and_keeps_its_source(files, tuned):
     assert {s.law for s in smc.grid("duffing", ["st.json"], seeds=2)} == {tuned.law}
 
 
+@pytest.mark.usefixtures("replayed_here")
 @pytest.mark.filterwarnings("ignore:no set of gains tried")
 def test_a_tuning_goes_through_every_door(files, tuned, capsys):
     tuned.save("st.json")

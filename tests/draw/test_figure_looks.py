@@ -88,7 +88,7 @@ def check(page) -> None:
 @pytest.mark.parametrize(
     ("kind", "size"),
     [
-        ("one", None), ("ten", PAGE), ("ten", COLUMN), ("failed", COLUMN), ("jump", COLUMN), ("short", COLUMN),
+        ("one", None), ("ten", COLUMN), ("failed", COLUMN), ("jump", COLUMN), ("short", COLUMN),
         ("arm", PAGE),
     ],
 )  # fmt: skip

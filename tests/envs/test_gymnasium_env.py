@@ -442,7 +442,11 @@ def fresh(code, **environment):
 
 
 @pytest.mark.parametrize(
-    "order", ["import gymnasium", "import smc_mujoco.envs, smc_mujoco as smc; smc.law; import gymnasium"]
+    "order",
+    [
+        "import gymnasium",
+        pytest.param("import smc_mujoco.envs, smc_mujoco as smc; smc.law; import gymnasium", marks=pytest.mark.slow),
+    ],
 )
 def test_an_id_is_found_whichever_package_is_imported_first(order):
     made = "gymnasium.make('smc_mujoco:Duffing-v0'), gymnasium.make('smc_mujoco:smc/Duffing-v0')"

@@ -13,9 +13,11 @@ EVERY = [(plant, task) for plant in smc.plants() for task in tasks.tasks(plant)]
 
 
 def one_of_each(turn: int) -> list[tuple[str, str]]:
-    """Every plant with one of its tasks, another one with each turn."""
+    """Half of the plants, the other half with the next turn, with one task each, another one with each turn."""
     tasked = {plant: tasks.tasks(plant) for plant in smc.plants()}
-    return [(plant, known[(i + turn) % len(known)]) for i, (plant, known) in enumerate(tasked.items())]
+    return [
+        (plant, known[(i + turn) % len(known)]) for i, (plant, known) in enumerate(tasked.items()) if i % 2 == turn % 2
+    ]
 
 
 SHORT = {"duration": 0.05}

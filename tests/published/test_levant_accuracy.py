@@ -95,7 +95,7 @@ def test_errors_under_noise_have_levant_s_exponents(r):
         np.testing.assert_allclose(exponents(eps, errors), (r - np.arange(r)) / r, rtol=0, atol=WITHIN)
 
 
-@pytest.mark.parametrize("r", [2, 3])
+@pytest.mark.parametrize("r", [pytest.param(2, marks=pytest.mark.slow), 3])
 def test_errors_in_the_sampling_period_have_levant_s_exponents(r):
     for errors in sliding(r, 0.0):
         np.testing.assert_allclose(exponents(PERIODS, errors), r - np.arange(r), rtol=0, atol=WITHIN)
@@ -166,7 +166,7 @@ def differentiation(n, noise):
     return periods, np.reshape(errors, (len(periods), -1, n + 1))
 
 
-@pytest.mark.parametrize("n", [1, 2])
+@pytest.mark.parametrize("n", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_differentiators_err_under_noise_with_levant_s_exponents(n):
     periods, errors = differentiation(n, 1.0)
     eps = (periods / 0.03) ** (n + 1)

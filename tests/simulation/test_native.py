@@ -148,6 +148,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_code_of_two_processes_is_not_mixed_up(cache, tmp_path, monkeypatch):
     """Numba numbers functions of one name, such as those around a law, and each of the processes counts from the start.
 
@@ -193,9 +194,6 @@ def doubled_by_sorting(x):
     return both[1]
 
 
-doubled_by_sorting(1.0)  # numba numbers its own function that sorts, and may give the number to another elsewhere
-
-
 @pytest.mark.parametrize(
     ("body", "thing"),
     [
@@ -207,6 +205,11 @@ doubled_by_sorting(1.0)  # numba numbers its own function that sorts, and may gi
     ids=["function", "array", "function that calls itself", "function that was compiled before"],
 )
 def test_code_that_holds_an_address_or_a_number_of_this_process_is_not_kept(cache, body, thing):
-    """It would be another one in the next process."""
+    """It would be another one in the next process.
+
+    Numba numbers its own function that sorts, and may give the number to another elsewhere.
+    """
+    if thing is doubled_by_sorting:
+        doubled_by_sorting(1.0)
     assert force(mine(body, thing=thing)) == 6.0
     assert list(cache.rglob("*.nb?")) == []

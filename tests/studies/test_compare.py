@@ -17,6 +17,7 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.units import FORCE, RATE, Gain
 from smc_mujoco.studies import executors, fair_gains, worst_case
 
+pytestmark = pytest.mark.usefixtures("replayed_here")
 SHORT = {"duration": 0.5, "budget": 48, "progress": False}
 PLANTS = ["duffing", "inverted_pendulum"]
 
@@ -35,9 +36,9 @@ def plain_law(y, gains, memory):
 
 @pytest.fixture(scope="module", autouse=True)
 def searched_shortly():
-    """Search gains by runs of 1 s."""
+    """Search gains by runs of 0.5 s."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fair_gains, "Objective", functools.partial(Objective, duration=1.0))
+        patch.setattr(fair_gains, "Objective", functools.partial(Objective, duration=0.5))
         yield
 
 

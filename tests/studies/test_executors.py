@@ -319,6 +319,7 @@ print(len({file.read_bytes() for file in Path(folder).glob("*/results.parquet")}
 """
 
 
+@pytest.mark.slow
 def test_a_client_of_ones_own_and_its_address_give_the_same_table(dask, tmp_path):
     address = dask[0].replace("dask://", "tcp://")
     client = start("-c", OWN_CLIENT, str(tmp_path), address, log=tmp_path / "client.log")

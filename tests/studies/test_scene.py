@@ -96,6 +96,7 @@ def test_a_scene_runs_and_its_traces_are_saved(path, tmp_path):
     assert set(tmp_path.iterdir()) == {*saved}
 
 
+@pytest.mark.usefixtures("coarse_grid")
 @pytest.mark.parametrize("name", ["vdp_noise", "arm_wall", "chattering", "control_signals"])
 def test_a_scene_of_each_kind_of_figure_is_drawn(name, tmp_path, monkeypatch):
     pages, write = [], page.write

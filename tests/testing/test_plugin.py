@@ -510,7 +510,7 @@ def test_used_it_leaves_the_renderer_to_mujoco():
 """
 
 
-@pytest.mark.parametrize("wish", [None, "glfw"])
+@pytest.mark.parametrize("wish", [None, pytest.param("glfw", marks=pytest.mark.slow)])
 def test_plugin_imports_nothing_heavy_and_never_sets_mujoco_gl(tmp_path, wish):
     (tmp_path / "test_user.py").write_text(UNUSED.replace("WISH", repr(wish)))
     clean = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "MUJOCO_GL"))}

@@ -35,9 +35,7 @@ def pictures(shown: Stage, push: bool) -> list[np.ndarray]:
     return found
 
 
-@pytest.mark.parametrize(
-    ("plant", "push"), [("inverted_pendulum", True), ("van_der_pol", True), ("pendulum_network", False)]
-)
+@pytest.mark.parametrize(("plant", "push"), [("van_der_pol", True), ("pendulum_network", False)])
 def test_parts_drawn_again_are_those_of_the_whole_picture(plant, push, monkeypatch):
     """Shadows and springs too; the first machine stands still."""
     areas, whole = [], lambda *_: [(0, 0, *SIZE)]

@@ -16,7 +16,7 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.draw import states, style
-from smc_mujoco.draw.film import camera, film, puppet, scene
+from smc_mujoco.draw.film import camera, encoder, film, puppet, scene
 from smc_mujoco.draw.film.arrows import Arrow, Scale, arrows, loads, scales
 from smc_mujoco.draw.film.caption import Caption, key
 from smc_mujoco.draw.film.pace import Clock
@@ -108,9 +108,8 @@ def test_every_machine_moves():
 
 
 @renders
-@pytest.mark.parametrize("plant", ["inverted_pendulum", "van_der_pol"])
-def test_every_law_has_its_colour(plant):
-    (picture,) = pictures(runs(plant), [0.1], size=(640, 360))
+def test_every_law_has_its_colour():
+    (picture,) = pictures(runs("van_der_pol"), [0.1], size=(640, 360))
     for law in LAWS:
         assert share(picture, style.law_colour(law)) > 3e-4, law
 
@@ -135,7 +134,7 @@ def test_arrows_are_to_scale_and_a_bar_shows_switching():
 
 
 @renders
-@pytest.mark.parametrize("plant", ["duffing", "inverted_pendulum"])
+@pytest.mark.parametrize("plant", ["duffing"])
 def test_an_arrow_ends_where_the_bar_of_its_range_does(plant):
     """MuJoCo draws an arrow in half the length of a capsule between the same points."""
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.01, x0=0.0))
@@ -192,9 +191,8 @@ def test_a_failed_machine_turns_grey_and_stays_where_it_was():
 
 
 @renders
-@pytest.mark.parametrize("plant", ["inverted_pendulum", "pendulum_network"])
-def test_a_machine_that_fails_at_once_is_grey_from_the_start(plant):
-    good, bad = runs(plant, laws=LAWS[::3])
+def test_a_machine_that_fails_at_once_is_grey_from_the_start():
+    good, bad = runs("pendulum_network", laws=LAWS[::3])
     first, last = pictures([broken(bad, 0)], [0.0, 0.3])
     assert share(first, style.law_colour(LAWS[3])) == 0.0
     assert np.abs(machines(first).astype(int) - machines(last)).max() < 30
@@ -232,14 +230,36 @@ def test_long_words_stay_in_the_picture(plant):
     assert 24 + style.width(caption.title, 24, bold=True) < 1280 - 24 - style.width("10.00 s", 24, bold=True)
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no masks of signals")
+def test_an_encoder_that_is_started_never_receives_ctrl_c():
+    with encoder.sigint_blocked():
+        process = subprocess.Popen(["sleep", "60"])
+    process.send_signal(signal.SIGINT)
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(0.2)
+    process.kill()
+    process.wait()
+
+
 @renders
+def test_a_film_that_is_stopped_leaves_nothing(tmp_path):
+    def stop(made):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        film.film(runs(), tmp_path / "a.mp4", size=SIZE, report=stop)
+    assert not list(tmp_path.iterdir())
+
+
+@renders
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no process groups to interrupt")
 def test_ctrl_c_ends_a_film_as_itself_and_leaves_nothing(tmp_path):
     code = """
 import signal, sys
 import smc_mujoco as smc
 signal.signal(signal.SIGINT, signal.default_int_handler)  # also where tests run in the background
-trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=100.0))
+trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=20.0))
 smc.film([trace], sys.argv[1], size=(320, 180), report=lambda n: print(n, flush=True))
 """
     command = [sys.executable, "-c", code, str(tmp_path / "a.mp4")]
@@ -278,8 +298,8 @@ def test_one_trace_is_filmed_like_a_list_of_one(tmp_path):
     for name, given in (("a.png", trace), ("b.png", [trace])):
         film.still(given, 0.05, tmp_path / name, size=SIZE)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert film.film(trace, tmp_path / "a.mp4", size=SIZE).stat().st_size
-    assert film.clip(trace, tmp_path / "a.webp", size=SIZE).stat().st_size
+    assert film.film(trace, tmp_path / "a.mp4", size=SIZE, speed=1.0).stat().st_size
+    assert film.clip(trace, tmp_path / "a.webp", size=SIZE, speed=1.0).stat().st_size
 
 
 def test_camera_sees_all_points_as_near_as_it_can():
@@ -367,7 +387,7 @@ def stood(scenarios) -> np.ndarray:
     return puppet.places(found, reaches * len(found), scene.turn(scenarios[0]))
 
 
-@pytest.mark.parametrize(("plant", "field", "name"), VARIANTS[::3], ids=str)
+@pytest.mark.parametrize(("plant", "field", "name"), VARIANTS[::6], ids=str)
 def test_machines_side_by_side_keep_apart(plant, field, name):
     start = None if smc.plant(plant).ranges else 0.5
     scenario = smc.Scenario(plant=plant, law="none", x0=start, duration=0.1, **{field: name})
@@ -509,10 +529,9 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
 
 
 @renders
-@pytest.mark.parametrize("at", [0, 100])
-def test_a_realistic_machine_that_fails_is_filmed(at):
+def test_a_realistic_machine_that_fails_is_filmed():
     parts = {"actuator": smc.Backlash(0.2), "friction": Coulomb(0.3), "contact": "stops"}
-    pictures([broken(realistic(duration=0.2, **parts), at)], [0.0, 0.2], charts=True)
+    pictures([broken(realistic(duration=0.2, **parts), 0)], [0.0, 0.2], charts=True)
 
 
 @renders

@@ -374,7 +374,7 @@ def about(plants, **options):
 
 
 def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory():
-    runs = about(("inverted_pendulum", "van_der_pol", "duffing"))
+    runs = about(("inverted_pendulum", "duffing"))
     for name, found in measured.smallest_stable(runs).items():
         theory, _ = lam_range(find_plant(name), runs.law(name, OURS).gains["k1"], measured.PERIOD)
         assert theory <= found <= 1.02 * theory, name
@@ -394,8 +394,8 @@ def verdicts():
 
 
 def test_the_same_audit_twice_gives_the_same(verdicts):
-    again = claims(only=["3", "18"], gains="study", quick=True, threads=1)
-    assert again == [verdicts[one] for one in ("3", "18")]
+    again = claims(only=["18"], gains="study", quick=True, threads=1)
+    assert again == [verdicts["18"]]
 
 
 def test_the_true_law_passes_what_its_mutants_fail(verdicts):

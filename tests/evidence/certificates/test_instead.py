@@ -49,6 +49,7 @@ def test_numbers_of_sentences_are_those_of_their_certificates(command):
         assert set(re.findall(DECIMALS, claim.instead)) <= told(command), claim.id
 
 
+@pytest.mark.slow
 def test_numbers_of_the_page_are_those_of_certificates():
     shown = set().union(*map(told, [*COMMANDS, "smc-mujoco certify inverted_pendulum --disturbance 1"]))
     shown |= told("smc-mujoco certify inverted_pendulum_network")

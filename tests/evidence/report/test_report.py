@@ -47,7 +47,7 @@ TINY = dataclasses.replace(
     claims=("3", "18"),
     scenes=(("duffing", "nominal"),),
     scene_laws=("observer_free", "classical"),
-    scene=0.6,
+    scene=0.3,
     rigs=("qube_servo",),
     periods=(4e-3, 2e-3),
 )
@@ -58,6 +58,14 @@ SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("report")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_films():
+    """Films of a ninth of the pixels."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(films, "SIZE", (320, 180))
+        yield
 
 
 @pytest.fixture(scope="module")

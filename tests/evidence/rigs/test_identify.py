@@ -20,7 +20,6 @@ from smc_mujoco.evidence.rigs import records, uncertainty
 from smc_mujoco.evidence.rigs.figure import residual_figure
 from smc_mujoco.evidence.rigs.replays import Point, Replays
 from smc_mujoco.evidence.rigs.rig import Fall
-from smc_mujoco.simulation import philox
 
 AXIS = smc.rig("emps")
 PENDULUM = smc.rig("simple_pendulum_ak80")
@@ -59,7 +58,9 @@ def axis_record(seconds, begin=0.0, speed=4.0):
     return {"t": t[first:] - begin, "x": y[first:], "u": u[first:], "r": r[first:]}
 
 
-@pytest.mark.parametrize("begin", [0.0, 0.25], ids=["with a jump from rest", "in motion"])
+@pytest.mark.parametrize(
+    "begin", [pytest.param(0.0, marks=pytest.mark.slow), 0.25], ids=["with a jump from rest", "in motion"]
+)
 def test_columns_of_the_axis_give_all_four_however_they_begin(begin):
     """By another simulator without steps; a cubic through the first samples would err by 8 % in the offset."""
     near = AXIS.with_values({name: 1.05 * AXIS.values[name] for name in AXIS.free})
@@ -121,18 +122,14 @@ def test_a_closed_loop_s_transient_gives_a_quantity_within_three_errors():
     """A reference that jumps in speed decides the mass within 0.1 s. A jackknife alone errs by more than 3 deviations.
 
     The noise of the second sample, which the controller takes for a velocity, decides most of the error. Where it is
-    itself beyond 3 deviations, as the 4.2 of seed 4, the error may be as far off.
+    itself beyond 3 deviations, as in seed 4, the error may be as far off.
     """
-    runs = [
-        AXIS.scenario(reference=smc.Sine(0.05, 3.0), x0=0.0, duration=1.0, seed=seed, noise=smc.Noise(2e-7))
-        for seed in (4, 8)
-    ]
-    for trace in smc.run(runs):
-        second = philox.normals(trace.scenario.seed, 0, philox.MEASUREMENT, 1)[0]
-        result = smc.identify(AXIS, trace, ("mass", "viscous"), starts=1, most=4)
-        for name, value in result.values.items():
-            assert abs(value - AXIS.values[name]) < max(3.0, abs(second)) * result.errors[name]
-            assert result.errors[name] < 0.01 * AXIS.values[name]
+    noise = smc.Noise(2e-7)
+    trace = smc.run(AXIS.scenario(reference=smc.Sine(0.05, 3.0), x0=0.0, duration=1.0, seed=8, noise=noise))
+    result = smc.identify(AXIS, trace, ("mass", "viscous"), starts=1, most=4)
+    for name, value in result.values.items():
+        assert abs(value - AXIS.values[name]) < 3.0 * result.errors[name]
+        assert result.errors[name] < 0.01 * AXIS.values[name]
 
 
 def test_noise_is_read_off_a_moving_record():
@@ -156,7 +153,7 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
 
 def test_a_plants_own_parameters_are_found_from_a_run():
     plant = smc.plant("duffing")
-    run = smc.run(smc.Scenario(plant=plant, law="none", feedforward=smc.Sine(3.0, 2.0), x0=0.3, duration=4.0))
+    run = smc.run(smc.Scenario(plant=plant, law="none", feedforward=smc.Sine(3.0, 2.0), x0=0.3, duration=2.0))
     wrong = smc.plant("duffing", M=1.2, delta=0.1)
     result = smc.identify(wrong, run, ("M", "delta"), starts=1)
     assert result.values == pytest.approx({name: plant.parameters[name] for name in ("M", "delta")}, rel=1e-3)

@@ -348,6 +348,7 @@ def test_a_parameter_that_is_a_word_of_python_is_a_gain(foreign, tmp_path):
     assert smc.law_from_fmu(file, **RENAMED, isolate=False).defaults == {"lambda_": 8.0}
 
 
+@pytest.mark.slow  # test_files.py refuses such archives of all kinds
 def test_an_fmu_that_unpacks_to_too_much_is_refused_before(foreign, tmp_path):
     bomb = shutil.copy(foreign, tmp_path / "bomb.FMU")  # whatever its suffix
     with zipfile.ZipFile(bomb, "a", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:

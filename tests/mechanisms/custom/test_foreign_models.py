@@ -80,7 +80,7 @@ def test_laws_run_on_a_foreign_model_and_its_columns_are_its_joints(name):
 
 
 @FOREIGN
-@pytest.mark.parametrize("name", ["menagerie-like", "gym cheetah"])
+@pytest.mark.parametrize("name", ["menagerie-like", pytest.param("gym cheetah", marks=pytest.mark.slow)])
 def test_a_foreign_model_is_drawn_seen_tuned_and_written_in_c(name, tmp_path):
     traces, joints = ran(name), list(ROAD[name][2])
     plant, start = traces[0].scenario.plant, traces[0].scenario.x0

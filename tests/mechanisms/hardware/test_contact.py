@@ -254,8 +254,8 @@ def test_bobs_that_start_on_each_others_sides_start_inside(name):
 
 @pytest.mark.parametrize(
     ("name", "kind", "mechanism", "restitution"),
-    [(*build, (None, 0.98)[i % 2]) for i, build in enumerate(BUILDS)],
-    ids=["-".join(build) for build in BUILDS],
+    [(*build, (None, 0.98)[i % 2]) for i, build in enumerate(BUILDS[::2])],
+    ids=["-".join(build) for build in BUILDS[::2]],
 )
 def test_a_passive_run_never_gains_energy(name, kind, mechanism, restitution):
     p = undamped(name)
@@ -276,7 +276,7 @@ def test_a_passive_run_never_gains_energy(name, kind, mechanism, restitution):
 # numbers and names
 
 
-@EVERY
+@pytest.mark.parametrize(("name", "kind"), OFFERED[::2], ids=["-".join(pair) for pair in OFFERED[::2]])
 def test_every_number_of_a_contact_is_its_simulations_own(name, kind):
     """Three contacts in a batch run as each of them alone, to the last bit."""
     p = catalogue()[name]
