@@ -31,6 +31,11 @@ OTHERS = {  # title -> names of modules that are no public names
     evidence.audit.audit.Audit
     evidence.audit.verdict.Claim
     """,
+    "Environments for agents": """
+    envs.gymnasium_env.PlantEnv
+    envs.vector_env.BatchEnv
+    envs.dm_control_env.load
+    """,
     "Arms, boards, the paper, tests": """
     evidence.papers.gaber.scenarios
     studies.arms

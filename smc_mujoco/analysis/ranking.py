@@ -113,7 +113,7 @@ class Comparison:
       shifts: (blocks, laws, laws), the least relevant difference of a law that is better than another.
       p: (blocks, laws, laws), one-sided p-value, not corrected, that a law is better than another; 1 of itself.
       sets: (laws, blocks), number of sets of gains of a law's runs.
-      untested: (blocks,), whether laws are compared without a test; p is 0 or 1 there.
+      untested: (blocks,), whether a value is no sample, such as a worst case, so that no test is made; p is 0 or 1.
       limits: of the p-values, after the correction.
     """
 
@@ -203,10 +203,10 @@ class Comparison:
 
     @functools.cached_property
     def undecided(self) -> np.ndarray:
-        """Whether a law is not beaten for want of samples alone, (laws, blocks).
+        """Whether a law is not beaten for want of samples alone, (laws, blocks); False in `untested` blocks.
 
         The median of another law is relevantly lower, and no more of its runs fail, but the two have too few samples
-        for any test.
+        for a test to tell them apart, whatever its result.
         """
         few = np.vectorize(least_p)(self.samples) > self.limits.pair
         few[self.untested] = False

@@ -114,10 +114,10 @@ def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str 
     columns = Column("name", no_wrap=True, style="cyan"), "family", "u", "arrives", "gains to choose"
     table = titled(title, *columns, show_edge=False, padding=(0, 2, 0, 0), pad_edge=False)
     for law in suiting:
-        u = "continuous" if law.continuous else "jumps"
+        u = "continuous" * law.continuous
         table.add_row(law.name, law.family, u, ARRIVES[law.finite_time], ", ".join(searched(law)) or "none")
     console.print(table, "")
-    key = "u: continuous, or jumps. arrives: what theory says is 0 after a finite time, s or the error e."
+    key = "u: continuous, where the law says so. arrives: what theory says is 0 after a finite time, s or the error e."
     console.print(key, style="dim", highlight=False)
 
 
@@ -166,7 +166,7 @@ def _promises(template: Template) -> str:
     """Return what theory says about a law's u and its convergence, in words; "" for surfaces and estimators."""
     if template.kind != "law":
         return ""
-    u = "a continuous u" if template.continuous else "u jumps"
+    u = "a continuous u" * template.continuous
     arrival = {"s": "s = 0 after a finite time", "e": "e = 0 after a finite time", "": ""}[template.finite_time]
     orders = [f"|{name}| of order {template.order(name, template.defaults):.3g}" for name in template.accuracy]
     accuracy = f"{' and '.join(orders)} in the control period" if orders else ""

@@ -99,7 +99,9 @@ def cartesian_path(
     if plant.free:
         raise ScenarioError(f"{plant.name} has joints without an actuator: a path in space needs all of them driven")
     if (site is None) == (body is None):
-        raise ScenarioError(f"site is {shown(site)} and body is {shown(body)}: give the name of one of them")
+        model = plant.load()
+        example = f"site={plant.tip!r}" if plant.tip else f"body={model.body(model.nbody - 1).name!r}"
+        raise ScenarioError(f"site is {shown(site)} and body is {shown(body)}: give one of them, such as {example}")
     try:
         array = np.asarray(points, float)
     except (TypeError, ValueError, OverflowError):  # no numbers, or rows of unequal lengths

@@ -170,6 +170,8 @@ class Advice(Tables):
         medians = f", and medians{of}, with 95 % intervals over {self.samples}" * (not self._untested)
         text = f"place by failed runs, then by mean rank{medians}. "
         text += f"*: no finalist is better{' in any condition' if of else ''}, and every run has a value."
+        bare = any(not NEEDS[need].below(choice) for choice in self.choices for need in self.needs)
+        text += " No interval: its ends are equal, or one is a run without a value." * bare
         if self.comparison.undecided.any():
             text += " A law is not marked where samples are too few to tell."
         if sources := in_words({choice.law.name: [choice.law.source] for choice in self.choices}):

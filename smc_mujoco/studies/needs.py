@@ -130,8 +130,7 @@ class Robust(Need):
         if least is choices[0]:
             return text
         found = least.worst_found
-        median = f"{found.shown(found.median)} {one.unit * math.isfinite(found.median)}".strip()
-        first = f"The median of the random runs would put {least.law.name} first, with {median}"
+        first = f"The median of the random runs would put {least.law.name} first, with {found.with_unit(found.median)}"
         return f"{text} {first}: its worst found is {found.words}."
 
 

@@ -42,6 +42,7 @@ MIN_RUNS, MAX_RUNS = 24, 1024  # of the default budget
 MOST_RUNS = 1_000_000
 PANELS = "error", "d", "u", "phase"  # of a figure
 HEADINGS = "law", "worst found", "median", "place by median", "found by"
+MAX_WORDS = 48  # letters of a class in a picture's title, which is cropped if it is longer; chosen
 BEGIN = 2  # random members that the search also changes, the worst of them
 
 
@@ -87,8 +88,15 @@ class WorstCase(Tables):
         label = CATALOGUE[self.metric].label
         return (
             f"{s.law.name} on {s.plant.name}: {label} {self.words}, median of random members "
-            f"{self.shown(self.median)}; {self.class_words}"
+            f"{self.with_unit(self.median)}; {self.class_words}"
         )
+
+    @property
+    def heading(self) -> str:
+        """The plant and the class, or how many bounds it has if these are too long for a picture's title."""
+        words = self.class_words
+        words = words if len(words) <= MAX_WORDS else f"{words.count(', ') + 1} bounds"
+        return f"{self.nominal.plant.name}: the worst found within {words}"
 
     @property
     def class_words(self) -> str:
@@ -100,10 +108,14 @@ class WorstCase(Tables):
         """Return a value of the metric as text: "fails" where a run failed."""
         return CATALOGUE[self.metric].text(value)
 
+    def with_unit(self, value: float) -> str:
+        """Return a value of the metric with its unit, such as "0.98 m"."""
+        return f"{self.shown(value)} {self.unit * (value < math.inf)}".strip()
+
     @property
     def words(self) -> str:
-        """The value with its unit, such as "0.98 m"."""
-        return f"{self.shown(self.value)} {self.unit * (self.value < math.inf)}".strip()
+        """The worst value with its unit."""
+        return self.with_unit(self.value)
 
     def about(self) -> dict[str, Any]:
         """Return it as JSON data. `scenario` is what a trace's file has, too."""
@@ -130,8 +142,8 @@ class WorstCase(Tables):
         from smc_mujoco.draw.figure import figure
 
         labels = "as given", f"worst found, {CATALOGUE[self.metric].label} {self.words}"
-        title = f"{self.nominal.plant.name}: the worst of {self.class_words}"
-        return figure(run([self.nominal, self.scenario]), path, labels, **{"title": title, "panels": PANELS} | options)
+        options = {"title": self.heading, "panels": PANELS} | options
+        return figure(run([self.nominal, self.scenario]), path, labels, **options)
 
     plot = figure
 
@@ -181,7 +193,7 @@ class WorstCases(Tables, list[WorstCase]):
 
         if len(self) == 1:
             return self[0].figure(path, **options)
-        options = {"title": self.title, "panels": PANELS} | options
+        options = {"title": self[0].heading, "panels": PANELS} | options
         labels = [f"{one.nominal.law.name}: {one.words}" for one in self]
         return figure(run([one.scenario for one in self]), path, labels, **options)
 

@@ -114,7 +114,7 @@ def test_a_filter_that_cannot_be_is_one_sentence(words, sentence, call):
 def test_a_page_has_what_theory_promises_and_what_the_law_reads(call):
     out = flat(call("laws", "twisting")[1])
     assert "family higher-order" in out
-    assert "promises u jumps, e = 0 after a finite time" in out
+    assert "promises e = 0 after a finite time" in out
     assert "reads e, de, ddr, f, g, model" in out
     assert "promises a continuous u" in flat(call("laws", "pid")[1])
     assert "promises" not in call("laws", "filtered_difference")[1]

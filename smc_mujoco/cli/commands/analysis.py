@@ -216,7 +216,7 @@ def worst(
     }
     given: dict[str, Any] = {name: bound for name, bound in bounds.items() if bound}
     within = Uncertainty(hold=hold, **given) if given else None
-    chosen, cases = _attacked(plant, options.laws(law), condition, duration, gains)
+    chosen, cases = _attacked(plant, law, condition, duration, gains)
     found = WorstCases(worst_case(one, metric, within, budget, seed, threads, progress=True) for one in cases)
     terminal.print(found)
     terminal.note(f"{sum(one.tried for one in found)} runs, {options.gains_used(chosen, gains)}", "dim")
@@ -228,7 +228,7 @@ def worst(
 
 
 def _attacked(
-    plant: str, laws: "list[str | Law]", condition: str, duration: float, gains: str
+    plant: str, law: list[str] | None, condition: str, duration: float, gains: str
 ) -> "tuple[list[str | Law], list[list[Scenario]]]":
     """Return the laws to attack, and the scenarios of each: one on a plant, one for each set of parameters of a rig."""
     from smc_mujoco.common import annexes
@@ -239,9 +239,10 @@ def _attacked(
     if rigs and plant in rigs.rigs():
         twin, ensemble = rigs.rig(plant), annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig")
         gain_set = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
-        cases = [ensemble.runs(twin, [one], 1, gain_set, duration) for one in laws or twin.laws]
+        named = options.laws(law, of_rig=twin.laws) or twin.laws
+        cases = [ensemble.runs(twin, [one], 1, gain_set, duration) for one in named]
         return [runs[0].law for runs in cases], cases
-    chosen = laws or list(gain_sets.LAWS)
+    chosen = options.laws(law, gain_sets.LAWS)
     return chosen, [[case(options.plant(plant), one, condition, duration, gains)] for one in chosen]
 
 

@@ -207,11 +207,18 @@ def columns(text: str | None) -> dict[str, str]:
     return pairs(text, "columns", "theta=arm_angle,t=time")
 
 
-def laws(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> "list[str | Law]":
-    """Return the laws in a text such as "pid,slow: classical(k=2),gains.json,my_law.py"; see `control.from_text`."""
+def laws(
+    texts: str | Sequence[str] | None, default: Sequence[str] = (), of_rig: "Sequence[Law]" = ()
+) -> "list[str | Law]":
+    """Return the laws in a text such as "pid,slow: classical(k=2),gains.json,my_law.py"; see `control.from_text`.
+
+    Args:
+      of_rig: the laws of a rig, which come before others of their names.
+    """
     from smc_mujoco.control import from_text
 
-    return [made for one in names(texts, default) for made in from_text.laws(one)]
+    known = {law.name: [law] for law in of_rig}
+    return [made for one in names(texts, default) for made in known.get(one) or from_text.laws(one)]
 
 
 def law(text: str) -> "str | Law":

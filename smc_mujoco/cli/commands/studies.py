@@ -218,7 +218,7 @@ def _compare_on(
 
     terminal, ensemble = Terminal(), annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
     machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
-    chosen = options.laws(law) or None
+    chosen = options.laws(law, of_rig=machine.laws) or None
     length = FULL.duration if duration is None else duration
     scenarios = ensemble.runs(machine, chosen, seeds, "default", length, starts)
     table = study(scenarios, out, not fresh, executor, threads, progress=True, noise_key=noise_key, replay=True)

@@ -13,7 +13,7 @@ from smc_mujoco.common.interrupts import held_back
 @errors_as_sentences()
 def identify(
     rig: Annotated[
-        str, typer.Argument(metavar="RIG", help="A rig, such as qube_servo, or a plant, which `list` shows.")
+        str, typer.Argument(metavar="RIG", help="A rig, such as qube_servo, a plant, or FILE.xml:joint+joint.")
     ],
     files: Annotated[
         list[Path], typer.Argument(metavar="FILE...", help="Records: CSV or npz files of columns, or saved traces.")
@@ -58,7 +58,7 @@ def identify(
             writable(file)
     named = options.columns(columns)
     found = find(
-        as_plant(options.plant(rig)) if rig not in rigs() and (rig in plants() or ".xml:" in rig) else rig,
+        as_plant(options.plant(rig)) if rig not in rigs() and (rig in plants() or ".xml" in rig) else rig,
         [load(file, named) for file in files],
         options.names(quantities) or None,
         start=_numbers(start),
@@ -152,4 +152,6 @@ def replay(
     if film:
         repeated = run([each.replay(record, start, duration, rounded=False) for each in twins.values()])
         traces = [twin.measured(record, start, duration), *repeated]
+        since = float(record[twin.columns.time][0]) + (twin.start if start is None else start)
+        title += f", from {since:.6g} s of the record" * bool(since)
         terminal.wrote(*filmed(traces, film, ["measured", *twins], title, terminal))

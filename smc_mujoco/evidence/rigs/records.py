@@ -160,7 +160,10 @@ def checked(record: Mapping[str, Any], columns: Columns, period: float | None, r
     missing = [name for name in columns.needed(period is not None) if name not in record]
     if missing:
         has = ", ".join(map(str, record)) or "none"
-        raise ScenarioError(f"the record of {rig} has no column {', '.join(missing)} (it has {has}): add it")
+        spare = next((name for name in record if name not in columns.known), "NAME")
+        example = f"--columns {missing[0]}={spare} (in Python names={{{missing[0]!r}: {spare!r}}})"
+        cure = f"add it, or say which it is, as {example}"
+        raise ScenarioError(f"the record of {rig} has no column {', '.join(missing)} (it has {has}): {cure}")
     data = {name: _numbers(name, record[name], rig) for name in columns.known if name in record}
     t = data[columns.time]
     for name, values in data.items():
