@@ -29,7 +29,7 @@ CLASSES = {
 }
 
 
-@pytest.mark.parametrize("name", [name for name in CLASSES if name != "force"])
+@pytest.mark.parametrize("name", CLASSES)
 def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(name):
     base, within = scenario(duration=1.0), CLASSES[name]
     worst = smc.worst_case(base, within=within, budget=8)
