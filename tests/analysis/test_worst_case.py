@@ -11,7 +11,7 @@ from smc_mujoco.analysis.worst_case.strategies import recorded
 from smc_mujoco.analysis.worst_case.uncertainty import usual
 from smc_mujoco.simulation import reference, serialise
 from smc_mujoco.simulation.signals import Relay
-from smc_mujoco.studies.worst_case import WorstCases
+from smc_mujoco.studies.worst_case import WorstCases, default_budget
 
 CLASSICAL = smc.law("classical", k=1.826, c=2.874)
 
@@ -181,3 +181,9 @@ def test_a_table_orders_by_the_worst_and_says_what_a_theorem_leaves_out():
     text = str(found)
     assert "its theorem needs |d| < 1.9 N with these gains" in text
     assert "its theorem needs |d'| < 1 N/s with these gains" in text
+
+
+def test_dry_friction_of_zero_does_not_halve_the_default_budget():
+    smooth = smc.Scenario(plant=smc.plant("servo_axis", cf=0.0), law="pid")
+    within, rubbing = smc.Uncertainty(disturbance=1.0), smc.Uncertainty(disturbance=1.0, friction=(0.0, 0.1))
+    assert default_budget(smooth, within) == pytest.approx(2 * default_budget(smooth, rubbing), abs=1)
