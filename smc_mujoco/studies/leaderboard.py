@@ -47,6 +47,8 @@ if TYPE_CHECKING:
     from smc_mujoco.studies.worst_case import WorstCase
 
 FEW_TIMES = 0.5  # ratio below which values are called so many times less, not so many percent; chosen
+MANY_TIMES = 10.0  # ratio above which values are called so many times as much; chosen
+SAME = 1e-9  # differences that are all smaller are not told, see `number`
 MAX_NAMES = 4  # of plants or conditions in a verdict
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 
@@ -314,10 +316,15 @@ def size_in_words(effect: Effect) -> str:
     """Return how much less or more a law has than a rival, with the interval, such as "12 % less (8 to 16 %)"."""
     if effect.low == effect.high == float(effect.relative):
         return "no difference"
+    if not effect.relative and max(map(abs, effect[:3])) < SAME:
+        return f"no difference of {SAME:g} or more"
     endless = math.isinf(effect.high) and effect.low == (0.0 if effect.relative else -math.inf)
     if effect.relative and effect.high < FEW_TIMES:
         times = [number(1 / value) if value else "inf" for value in (effect.value, effect.high, effect.low)]
         words, span = f"{times[0]} times less", f"{times[1]} to {times[2]} times"
+    elif effect.relative and effect.low > MANY_TIMES:
+        value, low, high = ("inf" if math.isinf(value) else number(value) for value in effect[:3])
+        words, span = f"{value} times as much", f"{low} to {high} times"
     else:
         saved = [float(effect.relative) - value for value in (effect.value, effect.high, effect.low)]
         less = saved[0] >= 0

@@ -440,6 +440,8 @@ def test_a_law_that_is_clearly_better_wins():
         (1.2, 0.9, 1.5, True, "20 % more (-10 to 50 %)"),
         (2e-4, 1e-4, 3e-4, False, "2.0e-4 more (1.0e-4 to 3.0e-4)"),
         (0.01, 0.005, 0.02, True, "100 times less (50.0 to 200 times)"),
+        (1.7e9, 2.8e8, math.inf, True, "1.7e9 times as much (2.8e8 to inf times)"),
+        (3e-12, -2e-11, 9e-10, False, "no difference of 1e-09 or more"),
         (-2e-4, -3e-4, -1e-4, False, "2.0e-4 less (1.0e-4 to 3.0e-4)"),
         (0.71, 0.0, math.inf, True, "29 % less (too few for an interval)"),
         (-2e-4, -math.inf, math.inf, False, "2.0e-4 less (too few for an interval)"),
