@@ -13,7 +13,7 @@ import itertools
 import math
 import re
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -233,12 +233,20 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
 
 def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -> str:
     """Return how a run differs from those of its law, and its machine from all, as "k1 = 6, no noise, m = 0.7"."""
-    return ", ".join(
-        _setting(name, value)
-        for settings, group in ((_settings, alike), (_machine, others))
-        for name, value in settings(trace).items()
-        if any(settings(other).get(name) != value for other in group)
-    )
+    settings = _differing(_settings, trace, alike)
+    machine = {
+        f"plant's {name}" if name in trace.scenario.law.gains else name: value
+        for name, value in _differing(_machine, trace, others).items()
+    }
+    return ", ".join(_setting(name, value) for name, value in [*settings.items(), *machine.items()])
+
+
+def _differing(
+    settings: Callable[[Trace], Mapping[str, object]], trace: Trace, others: Sequence[Trace]
+) -> dict[str, object]:
+    """Return the settings of a run that not all others have."""
+    tables = [settings(other) for other in others]
+    return {name: value for name, value in settings(trace).items() if any(t.get(name) != value for t in tables)}
 
 
 def _settings(trace: Trace) -> Mapping[str, object]:
@@ -251,9 +259,7 @@ def _settings(trace: Trace) -> Mapping[str, object]:
 
 def _machine(trace: Trace) -> Mapping[str, object]:
     """Return the true parameters of a run's machine."""
-    scenario = trace.scenario
-    values = vars(scenario.plant.values(scenario.mismatch))
-    return {f"plant's {name}" if name in scenario.law.gains else name: value for name, value in values.items()}
+    return vars(trace.scenario.plant.values(trace.scenario.mismatch))
 
 
 def distinct(names: Sequence[str]) -> list[str]:
