@@ -241,7 +241,7 @@ def _rows(page, cell: SubplotSpec, panel: Panel, names, colours, share: Axes | N
     pitch, size, rows = 1.0 / len(panel.traces), style.points(8.5), []
     for i, (trace, name, colour) in enumerate(zip(panel.traces, names, colours, strict=True)):
         ax = frame.inset_axes((0.0, 1.0 - (i + 1) * pitch, 1.0, FILLED * pitch), sharex=share)
-        words = style.cropped(name, 0.5 * 72 * page.bbox.width / page.dpi, size)
+        words = style.cropped(name, 72 * cell.get_position(page).width * page.bbox.width / page.dpi, size)
         ax.set_title(words, fontsize=size, fontweight="normal", color=colour, pad=1.0, parse_math=False)
         rows.append((ax, panel._replace(traces=[trace]), [colour]))
         share = ax

@@ -25,6 +25,7 @@ from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import known_laws
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics.channel_groups import Group, cut, groups
+from smc_mujoco.simulation.conditions import FIELDS
 from smc_mujoco.simulation.perturbations import Jump
 from smc_mujoco.simulation.signals import Push
 from smc_mujoco.simulation.trace import Trace
@@ -232,13 +233,21 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
 
 
 def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -> str:
-    """Return how a run differs from those of its law, and its machine from all, as "k1 = 6, no noise, m = 0.7"."""
+    """Return how a run differs from those of its law, and its machine from all, as "k1 = 6, no noise, m = 0.7".
+
+    The name of a run's condition, where it differs, stands for the fields in which all its runs agree.
+    """
     settings = _differing(_settings, trace, alike)
+    condition = settings.pop("condition", None)
+    if condition is not None:
+        same = _differing(_settings, trace, [one for one in alike if one.scenario.condition == condition])
+        settings = {name: value for name, value in settings.items() if name in same or name not in FIELDS}
     machine = {
         f"plant's {name}" if name in trace.scenario.law.gains else name: value
         for name, value in _differing(_machine, trace, others).items()
     }
-    return ", ".join(_setting(name, value) for name, value in [*settings.items(), *machine.items()])
+    words = [_setting(name, value) for name, value in [*settings.items(), *machine.items()]]
+    return ", ".join([str(condition), *words] if condition is not None else words)
 
 
 def _differing(

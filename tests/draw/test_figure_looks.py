@@ -213,6 +213,25 @@ def test_runs_of_one_law_are_told_apart_by_what_differs(one):
     assert style.labels([slow, slow], None) == ["Classical 1", "Classical 2"]
 
 
+def test_runs_under_several_conditions_have_their_names_inside_the_page(one):
+    late = [dataclasses.replace(one.scenario, input_delay=delay) for delay in (0.0, 0.01, 0.02)]
+    words = ["nominal", "late", "w" * 90]
+    runs = [dataclasses.replace(one, scenario=run.named(name)) for run, name in zip(late, words, strict=True)]
+    assert style.labels(runs, None) == [f"Classical: {name}" for name in words]
+    starts = [dataclasses.replace(late[1], x0=(x0,)).named("late") for x0 in (0.5, 0.7)]
+    several = [runs[0], *(dataclasses.replace(one, scenario=run) for run in starts)]
+    assert style.labels(several, None) == [
+        "Classical: nominal",
+        "Classical: late, x0 = 0.5",
+        "Classical: late, x0 = 0.7",
+    ]
+    page = figure(runs, panels=["u", "end"])
+    page.draw_without_rendering()  # matplotlib warns where words leave axes no room
+    titles = [row._left_title for ax in page.axes for row in rows(ax)]
+    assert len(titles) == 6
+    assert max(title.get_window_extent().x1 for title in titles) <= page.bbox.x1
+
+
 def test_labels_of_laws_are_written_one_way():
     assert [style.label(name) for name in ("super_twisting", "fixed_time", "my own")] == [
         "Super-twisting",
