@@ -19,6 +19,7 @@ CLOSE = 0.2  # difference of two orders up to which they agree
 LEVEL = 0.5  # how far the local order at the shortest periods lies below theory's where an error levels off; chosen
 CONFIDENCE = 0.95  # of intervals
 QUANTITIES = ("e", "s")
+UNTOLD = "the order cannot be told"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -207,13 +208,15 @@ def _difference(
     reasons: Mapping[str, str],
 ) -> list[str]:
     """Return why the order is not the promised one, as far as is seen; [] where it is, or nothing was promised."""
-    if theory is None or abs(order - theory) <= CLOSE:
+    if theory is None:
         return []
-    if order > theory:
-        return ["falls faster than promised"]
+    told = not interval[0] <= 0.0 < theory <= interval[1]
+    contained = "its interval contains " + ("the promised order" if told else f"0 and {theory:.2g}: {UNTOLD}")
+    if order >= theory - CLOSE:
+        return [] if told and order <= theory + CLOSE else ["falls faster than promised" if told else contained]
     seen = [text for name, text in reasons.items() if name != "always"]
     if interval[0] <= theory <= interval[1]:
-        seen.append("its interval contains the promised order")
+        seen.append(contained)
     elif len(periods) > 1 and theory > 0.0:
         fine = np.log(errors[:, -2:]).mean(axis=0)
         local = float((fine[1] - fine[0]) / math.log(periods[-1] / periods[-2]))

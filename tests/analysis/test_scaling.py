@@ -72,6 +72,10 @@ def test_an_order_below_the_promised_one_has_a_reason():
     assert measured(H, theory=2.0, saturated="u is at its bound").why == (
         "levels off (order 1 at the shortest periods): these gains, not sampling, limit it; u is at its bound"
     )
+    assert measured(np.array([H**2, 0.0 * H + 1e-4])).why == "its interval contains 0 and 2: the order cannot be told"
+    assert measured(np.array([H**3, 0.0 * H + 1e-4]), theory=1.5).why.endswith(
+        "contains 0 and 1.5: the order cannot be told"
+    )
     assert measured(H**1.7, theory=2.0).why == "no reason seen"
     assert measured(H**2, theory=1.0, saturated="u is at its bound").why == "falls faster than promised"
     assert measured(H, theory=None, saturated="u is at its bound").why == ""
