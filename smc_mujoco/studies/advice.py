@@ -365,7 +365,8 @@ class Advice(Tables):
             if math.isfinite(effect.value):
                 samples = "sets of gains" if effect.sets else "runs"
                 ahead = f"ahead with {effect.ahead} of {effect.samples} {samples}"
-                parts.append(f"{need}{where} {size_in_words(effect)}, {ahead}")
+                unit = NEEDS[need].metric.unit_for(self.plant.unit, self.effort)
+                parts.append(f"{need}{where} {size_in_words(effect, unit)}, {ahead}")
         return f"{first} against {rival}: {'; '.join(parts)}" if parts else ""
 
     @property

@@ -107,7 +107,7 @@ def key(boards: Sequence[Any]) -> str:
     several = f", corrected for {family} comparisons a metric" * (family > 1)
     words += (
         ". Marked: no law is better, and no run failed. A winner is better than every other law in a paired test"
-        f"{several}; {relevance(boards)}."
+        f"{several}; how much: by pairs of runs, not by the medians; {relevance(boards)}."
     )
     words += f" {UNTRIED[:1].upper()}{UNTRIED[1:]}." * any(board.by_step for board in boards)
     gains = in_words(sources(boards))

@@ -44,6 +44,7 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies import board_tables
 
 if TYPE_CHECKING:
+    from smc_mujoco.simulation.scenario import Scenario
     from smc_mujoco.studies.worst_case import WorstCase
 
 FEW_TIMES = 0.5  # ratio below which values are called so many times less, not so many percent; chosen
@@ -80,23 +81,19 @@ class Entry:
 
 
 class Lead(NamedTuple):
-    """The law in front in a block, the rival that it is least sure to be better than, and how they compare."""
+    """The law in front in a block, the rival that it is least sure to be better than, how they compare, and in what."""
 
     law: str
     rival: str
     effect: Effect
-
-    @property
-    def size(self) -> str:
-        """How much less the law has, with the interval, such as "12 % less (8 to 16 %)"."""
-        return size_in_words(self.effect)
+    unit: str
 
     @property
     def words(self) -> str:
         """How the law compares with its rival, such as "12 % less than pid (8 to 16 %), ahead in 24 of 24 seeds"."""
-        less, _, rest = self.size.partition(" (")
         samples = "sets of gains" if self.effect.sets else "runs"
-        return f"{less} than {self.rival} ({rest}, ahead in {self.effect.ahead} of {self.effect.samples} {samples}"
+        size = size_in_words(self.effect, self.unit, self.rival)
+        return f"{size}, ahead in {self.effect.ahead} of {self.effect.samples} {samples}"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -312,8 +309,11 @@ class Board(Tables):
         return f"{entry.failed} of {entry.runs} {'never' if self.unit == 's' else 'failed'}" if entry.failed else ""
 
 
-def size_in_words(effect: Effect) -> str:
-    """Return how much less or more a law has than a rival, with the interval, such as "12 % less (8 to 16 %)"."""
+def size_in_words(effect: Effect, unit: str = "", rival: str = "") -> str:
+    """Return how much less or more a law has than a rival, with the interval, such as "12 % less (8 to 16 %)".
+
+    A difference that is no ratio has the unit. The rival's name, if given, stands before the interval.
+    """
     if effect.low == effect.high == float(effect.relative):
         return "no difference"
     if not effect.relative and max(map(abs, effect[:3])) < SAME:
@@ -329,9 +329,9 @@ def size_in_words(effect: Effect) -> str:
         saved = [float(effect.relative) - value for value in (effect.value, effect.high, effect.low)]
         less = saved[0] >= 0
         value, *ends = saved if less else [0.0 - saved[k] for k in (0, 2, 1)]
-        shown, unit = (_percent, " %") if effect.relative else (number, "")
+        shown, unit = (_percent, " %") if effect.relative else (number, f" {unit}" * (unit not in ("", "1")))
         words, span = f"{shown(value)}{unit} {'less' if less else 'more'}", f"{' to '.join(map(shown, ends))}{unit}"
-    return f"{words} ({'too few for an interval' if endless else span})"
+    return f"{words}{f' than {rival}' * bool(rival)} ({'too few for an interval' if endless else span})"
 
 
 def _percent(share: float) -> str:
@@ -436,7 +436,8 @@ def leaderboard(
             comparison = compare(
                 scores.values, floors, metric == SETTLES, level, scores.outcomes, scores.sets, relevant, limits
             )
-            blocks = tuple(_block(group, comparison, at, k, untuned) for at, k in enumerate(there))
+            on = [_unit(metric, unit, ran[k]) for k in there]
+            blocks = tuple(_block(group, comparison, at, k, untuned, on[at]) for at, k in enumerate(there))
             mixed = "{" in unit and len({block.plant for block in blocks}) > 1
             board = Board(
                 group=group.name,
@@ -490,8 +491,15 @@ def _family(
     return corrected(comparisons, level), sum(len(one.laws) > 1 for one in comparisons) or 1
 
 
-def _block(group: cells.Group, found: Comparison, at: int, k: int, untuned: tuple[str, ...]) -> Block:
-    """Return block k of a group, which is number `at` of the compared blocks."""
+def _unit(metric: str, unit: str, scenario: "Scenario | None") -> str:
+    """Return the unit of a board for the plant of a run; "" where it is not known."""
+    if metric == SETTLES or scenario is None:
+        return "" if "{" in unit else unit
+    return dataclasses.replace(CATALOGUE[metric], unit=unit).unit_for(scenario.plant.unit)
+
+
+def _block(group: cells.Group, found: Comparison, at: int, k: int, untuned: tuple[str, ...], unit: str) -> Block:
+    """Return block k of a group, which is number `at` of the compared blocks; `unit` of its values."""
     plant, condition = group.blocks[k]
     several = found.sets[:, at][found.sets[:, at] > 1]
     return Block(
@@ -502,7 +510,7 @@ def _block(group: cells.Group, found: Comparison, at: int, k: int, untuned: tupl
         best=found.best[at],
         undecided=tuple(law for law, one in zip(found.laws, found.undecided[:, at].tolist(), strict=True) if one),
         ahead=found.winners[at],
-        lead=_lead(found, at),
+        lead=_lead(found, at, unit),
         seeds=group.seeds[k],
         runs=int(found.seeds[at]),
         samples=int(found.samples[at].max()) if len(found.laws) > 1 else int(found.seeds[at]),
@@ -511,7 +519,7 @@ def _block(group: cells.Group, found: Comparison, at: int, k: int, untuned: tupl
     )
 
 
-def _lead(found: Comparison, at: int) -> Lead | None:
+def _lead(found: Comparison, at: int, unit: str) -> Lead | None:
     """Return how the law in front of a block compares with its closest rival: the one with the largest p-value."""
     if len(found.laws) < 2 or found.shares:
         return None
@@ -522,7 +530,7 @@ def _lead(found: Comparison, at: int) -> Lead | None:
     rival = max((i for i in order if i != first), key=lambda i: found.p[at, first, i])
     names = found.laws[first], found.laws[rival]
     effect = found.effect(at, *names)
-    return Lead(*names, effect) if math.isfinite(effect.value) and effect.samples else None
+    return Lead(*names, effect, unit) if math.isfinite(effect.value) and effect.samples else None
 
 
 def _entries(

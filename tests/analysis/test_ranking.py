@@ -451,6 +451,13 @@ def test_a_difference_has_its_interval_or_says_that_there_is_none(value, low, hi
     assert size_in_words(Effect(value, low, high, relative, 1, 1, True)) == words
 
 
+def test_a_difference_that_is_no_ratio_has_the_unit_of_its_metric():
+    less = Effect(-2e-4, -3e-4, -1e-4, False, 1, 1, True)
+    assert size_in_words(less, "(N m)/s", "pid") == "2.0e-4 (N m)/s less than pid (1.0e-4 to 3.0e-4 (N m)/s)"
+    assert size_in_words(less, "1") == "2.0e-4 less (1.0e-4 to 3.0e-4)"
+    assert size_in_words(Effect(0.71, 0.6, 0.8, True, 1, 1, True), "rad") == "29 % less (20 to 40 %)"
+
+
 def test_over_several_conditions_only_what_holds_in_each_is_told():
     """a beats b, b beats c and c beats a, each in two of three conditions."""
     scores = {"a": blocks(1, 2, 3), "b": blocks(2, 3, 1), "c": blocks(3, 1, 2)}
