@@ -124,7 +124,8 @@ def _of_tuning(path: str) -> list[Law]:
         made = as_data.law(scenario["law"], scenario["source"])
     if any(part.function is None for part in made.parts):
         gains = ", ".join(f"{name}={value!r}" for name, value in made.gains.items())
-        raise ScenarioError(f"the law of {path} is your own: give its file with these gains, as my_law.py({gains})")
+        own = f"law {made.name} of {path} is your own"
+        raise ScenarioError(f"{own}: give its file with these gains, as FILE.py({gains})")
     return [made]
 
 

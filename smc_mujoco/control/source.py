@@ -142,6 +142,21 @@ def _searched(searches: Mapping[str, Sequence[Search]]) -> str:
     return ", ".join([*words, *(f"{end}: {joined(laws)}" for end, laws in ends.items() if end != ENDED[True])])
 
 
+def unequal(words: Mapping[str, str]) -> list[str]:
+    """Return a sentence on laws with default gains that stand beside tuned ones; [] if there are none.
+
+    Args:
+      words: law -> where its gains come from, see `kinds`.
+    """
+    default = [law for law, its in words.items() if DEFAULT in its.split(", ")]
+    tuned = [law for law, its in words.items() if its in (TUNED, SHIPPED)]
+    if not default or not tuned:
+        return []
+    have, them = ("has its default gains", "it") if len(default) == 1 else ("have their default gains", "them")
+    are = "is" if len(tuned) == 1 else "are"
+    return [f"{joined(default)} {have}, {joined(tuned)} {are} tuned: tune {them} too (smc-mujoco tune)"]
+
+
 def by_words(words: Mapping[str, str]) -> str:
     """Return law -> where its gains come from as one text, see `in_words`; "" stands for a law without gains."""
     laws: dict[str, list[str]] = {}

@@ -44,17 +44,15 @@ from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, usual
 from smc_mujoco.common.errors import ScenarioError, number, unknown, whole
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.properties import PROPERTIES, suitable
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
 from smc_mujoco.simulation.grid import case, check_moving, crossed, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.advice import Advice
-from smc_mujoco.studies.fair_gains import Candidate, fair_gains
+from smc_mujoco.studies.fair_gains import Candidate, asking, fair_gains
 from smc_mujoco.studies.needs import NEEDS, ROBUST, Choice, Need, Runs, ties
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import study
@@ -224,8 +222,8 @@ def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> list[Componen
         return _some([law for law in suitable(properties, plant=plant) if law.name not in left_out], plant, properties)
     chosen, wanted = [], [PROPERTIES[name] for name in properties]
     for one in listed_laws(laws):
-        law = catalogue()[one] if isinstance(one, str) else one
-        template = law if isinstance(law, Template) else coerce.law(law).template
+        law = asking(one)
+        template = law if isinstance(law, Template) else law.template
         if template is None or all(each.holds(template) for each in wanted):
             chosen.append(law)
     return _some(chosen, plant, properties)

@@ -28,8 +28,8 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
-from smc_mujoco.control.component import Component, Template, written
-from smc_mujoco.control.law import Law, catalogue, fits, known_laws
+from smc_mujoco.control.component import Template, written
+from smc_mujoco.control.law import Law, catalogue, fits
 from smc_mujoco.control.properties import suitable
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
@@ -41,7 +41,7 @@ from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import executors
-from smc_mujoco.studies.fair_gains import Candidate, fair_gains
+from smc_mujoco.studies.fair_gains import Candidate, asking, fair_gains
 from smc_mujoco.studies.leaderboard import METRICS, Boards, leaderboard
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, study
@@ -286,7 +286,7 @@ def compare(
         applicable(extent.conditions, machines, duration) if conditions is None else listed("conditions", conditions)
     )
     tested = [find_condition(one) for one in names]
-    compared = {plant.name: [_asking(law) for law in _chosen(laws, plant)] for plant in machines}
+    compared = {plant.name: [asking(law) for law in _chosen(laws, plant)] for plant in machines}
     every = {id(law): law for its in compared.values() for law in its}.values()
     check_apart(machines, [coerce.law(law) for law in every], tested)
     crossed(machines, lambda _: [lambda _: coerce.law("none")], tested, [0], duration, starts)  # refused before tuning
@@ -328,16 +328,6 @@ def _chosen(laws: Any, plant: Plant) -> list[Any]:
     known = [name for name in gain_sets.LAWS if fits(catalogue()[name], plant)]
     left_out = {"none", *gain_sets.FORMS}  # FORMS are other implementations of laws that are there already
     return known or [law for law in suitable(plant=plant) if law.name not in left_out]
-
-
-def _asking(law: object) -> Component | Template:
-    """Return a law as a template if its gains were not given by the user."""
-    if isinstance(law, str):
-        return known_laws()[law]
-    if isinstance(law, Template):
-        return law
-    given = coerce.law(law)  # pyright: ignore[reportArgumentType]
-    return given.template if given.template and given.source.kind == source.DEFAULT else given
 
 
 def _gains(law: Law) -> str:

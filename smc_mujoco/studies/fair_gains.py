@@ -23,7 +23,7 @@ from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
-from smc_mujoco.control.law import catalogue
+from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.simulation import coerce
@@ -86,6 +86,16 @@ def fair_gains(
     return [candidate for candidate in candidates if candidate is not None]
 
 
+def asking(law: Component | Template | str) -> Component | Template:
+    """Return a law as a template if its gains were not given by the user."""
+    if isinstance(law, str):
+        return known_laws()[law]
+    if isinstance(law, Template):
+        return law
+    given = coerce.law(law)
+    return given.template if given.template and given.source.kind == source.DEFAULT else given
+
+
 def _known(plant: Plant, law: Component | Template, gains: str) -> Candidate | None:
     """Return a law whose gains need no search; None for one that must be tuned."""
     if isinstance(law, Component):
@@ -144,6 +154,8 @@ def _tuned(
                 lambda made, path: made.save(path),
                 result.load,
             )
+    except search.BrokenLawError:
+        raise
     except ScenarioError as error:
         return _default(law, f"not tuned: {error}")
     its = tuned.law.source

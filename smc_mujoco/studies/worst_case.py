@@ -24,6 +24,7 @@ from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
+from smc_mujoco.control.source import unequal
 from smc_mujoco.draw.style import law_colour
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import serialise
@@ -183,9 +184,10 @@ class WorstCases(Tables, list[WorstCase]):
 
     @property
     def notes(self) -> list[str]:
-        """Kendall's tau, and what is known of laws whose theorem the class goes beyond."""
+        """Kendall's tau, what is known of laws whose theorem the class goes beyond, and which laws are not tuned."""
         tau = [f"Kendall's tau between the two orders: {self.tau:.2f}"] if len(self) > 2 else []
-        return tau + [f"{one.nominal.law.name}: {one.outside}" for one in self if one.outside]
+        beyond = [f"{one.nominal.law.name}: {one.outside}" for one in self if one.outside]
+        return [*tau, *beyond, *unequal({one.nominal.law.name: one.nominal.law.source.kind for one in self})]
 
     def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
         """Draw the worst runs of all laws; arguments as in `smc.figure`."""

@@ -9,6 +9,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.worst_case.strategies import recorded
 from smc_mujoco.analysis.worst_case.uncertainty import usual
+from smc_mujoco.control import gain_sets
 from smc_mujoco.simulation import reference, serialise
 from smc_mujoco.simulation.signals import Relay
 from smc_mujoco.studies.worst_case import WorstCases, default_budget
@@ -181,6 +182,15 @@ def test_a_table_orders_by_the_worst_and_says_what_a_theorem_leaves_out():
     text = str(found)
     assert "its theorem needs |d| < 1.9 N with these gains" in text
     assert "its theorem needs |d'| < 1 N/s with these gains" in text
+
+
+def test_a_table_says_which_law_has_its_defaults_beside_tuned_ones():
+    laws = smc.law("pid"), gain_sets.law("duffing", "classical", "tuned"), smc.law("twisting", r1=5.0)
+    short = smc.Scenario(plant="duffing", duration=0.1, law="none")
+    found = [smc.worst_case(dataclasses.replace(short, law=law), budget=1) for law in laws]
+    said = "pid has its default gains, classical is tuned: tune it too (smc-mujoco tune)"
+    assert WorstCases(found).notes[-1] == said
+    assert not any("default" in note for note in WorstCases([found[0], found[2]]).notes)
 
 
 def test_dry_friction_of_zero_does_not_halve_the_default_budget():

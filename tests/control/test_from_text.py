@@ -88,9 +88,9 @@ def test_a_tuning_goes_through_every_door(files, tuned, capsys):
 def test_gains_of_your_own_law_are_named_where_its_code_is_missing(files):
     smc.tune("duffing", smc.law("mine.py"), budget=1).save("mine.json")
     gains = json.loads((files / "mine.json").read_text())["scenario"]["law"]["gains"]
-    with pytest.raises(smc.ScenarioError, match=r"mine\.json is your own: give its file .* my_law\.py\(k=") as error:
+    with pytest.raises(smc.ScenarioError, match=r"law mine of mine\.json is your own: give .* FILE\.py\(k=") as error:
         smc.law("mine.json")
-    text = str(error.value).rpartition("my_law.py")[2]
+    text = str(error.value).rpartition("FILE.py")[2]
     assert smc.law(f"mine.py{text}").gains == gains
 
 

@@ -1,5 +1,6 @@
 """What `smc.accuracy` promises: the textbook's order of laws, theory's exponents, and a reason for every other one."""
 
+import dataclasses
 import math
 import warnings
 
@@ -96,6 +97,9 @@ def test_laws_without_tuned_gains_get_their_defaults_with_one_warning():
         table = smc.accuracy(["hierarchical"], "cart_pole", (4e-3, 2e-3), "nominal", seeds=2, duration=1.0)
     assert len(caught) == 1
     assert table[0].gains == "default"
+    assert "default gains" not in str(table), "no law beside it is tuned"
+    beside = type(table)([table[0], dataclasses.replace(table[0], law="pid", gains="shipped")])
+    assert "hierarchical has its default gains, pid is tuned: tune it too" in " ".join(str(beside).split())
 
 
 def test_a_table_reads_as_text_html_data_and_file(tmp_path):

@@ -21,6 +21,7 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.cli import main
 from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
+from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import catalogue, law_function
 from smc_mujoco.control.properties import searched
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
@@ -410,6 +411,15 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(folder
     assert (tuned[0].budget, tuned[0].plant) == (16, heavy)
     assert smc.which(heavy, **options).law == found.law
     assert len(tuned) == 1
+
+
+def test_a_law_whose_gains_nobody_gave_is_tuned_and_another_keeps_them(tmp_path):
+    code = "import smc_mujoco as smc\n@smc.law_function(gains={'k': 2.0})\ndef mine(y, gains, memory):\n"
+    (tmp_path / "mine.py").write_text(f"{code}    return -gains.k * y.e, y.e\n")
+    file = str(tmp_path / "mine.py")
+    chosen = adviser._suited(smc.plant("duffing"), (), [file, smc.law(file), f"{file}(k=2)", "pid", FAST])
+    assert [one.name for one in chosen] == ["mine", "mine", "mine", "pid", FAST.name]
+    assert [isinstance(one, Template) for one in chosen] == [True, True, False, True, False]
 
 
 def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_differs(folder, monkeypatch):

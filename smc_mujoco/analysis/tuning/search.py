@@ -50,7 +50,7 @@ from smc_mujoco.analysis.tuning.result import (
     versions,
 )
 from smc_mujoco.analysis.tuning.search_space import Box
-from smc_mujoco.common.errors import ScenarioWarning, find, users_frame, whole
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, users_frame, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.control.component import Component, Template
@@ -58,8 +58,10 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario, default_u_max
+from smc_mujoco.simulation.trace import Trace
 
 __all__ = ["Tuned", "compare", "load", "tune"]
 
@@ -83,6 +85,10 @@ RULE = (
     " the sets that are known, until they are as many"
 )
 Report = Callable[[int], None]
+
+
+class BrokenLawError(ScenarioError):
+    """An error: a law fails whatever its gains are."""
 
 
 def tune(
@@ -112,8 +118,8 @@ def tune(
         condition.
 
     Raises:
-      ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales, or an argument out
-        of range.
+      ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales, an argument out of
+        range, or a law whose own code fails in every run with its own gains.
 
     Warns:
       ScenarioWarning: a gain of unknown unit, which is searched about its default; the law's own gains are better than
@@ -133,7 +139,9 @@ def tune(
     start = search_space.box(law, scales)
     if search_space.without_unit(law):
         _warn(_about_defaults(law))
-    tracking, variation = goal.terms(run(cases, threads))
+    traces = run(cases, threads)
+    _refuse_broken(law, traces)
+    tracking, variation = goal.terms(traces)
     before = tracking + goal.weight * variation + goal.excess(cases[0])
     with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as drawn:
         ledger = _Ledger(goal, cases, tuple(start), bound, budget, threads, drawn.advance)
@@ -167,6 +175,17 @@ def tune(
         searched=searched,
         versions=versions(),
     ).sourced()
+
+
+def _refuse_broken(law: Component, traces: Sequence[Trace]) -> None:
+    """Raise BrokenLawError if the law, and not the plant, fails in every run: at once, or as it does not compile.
+
+    Bad gains may make the numbers of a compiled law overflow later in a run. Other gains may cure that.
+    """
+    if any(trace.failure is None or trace.plant_diverged for trace in traces):
+        return
+    if all(trace.diverged_at == 0.0 for trace in traces) or prepare(traces[0].scenario).why_not:
+        raise BrokenLawError(f"{law.name} cannot be tuned, {traces[0].failure}: correct the law or signal")
 
 
 def _warn(words: str) -> None:

@@ -189,7 +189,7 @@ def worst(
     at the frequency of the loop, all corners of the ranges, and an evolution from the worst of these. The column worst
     found has the error of the worst run, the column median that of as many random members of the class. Laws are
     ordered by the worst. A line below the table says where a class goes beyond the theorem of a law. What is found is
-    a lower bound: there may be worse.
+    a lower bound: there may be worse. The law of your file has its default gains: tune it first (`smc-mujoco tune`).
 
     Example: smc-mujoco worst duffing --law classical,super_twisting,observer_free --disturbance 2 --mass 0.7:1.3
 
@@ -278,7 +278,7 @@ def accuracy(
     twisting and super-twisting (a quarter), and r for order r. The command runs every law at several periods and prints
     the order that it measures beside the one that is promised. A line with * says what was left out, and why an order
     is not as promised: the runs may still be settling, the gains may be too small for the disturbance, or the error may
-    be mere rounding.
+    be mere rounding. The law of your file has its default gains: tune it first (`smc-mujoco tune`).
 
     The default disturbance is a constant force of 0.2 N or N m. --condition coulomb asks the same of dry friction, and
     --condition "constant + sine" of a force that changes, against which laws need gains for its rate.

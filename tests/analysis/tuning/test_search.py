@@ -22,6 +22,7 @@ from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.units import Gain, Unit
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.metrics.catalogue import itae, tv
+from smc_mujoco.studies.fair_gains import fair_gains
 
 SHORT = Objective(duration=0.5)
 LEAN = Objective(conditions=("nominal",), duration=0.25)
@@ -376,6 +377,23 @@ def test_what_is_no_tuning_is_refused(found, tmp_path):
 def test_bad_input_is_one_sentence(changed, message):
     with pytest.raises(smc.ScenarioError, match=message):
         tune(**({"plant": "duffing", "law": "classical", "budget": 5, "objective": LEAN} | changed))
+
+
+def refused(y, gains, memory):
+    raise ValueError("not yet")
+
+
+def mistyped(y, gains, memory):
+    return -gains.q * y.e if abs(y.e) < 1.0 else -gains.k * y.e, y.e
+
+
+@pytest.mark.filterwarnings("ignore:.*does not compile", "ignore:.* no unit")
+@pytest.mark.parametrize(("function", "why"), [(refused, "ValueError"), (mistyped, "AttributeError .*'q'")])
+def test_a_law_that_fails_by_itself_is_not_searched_and_says_why(function, why, monkeypatch, tmp_path):
+    law = smc.law_function(gains={"k": 3.0})(function)
+    monkeypatch.setattr(search, "_search", None)
+    with pytest.raises(smc.ScenarioError, match=f"{law.name} cannot be tuned, .* raised {why}.*, at t = .*: correct"):
+        fair_gains(smc.plant("duffing"), [law], tmp_path, budget=4)
 
 
 @pytest.mark.parametrize(
