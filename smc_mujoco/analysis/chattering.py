@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from smc_mujoco.analysis.harmonics import Loop, Wave
+from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import ended, write_json
 from smc_mujoco.control.component import Component, Template
@@ -424,6 +425,7 @@ def save(
     scenarios: Sequence[Scenario],
     cycles: Sequence[Chattering],
     measured: Sequence[tuple[float, float]],
+    changes: Sequence[StepChange],
     path: str | os.PathLike[str],
 ) -> Path:
     """Write predictions and measurements to a .json file. Return its path.
@@ -431,6 +433,7 @@ def save(
     Args:
       scenarios, cycles: the scenarios, and the predicted cycle of each.
       measured: amplitude of s in its unit and frequency in Hz, measured in a run of each scenario.
+      changes: relative changes of these in a run with half the physics step.
       path: of the file.
 
     Raises:
@@ -442,6 +445,7 @@ def save(
         | {"uncertainty": cycle.uncertainty}
         | {"gain": [cycle.gain.real, cycle.gain.imag], "response": [cycle.response.real, cycle.response.imag]}
         | {"measured_amplitude": amplitude, "measured_frequency": frequency}
-        for one, cycle, (amplitude, frequency) in zip(scenarios, cycles, measured, strict=True)
+        | {"half_step_changes": vars(change), "marked": change.marked}
+        for one, cycle, (amplitude, frequency), change in zip(scenarios, cycles, measured, changes, strict=True)
     ]
     return write_json(ended(path, ".json"), rows)

@@ -18,6 +18,7 @@ from matplotlib.lines import Line2D
 
 from smc_mujoco.analysis.chattering import Chattering, predict
 from smc_mujoco.analysis.harmonics import Loop
+from smc_mujoco.analysis.step_halving import NOTE, StepChange
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
@@ -41,6 +42,7 @@ def nyquist(
     size: Size = None,
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
+    changes: Sequence[StepChange] | None = None,
 ) -> Figure | SubFigure:
     """Draw the harmonic balance of scenarios, and their sliding variable, predicted and run.
 
@@ -50,6 +52,7 @@ def nyquist(
       cycles: predicted for these scenarios; default: they are predicted.
       traces: of these scenarios; default: they are run.
       path, size, format, fig: as in `figure`.
+      changes: of the traces, see `smc.step_halving`; the marked ones are told. Default: half the step is not tried.
 
     Raises:
       ScenarioError: no scenarios, or as `chattering` and `figure`.
@@ -74,6 +77,9 @@ def nyquist(
         for row, scenario, cycle, trace, colour in zip(axes, scenarios, cycles, runs, colours, strict=True):
             plane(row[0], scenario, cycle, channel, colour)
             last_periods(row[1], trace, cycle, channel, colour)
+        for ax, change in zip(axes[:, 1], changes or (), strict=bool(changes)):
+            if change.marked:
+                ax.set_title(NOTE, loc="left", fontsize=style.points(9.5))
         pages.set_head(page, width, f"Chattering of {style.plant_name(scenarios[0].plant)}", handles, shared)
         pages.write(page, paths)
     return page

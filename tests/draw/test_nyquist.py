@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.draw.nyquist import nyquist
 
 
 @pytest.fixture(scope="module")
 def page():
     fields = {"plant": "duffing", "actuator": smc.Lag(0.01), "duration": 2.0, "x0": 0.05}
-    return nyquist([smc.Scenario(law=law, **fields) for law in ("super_twisting", "observer_free")], size=(8.0, 5.0))
+    scenarios = [smc.Scenario(law=law, **fields) for law in ("super_twisting", "observer_free")]
+    return nyquist(scenarios, size=(8.0, 5.0), changes=[StepChange(0.11, 0.0), StepChange(0.09, 0.05)])
 
 
 def test_both_curves_pass_minus_one_where_the_mark_is(page):
@@ -37,3 +39,9 @@ def test_a_calm_law_has_no_crossing_and_no_band(page):
 def test_no_scenario_is_one_sentence():
     with pytest.raises(smc.ScenarioError, match="no scenario to draw"):
         nyquist([])
+
+
+def test_a_run_that_half_the_step_changes_says_so(page):
+    titles = [page.axes[i].get_title(loc="left") for i in (1, 3)]
+    assert "more than 10 %" in titles[0]
+    assert titles[1] == ""

@@ -446,16 +446,16 @@ def chatter(
             drawn.reached(done, len(cases) + 1)
             cycles.append(chattering(scenario, channel))
         traces = run(cases, threads=threads)
-        measured = [of_trace(trace, channel) for trace in traces]
-    terminal.print(tables.chattering(cases, channel, cycles, measured, step_halving(traces, channel, threads)))
+        measured, changes = [of_trace(trace, channel) for trace in traces], step_halving(traces, channel, threads)
+    terminal.print(tables.chattering(cases, channel, cycles, measured, changes))
     if designs:
         terminal.print(tables.designs([chosen for _, chosen in designs], cases[0].efforts[channel]))
     terminal.note("assumed: " + "; ".join(shared(cycles)), wrap=True)
     terminal.note(f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim")
     if json:
-        terminal.wrote(save(cases, cycles, measured, json))
+        terminal.wrote(save(cases, cycles, measured, changes, json))
     if pictures:
         from smc_mujoco.draw.nyquist import nyquist
 
-        nyquist(cases, out, channel, cycles, traces)
+        nyquist(cases, out, channel, cycles, traces, changes=changes)
         terminal.wrote(*pictures)
