@@ -135,7 +135,7 @@ def margins(
     for name in kind:
         terminal.print(tables.margins(name, [margin for margin in found if margin.kind == name]))
     count = f"{len(found)} margin{'s' * (len(found) != 1)}"
-    terminal.note(f"{count}, {options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim")
+    terminal.note(f"{count}, {options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim", wrap=True)
     if out:
         terminal.wrote(save_csv(found, out))
     if json:
@@ -219,7 +219,7 @@ def worst(
     chosen, cases = _attacked(plant, law, condition, duration, gains)
     found = WorstCases(worst_case(one, metric, within, budget, seed, threads, progress=True) for one in cases)
     terminal.print(found)
-    terminal.note(f"{sum(one.tried for one in found)} runs, {options.gains_used(chosen, gains)}", "dim")
+    terminal.note(f"{sum(one.tried for one in found)} runs, {options.gains_used(chosen, gains)}", "dim", wrap=True)
     if json:
         terminal.wrote(write_json(json, [one.about() for one in found]))
     if out:
@@ -451,7 +451,7 @@ def chatter(
     if designs:
         terminal.print(tables.designs([chosen for _, chosen in designs], cases[0].efforts[channel]))
     terminal.note("assumed: " + "; ".join(shared(cycles)), wrap=True)
-    terminal.note(f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim")
+    terminal.note(f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim", wrap=True)
     if json:
         terminal.wrote(save(cases, cycles, measured, changes, json))
     if pictures:
