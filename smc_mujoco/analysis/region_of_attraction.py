@@ -122,7 +122,7 @@ def basin(
       gains: set of gains, one of `gain_sets.SETS`, or "default".
       duration: of the longest runs, s.
       threads: as in `run`.
-      report: called with the work done and that which may be needed, in simulated steps; the latter shrinks as
+      report: called with the work done and the work that may be needed, in simulated steps; the latter shrinks as
         states are decided.
       condition: condition of the runs, such as "coulomb".
 

@@ -59,7 +59,7 @@ def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
 
 
 def columns(t: np.ndarray, y: np.ndarray, max_parts: int) -> Envelope:
-    """Return range and mean of y in at most `most` windows of equally many samples.
+    """Return range and mean of y in at most `max_parts` windows of equally many samples.
 
     That number is even, so that a control which switches at every sample has the correct mean.
     """

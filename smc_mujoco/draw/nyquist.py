@@ -77,7 +77,7 @@ def nyquist(
         for row, scenario, cycle, trace, colour in zip(axes, scenarios, cycles, runs, colours, strict=True):
             plane(row[0], scenario, cycle, channel, colour)
             last_periods(row[1], trace, cycle, channel, colour)
-        for ax, change in zip(axes[:, 1], changes or (), strict=bool(changes)):
+        for ax, change in zip(axes[:, 1], changes, strict=True) if changes else ():
             if change.marked:
                 ax.set_title(NOTE, loc="left", fontsize=style.points(9.5))
         pages.set_head(page, width, f"Chattering of {style.plant_name(scenarios[0].plant)}", handles, shared)

@@ -59,8 +59,8 @@ class Signal:
     def __post_init__(self):
         for name, value in self.parameters().items():
             above = 0.0 if name in self.positive else -math.inf
-            least = 0.0 if name in self.natural else -math.inf
-            checked = number(f"{type(self).__name__}'s {name}", value, above=above, low=least)
+            low = 0.0 if name in self.natural else -math.inf
+            checked = number(f"{type(self).__name__}'s {name}", value, above=above, low=low)
             object.__setattr__(self, name, checked)
 
     def parameters(self) -> dict[str, float]:

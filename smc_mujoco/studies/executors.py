@@ -126,7 +126,7 @@ def compute_elsewhere(
     plants: run_key.Hashes = {}
 
     def collect(under_way: int) -> None:
-        """Finish batches until at most `most` are under way."""
+        """Finish batches until at most so many are under way."""
         while len(sent) > under_way:
             done = futures.wait(sent, return_when=futures.FIRST_COMPLETED).done
             # those that failed come last, so that the others are stored before an error ends the study
