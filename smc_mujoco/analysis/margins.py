@@ -37,7 +37,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics import catalogue
-from smc_mujoco.metrics.conventions import parts, refuse, scale
+from smc_mujoco.metrics.conventions import by_group, refuse, scale
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import DURATION, Condition
 from smc_mujoco.simulation.grid import case, listed, listed_laws
@@ -176,7 +176,7 @@ def tolerates(trace: Trace) -> bool:
     except ScenarioError:  # it failed, or diverged
         return False
     bound = catalogue.CATALOGUE["ultimate_bound"].formula
-    return all(bound(part) <= TOLERATED_ERROR * scale(part) for part in parts(trace).values())
+    return all(bound(part) <= TOLERATED_ERROR * scale(part) for part in by_group(trace).values())
 
 
 def _doubled(largest: float) -> tuple[float, ...]:

@@ -44,7 +44,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.source import NONE
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.metrics.conventions import BAND, error, last
+from smc_mujoco.metrics.conventions import SETTLING_BAND, error, last_part
 from smc_mujoco.simulation.conditions import DURATION, Condition, find_condition
 from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.run import stream
@@ -57,7 +57,7 @@ LATE = 3  # an early verdict considers the last third of a run
 BATCH_BYTES = 48 * 2**20  # of traces in memory at once, about
 STILL = 1e-6  # of X, V and u_max: changes of a run that rests
 LEAVING, SHRINKING = 1.05, 0.9  # factors of the squared distance (e/X)^2 + (v/V)^2
-NEAR = (0.1 * BAND) ** 2  # squared distance
+NEAR = (0.1 * SETTLING_BAND) ** 2  # squared distance
 TURN = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}  # X of a plant, chosen
 PACE = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
 MIN_SAMPLES = 10  # of the shortest runs: then each half of their last fifth has one
@@ -211,8 +211,8 @@ def judge(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None
     far = np.abs(x).max() or 1.0, np.abs(v).max() or 1.0
     e = error(trace)
     distance = np.maximum(np.abs(e / far[0]), np.abs(trace.v / far[1])).max(axis=1)
-    late = last(trace) if final else slice(-(distance.size // LATE), None)
-    inside = distance[late] <= BAND
+    late = last_part(trace) if final else slice(-(distance.size // LATE), None)
+    inside = distance[late] <= SETTLING_BAND
     square = ((e / far[0]) ** 2 + (trace.v / far[1]) ** 2).sum(axis=1)
     start, square = square[0], square[late]
     middle = square.size // 2

@@ -10,7 +10,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-from smc_mujoco.metrics.limit_cycle import largest, of_trace
+from smc_mujoco.metrics.limit_cycle import channel_cycle, largest_cycle
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -68,7 +68,7 @@ def step_halving(traces: Sequence[Trace], channel: int | None = None, threads: i
     again = run([halved(trace.scenario) for trace in traces], threads=threads)
 
     def cycle(trace: Trace) -> tuple[float, float]:
-        return largest(trace) if channel is None else of_trace(trace, channel)
+        return largest_cycle(trace) if channel is None else channel_cycle(trace, channel)
 
     return [StepChange(*map(_change, cycle(one), cycle(other))) for one, other in zip(traces, again, strict=True)]
 

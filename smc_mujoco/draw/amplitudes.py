@@ -20,7 +20,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
-from smc_mujoco.metrics.limit_cycle import of_trace
+from smc_mujoco.metrics.limit_cycle import channel_cycle
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -82,7 +82,7 @@ def amplitudes(
             ax.plot(*predicted[label], color=colour, lw=style.points(2.0))
             for at, trace, change in zip(lags, of, step_halving(of, 0), strict=True):
                 face, edge = (style.PAPER, colour) if change.marked else (colour, style.PAPER)
-                ax.plot(at, of_trace(trace)[0], "o", color=face, ms=style.points(7.0), mec=edge)
+                ax.plot(at, channel_cycle(trace)[0], "o", color=face, ms=style.points(7.0), mec=edge)
                 hollow |= change.marked
             handles.append(Line2D([], [], color=colour, lw=style.points(3.0), label=f"{style.label(label)}{source}"))
         if len(predicted) == 2:

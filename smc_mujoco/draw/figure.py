@@ -21,7 +21,7 @@ from smc_mujoco.draw.panels import Panel
 from smc_mujoco.draw.states import HOLD
 from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.metrics import catalogue
-from smc_mujoco.metrics.channel_groups import Group, cut
+from smc_mujoco.metrics.channel_groups import Group, group_trace
 from smc_mujoco.simulation.trace import Trace
 
 OVER_TIME = {  # panel -> quantity
@@ -352,7 +352,7 @@ def signals(
         axes[0, 0].set_xlim(0.0, end(traces))
         for (law, condition), trace in cells.items():
             ax = axes[laws.index(law), conditions.index(condition)]
-            drawing.over_time(ax, Panel("u", group, [cut(trace, group)]), [colours[law]])
+            drawing.over_time(ax, Panel("u", group, [group_trace(trace, group)]), [colours[law]])
             drawing.mark(ax, style.jumps([trace], [law]), named=False)
             if room > points(250):
                 drawing.note(ax, _variation(trace, group))

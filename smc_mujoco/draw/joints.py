@@ -18,7 +18,7 @@ from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.draw.page import Size
 from smc_mujoco.draw.panels import Panel
 from smc_mujoco.metrics import tip
-from smc_mujoco.metrics.channel_groups import cut
+from smc_mujoco.metrics.channel_groups import group_trace
 from smc_mujoco.simulation.trace import Trace
 
 WIDE, SLIM = (4, 3), (2, 3)  # panels in a row of a page, and of a narrow one: the number that leaves fewer cells empty
@@ -85,7 +85,7 @@ def contents(traces: Sequence[Trace]) -> list[Panel]:
     for group in groups:
         for i in group.channels:
             one = dataclasses.replace(group, channels=(i,))
-            found.append(Panel("joint", one, [cut(trace, one) for trace in traces], i))
+            found.append(Panel("joint", one, [group_trace(trace, one) for trace in traces], i))
     found.sort(key=lambda panel: panel.channel)
     names = ["tip"] * bool(traces[0].scenario.plant.tip)
     names += ["contact"] * all(tip.knows_contacts(trace.scenario) for trace in traces)

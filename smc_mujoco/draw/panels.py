@@ -23,8 +23,8 @@ from smc_mujoco.draw.decimate import columns, end, line, smooth, window
 from smc_mujoco.draw.states import HOLD, at_rest, backlash_gap, has_dry_friction
 from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.metrics import tip
-from smc_mujoco.metrics.channel_groups import Group, cut
-from smc_mujoco.metrics.conventions import BAND, scale
+from smc_mujoco.metrics.channel_groups import Group, group_trace
+from smc_mujoco.metrics.conventions import SETTLING_BAND, scale
 from smc_mujoco.simulation.signals import PerChannel
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 
@@ -173,7 +173,7 @@ def small(traces: Sequence[Trace], group: Group) -> list[tuple[Panel, ...]]:
     names, rows = ["x", *["e"] * moving, *["u"] * group.driven], []
     for i in (group.channels[k] for k in chosen):
         one = dataclasses.replace(group, channels=(i,))
-        parts = [cut(trace, one) for trace in traces]
+        parts = [group_trace(trace, one) for trace in traces]
         rows.append(tuple(Panel(name, one, parts, i) for name in names))
     return rows
 
@@ -185,7 +185,7 @@ def by_channel(panel: Panel) -> list[Panel]:
     panels = []
     for k, i in enumerate(panel.group.channels):
         at, one = (dataclasses.replace(panel.group, channels=(j,)) for j in (k, i))
-        panels.append(Panel(panel.quantity, one, [cut(trace, at) for trace in panel.traces], i))
+        panels.append(Panel(panel.quantity, one, [group_trace(trace, at) for trace in panel.traces], i))
     return panels
 
 
@@ -435,7 +435,8 @@ def target(ax: Axes, panel: Panel) -> None:
         known = np.isfinite(r)
         r = r[known] if panel.quantity == "x" else np.zeros(known.sum())
         if known.any():
-            (t, r), half, play = line(trace.t[known], r, 2), BAND * scale(trace), backlash_gap(trace.scenario) / 2
+            (t, r), half = line(trace.t[known], r, 2), SETTLING_BAND * scale(trace)
+            play = backlash_gap(trace.scenario) / 2
             if not (r - half < bottom).all() or not (r + half > top).all():  # else it is the background
                 ax.fill_between(t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
             if play:

@@ -18,7 +18,7 @@ from smc_mujoco.mechanisms.hardware.contact import HIT, RUB
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.metrics import conventions
-from smc_mujoco.metrics.kept import kept
+from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -75,7 +75,7 @@ def timeline(trace: Trace, times: np.ndarray, hold: float = HOLD) -> list[State 
 def at_rest(trace: Trace) -> np.ndarray:
     """Return where each channel is at rest, in proportion to the speeds of its group, (K + 1, n)."""
     rest = np.empty(trace.x.shape, bool)
-    for group, part in conventions.parts(trace).items():
+    for group, part in conventions.by_group(trace).items():
         rest[:, group.channels] = conventions.at_rest(part)
     return rest
 
@@ -115,7 +115,7 @@ def backlash_gap(scenario: Scenario) -> float:
     return next((part.gap for part in scenario.actuator if isinstance(part, Backlash)), 0.0)
 
 
-@kept
+@once_per_trace
 def in_contact(trace: Trace) -> np.ndarray:
     """Return where each channel touches an obstacle or another channel, (K + 1, n)."""
     contact = np.zeros(trace.x.shape, bool)

@@ -24,7 +24,7 @@ from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import known_laws
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
-from smc_mujoco.metrics.channel_groups import Group, cut, groups
+from smc_mujoco.metrics.channel_groups import Group, group_trace, groups
 from smc_mujoco.simulation.conditions import FIELDS
 from smc_mujoco.simulation.perturbations import Jump
 from smc_mujoco.simulation.signals import Push
@@ -398,7 +398,7 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
 def split(traces: Sequence[Trace]) -> dict[Group, list[Trace]]:
     """Return the traces of each group of channels, which share a pair of axes. All traces are of one plant."""
     kinds = zip(*(groups(trace.scenario) for trace in traces), strict=True)
-    return {kind[0]: [cut(trace, group) for trace, group in zip(traces, kind, strict=True)] for kind in kinds}
+    return {kind[0]: [group_trace(trace, group) for trace, group in zip(traces, kind, strict=True)] for kind in kinds}
 
 
 def units(group: Group) -> dict[str, str]:

@@ -13,27 +13,26 @@ import numpy as np
 
 from smc_mujoco.metrics import conventions, limit_cycle
 from smc_mujoco.metrics.conventions import (
-    BAND,
     CATALOGUE,
     ROUNDING,
+    SETTLING_BAND,
     Metric,
     approaches,
     error,
-    last,
     last_exit,
+    last_part,
     metric,
     refuse,
     scale,
 )
-from smc_mujoco.metrics.kept import kept
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
 
-TRANSIENT = 0.25  # of the run, which rms_error leaves out
-RISE = (0.1, 0.9)  # of the way from the start of the approach to the reference
-HIGH_PASS = 50.0  # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
-CONSTANT = 1e-12  # of max |u|: a smaller range of u is rounding
+TRANSIENT_SHARE = 0.25  # of the run, which rms_error leaves out
+RISE_LEVELS = (0.1, 0.9)  # shares of the way from the start of an approach to the reference
+HIGH_FREQUENCY = 50.0  # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
+ROUNDING_SHARE = 1e-12  # of max |u|, and of a frequency: smaller differences are rounding
 
 
 def metrics() -> tuple[Metric, ...]:
@@ -51,8 +50,8 @@ def score(trace: Trace) -> dict[str, float]:
       ScenarioError: the run diverged, failed or holds NaN.
     """
     refuse(trace)
-    parts = conventions.parts(trace)
-    return {m.name: m.worst(parts) for m in metrics() if not m.refusal(trace.scenario.plant)}
+    traces = conventions.by_group(trace)
+    return {m.name: m.worst(traces) for m in metrics() if not m.refusal(trace.scenario.plant)}
 
 
 def scores(trace: Trace) -> dict[str, dict[str, float]]:
@@ -64,7 +63,7 @@ def scores(trace: Trace) -> dict[str, dict[str, float]]:
     refuse(trace)
     return {
         group.name: {m.name: float(m.formula(part)) for m in metrics() if m.fits(group)}
-        for group, part in conventions.parts(trace).items()
+        for group, part in conventions.by_group(trace).items()
     }
 
 
@@ -72,9 +71,9 @@ def scores(trace: Trace) -> dict[str, dict[str, float]]:
 def settling_time(trace: Trace) -> float:
     """Time from which every channel stays in the settling band.
 
-    Last exit of max_i |e_i| from 2 % of the scale, in s since t[0]; a late step of r counts from t[0] too.
+    Last exit of max_i |e_i| from 2 % of the scale, in s since t[0], also if r steps later.
     """
-    return last_exit(trace.t, conventions.largest(np.abs(error(trace))), BAND * scale(trace))
+    return last_exit(trace.t, conventions.row_max(np.abs(error(trace))), SETTLING_BAND * scale(trace))
 
 
 @metric("s")
@@ -91,7 +90,7 @@ def rise_time(trace: Trace) -> float:
         part = next((p for p in parts if e[p.start, i] != 0), None)
         if part is not None:
             done = 1 - e[part, i] / e[part.start, i]
-            low, high = (np.flatnonzero(done >= level) for level in RISE)
+            low, high = (np.flatnonzero(done >= level) for level in RISE_LEVELS)
             times.append(float(t[part][high[0]] - t[part][low[0]]) if high.size else np.inf)
     return max(times)
 
@@ -121,28 +120,28 @@ def peak(trace: Trace) -> float:
 @metric("{x}")
 def steady_error(trace: Trace) -> float:
     """|mean of e over the samples of the last part|, worst channel."""
-    return np.abs(error(trace)[last(trace)].mean(axis=0)).max()
+    return np.abs(error(trace)[last_part(trace)].mean(axis=0)).max()
 
 
 @metric("{x}", need="accurate")
 def ultimate_bound(trace: Trace) -> float:
     """Largest |e| in the last part, worst channel."""
-    return np.abs(error(trace)[last(trace)]).max()
+    return np.abs(error(trace)[last_part(trace)]).max()
 
 
 @metric("{x}")
 def ripple(trace: Trace) -> float:
     """Peak-to-peak e in the last part, worst channel; what is left of a transient counts."""
-    return np.ptp(error(trace)[last(trace)], axis=0).max()
+    return np.ptp(error(trace)[last_part(trace)], axis=0).max()
 
 
 @metric("{x}", label="rms error")
 def rms_error(trace: Trace) -> float:
     """Root mean square of e from a quarter of the run on, worst channel.
 
-    Samples t >= t0 + 0.25 (tK - t0), each with the same weight: what an adversary maximises, as its square is smooth.
+    Samples t >= t0 + 0.25 (tK - t0) have equal weights. `worst_case` maximises it, because its square is smooth.
     """
-    late = trace.t >= trace.t[0] + TRANSIENT * (1.0 - ROUNDING) * (trace.t[-1] - trace.t[0])
+    late = trace.t >= trace.t[0] + TRANSIENT_SHARE * (1.0 - ROUNDING) * (trace.t[-1] - trace.t[0])
     return np.sqrt((error(trace)[late] ** 2).mean(axis=0)).max()
 
 
@@ -173,8 +172,8 @@ def reaching_time(trace: Trace) -> float:
     on the surface, s(0) = 0, is measured against the largest |s| of the run. 0 if s = 0 throughout, as for a law
     without a surface. s is what the law computed from its measurement: under noise it may never stay.
     """
-    size = conventions.largest(np.abs(trace.s))
-    return last_exit(trace.t, size, BAND * (size[0] or size.max()))
+    magnitude = conventions.row_max(np.abs(trace.s))
+    return last_exit(trace.t, magnitude, SETTLING_BAND * (magnitude[0] or magnitude.max()))
 
 
 @metric("{u}", label="max |u|", command=True, need="gentle")
@@ -199,10 +198,10 @@ def tv(trace: Trace) -> float:
 def tv_rate(trace: Trace) -> float:
     """Total variation of u per second in the last part, worst channel.
 
-    Sum of |u[k+1] - u[k]| over the steps between samples of the last part, over the time they span; 0 if
-    the last part is a single sample.
+    Sum of |u[k+1] - u[k]| between samples of the last part, divided by the time from its first to its last sample; 0
+    for a single sample.
     """
-    part = last(trace)
+    part = last_part(trace)
     u, t = trace.u[part], trace.t[part]
     if t.size < 2:
         return 0.0
@@ -227,41 +226,38 @@ def hf_share(trace: Trace) -> float:
     channel at rest does not count. 0 if u is constant, and if half the sampling rate is 50 Hz or less.
     """
     u, t = trace.u[:-1], trace.t
-    if u.size == 0 or np.ptp(u, axis=0).max() <= CONSTANT * np.abs(u).max():
+    if u.size == 0 or np.ptp(u, axis=0).max() <= ROUNDING_SHARE * np.abs(u).max():
         return 0.0
     k = len(u)
     power = (np.abs(np.fft.rfft(u, axis=0)) ** 2).sum(axis=1)
     power[1 : (k + 1) // 2] *= 2  # f > 0 stands for -f as well, except at half the sampling rate
     frequency = np.arange(power.size) / (t[-1] - t[0])
-    return power[frequency > HIGH_PASS * (1 + CONSTANT)].sum() / power[1:].sum()
+    return power[frequency > HIGH_FREQUENCY * (1 + ROUNDING_SHARE)].sum() / power[1:].sum()
 
 
 @metric("unit of s", command=True, absent=0.0)
 def chattering_amplitude(trace: Trace) -> float:
     """Amplitude of the limit cycle of s in the last part, in the unit of s, worst channel; NaN without one.
 
-    Half the range of s within a period, without slow waves. `limit_cycle` says what counts as a limit cycle. Laws are
-    compared at 0 where there is none.
+    Half the range of s within a period, without slow waves. `limit_cycle` says what counts as a limit cycle. Laws
+    without one are compared with the value 0.
     """
-    return _cycle(trace)[0]
+    return limit_cycle.largest_cycle(trace)[0]
 
 
 @metric("Hz", command=True)
 def chattering_frequency(trace: Trace) -> float:
     """Frequency of the limit cycle of s in the last part, of the channel with the largest; NaN without one.
 
-    A cycle has at least five periods in the last part, else it counts as none.
+    A limit cycle has at least five periods in the last part.
     """
-    return _cycle(trace)[1]
-
-
-_cycle = kept(limit_cycle.largest)
+    return limit_cycle.largest_cycle(trace)[1]
 
 
 @metric("s", realistic=True)
 def stick_time(trace: Trace) -> float:
     """Time for which a channel is at rest, with a reaction of friction or contact; longest channel."""
-    rest = conventions.at_rest(trace)  # the reaction at a sample is that of the step before it
+    rest = conventions.at_rest(trace)  # a sample's reaction is the mean over the control period before it
     return (np.diff(trace.t) @ (rest[:-1] & rest[1:] & (trace.reaction[1:] != 0.0))).max()
 
 
@@ -278,23 +274,23 @@ def reversal_rate(trace: Trace) -> float:
     Only swings of at least half the ripple count; 0 for a ripple up to 1e-6 of the scale. A cycle longer than the last
     part is not seen.
     """
-    part, threshold = last(trace), 1e-6 * scale(trace)
+    part, threshold = last_part(trace), 1e-6 * scale(trace)
     return max(conventions.turns(e, threshold) for e in error(trace)[part].T) / (np.ptp(trace.t[part]) or np.inf)
 
 
 @metric("s", network=True)
 def mean_settling_time(trace: Trace) -> float:
     """Time from which |mean of e over the channels| stays in the settling band."""
-    return last_exit(trace.t, np.abs(error(trace).mean(axis=1)), BAND * scale(trace))
+    return last_exit(trace.t, np.abs(error(trace).mean(axis=1)), SETTLING_BAND * scale(trace))
 
 
 @metric("s", network=True)
 def spread_settling_time(trace: Trace) -> float:
     """Time from which max_i x_i - min_i x_i stays within 2 % of the scale."""
-    return last_exit(trace.t, np.ptp(trace.x, axis=1), BAND * scale(trace))
+    return last_exit(trace.t, np.ptp(trace.x, axis=1), SETTLING_BAND * scale(trace))
 
 
 @metric("{x}", network=True)
 def spread_bound(trace: Trace) -> float:
     """Largest max_i x_i - min_i x_i in the last part."""
-    return np.ptp(trace.x[last(trace)], axis=1).max()
+    return np.ptp(trace.x[last_part(trace)], axis=1).max()

@@ -24,7 +24,7 @@ class Group:
     Attributes:
       name: "driven" or "free"; "driven rad" if several groups are driven.
       unit: of their x, "rad" or "m".
-      effort: unit of their u; that of a force on them, or "V".
+      effort: unit of their u: "N m", "N" or "V".
       driven: whether they have actuators.
       channels: their indices, ascending.
     """
@@ -36,12 +36,9 @@ class Group:
     channels: tuple[int, ...]
 
 
-def groups(of: Plant | Scenario) -> tuple[Group, ...]:
-    """Return the groups of a plant, or of a scenario's plant, whose u may be a voltage.
-
-    Driven ones are first, each kind in the order of its channels.
-    """
-    plant = of if isinstance(of, Plant) else of.plant
+def groups(machine: Plant | Scenario) -> tuple[Group, ...]:
+    """Return the groups of a plant, or of a scenario's plant, driven groups first. A scenario's u may be a voltage."""
+    plant = machine if isinstance(machine, Plant) else machine.plant
     members: dict[tuple[bool, str], list[int]] = {}
     for i, unit in enumerate(plant.units):
         members.setdefault((i < plant.driven, unit), []).append(i)
@@ -50,7 +47,7 @@ def groups(of: Plant | Scenario) -> tuple[Group, ...]:
         Group(
             name=("driven" if driven else "free") + (f" {unit}" if kinds.count(driven) > 1 else ""),
             unit=unit,
-            effort=of.efforts[channels[0]],
+            effort=machine.efforts[channels[0]],
             driven=driven,
             channels=tuple(channels),
         )
@@ -58,8 +55,8 @@ def groups(of: Plant | Scenario) -> tuple[Group, ...]:
     )
 
 
-def cut(trace: Trace, group: Group) -> Trace:
-    """Return the trace of a group's channels; the same trace if these are all. Its scenario keeps all channels."""
+def group_trace(trace: Trace, group: Group) -> Trace:
+    """Return the trace of a group's channels; the same trace if these are all. Its scenario has all channels."""
     if len(group.channels) == trace.x.shape[1]:
         return trace
     columns = list(group.channels)

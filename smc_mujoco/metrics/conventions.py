@@ -39,15 +39,16 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.text import number
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
-from smc_mujoco.metrics.channel_groups import Group, cut, groups
+from smc_mujoco.metrics.channel_groups import Group, group_trace, groups
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
 
-BAND = 0.02  # of the scale
-LAST = 0.2  # of the run's duration
-ROUNDING = 1e-9  # of the duration: a sample so little before the last part counts as in it
-REST, STILL = 1e-3, 1e-5  # of the run's largest |v|; rad/s or m/s, above the creep of stuck joints, see friction.py
+SETTLING_BAND = 0.02  # of the scale
+LAST_PART = 0.2  # of the run's duration
+ROUNDING = 1e-9  # of the duration: a sample that is so little before the last part belongs to it
+REST_SHARE = 1e-3  # of the run's largest |v|
+REST_SPEED = 1e-5  # rad/s or m/s: above the creep of stuck joints, see friction.py
 
 CATALOGUE: dict[str, Metric] = {}  # filled by @metric, in order of definition
 
@@ -66,7 +67,7 @@ class Metric:
       network: whether it compares channels, and so needs several of a kind.
       realistic: whether it is meaningful only for mechanisms with friction, contacts or other parts.
       command: whether it is computed from u or s, which free joints do not have.
-      absent: value at which laws are compared in a run where it is NaN; NaN for a metric that always has a value.
+      absent: value with which laws are compared where the metric is NaN; NaN for a metric that is never NaN.
     """
 
     name: str
@@ -92,17 +93,17 @@ class Metric:
 
     @property
     def shared(self) -> bool:
-        """Whether free joints count in its single value: it is computed from the motion, and does not have x's unit."""
+        """Whether its single value includes free joints: it follows from the motion, and its unit is not that of x."""
         return not self.command and "{" not in self.unit
 
     def of(self, trace: Trace) -> float:
-        """Return the single value of a trace that `refuse` and `refusal` accept: that of the worst group."""
-        return self.worst(parts(trace))
+        """Return the value of the worst group, for a trace that `refuse` and `refusal` accept."""
+        return self.worst(by_group(trace))
 
-    def worst(self, parts: Mapping[Group, Trace]) -> float:
-        """Return what `of` does, from the `parts` of the trace."""
-        counted = [part for group, part in parts.items() if self.fits(group) and (group.driven or self.shared)]
-        return max(float(self.formula(part)) for part in counted)
+    def worst(self, traces: Mapping[Group, Trace]) -> float:
+        """Return the value of the worst group, from the result of `by_group`."""
+        counted = [trace for group, trace in traces.items() if self.fits(group) and (group.driven or self.shared)]
+        return max(float(self.formula(trace)) for trace in counted)
 
     def fits(self, group: Group) -> bool:
         """Return whether the metric applies to a group by itself."""
@@ -113,7 +114,7 @@ class Metric:
         return "fails" if value == math.inf and self.unit != "s" else number(value)
 
     def unit_for(self, x: str, u: str = "") -> str:
-        """Return the unit for positions in x, "rad" or "m" (as `plant.unit`), and commands in u; "": of a force."""
+        """Return the unit where positions are in x, "rad" or "m", and commands in u; "" for those of a force."""
         u = u or EFFORT[x]
         text = self.unit.replace("({x})", x).replace("({u})", f"({u})" if " " in u else u)
         return text.format(x=x, u=u, force=EFFORT[x])
@@ -147,7 +148,7 @@ def metric(
 
 
 def refuse(trace: Trace) -> None:
-    """Raise ScenarioError if it is no trace, or the run diverged, failed, or holds a NaN or an infinity."""
+    """Raise ScenarioError for anything but a trace of finite signals whose run did not fail."""
     if not hasattr(trace, "scenario"):
         raise ScenarioError(f"cannot score {shown(trace)}: give one Trace")
     signals = (trace.x, trace.v, trace.u, trace.applied, trace.s, trace.d, trace.r, trace.reaction)
@@ -172,9 +173,9 @@ def error(trace: Trace) -> np.ndarray:
     return trace.x - trace.r
 
 
-def parts(trace: Trace) -> dict[Group, Trace]:
-    """Return the trace of each group's channels, as the functions below take it."""
-    return {group: cut(trace, group) for group in groups(trace.scenario)}
+def by_group(trace: Trace) -> dict[Group, Trace]:
+    """Return the trace of each group's channels, the argument of the functions below."""
+    return {group: group_trace(trace, group) for group in groups(trace.scenario)}
 
 
 def scale(trace: Trace) -> float:
@@ -185,19 +186,19 @@ def scale(trace: Trace) -> float:
 
 def at_rest(trace: Trace) -> np.ndarray:
     """Return where each channel of a group's trace is at rest, (K+1, n); see the module's conventions."""
-    return np.abs(trace.v) <= max(REST * float(np.abs(trace.v).max()), STILL)
+    return np.abs(trace.v) <= max(REST_SHARE * float(np.abs(trace.v).max()), REST_SPEED)
 
 
-def last(trace: Trace) -> slice:
+def last_part(trace: Trace) -> slice:
     """Return the samples of the last part."""
     t = trace.t
-    begin = t[-1] - LAST * (1 + ROUNDING) * (t[-1] - t[0])
+    begin = t[-1] - LAST_PART * (1 + ROUNDING) * (t[-1] - t[0])
     return slice(int(np.searchsorted(t, begin)), None)
 
 
-def last_exit(t: np.ndarray, size: np.ndarray, band: float) -> float:
-    """Return the time since t[0], s, from which size (K+1,) stays <= band; 0 if always, inf if not at the end."""
-    outside = np.flatnonzero(size > band)
+def last_exit(t: np.ndarray, magnitude: np.ndarray, band: float) -> float:
+    """Return the time since t[0], s, from which magnitude, (K+1,), stays <= band; 0 if always, inf if never."""
+    outside = np.flatnonzero(magnitude > band)
     if outside.size == 0:
         return 0.0
     if outside[-1] == t.size - 1:
@@ -207,7 +208,7 @@ def last_exit(t: np.ndarray, size: np.ndarray, band: float) -> float:
 
 def approaches(trace: Trace) -> list[list[slice]]:
     """Return the samples of each approach in order, channel by channel."""
-    band = BAND * scale(trace)
+    band = SETTLING_BAND * scale(trace)
     channels = []
     for r in trace.r.T:
         jumps = np.flatnonzero(np.abs(np.diff(r)) > band) + 1
@@ -215,21 +216,21 @@ def approaches(trace: Trace) -> list[list[slice]]:
     return channels
 
 
-def largest(a: np.ndarray) -> np.ndarray:
-    """Return a.max(axis=1) of a (K, n), much faster for few channels."""
+def row_max(a: np.ndarray) -> np.ndarray:
+    """Return a.max(axis=1) of a, (K, n). It is much faster for few channels."""
     return functools.reduce(np.maximum, a.T)
 
 
 def turns(y: np.ndarray, threshold: float) -> int:
     """Return how often y (K,) turns back by half its range or more; 0 for a range <= `threshold`."""
-    count, going, low, high = 0, 0, y[0], y[0]
+    count, direction, low, high = 0, 0, y[0], y[0]
     swing = float(np.ptp(y)) / 2
     slopes = np.diff(y)
     peaks = np.flatnonzero(slopes[1:] * slopes[:-1] <= 0.0) + 1  # y is monotonic between them
     for value in y[[0, *peaks, -1]].tolist() if 2 * swing > threshold else ():
         low, high = min(low, value), max(high, value)
-        if going >= 0 and value <= high - swing:
-            count, going, low, high = count + (going > 0), -1, value, value
-        elif going <= 0 and value >= low + swing:
-            count, going, low, high = count + (going < 0), 1, value, value
+        if direction >= 0 and value <= high - swing:
+            count, direction, low, high = count + (direction > 0), -1, value, value
+        elif direction <= 0 and value >= low + swing:
+            count, direction, low, high = count + (direction < 0), 1, value, value
     return count

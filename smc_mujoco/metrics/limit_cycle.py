@@ -11,8 +11,9 @@ There is no limit cycle where
 
 - s is not finite, or not below 1e100;
 - s does not oscillate, except by rounding;
-- the harmonics of the peak have less than a tenth of the spectrum, as in noise, or in the irregular steps of a coarse
-  encoder, or no more than leaks from slow waves;
+- the peak is no larger than what leaks from slow waves;
+- the harmonics of the peak have less than a tenth of the spectrum's power, as in noise, or in the irregular steps of a
+  coarse encoder;
 - the peak may be a harmonic of a larger cycle with fewer than five periods;
 - the oscillation grows or dies: its amplitude differs by more than half from the first to the second half of the
   samples.
@@ -26,20 +27,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from smc_mujoco.metrics.conventions import last
+from smc_mujoco.metrics.conventions import last_part
+from smc_mujoco.metrics.once_per_trace import once_per_trace
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
 
-PERIODS = 5  # fewest in the samples
-LARGEST = 1e100  # of |s|: the powers of a spectrum of larger numbers may be infinite
-LEAK = 2.5e-9  # of the spectrum's largest power: what the window leaks from slow waves
+MIN_PERIODS = 5  # of a cycle in the samples
+MAX_MAGNITUDE = 1e100  # of s: the power of larger numbers may be infinite
+LEAK_SHARE = 2.5e-9  # of the spectrum's largest power: what the window leaks from slow waves
 ROUNDING = 1e-10  # of the largest |s|
-SHARE = 0.1  # of the spectrum's power, which the cycle's harmonics have at least
-SAME = 0.1  # periods: how far a line lies from a fraction of another at most, to be the first harmonic of both
-LINE = 0.01  # of the largest peak's power: what the line of the first harmonic has at least
-STEADY = 0.5  # largest relative change of the amplitude from the first to the second half
-NONE = (math.nan, math.nan)
+MIN_POWER_SHARE = 0.1  # of the spectrum's power, in the harmonics of a cycle
+MAX_LINE_OFFSET = 0.1  # periods: between the line of a first harmonic and a fraction of the line of a higher one
+MIN_LINE_SHARE = 0.01  # of the largest peak's power, in the line of the first harmonic
+MAX_CHANGE = 0.5  # of the amplitude, relative, from the first to the second half
+NO_CYCLE = (math.nan, math.nan)
 
 
 def limit_cycle(t: np.ndarray, s: np.ndarray) -> tuple[float, float]:
@@ -50,59 +52,70 @@ def limit_cycle(t: np.ndarray, s: np.ndarray) -> tuple[float, float]:
       s: (K,) sliding variable.
     """
     rates = np.diff(s)
-    if len(rates) < 4 * PERIODS or not np.abs(s).max() < LARGEST:
-        return NONE
+    if len(rates) < 4 * MIN_PERIODS or not np.abs(s).max() < MAX_MAGNITUDE:
+        return NO_CYCLE
     h = float(t[-1] - t[0]) / (len(t) - 1)
     spectrum = np.abs(np.fft.rfft((rates - rates.mean()) * _window(len(rates)))) ** 2
-    first = PERIODS
+    first = MIN_PERIODS
     while first < len(spectrum) - 1 and spectrum[first - 1] > spectrum[first]:
         first += 1  # on the slope of slower waves
     peak = first + int(spectrum[first:].argmax())
-    if spectrum[peak] <= LEAK * float(spectrum.max()):
-        return NONE
+    if spectrum[peak] <= LEAK_SHARE * float(spectrum.max()):
+        return NO_CYCLE
     periods = _refined(rates, peak)
     periods /= _order(rates, spectrum, first, peak, periods)
-    if periods < PERIODS or _share(spectrum, first, periods) < SHARE:
-        return NONE
+    if periods < MIN_PERIODS or _share(spectrum, first, periods) < MIN_POWER_SHARE:
+        return NO_CYCLE
     frequency = periods / (h * len(rates))
-    window = max(2, min(round(1.0 / (frequency * h)), len(s) // PERIODS))
+    window = max(2, min(round(1.0 / (frequency * h)), len(s) // MIN_PERIODS))
     fast = s[window // 2 : window // 2 + len(s) - window + 1] - np.convolve(s, np.full(window, 1.0 / window), "valid")
     ranges = np.ptp(sliding_window_view(fast, window + 1), axis=1)
     early, late = (float(np.median(part)) for part in np.array_split(ranges, 2))
-    if max(early, late) <= 2.0 * ROUNDING * np.abs(s).max() or abs(late - early) > STEADY * max(early, late):
-        return NONE
+    if max(early, late) <= 2.0 * ROUNDING * np.abs(s).max() or abs(late - early) > MAX_CHANGE * max(early, late):
+        return NO_CYCLE
     return float(np.median(ranges)) / 2.0, frequency
+
+
+def channel_cycle(trace: Trace, channel: int = 0) -> tuple[float, float]:
+    """Return amplitude and frequency of the limit cycle in the last part of a run; NaN, NaN without one."""
+    part = last_part(trace)
+    return limit_cycle(trace.t[part], trace.s[part, channel])
+
+
+@once_per_trace
+def largest_cycle(trace: Trace) -> tuple[float, float]:
+    """Return amplitude and frequency of the channel with the largest limit cycle; NaN, NaN where none has one."""
+    cycles = [channel_cycle(trace, i) for i in range(trace.s.shape[1])]
+    return max((cycle for cycle in cycles if not math.isnan(cycle[0])), default=NO_CYCLE)
 
 
 def _order(rates: np.ndarray, spectrum: np.ndarray, first: int, peak: int, periods: float) -> int:
     """Return which harmonic of the cycle the largest peak of s' is: 1, or larger for a wave with jumps or pulses.
 
-    The first harmonic is the largest in s itself, and has a line of its own. Waves with fewer than five periods have no
-    lines that can be told apart: one of them counts if the peak may be its second or third harmonic.
+    The first harmonic is the largest in the spectrum of s, and is a line there. Waves with fewer than five periods have
+    no separate lines: such a wave is the cycle if the peak may be its second or third harmonic.
     """
     of_s = spectrum[1:] / np.sin(0.5 * math.pi * np.arange(1, len(spectrum)) / (len(spectrum) - 1)) ** 2
     sizes = np.convolve(np.r_[0.0, of_s], np.ones(5), "same")  # of lines, which the window spreads
     order, largest = 1, sizes[peak]
-    for k in range(2, round(periods / PERIODS) + 1 if periods >= 3 * PERIODS else 4):
+    for k in range(2, round(periods / MIN_PERIODS) + 1 if periods >= 3 * MIN_PERIODS else 4):
         at = round(periods / k)
         if sizes[at] <= largest:
             continue
-        strong = at >= first and spectrum[at] > LINE * spectrum[peak]
-        if at < PERIODS or (strong and abs(_refined(rates, at) - periods / k) < SAME):
+        strong = at >= first and spectrum[at] > MIN_LINE_SHARE * spectrum[peak]
+        if at < MIN_PERIODS or (strong and abs(_refined(rates, at) - periods / k) < MAX_LINE_OFFSET):
             order, largest = k, sizes[at]
     return order
 
 
 def _share(spectrum: np.ndarray, first: int, periods: float) -> float:
-    """Return the share of a cycle's harmonics in a spectrum, over what they have in one without lines: at most 1."""
+    """Return the share of a spectrum's power in a cycle's harmonics: 0 for a flat spectrum, at most 1."""
     width = min(3, int(periods - 2) // 2)  # bins to each side of a line
     bins = np.arange(len(spectrum))
     lines = np.abs(bins - periods * np.maximum(np.round(bins / periods), 1.0)) <= width + 0.5
     if lines[first:].all():  # the cycle is the fastest of all: there is nothing beside it
         return 1.0
     covered = lines[first:].mean()
-    if covered == 1.0:
-        return 0.0  # so few bins are left that any spectrum looks like this
     return float((spectrum[first:][lines[first:]].sum() / spectrum[first:].sum() - covered) / (1.0 - covered))
 
 
@@ -112,23 +125,11 @@ def _window(count: int) -> np.ndarray:
     return 0.35875 - 0.48829 * np.cos(angles) + 0.14128 * np.cos(2.0 * angles) - 0.01168 * np.cos(3.0 * angles)
 
 
-def of_trace(trace: Trace, channel: int = 0) -> tuple[float, float]:
-    """Return amplitude and frequency of the limit cycle in the last part of a run; NaN, NaN without one."""
-    part = last(trace)
-    return limit_cycle(trace.t[part], trace.s[part, channel])
-
-
-def largest(trace: Trace) -> tuple[float, float]:
-    """Return amplitude and frequency of the channel with the largest limit cycle; NaN, NaN where none has one."""
-    cycles = [of_trace(trace, i) for i in range(trace.s.shape[1])]
-    return max((one for one in cycles if not math.isnan(one[0])), default=NONE)
-
-
 def _refined(rates: np.ndarray, peak: int) -> float:
-    """Return a peak of the spectrum between its whole numbers: how far its phase turns from one half to the other."""
+    """Return a peak's number of periods, not a whole one: its phase turns from the first half to the second."""
     half = len(rates) // 2
     turns = np.exp(-2j * math.pi * peak / len(rates) * np.arange(2 * half))
     window = _window(half)
-    first, last = ((rates[at : at + half] * turns[at : at + half]) @ window for at in (0, half))
-    turned = float(np.angle(last * np.conj(first))) / (2.0 * math.pi)  # of a turn, in half of the samples
+    early, late = ((rates[at : at + half] * turns[at : at + half]) @ window for at in (0, half))
+    turned = float(np.angle(late * np.conj(early))) / (2.0 * math.pi)  # turns in half of the samples
     return peak + turned * len(rates) / half

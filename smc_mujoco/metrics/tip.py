@@ -1,11 +1,12 @@
 """Scores of arms: where the tip is and how hard it presses, and every metric of each joint by itself.
 
-The tip is the site that `plant.tip` names. Its path follows from the joints' positions. Forces of contact are MuJoCo's
-at the logged state under the logged command and disturbances: those of the sample, not means over a control period.
-They are unknown if an actuator has a state that a trace lacks, such as a motor's current or the rotor behind a
-backlash. Frictions that bristles or the callback compute are left out. That does not matter on an arm: a sliding
-contact's spring carries 99 % of a change of load, see `mechanisms.hardware.contact`. Joints without a channel are taken
-to be where they start.
+The tip is the site that `plant.tip` names. Its path follows from the joints' positions. A joint without a channel is
+taken to stay where it starts.
+
+MuJoCo computes the forces of contact at the logged state, command and disturbances of each sample. So they are not
+means over a control period. They are unknown if an actuator has a state that a trace lacks, such as a motor's current,
+or the rotor behind a backlash. LuGre friction and friction by a formula are left out. That does not matter on an arm: a
+sliding contact's spring carries 99 % of a change of load, see `mechanisms.hardware.contact`.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.mechanisms.hardware.part import drive_ids, initial_pose, joint_ids, joint_names
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
-from smc_mujoco.metrics.channel_groups import cut, groups
-from smc_mujoco.metrics.kept import kept
+from smc_mujoco.metrics.channel_groups import group_trace, groups
+from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.reference import evaluate
 from smc_mujoco.simulation.signals import Push
@@ -33,8 +34,7 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation.scenario import Scenario
     from smc_mujoco.simulation.trace import Trace
 
-# Share of a run after which forces of contact are scored: chosen, so that the tip has touched and the force has risen.
-SETTLED = 0.2
+FORCE_START = 0.2  # share of a run after which forces are scored; chosen, so that the tip has touched the surface
 
 
 class Contacts(NamedTuple):
@@ -65,15 +65,15 @@ def tip_path(plant: Plant, x: np.ndarray, factors: Mapping[str, float] | None = 
     model = plant.load(factors)
     data, site = mujoco.MjData(model), model.site(plant.tip).id
     data.qpos[:] = initial_pose(model)
-    places, tip = model.jnt_qposadr[joint_ids(model)], np.empty((len(x), 3))
-    for k, each in enumerate(x):
-        data.qpos[places] = each
+    positions, tip = model.jnt_qposadr[joint_ids(model)], np.empty((len(x), 3))
+    for k, joints in enumerate(x):
+        data.qpos[positions] = joints
         mujoco.mj_kinematics(model, data)
         tip[k] = data.site_xpos[site]
     return tip
 
 
-@kept
+@once_per_trace
 def tip_paths(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
     """Return the actual and the wanted path of the tip, m, (K + 1, 3) each, read-only. Raises like `tip_path`.
 
@@ -96,15 +96,15 @@ def tip_error(trace: Trace) -> np.ndarray:
 
 def knows_contacts(scenario: Scenario) -> bool:
     """Return whether a scenario has contacts whose forces follow from a trace."""
-    return scenario.contact.kind != "none" and not _unknown(scenario)
+    return scenario.contact.kind != "none" and not _with_hidden_state(scenario)
 
 
-def _unknown(scenario: Scenario) -> list:
+def _with_hidden_state(scenario: Scenario) -> list:
     """Return the actuators with a state that a trace lacks."""
     return [part for part in scenario.actuator if part.stateful or part.in_callback or not part.drives]
 
 
-@kept
+@once_per_trace
 def contacts(trace: Trace) -> Contacts:
     """Return the normal forces and the penetrations of a run's contacts, read-only.
 
@@ -114,8 +114,8 @@ def contacts(trace: Trace) -> Contacts:
     scenario = trace.scenario.resolved
     if scenario.contact.kind == "none":
         raise ScenarioError(f"the scenario of {scenario.plant.name} has no contact: give contact=")
-    if unknown := _unknown(scenario):
-        raise ScenarioError(f"the state of {type(unknown[0]).__name__} is not in a trace, so its contacts are unknown")
+    if hidden := _with_hidden_state(scenario):
+        raise ScenarioError(f"the state of {type(hidden[0]).__name__} is not in a trace, so its contacts are unknown")
     compiled = models.model(scenario)
     model = models.with_values(compiled, scenario)
     data, joints = mujoco.MjData(model), joint_ids(model)
@@ -123,13 +123,12 @@ def contacts(trace: Trace) -> Contacts:
     drives, n = model.actuator_ctrladr[drive_ids(model)], scenario.plant.driven
     scale = math.prod(part.scale for part in scenario.actuator)
     pushes = [(model.body(d.body).id, d) for d in scenario.disturbance if isinstance(d, Push) and scenario.plant.direct]
-    touches, wrench = Contacts(np.zeros(len(trace.t)), np.zeros(len(trace.t)), np.zeros((len(trace.t), 3))), np.zeros(6)
-    moves = model.body_weldid[model.geom_bodyid] != 0
+    contacts = Contacts(np.zeros(len(trace.t)), np.zeros(len(trace.t)), np.zeros((len(trace.t), 3)))
     data.qpos[:] = initial_pose(model)
     jump = _jump_sample(trace)
     for k in range(len(trace.t)):
         if np.isnan(trace.x[k]).any():  # the run has failed
-            for values in touches:
+            for values in contacts:
                 values[k:] = np.nan
             break
         if k == jump:
@@ -141,15 +140,22 @@ def contacts(trace: Trace) -> Contacts:
         for body, push in pushes:
             data.xfrc_applied[body, :3] += evaluate(push, trace.t[k])[0] * np.array([push.x, push.y, push.z])
         mujoco.mj_forward(model, data)
-        for i in range(data.ncon):
-            mujoco.mj_contactForce(model, data, i, wrench)
-            touches.force[k] += wrench[0]
-            touches.depth[k] = max(touches.depth[k], -data.contact.dist[i])
-            one, other = moves[data.contact.geom[i]].astype(float)  # the normal points from the first to the other
-            touches.push[k] += (other - one) * wrench[0] * data.contact.frame[i, :3]
-    for values in touches:
+        _add_contacts(model, data, contacts, k)
+    for values in contacts:
         values.flags.writeable = False
-    return touches
+    return contacts
+
+
+def _add_contacts(model: mujoco.MjModel, data: mujoco.MjData, contacts: Contacts, k: int) -> None:
+    """Add MuJoCo's present contacts to sample k."""
+    wrench = np.zeros(6)
+    for i in range(data.ncon):
+        mujoco.mj_contactForce(model, data, i, wrench)
+        contacts.force[k] += wrench[0]
+        contacts.depth[k] = max(contacts.depth[k], -data.contact.dist[i])
+        # 1 for a geom that moves, 0 for a fixed one; the normal points from the first to the second
+        first, second = (model.body_weldid[model.geom_bodyid[data.contact.geom[i]]] != 0).astype(float)
+        contacts.push[k] += (second - first) * wrench[0] * data.contact.frame[i, :3]
 
 
 def _jump_sample(trace: Trace) -> int:
@@ -162,7 +168,7 @@ def tip_scores(trace: Trace, force: float | None = None) -> dict[str, float]:
     """Return scores of an arm's tip, by name.
 
     Args:
-      force: with which it should press, N; None: the gain `force` of its law, if there is one.
+      force: the force with which it should press, N; None: the gain `force` of its law, if there is one.
 
     Returns:
       max_error, rms_error, last_error, m: the distance of the tip from where the references want it. With a contact
@@ -179,8 +185,8 @@ def tip_scores(trace: Trace, force: float | None = None) -> dict[str, float]:
     if knows_contacts(trace.scenario):
         wanted = trace.scenario.law.gains.get("force") if force is None else number("force", force, above=0.0)
         pressed = contacts(trace)
-        late = pressed.force[trace.t >= trace.t[0] + SETTLED * np.ptp(trace.t)]
-        values |= {"mean_force": late.mean()}
+        late = pressed.force[trace.t >= trace.t[0] + FORCE_START * np.ptp(trace.t)]
+        values["mean_force"] = late.mean()
         values |= {"force_error": 100.0 * (late.mean() / wanted - 1.0)} if wanted else {}
         values |= {"force_ripple": late.std(), "touching": 100.0 * (late > 0.0).mean(), "depth": pressed.depth.max()}
     return {name: float(value) for name, value in values.items()}
@@ -196,9 +202,9 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
     values, names = {}, joint_names(trace.scenario.plant)
     for group in groups(trace.scenario):
         for i in group.channels:
-            one = dataclasses.replace(group, channels=(i,))
-            part, power = cut(trace, one), np.abs(trace.force[:, i] * trace.v[:, i])
-            values[names[i]] = {m.name: float(m.formula(part)) for m in metrics() if m.fits(one)}
+            joint = dataclasses.replace(group, channels=(i,))
+            part, power = group_trace(trace, joint), np.abs(trace.force[:, i] * trace.v[:, i])
+            values[names[i]] = {m.name: float(m.formula(part)) for m in metrics() if m.fits(joint)}
             values[names[i]] |= {"peak_power": float(power.max()), "work": float(np.trapezoid(power, trace.t))}
     return {name: values[name] for name in names}
 

@@ -49,7 +49,7 @@ from smc_mujoco.control.source import by_words, kinds, unequal
 from smc_mujoco.draw.style import law_colour
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.metrics.conventions import last
+from smc_mujoco.metrics.conventions import last_part
 from smc_mujoco.simulation.conditions import Condition, find_condition
 from smc_mujoco.simulation.grid import DURATION, case, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
@@ -257,7 +257,7 @@ def _measured(trace: Trace) -> Run:
             failure=trace.failure or f"it diverged at {trace.diverged_at:g} s",
         )
     driven = slice(trace.scenario.plant.driven)
-    end = last(trace)
+    end = last_part(trace)
     count = len(trace.t) - end.start
     sizes = {"e": np.abs(trace.x - trace.r)[-PARTS * count :, driven], "s": np.abs(trace.s)[-PARTS * count :, driven]}
     parts = {name: [float(part.max()) for part in np.array_split(size, PARTS)] for name, size in sizes.items()}

@@ -676,8 +676,8 @@ def test_a_run_of_one_step_by_hand():
         "tv_rate": 0.0,
         "energy": 4.5,
         "hf_share": 0.0,
-        "chattering_amplitude": limit_cycle.NONE[0],  # the object, as NaN is not equal to itself
-        "chattering_frequency": limit_cycle.NONE[1],
+        "chattering_amplitude": limit_cycle.NO_CYCLE[0],  # the object, as NaN is not equal to itself
+        "chattering_frequency": limit_cycle.NO_CYCLE[1],
         "stick_time": 0.0,
         "peak_reaction": 0.0,
         "reversal_rate": 0.0,
@@ -698,7 +698,7 @@ def test_scoring_looks_for_the_limit_cycle_of_a_channel_once(monkeypatch):
     cart = run(
         t, np.zeros((len(t), 2)), s=np.column_stack([np.sin(60 * t), np.zeros(len(t))]), units=("m", "rad"), free=True
     )
-    monkeypatch.setattr(limit_cycle, "of_trace", lambda trace, channel: asked.append(channel) or (0.1, 10.0))
+    monkeypatch.setattr(limit_cycle, "channel_cycle", lambda trace, channel: asked.append(channel) or (0.1, 10.0))
     assert m.score(cart)["chattering_frequency"] == 10.0
     assert asked == [0]
 
@@ -706,7 +706,7 @@ def test_scoring_looks_for_the_limit_cycle_of_a_channel_once(monkeypatch):
 def test_scoring_keeps_no_trace_and_looks_once_in_each_group(monkeypatch):
     t, asked = np.arange(2001) / 100, []
     both = run(t, np.zeros((len(t), 2)), s=np.sin(60 * t)[:, None] * np.ones(2), units=("m", "rad"))
-    monkeypatch.setattr(limit_cycle, "of_trace", lambda trace, channel: asked.append(trace.s.shape) or (0.1, 10.0))
+    monkeypatch.setattr(limit_cycle, "channel_cycle", lambda trace, channel: asked.append(trace.s.shape) or (0.1, 10.0))
     m.scores(both)
     m.score(both)
     assert len(asked) == 4  # two groups, scored twice

@@ -25,7 +25,7 @@ import numpy as np
 from smc_mujoco.analysis.worst_case import strategies
 from smc_mujoco.analysis.worst_case.uncertainty import Member, Members
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.metrics.conventions import Metric, parts
+from smc_mujoco.metrics.conventions import Metric, by_group
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.signals import Relay
 from smc_mujoco.simulation.trace import Trace
@@ -119,7 +119,7 @@ class Search:
         """Return the key of a run."""
         if trace.failure is not None:
             return FAILED
-        groups = parts(trace)
+        groups = by_group(trace)
         value, error = self.metric.worst(groups), CATALOGUE["rms_error"].worst(groups)
         return (self.metric.absent if math.isnan(value) else value), error
 

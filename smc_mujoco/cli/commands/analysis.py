@@ -421,7 +421,7 @@ def chatter(
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
         from smc_mujoco.draw.page import files
-        from smc_mujoco.metrics.limit_cycle import of_trace
+        from smc_mujoco.metrics.limit_cycle import channel_cycle
         from smc_mujoco.simulation.grid import case
         from smc_mujoco.simulation.run import run
 
@@ -446,7 +446,7 @@ def chatter(
             drawn.reached(done, len(cases) + 1)
             cycles.append(chattering(scenario, channel))
         traces = run(cases, threads=threads)
-        measured, changes = [of_trace(trace, channel) for trace in traces], step_halving(traces, channel, threads)
+        measured, changes = [channel_cycle(trace, channel) for trace in traces], step_halving(traces, channel, threads)
     terminal.print(tables.chattering(cases, channel, cycles, measured, changes))
     if designs:
         terminal.print(tables.designs([chosen for _, chosen in designs], cases[0].efforts[channel]))

@@ -10,7 +10,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.evidence.report.plan import GAINS, Report, Work
 from smc_mujoco.mechanisms.hardware.drives import Lag
-from smc_mujoco.metrics.limit_cycle import NONE, of_trace
+from smc_mujoco.metrics.limit_cycle import NO_CYCLE, channel_cycle
 from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.run import run
 from smc_mujoco.studies.cache import cached
@@ -73,7 +73,7 @@ def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) 
             cycle = chattering(one)
         except ScenarioError:
             continue
-        amplitude, frequency = NONE if trace.diverged_at is not None else of_trace(trace)
+        amplitude, frequency = NO_CYCLE if trace.diverged_at is not None else channel_cycle(trace)
         found.append(
             Oscillation(
                 plant=plant,

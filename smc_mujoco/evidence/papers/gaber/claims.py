@@ -28,7 +28,7 @@ from smc_mujoco.evidence.papers.gaber.timing import nanoseconds
 from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics import conventions
-from smc_mujoco.metrics.catalogue import HIGH_PASS, settling_time
+from smc_mujoco.metrics.catalogue import HIGH_FREQUENCY, settling_time
 from smc_mujoco.simulation.perturbations import Noise
 
 OURS, CLASSICAL, ADAPTIVE, HOSMC = LAWS  # the paper's law, and those that it compares
@@ -589,13 +589,13 @@ def fluctuation(trace):
 
     The share is from the discrete Fourier transform, no window; a failed run gives inf, a constant u 0.
     """
-    u = trace.u[conventions.last(trace)]
+    u = trace.u[conventions.last_part(trace)]
     if not np.isfinite(u).all():
         return np.inf, np.inf, np.inf
     std, step = float(u.std(axis=0).max()), float(np.abs(np.diff(u, axis=0)).max())
     power = (np.abs(np.fft.rfft(u - u.mean(axis=0), axis=0)) ** 2).max(axis=1)
     frequency = np.fft.rfftfreq(len(u), trace.scenario.control_period)
-    return std, step, float(power[frequency > HIGH_PASS].sum() / power.sum()) if power.any() else 0.0
+    return std, step, float(power[frequency > HIGH_FREQUENCY].sum() / power.sum()) if power.any() else 0.0
 
 
 # practice: cheap tanh, saturation, exponential convergence, parameter jumps, delays
@@ -677,7 +677,7 @@ def decay_rate(trace):
     """
     worst = np.abs(trace.x).max(axis=1)
     envelope = np.maximum.accumulate(worst[::-1])[::-1]
-    inside = np.flatnonzero(envelope <= conventions.BAND * scale(trace.scenario))
+    inside = np.flatnonzero(envelope <= conventions.SETTLING_BAND * scale(trace.scenario))
     if inside.size == 0:  # as where it holds NaN
         return math.nan
     upto = slice(0, max(int(inside[0]), 2))
@@ -692,7 +692,7 @@ def jumps(runs):
             (trace,) = runs.traces([runs.scenario(plant, OURS, condition)])
             peak, bound = (
                 float(np.nan_to_num(np.abs(trace.x[part]).max(), nan=math.inf)) / scale(trace.scenario)
-                for part in (trace.t >= trace.scenario.jump.time, conventions.last(trace))
+                for part in (trace.t >= trace.scenario.jump.time, conventions.last_part(trace))
             )
             peaks[f"{plant}, a {condition.removeprefix('jump_')} jump"] = peak
             bounds.append(bound)

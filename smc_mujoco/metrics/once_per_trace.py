@@ -13,15 +13,15 @@ if TYPE_CHECKING:
 V = TypeVar("V")
 
 
-class kept(Generic[V]):
+class once_per_trace(Generic[V]):
     """Decorator of a function of a trace, which then computes its result once as long as the trace exists."""
 
     def __init__(self, function: Callable[[Trace], V]):
-        functools.update_wrapper(self, function)  # hashes of code follow __wrapped__ and do not see what is kept
+        functools.update_wrapper(self, function)  # hashes of code follow __wrapped__ and do not see the results
         self._function = function
-        self._found: weakref.WeakKeyDictionary[Trace, V] = weakref.WeakKeyDictionary()
+        self._results: weakref.WeakKeyDictionary[Trace, V] = weakref.WeakKeyDictionary()
 
     def __call__(self, trace: Trace) -> V:
-        if trace not in self._found:
-            self._found[trace] = self._function(trace)
-        return self._found[trace]
+        if trace not in self._results:
+            self._results[trace] = self._function(trace)
+        return self._results[trace]
