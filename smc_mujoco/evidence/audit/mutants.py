@@ -12,10 +12,10 @@ from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.component import Component
-from smc_mujoco.control.variants import forgetful, relay, reversed_gain, zero_gain
 from smc_mujoco.evidence.audit.audit import as_paper, measure, sets, wanted
 from smc_mujoco.evidence.audit.paper import Entry, Paper
 from smc_mujoco.evidence.audit.runs import Result, Runs
+from smc_mujoco.evidence.audit.variants import forgetful, relay, reversed_gain, zero_gain
 from smc_mujoco.evidence.audit.verdict import Evidence, sentences
 
 MUTANTS: dict[str, Callable[[Component], Component]] = {

@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 import smc_mujoco as smc
 from smc_mujoco.analysis.linear_theory import lam_range
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.control.variants import reversed_gain, squeezed, with_gains, zero_gain
 from smc_mujoco.evidence.audit import audit
 from smc_mujoco.evidence.audit import runs as claim_runs
 from smc_mujoco.evidence.audit.audit import claims, evaluations
 from smc_mujoco.evidence.audit.paper import Entry, paper
 from smc_mujoco.evidence.audit.runs import Runs
+from smc_mujoco.evidence.audit.variants import reversed_gain, squeezed, with_gains, zero_gain
 from smc_mujoco.evidence.audit.verdict import (
     EXISTENTIAL,
     NAMED,

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.control.variants import with_gains
 from smc_mujoco.evidence.audit import evidence, template
 from smc_mujoco.evidence.audit.audit import claims
 from smc_mujoco.evidence.audit.paper import CODE, FILE, new, paper
 from smc_mujoco.evidence.audit.runs import Runs
+from smc_mujoco.evidence.audit.variants import with_gains
 from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Beside, Check, Threshold
 
 pytestmark = pytest.mark.quick

@@ -10,10 +10,10 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.margins import DELAYS, TOLERATED_ERROR
 from smc_mujoco.control.gain_sets import SETS
 from smc_mujoco.control.law import law_function
-from smc_mujoco.control.variants import reversed_gain, with_gains, zero_gain
 from smc_mujoco.evidence.audit.audit import claims, measure
 from smc_mujoco.evidence.audit.paper import paper
 from smc_mujoco.evidence.audit.runs import Runs
+from smc_mujoco.evidence.audit.variants import reversed_gain, with_gains, zero_gain
 from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED, Check, verdict
 from smc_mujoco.evidence.papers.gaber import claims as measured
 from smc_mujoco.evidence.papers.gaber import lyapunov

@@ -20,7 +20,7 @@ from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.control.law import Measurement, catalogue, command, law_function, sliding
 from smc_mujoco.control.law import law as find_law
-from smc_mujoco.control.variants import reversed_gain, squeezed, with_gains
+from smc_mujoco.evidence.audit.variants import reversed_gain, squeezed, with_gains
 from smc_mujoco.evidence.audit.verdict import Beside, check, ratio
 from smc_mujoco.evidence.papers.gaber import lyapunov
 from smc_mujoco.evidence.papers.gaber.scenarios import CONTROL_PERIOD, LAWS, U_MAX
