@@ -84,9 +84,9 @@ def stepping(
 def plain_batch(scenario: smc.Scenario, runs: int, threads: int = 1) -> Batch:
     """A batch of a plant's whole model, with scenery. It is stepped outside of `installed`, with MuJoCo's timers."""
     first = scenario.resolved
-    model = models.with_values(models.model(first), first)
+    model = models.with_values(models.compile_model(first), first)
     batch = Batch(model, runs, threads)
-    batch.bind("qpos")[:], batch.bind("qvel")[:] = models.start(model, first)
+    batch.bind("qpos")[:], batch.bind("qvel")[:] = models.initial_state(model, first)
     return batch
 
 

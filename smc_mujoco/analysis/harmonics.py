@@ -111,7 +111,7 @@ class Loop:
             self.scenario, actuator=closed, contact="none", x0=None, v0=None, jump=None, integrator=s.integrator
         )
         with installed(None):
-            compiled = models.model(ideal)
+            compiled = models.compile_model(ideal)
             made = models.with_values(compiled, ideal)
             made.opt.disableflags |= JUMPING
             gear = next((part for part in s.actuator if isinstance(part, Backlash)), None)
@@ -122,7 +122,7 @@ class Loop:
                 mujoco.mj_setConst(made, mujoco.MjData(made))
             self.step = float(made.opt.timestep)
             data = mujoco.MjData(made)
-            key = models.start(made, dataclasses.replace(ideal, x0=0.0, v0=0.0))
+            key = models.initial_state(made, dataclasses.replace(ideal, x0=0.0, v0=0.0))
             data.qpos[:], data.qvel[:] = key
             self.a, b = transition(made, data)
             self.b = b[:, drive_ids(made)[self.channel]] * math.prod(part.scale for part in s.actuator)

@@ -50,10 +50,10 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     plant = as_plant(plant)
     at = Scenario(plant=plant, law="none", x0=(plant.rest or 0.0) if x is None else x, v0=0.0)
     with installed(None):
-        made = models.with_values(models.model(at), at)
+        made = models.with_values(models.compile_model(at), at)
         made.opt.disableflags |= JUMPING
         data = mujoco.MjData(made)
-        data.qpos[:], data.qvel[:] = models.start(made, at)
+        data.qpos[:], data.qvel[:] = models.initial_state(made, at)
         driven, dofs = drive_ids(made), dof_ids(made)
         _hold(made, data, driven, plant.name)
         block = rates(made, data)

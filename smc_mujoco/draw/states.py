@@ -45,7 +45,7 @@ class Shape(NamedTuple):
 def shapes(scenario: Scenario) -> list[Shape]:
     """Return the mechanism at the start of a run, and after its jump."""
     steps = [0] if scenario.jump is None else [0, scenario.jump_step]
-    compiled = models.model(scenario)
+    compiled = models.compile_model(scenario)
     return [
         Shape(step * scenario.resolved.physics_step, models.with_values(compiled, scenario, step)) for step in steps
     ]

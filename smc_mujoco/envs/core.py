@@ -89,7 +89,7 @@ class Setting:
         table = channels(self.model)
         self.qpos, self.qvel, self.ctrl = table["qpos"], table["qvel"], table["ctrl"][: plant.driven]
         self.rotors = _rotors(self.model)
-        self.rest = models.start(self.model, self.scenario)
+        self.rest = models.initial_state(self.model, self.scenario)
         self.ctrl_limits = math.prod(part.scale for part in self.scenario.actuator) * np.array(self.scenario.limits)
         self.selected, self.rest_x = self.task.selected(plant), rest(plant)
         self.references = _references(self.scenario, self.scenario.samples + 1 if self.task.moving else 1)

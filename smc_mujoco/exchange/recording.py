@@ -85,7 +85,7 @@ def posed(trace: Trace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     samples = np.flatnonzero(np.isfinite(trace.x).all(axis=1))[::step]
     whole = puppet.poses(trace, trace.t[samples]) if first.nq > len(channels) else None
     if whole is None:
-        whole = np.tile(models.start(first, trace.scenario)[0], (len(samples), 1))
+        whole = np.tile(models.initial_state(first, trace.scenario)[0], (len(samples), 1))
     whole[:, channels] = trace.x[samples]
     places, turns = np.empty((len(samples), first.nbody, 3)), np.empty((len(samples), first.nbody, 4))
     for i, k in enumerate(samples.tolist()):

@@ -116,7 +116,7 @@ def contacts(trace: Trace) -> Contacts:
         raise ScenarioError(f"the scenario of {scenario.plant.name} has no contact: give contact=")
     if hidden := _with_hidden_state(scenario):
         raise ScenarioError(f"the state of {type(hidden[0]).__name__} is not in a trace, so its contacts are unknown")
-    compiled = models.model(scenario)
+    compiled = models.compile_model(scenario)
     model = models.with_values(compiled, scenario)
     data, joints = mujoco.MjData(model), joint_ids(model)
     positions, rates = model.jnt_qposadr[joints], model.jnt_dofadr[joints]

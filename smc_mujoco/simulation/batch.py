@@ -1,6 +1,7 @@
-"""Scenarios of one layout in one Batch: from records, through the simulation, to traces."""
+"""Scenarios that share a model layout, simulated in one MuJoCo Batch: records in, traces out."""
 
 import copy
+import itertools
 from collections.abc import Callable, Sequence
 
 import mujoco
@@ -20,95 +21,97 @@ from smc_mujoco.simulation.trace import Trace, from_log
 # isort: split
 from mujoco.batch import Batch, SimulationError  # by now imported by callback
 
-SLICE_STEPS = 400_000  # physics steps times channels between two looks at the clock, about a second
+SLICE_STEPS = 400_000  # physics steps times channels in a slice, about a second
 USER_MODEL_STEPS = 200  # in a slice: a user's model with contacts takes 0.1 s and more a step once it has diverged
-FULL = mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL
-OVERFLOWED = "MuJoCo had no room for all contacts in the model's memory: give its <size> more memory"
+FULL_WARNINGS = mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL
+LOST_CONTACTS = "MuJoCo had no room for all contacts in the model's memory: give its <size> more memory"
 
 Report = Callable[[int], None]  # called with the number of steps since its last call
 
 
 class ScenarioBatch:
-    """Scenarios of one key in one Batch. Make and run it while the callback is installed."""
+    """Scenarios of one key (`Prepared.key`) in one Batch. Make and run it while the callback is installed."""
 
     def __init__(self, prepared: Sequence[Prepared], threads: int):
         self.prepared = prepared
-        self.scenarios = scenarios = [one.scenario.resolved for one in prepared]
+        self.scenarios = scenarios = [item.scenario.resolved for item in prepared]
         first, count = scenarios[0], len(scenarios)
-        self.compiled, self.model = prepared[0].mechanism.model, copy.copy(prepared[0].mechanism.model)
-        set_fields = models.put_values(self.model, self.compiled, first, 0)
+        self.base, self.model = prepared[0].mechanism.model, copy.copy(prepared[0].mechanism.model)
+        set_fields = models.put_values(self.model, self.base, first, 0)
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
-        # Fields that the first scenario sets in the shared model, with the values for scenarios that do not set them.
-        self.untouched = {name: field_array(self.compiled, name) for name in set_fields}
+        # The shared model has the first scenario's values. Scenarios that do not set these fields need the base values.
+        self.base_values = {name: field_array(self.base, name) for name in set_fields}
         self.logs = [np.full((first.samples + 1, first.plant.n), np.nan, state.LOG) for _ in scenarios]
         self.records = np.zeros(count, state.SIMULATION)
         self.packed = []  # the arrays whose addresses are in the records
-        for i, (one, log) in enumerate(zip(prepared, self.logs, strict=True)):
-            self.records[i], packed = pack(one, log)
+        for i, (item, log) in enumerate(zip(prepared, self.logs, strict=True)):
+            self.records[i], packed = pack(item, log)
             self.packed.append(packed)
         # persistent: at a sample, mjData still holds the forces of this simulation's last step
         self.batch = Batch(self.model, count, min(threads, count), persistent=True)
         self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         addresses = state.address(self.records) + np.arange(count) * self.records.itemsize
         self.batch.bind("userdata")[:] = np.column_stack([np.full(count, callback.magic()), addresses])
-        self.put_starts()
+        self.put_initial_states()
         self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
-        self.errors: dict[int, str] = {}
-        self.calls = 0  # of the callback that each simulation has had
-        self.spare = mujoco.MjData(self.model)
+        self.errors: dict[int, str] = {}  # simulation -> MuJoCo's error
+        self.calls = 0  # callbacks that each simulation should have had by now
+        self.scratch = mujoco.MjData(self.model)  # for `lost_contacts`
         self.set_parameters(0, range(count))
 
     def run(self, report: Report) -> list[Trace]:
         """Simulate all of them to the end."""
         total = self.scenarios[0].samples * self.scenarios[0].steps
-        starts = sorted({0} | {s.jump_step for s in self.scenarios if 0 < s.jump_step <= total})
-        for start, end in zip(starts, [*starts[1:], total], strict=True):
-            if start:
-                self.set_parameters(start, [i for i, s in enumerate(self.scenarios) if s.jump_step == start])
-            self.advance(end - start, report)
-        self.attempt(self.batch.forward, 1)  # the callback's last sample, at the end
+        jumps = sorted({s.jump_step for s in self.scenarios if 0 < s.jump_step <= total})
+        for step, next_step in itertools.pairwise([0, *jumps, total]):
+            if step:
+                self.set_parameters(step, [i for i, s in enumerate(self.scenarios) if s.jump_step == step])
+            self.advance(next_step - step, report)
+        self.run_alive(self.batch.forward, 1)  # the last sample, at the end of the run
         return [self.trace(i) for i in range(len(self.scenarios))]
 
     def set_parameters(self, step: int, indices: Sequence[int]) -> None:
         """Set the true parameters that hold from a step on."""
-        derived = []
+        changed = []
         for i in indices:
-            values = self.untouched | models.field_values(self.compiled, self.scenarios[i], step)
+            values = self.base_values | models.field_values(self.base, self.scenarios[i], step)
             for name, value in values.items():
                 before = self.fields[name][i] if name in self.fields else field_array(self.model, name)
                 if np.any(before != value):
                     self.fields[name] = self.batch.expand(name)
                     self.fields[name][i] = value
-                    derived.append(i)
-        if derived:
-            self.batch.set_const(np.unique(derived).astype(np.int32))
+                    changed.append(i)
+        if changed:
+            self.batch.set_const(np.unique(changed).astype(np.int32))
 
-    def put_starts(self) -> None:
-        """Put all simulations at t = 0, with the past readings of late sensors."""
-        kept = {name: self.batch.bind(name) for name in ("qpos", "qvel", *["history"] * bool(self.model.nhistory))}
+    def put_initial_states(self) -> None:
+        """Put all simulations at t = 0, with the past readings of delayed sensors."""
+        delayed = bool(self.model.nhistory)
+        arrays = {name: self.batch.bind(name) for name in ("qpos", "qvel", *["history"] * delayed)}
         model, data = copy.copy(self.model), mujoco.MjData(self.model)
         for i, scenario in enumerate(self.scenarios):
-            if self.model.nhistory:  # of which each scenario has its own period
-                models.put_values(model, self.compiled, scenario, 0)
-            models.put_start(model, data, scenario)
-            for name, values in kept.items():
-                values[i] = getattr(data, name)
+            if delayed:  # the periods of the readings differ between scenarios
+                models.put_values(model, self.base, scenario, 0)
+            models.put_initial_state(model, data, scenario)
+            for name, array in arrays.items():
+                array[i] = getattr(data, name)
 
     def advance(self, steps: int, report: Report) -> None:
         """Step the simulations that still run, in slices, so that the progress bar moves and Ctrl-C works."""
-        size = len(self.scenarios) * self.scenarios[0].plant.n
+        first = self.scenarios[0]
+        channels = len(self.scenarios) * first.plant.n
+        slice_steps = USER_MODEL_STEPS if first.plant.own else max(1, SLICE_STEPS // channels)
         while steps:
-            longest = USER_MODEL_STEPS if self.scenarios[0].plant.own else SLICE_STEPS // size
-            count = min(steps, max(1, longest))
-            calls = count * self.scenarios[0].stages
-            self.attempt(lambda alive, count=count: self.batch.step(alive, nstep=count), calls)
-            report(count * size)
+            count = min(steps, slice_steps)
+            self.run_alive(lambda alive, count=count: self.batch.step(alive, nstep=count), count * first.stages)
+            report(count * channels)
             steps -= count
 
-    def attempt(self, action: Callable[[np.ndarray], None], calls: int) -> None:
-        """Do something to the simulations that still run. Mark those in which MuJoCo raises or skips the callback.
+    def run_alive(self, action: Callable[[np.ndarray], None], calls: int) -> None:
+        """Apply an action to the simulations that still run, and mark those that fail.
 
         Args:
+          action: a function of their indices.
           calls: how often MuJoCo should call the callback in each.
         """
         records = self.records
@@ -125,32 +128,31 @@ class ScenarioBatch:
             if "allocate memory" in str(error):
                 raise
             # another Python callback replaced ours; the count of calls shows it below
-        short = [i for i in alive if i not in self.errors and records["calls"][i] != self.calls]
-        records["failure"][short] = state.INTERRUPTED
-        records["failed_step"][short] = before // self.scenarios[0].stages
+        interrupted = [i for i in alive if i not in self.errors and records["calls"][i] != self.calls]
+        records["failure"][interrupted] = state.INTERRUPTED
+        records["failed_step"][interrupted] = before // self.scenarios[0].stages
 
     def trace(self, i: int) -> Trace:
         """Return the Trace of simulation i."""
-        scenario = self.scenarios[i]
-        failure, step = int(self.records["failure"][i]), int(self.records["failed_step"][i])
-        reason = None if failure == state.FINE else self.reason(i, failure)
-        if reason is None and (self.model.npair or scenario.plant.own) and self.overflowed(i):
-            reason, step = OVERFLOWED, 0
-        return from_log(self.prepared[i].scenario, self.logs[i], step, reason)
+        code, step = int(self.records["failure"][i]), int(self.records["failed_step"][i])
+        failure = None if code == state.FINE else self.failure(i, code)
+        if failure is None and (self.model.npair or self.scenarios[i].plant.own) and self.lost_contacts(i):
+            failure, step = LOST_CONTACTS, 0
+        return from_log(self.prepared[i].scenario, self.logs[i], step, failure)
 
-    def overflowed(self, i: int) -> bool:
-        """Whether MuJoCo left out contacts of simulation i because its memory for them was full."""
-        warnings = self.batch.get_data(i, self.spare).warning
-        return any(warnings[kind].number for kind in FULL)
+    def lost_contacts(self, i: int) -> bool:
+        """Return whether MuJoCo left out contacts of simulation i because its memory for them was full."""
+        warnings = self.batch.get_data(i, self.scratch).warning
+        return any(warnings[kind].number for kind in FULL_WARNINGS)
 
-    def reason(self, i: int, failure: int) -> str:
-        """Return what went wrong in simulation i."""
+    def failure(self, i: int, code: int) -> str:
+        """Return the failure of simulation i in words."""
         scenario = self.scenarios[i]
-        if state.NOT_FINITE <= failure < state.INTERRUPTED:
-            if reason := call_again(scenario, self.records[i], self.packed[i]):
-                return reason
-            if failure_in_python := reference.run(scenario).failure:
-                return failure_in_python.rpartition(", at t = ")[0]
+        if state.NOT_FINITE <= code < state.INTERRUPTED:
+            if failure := repeated_failure(scenario, self.records[i], self.packed[i]):
+                return failure
+            if in_python := reference.run(scenario).failure:
+                return in_python.rpartition(", at t = ")[0]
         law, estimator = f"law {scenario.law.name!r}", f"estimator {scenario.velocity.name!r}"
         return {
             state.DIVERGED: self.errors.get(i, reference.PLANT_DIVERGED),
@@ -165,17 +167,16 @@ class ScenarioBatch:
             state.INTERRUPTED: reference.INTERRUPTED,
             state.FRICTION_RAISED: f"friction {type(scenario.sliding).__name__} raised an exception",
             state.SURFACE_RAISED: f"surface {scenario.surface and scenario.surface.name!r} raised an exception",
-        }[failure]
+        }[code]
 
 
-def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
-    """Return why a simulation failed, from Python's exception, whose text compiled functions lack.
+def repeated_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
+    """Call the function that failed again, in Python, and return its exception in words.
 
-    The function that failed is called again, in Python, with the inputs in its record, so the text depends only on
-    the run. Return None if it does not fail again, because it had already changed its memory.
+    Compiled functions have no text of an exception. The inputs are those in the record, so the text depends only on the
+    run. Return None if the function does not fail again, because it had already changed its memory.
     """
-    n, seen = s.plant.n, record["seen"]
-    i, t = int(seen["i"]), float(record["instant"]["t"])
+    n, i, t = s.plant.n, int(record["seen"]["i"]), float(record["instant"]["t"])
 
     def memory(function: np.ndarray, size: int) -> np.ndarray:
         return state.view(packed.numbers, int(function["memory"]), (n, size)).copy()
@@ -191,9 +192,9 @@ def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
                 call(s.velocity, Reading(*record["reading"].tolist()))
             case state.SURFACE_RAISED if s.surface is not None:
                 call(s.surface, Measurement(*record["y"].tolist()))
-            case state.LAW_RAISED | state.NOT_FINITE as failure:
+            case state.LAW_RAISED | state.NOT_FINITE as code:
                 u, sliding = call_law(s, record, packed, memory(record["law"], s.law.memory))
-                if failure == state.NOT_FINITE:
+                if code == state.NOT_FINITE:
                     return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {i}"
             case state.REFERENCE_RAISED:
                 for signal in s.references:
@@ -201,22 +202,23 @@ def call_again(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
             case state.FEEDFORWARD_RAISED if s.feedforward is not None:
                 reference.evaluate(s.feedforward, t)
             case state.NOMINAL_RAISED:
-                x, v, u = (state.view(packed.numbers, int(seen[name]), (n,)).copy() for name in ("x", "v", "u"))
+                places = (int(record["seen"][name]) for name in ("x", "v", "u"))
+                x, v, u = (state.view(packed.numbers, place, (n,)).copy() for place in places)
                 reference.nominal(s.plant, x, v, i, Values(**s.plant.parameters), u)
             case state.DISTURBANCE_RAISED | state.DISTURBANCE_NOT_FINITE:
+                loop = record["instant"][["e", "de", "s"]].tolist()
                 for j, signal in enumerate(s.disturbance):
                     memories = memory(packed.signals[j]["function"], signal.memory)
                     for channel in range(n if signal.random else 1):
                         noise = s.noise_seed, channel, s.stream(j)
-                        seen = record["instant"][["e", "de", "s"]].tolist()
-                        reference.evaluate(signal, t, memories[channel], *(seen if signal.sees else noise))
+                        reference.evaluate(signal, t, memories[channel], *(loop if signal.sees else noise))
     except reference.Failure as failure:
         return str(failure)
     return None
 
 
 def call_law(s: Resolved, record: np.ndarray, packed: Packed, memory: np.ndarray) -> tuple[float, float]:
-    """Call the law that failed again. Return the u and s that it returned before."""
+    """Call the law that failed again. Return the u and s in the record, from the call that failed."""
     n, i, width = s.plant.n, int(record["seen"]["i"]), int(record["width"])
     function = reference.PythonComponent(s.law, n)
     function.memory = memory

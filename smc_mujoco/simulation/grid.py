@@ -2,9 +2,10 @@
 
     scenarios = smc.grid(["duffing", arm], ["classical", my_law], ["noise", worn_gear], seeds=16)
 
-Plants, laws and conditions are names of the suite's, or your own objects.
+Plants, laws and conditions are names in the suite, or the user's objects.
 """
 
+import itertools
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -33,12 +34,11 @@ from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, DURATION, Condition, find_condition
 from smc_mujoco.simulation.initial_states import SEEDS, Starts
-from smc_mujoco.simulation.model import model, start, with_values
+from smc_mujoco.simulation.model import compile_model, initial_state, with_values
 from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.scenario import U_MAX, Scenario
 
-Turns = Callable[[int], Law]  # seed -> the law of that run
-NOTHING: Mapping[str, Any] = frozen({})
+LawOfSeed = Callable[[int], Law]  # seed -> the law of that run
 MAX_REST_ACCELERATION = 1e-9  # rad/s^2 or m/s^2; chosen: rounding stays below
 
 
@@ -71,22 +71,22 @@ def grid(
     Warns:
       ScenarioWarning: gains of a set that were tuned for other parameters of the plant.
     """
-    numbers = listed("seeds", seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_ITEMS)))
+    seeds = listed("seeds", seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_ITEMS)))
     plants, laws, conditions = listed("plants", plants), listed_laws(laws), listed("conditions", conditions)
-    if (runs := len(plants) * len(laws) * len(conditions) * len(numbers)) > MAX_ITEMS:
+    if (runs := len(plants) * len(laws) * len(conditions) * len(seeds)) > MAX_ITEMS:
         raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MAX_ITEMS:,} runs at most")
     conditions = [find_condition(condition) for condition in conditions]
-    check_apart(plants, laws, conditions)
+    check_names(plants, laws, conditions)
 
-    def of(plant: Plant) -> list[Turns]:
+    def laws_on(plant: Plant) -> list[LawOfSeed]:
         return [lambda seed, law=law: _law(plant, law, gains, seed) for law in laws]
 
-    return crossed([as_plant(plant) for plant in plants], of, conditions, numbers, duration, starts)
+    return all_combinations([as_plant(plant) for plant in plants], laws_on, conditions, seeds, duration, starts)
 
 
-def crossed(
+def all_combinations(
     plants: Sequence[Plant],
-    laws: Callable[[Plant], Sequence[Turns]],
+    laws: Callable[[Plant], Sequence[LawOfSeed]],
     conditions: Sequence[Condition],
     seeds: Sequence[int],
     duration: float,
@@ -95,18 +95,18 @@ def crossed(
     """Return scenarios of every plant, condition, law and seed, as `grid`.
 
     Args:
-      laws: function of a plant that returns for each law a function of the seed, which returns the law of that run.
+      laws: plant -> for each law, a function of the seed that returns the law of that run.
     """
-    made = []
+    scenarios = []
     for plant in plants:
-        its = laws(plant)
         for condition in conditions:
             runs = [
-                [case(plant, law(seed), condition, duration, seed=seed, starts=starts) for seed in seeds] for law in its
+                [case(plant, law(seed), condition, duration, seed=seed, starts=starts) for seed in seeds]
+                for law in laws(plant)
             ]
             check_moving(runs[0])
-            made += [scenario for one in runs for scenario in one]
-    return made
+            scenarios += itertools.chain.from_iterable(runs)
+    return scenarios
 
 
 def case(
@@ -117,7 +117,7 @@ def case(
     gains: str = "tuned",
     seed: int = 0,
     starts: Starts | None = None,
-    changes: Mapping[str, Any] = NOTHING,
+    changes: Mapping[str, Any] = frozen({}),
 ) -> Scenario:
     """Return one run of a grid, with arguments as in `grid`.
 
@@ -134,35 +134,35 @@ def case(
     return starts.place(scenario, seed).named(condition.name)
 
 
-def check_moving(seeds: Sequence[Scenario]) -> None:
-    """Raise ScenarioError if no run moves under any law. The runs differ only in their seeds."""
-    if all(map(_rests, seeds)):
-        at = seeds[0]
+def check_moving(runs: Sequence[Scenario]) -> None:
+    """Raise ScenarioError if none of the runs, which differ only in their seeds, moves under any law."""
+    if all(map(_stays_at_rest, runs)):
+        first = runs[0]
         raise ScenarioError(
-            f"{at.plant.name} starts at rest at 0 and nothing moves it under condition {at.condition!r}: give another "
-            "start, with starts=smc.starts(x0=0.5) or --x0 0.5"
+            f"{first.plant.name} starts at rest at 0 and nothing moves it under condition {first.condition!r}: give "
+            "another start, with starts=smc.starts(x0=0.5) or --x0 0.5"
         )
 
 
-def _rests(scenario: Scenario) -> bool:
+def _stays_at_rest(scenario: Scenario) -> bool:
     """Return whether a run begins at rest at its reference 0, and neither a force nor a sensor ever moves it."""
     moved = any(scenario.resolved.x0) or any(scenario.resolved.v0) or scenario.disturbance or scenario.sensor
     if moved or scenario.feedforward or scenario.noise != Noise() or scenario.resolved.reference != REST:
         return False
-    made = with_values(model(scenario), scenario)
-    data = mujoco.MjData(made)
-    data.qpos[:], data.qvel[:] = start(made, scenario)
-    mujoco.mj_forward(made, data)
+    model = with_values(compile_model(scenario), scenario)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = initial_state(model, scenario)
+    mujoco.mj_forward(model, data)
     return bool(np.abs(data.qacc).max() < MAX_REST_ACCELERATION)
 
 
-def check_apart(
+def check_names(
     plants: Sequence[str | Plant], laws: Sequence[str | Law | Template], conditions: Sequence[Condition]
 ) -> None:
     """Raise ScenarioError if two different plants, laws or conditions have the same name, as tables show only names."""
     chosen_plants = [as_plant(plant) for plant in plants]
     chosen_laws = [law if isinstance(law, str) else coerce.law(law) for law in laws]
-    # name, thing, and what distinguishes it from others
+    # each thing with its name and what distinguishes it from others
     for what, cure, things in (
         ("plants", "give each its own grid", [(p.name, p, (p.build, p.parameters, p.n)) for p in chosen_plants]),
         (
@@ -185,22 +185,22 @@ def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Comp
     if not isinstance(law, str) or law not in known_laws():
         return checked_name(coerce.law(law))
     gains = "default" if law == "none" else gains
-    found, known = sets.law(plant, law, gains, seed), catalogue().get(plant.name)
-    if gains != "default" and known is not None and plant.parameters != known.parameters:
-        changed = [f"{name} = {v:g}" for name, v in plant.parameters.items() if v != known.parameters[name]]
+    with_gains, standard = sets.law(plant, law, gains, seed), catalogue().get(plant.name)
+    if gains != "default" and standard is not None and plant.parameters != standard.parameters:
+        changed = [f"{name} = {v:g}" for name, v in plant.parameters.items() if v != standard.parameters[name]]
         warnings.warn(
-            f"gains of set {gains!r} were found for {plant.name} with its default parameters, and this one has "
+            f"gains of set {gains!r} were tuned for {plant.name} with its default parameters, and this one has "
             f"{', '.join(changed)}: tune the law on it, or give the law's gains yourself",
             ScenarioWarning,
             users_frame(),
         )
-    return found
+    return with_gains
 
 
 def listed_laws(laws: object) -> list[str | Law | Template]:
-    """Return one or several laws as a list: names of the library's as they are, and the laws of other texts."""
+    """Return one or several laws as a list. Names of the library's laws stay names; other texts become laws."""
     values = listed("laws", laws)
-    return [law for one in values for law in (from_text.laws(one) if isinstance(one, str) else [one])]
+    return [law for value in values for law in (from_text.laws(value) if isinstance(value, str) else [value])]
 
 
 def listed(what: str, values: object) -> list:

@@ -1,7 +1,7 @@
-"""Assembly: a scenario's plant and parts as one compiled model, and the model fields that its numbers set.
+"""A scenario's plant and parts as one compiled MuJoCo model, and the model fields that its numbers set.
 
-Scenarios of the same `structure` share a `Mechanism`. Everything else about their mechanisms is a number in some field
-of its model, and a Batch keeps those fields separately for each simulation.
+Scenarios of the same `structure` share a `Mechanism`, with one compiled base model. Their mechanisms differ only in
+values of model fields. A Batch has those values separately for each simulation.
 """
 
 import copy
@@ -23,7 +23,7 @@ from smc_mujoco.simulation.scenario import Scenario
 
 USERDATA = 2  # numbers in mjData.userdata: callback.magic() and the address of the simulation's record
 PATH_POINTS = 400  # points that are checked on the path to a start: 1 cm apart on the longest rail
-MAX_OVERLAP = 1e-3  # m, at a start; chosen: contacts give way by less, so a deeper start begins with a blow
+MAX_OVERLAP = 1e-3  # m, at a start; chosen: bodies in contact overlap by less, so a deeper start begins with a blow
 
 
 def parts(scenario: Scenario) -> tuple[Part, ...]:
@@ -37,19 +37,18 @@ def parts(scenario: Scenario) -> tuple[Part, ...]:
 def structure(scenario: Scenario) -> Hashable:
     """Return a key that is equal for scenarios whose mechanisms differ only in numbers."""
     plant = scenario.plant
-    built = tuple(part.structure() for part in parts(scenario))
+    of_parts = tuple(part.structure() for part in parts(scenario))
     edits = plant.contacts.get(scenario.contact.kind), plant.mechanisms.get(scenario.mechanism)
-    resolved = scenario.resolved
-    clock = resolved.integrator, resolved.physics_step
-    return plant.build, plant.fields, plant.n, edits, built, scenario.readings, *clock
+    stepping = scenario.resolved.integrator, scenario.resolved.physics_step
+    return plant.build, plant.fields, plant.n, edits, of_parts, scenario.readings, *stepping
 
 
 class Mechanism:
     """What scenarios of one structure share.
 
     Attributes:
-      model: their compiled model, without their values and without scenery.
-      channels: where their channels are in it, (n,) CHANNEL.
+      model: the base model, without the values of a scenario and without scenery.
+      channels: the indices of the channels in it, (n,) CHANNEL.
     """
 
     def __init__(self, model: mujoco.MjModel, channels: np.ndarray):
@@ -57,45 +56,44 @@ class Mechanism:
         self._free_starts: set[Hashable] = set()
 
     def check_start(self, scenario: Scenario) -> None:
-        """Check that a scenario starts on the free side of its obstacles.
+        """Raise ScenarioError if a scenario starts inside an obstacle or beyond it.
 
-        The path from the plant's own start, or from 0 if that is not free, must cross no obstacle, because the
-        mechanism could not get to a start beyond a stop or inside it.
+        The path from the plant's default start, or from 0 if that is not free, must cross no obstacle, because the
+        mechanism could not get to a start beyond a stop.
         """
         if scenario.contact.kind == "none":
             return
-        # all that the check depends on
-        place = scenario.plant, scenario.contact, scenario.resolved.x0, frozen(scenario.factors(0))
-        if place not in self._free_starts:
-            made = copy.copy(self.model)
-            put_values(made, self.model, scenario, 0)
-            _check_start(made, scenario)
-            self._free_starts.add(place)
+        inputs = scenario.plant, scenario.contact, scenario.resolved.x0, frozen(scenario.factors(0))
+        if inputs not in self._free_starts:
+            model = copy.copy(self.model)
+            put_values(model, self.model, scenario, 0)
+            _check_start(model, scenario)
+            self._free_starts.add(inputs)
 
 
 _mechanisms: weakref.WeakValueDictionary[Hashable, Mechanism] = weakref.WeakValueDictionary()  # by structure
 
 
 def mechanism(scenario: Scenario) -> Mechanism:
-    """Return the Mechanism of a scenario. It is compiled once, as long as any scenario that is prepared needs it."""
+    """Return the Mechanism of a scenario. It is kept as long as a prepared scenario uses it."""
     key = structure(scenario)
     if (shared := _mechanisms.get(key)) is None:
-        made = model(scenario, USERDATA, scenery=False)
-        shared = _mechanisms[key] = Mechanism(made, channels(made))
+        base = compile_model(scenario, USERDATA, scenery=False)
+        shared = _mechanisms[key] = Mechanism(base, channels(base))
     return shared
 
 
 def spec(scenario: Scenario) -> mujoco.MjSpec:
     """Return a scenario's mechanism as an editable MjSpec."""
-    made = scenario.plant.spec()
+    spec = scenario.plant.spec()
     if scenario.mechanism != "equation":
-        scenario.plant.mechanisms[scenario.mechanism].edit(made)
-    scenario.contact.edit_on(scenario.plant, made)
+        scenario.plant.mechanisms[scenario.mechanism].edit(spec)
+    scenario.contact.edit_on(scenario.plant, spec)
     for part in parts(scenario):
-        part.edit(made)
-    for sensor in made.sensors:
+        part.edit(spec)
+    for sensor in spec.sensors:
         sensor.nsample = scenario.readings
-    return made
+    return spec
 
 
 def without_scenery(spec: mujoco.MjSpec) -> None:
@@ -117,99 +115,99 @@ def _is_fixed(body: mujoco.MjsBody | None) -> bool:
     return body is None or (not body.joints and _is_fixed(body.parent))
 
 
-def model(scenario: Scenario, nuserdata: int = 0, scenery: bool = True) -> mujoco.MjModel:
-    """Return the compiled model of a scenario's structure, without its values and for no picture.
+def compile_model(scenario: Scenario, nuserdata: int = 0, scenery: bool = True) -> mujoco.MjModel:
+    """Return the base model of a scenario's structure: compiled, without the scenario's values.
 
-    Its procedural textures have a few pixels: MuJoCo paints them at each compilation, in three quarters of its time.
+    It is not for pictures. Its procedural textures have a few pixels, because MuJoCo paints them at each compilation,
+    in three quarters of its time.
 
     Args:
       nuserdata: length of mjData.userdata.
-      scenery: whether it keeps what `without_scenery` deletes. Users' own models always do: a fixed part may be a
-        floor.
+      scenery: whether it has what `without_scenery` deletes. Users' models always do: a fixed part may be a floor.
     """
     edited, resolved = spec(scenario), scenario.resolved
     if not (scenery or scenario.plant.direct):
         without_scenery(edited)
     for texture in edited.textures:
         texture.width, texture.height = 1, 6  # a skybox has six sides
-    made = ready(edited, nuserdata)
-    made.opt.timestep = resolved.physics_step
-    made.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{resolved.integrator.upper()}")
-    return made
+    model = ready(edited, nuserdata)
+    model.opt.timestep = resolved.physics_step
+    model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{resolved.integrator.upper()}")
+    return model
 
 
-def with_values(compiled: mujoco.MjModel, scenario: Scenario, step: int = 0) -> mujoco.MjModel:
-    """Return a copy of the compiled model with the scenario's values from a physics step on."""
-    made = copy.copy(compiled)
-    put_values(made, compiled, scenario, step)
-    mujoco.mj_setConst(made, mujoco.MjData(made))
-    return made
+def with_values(base: mujoco.MjModel, scenario: Scenario, step: int = 0) -> mujoco.MjModel:
+    """Return a copy of the base model with the scenario's values from a physics step on."""
+    model = copy.copy(base)
+    put_values(model, base, scenario, step)
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model
 
 
-def put_values(made: mujoco.MjModel, compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
-    """Write the field values of a scenario into a copy of the compiled model, and return them.
+def put_values(model: mujoco.MjModel, base: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
+    """Write the field values of a scenario into a copy of the base model, and return them.
 
     The caller calls mj_setConst.
     """
-    values = field_values(compiled, scenario, step)
+    values = field_values(base, scenario, step)
     for name, value in values.items():
-        field_array(made, name)[:] = value
+        field_array(model, name)[:] = value
     return values
 
 
-def field_values(compiled: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
+def field_values(base: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
     """Return model field -> its values from a physics step on, for every field that the scenario sets."""
     plant, written = scenario.plant, {}
     fields = plant.fields if scenario.mechanism == "equation" else plant.mechanisms[scenario.mechanism].fields
-    of_parts = (part.fields(compiled) for part in parts(scenario))
-    for name, at, value, adds in itertools.chain(fields(compiled, plant.values(scenario.factors(step))), *of_parts):
-        values = written.setdefault(name, field_array(compiled, name).copy())
-        values[at] = values[at] + value if adds else value
+    of_parts = (part.fields(base) for part in parts(scenario))
+    for name, index, value, adds in itertools.chain(fields(base, plant.values(scenario.factors(step))), *of_parts):
+        values = written.setdefault(name, field_array(base, name).copy())
+        values[index] = values[index] + value if adds else value
     return written
 
 
-def start(compiled: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+def initial_state(model: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     """Return qpos and qvel at t = 0: channels and their rotors at x0 and v0, other joints as in `initial_pose`."""
-    qpos, qvel = initial_pose(compiled), np.zeros(compiled.nv)
+    qpos, qvel = initial_pose(model), np.zeros(model.nv)
     resolved = scenario.resolved
-    for joint, x, v in zip(joint_ids(compiled), resolved.x0, resolved.v0, strict=True):
-        rotor = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + compiled.joint(joint).name)
+    for joint, x, v in zip(joint_ids(model), resolved.x0, resolved.v0, strict=True):
+        rotor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(joint).name)
         for moved in (joint, rotor) if rotor >= 0 else (joint,):
-            qpos[compiled.jnt_qposadr[moved]], qvel[compiled.jnt_dofadr[moved]] = x, v
+            qpos[model.jnt_qposadr[moved]], qvel[model.jnt_dofadr[moved]] = x, v
     return qpos, qvel
 
 
-def put_start(made: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario) -> None:
-    """Put a scenario's state at t = 0 into the data of its model, with the past readings of late sensors."""
-    data.qpos[:], data.qvel[:] = start(made, scenario)
-    if made.nhistory:
-        encoder.remember(made, data)
+def put_initial_state(model: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario) -> None:
+    """Write a scenario's state at t = 0 into the data of its model, with the past readings of delayed sensors."""
+    data.qpos[:], data.qvel[:] = initial_state(model, scenario)
+    if model.nhistory:
+        encoder.remember(model, data)
 
 
-def _check_start(made: mujoco.MjModel, scenario: Scenario) -> None:
-    """Raise ScenarioError if a scenario, whose values the model has, starts inside an obstacle or beyond it."""
-    data, there = mujoco.MjData(made), start(made, scenario)[0]
-    inside, beyond = _overlap(made, data, there), None
+def _check_start(model: mujoco.MjModel, scenario: Scenario) -> None:
+    """Do what `Mechanism.check_start` says, with a model that has the scenario's values."""
+    data, qpos = mujoco.MjData(model), initial_state(model, scenario)[0]
+    inside, beyond = _overlap(model, data, qpos), None
     moves_around = scenario.plant.tip  # an arm: the straight line in its joints may cross what the arm goes around
     if not inside and scenario.resolved.x0 != scenario.plant.x0 and not moves_around:
-        free = start(made, dataclasses.replace(scenario, x0=scenario.plant.x0))[0]
-        free = made.qpos0 if _overlap(made, data, free) else free
-        path = (_overlap(made, data, (1 - part) * free + part * there) for part in np.linspace(0, 1, PATH_POINTS))
+        free = initial_state(model, dataclasses.replace(scenario, x0=scenario.plant.x0))[0]
+        free = model.qpos0 if _overlap(model, data, free) else free
+        path = (_overlap(model, data, (1 - part) * free + part * qpos) for part in np.linspace(0, 1, PATH_POINTS))
         beyond = next(filter(None, path), None)
-    if hit := inside or beyond:
+    if overlap := inside or beyond:
         raise ScenarioError(
-            f"x0 {shown(scenario.resolved.x0)} puts {scenario.plant.name}'s {hit[0]} "
-            f"{'inside' if inside else 'beyond'} {hit[1]} of contact {scenario.contact.kind!r}: give another x0"
+            f"x0 {shown(scenario.resolved.x0)} puts {scenario.plant.name}'s {overlap[0]} "
+            f"{'inside' if inside else 'beyond'} {overlap[1]} of contact {scenario.contact.kind!r}: give another x0"
         )
 
 
-def _overlap(made: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray) -> tuple[str, str] | None:
+def _overlap(model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray) -> tuple[str, str] | None:
     """Return the names of two geoms that overlap at qpos by more than MAX_OVERLAP, or None."""
     data.qpos[:] = qpos
-    mujoco.mj_kinematics(made, data)
-    mujoco.mj_collision(made, data)
-    for touching in data.contact:
-        if touching.dist < -MAX_OVERLAP:
-            first, second = (made.geom(int(geom)).name for geom in touching.geom)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_collision(model, data)
+    for contact in data.contact:
+        if contact.dist < -MAX_OVERLAP:
+            first, second = (model.geom(int(geom)).name for geom in contact.geom)
             return first, second
     return None

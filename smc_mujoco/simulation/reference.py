@@ -76,7 +76,7 @@ class Loop:
         self.channels = {name: table[name].copy() for name in table.dtype.names or ()}
         self.driven, self.hinged = self.channels["ctrl"] >= 0, self.channels["tip"] >= 0  # (n,) bool
         self.rubs, self.forced = self.channels["friction"] >= 0, self.channels["force"] >= 0
-        models.put_start(self.model, self.data, scenario)
+        models.put_initial_state(self.model, self.data, scenario)
         self.total = scenario.samples * scenario.steps  # physics steps
         self.calls = 0
         self.law, self.estimator = (PythonComponent(c, n) for c in (scenario.law, self.scenario.velocity))

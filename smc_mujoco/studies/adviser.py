@@ -48,7 +48,7 @@ from smc_mujoco.control.properties import PROPERTIES, suitable
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
-from smc_mujoco.simulation.grid import case, check_moving, crossed, listed, listed_laws
+from smc_mujoco.simulation.grid import all_combinations, case, check_moving, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.advice import Advice
@@ -142,7 +142,7 @@ def which(
 
     def contest(names: Sequence[str], numbers: range, part: str, budget: int | None = None) -> Contest:
         its = [candidates[name] for name in names]
-        runs = crossed([machine], lambda _: its, tested, numbers, length, starts)
+        runs = all_combinations([machine], lambda _: its, tested, numbers, length, starts)
         table = study(runs, folder / part, noise_key=noise_key, replay=True, **options)
         (group,) = paired_runs.groups(table, by=("plant",))
         worst, cases = {}, [[case(machine, one.law, on, attacked_for, starts=starts) for on in tested] for one in its]

@@ -36,7 +36,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition, applicable, find_condition
-from smc_mujoco.simulation.grid import case, check_apart, crossed, listed, listed_laws
+from smc_mujoco.simulation.grid import all_combinations, case, check_names, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
@@ -288,8 +288,10 @@ def compare(
     tested = [find_condition(one) for one in names]
     compared = {plant.name: [asking(law) for law in _chosen(laws, plant)] for plant in machines}
     every = {id(law): law for its in compared.values() for law in its}.values()
-    check_apart(machines, [coerce.law(law) for law in every], tested)
-    crossed(machines, lambda _: [lambda _: coerce.law("none")], tested, [0], duration, starts)  # refused before tuning
+    check_names(machines, [coerce.law(law) for law in every], tested)
+    all_combinations(
+        machines, lambda _: [lambda _: coerce.law("none")], tested, [0], duration, starts
+    )  # refused before tuning
     folder = Path(out)
     options = {"tune": tune and gains == "tuned", "gains": gains, "alike": budget is None}
     candidates = {
@@ -298,7 +300,7 @@ def compare(
         )
         for plant in machines
     }
-    runs = crossed(machines, lambda plant: candidates[plant.name], tested, range(count), duration, starts)
+    runs = all_combinations(machines, lambda plant: candidates[plant.name], tested, range(count), duration, starts)
     table = study(runs, folder, not fresh, where, threads, progress, traces, noise_key, replay=True)
 
     def attacked(plant: Plant, law: Law) -> WorstCase:

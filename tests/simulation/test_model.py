@@ -4,7 +4,7 @@ import mujoco
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.simulation.model import model, without_scenery
+from smc_mujoco.simulation.model import compile_model, without_scenery
 
 pytestmark = pytest.mark.quick
 
@@ -43,7 +43,7 @@ def test_geoms_that_move_or_touch_or_are_referred_to_are_no_scenery():
 @pytest.mark.parametrize("contact", ["none", "stops"])
 def test_a_run_has_a_model_without_scenery(contact):
     scenario = smc.Scenario(plant="cart_pole", law="classical", contact=contact).resolved
-    whole, bare = model(scenario), model(scenario, scenery=False)
+    whole, bare = compile_model(scenario), compile_model(scenario, scenery=False)
     assert bare.ngeom < 0.6 * whole.ngeom
     assert (bare.nlight, bare.ncam) == (0, 0)
     assert (bare.nbody, bare.npair, bare.nsensor) == (whole.nbody, whole.npair, whole.nsensor)
@@ -55,5 +55,5 @@ def test_the_scenery_of_a_users_model_stays():
         "<body><joint name='turn'/><geom size='0.1' pos='0 0 1'/></body></worldbody></mujoco>",
         channels={"turn": smc.Channel(motor=True)},
     )
-    made = model(smc.Scenario(plant=plant, law="classical"), scenery=False)
+    made = compile_model(smc.Scenario(plant=plant, law="classical"), scenery=False)
     assert (made.ngeom, made.nlight) == (2, 1)

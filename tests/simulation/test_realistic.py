@@ -429,10 +429,10 @@ def test_without_friction_a_smooth_law_does_not_rest_off_balance(name):
 
 def energies(s):
     """Mechanical energy at every physics step of a scenario without a command."""
-    model = models.with_values(models.model(s), s)
+    model = models.with_values(models.compile_model(s), s)
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:] = models.start(model, s)
+    data.qpos[:], data.qvel[:] = models.initial_state(model, s)
     energy, found = data.energy, []
     for _ in range(s.samples * s.steps):
         mujoco.mj_step(model, data)
@@ -476,10 +476,10 @@ def test_a_passive_mechanism_never_gains_energy(name, part):
 def test_a_jump_of_the_mass_leaves_the_parts_as_they_are(name):
     rotor, extra = smc.DCMotor(rotor_inertia=1e-4), smc.Viscous(0.3)
     s = scenario(name, actuator=rotor, friction=(extra, smc.Coulomb(0.2)), jump=smc.Jump(0.05, {"mass": 3.0}))
-    compiled = models.model(s)
+    compiled = models.compile_model(s)
     before, after = models.with_values(compiled, s), models.with_values(compiled, s, s.jump_step)
     dofs = dof_ids(compiled)
-    own = models.with_values(models.model(scenario(name)), scenario(name))
+    own = models.with_values(models.compile_model(scenario(name)), scenario(name))
     for model in (before, after):
         np.testing.assert_allclose(model.dof_damping[dofs], own.dof_damping[dofs] + 0.3)
         np.testing.assert_allclose(model.dof_armature[dofs], own.dof_armature[dofs] + rotor.gear**2 * 1e-4)
@@ -881,8 +881,8 @@ def test_an_order_of_drive_and_play_that_says_the_same_is_the_same():
 
 def test_every_channel_starts_with_its_rotor_in_the_middle_of_the_play():
     s = scenario("pendulum_network", actuator=smc.Backlash(0.1), v0=(0.1, 0.2, 0.3))
-    model = models.with_values(models.model(s), s)
-    qpos, qvel = models.start(model, s)
+    model = models.with_values(models.compile_model(s), s)
+    qpos, qvel = models.initial_state(model, s)
     for i, joint in enumerate(joint_ids(model)):
         rotor = model.joint(f"rotor:{model.joint(joint).name}")
         assert qpos[rotor.qposadr[0]] == qpos[model.jnt_qposadr[joint]] == s.resolved.x0[i]

@@ -92,7 +92,7 @@ def test_plants_sizes_and_durations_mix_in_one_call():
 
 def test_the_model_of_a_run_has_no_picture_to_paint():
     """MuJoCo paints textures at each compilation, in three quarters of its time."""
-    assert 0 < models.model(scenario()).ntexdata < 100 < scenario().plant.load().ntexdata
+    assert 0 < models.compile_model(scenario()).ntexdata < 100 < scenario().plant.load().ntexdata
 
 
 def test_what_is_no_scenario_is_refused():

@@ -79,7 +79,7 @@ def mounts(
 ) -> list[Mount]:
     """Return the Mount of each joint of a machine on a `rail` of that length in m; `front` points to the camera."""
     plant, own = scenario.plant, not scenario.plant.on_stage
-    extent = float(models.model(scenario).stat.extent) if own else 0.0
+    extent = float(models.compile_model(scenario).stat.extent) if own else 0.0
     length, thick = (
         (OWN_LENGTH * extent, OWN_THICKNESS * extent) if own else (SLIDE * rail, min(THICKNESS, SHORT * rail))
     )

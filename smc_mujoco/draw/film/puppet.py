@@ -64,7 +64,7 @@ class Puppet:
         self.links = sorted(moved)
         off_stage = not self.scenario.plant.on_stage
         self.whole = not off_stage or len(self._joints) + len(self._rotors) == model.nq
-        self._start = models.start(model, self.scenario)[0] if off_stage else model.qpos0
+        self._start = models.initial_state(model, self.scenario)[0] if off_stage else model.qpos0
 
     @property
     def shown(self) -> int:

@@ -143,17 +143,17 @@ def turn(scenario: Scenario, chosen: Camera | None = None) -> np.ndarray:
     if chosen is not None:
         return camera.turn(*chosen[:2])
     if not scenario.plant.on_stage:
-        return camera.turn(*view(models.model(scenario)))
+        return camera.turn(*view(models.compile_model(scenario)))
     return named(scenario, LOOK)
 
 
 def named(scenario: Scenario, name: str) -> np.ndarray:
     """Return the frame of a camera of the scenario's model, (3, 3), at the start of its run."""
-    model = models.model(scenario)
+    model = models.compile_model(scenario)
     names = {model.camera(i).name: i for i in range(model.ncam) if model.camera(i).name}
     which = find(f"camera of {scenario.plant.name}", name, names)
     data = mujoco.MjData(model)
-    data.qpos[:] = models.start(model, scenario)[0]
+    data.qpos[:] = models.initial_state(model, scenario)[0]
     forward(model, data)
     return data.cam_xmat[which].reshape(3, 3).copy()
 
@@ -209,7 +209,7 @@ def lane(scenarios: Sequence[Scenario], reaches: Sequence[np.ndarray], turn: np.
         return (wide + gap * max(wide, tall)) * right
     if not any(scenario.realistic for scenario in scenarios):
         return step
-    things = [fixed_boxes(models.model(scenario)) for scenario in scenarios]
+    things = [fixed_boxes(models.compile_model(scenario)) for scenario in scenarios]
     low, high = [corners.min(axis=1)[:, :2] for corners in things], [corners.max(axis=1)[:, :2] for corners in things]
     for stretch in np.arange(1.0, 20.0, 0.05):
         gaps = []

@@ -391,7 +391,7 @@ def stood(scenarios) -> np.ndarray:
 def test_machines_side_by_side_keep_apart(plant, field, name):
     start = None if smc.plant(plant).ranges else 0.5
     scenario = smc.Scenario(plant=plant, law="none", x0=start, duration=0.1, **{field: name})
-    corners = scene.fixed_boxes(models.model(scenario))[..., :2]
+    corners = scene.fixed_boxes(models.compile_model(scenario))[..., :2]
     low, high = corners.min(axis=1), corners.max(axis=1)
     step = stood([scenario] * 3)[1, :2] - stood([scenario] * 3)[0, :2]
     for by in (step, 2 * step):

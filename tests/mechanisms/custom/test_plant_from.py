@@ -431,7 +431,7 @@ def test_a_keyframe_is_where_runs_start(arm):
     assert smc.run(smc.Scenario(plant=driven_otherwise, law="none", duration=0.1)).failure is None
     for part in (None, smc.Backlash(0.02)):  # which adds joints
         scenario = smc.Scenario(plant=arm(["elbow"], moving, keyframe="home"), law="none", actuator=part)
-        qpos, qvel = models.start(model := models.model(scenario), scenario)
+        qpos, qvel = models.initial_state(model := models.compile_model(scenario), scenario)
         assert [qpos[model.joint(joint).qposadr[0]] for joint in ("shoulder", "elbow")] == [0.2, -0.5]
         assert not qvel.any()
     with pytest.raises(smc.ScenarioError, match=r"unknown keyframe of arm.xml 'hme': did you mean 'home'"):

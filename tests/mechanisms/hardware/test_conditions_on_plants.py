@@ -7,7 +7,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.simulation.conditions import NAMED
-from smc_mujoco.simulation.model import model
+from smc_mujoco.simulation.model import compile_model
 
 WHEEL = """<mujoco><worldbody><body><joint name="hinge" axis="0 1 0"/>
 <geom type="cylinder" size="0.1 0.01" euler="90 0 0" mass="1"/></body></worldbody>
@@ -22,5 +22,5 @@ def test_every_condition_fits_a_plant_or_is_refused(name):
     for condition in NAMED:
         with contextlib.suppress(smc.ScenarioError):
             (scenario,) = smc.grid(machine, "none", condition, starts=starts, gains="default", duration=0.1)
-            compiled += isinstance(model(scenario), mujoco.MjModel)
+            compiled += isinstance(compile_model(scenario), mujoco.MjModel)
     assert compiled > len(NAMED) / 2

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
@@ -30,7 +31,6 @@ from smc_mujoco.simulation.conditions import (  # noqa: F401  # smc.paper has th
     Condition,
     find_condition,
 )
-from smc_mujoco.simulation.grid import NOTHING
 from smc_mujoco.simulation.scenario import U_MAX, Scenario
 
 # The four laws that the paper compares; its higher-order one is the last.
@@ -56,7 +56,7 @@ def scenario(
     condition: str | Condition = "nominal",
     seed: int = 0,
     duration: float = DURATION,
-    changes: Mapping[str, Any] = NOTHING,
+    changes: Mapping[str, Any] = frozen({}),
     gains: str = "study",
 ) -> Scenario:
     """Return the scenario of one plant under one law in one condition.
@@ -87,7 +87,7 @@ def comparison(
     laws: Sequence[str] = LAWS,
     seed: int = 0,
     duration: float = DURATION,
-    changes: Mapping[str, Any] = NOTHING,
+    changes: Mapping[str, Any] = frozen({}),
     gains: str = "study",
 ) -> dict[str, Scenario]:
     """Return law name -> scenario, for one plant in one condition; arguments as of `scenario`."""
