@@ -18,7 +18,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
-from smc_mujoco.envs.core import Episode
+from smc_mujoco.envs.episode import Episode
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.model import mechanism
@@ -60,17 +60,17 @@ class Agent:
     Attributes:
       episode: the environment's Episode, which counts the samples.
       loop: the reference loop of the scenario with the law in it. Only its controller is used.
-      latest: number of the episode in which it acted last; 0 before its first action.
+      last_episode: number of the episode in which it acted last; 0 before its first action.
     """
 
     def __init__(self, episode: Episode, loop: reference.Loop):
-        self.episode, self.loop, self.latest = episode, loop, 0
+        self.episode, self.loop, self.last_episode = episode, loop, 0
 
     def __call__(self, observation: Any) -> np.ndarray:
-        """Return the action for an observation: of dm_env a TimeStep or its mapping, of gymnasium an array."""
+        """Return the action for an observation: a TimeStep or mapping of dm_env, or an array of gymnasium."""
         loop, k, n = self.loop, self.episode.sample, self.loop.scenario.plant.n
-        if k == 0 or self.latest != self.episode.episodes:
-            self.latest = self.episode.episodes
+        if k == 0 or self.last_episode != self.episode.episodes:
+            self.last_episode = self.episode.episodes
             for component in filter(None, (loop.law, loop.surface, loop.estimator)):
                 component.memory[:] = 0.0
             loop.latest[:] = 0.0  # the last commands, part of the nominal model of coupled channels
@@ -87,7 +87,6 @@ class Agent:
 
 
 def _episode(environment: Any) -> Episode:
-    """Return the Episode of an environment."""
     for owner in (getattr(environment, "task", None), getattr(environment, "unwrapped", None)):
         if isinstance(owner, Episode):
             return owner

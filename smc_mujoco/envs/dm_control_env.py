@@ -22,7 +22,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.extras import MissingPackageError, cure, extra
-from smc_mujoco.envs.core import Episode, Setting, bounded
+from smc_mujoco.envs.episode import Episode, Setting, bounded
 from smc_mujoco.envs.tasks import tasks
 from smc_mujoco.mechanisms.plant import Plant, plants
 
@@ -41,19 +41,19 @@ class PlantPhysics(Physics):
     """dm_control's physics, without its exception for a plant that diverges.
 
     Attributes:
-      stretches: numbers of physics steps to come, from `Setting.stretches`.
-      acting: the context in which they are taken, from `Episode.acting`.
+      step_counts: numbers of physics steps to take, from `Episode.apply_action`.
+      step_context: the context in which they are taken, from `Episode.with_friction`.
     """
 
-    stretches: Iterable[int] = ()
-    acting: contextlib.AbstractContextManager[None] = contextlib.nullcontext()
+    step_counts: Iterable[int] = ()
+    step_context: contextlib.AbstractContextManager[None] = contextlib.nullcontext()
 
     def step(self, nstep: int = 1) -> None:
-        """Take physics steps, in stretches where a command goes through two drives."""
-        stretches, self.stretches = self.stretches, ()
-        acting, self.acting = self.acting, contextlib.nullcontext()
-        with acting:
-            for steps in stretches:
+        """Take physics steps. Those of an action with two drives in series are taken one by one."""
+        step_counts, self.step_counts = self.step_counts, ()
+        context, self.step_context = self.step_context, contextlib.nullcontext()
+        with context:
+            for steps in step_counts:
                 super().step(steps)
                 nstep -= steps
             if nstep > 0:  # a user may step without a command
@@ -61,16 +61,12 @@ class PlantPhysics(Physics):
 
     @contextlib.contextmanager
     def check_invalid_state(self) -> Iterator[None]:
-        """Check nothing, because `PlantTask.over` does."""
+        """Check nothing, because `PlantTask.diverged` does."""
         yield
 
 
 class PlantTask(Episode, control.Task):
-    """A task of `tasks` for dm_control.
-
-    Attributes:
-      random: the numpy generator of the starts; the others are those of an Episode.
-    """
+    """A task of `tasks` for dm_control: an Episode with `random`, the numpy generator of its starts."""
 
     def __init__(self, setting: Setting, random: Any):
         super().__init__(setting)
@@ -82,20 +78,21 @@ class PlantTask(Episode, control.Task):
 
     def before_step(self, action: Any, physics: PlantPhysics) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Apply the action."""
-        physics.stretches, physics.acting = self.stretches(physics.data.ptr, action), self.acting(physics.data.ptr)
+        physics.step_counts = self.apply_action(physics.data.ptr, action)
+        physics.step_context = self.with_friction(physics.data.ptr)
 
     def after_step(self, physics: Physics) -> None:
         """Count the sample and read the state."""
         self.sample += 1
-        self.look(physics.data.ptr)
+        self.read_state(physics.data.ptr)
 
     def action_spec(self, physics: Physics) -> specs.BoundedArray:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the spec of an action: commands of the driven channels, divided by their limits."""
-        return specs.BoundedArray(self.setting.shape, float, minimum=-1.0, maximum=1.0, name="u")
+        return specs.BoundedArray(self.setting.action_shape, float, minimum=-1.0, maximum=1.0, name="u")
 
     def get_observation(self, physics: Physics) -> OrderedDict[str, np.ndarray]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return positions and velocities, and the reference if the task has one."""
-        x, v = (bounded(self.x), bounded(self.v)) if self.over else (self.x, self.v)
+        x, v = (bounded(self.x), bounded(self.v)) if self.diverged else (self.x, self.v)
         observation = OrderedDict(position=x, velocity=v)
         if self.setting.task.moving:
             observation["reference"] = self.setting.reference(self.sample)
@@ -103,11 +100,11 @@ class PlantTask(Episode, control.Task):
 
     def get_reward(self, physics: Physics) -> float:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the reward of the state."""
-        return self.assess()[0]
+        return self.reward_and_info()[0]
 
     def get_termination(self, physics: Physics) -> float | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the discount 0, which ends the episode, if the plant has diverged."""
-        return 0.0 if self.over else None
+        return 0.0 if self.diverged else None
 
 
 def load(
@@ -127,7 +124,7 @@ def load(
       task: one of `smc_mujoco.envs.tasks.tasks(domain)`.
       task_kwargs: arguments of dm_control's suite: random, and time_limit in s, which is the field duration.
       environment_kwargs: arguments of dm_control's suite: flat_observation, and control_timestep in s, which is the
-        field control_period. Both take precedence over the arguments below.
+        field control_period. These and task_kwargs take precedence over the arguments below.
       random: a seed or a numpy generator for the starts; None for different starts every time.
       changes: Scenario field -> value, such as {"duration": 5.0, "control_period": 0.01, "u_max": 3.0}.
       flat_observation: whether an observation is one array, {"observations": ...}, as in dm_control's suite.

@@ -20,7 +20,7 @@ from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.extras import extra
 from smc_mujoco.envs import registration
-from smc_mujoco.envs.core import Episode, Setting, bounded
+from smc_mujoco.envs.episode import Episode, Setting, bounded
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_STATE
 
@@ -33,29 +33,26 @@ registration.register()  # also if only this module is imported
 
 
 def action_space(setting: Setting) -> spaces.Box:
-    """Return the space of actions: commands of the driven channels, divided by their limits.
-
-    It is of float64, as laws compute, and so holds the float32 of learners too.
-    """
-    return spaces.Box(-1.0, 1.0, setting.shape, np.float64)
+    """Return the space of actions, of float64 like the commands of laws; it contains float32 actions too."""
+    return spaces.Box(-1.0, 1.0, setting.action_shape, np.float64)
 
 
 def observation_space(setting: Setting) -> spaces.Box:
-    """Return the space of observations: the largest state of a run, and for r, r', r'' as much more as they need."""
-    high = np.full(setting.size, MAX_STATE)
+    """Return the space of observations: up to the largest state of a run, or up to the largest r, r', r'' beyond it."""
+    high = np.full(setting.observation_size, MAX_STATE)
     if setting.task.moving:
         high[2 * setting.scenario.plant.n :] = np.maximum(MAX_STATE, np.abs(setting.references).max(axis=0))
     return spaces.Box(-high, high, dtype=np.float64)
 
 
-class Timed:
+class TimeLimited:
     """An environment that writes the length of its episodes to its spec, which `gymnasium.make` sets.
 
     Attributes:
-      last: the sample at which an episode is truncated.
+      max_samples: control samples after which an episode is truncated.
     """
 
-    last: int
+    max_samples: int
     _spec: EnvSpec | None = None
 
     @property
@@ -68,15 +65,15 @@ class Timed:
         """Copy a spec, with the length of the episode as its max_episode_steps."""
         self._spec = copy.copy(spec)
         if self._spec is not None:
-            self._spec.max_episode_steps = self.last
+            self._spec.max_episode_steps = self.max_samples
 
 
-class PlantEnv(Timed, Episode, gymnasium.Env):  # pyright: ignore[reportIncompatibleVariableOverride]
+class PlantEnv(TimeLimited, Episode, gymnasium.Env):  # pyright: ignore[reportIncompatibleVariableOverride]
     """One plant with a task. It has the attributes of an Episode too.
 
     Attributes:
       data: the simulation's state.
-      last: the sample at which an episode is truncated.
+      max_samples: control samples after which an episode is truncated.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 1000}  # noqa: RUF012  # as gymnasium has it
@@ -88,15 +85,15 @@ class PlantEnv(Timed, Episode, gymnasium.Env):  # pyright: ignore[reportIncompat
         changes: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
     ):
-        """Arguments are those of `core.Setting`. The options of `reset` are x0 and v0.
+        """Arguments are those of `episode.Setting`. The options of `reset` are x0 and v0.
 
         Raises:
-          ScenarioError: what `core.Setting` raises, or another render_mode.
+          ScenarioError: what `episode.Setting` raises, or another render_mode.
         """
         if render_mode not in (None, "rgb_array"):
             raise ScenarioError(f"render_mode is {shown(render_mode)}: give 'rgb_array' or None")
         Episode.__init__(self, Setting(plant, task, changes))
-        self.render_mode, self.last = render_mode, self.setting.scenario.samples
+        self.render_mode, self.max_samples = render_mode, self.setting.scenario.samples
         self.metadata = self.metadata | {"render_fps": max(1, round(1.0 / self.setting.scenario.control_period))}
         self.data = mujoco.MjData(self.setting.model)
         self.action_space, self.observation_space = action_space(self.setting), observation_space(self.setting)
@@ -105,23 +102,23 @@ class PlantEnv(Timed, Episode, gymnasium.Env):  # pyright: ignore[reportIncompat
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Draw a start, unless the options x0 and v0 set it. Return the observation and the info."""
+        """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
         super().reset(seed=seed)
         self.begin(self.data, self.np_random, options)
-        return self.setting.observe(self.x, self.v, 0), self.assess()[1]
+        return self.setting.observe(self.x, self.v, 0), self.reward_and_info()[1]
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Take one control period. Return observation, reward, terminated, truncated and the info."""
-        with self.acting(self.data):
-            for steps in self.stretches(self.data, action):
+        with self.with_friction(self.data):
+            for steps in self.apply_action(self.data, action):
                 mujoco.mj_step(self.setting.model, self.data, steps)
         self.sample += 1
-        self.look(self.data)
+        self.read_state(self.data)
         observation = self.setting.observe(self.x, self.v, self.sample)
-        if self.over:
+        if self.diverged:
             observation = bounded(observation)
-        reward, info = self.assess()
-        return observation, reward, self.over, self.sample >= self.last, info
+        reward, info = self.reward_and_info()
+        return observation, reward, self.diverged, self.sample >= self.max_samples, info
 
     def render(self) -> np.ndarray | None:
         """Return a picture from the plant's camera, (height, width, 3), with render_mode "rgb_array", else None.

@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import Any
 
 LIBRARY = "gymnasium"
-SPACE = "smc"  # namespace of all plants
+NAMESPACE = "smc"  # of all plants
 
 
 def register_when_imported() -> None:
@@ -21,15 +21,15 @@ def register_when_imported() -> None:
     if getattr(sys.modules.get(LIBRARY), "envs", None) is not None:  # set once gymnasium has registered its own ids
         register()
     else:
-        others = [finder for finder in sys.meta_path if type(finder).__module__ != __name__]  # not one before a reload
+        others = [finder for finder in sys.meta_path if type(finder).__module__ != __name__]  # none of ours
         sys.meta_path[:] = [Importer(), *others]
 
 
 class Importer:
-    """The finder that registers the ids after the first import of gymnasium. It finds nothing else."""
+    """The finder of gymnasium alone. It registers the ids after gymnasium's first import."""
 
     def find_spec(self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> Any:
-        """Return where gymnasium is, with a loader that registers the ids; None for other packages."""
+        """Return the spec of gymnasium, with a loader that also registers the ids; None for other packages."""
         if name != LIBRARY:
             return None
         others = [finder for finder in sys.meta_path if finder is not self]
@@ -52,7 +52,7 @@ def register() -> None:
 
     taken = {spec.name for spec in theirs.registry.values() if str(spec.entry_point).startswith(f"{LIBRARY}.")}
     for plant in plants():
-        for name in (f"{SPACE}/{camel(plant)}-v0", *([] if camel(plant) in taken else [f"{camel(plant)}-v0"])):
+        for name in (f"{NAMESPACE}/{camel(plant)}-v0", *([] if camel(plant) in taken else [f"{camel(plant)}-v0"])):
             if name not in theirs.registry:
                 theirs.register(
                     id=name,
@@ -66,9 +66,8 @@ def plants() -> list[str]:
     """Return the names of the plants, other packages' included, without importing one."""
     from smc_mujoco.common.catalogue import points
 
-    shipped = [
-        module.name for module in pkgutil.iter_modules([str(Path(__file__).parents[1] / "mechanisms" / "plants")])
-    ]
+    folder = Path(__file__).parents[1] / "mechanisms" / "plants"
+    shipped = [module.name for module in pkgutil.iter_modules([str(folder)])]
     return list(dict.fromkeys([*shipped, *(point.name for point in points("smc_mujoco.plants"))]))
 
 

@@ -34,13 +34,13 @@ RATE_MARGIN = 5.0  # rad/s or m/s, the margin of w: chosen
 SWING_UP_SPREAD = 0.1  # rad, largest distance from hanging at the start of a swing-up: chosen
 SWING_UP_TORQUE = 0.5  # u_max of a swing-up, of the torque that holds the pendulum level: chosen, too weak for one push
 TRACK_REFERENCE = Sine(amplitude=0.5, omega=1.0)  # rad or m, the default of `track`: chosen
-WITHIN = 0.5  # of the way to the end of a joint's range, the largest amplitude of an arm's default reference: chosen
+AMPLITUDE_SHARE = 0.5  # of the way to the end of a joint's range: bounds the default reference of an arm; chosen
 
 Pair = tuple[np.ndarray, np.ndarray]
 
 
 @dataclasses.dataclass(frozen=True)
-class Swing(Signal):
+class OffsetSine(Signal):
     """r(t) = middle + amplitude sin(omega t); omega in rad/s."""
 
     middle: float
@@ -54,7 +54,7 @@ class Swing(Signal):
 
 
 class Task:
-    """The goal of an agent. This class is `regulate`, which brings every channel to 0; the others derive from it.
+    """The goal of an agent. This base class is `regulate`: bring every channel to 0.
 
     Attributes:
       moving: whether there is a moving reference, which is then part of the observation.
@@ -99,11 +99,11 @@ class Track(Task):
         if not plant.rest:
             return {"reference": TRACK_REFERENCE}
         low, high = _ranges(plant)
-        room = WITHIN * np.minimum(high - plant.rest, plant.rest - low)
+        room = AMPLITUDE_SHARE * np.minimum(high - plant.rest, plant.rest - low)
         amplitudes = np.minimum(room, TRACK_REFERENCE.amplitude)[: plant.driven].tolist()
         return {
             "reference": [
-                Swing(middle, amplitude, TRACK_REFERENCE.omega)
+                OffsetSine(middle, amplitude, TRACK_REFERENCE.omega)
                 for middle, amplitude in zip(plant.rest, amplitudes, strict=False)
             ]
         }
@@ -124,11 +124,11 @@ class SwingUp(Task):
     """Bring hanging pendulums and poles upright."""
 
     def fits(self, plant: Plant) -> bool:
-        """Return whether all that topples can hang, and u_max has one unit."""
+        """Return whether every toppling channel can hang, and u_max has one unit."""
         down, (low, high) = toppling(plant), _ranges(plant)
         hangs = (low[down] <= math.pi) & (high[down] >= math.pi)
-        one = plant.free or {"rad"}.issuperset(plant.units)
-        return bool(down.any() and hangs.all() and one)
+        one_unit = plant.free or {"rad"}.issuperset(plant.units)
+        return bool(down.any() and hangs.all() and one_unit)
 
     def fields(self, plant: Plant) -> dict[str, Any]:
         """Return a torque too weak to push the heaviest pendulum up at once; a cart keeps its own limit."""

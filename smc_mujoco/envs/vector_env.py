@@ -16,8 +16,8 @@ import numpy as np
 
 from smc_mujoco.common import mjcb
 from smc_mujoco.common.errors import ScenarioError, shown, whole
-from smc_mujoco.envs.core import Setting, bounded
-from smc_mujoco.envs.gymnasium_env import Timed, action_space, observation_space
+from smc_mujoco.envs.episode import Setting, bounded
+from smc_mujoco.envs.gymnasium_env import TimeLimited, action_space, observation_space
 from smc_mujoco.envs.tasks import Pair, reward
 from smc_mujoco.mechanisms.custom.plant_from import smooth
 from smc_mujoco.mechanisms.plant import DIRECTLY, Plant
@@ -35,17 +35,17 @@ MAX_COPIES = 1_000_000  # a larger number is a mistake
 SEEDS = 2**64
 
 
-class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
+class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
     """Copies of one plant with one task; they are not rendered.
 
     Attributes:
       setting: the plant with its task.
       batch: the simulations.
-      first: output of the first of two drives in series, (num_envs, driven).
-      rubbing: a friction by a formula, or None.
+      drive_states: both states of `DriveStep`, (2, num_envs, driven).
+      friction: a friction by a formula, or None.
       samples: control samples since the episode began, (num_envs,).
-      over: the copies for which the episode has ended, (num_envs,) of bool.
-      last: the sample at which an episode is truncated.
+      ended: the copies whose episode has ended, (num_envs,) of bool.
+      max_samples: control samples after which an episode is truncated.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012  # as gymnasium has it
@@ -61,16 +61,16 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         max_episode_steps: int | None = None,
         render_mode: None = None,
     ):
-        """Plant, task and changes are those of `core.Setting`.
+        """Plant, task and changes are those of `episode.Setting`.
 
         Args:
           threads: None for one per available core.
           autoreset_mode: when a copy begins a new episode after the end of one.
-          max_episode_steps: control samples after which an episode is truncated, if the duration has not come first.
+          max_episode_steps: control samples after which an episode is truncated, if the duration is not shorter.
           render_mode: None, because copies are not rendered.
 
         Raises:
-          ScenarioError: as of `core.Setting`, or another value of these.
+          ScenarioError: what `episode.Setting` raises, or another value of these.
         """
         if render_mode is not None:
             raise ScenarioError(f"render_mode is {shown(render_mode)}: copies are not drawn, make a single environment")
@@ -80,22 +80,22 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
             modes = ", ".join(repr(mode.value) for mode in AutoresetMode)
             raise ScenarioError(f"autoreset_mode is {shown(autoreset_mode)}: choose from {modes}") from None
         self.num_envs = whole("num_envs", num_envs, 1, MAX_COPIES)
-        self.setting = Setting(plant, task, changes, edit=strip)
-        relieve(self.setting.model)
+        self.setting = Setting(plant, task, changes, edit=remove_scenery)
+        disable_unused_constraints(self.setting.model)
         steps = math.inf if max_episode_steps is None else whole("max_episode_steps", max_episode_steps, 1, 10**15)
-        self.last = min(self.setting.scenario.samples, steps)
+        self.max_samples = min(self.setting.scenario.samples, steps)
         self.single_action_space = action_space(self.setting)
         self.single_observation_space = observation_space(self.setting)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.rubbing = self.setting.rubbing(self.num_envs)
-        # persistent, if a friction reads the forces of the step before
-        workers, kept = min(cores(threads), self.num_envs), self.rubbing is not None
-        self.batch = Batch(self.setting.model, self.num_envs, workers, persistent=kept)
+        self.friction = self.setting.formula_friction(self.num_envs)
+        workers = min(cores(threads), self.num_envs)
+        persistent = self.friction is not None  # it reads the forces of the previous step
+        self.batch = Batch(self.setting.model, self.num_envs, workers, persistent=persistent)
         self.qpos, self.qvel, self.ctrl = (self.batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
-        self.drives = np.zeros((2, self.num_envs, *self.setting.shape))
+        self.drive_states = np.zeros((2, self.num_envs, *self.setting.action_shape))
         self.randoms: list[np.random.Generator] = []
-        self.samples, self.over = np.zeros(self.num_envs, int), np.zeros(self.num_envs, bool)
+        self.samples, self.ended = np.zeros(self.num_envs, int), np.zeros(self.num_envs, bool)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None
@@ -107,8 +107,8 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         mask, options = self._mask(options)
         generators = self.randoms or [None] * self.num_envs
         self.randoms = [
-            seeding.np_random(own)[0] if random is None or (new and own is not None) else random
-            for random, own, new in zip(generators, self._seeds(seed), mask, strict=True)
+            seeding.np_random(number)[0] if random is None or (new and number is not None) else random
+            for random, number, new in zip(generators, self._seeds(seed), mask, strict=True)
         ]
         self.begin(mask, options)
         return self.observe(), self.infos(self.errors()[0], mask)
@@ -121,10 +121,10 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         """
         if not self.randoms:
             raise ScenarioError("no episode has begun: call reset first")
-        restarts, mode = self.over.copy(), self.metadata["autoreset_mode"]
+        restarts, mode = self.ended.copy(), self.metadata["autoreset_mode"]
         if restarts.any() and mode is AutoresetMode.DISABLED:
-            over = np.argmax(restarts)
-            raise ScenarioError(f"the episode of copy {over} is over: reset it with the option reset_mask")
+            copy = np.argmax(restarts)
+            raise ScenarioError(f"the episode of copy {copy} is over: reset it with the option reset_mask")
         commands = self.setting.command(actions, (self.num_envs,))
         terminated = self.advance(np.flatnonzero(~restarts).astype(np.int32) if restarts.any() else None, commands)
         self.samples += 1
@@ -132,19 +132,19 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
             self.begin(restarts)
             terminated[restarts] = False
         x, v = self.state()
-        terminated |= self.setting.lost(x, v)
-        truncated = self.samples >= self.last
+        terminated |= self.setting.diverged(x, v)
+        truncated = self.samples >= self.max_samples
         e, w = self.errors()
         with np.errstate(over="ignore", invalid="ignore"):
             rewards = np.where(terminated | restarts, 0.0, reward(e, w))
         e[terminated] = np.nan
-        observations, self.over = self.observe(terminated), terminated | truncated
+        observations, self.ended = self.observe(terminated), terminated | truncated
         final, times = {}, self.times
-        if mode is AutoresetMode.SAME_STEP and self.over.any():
-            for i in np.flatnonzero(self.over):
+        if mode is AutoresetMode.SAME_STEP and self.ended.any():
+            for i in np.flatnonzero(self.ended):
                 info = {"time": times[i], "error": e[i]}
                 final = self._add_info(final, {"final_obs": observations[i].copy(), "final_info": info}, int(i))
-            self.begin(self.over.copy())
+            self.begin(self.ended.copy())
             observations, e = self.observe(), self.errors()[0]
         return observations, rewards, terminated, truncated, self.infos(e) | final
 
@@ -154,30 +154,30 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         with mjcb.installed(None):
             self.batch.reset(ids.astype(np.int32), stage=0)
         for i in ids:
-            self.setting.place(self.qpos[i], self.qvel[i], *self.setting.draw(self.randoms[i], options))
-        self.samples[mask], self.over[mask], self.drives[:, mask] = 0, False, 0.0
-        if self.rubbing:
-            self.rubbing.begin(ids)
-            self.batch.bind("userdata")[ids] = self.rubbing.userdata[ids]
+            self.setting.write_start(self.qpos[i], self.qvel[i], *self.setting.draw_start(self.randoms[i], options))
+        self.samples[mask], self.ended[mask], self.drive_states[:, mask] = 0, False, 0.0
+        if self.friction:
+            self.friction.begin(ids)
+            self.batch.bind("userdata")[ids] = self.friction.userdata[ids]
 
     def advance(self, ids: np.ndarray | None, commands: np.ndarray) -> np.ndarray:
-        """Step copies, None for all. Return the copies in which MuJoCo gave up, (num_envs,) of bool."""
+        """Take one control period in the copies `ids`, None for all. Return those that failed, (num_envs,) of bool."""
         failed = np.zeros(self.num_envs, bool)
-        for steps in self.setting.stretches(self.ctrl, commands, self.drives):
+        for steps in self.setting.apply_command(self.ctrl, commands, self.drive_states):
             try:
                 # a Batch refuses Python callbacks, which runs of other threads may have set
-                with callback.installed() if self.rubbing else mjcb.installed(None):
+                with callback.installed() if self.friction else mjcb.installed(None):
                     self.batch.step(ids, nstep=steps)
             except SimulationError as error:
                 failed[list(error.ids)] = True
                 ids = np.setdiff1d(np.arange(self.num_envs) if ids is None else ids, error.ids).astype(np.int32)
-        return failed | self.rubbing.failed if self.rubbing else failed
+        return failed | self.friction.failed if self.friction else failed
 
     def observe(self, lost: np.ndarray | None = None) -> np.ndarray:
         """Return the observations of all copies, (num_envs, size). `lost` marks those that diverged, if known."""
         x, v = self.state()
         if lost is None:
-            lost = np.asarray(self.setting.lost(x, v))
+            lost = np.asarray(self.setting.diverged(x, v))
         observations = self.setting.observe(x, v, self.samples)
         if lost.any():
             observations[lost] = bounded(observations[lost])
@@ -194,13 +194,13 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
             return self.setting.errors(*self.state(), self.samples)
 
     def infos(self, e: np.ndarray, mask: np.ndarray | None = None) -> dict[str, Any]:
-        """Return the infos of `Episode.assess` for the copies in a mask, as gymnasium joins them.
+        """Return the infos of `Episode.reward_and_info` for the copies in a mask, as gymnasium joins them.
 
         Args:
           e: errors of the task, (num_envs, n).
           mask: (num_envs,) of bool; None for all copies.
         """
-        known = np.ones(self.num_envs, bool) if mask is None else mask.copy()  # it is a user's
+        known = np.ones(self.num_envs, bool) if mask is None else mask.copy()  # a user may change the mask later
         times = np.where(known, self.times, 0.0)
         return {"time": times, "_time": known, "error": np.where(known[:, None], e, 0.0), "_error": known.copy()}
 
@@ -209,7 +209,7 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         return self.qpos[:, self.setting.qpos], self.qvel[:, self.setting.qvel]
 
     def _mask(self, options: Mapping[str, Any] | None) -> tuple[np.ndarray, Mapping[str, Any] | None]:
-        """Return the copies to be reset, (num_envs,) of bool, and the other options."""
+        """Return the copies to reset, (num_envs,) of bool, and the other options."""
         if not isinstance(options, Mapping) or "reset_mask" not in options:
             return np.ones(self.num_envs, bool), options
         mask = options["reset_mask"]
@@ -227,24 +227,23 @@ class BatchEnv(Timed, VectorEnv):  # pyright: ignore[reportIncompatibleVariableO
         if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
             if len(seed) != self.num_envs:
                 raise ScenarioError(f"seed has {len(seed)} values for {self.num_envs} copies: give one number or all")
-            return [None if one is None else whole("seed", one, 0, SEEDS) for one in seed]
+            return [None if number is None else whole("seed", number, 0, SEEDS) for number in seed]
         first = whole("seed", seed, 0, SEEDS)
         return range(first, first + self.num_envs)
 
 
-def strip(spec: mujoco.MjSpec) -> None:
+def remove_scenery(spec: mujoco.MjSpec) -> None:
     """Delete scenery, merge fixed bodies and disable sensors, which take a third of MuJoCo's time.
 
-    Users' own models keep their scenery and bodies, since a fixed part may be a floor, or hold a tendon.
+    A user's model keeps its scenery and bodies, because a fixed part may be a floor, or carry a tendon.
     """
     if not any(text.name == DIRECTLY for text in spec.texts):
         without_scenery(spec)
         spec.compiler.fusestatic = True
-    # observations come from the state, not from sensors
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 
 
-def relieve(model: mujoco.MjModel) -> None:
+def disable_unused_constraints(model: mujoco.MjModel) -> None:
     """Disable constraints in a model that has none, which saves a tenth of MuJoCo's time."""
     if smooth(model) and not model.nflex:
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value

@@ -25,7 +25,7 @@ from helpers.episodes import (
 import smc_mujoco as smc
 from smc_mujoco.common import extras, gl
 from smc_mujoco.envs import tasks
-from smc_mujoco.envs.core import Setting
+from smc_mujoco.envs.episode import Setting
 from smc_mujoco.simulation import callback
 
 suite = dm_control_suite()

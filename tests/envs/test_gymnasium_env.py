@@ -102,7 +102,7 @@ def test_an_arm_with_friction_is_copied_and_sent_away_while_its_joints_stick():
     one.reset(seed=0)
     for _ in range(3):
         one.step(np.zeros(7))
-    assert np.any(one.rubbing.states(0))  # pyright: ignore[reportOptionalMemberAccess]
+    assert np.any(one.friction.states(0))  # pyright: ignore[reportOptionalMemberAccess]
     others = [copy.deepcopy(one), pickle.loads(pickle.dumps(one))]
     expected = [one.step(np.full(7, 0.02))[0] for _ in range(20)]
     for other in others:
@@ -312,7 +312,7 @@ def test_an_episode_ends_where_a_run_diverges_with_an_observation_in_its_space()
     changes = {"x0": 9.9e5, "v0": 9e5, "control_period": 0.1}
     single, many = PlantEnv("inverted_pendulum", changes=changes), BatchEnv("inverted_pendulum", 2, changes=changes)
     single.reset(seed=0)
-    assert not single.setting.lost(single.x, single.v)  # each number is below the limit of a run
+    assert not single.setting.diverged(single.x, single.v)  # each number is below the limit of a run
     observation, reward, terminated, _, info = single.step([0.0])
     assert (terminated, reward) == (True, 0.0)
     assert np.isnan(info["error"]).all()

@@ -7,7 +7,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.envs import tasks
-from smc_mujoco.envs.core import FIELDS, Setting
+from smc_mujoco.envs.episode import FIELDS, Setting
 
 EVERY = [(plant, task) for plant in smc.plants() for task in tasks.tasks(plant)]
 
@@ -26,7 +26,7 @@ LAW = smc.law("observer_free", lam=6.0, k1=3.076)
 
 def start(plant, task):
     """A start within the task's own, as x0."""
-    return Setting(plant, task).draw(np.random.default_rng(7))[0]
+    return Setting(plant, task).draw_start(np.random.default_rng(7))[0]
 
 
 def dm_control_suite() -> ModuleType:

@@ -17,7 +17,7 @@ from smc_mujoco.analysis import linearisation
 from smc_mujoco.common import process
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import design
-from smc_mujoco.envs import core, tasks
+from smc_mujoco.envs import episode, tasks
 from smc_mujoco.mechanisms.custom import channels as own_channels
 from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, prepared
@@ -401,10 +401,10 @@ def test_a_law_with_anti_wind_up_knows_its_motor_s_limit(arm):
 
 def test_an_environment_clips_actions_at_the_motors_limits_and_starts_in_the_keyframe(arm):
     rest = ACTUATED + '<keyframe><key name="home" qpos="0.2 -0.5"/></keyframe>'
-    found = core.Setting(arm(["shoulder"], rest, keyframe="home"), changes={"u_max": 50.0})
+    found = episode.Setting(arm(["shoulder"], rest, keyframe="home"), changes={"u_max": 50.0})
     np.testing.assert_array_equal(found.command([-3.0]), [-4.0])
     qpos, qvel = np.empty(2), np.empty(2)
-    found.place(qpos, qvel, np.array([0.1]), np.array([0.0]))
+    found.write_start(qpos, qvel, np.array([0.1]), np.array([0.0]))
     np.testing.assert_array_equal(qpos, [0.1, -0.5])
 
 
@@ -670,15 +670,15 @@ def test_environments_start_where_runs_may(bounded):
     starts = {"regulate": (2.0, 0.8), "track": (2.0, 0.8), "synchronise": (2.0, MOST)}
     assert list(starts) == tasks.tasks(plant)
     for task, highest in starts.items():
-        found = core.Setting(plant, task)
+        found = episode.Setting(plant, task)
         assert found.low.tolist() == [-2.0, LEAST]
         assert found.high.tolist() == list(highest)
         for random in map(np.random.default_rng, range(20)):
-            smc.Scenario(plant=plant, law="none", x0=found.draw(random)[0])
-    found, random = core.Setting(plant), np.random.default_rng(0)
+            smc.Scenario(plant=plant, law="none", x0=found.draw_start(random)[0])
+    found, random = episode.Setting(plant), np.random.default_rng(0)
     with pytest.raises(smc.ScenarioError, match=REFUSED):
-        found.draw(random, {"x0": (0.0, 1.2)})
-    assert found.draw(random, {"x0": (9.0, 1.0)})[0].tolist() == [9.0, 1.0]
+        found.draw_start(random, {"x0": (0.0, 1.2)})
+    assert found.draw_start(random, {"x0": (9.0, 1.0)})[0].tolist() == [9.0, 1.0]
 
 
 # swing-ups
@@ -698,8 +698,8 @@ def test_what_cannot_hang_is_not_asked_to_swing_up(tmp_path, joint):
     plant = smc.plant_from(tmp_path / "pole.xml", {"slide": smc.Channel(partner="pole")})
     assert ("swing_up" in tasks.tasks(plant)) == HANGING[joint]
     if HANGING[joint]:
-        found = core.Setting(plant, "swing_up")
-        x = found.draw(np.random.default_rng(0))[0]
+        found = episode.Setting(plant, "swing_up")
+        x = found.draw_start(np.random.default_rng(0))[0]
         assert abs(smc.Scenario(plant=plant, law="none", x0=x).resolved.x0[1] - math.pi) <= 0.1
         assert found.scenario.resolved.u_max == 20.0
 
@@ -714,7 +714,7 @@ def test_a_swing_up_has_half_the_torque_of_its_heaviest_pendulum_and_no_slide(tm
     (tmp_path / "three.xml").write_text(f"<mujoco><worldbody>{''.join(bodies)}</worldbody></mujoco>")
     for order in (("upright", "light", "heavy"), ("heavy", "light", "upright")):
         plant = smc.plant_from(tmp_path / "three.xml", dict.fromkeys(order, smc.Channel(motor=True)))
-        scenario = core.Setting(plant, "swing_up").scenario
+        scenario = episode.Setting(plant, "swing_up").scenario
         assert scenario.resolved.u_max == pytest.approx(0.5 * 2.0 * 9.81)
 
 

@@ -1,4 +1,4 @@
-"""Frictions by a formula in environments: the callback of smc.run computes them, and the agent gives all commands."""
+"""Friction by a formula in environments: the callback of `smc.run` computes it, and the agent gives the commands."""
 
 import contextlib
 import dataclasses
@@ -16,11 +16,11 @@ from smc_mujoco.simulation.prepare import pack, prepare
 from smc_mujoco.simulation.scenario import Resolved
 
 
-class Rubbing:
-    """The friction by a formula of copies of a mechanism.
+class FormulaFriction:
+    """The friction by a formula of `count` copies of a mechanism.
 
     Args:
-      model: the compiled mechanism, with callback.USERDATA numbers of userdata.
+      model: the compiled mechanism. It has callback.USERDATA numbers of userdata.
 
     Raises:
       ScenarioError: a function of the scenario does not compile.
@@ -43,38 +43,38 @@ class Rubbing:
 
     @property
     def userdata(self) -> np.ndarray:
-        """What mjData.userdata of each copy holds, (copies, 2)."""
+        """The content of mjData.userdata of each copy, (count, 2)."""
         addresses = state.address(self.records) + np.arange(self.count) * self.records.itemsize
         return np.column_stack([np.full(self.count, callback.magic()), addresses])
 
     @property
     def failed(self) -> np.ndarray:
-        """The copies in which the formula raised an exception, (copies,) of bool."""
+        """The copies in which the formula raised an exception, (count,) of bool."""
         return self.records["failure"] != state.FINE
 
     def states(self, i: int) -> np.ndarray:
-        """Return where the joints of a copy stick and how fast they were, as numbers of CHANNEL_STATE; writeable."""
+        """Return the channel states of copy i as writeable numbers: where its joints stick, and their last speeds."""
         size = state.CHANNEL_STATE.itemsize // 8 * self.scenario.plant.n
         return state.view(self.packed[i].numbers, int(self.records["states"][i]), (size,))
 
     def begin(self, copies: Iterable[int]) -> None:
-        """Begin episodes: no joint sticks."""
+        """Begin episodes in which no joint sticks."""
         for i in copies:
             self.states(i)[:] = 0.0
             self.records["failure"][i] = state.FINE
 
-    def acting(self, data: mujoco.MjData) -> contextlib.AbstractContextManager[None]:
-        """Return a context in which the steps of a single copy have friction."""
+    def with_friction(self, data: mujoco.MjData) -> contextlib.AbstractContextManager[None]:
+        """Return the context in which friction acts on the only copy."""
         data.userdata[:] = self.userdata[0]
         return callback.installed()
 
     def __getstate__(self) -> dict[str, Any]:
         """Return all but addresses, for copies and other processes."""
         states = [self.states(i).copy() for i in range(self.count)]
-        return {"of": (self.scenario, self.model, self.count), "states": states, "failed": self.failed}
+        return {"arguments": (self.scenario, self.model, self.count), "states": states, "failed": self.failed}
 
-    def __setstate__(self, kept: dict[str, Any]) -> None:
-        self.__init__(*kept["of"])
-        for i, numbers in enumerate(kept["states"]):
+    def __setstate__(self, pickled: dict[str, Any]) -> None:
+        self.__init__(*pickled["arguments"])
+        for i, numbers in enumerate(pickled["states"]):
             self.states(i)[:] = numbers
-        self.records["failure"] = np.where(kept["failed"], state.FRICTION_RAISED, state.FINE)
+        self.records["failure"] = np.where(pickled["failed"], state.FRICTION_RAISED, state.FINE)

@@ -1,9 +1,8 @@
-"""A plant with a task, ready to be simulated: the common base of dm_env, gymnasium and batched environments.
+"""A plant with a task, compiled, and an episode of it: the base of dm_env, gymnasium and batched environments.
 
 The physics are those of `smc.run`. An action is the command u of each driven channel, divided by the channel's limit
 and held for one control period; it saturates outside [-1, 1]. The limit is u_max, or that of the channel's own motor.
-An environment has no law, and nothing that a Scenario puts between plant and law (noise, delay, encoder). It has no
-disturbances, contacts or jumps.
+An environment has no law, no noise, delay or encoder, and no disturbances, contacts or jumps.
 """
 
 import contextlib
@@ -15,7 +14,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
-from smc_mujoco.envs.rubbing import Rubbing
+from smc_mujoco.envs.formula_friction import FormulaFriction
 from smc_mujoco.envs.tasks import TASKS, Pair, rest, reward, starts, tasks
 from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
@@ -36,7 +35,7 @@ FIELDS = (  # of a Scenario, that an environment accepts
 
 
 class Setting:
-    """A plant with a task, compiled. Environments of every kind have one.
+    """A plant with a task, compiled. Every environment has one.
 
     Attributes:
       task: the Task.
@@ -44,17 +43,17 @@ class Setting:
       model: its compiled model.
       qpos, qvel: addresses of the n channels, (n,) each.
       ctrl: addresses of the driven channels' actuators.
-      rotors: the m channels with a separate rotor, and the rotor's addresses in qpos and qvel, (3, m).
-      rest: qpos (nq,) and qvel (nv,) at the start of a run, before x and v of the episode are written into them.
+      rotors: channels with a separate rotor, and its addresses in qpos and qvel, (3, rotors).
+      initial_state: qpos (nq,) and qvel (nv,), into which x and v of an episode's start are written.
       ctrl_limits: the largest inputs of the model's actuators, (driven,).
       selected: the channels that the task treats differently, (n,) of bool, see `Task.selected`.
-      rest_x: the plant's rest, from which errors count, (n,).
+      rest_x: the plant's rest, from which positions count in errors, (n,).
+      rest_r: the same for the references: the rest of each channel that has one, then zeros, (3 m,).
       low, high: bounds of the initial positions, (n,) each.
-      references: all r, r' and r'' at every sample, (K + 1, 3 m): of one reference, m = 1, or of each driven channel;
-        one row of zeros if the task has none.
-      rest_r: what r, r' and r'' are at the plant's rest, (3 m,).
-      size: number of values in an observation: positions, velocities, and r, r', r'' if the task has a reference.
-      shape: of an action.
+      references: r, r' and r'' of m references at every sample, (K + 1, 3 m). There is one reference, or one for each
+        driven channel. A task without a reference has one row of zeros.
+      observation_size: number of values in an observation.
+      action_shape: (driven,).
     """
 
     def __init__(
@@ -89,14 +88,14 @@ class Setting:
         table = channels(self.model)
         self.qpos, self.qvel, self.ctrl = table["qpos"], table["qvel"], table["ctrl"][: plant.driven]
         self.rotors = _rotors(self.model)
-        self.rest = models.initial_state(self.model, self.scenario)
+        self.initial_state = models.initial_state(self.model, self.scenario)
         self.ctrl_limits = math.prod(part.scale for part in self.scenario.actuator) * np.array(self.scenario.limits)
         self.selected, self.rest_x = self.task.selected(plant), rest(plant)
         self.references = _references(self.scenario, self.scenario.samples + 1 if self.task.moving else 1)
-        followed = self.references.shape[1]
-        self.size, self.shape = 2 * plant.n + followed * self.task.moving, (plant.driven,)
-        self.rest_r = np.zeros(followed)
-        self.rest_r[: followed // 3] = self.rest_x[: followed // 3] if plant.rest else 0.0
+        width = self.references.shape[1]
+        self.observation_size, self.action_shape = 2 * plant.n + width * self.task.moving, (plant.driven,)
+        self.rest_r = np.zeros(width)
+        self.rest_r[: width // 3] = self.rest_x[: width // 3] if plant.rest else 0.0
 
     def command(self, action: Any, copies: tuple[int, ...] = ()) -> np.ndarray:
         """Return the actuators' inputs for an action, (*copies, driven): its saturated values times the limits.
@@ -104,7 +103,7 @@ class Setting:
         Raises:
           ScenarioError: an action of another shape, or not of finite numbers.
         """
-        shape = copies + self.shape
+        shape = copies + self.action_shape
         try:
             a = np.asarray(action, float)
         except (TypeError, ValueError, OverflowError):
@@ -117,13 +116,13 @@ class Setting:
             raise ScenarioError(f"action is {wrong}: give finite numbers, of shape {shape}")
         return self.ctrl_limits * np.minimum(np.maximum(a, -1.0), 1.0)
 
-    def stretches(self, ctrl: np.ndarray, command: np.ndarray, drives: np.ndarray) -> Iterator[int]:
-        """Write a command into ctrl over a control period; yield for how many physics steps each input holds.
+    def apply_command(self, ctrl: np.ndarray, command: np.ndarray, drive_states: np.ndarray) -> Iterator[int]:
+        """Write inputs into ctrl over a control period; yield after each for how many physics steps it lasts.
 
         Args:
           ctrl: of one simulation, (nu,), or of several, (..., nu).
           command: the return value of `command`, (..., driven).
-          drives: both states of `DriveStep`, (2, ..., driven); updated in place.
+          drive_states: both states of `DriveStep`, (2, ..., driven); updated in place.
         """
         effect, steps = self.scenario.drive_step, self.scenario.steps
         if effect is None:
@@ -131,14 +130,14 @@ class Setting:
             yield steps
             return
         for _ in range(steps):
-            ctrl[..., self.ctrl], drives[0], drives[1] = effect(command, drives[0], drives[1])
+            ctrl[..., self.ctrl], drive_states[0], drive_states[1] = effect(command, *drive_states)
             yield 1
 
-    def rubbing(self, count: int = 1) -> Rubbing | None:
-        """Return the friction by a formula of so many copies; None without one."""
-        return None if self.scenario.sliding is None else Rubbing(self.scenario, self.model, count)
+    def formula_friction(self, count: int = 1) -> FormulaFriction | None:
+        """Return the friction by a formula of `count` simulations; None without one."""
+        return None if self.scenario.sliding is None else FormulaFriction(self.scenario, self.model, count)
 
-    def draw(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
+    def draw_start(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
         """Return a start, x and v, (n,) each: drawn from a numpy generator, or set by the options x0 and v0.
 
         Raises:
@@ -156,9 +155,9 @@ class Setting:
             x, v = (state, v) if name == "x0" else (x, state)
         return x, v
 
-    def place(self, qpos: np.ndarray, qvel: np.ndarray, x: np.ndarray, v: np.ndarray) -> None:
+    def write_start(self, qpos: np.ndarray, qvel: np.ndarray, x: np.ndarray, v: np.ndarray) -> None:
         """Write a start into qpos (nq,) and qvel (nv,)."""
-        qpos[:], qvel[:] = self.rest
+        qpos[:], qvel[:] = self.initial_state
         qpos[self.qpos], qvel[self.qvel] = x, v
         channel, rotor_qpos, rotor_qvel = self.rotors
         qpos[rotor_qpos], qvel[rotor_qvel] = x[channel], v[channel]
@@ -175,8 +174,8 @@ class Setting:
         """Return the errors e and w of the task for x, v (..., n) at sample k, (..., n) each."""
         return self.task.errors(x - self.rest_x, v, self.reference(k) - self.rest_r, self.selected)
 
-    def lost(self, x: np.ndarray, v: np.ndarray) -> Any:
-        """Return whether x, v (..., n) are beyond the largest state of a run, or not numbers."""
+    def diverged(self, x: np.ndarray, v: np.ndarray) -> Any:
+        """Return whether x, v (..., n) are beyond the largest state of a run, or NaN."""
         return ~(np.maximum(np.abs(x), np.abs(v)).max(axis=-1) < MAX_STATE)
 
 
@@ -187,61 +186,60 @@ class Episode:
       setting: the plant with its task.
       episodes: number of episodes that have begun.
       sample: control samples since the episode began.
-      drives: both states of `DriveStep`, (2, driven).
-      rubbing: a friction by a formula, or None.
+      drive_states: both states of `DriveStep`, (2, driven).
+      friction: a friction by a formula, or None.
       x, v: positions and velocities, (n,) each.
-      over: whether the plant has diverged, which ends the episode without a reward.
+      diverged: whether the plant has diverged, which ends the episode without a reward.
     """
 
     def __init__(self, setting: Setting):
-        self.setting, self.sample, self.drives, self.over = setting, 0, np.zeros((2, *setting.shape)), False
-        self.episodes = 0
+        self.setting, self.episodes, self.sample, self.diverged = setting, 0, 0, False
+        self.drive_states = np.zeros((2, *setting.action_shape))
         self.x = self.v = np.zeros(setting.scenario.plant.n)
-        self.rubbing = setting.rubbing()
+        self.friction = setting.formula_friction()
 
     def begin(self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None) -> None:
         """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
-        x, v = self.setting.draw(random, options)
+        x, v = self.setting.draw_start(random, options)
         mujoco.mj_resetData(self.setting.model, data)
-        self.setting.place(data.qpos, data.qvel, x, v)
-        self.episodes, self.sample, self.drives[:] = self.episodes + 1, 0, 0.0
-        if self.rubbing:
-            self.rubbing.begin([0])
-        self.look(data)
+        self.setting.write_start(data.qpos, data.qvel, x, v)
+        self.episodes, self.sample, self.drive_states[:] = self.episodes + 1, 0, 0.0
+        if self.friction:
+            self.friction.begin([0])
+        self.read_state(data)
 
-    def acting(self, data: mujoco.MjData) -> contextlib.AbstractContextManager[None]:
-        """Return a context in which physics steps are taken: with a friction by a formula, if there is one."""
-        return self.rubbing.acting(data) if self.rubbing else contextlib.nullcontext()
+    def with_friction(self, data: mujoco.MjData) -> contextlib.AbstractContextManager[None]:
+        """Return the context of physics steps, in which a friction by a formula acts, if there is one."""
+        return self.friction.with_friction(data) if self.friction else contextlib.nullcontext()
 
-    def stretches(self, data: mujoco.MjData, action: Any) -> Iterator[int]:
-        """Apply an action, as `Setting.stretches` does."""
-        return self.setting.stretches(data.ctrl, self.setting.command(action), self.drives)
+    def apply_action(self, data: mujoco.MjData, action: Any) -> Iterator[int]:
+        """Apply an action over a control period, see `Setting.apply_command`."""
+        return self.setting.apply_command(data.ctrl, self.setting.command(action), self.drive_states)
 
-    def look(self, data: mujoco.MjData) -> None:
+    def read_state(self, data: mujoco.MjData) -> None:
         """Read the state."""
         self.x, self.v = data.qpos[self.setting.qpos], data.qvel[self.setting.qvel]
-        self.over = bool(self.setting.lost(self.x, self.v)) or bool(self.rubbing and self.rubbing.failed[0])
+        self.diverged = bool(self.setting.diverged(self.x, self.v)) or bool(self.friction and self.friction.failed[0])
 
-    def assess(self) -> tuple[float, dict[str, Any]]:
+    def reward_and_info(self) -> tuple[float, dict[str, Any]]:
         """Return the reward of the state, in [0, 1], and the info of gymnasium.
 
         The info has "time", s since the start, and "error", the e of the task in each channel, (n,). After a divergence
         the error is NaN, and the reward is 0.
         """
         time = self.sample * self.setting.scenario.control_period
-        if self.over:
+        if self.diverged:
             return 0.0, {"time": time, "error": np.full(len(self.x), np.nan)}
         e, w = self.setting.errors(self.x, self.v, self.sample)
         return float(reward(e, w)), {"time": time, "error": e}
 
 
 def bounded(observation: np.ndarray) -> np.ndarray:
-    """Return the last observation of an episode that diverged, with its values limited to the observation space."""
+    """Return the last observation of an episode that diverged, limited to the observation space."""
     return np.clip(np.nan_to_num(observation, nan=MAX_STATE), -MAX_STATE, MAX_STATE)
 
 
 def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:
-    """Return changes as a dict, or raise ScenarioError."""
     if not isinstance(changes, Mapping):
         raise ScenarioError(f"changes is {shown(changes)}: give Scenario fields with their values")
     for name in changes:
@@ -253,7 +251,7 @@ def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:
 
 
 def _rotors(model: mujoco.MjModel) -> np.ndarray:
-    """Return the channels with a separate rotor, and the rotor's addresses in qpos and qvel, (3, m)."""
+    """Return `Setting.rotors`."""
     rotors = []
     for i, joint in enumerate(joint_ids(model)):
         rotor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(joint).name)
@@ -263,7 +261,7 @@ def _rotors(model: mujoco.MjModel) -> np.ndarray:
 
 
 def _references(scenario: Resolved, samples: int) -> np.ndarray:
-    """Return all r, r' and r'' at the first samples, (samples, 3 m), or raise ScenarioError."""
+    """Return `Setting.references`, or raise ScenarioError."""
     if samples == 1:  # the task has none
         return np.zeros((1, 3))
     times = (np.arange(samples) * scenario.control_period).tolist()
@@ -282,7 +280,7 @@ def _references(scenario: Resolved, samples: int) -> np.ndarray:
 
 
 def _compiled(scenario: Resolved, edit: Callable[[mujoco.MjSpec], None]) -> mujoco.MjModel:
-    """Return the model of a scenario, with its mechanism edited."""
+    """Return the model of a scenario. `edit` changes its mechanism before."""
     spec = models.spec(scenario)
     edit(spec)
     model = ready(spec, 0 if scenario.sliding is None else callback.USERDATA)
