@@ -42,6 +42,7 @@ from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics.channel_groups import Group, group_trace, groups
 
 if TYPE_CHECKING:
+    from smc_mujoco.simulation.scenario import Scenario
     from smc_mujoco.simulation.trace import Trace
 
 SETTLING_BAND = 0.02  # of the scale
@@ -118,6 +119,12 @@ class Metric:
         u = u or EFFORT[x]
         text = self.unit.replace("({x})", x).replace("({u})", f"({u})" if " " in u else u)
         return text.format(x=x, u=u, force=EFFORT[x])
+
+    def unit_in(self, machine: Plant | Scenario, group: str = "") -> str:
+        """Return the unit in the group of that name, such as "free"; without a name, that of the first driven group."""
+        by_name = {one.name: one for one in groups(machine)}
+        chosen = by_name.get(group) or next(iter(by_name.values()))
+        return self.unit_for(chosen.unit, chosen.effort)
 
 
 def metric(

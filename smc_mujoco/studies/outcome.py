@@ -271,13 +271,7 @@ def _floor(measure: Measure, run: Trace, group: str) -> float:
 
 def _unit(measure: Measure, run: Trace, group: str) -> str:
     """Return the unit of a metric in a run; "" for a function."""
-    from smc_mujoco.metrics.channel_groups import groups
-
-    if not isinstance(measure, str):
-        return ""
-    each = {one.name: one for one in groups(run.scenario)}
-    of = each.get(group, next(iter(each.values())))
-    unit = CATALOGUE[measure].unit_for(of.unit, of.effort)
+    unit = CATALOGUE[measure].unit_in(run.scenario, group) if isinstance(measure, str) else ""
     return "" if unit == "1" else unit
 
 

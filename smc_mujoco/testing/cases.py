@@ -11,7 +11,7 @@ EXAMPLE = '@pytest.mark.smc(plants=["duffing"], conditions=["nominal", "noise"])
 
 
 def cases(given: Sequence[object], named: Mapping[str, object], arguments: Collection[str]) -> dict[str, list[str]]:
-    """Return `plant` and `condition`, as far as the test has these arguments -> the names with which the test runs.
+    """Return the test's argument, "plant" or "condition" -> the names with which the test runs.
 
     Args:
       given, named: the marker's arguments by position and by name. Default: every plant of the study, and the condition
@@ -42,7 +42,7 @@ def cases(given: Sequence[object], named: Mapping[str, object], arguments: Colle
 def _conditions(value: object) -> list[str]:
     """Return one or several conditions as texts."""
     several: Any = value if isinstance(value, list | tuple) else [value]
-    return [str(find_condition(one)) for one in several]
+    return [str(find_condition(condition)) for condition in several]
 
 
 def _names(kind: str, value: object, known: Mapping[str, object]) -> list[str]:

@@ -25,7 +25,7 @@ UPDATE = "run pytest --smc-update"
 MIN_TOLERANCE = 1e-9  # in the metric's unit: above rounding errors of a value that is 0
 
 
-def place(test: Path) -> Path:
+def golden_file(test: Path) -> Path:
     """Return the golden file of a test file."""
     return test.with_suffix(".golden.json")
 
@@ -36,13 +36,13 @@ def record(file: Path, key: str, response: StepResponse, rel: float | None, tole
     Raises:
       ScenarioError: the run failed, a tolerance is not a number of at least 0, or the file cannot be written.
     """
-    _checked(response, tolerances)
+    _check(response, tolerances)
     names = tolerances if tolerances and rel is None else [name for name in response.values if response.applies(name)]
     entry = {}
     for name in names:
         value, unit = response.value(name)
-        within = _tolerance(name, value, tolerances, RELATIVE if rel is None else rel)
-        entry[name] = {"value": value, "tolerance": within, "unit": unit}
+        tolerance = _tolerance(name, value, tolerances, RELATIVE if rel is None else rel)
+        entry[name] = {"value": value, "tolerance": tolerance, "unit": unit}
     try:
         with locked(file.parent):
             text = json.dumps(plain(dict(sorted((read(file) | {key: entry}).items()))), indent=2, ensure_ascii=False)
@@ -68,7 +68,7 @@ def compare(file: Path, key: str, response: StepResponse, rel: float | None, tol
       ScenarioError: the file cannot be read, or a tolerance is not a number of at least 0.
     """
     __tracebackhide__ = True
-    _checked(response, tolerances)
+    _check(response, tolerances)
     if response.failure is not None:
         raise AssertionError(f"{response}: {response.failure}")
     known = read(file).get(key, {})
@@ -76,26 +76,26 @@ def compare(file: Path, key: str, response: StepResponse, rel: float | None, tol
         raise AssertionError(f"{file.name} has no golden {', '.join(missing)} of {key}: {UPDATE}")
     names = tolerances if tolerances and rel is None else known
     try:
-        response.named(names)
+        response.check_names(names)
     except ScenarioError as error:  # recorded by another version, or of another plant
         raise ScenarioError(f"{file.name}, {key}: {error}; or {UPDATE}") from None
     limits = []
     for name in names:
         (value, unit), golden = response.value(name), _recorded(file, key, name, known, "value")
         if rel is None and name not in tolerances:
-            within = _recorded(file, key, name, known, "tolerance")
+            tolerance = _recorded(file, key, name, known, "tolerance")
         else:
-            within = _tolerance(name, golden, tolerances, rel or 0.0)
-        kept = value == golden or abs(value - golden) <= within or (math.isnan(value) and math.isnan(golden))
-        limits.append(Limit(name, quantity(value, unit), f"{quantity(golden)} ± {quantity(within)}", kept))
+            tolerance = _tolerance(name, golden, tolerances, rel or 0.0)
+        within = value == golden or abs(value - golden) <= tolerance or (math.isnan(value) and math.isnan(golden))
+        limits.append(Limit(name, quantity(value, unit), f"{quantity(golden)} ± {quantity(tolerance)}", within))
     judge(limits, "golden", "golden", f"{response}; if it is meant, {UPDATE}")
 
 
-def _checked(response: object, tolerances: Mapping[str, float]) -> None:
+def _check(response: object, tolerances: Mapping[str, float]) -> None:
     """Raise ScenarioError for anything but a response, and for tolerances of metrics that it does not have."""
     if not isinstance(response, StepResponse):
         raise ScenarioError(f"golden is given {shown(response)}: give what step_response returned")
-    response.named(tolerances)
+    response.check_names(tolerances)
 
 
 def _tolerance(name: str, value: float, tolerances: Mapping[str, float], rel: float) -> float:
@@ -107,11 +107,7 @@ def _tolerance(name: str, value: float, tolerances: Mapping[str, float], rel: fl
 
 
 def _recorded(file: Path, key: str, name: str, known: Mapping[str, Any], what: str) -> float:
-    """Return `what`, the value or the tolerance, of a metric in the file.
-
-    Args:
-      known: metric -> its entry, of this key.
-    """
+    """Return a metric's "value" or "tolerance" from `known`, the file's metric -> entry of this key."""
     try:
         return float(known[name][what])
     except (TypeError, KeyError, ValueError):
@@ -155,7 +151,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _locked_on_windows(folder: Path) -> Iterator[None]:
-    """Lock a folder on Windows, which locks no folders: lock the first byte of a temporary file named after it."""
+    """Lock the first byte of a temporary file named after the folder, because Windows locks no folders."""
     import msvcrt  # pyright: ignore[reportMissingImports]
 
     name = hashlib.sha256(str(folder.resolve()).encode()).hexdigest()[:16]

@@ -19,13 +19,13 @@ class Limit(NamedTuple):
     metric: str
     value: str
     limit: str
-    kept: bool
+    within: bool
 
 
 def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
-    """Return the Limit of a value that may be at most `limit`, or in the range `limit` = (least, most).
+    """Return the Limit of a value that may be up to `limit`, or in the range `limit` = (lowest, highest).
 
-    A metric of a limit cycle is NaN for a run without one. Its limit is then compared with `Metric.absent`.
+    A metric of a limit cycle is NaN in a run without one. `Metric.absent` is then compared with the limit.
 
     Args:
       metric: its name, or "GROUP METRIC".
@@ -39,7 +39,7 @@ def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
         high = number(f"limit of {metric}", limit, infinite=True)
         return Limit(metric, quantity(value, unit), f"<= {quantity(high)}", compared <= high)
     if len(limit) != 2:
-        raise ScenarioError(f"limit of {metric} is {shown(limit)}: give the most, or (least, most)")
+        raise ScenarioError(f"limit of {metric} is {shown(limit)}: give the highest value, or (lowest, highest)")
     low, high = (number(f"limit of {metric}", end, infinite=True) for end in limit)
     if low > high:
         raise ScenarioError(f"limits of {metric} are {shown(limit)}: give the lower one first")
@@ -55,8 +55,8 @@ def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:
       note: text in parentheses after the violations.
     """
     __tracebackhide__ = True
-    if missed := [f"{metric} is {value}, {word} {limit}" for metric, value, limit, kept in limits if not kept]:
-        rows = [(*line, "yes" if kept else "NO") for *line, kept in limits]
+    if missed := [f"{metric} is {value}, {word} {limit}" for metric, value, limit, within in limits if not within]:
+        rows = [(*line, "yes" if within else "NO") for *line, within in limits]
         raise AssertionError(
             f"{'; '.join(missed)} ({note})\n{Tabular(headings=('metric', 'value', kind, 'ok'), rows=rows)}"
         )
@@ -72,7 +72,7 @@ def quantity(value: float, unit: str = "") -> str:
 
 
 def without_frames(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function with its ScenarioErrors raised again, so that pytest shows no frame of this package."""
+    """Return the function with its ScenarioErrors raised anew, so that pytest shows no frames of this package."""
 
     @functools.wraps(function)
     def call(*args: P.args, **named: P.kwargs) -> R:

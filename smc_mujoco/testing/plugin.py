@@ -24,7 +24,7 @@ GOLDEN = "smc_golden"  # property of a test's report: the golden file that it wr
 
 
 class Ledger(NamedTuple):
-    """Responses of the running test, and pytest's temporary folder. Fixtures write them, hooks read them."""
+    """The running test's responses, and pytest's temporary folder: written by fixtures, read by hooks."""
 
     responses: list[StepResponse]
     temporary: Path
@@ -59,12 +59,12 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     from smc_mujoco.testing.cases import cases
 
     try:
-        found, wrong = cases(marker.args, marker.kwargs, metafunc.fixturenames), None
+        names_of, wrong = cases(marker.args, marker.kwargs, metafunc.fixturenames), ""
     except ScenarioError as error:
-        found, wrong = {}, str(error)
+        names_of, wrong = {}, str(error)
     if wrong:  # raised outside of the handler, so that pytest does not show the frames of the error
         pytest.fail(f"{metafunc.definition.nodeid}: {wrong}", pytrace=False)
-    for argument, names in found.items():
+    for argument, names in names_of.items():
         metafunc.parametrize(argument, names)
 
 
@@ -100,7 +100,7 @@ def smc_golden(request: pytest.FixtureRequest) -> Callable[..., None]:
     from smc_mujoco.testing import golden as files
     from smc_mujoco.testing.limits import without_frames
 
-    file, update = files.place(request.path), request.config.getoption("smc_update")
+    file, update = files.golden_file(request.path), request.config.getoption("smc_update")
     test, number = request.node.nodeid.partition("::")[2], itertools.count(1)
 
     @without_frames
@@ -131,13 +131,12 @@ def pytest_runtest_makereport(
     report = yield
     ledger = item.config.stash.get(LEDGER, None)
     if ledger and report.failed and call.when != "teardown" and (responses := _used(item, ledger)):
-        from smc_mujoco.testing.report import report as tell
+        from smc_mujoco.testing.report import report_of
 
         config, out = item.config, item.config.getoption("smc_out")
         folder = config.invocation_params.dir / out if out else ledger.temporary / "smc_mujoco"
-        report.sections.append(
-            ("step responses", tell(item.nodeid, responses, folder, bool(config.getoption("smc_film"))))
-        )
+        text = report_of(item.nodeid, responses, folder, bool(config.getoption("smc_film")))
+        report.sections.append(("step responses", text))
     return report
 
 
@@ -153,6 +152,6 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     """Print which golden files were written."""
     if config.getoption("smc_update"):
         reports = itertools.chain.from_iterable(terminalreporter.stats.values())
-        noted = [pair for report in reports for pair in getattr(report, "user_properties", ())]
-        for file in sorted({value for name, value in noted if name == GOLDEN}):
+        properties = [pair for report in reports for pair in getattr(report, "user_properties", ())]
+        for file in sorted({value for name, value in properties if name == GOLDEN}):
             terminalreporter.write_line(f"golden metrics recorded in {file}")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.scene import slug
@@ -10,7 +11,7 @@ from smc_mujoco.testing.response import StepResponse
 MAX_ID = 150  # characters of a test's id in a file's name: most file systems allow 255 bytes
 
 
-def report(test: str, responses: Sequence[StepResponse], folder: Path, video: bool) -> str:
+def report_of(test: str, responses: Sequence[StepResponse], folder: Path, video: bool) -> str:
     """Return tables of all responses, and the paths of the files that show them: a figure and a film for each plant.
 
     Args:
@@ -22,20 +23,19 @@ def report(test: str, responses: Sequence[StepResponse], folder: Path, video: bo
     plants: dict[str, list[Trace]] = {}
     for response in responses:
         plants.setdefault(response.scenario.plant.name, []).append(response.trace)
-    files = []
+    lines = []
     for plant, traces in plants.items():
         name = slug(test[-MAX_ID:], MAX_ID) + (f"-{slug(plant)}" if len(plants) > 1 else "")
-        title = test.rpartition("::")[2]
-        files.append(_shown("figure", lambda t=traces, n=name, w=title: _figure(t, folder / f"{n}.png", w)))
+        lines.append(_line("figure", _figure, traces, folder / f"{name}.png", test.rpartition("::")[2]))
         if video:
-            files.append(_shown("film", lambda t=traces, n=name: _film(t, folder / f"{n}.mp4")))
-    return "\n\n".join([*parts, "\n".join(dict.fromkeys(files))])
+            lines.append(_line("film", _film, traces, folder / f"{name}.mp4"))
+    return "\n\n".join([*parts, "\n".join(dict.fromkeys(lines))])
 
 
-def _shown(what: str, make: Callable[[], Path]) -> str:
+def _line(what: str, make: Callable[..., Path], *arguments: Any) -> str:
     """Return a line with the file that `make` writes, or with the reason why there is none."""
     try:
-        return f"{what}: {make()}"
+        return f"{what}: {make(*arguments)}"
     except Exception as error:  # a picture must not hide why the test failed
         return f"no {what}: {str(error).removeprefix(f'no {what}: ')}"
 

@@ -68,9 +68,9 @@ class StepResponse:
     @functools.cached_property
     def values(self) -> Mapping[str, float]:
         """`metrics`, and those of each group of channels if there are several, with names such as "free peak"."""
-        groups = self.scores.items()
-        each = {self._label(group, name): value for group, values in groups for name, value in values.items()}
-        return dict(self.metrics) | each
+        by_group = self.scores.items()
+        labelled = {self._label(group, name): value for group, values in by_group for name, value in values.items()}
+        return dict(self.metrics) | labelled
 
     @without_frames
     def __getattr__(self, name: str) -> float:
@@ -79,7 +79,7 @@ class StepResponse:
             raise AttributeError(name)
         if name in CATALOGUE and name in self.metrics:
             return self.metrics[name]
-        raise AttributeError(str(self._unknown(name)))
+        raise AttributeError(str(self._no_metric(name)))
 
     def __dir__(self) -> list[str]:
         return sorted({*super().__dir__(), *CATALOGUE})
@@ -98,11 +98,9 @@ class StepResponse:
     def value(self, name: str) -> tuple[float, str]:
         """Return the value and the unit of one of `values`."""
         group, _, metric = name.rpartition(" ")
-        driven = groups(self.scenario)[0]
-        of = next((each for each in groups(self.scenario) if each.name == group), driven)
-        return self.values[name], CATALOGUE[metric].unit_for(of.unit, of.effort)
+        return self.values[name], CATALOGUE[metric].unit_in(self.scenario, group)
 
-    def _unknown(self, name: str) -> ScenarioError:
+    def _no_metric(self, name: str) -> ScenarioError:
         """Return the error for a metric that does not exist, or that the plant does not have."""
         if name in CATALOGUE:
             return ScenarioError(CATALOGUE[name].refusal(self.scenario.plant))
@@ -110,28 +108,29 @@ class StepResponse:
 
     def _label(self, group: str, metric: str) -> str:
         """Return the name of a group's metric in tables: the metric's name if `metrics` has it, else "GROUP METRIC"."""
-        alone = len(groups(self.scenario.plant)) == 1
-        return metric if alone or (group == "driven" and not CATALOGUE[metric].shared) else f"{group} {metric}"
+        only_group = len(groups(self.scenario.plant)) == 1
+        return metric if only_group or (group == "driven" and not CATALOGUE[metric].shared) else f"{group} {metric}"
 
     def applies(self, name: str) -> bool:
-        """Return whether a metric has a meaning for this run. Some have one for realistic mechanisms only."""
+        """Return whether a metric has a meaning for this run: some have one for realistic mechanisms only."""
         return self.scenario.realistic or not CATALOGUE[name.rpartition(" ")[2]].realistic
 
-    def named(self, names: Iterable[str]) -> None:
-        """Raise ScenarioError for a name that is not among the `values` of this run, even if the run failed."""
-        plant = self.scenario.plant
-        known = [m.name for m in CATALOGUE.values() if not m.refusal(plant)]
-        known += [self._label(each.name, m.name) for each in groups(plant) for m in CATALOGUE.values() if m.fits(each)]
+    def check_names(self, names: Iterable[str]) -> None:
+        """Raise ScenarioError for a name that a successful run would not have among its `values`."""
+        plant, metrics = self.scenario.plant, CATALOGUE.values()
+        known = [metric.name for metric in metrics if not metric.refusal(plant)]
+        for group in groups(plant):
+            known += [self._label(group.name, metric.name) for metric in metrics if metric.fits(group)]
         for name in names:
             if name not in known:
-                raise self._unknown(name)
+                raise self._no_metric(name)
 
     @without_frames
     def check(self, **limits: float | tuple[float, float]) -> None:
         """Assert several limits on metrics: `r.check(settling_time=0.6, overshoot=5, rise_time=(0.05, 0.3))`.
 
         Args:
-          limits: metric -> largest value, or (least, largest) value, in the metric's unit.
+          limits: metric -> highest value, or (lowest, highest) value, in the metric's unit.
 
         Raises:
           AssertionError: a limit is violated, or the run failed; the message has a table of all limits.
@@ -140,7 +139,7 @@ class StepResponse:
         __tracebackhide__ = True
         if not limits:
             raise ScenarioError("check has no limits: give metrics with their largest values, as settling_time=0.6")
-        self.named(limits)
+        self.check_names(limits)
         if self.failure is not None:
             raise AssertionError(f"{self}: {self.failure}")
         judge([bound(name, *self.value(name), limit) for name, limit in limits.items()], "limit", "not", self)
@@ -182,12 +181,12 @@ def respond(
     height = number("step", step)
     if height == 0.0:
         raise ScenarioError("step is 0: give the height of the step in rad or m, such as 0.2")
-    chosen = find_condition(condition)
-    plant = as_plant(plant)
-    conditions = chosen.on(plant, number("duration", given.get("duration", DURATION)))
+    chosen, plant = find_condition(condition), as_plant(plant)
+    under = chosen.on(plant, number("duration", given.get("duration", DURATION)))
     start = {"x0": 0.0, "reference": Step(height)}
     if plant.rest:
         start = {"x0": plant.rest, "reference": [Constant(x + height) for x in plant.rest[: plant.driven]]}
-    whole: dict = {"plant": plant, "law": law} | start | conditions | given
-    words = [chosen.name] * (chosen.name != "nominal") + [f"{name}={shown(value)}" for name, value in given.items()]
-    return StepResponse(trace=run(Scenario(**whole)), step=height, condition=", ".join(words))
+    scenario = Scenario(**({"plant": plant, "law": law} | start | under | given))  # pyright: ignore[reportArgumentType]
+    words = [chosen.name] if chosen.name != "nominal" else []
+    words += [f"{name}={shown(value)}" for name, value in given.items()]
+    return StepResponse(trace=run(scenario), step=height, condition=", ".join(words))

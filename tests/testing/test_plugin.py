@@ -118,7 +118,7 @@ def test_check_tells_all_limits_that_were_missed_at_once(session):
 @pytest.mark.parametrize(("value", "kept"), [(0.9, False), (1.0, True), (2.0, True), (2.1, False)])
 def test_a_pair_of_limits_holds_from_both_sides(value, kept):
     found = bound("overshoot", value, "%", (1.0, 2.0))
-    assert found.kept == kept
+    assert found.within == kept
     assert found.limit == "1 .. 2"
     assert bound("driven chattering_amplitude", math.nan, "rad", 0.0).kept  # no limit cycle
 
