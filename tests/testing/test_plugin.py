@@ -205,7 +205,7 @@ def test_a_mistake_is_one_sentence(step_response, call, sentence):
         ({"overshot": 5}, "unknown metric 'overshot': did you mean 'overshoot'?"),
         ({"spread_bound": 5}, "spread_bound compares channels and duffing has one"),
         ({"overshoot": (5, 1)}, "give the lower one first"),
-        ({"overshoot": (1, 2, 3)}, "give the most, or (least, most)"),
+        ({"overshoot": (1, 2, 3)}, "give the highest value, or (lowest, highest)"),
     ],
 )
 def test_a_limit_that_is_none_is_one_sentence(step_response, limits, sentence):
