@@ -359,6 +359,11 @@ def test_an_extra_that_pip_cannot_install_here_names_a_python_on_which_it_can(mo
     assert extras.cure("rl") == "pip install 'smc-mujoco[rl]'"
 
 
+def test_every_extra_is_named_where_it_is_missing_and_no_other():
+    code = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "smc_mujoco").rglob("*.py"))
+    assert set(re.findall(r"""\b(?:extra|missing|cure)\(["'](\w+)""", code)) == set(EXTRAS) - {"all"}
+
+
 def test_every_extra_is_in_all():
     (every,) = EXTRAS["all"]
     assert every == f"smc-mujoco[{','.join(name for name in EXTRAS if name != 'all')}]"

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.worst_case.search import Search
 from smc_mujoco.analysis.worst_case.strategies import recorded
-from smc_mujoco.analysis.worst_case.uncertainty import usual
+from smc_mujoco.analysis.worst_case.uncertainty import Members, usual
 from smc_mujoco.control import gain_sets
+from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import reference, serialise
 from smc_mujoco.simulation.signals import Relay
 from smc_mujoco.studies.worst_case import WorstCases, default_budget
@@ -68,6 +70,14 @@ def test_a_larger_budget_continues_the_search():
     values = [smc.worst_case(base, within=CLASSES["all"], budget=n).value for n in (1, 5, 12)]
     assert all(a <= b for a, b in itertools.pairwise(values))
     assert values[0] < values[-1]
+
+
+@pytest.mark.parametrize(("name", "disturbance"), [("force", (Relay(2.0, rate=1.0),)), ("errors", ())])
+def test_the_loop_s_frequency_is_read_of_a_run_under_a_relay_of_the_rate_or_without_a_force(name, disturbance):
+    searcher = Search(Members([scenario(duration=0.1)], CLASSES[name]), CATALOGUE["rms_error"], 9, 1, lambda _: None)
+    searcher.search(np.random.default_rng(0), [])
+    assert searcher.swing
+    assert searcher.swing.scenario.disturbance == disturbance
 
 
 def test_a_relay_replays_from_its_record_to_the_last_bit():

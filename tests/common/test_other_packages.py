@@ -191,6 +191,11 @@ def many_estimator(y, gains, memory):
     assert "many_scene" not in sys.modules
 
 
+def test_entries_are_listed_by_name_whatever_their_modules(install):
+    install("zoo", {"laws": {"b": "a:b", "c": "b:c", "a": "c:a"}})
+    assert [point.name for point in catalogue.points("smc_mujoco.laws")] == ["a", "b", "c"]
+
+
 @pytest.mark.filterwarnings("ignore:no set of gains")
 def test_a_package_brings_the_gains_of_its_law(install):
     units = "from smc_mujoco.control.units import FORCE_PER_POSITION, Gain"

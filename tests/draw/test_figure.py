@@ -14,7 +14,7 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco.draw import decimate, panels, style
 from smc_mujoco.draw import figure as draw_figure
-from smc_mujoco.draw.page import files
+from smc_mujoco.draw.page import FORMATS, files, write
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.trace import ARRAYS
@@ -87,6 +87,16 @@ def test_a_figure_that_was_written_is_laid_out_again_when_it_is_shown(pair, tmp_
 def test_same_traces_give_the_same_files(pair, tmp_path):
     first, second = figure(pair[:1], tmp_path / "a", None), figure(pair[:1], tmp_path / "b", None)
     assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
+
+
+def test_a_file_does_not_say_when_it_was_written(tmp_path, monkeypatch):
+    written = []
+    for second in ("0", "86400"):
+        monkeypatch.setenv("SOURCE_DATE_EPOCH", second)
+        paths = [tmp_path / f"{second}.{ending}" for ending in FORMATS]
+        write(Figure(), paths)
+        written.append([path.read_bytes() for path in paths])
+    assert written[0] == written[1]
 
 
 def test_a_network_has_a_row_for_each_run_with_a_line_for_each_channel(tmp_path):

@@ -227,7 +227,9 @@ def test_any_smooth_feedback_scores_the_same_and_a_switching_one_loses(robot, tr
         assert score[name] < min(row.score for row in boards.SIMULATION[robot]["v2"])
     top = np.array([row.name for row in boards.board(found)])
     assert set(rows) <= set(top)
-    assert f"{score['trajectory + sliding']:.3f} with a sliding mode" in boards.comparison(found, None)
+    said = boards.comparison(found, {boards.NAME + "*": ALL})
+    assert f"{score['trajectory + sliding']:.3f} with a sliding mode" in said
+    assert said.endswith(f"is 1.000: number 1 of {len(boards.ROBUSTNESS[robot]) + 1}")
 
 
 def test_feedback_of_a_control_experiment_is_what_its_name_says():

@@ -119,8 +119,9 @@ def test_the_physics_step_is_the_largest_divisor_up_to_a_millisecond():
         (1.5e-3, 7.5e-4, 2),
         (1 / 300, 1 / 1200, 4),
         (0.1, 1e-3, 100),
+        (100.0, 1e-3, 100_000),
     ):
-        made = scenario(control_period=period)
+        made = scenario(control_period=period, duration=100.0)
         assert made.resolved.physics_step == pytest.approx(step, rel=1e-12)
         assert made.steps == steps
 

@@ -117,6 +117,9 @@ def test_robust_goes_by_the_worst_found_and_tells_the_median_too(folder, monkeyp
     }
     assert [one.law.name for one in made.choices] == sorted(alone, key=lambda law: alone[law].value)
     assert [one.worst_found.value for one in made.choices] == [alone[one.law.name].value for one in made.choices]
+    milder = dataclasses.replace(made.choices[0].worst[0], value=0.0)
+    for worst in ((milder, *made.choices[0].worst), (*made.choices[0].worst, milder)):  # of two conditions
+        assert dataclasses.replace(made.choices[0], worst=worst).worst_found is made.choices[0].worst[0]
     first, second, third = (one.law.name for one in made.choices)
     assert made.wins(first, second) == made.wins(second, third) == [("robust", "nominal")]
     assert made.wins(third, second) == made.wins(second, first) == []

@@ -185,6 +185,18 @@ def test_scores_are_the_medians_of_the_tables_runs(folder, findings):
     assert score.seeds == 2
 
 
+def test_a_score_counts_its_law_s_failed_runs(made, folder):
+    from smc_mujoco.studies.table import Table
+
+    table = Table.read(folder / "study")
+    cells = list(zip(*(table.column(name) for name in ("plant", "condition", "law")), strict=True))
+    at = table.data.schema.get_field_index("failure")
+    failed = table.data.set_column(at, "failure", [["it failed", *[None] * (len(table) - 1)]])
+    rows = scores_of.scores(dataclasses.replace(table, data=failed))
+    assert {(s.plant, s.condition, s.law) for s in rows if s.failed == 1} == {cells[0]}
+    assert {s.failed for s in rows} == {0, 1}
+
+
 def test_margins_and_fronts_are_told_as_found(reader, findings):
     rows = [row[1] for row in reader.rows["margins-table"] if row[1]]
     assert [float(cells[3][0]["data-v"]) for cells in rows] == [m.value for m in findings.margins]
@@ -377,7 +389,7 @@ def test_the_answer_says_where_seeds_change_nothing(findings):
     assert "seeds change nothing" not in told(findings, cells[1])
 
 
-def test_places_over_all_plants_count_the_cells_that_a_law_wins(folder):
+def test_places_over_all_plants_count_the_cells_that_a_law_wins(made, folder):
     from smc_mujoco.studies.table import Table
 
     rows = scores_of.places(Table.read(folder / "study"))

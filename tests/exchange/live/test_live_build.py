@@ -80,6 +80,7 @@ def test_every_plant_of_the_page_has_laws_and_an_opening(vendor, tmp_path):
 
     found = facts(smc.live(build.known.plants(), laws=[mine], out=tmp_path / "page"))
     assert {"inverted_pendulum", "cart_pole", "furuta"} <= set(found["plants"])
+    assert set(build.PLANTS) == {name for name in smc.paper.PLANTS if smc.plant(name).n == 1}
     for plant in found["plants"].values():
         assert (plant["start"][0], len(set(plant["start"]))) == ("mine", 2)  # beside a law that suits the plant
         assert set(plant["start"]) <= set(plant["laws"]) <= set(found["laws"])
