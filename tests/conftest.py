@@ -73,7 +73,7 @@ def replayed_here():
     from smc_mujoco.studies import replay
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(replay, "_elsewhere", lambda task, given: getattr(replay, task)(given))
+        patch.setattr(replay, "_in_fresh_process", lambda task, given: getattr(replay, task)(given))
         yield
 
 
@@ -82,4 +82,4 @@ def fixed_noise_key():
     """Draw the same noise key for every study, so that tests have the same numbers each time."""
     from smc_mujoco.studies import noise_key
 
-    noise_key.draw = lambda: 20_090_531
+    noise_key.draw_key = lambda: 20_090_531

@@ -275,7 +275,7 @@ def compare(
     attacked_for = DURATION if duration is None else duration
     duration = extent.duration if duration is None else checked("duration", duration, above=0.0)
     tries = search.BUDGET // (3 if quick else 1) if budget is None else whole("budget", budget, 1, MAX_ITEMS)
-    where = executors.checked("local" if executor is None else executor)
+    where = executors.as_executor("local" if executor is None else executor)
     for name in taken("metrics", metrics):
         find("metric", name, dict.fromkeys((SETTLES, *CATALOGUE)))
     find("set of gains", gains, dict.fromkeys((*gain_sets.SETS, "default")))

@@ -4,8 +4,8 @@
     compute_elsewhere(batches(scenarios, 1), ProcessPoolExecutor(8), finish)
 
 A batch is a list of prepared scenarios of one layout. It is run, scored and stored as a whole, so a killed study loses
-at most one. An outcome is the part of a table's row that follows from the run: its scores, or how it failed. It depends
-neither on the batch nor on the machine that computed it.
+at most one. The result columns of a table's row follow from the run: its scores, or how it failed. They depend neither
+on the batch nor on the machine that computed it.
 
 A cluster takes `pip install 'smc-mujoco[cluster]'` on every machine, with the same versions, and
 
@@ -13,7 +13,7 @@ A cluster takes `pip install 'smc-mujoco[cluster]'` on every machine, with the s
     dask worker tcp://HOST:PORT                            # on every machine
     smc-mujoco compare --executor dask://HOST:PORT
 
-A batch whose worker dies is run by another one. Four deaths over one batch end the study, which can be started again.
+If a worker dies, another one runs its batch. If four die with the same batch, the study ends, and can be started again.
 """
 
 import contextlib
@@ -36,28 +36,29 @@ from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies.parcel import packed
+from smc_mujoco.studies.pickling import packed
 
-# Limits of a batch: `Scenario.work` per thread, 2 to 5 s of a core; work in all, which bounds the memory; runs.
-STEPS, LOG_STEPS, RUNS = 500_000, 1_000_000, 1000
+MAX_WORK_PER_THREAD = 500_000  # of a batch, see `Scenario.work`: 2 to 5 s of a core
+MAX_WORK = 1_000_000  # of a batch: bounds the memory
+MAX_RUNS = 1000  # of a batch
 LOOP_SLOWDOWN = 40  # of the reference loop against compiled laws, roughly
-UNDER_WAY = 1000  # most batches sent to workers and not finished; chosen
-ADDRESS, DASKS_OWN = "dask://", "tcp://"  # two ways to write the address of a scheduler
-LOGGERS = "distributed", "distributed.client", "tornado.application"  # those of dask that set their own level
-WAIT = 10.0  # s, for a scheduler, and for its first worker; chosen
+MAX_BATCHES_SENT = 1000  # to workers, and not finished; chosen
+ADDRESS, DASK_ADDRESS = "dask://", "tcp://"  # beginnings of a scheduler's address, here and in dask
+LOGGERS = "distributed", "distributed.client", "tornado.application"  # of dask, which set their own level
+TIMEOUT = 10.0  # s, for a scheduler, and for its first worker; chosen
 
 if TYPE_CHECKING:
     from distributed import Client
 
     Workers = str | Executor | Client  # where a study is computed, see `checked`
 
-Outcome = dict[str, Any]
+ResultColumns = dict[str, Any]
 Batch = Sequence[Prepared]
 
 
-def outcome(trace: Trace) -> Outcome:
+def result_columns(trace: Trace) -> ResultColumns:
     """Return the scores of a run, without those that are NaN, or how it failed."""
-    failed: Outcome = {"diverged_at": trace.diverged_at, "failure": trace.failure}
+    failed: ResultColumns = {"diverged_at": trace.diverged_at, "failure": trace.failure}
     if trace.failure is not None:
         return failed
     try:
@@ -73,11 +74,11 @@ def batches(scenarios: Iterable[Scenario], threads: int) -> Iterator[list[Prepar
         groups.setdefault((prepared.key, bool(prepared.why_not)), []).append(prepared)
     for group in groups.values():
         work = max(1, group[0].scenario.work) * (LOOP_SLOWDOWN * threads if group[0].why_not else 1)
-        size = max(1, min(RUNS, min(STEPS * threads, LOG_STEPS) // work))
+        size = max(1, min(MAX_RUNS, min(MAX_WORK_PER_THREAD * threads, MAX_WORK) // work))
         yield from (group[i : i + size] for i in range(0, len(group), size))
 
 
-def simulated(batch: Sequence[Scenario | Prepared], threads: int, report: Report = lambda steps: None) -> list[Trace]:
+def run_batch(batch: Sequence[Scenario | Prepared], threads: int, report: Report = lambda steps: None) -> list[Trace]:
     """Return the traces of a batch, in its order."""
     traces = dict(stream(batch, threads, report))
     return [traces[i] for i in range(len(batch))]
@@ -93,12 +94,12 @@ def compute_here(
 
     Args:
       finish: called with each batch and its traces, one batch at a time.
-      report: called with the number of steps just simulated.
+      report: called with the number of steps just run_batch.
     """
     with futures.ThreadPoolExecutor(1) as pool:
         last: Future[None] | None = None
         for batch in batches:
-            traces = simulated(batch, threads, report)
+            traces = run_batch(batch, threads, report)
             if last is not None:
                 last.result()  # two batches are in memory, no more
             last = pool.submit(finish, batch, traces)
@@ -109,39 +110,39 @@ def compute_here(
 def compute_elsewhere(
     batches: Iterable[Batch],
     pool: Executor,
-    finish: Callable[[Batch, Sequence[Outcome]], None],
+    finish: Callable[[Batch, Sequence[ResultColumns]], None],
     report: Report = lambda steps: None,
 ) -> None:
-    """Have the workers of an Executor run batches. They send back outcomes, not traces.
+    """Have the workers of an Executor run batches. They send back result columns, not traces.
 
     Args:
       pool: any concurrent.futures.Executor. It stays open.
-      finish: called with each batch and its outcomes, as they come.
+      finish: called with each batch and its result columns, as they come.
       report: called with the number of steps of each batch.
 
     Raises:
       ScenarioError: the workers died, cannot load the scenarios, or have other code than this process.
     """
-    sent: dict[Future[list[Outcome]], Batch] = {}
+    sent: dict[Future[list[ResultColumns]], Batch] = {}
     plants: run_key.Hashes = {}
 
-    def collect(under_way: int) -> None:
-        """Finish batches until at most so many are under way."""
-        while len(sent) > under_way:
+    def collect(remaining: int) -> None:
+        """Finish batches until at most `remaining` are left with the workers."""
+        while len(sent) > remaining:
             done = futures.wait(sent, return_when=futures.FIRST_COMPLETED).done
-            # those that failed come last, so that the others are stored before an error ends the study
-            for future in sorted(done, key=lambda one: one.cancelled() or one.exception() is not None):
+            # failed batches come last, so that the others are stored before an error ends the study
+            for future in sorted(done, key=lambda future: future.cancelled() or future.exception() is not None):
                 batch = sent.pop(future)
                 finish(batch, future.result())
-                report(sum(one.scenario.work for one in batch))
+                report(sum(prepared.scenario.work for prepared in batch))
 
     try:
         for batch in batches:
-            collect(UNDER_WAY - 1)
-            scenarios = [one.scenario for one in batch]
+            collect(MAX_BATCHES_SENT - 1)
+            scenarios = [prepared.scenario for prepared in batch]
             task = packed(scenarios), [run_key.key(s, plants=plants) for s in scenarios]
             try:
-                sent[pool.submit(work, *task)] = batch
+                sent[pool.submit(run_on_worker, *task)] = batch
             except RuntimeError as error:  # it was shut down, or its workers died
                 raise BrokenExecutor(*error.args) from error
         collect(0)
@@ -155,12 +156,12 @@ def compute_elsewhere(
             future.cancel()
 
 
-def work(packed: bytes, keys: Sequence[str]) -> list[Outcome]:
+def run_on_worker(packed: bytes, keys: Sequence[str]) -> list[ResultColumns]:
     """Run and score scenarios, on a worker.
 
     Args:
       packed: the scenarios, pickled.
-      keys: their keys in the process that sent them; see `run_key.key`.
+      keys: their keys in the process that sent them, see `run_key.key`.
 
     Raises:
       ScenarioError: the worker cannot load the scenarios, or other code or versions give them other keys here.
@@ -172,14 +173,14 @@ def work(packed: bytes, keys: Sequence[str]) -> list[Outcome]:
     plants: run_key.Hashes = {}
     for scenario, sent in zip(scenarios, keys, strict=True):
         if run_key.key(scenario, plants=plants) != sent:
-            versions = {"Python": platform.python_version()} | run_key.described(scenario)["versions"]
+            versions = {"Python": platform.python_version()} | run_key.description(scenario)["versions"]
             here = ", ".join(f"{name} {version}" for name, version in versions.items())
             raise ScenarioError(f"a worker has other code for {scenario.law} ({here}): install the same there as here")
-    return [outcome(trace) for trace in simulated(scenarios, _threads())]
+    return [result_columns(trace) for trace in run_batch(scenarios, _threads())]
 
 
 def _threads() -> int:
-    """Return the threads of a dask worker; else 1, as other executors have a worker per core."""
+    """Return the number of threads of a dask worker; 1 elsewhere, because other executors have a worker per core."""
     if (distributed := sys.modules.get("distributed")) is None:
         return 1
     try:
@@ -188,7 +189,7 @@ def _threads() -> int:
         return 1
 
 
-def checked(executor: object) -> str | Executor:
+def as_executor(executor: object) -> str | Executor:
     """Return "local", an address that begins with ADDRESS, or an Executor, also for a dask Client."""
     dask = sys.modules.get("distributed")
     if dask is not None and isinstance(executor, dask.Client):
@@ -196,7 +197,7 @@ def checked(executor: object) -> str | Executor:
     if isinstance(executor, Executor):
         return executor
     if isinstance(executor, str):
-        address = executor.replace(DASKS_OWN, ADDRESS, 1)
+        address = executor.replace(DASK_ADDRESS, ADDRESS, 1)
         host, _, port = address.removeprefix(ADDRESS).rpartition(":")
         remote = address.startswith(ADDRESS) and host and port.isdecimal() and int(port) < 2**16
         if remote or executor == "local":
@@ -209,7 +210,7 @@ def checked(executor: object) -> str | Executor:
 
 @contextlib.contextmanager
 def opened(executor: str | Executor) -> Iterator[Executor]:
-    """Return an Executor as it is, or open one of a dask scheduler's workers.
+    """Yield the Executor, or one with the workers of a dask scheduler.
 
     Args:
       executor: an Executor, which stays open, or dask://HOST:PORT.
@@ -228,9 +229,9 @@ def opened(executor: str | Executor) -> Iterator[Executor]:
     try:
         for log in logs:
             log.setLevel(logging.CRITICAL)
-        with Client(f"tcp://{executor.removeprefix(ADDRESS)}", timeout=WAIT, set_as_default=False) as client:
+        with Client(f"tcp://{executor.removeprefix(ADDRESS)}", timeout=TIMEOUT, set_as_default=False) as client:
             with contextlib.suppress(TimeoutError):
-                client.wait_for_workers(1, timeout=WAIT)
+                client.wait_for_workers(1, timeout=TIMEOUT)
             if not client.ncores():
                 raise ScenarioError(f"dask at {executor} has no workers: start `dask worker` with its address")
             yield _DaskExecutor(client)
@@ -262,7 +263,7 @@ class _DaskExecutor(Executor):
                 future.set_result(done.result())
             except CancelledError:
                 future.set_exception(BrokenExecutor("dask is no longer there"))
-            except BaseException as error:  # of any kind: the study waits for it
+            except BaseException as error:  # any: the study waits for this future
                 future.set_exception(error)
 
         self.client.submit(fn, *args, pure=False, **kwargs).add_done_callback(copy)

@@ -3,9 +3,9 @@
 The noise of a run follows from its seed. Seeds are 0, 1, 2, ..., so a law could try them all against its first readings
 and know every later one. With a key, the noise of a seed is that of a hash of key and seed.
 
-The key is kept beside the study, so that a study which was stopped goes on with the same noise. It holds for the code
-and the gains of the user's laws that were there when it was drawn: their author may have read it since. For another law
-a new key is drawn, and all runs are done again.
+The key is stored in the study's folder, so that a study that was stopped goes on with the same noise. It is valid for
+the user's laws, code and gains, with which it was drawn. The author of another law may have read it: a new key is drawn
+for that law, and all runs are done again.
 """
 
 import dataclasses
@@ -25,10 +25,10 @@ from smc_mujoco.simulation.scenario import MAX_SEED, Scenario
 
 DRAWN = "drawn"
 FILE = "noise_key.json"
-CODE = "its code"  # beside the names of variables
+CODE = "its code"  # name of a function's code among the names of the variables that it reads
 
 
-def draw() -> int:
+def draw_key() -> int:
     """Return a new key."""
     return secrets.randbelow(MAX_SEED) + 1
 
@@ -39,23 +39,23 @@ def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume
     Args:
       wanted: a key; 0 for the noise of the seeds alone; DRAWN for that of the folder, or a new one.
       folder: of the study.
-      resume: whether the folder's key may be that of the study.
+      resume: whether the folder's key may be used.
 
     Raises:
-      ScenarioError: another key.
+      ScenarioError: `wanted` is none of these.
     """
     if wanted == DRAWN:
         given = []
-        for one in scenarios:
-            if not isinstance(one, Scenario):
-                yield one  # which the study refuses
+        for scenario in scenarios:
+            if not isinstance(scenario, Scenario):
+                yield scenario  # which the study refuses
                 return
-            given.append(one)
+            given.append(scenario)
         if not resume:
             (folder / FILE).unlink(missing_ok=True)
         scenarios = given
-        laws = {identity(one): one for one in filter(own, given)}
-        key = _of_folder(folder / FILE, {name: _about(one) for name, one in laws.items()})
+        laws = {law_hash(scenario): scenario for scenario in filter(has_user_code, given)}
+        key = _of_folder(folder / FILE, {name: _description(scenario) for name, scenario in laws.items()})
     elif isinstance(wanted, str):
         raise ScenarioError(f"noise_key is {shown(wanted)}: give a whole number, or {DRAWN!r}")
     else:
@@ -66,29 +66,29 @@ def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume
 
 
 def _of_folder(file: Path, laws: dict[str, dict[str, Any]]) -> int:
-    """Return the key in a file if it was drawn for all these laws, else a new one, which is kept there.
+    """Return the key in a file if it was drawn for all these laws, else a new one, which is written there.
 
     Args:
-      laws: `identity` of each of the user's laws -> what `_about` returns.
+      laws: `law_hash` -> `_description`, of each of the user's laws.
     """
     try:
-        known = json.loads(file.read_text(encoding="utf-8"))
-        key, fixed = whole("noise_key", known["key"], 1, MAX_SEED), dict(known["laws"])
+        stored = json.loads(file.read_text(encoding="utf-8"))
+        key, before = whole("noise_key", stored["key"], 1, MAX_SEED), dict(stored["laws"])
     except (OSError, ValueError, KeyError, TypeError):
-        key, fixed = 0, {}
-    others = [about for name, about in laws.items() if name not in fixed]
-    if key and not others:
+        key, before = 0, {}
+    new = [law for name, law in laws.items() if name not in before]
+    if key and not new:
         return key
     if key:
-        changes = joined(dict.fromkeys(_changed(about, list(fixed.values())) for about in others))
+        changes = joined(dict.fromkeys(_change_in_words(law, list(before.values())) for law in new))
         print(f"{changes}: a new noise key is drawn, and all runs are done again", file=sys.stderr)
-    key = draw()
+    key = draw_key()
     write_json(file, {"key": key, "laws": laws})
     return key
 
 
-def _about(scenario: Scenario) -> dict[str, Any]:
-    """Return the name of a scenario's law, and the hashes of what law, surface and estimator read."""
+def _description(scenario: Scenario) -> dict[str, Any]:
+    """Return the name of a scenario's law, and hashes of what its law, surface and estimator read, by name."""
     functions = tuple(part.function for part in _parts(scenario))
     reads = {CODE: fingerprint.of(functions)}
     for function in functions:
@@ -96,28 +96,28 @@ def _about(scenario: Scenario) -> dict[str, Any]:
     return {"name": scenario.law.name, "reads": reads}
 
 
-def _changed(about: dict[str, Any], before: list[dict[str, Any]]) -> str:
-    """Return in words what is new or has changed of a law, compared with the laws of its name before."""
-    name = about["name"]
-    alike = [one["reads"] for one in before if one["name"] == name]
-    if not alike:
+def _change_in_words(law: dict[str, Any], before: list[dict[str, Any]]) -> str:
+    """Return what has changed of a law since the laws `before`, or that no law of its name was among them."""
+    name = law["name"]
+    same_name = [other["reads"] for other in before if other["name"] == name]
+    if not same_name:
         return f"law {name} is new"
-    names = [what for what, its in about["reads"].items() if its != alike[-1].get(what)]
-    variables = [what for what in names if what != CODE]
+    names = [read for read, value in law["reads"].items() if value != same_name[-1].get(read)]
+    variables = [read for read in names if read != CODE]
     return f"law {name} has changed ({joined(variables or names or ['its gains'])})"
 
 
 def _parts(scenario: Scenario) -> list[Component]:
-    """Return the law, or those of the channels, the surface and the estimator of a scenario."""
+    """Return the law, or the laws of the channels, the surface and the estimator of a scenario."""
     return [part for part in (*scenario.law.parts, scenario.surface, scenario.velocity) if part]
 
 
-def own(scenario: Scenario) -> bool:
-    """Return whether the law, its surface or its estimator is not of this package."""
+def has_user_code(scenario: Scenario) -> bool:
+    """Return whether a scenario's law, surface or estimator is not of this package."""
     return not all(fingerprint.ours(part.function) for part in _parts(scenario))
 
 
-def identity(scenario: Scenario) -> str:
+def law_hash(scenario: Scenario) -> str:
     """Return a hash of the code and the gains of a scenario's law, surface and estimator."""
     parts = _parts(scenario)
     return fingerprint.of(tuple(part.function for part in parts))[:16] + repr([dict(part.gains) for part in parts])

@@ -1,13 +1,14 @@
 """Replays: whether a trace's commands are what its law computes from its measurements, and from nothing else.
 
-    found = smc.replay(trace)
-    found.same, found.why
+    result = smc.replay(trace)
+    result.same, result.why
 
-Two fresh processes do it. The first has no code of the law. It repeats the run with the recorded commands, which gives
-the law's measurements; every control period must end where the recorded one ends. The second has the law and these
-measurements, and no plant; its commands must be the recorded ones. So a law that reads the plant's true state or the
-time of day, that counts its calls, or that writes to the plant has another trace. A law could still hand over its
-commands by a file or a connection: no process is a sandbox.
+A replay takes two fresh processes. The first has no code of the law. It repeats the run with the recorded commands,
+which gives the law's measurements. Every control period must end in the recorded state. The second process has the law
+and these measurements, and no plant. Its commands must be the recorded ones.
+
+So a law is recognised that reads the plant's true state or the time of day, counts its calls, or writes to the plant. A
+law could still pass its commands through a file or a connection: no process is a sandbox.
 """
 
 import dataclasses
@@ -27,10 +28,10 @@ from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.model import mechanism
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.parcel import packed
+from smc_mujoco.studies.pickling import packed
 
-ROUNDING = 1e-9  # relative to the largest value: of a state after a control period, and of a command
-MODELLED = 0.01  # rms of a command, relative to the largest: the last bit of a nominal model may turn a switch over
+ROUNDING = 1e-9  # difference of a state after a control period, or of a command, relative to the largest value
+MODEL_RMS = 0.01  # rms difference of commands, relative to the largest: a nominal model's last bit may flip a switch
 TIMEOUT = 600.0  # s, for all traces of a call; chosen
 
 
@@ -47,7 +48,7 @@ class Replay(NamedTuple):
 
 
 class Recording(NamedTuple):
-    """What the process without the law gets: the run without its law, and what was recorded."""
+    """The input of the process without the law: the run without its law, and the recorded signals."""
 
     scenario: Scenario
     x: np.ndarray
@@ -68,38 +69,38 @@ def replay(trace: Trace) -> Replay:
 
 
 def replays(traces: Sequence[Trace]) -> list[Replay]:
-    """Return what `replay` returns, for several traces in one go."""
-    results = [_refused(trace) for trace in traces]
-    sent = [i for i, known in enumerate(results) if known is None]
+    """Return the `replay` of each trace, all with one pair of processes."""
+    results = [Replay(None, _obstacle(trace)) for trace in traces]
+    sent = [i for i, result in enumerate(results) if not result.why]
     tasks = [(_recording(traces[i]), packed(traces[i].scenario.law)) for i in sent]
     if tasks:
-        for i, result in zip(sent, _elsewhere("compared", tasks), strict=True):
+        for i, result in zip(sent, _in_fresh_process("verify", tasks), strict=True):
             results[i] = Replay(*result)
-    return [one or Replay(None) for one in results]
+    return results
 
 
-def _refused(trace: Trace) -> Replay | None:
-    """Return why a trace cannot be replayed, or None."""
+def _obstacle(trace: Trace) -> str:
+    """Return why a trace cannot be replayed, "" if it can."""
     if any(part.function is None for part in trace.scenario.law.parts):
-        return Replay(None, "its law is not available here")
-    return Replay(None, "it failed at the start") if len(trace.t) < 2 or np.isnan(trace.u[1]).any() else None
+        return "its law is not available here"
+    return "it failed at the start" if len(trace.t) < 2 or np.isnan(trace.u[1]).any() else ""
 
 
 def _recording(trace: Trace) -> Recording:
-    """Return a trace without its law's code: a law of the same kind that is never called stands for it."""
+    """Return a trace without its law's code. A law of the same kind, which is never called, stands for it."""
     s = trace.scenario
-    silent = Component(
-        kind="law", name="recorded", gains={}, memory=1, function=_silent, joint=s.law.joint,
+    placeholder = Component(
+        kind="law", name="recorded", gains={}, memory=1, function=_never_called, joint=s.law.joint,
         requires_model=s.law.requires_model, relative_degree=s.law.relative_degree,
     )  # fmt: skip
-    return Recording(dataclasses.replace(s, law=silent), trace.x, trace.v, trace.u, trace.s)
+    return Recording(dataclasses.replace(s, law=placeholder), trace.x, trace.v, trace.u, trace.s)
 
 
-def _silent(y: Any, gains: Any, memory: Any) -> tuple[float, float]:
+def _never_called(y: Any, gains: Any, memory: Any) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-def _elsewhere(task: str, arguments: object) -> Any:
+def _in_fresh_process(task: str, arguments: object) -> Any:
     """Return the result of a function of this file, computed in a fresh process.
 
     Raises:
@@ -121,10 +122,10 @@ def _elsewhere(task: str, arguments: object) -> Any:
 
 
 def serve() -> None:
-    """Answer on standard output what the parent process wants to know."""
+    """Call the function that the parent process names, and write its result to standard output."""
     answer = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what the user's code prints is no answer
-    function = {"compared": compared, "commanded": commanded}[sys.argv[1]]
+    os.dup2(2, 1)  # so that nothing else is written there, by the user's code
+    function = {"verify": verify, "commands_of": commands_of}[sys.argv[1]]
     pickle.dump(function(pickle.load(sys.stdin.buffer)), answer)
     answer.flush()
 
@@ -132,13 +133,13 @@ def serve() -> None:
 # in the process without the law
 
 
-def compared(tasks: Sequence[tuple[Recording, bytes]]) -> list[tuple[bool, str]]:
-    """Return for every recording whether it is what the packed law does, and what differs first."""
+def verify(tasks: Sequence[tuple[Recording, bytes]]) -> list[tuple[bool, str]]:
+    """Return for every recording whether its commands are those of the packed law, and what differs first."""
     runs = [Playback(recording) for recording, _ in tasks]
     for run in runs:
         run.play()
-    commanded = _elsewhere("commanded", [(law, run.measured) for run, (_, law) in zip(runs, tasks, strict=True)])
-    return [run.verdict(commands) for run, commands in zip(runs, commanded, strict=True)]
+    laws = [(law, run.measured) for run, (_, law) in zip(runs, tasks, strict=True)]
+    return [run.verdict(commands) for run, commands in zip(runs, _in_fresh_process("commands_of", laws), strict=True)]
 
 
 class Playback(reference.Loop):
@@ -147,28 +148,29 @@ class Playback(reference.Loop):
     Attributes:
       recorded: the run.
       measured: (channel, measurement) of every call of the law; of a law of many joints the channel is -1.
-      samples_of: the sample of each.
-      strayed: the first time, s, to which the plant did not get as recorded; None: it got everywhere.
+      call_samples: the sample of each call.
+      mismatch_time: the first time, s, at which the state is not the recorded one; None if it always is.
+      end: number of recorded samples without NaN.
     """
 
     def __init__(self, recorded: Recording):
         with installed():
             super().__init__(recorded.scenario, mechanism(recorded.scenario))
-        self.recorded, self.law = recorded, _Recorded(self)
+        self.recorded, self.law = recorded, _RecordedLaw(self)
         self.measured: list[tuple[int, Any]] = []
-        self.samples_of: list[int] = []
-        self.strayed: float | None = None
-        there = np.flatnonzero(np.isnan(recorded.x).any(axis=1) | np.isnan(recorded.u).any(axis=1))
-        self.end = int(there[0]) if len(there) else len(recorded.x)  # the first sample that is not there
+        self.call_samples: list[int] = []
+        self.mismatch_time: float | None = None
+        missing = np.flatnonzero(np.isnan(recorded.x).any(axis=1) | np.isnan(recorded.u).any(axis=1))
+        self.end = int(missing[0]) if len(missing) else len(recorded.x)
 
     def play(self) -> None:
-        """Do all steps."""
+        """Take all physics steps."""
         with installed(self.control), np.errstate(all="ignore"):
             for step in range(min(self.end * self.scenario.steps, self.total + 1)):
                 self.step(step)
 
     def step(self, step: int) -> None:
-        """Do a physics step; one that begins a sample begins in the recorded state."""
+        """Take a physics step. Each control period begins in the recorded state, which is compared."""
         k, within = divmod(step, self.scenario.steps)
         if within == 0 and k:
             for values, recorded, at in (
@@ -176,8 +178,8 @@ class Playback(reference.Loop):
                 (self.data.qvel, self.recorded.v, self.channels["qvel"]),
             ):
                 error = np.abs(values[at] - recorded[k]).max()
-                if not error <= ROUNDING * max(np.nanmax(np.abs(recorded)), 1e-3) and self.strayed is None:
-                    self.strayed = k * self.scenario.control_period
+                if not error <= ROUNDING * max(np.nanmax(np.abs(recorded)), 1e-3) and self.mismatch_time is None:
+                    self.mismatch_time = k * self.scenario.control_period
                 values[at] = recorded[k]
         super().step(step)
 
@@ -187,29 +189,28 @@ class Playback(reference.Loop):
         return self.latest[i]
 
     def verdict(self, commands: Sequence[Any]) -> tuple[bool, str]:
-        """Return whether the recorded commands are these, after feedforward and bounds, and what differs first."""
-        if self.strayed is not None:
-            return False, f"the plant does not move as recorded under these commands, at t = {self.strayed:g} s"
+        """Return whether these commands, with feedforward and bounds, are the recorded ones, and what differs first."""
+        if self.mismatch_time is not None:
+            return False, f"the plant does not move as recorded under these commands, at t = {self.mismatch_time:g} s"
         scale, total, first = max(float(np.nanmax(np.abs(self.recorded.u))), 1e-300), 0.0, None
-        for k, (i, y), command in zip(self.samples_of, self.measured, commands, strict=True):
+        for k, (i, y), command in zip(self.call_samples, self.measured, commands, strict=True):
             feedforward = self.scenario.feedforward
             added = 0.0 if feedforward is None else reference.evaluate(feedforward, y.t)[0]
             at = slice(None) if i < 0 else slice(i, i + 1)
-            u = np.clip(
-                np.atleast_1d(np.nan if command is None else command) + added, -self.limits[at], self.limits[at]
-            )
+            law_u = np.atleast_1d(np.nan if command is None else command)
+            u = np.clip(law_u + added, -self.limits[at], self.limits[at])
             error = float(np.abs(u - self.recorded.u[k, : len(self.limits)][at]).max()) / scale
             total += error**2 if error > ROUNDING else 0.0
             first = k if first is None and not error <= ROUNDING else first
         rms = (total / max(len(commands), 1)) ** 0.5
-        if first is None or (self.scenario.model == "nominal" and rms <= MODELLED):
+        if first is None or (self.scenario.model == "nominal" and rms <= MODEL_RMS):
             return True, ""
         t = first * self.scenario.control_period
         return False, f"the law computes other commands from its measurements alone, from t = {t:g} s on"
 
 
-class _Recorded:
-    """What stands for the law in a Playback: it notes the measurements."""
+class _RecordedLaw:
+    """The law of a Playback: it records its measurements and returns the recorded commands."""
 
     name = "recorded"
 
@@ -220,25 +221,25 @@ class _Recorded:
         """Return u and s of channel i."""
         k = len(self.run.commands) - 1
         self.run.measured.append((i, y))
-        self.run.samples_of.append(k)
+        self.run.call_samples.append(k)
         return float(self.run.recorded.u[k, i]), float(self.run.recorded.s[k, i])
 
     def together(self, y: Any) -> tuple[np.ndarray, np.ndarray]:
         """Return u and s of all channels."""
         self(0, y)
         self.run.measured[-1] = -1, y
-        k = self.run.samples_of[-1]
+        k = self.run.call_samples[-1]
         return self.run.recorded.u[k], self.run.recorded.s[k]
 
 
 # in the process without the plant
 
 
-def commanded(tasks: Sequence[tuple[bytes, list[tuple[int, Any]]]]) -> list[list[Any]]:
-    """Return the u that each law, packed, returns for its measurements in their order; None where it raises.
+def commands_of(tasks: Sequence[tuple[bytes, list[tuple[int, Any]]]]) -> list[list[Any]]:
+    """Return the u of each packed law for its measurements, in their order; None where the law raises.
 
-    Each law has been called for all of them before, in the other order of tasks, so that one which keeps a state
-    elsewhere than in its memory gives others.
+    All laws are called twice, first in the reverse order of the tasks. So a law that keeps a state outside its memory
+    returns other commands.
     """
     loaded = [(pickle.loads(law), measured) for law, measured in tasks]
     for law, measured in reversed(loaded):

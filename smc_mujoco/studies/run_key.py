@@ -16,17 +16,17 @@ from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, find_conditi
 from smc_mujoco.simulation.scenario import U_MAX, Scenario
 
 PACKAGE = "smc_mujoco."
-# Fields of a description that do not belong to the condition, but to the plant, the law or the run.
-NO_CONDITION = ("plant", "law", "model", "surface", "seed", "noise_key", "x0", "duration", "versions", "condition")
-Hashes = dict[Plant, list[str]]  # of the code and the files of other packages' plants, for runs that are keyed together
-UNRELATED = (  # folders that do not affect runs
+# Fields of a description that belong to the plant, the law or the run, and not to the condition.
+NOT_OF_CONDITION = ("plant", "law", "model", "surface", "seed", "noise_key", "x0", "duration", "versions", "condition")
+Hashes = dict[Plant, list[str]]  # plant -> hashes of its code and files, for a call with many runs
+UNRELATED_FOLDERS = (  # of this package, which do not affect runs
     "evidence/audit", "evidence/boards", "evidence/papers", "exchange/live", "draw", "testing", "control/tuned_gains",
 )  # fmt: skip
 MAX_NAME = 60  # characters of a condition's name
 
 
-def described(scenario: Scenario) -> dict[str, Any]:
-    """Return the scenario as plain data, the same for equal scenarios, so without the source of its gains."""
+def description(scenario: Scenario) -> dict[str, Any]:
+    """Return the scenario as plain data. It is the same for equal scenarios: the source of gains is left out."""
     data = serialise.describe(scenario)
     del data["left_out"], data["source"]
     return data
@@ -36,30 +36,30 @@ def key(scenario: Scenario, data: dict[str, Any] | None = None, plants: Hashes |
     """Return a hash, 32 hex digits, of all that determines a run: scenario, code of its parts and package, versions.
 
     Args:
-      data: the result of `described`, if the caller has it.
-      plants: a dict that keeps the hashes of plants from one call to the next, for callers with many runs. It begins
-        empty, as the file that a plant reads may change until the next study.
+      data: the result of `description`, if the caller has it.
+      plants: a dict in which callers with many runs keep the hashes of plants. It is empty at first, and new for each
+        study, because a file that a plant reads may change.
     """
-    data = data or described(scenario)
+    data = data or description(scenario)
     if scenario.condition in NAMED:  # the name adds nothing to the fields
         data = data | {"condition": None}
     codes = _codes(scenario, {} if plants is None else plants)
-    text = to_json([data, codes, fingerprint.package(*UNRELATED)], sort_keys=True)
+    text = to_json([data, codes, fingerprint.package(*UNRELATED_FOLDERS)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def portable_key(scenario: Scenario) -> str:
     """Return a hash, 16 hex digits, of the scenario and of the code of its parts: the same on every machine.
 
-    It holds neither the versions of packages nor the rest of this package's code, on which a run depends too.
+    It does not depend on the versions of packages or on the rest of this package's code, though the run does.
     """
-    data = described(scenario) | {"versions": None, "condition": None}  # a condition's name adds nothing to the fields
+    data = description(scenario) | {"versions": None, "condition": None}  # the condition's name adds nothing
     return hashlib.sha256(to_json([data, _codes(scenario, {})], sort_keys=True).encode()).hexdigest()[:16]
 
 
 def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
     """Return the columns of a table that describe a run. `plants` is that of `key`."""
-    data = described(scenario)
+    data = description(scenario)
     return {
         "hash": key(scenario, data, plants),
         "plant": scenario.plant.name,
@@ -77,19 +77,18 @@ def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
 
 def source(scenario: Scenario) -> dict[str, str | None]:
     """Return the columns of a table that say where the run's gains come from."""
-    found = scenario.law.source.about()
-    return {"source": found["kind"], "search": found["search"] and to_json(found["search"])}
+    about = scenario.law.source.about()
+    return {"source": about["kind"], "search": about["search"] and to_json(about["search"])}
 
 
 def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
-    """Return the name of the run's condition: the given name, or the differences from the nominal one.
+    """Return the name of the run's condition: the given name, or the differences from the nominal condition.
 
-    Plant, law, initial state, seed and duration do not belong to it. `data` is the result of `described`, if the caller
-    has it.
+    Plant, law, initial state, seed and duration do not belong to it. `data` is the `description`, if the caller has it.
     """
     if scenario.condition:
         return scenario.condition
-    text, nominal = _compared(data or described(scenario)), _nominal(scenario.plant, scenario.duration)
+    text, nominal = _condition_text(data or description(scenario)), _nominal(scenario.plant, scenario.duration)
     if text == nominal:
         return "nominal"
     changed = [name for name, value in json.loads(text).items() if json.loads(nominal).get(name) != value]
@@ -129,16 +128,17 @@ def _of_a_user(thing: Any) -> bool:
     return callable(thing) and not (thing.__module__ or "").startswith(PACKAGE)  # generated code has no module
 
 
-def _compared(data: dict[str, Any]) -> str:
-    return to_json({name: value for name, value in data.items() if name not in NO_CONDITION})
+def _condition_text(data: dict[str, Any]) -> str:
+    """Return the fields of a description that belong to the condition, as JSON."""
+    return to_json({name: value for name, value in data.items() if name not in NOT_OF_CONDITION})
 
 
 @functools.lru_cache(maxsize=256)
 def _nominal(plant: Plant, duration: float) -> str:
-    """Return the description of the nominal condition on a plant; that of no field where it does not fit the plant."""
+    """Return the `_condition_text` of the nominal condition on a plant, "{}" where it does not fit the plant."""
     common: dict[str, Any] = {"plant": plant, "law": "none", "duration": duration, "control_period": CONTROL_PERIOD}
     if not plant.limits:  # else its motors bound u
         common["u_max"] = U_MAX
     with contextlib.suppress(ScenarioError):  # `recorded`: x0 may be outside a joint's range, as this is not run
-        return _compared(described(Scenario.recorded(**common | find_condition("nominal").on(plant, duration))))
+        return _condition_text(description(Scenario.recorded(**common | find_condition("nominal").on(plant, duration))))
     return "{}"

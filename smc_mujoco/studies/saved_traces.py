@@ -22,20 +22,20 @@ def path(folder: Path, row: Mapping[str, Any]) -> Path:
 
 
 def worst(table: Table) -> list[int]:
-    """Return the row of the worst run for every plant and condition.
+    """Return the row of the worst run of every plant and condition.
 
-    Failed runs are the worst, then those that never settle. Among equals it is the one with the largest ultimate bound,
-    or with the largest overshoot if channels have different units and so no ultimate bound.
+    Failed runs are the worst, then those that never settle. Among these the ultimate bound decides, or the overshoot
+    where channels have different units, and so no ultimate bound.
     """
     failed, bounds = table.column("failure") != np.array(None), table.column("ultimate_bound")
     ends = np.where(np.isnan(bounds), table.column("overshoot"), bounds)
     unsettled = table.column("settling_time") == np.inf
     badness = list(zip(failed, unsettled & ~failed, np.where(failed, 0.0, ends), strict=True))
-    found: dict[tuple, int] = {}
+    rows: dict[tuple, int] = {}
     for i, cell in enumerate(zip(table.column("plant"), table.column("condition"), strict=True)):
-        if badness[i] > badness[found.setdefault(cell, i)]:
-            found[cell] = i
-    return list(found.values())
+        if badness[i] > badness[rows.setdefault(cell, i)]:
+            rows[cell] = i
+    return list(rows.values())
 
 
 def save(table: Table, choice: str, folder: Path, threads: int, progress: bool) -> None:

@@ -5,8 +5,8 @@
     store.add(rows)                        # a part, written whole or not at all
     store.collect(["5f0c...", ...])        # results.parquet, in this order, from the parts
 
-A part is a parquet file, named by a hash of the runs in it. A file that is damaged, or has other columns, or scores by
-other code, is ignored, and its runs count as not done. The bytes of results.parquet depend on its rows only.
+A part is a parquet file, named by a hash of the runs in it. A file that is damaged, has other columns, or has scores by
+other code is ignored, and its runs count as not done. The bytes of results.parquet depend only on its rows.
 """
 
 import contextlib
@@ -30,10 +30,10 @@ from smc_mujoco.studies import table
 if TYPE_CHECKING:
     import pyarrow as pa
 
-GROUP = 4096  # rows in memory at once while the table is written; chosen
-PARTS_HELD = 64  # parts in memory at once while the table is written; chosen
-ABANDONED = 3600.0  # s, age of temporary files that belong to a killed study; chosen
-NOTHING: Mapping[str, Any] = frozen({})
+ROWS_PER_GROUP = 4096  # rows in memory at once while the table is written; chosen
+MAX_OPEN_PARTS = 64  # parts in memory at once while the table is written; chosen
+MAX_TEMPORARY_AGE = 3600.0  # s: older temporary files belong to a killed study; chosen
+NO_CHANGES: Mapping[str, Any] = frozen({})
 PART = re.compile(r"[0-9a-f]{32}\.parquet")
 
 
@@ -70,7 +70,7 @@ class Store:
         """Remove the temporary files of studies that were killed long ago."""
         for path in [*self.parts.glob(".*.parquet"), *self.parts.parent.glob(".results.*.parquet")]:
             with contextlib.suppress(FileNotFoundError):  # another study has just finished it
-                if time.time() - path.stat().st_mtime > ABANDONED:
+                if time.time() - path.stat().st_mtime > MAX_TEMPORARY_AGE:
                     path.unlink()
 
     def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -87,24 +87,24 @@ class Store:
         self.where.update((name, (path, i)) for i, name in enumerate(hashes))
 
     def row(self, name: str) -> dict[str, Any]:
-        """Return a finished run as it is in its part."""
+        """Return the row of a finished run in its part."""
         path, i = self.where[name]
         part = self._read(path)
         return {} if part is None else part.slice(i, 1).to_pylist()[0]
 
-    def collect(self, hashes: Sequence[str], changes: Mapping[str, Mapping[str, Any]] = NOTHING) -> None:
+    def collect(self, hashes: Sequence[str], changes: Mapping[str, Mapping[str, Any]] = NO_CHANGES) -> None:
         """Write the table of these finished runs, in this order.
 
         Args:
-          changes: hash -> columns with other values than in the parts: of `run_key.source`, as an earlier study may
-            have written these runs, and of replays.
+          changes: hash -> columns that replace those of the part. These are the columns of `run_key.source`, because
+            an earlier study with other sources may have written the part, and those of replays.
 
         Raises:
           ScenarioError: the folder cannot be written, or a part has been removed.
         """
         import pyarrow as pa
 
-        read = functools.lru_cache(maxsize=PARTS_HELD)(self._read)
+        read = functools.lru_cache(maxsize=MAX_OPEN_PARTS)(self._read)
 
         def rows(names: Sequence[str]) -> "pa.Table":
             places: dict[Path, list[int]] = {}  # part -> indices of the names in it
@@ -125,7 +125,7 @@ class Store:
                 data = data.set_column(data.column_names.index(name), data.field(name), column)
             return data
 
-        groups = (hashes[i : i + GROUP] for i in range(0, len(hashes), GROUP))
+        groups = (hashes[i : i + ROWS_PER_GROUP] for i in range(0, len(hashes), ROWS_PER_GROUP))
         table.write(self.results, self.schema, map(rows, groups))
 
     def _read(self, path: Path) -> "pa.Table | None":

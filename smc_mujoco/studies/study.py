@@ -4,9 +4,9 @@
     table = smc.study(scenarios, "study")          # study/results.parquet; killed, it continues where it was
     print(table.select(law="classical").column("ultimate_bound"))
 
-A run is identified by everything that determines its outcome: the scenario, the code of its law, signals and your other
-own parts, and the versions of the packages. A run with a result in the folder is not repeated, unless this code was
-edited.
+A run is identified by everything that determines its result: the scenario, the code of its law, of its signals and of
+your other parts, and the versions of the packages. A run with a result in the folder is repeated only if this code has
+changed.
 """
 
 import dataclasses
@@ -23,13 +23,11 @@ from smc_mujoco.simulation.conditions import DURATION, PLANTS
 from smc_mujoco.simulation.run import cores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies import executors, run_key, saved_traces, seals
+from smc_mujoco.studies import executors, run_key, saved_traces, study_replays
 from smc_mujoco.studies import noise_key as noise
-from smc_mujoco.studies.executors import Batch, Outcome
+from smc_mujoco.studies.executors import Batch, ResultColumns
 from smc_mujoco.studies.store import Store
 from smc_mujoco.studies.table import Table
-
-key, condition = run_key.key, run_key.condition
 
 # One condition of each kind: of the paper's, and one each for friction, drive, gear, sensor and obstacles.
 IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
@@ -84,8 +82,8 @@ def study(
       progress: whether to show a progress bar.
       traces: traces to save in out/traces: "none", "all", or "worst", one for every plant and condition: a failed run,
         else one that never settles, else the one with the largest ultimate bound.
-      noise_key: of all runs, see `Scenario`. "drawn": a new one, that is drawn now and kept in the folder, unless the
-        study goes on; so no law can know its noise.
+      noise_key: of all runs, see `Scenario`. "drawn": that of the folder if the study goes on, else a new one, which
+        is drawn now. So no law can know its noise.
       replay: whether to replay one run of each of your laws on each plant in each condition, see `smc.replay`. A run
         whose commands do not follow from its measurements counts as failed.
 
@@ -95,7 +93,7 @@ def study(
     """
     if not isinstance(out, str | os.PathLike):
         raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
-    where = executors.checked(executor)
+    where = executors.as_executor(executor)
     find("choice of traces", traces, dict.fromkeys(saved_traces.CHOICES))
     threads = cores(threads)
     store, folder = Store(Path(out)), Path(out) / "traces"
@@ -108,15 +106,17 @@ def study(
         print(f"{done} of {len(by_key)} runs are in {printable(str(store.parts))}", file=sys.stderr)
     with counter(len(missing), sum(s.work for s in missing), progress) as counts:
 
-        def finish(batch: Batch, outcomes: Sequence[Outcome]) -> None:
-            hashes = ({"hash": names[id(one.scenario)]} for one in batch)  # as they were: a law may change its globals
-            rows = (run_key.row(one.scenario, plants) for one in batch)
-            store.add([row | name | its for row, name, its in zip(rows, hashes, outcomes, strict=True)])
+        def finish(batch: Batch, results: Sequence[ResultColumns]) -> None:
+            rows = []
+            for scenario, result in zip((prepared.scenario for prepared in batch), results, strict=True):
+                known = {"hash": names[id(scenario)]}  # from before the run, because a law may change its globals
+                rows.append(run_key.row(scenario, plants) | known | result)
+            store.add(rows)
 
-        def finish_here(batch: Batch, found: Sequence[Trace]) -> None:
-            for trace in found if traces == "all" else ():
+        def finish_here(batch: Batch, finished: Sequence[Trace]) -> None:
+            for trace in finished if traces == "all" else ():
                 trace.save(saved_traces.path(folder, run_key.row(trace.scenario, plants)))
-            finish(batch, [executors.outcome(trace) for trace in found])
+            finish(batch, [executors.result_columns(trace) for trace in finished])
 
         if where == "local":
             executors.compute_here(executors.batches(missing, threads), threads, finish_here, counts.stepped)
@@ -124,8 +124,9 @@ def study(
             with executors.opened(where) as pool:
                 executors.compute_elsewhere(executors.batches(missing, 1), pool, finish, counts.stepped)
     changes = {name: run_key.source(scenario) for name, scenario in by_key.items()}
-    for name, its in (seals.replayed(by_key, store, Path(out), threads, progress) if replay else {}).items():
-        changes[name] = changes[name] | its
+    if replay:
+        for name, columns in study_replays.replayed(by_key, store, Path(out), threads, progress).items():
+            changes[name] = changes[name] | columns
     store.collect(list(by_key), changes)
     table = dataclasses.replace(Table.read(store.results), known=by_key)
     saved_traces.save(table, traces, folder, threads, progress)
@@ -137,14 +138,14 @@ def _by_key(
     plants: run_key.Hashes,
     keyed: Callable[[Iterable[Scenario]], Iterable[Scenario]],
 ) -> dict[str, Scenario]:
-    """Return key -> scenario, in order, with the first of equal ones, and with their noise `keyed`."""
-    found: dict[str, Scenario] = {}
+    """Return key -> scenario, in order and each once, after `keyed` has set their noise keys."""
+    by_key: dict[str, Scenario] = {}
     several = isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
-    for scenario in keyed(scenarios) if several else ():  # one by one: a wrong item of an endless generator is found
+    for scenario in keyed(scenarios) if several else ():  # one by one: a generator with a wrong item may be endless
         if not isinstance(scenario, Scenario):
             raise ScenarioError(f"cannot study {shown(scenario)}: give scenarios, such as those of smc.grid")
         checked_name(scenario.law)
-        found.setdefault(key(scenario, plants=plants), scenario)
-    if not found:
+        by_key.setdefault(run_key.key(scenario, plants=plants), scenario)
+    if not by_key:
         raise ScenarioError(f"scenarios is {shown(scenarios)}: give several, such as a list")
-    return found
+    return by_key

@@ -4,12 +4,15 @@
     best = table.select(plant="duffing", condition=["noise", "coulomb"]).column("ultimate_bound")
     table.scenario(0), table.trace(0)          # the scenario of a row, and its trace, by repeating the run
 
-Columns: the run (`hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `noise_key`, which is 0 for the noise of
-the seed alone, `duration` in s); where its gains come
-from (`source`, a kind of `control.source`, and `search` as JSON, null if no search found them); every metric of
-`smc.score`, null if the run failed or the metric does not apply, inf for "never"; how the run failed (`diverged_at` in
-s, `failure`); `replayed`, whether its commands follow from its measurements alone, null if that was not tried, see
-`smc.replay`; and the data to repeat it (`versions`, `scenario`, both JSON).
+Columns:
+
+- the run: `hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `noise_key`, 0 for the noise of the seed alone,
+  and `duration` in s;
+- where its gains come from: `source`, a kind of `control.source`, and `search` as JSON, null if there was no search;
+- every metric of `smc.score`: null if the run failed or the metric does not apply, inf for "never";
+- how the run failed: `diverged_at` in s, and `failure`;
+- `replayed`: whether its commands follow from its measurements alone, null if that was not tried, see `smc.replay`;
+- the data to repeat it, as JSON: `versions` and `scenario`.
 """
 
 import dataclasses
@@ -25,7 +28,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, find, shown, taken
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import MAX_RATIO, MAX_UNPACKED, from_json, reading, replacing, to_json
-from smc_mujoco.common.html import table
+from smc_mujoco.common.html import table as html_table
 from smc_mujoco.common.text import number
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import serialise
@@ -37,12 +40,14 @@ if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     import pyarrow as pa
 
-# Column -> its type, before and after the metrics.
-BEFORE = dict.fromkeys(("hash", "plant", "law", "gains", "source", "search", "condition"), "string")
-BEFORE |= {"seed": "int64", "noise_key": "int64", "duration": "float64"}
-AFTER = {"diverged_at": "float64", "failure": "string", "replayed": "bool", "versions": "string", "scenario": "string"}
-SHOWN = ("plant", "law", "source", "condition", "seed", "settling_time", "ultimate_bound", "itae", "tv_rate", "failure")
-MAX_ROWS = 8  # of a table in a notebook
+# Column -> its type: before the metrics, and after them.
+RUN_COLUMNS = dict.fromkeys(("hash", "plant", "law", "gains", "source", "search", "condition"), "string")
+RUN_COLUMNS |= {"seed": "int64", "noise_key": "int64", "duration": "float64"}
+RESULT_COLUMNS = {"diverged_at": "float64", "failure": "string", "replayed": "bool"}
+RESULT_COLUMNS |= {"versions": "string", "scenario": "string"}
+PREVIEW = ("plant", "law", "source", "condition", "seed")
+PREVIEW += ("settling_time", "ultimate_bound", "itae", "tv_rate", "failure")
+MAX_ROWS = 8  # of the preview in a notebook
 DIGEST = b"digest"  # in a file's metadata
 
 
@@ -51,12 +56,12 @@ def schema(metadata: Mapping[str, str]) -> "pa.Schema":
     import pyarrow as pa
 
     kinds = {"bool": pa.bool_(), "string": pa.string(), "int64": pa.int64(), "float64": pa.float64()}
-    columns = BEFORE | {m.name: "float64" for m in metrics()} | AFTER
+    columns = RUN_COLUMNS | {m.name: "float64" for m in metrics()} | RESULT_COLUMNS
     return pa.schema([(name, kinds[kind]) for name, kind in columns.items()], metadata=dict(metadata))
 
 
 def content(rows: "pa.Table") -> bytes:
-    """Return names and values of rows as bytes; null differs from NaN."""
+    """Return names and values of rows as bytes, in which null differs from NaN."""
     from pyarrow import types
 
     parts = [to_json([rows.column_names, len(rows)]).encode()]
@@ -141,7 +146,7 @@ class Table:
             path = Path(path) / "results.parquet"
         with reading(path, "table", "give the results.parquet of a study that has ended") as file:
             data = read(file)
-            if missing := [name for name in (*BEFORE, *AFTER) if name not in data.column_names]:
+            if missing := [name for name in (*RUN_COLUMNS, *RESULT_COLUMNS) if name not in data.column_names]:
                 raise ScenarioError(f"it has no column {missing[0]!r}")
         return cls(data=data)
 
@@ -154,16 +159,15 @@ class Table:
         return f"Table({len(self)} runs: {', '.join(counts)})"
 
     def _repr_html_(self) -> str:
-        names = [name for name in SHOWN if name in self.data.column_names]
+        names = [name for name in PREVIEW if name in self.data.column_names]
         rows = [list(row.values()) for row in self.data.select(names).slice(0, MAX_ROWS).to_pylist()]
         cells = [["" if v is None else number(v) if isinstance(v, float) else v for v in row] for row in rows]
         rest = len(self) - len(rows)
-        return table(
-            names, cells, repr(self), f"and {rest} more: Table.rows, Table.column" if rest else "", range(4, 9)
-        )
+        note = f"and {rest} more: Table.rows, Table.column" if rest else ""
+        return html_table(names, cells, repr(self), note, range(4, 9))
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
-        """Return the rows as a stream of Arrow's C interface: what polars.from_dataframe, duckdb and pandas take."""
+        """Return the rows as a stream of Arrow's C interface, which polars, duckdb and pandas read."""
         return self.data.__arrow_c_stream__(requested_schema)
 
     def to_pandas(self) -> "pandas.DataFrame":

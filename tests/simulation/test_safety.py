@@ -1068,7 +1068,7 @@ def test_many_runs_leave_no_memory_behind():
 
 def test_how_this_machine_rounds_is_part_of_what_a_run_is(monkeypatch):
     here = run_key.key(scenario())
-    assert run_key.described(scenario())["versions"]["arithmetic"] == fingerprint.arithmetic()
+    assert run_key.description(scenario())["versions"]["arithmetic"] == fingerprint.arithmetic()
     monkeypatch.setattr(fingerprint.math, "tanh", lambda x: math.nextafter(math.sinh(x) / math.cosh(x), 2.0))
     monkeypatch.setattr(
         importlib.import_module("smc_mujoco.simulation.serialise"), "arithmetic", fingerprint.arithmetic.__wrapped__

@@ -19,7 +19,7 @@ import smc_mujoco as smc
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.prepare import prepare
-from smc_mujoco.studies import executors, parcel, run_key
+from smc_mujoco.studies import executors, pickling, run_key
 from smc_mujoco.studies.study import study
 
 ROOT = Path(__file__).parents[2]
@@ -39,7 +39,7 @@ def slow(y, gains, memory):
 
 @pytest.mark.parametrize("steps", [1, 200, 10**9])
 def test_batches_hold_every_scenario_once_and_agree_on_its_layout(monkeypatch, steps):
-    monkeypatch.setattr(executors, "STEPS", steps)
+    monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", steps)
     scenarios = mixed()
     found = list(executors.batches(scenarios, threads=2))
     assert sorted(map(id, scenarios)) == sorted(id(one.scenario) for batch in found for one in batch)
@@ -50,7 +50,7 @@ def test_batches_hold_every_scenario_once_and_agree_on_its_layout(monkeypatch, s
 
 def test_a_batch_is_bounded_by_memory_however_many_threads_there_are():
     scenarios = [paper.scenario("duffing", "classical", seed=seed) for seed in range(400)]
-    assert max(len(batch) for batch in executors.batches(scenarios, threads=512)) <= executors.LOG_STEPS / 10_000
+    assert max(len(batch) for batch in executors.batches(scenarios, threads=512)) <= executors.MAX_WORK / 10_000
 
 
 def test_what_does_not_compile_goes_in_small_batches():
@@ -60,8 +60,8 @@ def test_what_does_not_compile_goes_in_small_batches():
 
 def test_outcomes_come_in_the_order_of_the_batch_and_do_not_depend_on_it():
     batch = [smc.Scenario(plant="duffing", law=fails_late(when=w), duration=0.05) for w in (1.0, 0.01, 0.02)]
-    together = [executors.outcome(trace) for trace in executors.simulated(batch, 2)]
-    assert together == [executors.outcome(trace) for s in batch for trace in executors.simulated([s], 1)]
+    together = [executors.result_columns(trace) for trace in executors.run_batch(batch, 2)]
+    assert together == [executors.result_columns(trace) for s in batch for trace in executors.run_batch([s], 1)]
     assert [found["diverged_at"] for found in together] == [None, 0.011, 0.021]
 
 
@@ -90,7 +90,7 @@ def test_a_batch_is_finished_while_the_next_one_runs_and_what_that_raises_is_hea
 )
 def test_an_executor_that_there_is_not_is_one_sentence(name):
     with pytest.raises(smc.ScenarioError, match=r"give 'local', 'dask://HOST:PORT', a dask Client or a"):
-        executors.checked(name)
+        executors.as_executor(name)
 
 
 def test_without_the_package_the_sentence_says_what_to_install(tmp_path, monkeypatch):
@@ -133,7 +133,7 @@ def refused() -> Future:
 
 
 def test_the_workers_of_any_executor_find_the_same_table(tmp_path, monkeypatch):
-    monkeypatch.setattr(executors, "STEPS", 200)
+    monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", 200)
     with Elsewhere(2) as pool:
         study(mixed(), tmp_path / "elsewhere", executor=pool)
         assert pool.submit(abs, -1).result() == 1  # it stays open
@@ -144,7 +144,7 @@ def test_the_workers_of_any_executor_find_the_same_table(tmp_path, monkeypatch):
 
 
 def test_no_more_batches_are_under_way_than_allowed(monkeypatch):
-    monkeypatch.setattr(executors, "UNDER_WAY", 2)
+    monkeypatch.setattr(executors, "MAX_BATCHES_SENT", 2)
     finished = []
     with Elsewhere(1) as pool:
 
@@ -159,8 +159,8 @@ def test_no_more_batches_are_under_way_than_allowed(monkeypatch):
 
 @pytest.mark.parametrize("end", [died, cancelled, refused])
 def test_when_an_executor_stops_one_sentence_says_so_and_what_is_finished_stays(end, tmp_path, monkeypatch):
-    monkeypatch.setattr(executors, "STEPS", 200)
-    monkeypatch.setattr(executors, "UNDER_WAY", 1)
+    monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", 200)
+    monkeypatch.setattr(executors, "MAX_BATCHES_SENT", 1)
     with Elsewhere(1) as pool:
         pool.last, pool.end = 4, end
         with pytest.raises(
@@ -198,7 +198,7 @@ def test_a_worker_that_would_run_something_else_is_one_sentence(change, said, mo
     packed = pickle.dumps(batch)
     monkeypatch.setattr(*change)
     with pytest.raises(smc.ScenarioError, match=said):
-        executors.work(packed, keys)
+        executors.run_on_worker(packed, keys)
 
 
 def test_a_law_without_a_module_is_sent_by_value(monkeypatch):
@@ -206,10 +206,10 @@ def test_a_law_without_a_module_is_sent_by_value(monkeypatch):
     found = []
     with Elsewhere(1) as pool:
         executors.compute_elsewhere([[prepare(scenario)]], pool, lambda batch, its: found.extend(its))
-    assert found == [executors.outcome(smc.run(scenario))]
+    assert found == [executors.result_columns(smc.run(scenario))]
     monkeypatch.setitem(sys.modules, "cloudpickle", None)
     with pytest.raises(smc.ScenarioError, match="put it into a module, or pip install cloudpickle"):
-        parcel.packed(scenario)
+        pickling.packed(scenario)
 
 
 # a cluster
@@ -223,8 +223,8 @@ from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.store import Store
 from smc_mujoco.studies.study import study
 
-out, address, executors.STEPS, executors.WAIT = Path(sys.argv[1]), sys.argv[2], 400, float(sys.argv[3])
-executors.UNDER_WAY = 4  # few, so that most of the work is not even sent when the third part is written
+out, address, executors.MAX_WORK_PER_THREAD, executors.TIMEOUT = Path(sys.argv[1]), sys.argv[2], 400, float(sys.argv[3])
+executors.MAX_BATCHES_SENT = 4  # few, so that most of the work is not even sent when the third part is written
 SLOPE = 3.0
 
 @smc.law_function(gains={"k": 4.0}, conditions={"k > 0": lambda g: g.k > 0.0})

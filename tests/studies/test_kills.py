@@ -21,12 +21,13 @@ import os, random, signal, sys, time
 from pathlib import Path
 from smc_mujoco.studies import executors, store
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.studies.study import key, study
+from smc_mujoco.studies.run_key import key
+from smc_mujoco.studies.study import study
 from smc_mujoco.simulation.callback import callback as compiled_callback, silence
 from smc_mujoco.simulation.prepare import prepare
 import pyarrow.parquet
 
-out, executors.STEPS = Path(sys.argv[1]), 60
+out, executors.MAX_WORK_PER_THREAD = Path(sys.argv[1]), 60
 plants, laws, conditions = ["duffing", "van_der_pol"], ["observer_free", "classical"], ["nominal", "noise"]
 scenarios = grid(plants, laws, conditions, 10, "study", 0.05)
 """
@@ -41,7 +42,7 @@ def told(pipe):
     # what a life does, as it does it: "run", "write", "wrote <hashes>", "collect"
     def tell(*words):
         os.write(pipe, " ".join(words).encode() + b"\\n")
-    run, add, collect = executors.simulated, store.Store.add, store.Store.collect
+    run, add, collect = executors.run_batch, store.Store.add, store.Store.collect
     def simulated(*rest):
         tell("run")
         return run(*rest)
@@ -52,7 +53,7 @@ def told(pipe):
     def collecting(self, *given):
         tell("collect")
         collect(self, *given)
-    executors.simulated, store.Store.add, store.Store.collect = simulated, adding, collecting
+    executors.run_batch, store.Store.add, store.Store.collect = simulated, adding, collecting
 
 def live(folder, doomed):
     # one life of the study; doomed(line) says whether it dies there

@@ -21,7 +21,7 @@ from smc_mujoco.mechanisms.plant import Variant
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.studies.study import condition, key
+from smc_mujoco.studies.run_key import condition, key
 
 pytestmark = pytest.mark.quick
 
@@ -135,7 +135,7 @@ def test_a_key_does_not_depend_on_the_process():
         [
             sys.executable,
             "-c",
-            f"from smc_mujoco import grid; from smc_mujoco.studies.study import key; print(key({made}))",
+            f"from smc_mujoco import grid; from smc_mujoco.studies.run_key import key; print(key({made}))",
         ],
         env=os.environ | {"PYTHONHASHSEED": "1", "PYTHONPATH": str(ROOT)},
         capture_output=True,

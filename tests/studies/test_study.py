@@ -17,7 +17,8 @@ from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.studies import executors, run_key, saved_traces, store
-from smc_mujoco.studies.study import condition, study
+from smc_mujoco.studies.run_key import condition
+from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
 
 ROOT = Path(__file__).parents[2]
@@ -39,7 +40,7 @@ def none_runs(monkeypatch):
     def refuse(*_: object) -> None:
         raise AssertionError("a finished run is run again")
 
-    return lambda: monkeypatch.setattr(executors, "simulated", refuse)
+    return lambda: monkeypatch.setattr(executors, "run_batch", refuse)
 
 
 @smc.law_function
@@ -143,7 +144,7 @@ def test_what_cannot_be_studied_is_refused_before_anything_runs(tmp_path):
 def test_failed_runs_have_no_scores_and_their_own_words_in_any_company(tmp_path, monkeypatch):
     failing = [scenario(fails_late(when=when)) for when in (0.01, 0.02, 0.03)] + [scenario(raises()), *small(1)]
     study(failing, tmp_path / "together")
-    monkeypatch.setattr(executors, "STEPS", 1)
+    monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", 1)
     table = study(failing, tmp_path / "alone")
     assert bytes_of(tmp_path / "together") == bytes_of(tmp_path / "alone")
     said = table.column("failure")
@@ -175,9 +176,9 @@ def test_a_study_says_how_many_runs_were_there(tmp_path, capsys):
 def test_a_larger_grid_takes_over_what_is_there(tmp_path, monkeypatch):
     study(small(seeds=2), tmp_path)
     ran = []
-    honest = executors.simulated
+    honest = executors.run_batch
     monkeypatch.setattr(
-        executors, "simulated", lambda batch, *rest: ran.extend(one.scenario for one in batch) or honest(batch, *rest)
+        executors, "run_batch", lambda batch, *rest: ran.extend(one.scenario for one in batch) or honest(batch, *rest)
     )
     study(small(seeds=3), tmp_path)
     assert sorted(s.seed for s in ran) == [2] * 4
@@ -189,9 +190,9 @@ def test_without_resume_everything_is_run_again_and_foreign_files_stay(tmp_path,
     study(small(), tmp_path)
     (tmp_path / "parts" / "mine.parquet").write_text("not a part")
     ran = []
-    honest = executors.simulated
+    honest = executors.run_batch
     monkeypatch.setattr(
-        executors, "simulated", lambda batch, *rest: ran.extend(one.scenario for one in batch) or honest(batch, *rest)
+        executors, "run_batch", lambda batch, *rest: ran.extend(one.scenario for one in batch) or honest(batch, *rest)
     )
     study(small(), tmp_path, resume=False)
     assert len(ran) == len(small())
@@ -217,15 +218,15 @@ def other_scores(path: Path) -> None:
 
 @pytest.mark.parametrize("harm", [cut, foreign, other_scores, lambda path: path.write_bytes(b"")])
 def test_a_part_that_is_none_is_computed_again(tmp_path, monkeypatch, harm):
-    monkeypatch.setattr(executors, "STEPS", 50)
+    monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", 50)
     study(small(), tmp_path)
     before, parts = bytes_of(tmp_path), sorted((tmp_path / "parts").iterdir())
     assert len(parts) > 3
     harm(parts[1])
     ran = []
-    honest = executors.simulated
+    honest = executors.run_batch
     monkeypatch.setattr(
-        executors, "simulated", lambda batch, *rest: ran.extend(one.scenario for one in batch) or honest(batch, *rest)
+        executors, "run_batch", lambda batch, *rest: ran.extend(one.scenario for one in batch) or honest(batch, *rest)
     )
     study(small(), tmp_path)
     assert 0 < len(ran) < len(small())
@@ -270,13 +271,13 @@ def test_half_written_files_of_a_killed_study_are_deleted_in_time(tmp_path):
 def test_the_table_is_written_in_groups_from_parts_in_any_order(tmp_path, monkeypatch):
     scenarios = small(seeds=4)
     study(scenarios, tmp_path / "one")
-    monkeypatch.setattr(executors, "STEPS", 1)
-    monkeypatch.setattr(store, "PARTS_HELD", 1)
+    monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", 1)
+    monkeypatch.setattr(store, "MAX_OPEN_PARTS", 1)
     shuffled = [scenarios[i] for i in np.random.default_rng(0).permutation(len(scenarios))]
     study(shuffled, tmp_path / "two")
     study(scenarios, tmp_path / "two")
     assert bytes_of(tmp_path / "one") == bytes_of(tmp_path / "two")
-    monkeypatch.setattr(store, "GROUP", 3)
+    monkeypatch.setattr(store, "ROWS_PER_GROUP", 3)
     assert study(scenarios, tmp_path / "two").rows() == Table.read(tmp_path / "one").rows()
 
 

@@ -16,8 +16,9 @@ from helpers.runs import fails_late
 import smc_mujoco as smc
 from smc_mujoco.common.text import number
 from smc_mujoco.simulation.grid import grid
+from smc_mujoco.studies.run_key import condition, key
 from smc_mujoco.studies.store import Store
-from smc_mujoco.studies.study import condition, key, study
+from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import MAX_ROWS, Table, content
 
 

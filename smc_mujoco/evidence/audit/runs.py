@@ -27,7 +27,7 @@ from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import ARRAYS, Trace
-from smc_mujoco.studies.executors import outcome
+from smc_mujoco.studies.executors import result_columns
 from smc_mujoco.studies.run_key import Hashes, key
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ class Runs:
         names = list(new)
         for index, trace in stream(list(new.values()), self.threads):
             law = trace.scenario.law
-            self._known[names[index]] = Result.of(law.name, law.gains, outcome(trace))
+            self._known[names[index]] = Result.of(law.name, law.gains, result_columns(trace))
         self._used |= {name: self._known[name] for name, _ in wanted}
         for name, scenario in wanted:
             hashed = _hash_of_scores(self._known[name].scores)

@@ -38,7 +38,7 @@ from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1, acceleration
 from smc_mujoco.simulation import native
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.noise_key import draw, own
+from smc_mujoco.studies.noise_key import draw_key, has_user_code
 
 SEED = 20240  # of all random numbers; chosen before any run
 STEP, STEPS = 2e-3, 5000  # s; number of
@@ -165,8 +165,8 @@ def robustness(scenario: Scenario, report: Callable[[float, float], None] | None
     Raises:
       ScenarioError: another plant, a surface, a reference that moves, or a law that does not compile.
     """
-    if not scenario.noise_key and own(scenario):
-        scenario = dataclasses.replace(scenario, noise_key=draw())
+    if not scenario.noise_key and has_user_code(scenario):
+        scenario = dataclasses.replace(scenario, noise_key=draw_key())
     machine, todo = Machine(scenario), cases(scenario.noise_key)
     ends = list[bool]()
     for done, case in enumerate(todo):

@@ -32,7 +32,7 @@ from smc_mujoco.simulation.grid import grid as make_grid
 from smc_mujoco.simulation.run import run
 from smc_mujoco.studies.accuracy import AccuracyTable
 from smc_mujoco.studies.cache import cached
-from smc_mujoco.studies.noise_key import DRAWN, own
+from smc_mujoco.studies.noise_key import DRAWN, has_user_code
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import DURATION, WorstCase, kept
@@ -146,7 +146,7 @@ def grid(work: Work) -> Table:
     plan = work.plan
     runs = make_grid(plan.plants, plan.laws, plan.conditions, plan.seeds, GAINS, plan.duration)
     with work.bars.stage("grid", f"{len(runs)} runs", bar=False):
-        key = DRAWN if any(map(own, runs)) else 0  # the claims of the paper share the runs of the package's own laws
+        key = DRAWN if any(map(has_user_code, runs)) else 0  # the paper's claims share the runs of the package's laws
         return study(
             runs, work.folder / "study", threads=work.threads, progress=work.bars.shown, noise_key=key, replay=True
         )

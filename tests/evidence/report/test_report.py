@@ -604,7 +604,7 @@ def test_what_is_there_is_not_computed_again(made, folder, monkeypatch):
         "analysis.margins.margins",
         "evidence.audit.audit.claims",
         "evidence.report.films.film",
-        "studies.executors.outcome",
+        "studies.executors.result_columns",
     ):
         module, _, function = f"smc_mujoco.{name}".rpartition(".")
         monkeypatch.setattr(importlib.import_module(module), function, None)  # not to be called

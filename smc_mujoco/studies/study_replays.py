@@ -1,4 +1,4 @@
-"""Replays in a study: of one run of each of the user's laws on each plant in each condition, which nobody foresees."""
+"""Replays in a study: one run of each of the user's laws on each plant in each condition, which no law can foresee."""
 
 import hashlib
 import json
@@ -14,8 +14,8 @@ from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.run import PlainLoopWarning, run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies.executors import outcome
-from smc_mujoco.studies.noise_key import own
+from smc_mujoco.studies.executors import result_columns
+from smc_mujoco.studies.noise_key import has_user_code
 from smc_mujoco.studies.replay import replays
 from smc_mujoco.studies.store import Store
 
@@ -26,10 +26,10 @@ OTHER_SCORES = "run again, it has other scores: the law keeps a state of its own
 def replayed(
     runs: Mapping[str, Scenario], store: Store, folder: Path, threads: int | None, progress: bool
 ) -> dict[str, dict[str, Any]]:
-    """Return hash -> the columns that a replay changes, of the runs that are chosen.
+    """Replay chosen runs. Return hash -> the columns of the table that their replays change.
 
-    Results are kept in the folder, so that a study which goes on replays nothing twice. A law that cannot be sent to
-    another process is not replayed, and a note says so.
+    Results are written into the folder, so that a study that goes on replays nothing twice. A law that cannot be sent
+    to another process is not replayed, and a note says so.
     """
     chosen, known = _chosen(runs), _known(folder / FILE)
     if missing := [name for name in chosen if name not in known]:
@@ -49,13 +49,13 @@ def replayed(
 
 
 def _chosen(runs: Mapping[str, Scenario]) -> list[str]:
-    """Return the hash of one run for each law of the user's, plant and condition.
+    """Return the hash of one run for each of the user's laws, on each plant in each condition.
 
-    It is the one with the least hash of hashes, which follow from the noise key.
+    The choice is by a hash of these hashes. They depend on the noise key, so it cannot be foreseen.
     """
     groups: dict[tuple, list[str]] = {}
     for name, scenario in runs.items():
-        if own(scenario):
+        if has_user_code(scenario):
             group = scenario.law.name, scenario.plant.name, run_key.condition(scenario)
             groups.setdefault(group, []).append(name)
     return [min(names, key=lambda name: hashlib.sha256(name.encode()).digest()) for names in groups.values()]
@@ -71,13 +71,15 @@ def _known(file: Path) -> dict[str, str | None]:
 
 
 def _results(runs: Mapping[str, Scenario], store: Store, threads: int | None) -> dict[str, str | None]:
-    """Return the results of runs, which are run again."""
+    """Run and replay runs. Return hash -> what differs, as in `_known`."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlainLoopWarning)  # the study itself has warned
         traces = run(list(runs.values()), threads=threads)
     results: dict[str, str | None] = {}
-    for name, trace, its in zip(runs, traces, replays(traces), strict=True):
-        row, scores = store.row(name), outcome(trace)
-        same = all(row.get(column) == value for column, value in scores.items())
-        results[name] = OTHER_SCORES if not same else its.why if its.same is False else "" if its.same else None
+    for name, trace, replay in zip(runs, traces, replays(traces), strict=True):
+        row = store.row(name)
+        if any(row.get(column) != value for column, value in result_columns(trace).items()):
+            results[name] = OTHER_SCORES
+        else:
+            results[name] = None if replay.same is None else replay.why
     return results

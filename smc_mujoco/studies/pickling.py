@@ -1,7 +1,7 @@
 """Scenarios and laws as bytes for another process, with the code that it cannot import.
 
-Pickle names a function by its module. A script or notebook is the module `__main__`, which in a worker is another one,
-and a law in a function or an executed file has no module at all. Their code is sent by value, with cloudpickle.
+Pickle names a function by its module. A script or notebook is the module `__main__`, but a worker has another
+`__main__`. A law in a function or an executed file has no module at all. cloudpickle sends their code by value.
 """
 
 import copyreg
@@ -12,11 +12,11 @@ from typing import Any
 from smc_mujoco.common.errors import ScenarioError, one_line
 from smc_mujoco.control.component import Component
 
-SCRIPTS = ("__main__", "__mp_main__")  # modules that are others in another process
+SCRIPTS = ("__main__", "__mp_main__")  # modules that differ from process to process
 
 
 def packed(thing: Any) -> bytes:
-    """Return a thing as bytes for `pickle.loads` in any process with this package, and with cloudpickle if needed.
+    """Return a thing as bytes for `pickle.loads` in any process that has this package, and cloudpickle if needed.
 
     Raises:
       ScenarioError: it cannot be sent, or needs cloudpickle, which is not installed.
@@ -25,7 +25,7 @@ def packed(thing: Any) -> bytes:
         data = pickle.dumps(thing)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         return _by_value(thing, one_line(str(error)))
-    return _by_value(thing, "it is of a script") if any(name.encode() in data for name in SCRIPTS) else data
+    return _by_value(thing, "it is in a script") if any(name.encode() in data for name in SCRIPTS) else data
 
 
 def _by_value(thing: Any, why: str) -> bytes:
@@ -37,10 +37,9 @@ def _by_value(thing: Any, why: str) -> bytes:
         raise ScenarioError(f"a law, signal or part cannot be sent to another process ({why}): {cure}") from None
 
     class Pickler(cloudpickle.Pickler):
-        """Pickler that writes the fields of a component of a script, not its name."""
+        """Pickler that writes a script's component by its fields, not by its name."""
 
         def reducer_override(self, obj: Any) -> Any:
-            """Return how an object is written."""
             if isinstance(obj, Component) and getattr(obj.function, "__module__", "") in SCRIPTS:
                 return copyreg.__newobj__, (Component,), vars(obj)  # type: ignore[attr-defined]
             return super().reducer_override(obj)
