@@ -7,6 +7,7 @@ from helpers.models import unnamed
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.fidelity import deviation
+from smc_mujoco.mechanisms.geometry import coil
 from smc_mujoco.mechanisms.geometry.pendulum_chain import HOOK
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.plant import catalogue, plant, write
@@ -167,3 +168,16 @@ def test_an_unknown_mechanism_is_refused():
         deviation(plant("duffing"), "spring")
     with pytest.raises(ScenarioError, match="reach"):
         deviation(plant("duffing"), "springs", -1.0)
+
+
+def test_a_coil_winds_as_often_as_it_says_at_its_radius_about_its_line():
+    spec, fixed = mujoco.MjSpec(), ("world", (0.0, 0.0, 0.0))
+    coil.draw(
+        spec, "coil", (*fixed, (0.1, 0.0, 0.3)), (*fixed, (0.5, 0.0, 0.3)),
+        radius=0.02, turns=3, wire=1e-3, material="",
+    )  # fmt: skip
+    x, y, z = np.reshape(spec.skins[0].vert, (-1, coil.SIDES, 3)).mean(axis=1).T  # of the middle of the wire
+    angle = np.unwrap(np.arctan2(y, z - 0.3))
+    assert abs(angle[-1] - angle[0]) == pytest.approx(3 * 2 * np.pi)
+    np.testing.assert_allclose(np.hypot(y, z - 0.3), 0.02, rtol=1e-5)
+    np.testing.assert_allclose(x, np.linspace(0.1, 0.5, len(x)), rtol=1e-5)

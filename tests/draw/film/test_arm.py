@@ -106,6 +106,9 @@ def test_a_blow_is_an_arrow_that_ends_before_its_body(trace):
     y, x = np.nonzero((during == hue).all(axis=2) & ~(before == hue).all(axis=2))
     assert 250 - 100 * arm.REACH - 3 <= x.max() <= 250 - 100 * arm.REACH + 1
     assert abs(np.median(y) - 100) <= 1
+    edges = np.array([0.0, 0.02, 0.03, 0.14, 0.16, 0.18])  # s, of frames; it is seen until 0.12 s after its end
+    frames = [overlay(hit, edges).over(paper(), frame, lambda k, name: body) for frame in range(5)]
+    assert [(each[y, x] == hue).all() for each in frames] == [False, True, True, True, False]
 
 
 def test_the_key_names_only_what_is_in_the_picture(trace):

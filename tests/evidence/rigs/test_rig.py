@@ -57,6 +57,16 @@ def test_a_rig_makes_scenarios_of_its_machine(name):
         assert rig.scenario(duration=0.1).law == rig.controller
 
 
+@pytest.mark.parametrize(
+    ("name", "stall", "brake"),  # N m or N per volt; V per rad/s or m/s
+    [("qube_servo_2", 5e-3, 0.042), ("qube_servo_3", 5.63e-3, 0.0422), ("srv02", 0.128, 0.538), ("ip02", 1.72, 4.48)],
+)
+def test_a_quanser_motor_pushes_and_brakes_as_published(name, stall, brake):
+    (motor,) = smc.rig(name).scenario("none").actuator
+    lever = motor.gear * motor.torque_constant
+    assert (lever / motor.resistance, lever) == pytest.approx((stall, brake), rel=5e-3)
+
+
 def test_a_changed_quantity_changes_the_machine_and_its_source():
     other = smc.rig("qube_servo", arm_length=0.1)
     assert other.scenario("none").plant.parameters["L"] == 0.1
