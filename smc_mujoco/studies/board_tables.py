@@ -1,4 +1,4 @@
-"""Boards as tables: a line for each law, a column for each metric, its median with its interval.
+"""Boards as tables: a line for each law, a column for each metric with medians and their intervals.
 
 `leaderboard` imports this module, so its class Board is not named here.
 """
@@ -23,17 +23,14 @@ NO_BOARDS = Tabular(headings=["no boards: no metric applies"], rows=[])
 
 
 def size(value: float, metric: str) -> str:
-    """Return a median as text: "" for NaN, and a share in percent."""
+    """Return a median as text: "" for NaN, a share in percent."""
     if math.isnan(value):
         return ""
     return f"{100 * value:.0f}" if metric == SETTLES else CATALOGUE[metric].text(value)
 
 
 def spread(interval: Interval, metric: str) -> str:
-    """Return the ends of an interval with the digits of its median, so that it holds the median as printed.
-
-    It is "" for an interval that is not known.
-    """
+    """Return the ends of an interval, rounded like its median, so that the printed median is within; "" if unknown."""
     ends = [size(value, metric) for value in (interval.low, interval.high)]
     return "–".join(ends) if all(ends) else ""
 
@@ -65,25 +62,27 @@ def tables(boards: Iterable[Any], worst: Mapping[str, Mapping[str, Any]] | None 
 
 
 def _table(name: str, boards: Sequence[Any], worst: Mapping[str, Any]) -> Tabular:
-    """Return the table of one group of runs."""
+    """Return the table of one group of runs. Laws stand by place in the first metric, then in the next ones."""
     sources_of = sources(boards)
     known = ["gains"] * any(sources_of.values())
-    laws: dict[str, list[Cell | str]] = {}
+    rows: dict[str, list[Cell | str]] = {}
+    places: dict[str, list[float]] = {}
     for i, board in enumerate(boards):
         for entry in board.entries:
             left = [Cell(entry.law, colour=style.law_colour(entry.law)), *([kinds(sources_of[entry.law])] * len(known))]
-            row = laws.setdefault(entry.law, [*left, *[""] * len(boards)])
+            row = rows.setdefault(entry.law, [*left, *[""] * len(boards)])
             row[len(left) + i] = _cell(board, entry)
-    for law, one in worst.items():
-        laws[law].append(Cell(one.shown(one.value), f"median {one.shown(one.median)}"))
-    units = [f"worst found ({one.unit})" for one in worst.values()][:1]
+            places.setdefault(entry.law, []).append(entry.rank.place)
+    for law, case in worst.items():
+        rows[law].append(Cell(case.shown(case.value), f"median {case.shown(case.median)}"))
+    units = [f"worst found ({case.unit})" for case in worst.values()][:1]
     largest = max(boards, key=lambda board: len(board.blocks))
     name = ", ".join(filter(None, [name, largest.name(largest.blocks[0]) if len(largest.blocks) == 1 else ""]))
     samples = {block.sample: largest.name(block) for block in reversed(largest.blocks)}
     several = "; ".join(f"{sample} ({block}{' ...' * (len(largest.blocks) > 2)})" for sample, block in samples.items())
     return Tabular(
         headings=["law", *known, *map(heading, boards), *units],
-        rows=list(laws.values()),
+        rows=[rows[law] for law in sorted(rows, key=lambda law: (places[law], law))],
         title=f"{name}: {several if len(samples) > 1 else largest.blocks[0].sample}",
         notes=_verdicts(boards),
         left=1 + len(known),
@@ -93,9 +92,9 @@ def _table(name: str, boards: Sequence[Any], worst: Mapping[str, Any]) -> Tabula
 
 def _cell(board: Any, entry: Any) -> Cell:
     """Return a law's median, strong if no law is better, no run failed and there are enough runs for a winner."""
-    middle = size(entry.interval.median, board.metric)
-    best = entry.rank.best and middle != "" and not board.too_few and not board.barred
-    return Cell(middle, spread(entry.interval, board.metric), best, alarm=board.failures(entry))
+    median = size(entry.interval.median, board.metric)
+    best = entry.rank.best and median != "" and not board.too_few and not board.barred
+    return Cell(median, spread(entry.interval, board.metric), best, alarm=board.failures(entry))
 
 
 def key(boards: Sequence[Any]) -> str:
@@ -131,8 +130,8 @@ def sources(boards: Iterable[Any]) -> dict[str, list[Source]]:
 
 
 def _verdicts(boards: Sequence[Any]) -> list[str]:
-    """Return what the boards say, a sentence each; metrics with the same result share one."""
+    """Return the verdicts of boards; metrics with the same result share a sentence."""
     results: dict[str, list[Any]] = {}
     for board in boards:
         results.setdefault(board.result, []).append(board)
-    return [f"{', '.join(one.label for one in alike)}{alike[0].where}: {result}." for result, alike in results.items()]
+    return [f"{', '.join(one.label for one in same)}{same[0].where}: {result}." for result, same in results.items()]

@@ -2,7 +2,7 @@
 
     boards = leaderboard(table)                        # a Board for each plant and metric
     boards[0].winner                                   # a law's name, or None if no law is significantly better
-    print(boards[0].verdict)                           # the winner, and how much it has less than the next law
+    print(boards[0].verdict)                           # the winner, and by how much it leads
     print(boards)                                      # tables, with all verdicts
 
 `analysis.ranking` defines samples, tests, winners and the correction, `analysis.bootstrap` the intervals of medians. A
@@ -47,9 +47,9 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation.scenario import Scenario
     from smc_mujoco.studies.worst_case import WorstCase
 
-FEW_TIMES = 0.5  # ratio below which values are called so many times less, not so many percent; chosen
-MANY_TIMES = 10.0  # ratio above which values are called so many times as much; chosen
-SAME = 1e-9  # differences that are all smaller are not told, see `number`
+MAX_RATIO_OF_TIMES_LESS = 0.5  # a smaller ratio is "so many times less", a larger one so many percent; chosen
+MIN_RATIO_OF_TIMES_AS_MUCH = 10.0  # a larger ratio is "so many times as much", not so many percent; chosen
+MIN_DIFFERENCE = 1e-9  # smaller differences are not printed, see `number`
 MAX_NAMES = 4  # of plants or conditions in a verdict
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 
@@ -76,12 +76,12 @@ class Entry:
 
     @property
     def about_defaults(self) -> bool:
-        """Whether gains of it were searched about their defaults, as one has no unit."""
+        """Whether some of its gains were searched about their defaults, because one has no unit."""
         return any(source.search and source.search.about_defaults for source in self.sources)
 
 
 class Lead(NamedTuple):
-    """The law in front in a block, the rival that it is least sure to be better than, how they compare, and in what."""
+    """The law in front in a block, its closest rival (with the largest p-value), and how they compare, in a unit."""
 
     law: str
     rival: str
@@ -104,8 +104,8 @@ class Block:
       plant, condition: their names.
       medians: law -> median over the seeds; for "settles" the share of runs that do not settle.
       lacking: law -> number of runs that failed or have no value.
-      best: the laws without such a run that no other law is better than, with enough samples to tell.
-      undecided: the laws that no other is better than only because there are too few samples, see `ranking`.
+      best: the laws that no other law is better than, without such a run, and with enough samples to tell.
+      undecided: the laws that no other is better than, but only because there are too few samples, see `ranking`.
       lead: how the law in front compares with its closest rival; None for one law, for "settles", or if it has runs
         without a value.
       seeds: number of seeds in which every law ran.
@@ -113,7 +113,7 @@ class Block:
       samples: largest number of samples of any two laws, see `ranking`; of one law that of its runs.
       sets: smallest number of sets of gains of a law that has several; 1 if none has.
       untuned: the laws with default gains, over which no other law is named the winner.
-      ahead: the law that is better than every other, also over laws with default gains.
+      ahead: the law that is better than every other, laws with default gains included.
     """
 
     plant: str
@@ -158,7 +158,7 @@ class Board(Tables):
       unit: of the medians, with {x} and {u} as in `conventions.Metric.unit`; "" for "settles", which is 0 to 1.
       entries: lowest mean rank first. A median over several plants is NaN if its unit depends on the plant.
       blocks: the same laws on each plant in each condition.
-      cells: number of runs of each law, counting only cells that all laws have, and equal runs once.
+      cells: number of runs of each law in the cells that all laws have; equal runs count once.
       seeds: number of seeds, equal runs included.
       family: number of blocks of the table for which winners are corrected.
       limits: of the p-values, after the correction.
@@ -208,7 +208,7 @@ class Board(Tables):
         return [self.name(block) for block in self.blocks if block.winner == law]
 
     def losses(self, law: str) -> list[str]:
-        """Return the names of the blocks in which another law is better, or in which this one has runs that fail."""
+        """Return the names of the blocks in which another law is better, or in which runs of this law fail."""
         return [self.name(block) for block in self.blocks if law not in (*block.best, *block.undecided)]
 
     def name(self, block: Block) -> str:
@@ -218,7 +218,7 @@ class Board(Tables):
 
     @property
     def kind(self) -> str:
-        """The kind of the blocks: "conditions", "plants", or "cells" if they differ in both."""
+        """The kind of the blocks: "conditions", "plants", or "cells" if plants and conditions differ."""
         return {"plant": "conditions", "condition": "plants"}.get("".join(self.group), "cells")
 
     @property
@@ -242,9 +242,9 @@ class Board(Tables):
         """The result in words: the winner, else where laws win and lose, why there is no winner, or the best laws."""
         if self.winner:
             leads = [block.lead for block in self.blocks if block.lead]
-            least = min(leads, key=_shown_lead, default=None)
+            closest = min(leads, key=_closeness, default=None)
             several = f" in all {len(self.blocks)} {self.kind}" * (len(self.blocks) > 1)
-            how = f": {'at least ' * (len(leads) > 1)}{least.words}" if least else ""
+            how = f": {'at least ' * (len(leads) > 1)}{closest.words}" if closest else ""
             return f"{self.winner} wins{several}{how}{self._gains([self.winner])}"
         results = {}
         for law in (entry.law for entry in self.entries):
@@ -262,11 +262,11 @@ class Board(Tables):
 
     def _gains(self, laws: Collection[str]) -> str:
         """Return what limits the results of laws that win, after commas: their search, and "for these gains"."""
-        others = [one.law for one in self.entries if one.law in laws and one.about_defaults]
+        others = [entry.law for entry in self.entries if entry.law in laws and entry.about_defaults]
         names, its = f"{joined(others)} " * (len(laws) > 1), "its" if len(others) == 1 else "their"
         limits = [f"{names}with gains searched about {its} defaults and not by the rule"] * bool(others)
         limits += ["for these gains"] * all(block.sets == 1 for block in self.blocks)
-        return "".join(f", {one}" for one in limits)
+        return "".join(f", {limit}" for limit in limits)
 
     @property
     def why(self) -> str:
@@ -289,17 +289,17 @@ class Board(Tables):
     def too_few(self) -> str:
         """The size of the sample in words, if no block has enough samples for a winner; else ""."""
         largest = max(self.blocks, key=lambda block: block.samples)
-        least, error = 2 * least_p(largest.samples), 1 - self.level
-        if least <= error / self.family:
+        smallest_p, error = 2 * least_p(largest.samples), 1 - self.level
+        if smallest_p <= error / self.family:
             return ""
-        compared = f", too few for {self.family} comparisons" if least <= error else ", too few"
+        compared = f", too few for {self.family} comparisons" if smallest_p <= error else ", too few"
         if largest.samples < largest.sets or (largest.sets > 1 and largest.samples > largest.sets):
             return f"{largest.samples} samples{compared}"
         if largest.sets > 1:
             return f"{largest.sets} sets of gains{compared}"
         if largest.samples < largest.runs:
             return f"{largest.sample}, of two laws {_distinct(largest.samples)}"
-        return largest.sample + compared * (largest.runs == largest.seeds or least <= error)
+        return largest.sample + compared * (largest.runs == largest.seeds or smallest_p <= error)
 
     def failures(self, entry: Entry) -> str:
         """Return how many of a law's runs failed, such as "2 of 24 failed"; "" if none did.
@@ -316,13 +316,13 @@ def size_in_words(effect: Effect, unit: str = "", rival: str = "") -> str:
     """
     if effect.low == effect.high == float(effect.relative):
         return "no difference"
-    if not effect.relative and max(map(abs, effect[:3])) < SAME:
-        return f"no difference of {SAME:g} or more"
+    if not effect.relative and max(map(abs, effect[:3])) < MIN_DIFFERENCE:
+        return f"no difference of {MIN_DIFFERENCE:g} or more"
     endless = math.isinf(effect.high) and effect.low == (0.0 if effect.relative else -math.inf)
-    if effect.relative and effect.high < FEW_TIMES:
+    if effect.relative and effect.high < MAX_RATIO_OF_TIMES_LESS:
         times = [number(1 / value) if value else "inf" for value in (effect.value, effect.high, effect.low)]
         words, span = f"{times[0]} times less", f"{times[1]} to {times[2]} times"
-    elif effect.relative and effect.low > MANY_TIMES:
+    elif effect.relative and effect.low > MIN_RATIO_OF_TIMES_AS_MUCH:
         value, low, high = ("inf" if math.isinf(value) else number(value) for value in effect[:3])
         words, span = f"{value} times as much", f"{low} to {high} times"
     else:
@@ -345,8 +345,8 @@ def _counted(names: Sequence[str]) -> str:
     return joined(several) if len(several) <= MAX_NAMES else f"{several[0]} ... {several[-1]} ({len(several)})"
 
 
-def _shown_lead(lead: Lead) -> float:
-    """Return the key by which the closest of several leads is chosen: ratios by their size, then differences."""
+def _closeness(lead: Lead) -> float:
+    """Return a number that is smallest for the closest lead: ratios by the end of their interval, then differences."""
     return -lead.effect.high if lead.effect.relative else math.inf
 
 
@@ -358,7 +358,7 @@ class Boards(Tables, list[Board]):
     """Boards: a list that terminals, notebooks and `print` show as tables, with a verdict on each board.
 
     Attributes:
-      worst: plant -> law -> the worst case found, for a column of the plant's tables; empty for none.
+      worst: plant -> law -> its `worst_case`, for a column of the plant's tables; empty for none.
     """
 
     worst: "Mapping[str, Mapping[str, WorstCase]]" = frozen({})
@@ -498,62 +498,63 @@ def _unit(metric: str, unit: str, scenario: "Scenario | None") -> str:
     return dataclasses.replace(CATALOGUE[metric], unit=unit).unit_for(scenario.plant.unit)
 
 
-def _block(group: cells.Group, found: Comparison, at: int, k: int, untuned: tuple[str, ...], unit: str) -> Block:
-    """Return block k of a group, which is number `at` of the compared blocks; `unit` of its values."""
+def _block(group: cells.Group, comparison: Comparison, at: int, k: int, untuned: tuple[str, ...], unit: str) -> Block:
+    """Return block k of a group, block `at` of the comparison, with values in `unit`."""
     plant, condition = group.blocks[k]
-    several = found.sets[:, at][found.sets[:, at] > 1]
+    sets = comparison.sets[:, at]
     return Block(
         plant=plant,
         condition=condition,
-        medians=dict(zip(found.laws, found.centres[:, at].tolist(), strict=True)),
-        lacking=dict(zip(found.laws, found.without_value[:, at].tolist(), strict=True)),
-        best=found.best[at],
-        undecided=tuple(law for law, one in zip(found.laws, found.undecided[:, at].tolist(), strict=True) if one),
-        ahead=found.winners[at],
-        lead=_lead(found, at, unit),
+        medians=dict(zip(comparison.laws, comparison.centres[:, at].tolist(), strict=True)),
+        lacking=dict(zip(comparison.laws, comparison.without_value[:, at].tolist(), strict=True)),
+        best=comparison.best[at],
+        undecided=tuple(np.array(comparison.laws)[comparison.undecided[:, at]].tolist()),
+        ahead=comparison.winners[at],
+        lead=_lead(comparison, at, unit),
         seeds=group.seeds[k],
-        runs=int(found.seeds[at]),
-        samples=int(found.samples[at].max()) if len(found.laws) > 1 else int(found.seeds[at]),
-        sets=int(several.min(initial=found.cells.shape[2])) if several.size else 1,
+        runs=int(comparison.seeds[at]),
+        samples=int(comparison.samples[at].max()) if len(comparison.laws) > 1 else int(comparison.seeds[at]),
+        sets=int(sets[sets > 1].min()) if (sets > 1).any() else 1,
         untuned=untuned,
     )
 
 
-def _lead(found: Comparison, at: int, unit: str) -> Lead | None:
-    """Return how the law in front of a block compares with its closest rival: the one with the largest p-value."""
-    if len(found.laws) < 2 or found.shares:
+def _lead(comparison: Comparison, at: int, unit: str) -> Lead | None:
+    """Return how the law in front of a block compares with its closest rival, that with the largest p-value."""
+    if len(comparison.laws) < 2 or comparison.shares:
         return None
-    order = sorted(range(len(found.laws)), key=lambda i: (found.without_value[i, at], found.centres[i, at]))
-    first = order[0] if found.winners[at] is None else found.laws.index(found.winners[at])
-    if found.without_value[first, at]:
+    lacking, winner = comparison.without_value[:, at], comparison.winners[at]
+    order = sorted(range(len(comparison.laws)), key=lambda i: (lacking[i], comparison.centres[i, at]))
+    first = order[0] if winner is None else comparison.laws.index(winner)
+    if lacking[first]:
         return None
-    rival = max((i for i in order if i != first), key=lambda i: found.p[at, first, i])
-    names = found.laws[first], found.laws[rival]
-    effect = found.effect(at, *names)
+    rival = max((i for i in order if i != first), key=lambda i: comparison.p[at, first, i])
+    names = comparison.laws[first], comparison.laws[rival]
+    effect = comparison.effect(at, *names)
     return Lead(*names, effect, unit) if math.isfinite(effect.value) and effect.samples else None
 
 
 def _entries(
-    found: Comparison,
+    comparison: Comparison,
     sets: Mapping[str, np.ndarray],
     sources: Mapping[str, tuple[Source, ...]],
     mixed: bool,
     resamples: int,
     seed: int,
 ) -> tuple[Entry, ...]:
-    """Return the laws' lines. If `mixed`, values have several units, so there is no median."""
+    """Return the entries of all laws. If `mixed`, values have several units, so there is no median."""
     entries = []
-    for rank in ranks(found):
-        at = found.laws.index(rank.law)
-        values, samples = found.cells[at], samples_of(sets[rank.law])
+    for rank in ranks(comparison):
+        at = comparison.laws.index(rank.law)
+        values, samples = comparison.cells[at], samples_of(sets[rank.law])
         n = values.shape[1] if samples is None else max(samples) + 1
-        if found.shares:
-            interval = share_interval(float(1 - np.nanmean(values, axis=1).mean()), n, found.level)
+        if comparison.shares:
+            interval = share_interval(float(1 - np.nanmean(values, axis=1).mean()), n, comparison.level)
         elif mixed:
             interval = Interval(math.nan, math.nan, math.nan, n)
         else:
-            interval = median_of(values, found.level, resamples, seed, samples)
-        failed, runs = int(found.without_value[at].sum()), int((~np.isnan(values)).sum())
+            interval = median_of(values, comparison.level, resamples, seed, samples)
+        failed, runs = int(comparison.without_value[at].sum()), int((~np.isnan(values)).sum())
         its = sources.get(rank.law, ())
         entries.append(Entry(law=rank.law, interval=interval, rank=rank, failed=failed, runs=runs, sources=its))
     return tuple(entries)

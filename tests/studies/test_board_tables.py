@@ -66,6 +66,12 @@ def cells(boards: Boards) -> list[dict[str, list[str]]]:
     return found
 
 
+@pytest.mark.parametrize(("first", "laws"), [("ultimate_bound", ["third", EVIL, "second"]), ("settles", [*LAWS])])
+def test_laws_stand_by_place_in_the_first_metric_then_in_the_next(first, laws):
+    (table,) = leaderboard(Stand(), metrics=(first, "itae")).tables
+    assert [row[0].text for row in table.rows] == laws
+
+
 def bold(text: str) -> list[str]:
     return re.findall(r"<b>(.*?)</b>", text)
 
