@@ -101,6 +101,11 @@ def winner(found: Cells, plant: str, condition: str, metric: str) -> str | None:
     return next((score.law for score in found.get((plant, condition, metric), ()) if score.wins), None)
 
 
+def settles(found: Cells, plant: str, condition: str, law: str) -> bool:
+    """Return whether a law settles in the median of a cell; True where that was not measured."""
+    return all(s.median < math.inf for s in found.get((plant, condition, "settling_time"), ()) if s.law == law)
+
+
 def lead(found: Cells, plant: str, condition: str, metric: str) -> str:
     """Return how the winner compares with its closest rival, in words; "" if there is no winner."""
     said = next((score.lead for score in found[plant, condition, metric] if score.wins), "")
@@ -143,7 +148,6 @@ def losses(found: Cells, metrics: Sequence[str], law: str = words.PAPER) -> list
             continue
         best = min((s for s in scores if s.best), key=lambda s: s.median, default=None)
         if best is not None and math.isfinite(best.median):
-            settling = {s.law: s.median for s in found.get((plant, condition, "settling_time"), ())}
             least = max(best.floor, ROUNDING)
             loss = Loss(
                 metric=metric,
@@ -154,7 +158,7 @@ def losses(found: Cells, metrics: Sequence[str], law: str = words.PAPER) -> list
                 law=best.law,
                 times=own.median / max(best.median, least),
                 rounded=best.median < least,
-                settles=settling.get(best.law) != math.inf,
+                settles=settles(found, plant, condition, best.law),
             )
             lost.append(loss)
     return sorted(lost, key=lambda loss: -loss.times)
@@ -253,8 +257,14 @@ def leads(findings: "Findings", metric: str) -> str:
         f"{words.law(law)} wins on every plant under {joined(names)}"
         for law, names in everywhere(findings, metric).items()
     ]
+    found = cells(findings.scores)
+    unsettled = Counter(
+        law for key in found if key[2] == metric and (law := winner(found, *key)) and not settles(found, *key[:2], law)
+    )
     wins = [
-        f"{words.law(row.law)} wins in {row.alone} and loses in {row.lost or 'none'}"
+        f"{words.law(row.law)} wins in {row.alone}"
+        + f" (never settling in {unsettled[row.law]} of them)" * bool(unsettled[row.law])
+        + f" and loses in {row.lost or 'none'}"
         for row in standing[:NAMED]
         if row.alone
     ]

@@ -95,6 +95,8 @@ def sentence(found: tuple[Oscillation, ...]) -> str:
     both = [one for one in found if not math.isnan(one.error)]
     calm = sum(math.isnan(one.amplitude) and math.isnan(one.measured_amplitude) for one in found)
     text = f"Of {len(found)} pairs of plant and law {len(both)} are predicted to oscillate and do; {calm} do neither"
+    if wrong := len(found) - len(both) - calm:
+        text += f"; for {wrong} prediction and run disagree"
     if not both:
         return f"{text}."
     error = statistics.median(abs(one.error) for one in both)

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 
+from smc_mujoco.analysis.scaling import CLOSE
+from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.plan import GAINS, Report, Work
 from smc_mujoco.studies.accuracy import AccuracyTable, accuracy, load
 from smc_mujoco.studies.cache import cached
@@ -41,4 +43,8 @@ def sentences(table: AccuracyTable) -> Iterator[str]:
     for title, rows in table.groups.items():
         promised = [row.s for row in rows if row.s.theory is not None]
         kept = sum(one.as_promised for one in promised)
-        yield f"{title}: {kept} of {len(promised)} laws have the order of s that theory promises."
+        plant, _, condition = title.partition(", ")
+        yield (
+            f"{words.plant(plant)}, {condition}: the order of s is within {CLOSE:g} of theory’s for {kept} of "
+            f"{len(promised)} laws."
+        )

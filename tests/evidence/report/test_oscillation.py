@@ -40,6 +40,10 @@ def test_the_sentence_counts_pairs_and_takes_the_median_error(found):
     better = dataclasses.replace(switching, amplitude=1.01 * switching.measured_amplitude)
     said = oscillation.sentence((*worse, better, calm))
     assert said.startswith("Of 4 pairs of plant and law 3 are predicted to oscillate and do; 1 do neither.")
+    unseen = dataclasses.replace(switching, measured_amplitude=math.nan)
+    assert "2 are predicted to oscillate and do; 0 do neither; for 1 prediction and run disagree." in (
+        oscillation.sentence((*worse, unseen))
+    )
     assert said.endswith("is 30 %.")
     better = dataclasses.replace(switching, amplitude=1.1 * switching.measured_amplitude)
     assert oscillation.sentence((worse[0], better)).endswith("is 20 %.")  # midway between 10 % and 30 %

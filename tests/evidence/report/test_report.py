@@ -373,6 +373,14 @@ def test_over_several_cells_the_answer_says_who_wins_where_and_loses_where(findi
     assert "nor in every condition" in text
 
 
+def test_a_win_of_a_law_that_never_settles_says_so(findings):
+    settling = [*scores(adaptive=math.inf, classical=1.0), *scores("noise", adaptive=2.0, classical=1.0)]
+    calm = [s for name in ("nominal", "noise", "sine") for s in scores(name, adaptive=1.0, classical=3.0)]
+    calm = [s._replace(metric="tv_rate", wins=s.wins and s.condition != "sine") for s in calm]
+    few = dataclasses.replace(findings, scores=(*settling, *calm))
+    assert "Adaptive wins in 2 (never settling in 1 of them) and loses in none" in answer.leads(few, "tv_rate")
+
+
 def test_a_law_that_is_level_with_one_that_seldom_settles_keeps_it_from_winning(findings):
     cell = [s._replace(best=True, wins=False) for s in scores(observer_free=1.0, classical=math.inf)]
     assert answer.leaders(answer.cells(cell), "duffing", "nominal", "settling_time") == ["observer_free", "classical"]
