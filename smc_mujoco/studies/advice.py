@@ -344,7 +344,7 @@ class Advice(Tables):
             f"a matter of what counts against {joined(mixed)}, better here and worse there" if mixed else "",
             self._against(others[0]),
         ]
-        return f"How sure: {'; '.join(filter(None, parts))}. {self._holds}"
+        return f"How sure: {'; '.join(filter(None, parts))}. {self._holds} {self._luck}".strip()
 
     def _against(self, rival: str) -> str:
         """Return how the first law compares with a rival on each need, in the condition in which it does worst."""
@@ -380,8 +380,19 @@ class Advice(Tables):
             ones = [law for law, its in zip(self.comparison.laws, several.tolist(), strict=True) if not its]
             gains = f"over sets of gains, but for these gains of {joined(ones)}"
         others = [need for need in self.needs if not NEEDS[need].tested]
-        this = f"Except for {joined(others)}, this" if others else "This"
-        return f"{this} holds {gains}, over starts and noise."
+        these = f"Except for {joined(others)}, these" if others else "These"
+        return f"{these} comparisons hold {gains}, over starts and noise."
+
+    @property
+    def _luck(self) -> str:
+        """Which laws might be first by chance, in words; "" if none."""
+        first, *others = self.compared
+        rivals = any(first not in self.dominated(name) for name in others)
+        which = ["it does not dominate"] * rivals + ["the screening left out"] * bool(self.others)
+        told = (
+            f"The order is not tested: with other starts and noise a law that {' or that '.join(which)} may be first."
+        )
+        return told * bool(which and not self._untested)
 
     def _left_out(self) -> str:
         if not self.others:

@@ -135,7 +135,7 @@ def test_robust_goes_by_the_worst_found_and_tells_the_median_too(folder, monkeyp
     tested = ranking.compare({law: both.comparison.cells[i, :1] for i, law in enumerate(both.comparison.laws)})
     assert both.comparison.limits == tested.limits  # what has no test is in no family of tests
     assert text(made).endswith("There is no test, as the worst found is one value of a law and no sample.")
-    assert "Except for robust, this holds over sets of gains, but for these gains of" in text(both)
+    assert "Except for robust, these comparisons hold over sets of gains, but for these gains of" in text(both)
     alike = options | {"starts": smc.starts(spread=0.0), "laws": [FAST, SLOW]}
     one = smc.which("duffing", needs="fast,robust", conditions="nominal", duration=2.5, seeds=6, **alike)
     assert one.comparison.cells.shape == (2, 2, 1)  # every seed is the same run
@@ -163,6 +163,7 @@ def test_where_another_law_is_better_the_answer_says_which_and_what_it_gives_and
     assert "Fast: settling time 2.00 s; better is observer_free." in first
     assert f"If only fast counts: {FAST}, with settling time 1.00 s instead of 2.00 s; it costs TV rate 9.90" in first
     assert "a matter of what counts against observer_free, better here and worse there" in first
+    assert "with other starts and noise a law that it does not dominate may be first." in first
     assert "it dominates classical" in first
 
 
@@ -261,7 +262,11 @@ def test_an_answer_over_sets_of_gains_counts_them(advice):
     found = dataclasses.replace(advice, comparison=comparison, choices=tuple(choices))
     assert found.samples == "24 sets of gains"
     assert "ahead with 9 of 24 sets of gains" in text(found)
-    assert "This holds over sets of gains, over starts and noise." in text(found)
+    assert "These comparisons hold over sets of gains, over starts and noise." in text(found)
+    assert "not tested" not in text(found)  # the first dominates all that there are
+    lucky = "The order is not tested: with other starts and noise a law that {} may be first."
+    others = dataclasses.replace(found, others=("pid",))
+    assert lucky.format("the screening left out") in text(others)
 
 
 def test_restraint_ranks_laws_by_overshoot_and_by_energy_of_u(advice):
