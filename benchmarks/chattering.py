@@ -1,16 +1,18 @@
 """Calibrate the ranges of predicted chattering on random loops that are integrated exactly.
 
     python benchmarks/chattering.py [--loops 200] [--seed 0]
+    python benchmarks/chattering.py --halving duffing    # behind which drives half the physics step changes which laws
 
 A range is widened by a factor, so that it holds the exact amplitude, or frequency, in more than 95 % of the loops. The
 script prints the factors, which `smc_mujoco/analysis/chattering.py` has as constants, and how good the predictions are.
-It takes about a minute and a half of processor time.
+It takes about a minute and a half of processor time, the halving a third of that.
 """
 
 import argparse
 import math
 import sys
 import warnings
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +25,39 @@ from test_exact_cycles import scenario  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.analysis.chattering import AMPLITUDE_FACTOR, FREQUENCY_FACTOR  # noqa: E402
+from smc_mujoco.control import gain_sets  # noqa: E402
+from smc_mujoco.simulation.grid import case  # noqa: E402
 
 SHARE = 0.97  # of the loops whose ranges are to hold the truth, over 95 %: chosen after a trial on 60 other loops
 SLOWEST = 1.0  # Hz, of the cycles that count
+DRIVES = {
+    "none": None,
+    "lag 1 ms": smc.Lag(1e-3),
+    "lag 10 ms": smc.Lag(0.01),
+    "lags 5 and 10 ms": (smc.Lag(5e-3), smc.Lag(0.01)),
+    "rate limit": smc.RateLimit(200.0),
+    "motor without inductance": smc.DCMotor(inductance=0.0),
+    "motor RE 40": smc.DCMotor(),
+    "motor of 5 ms": smc.DCMotor(inductance=5e-3 * smc.DCMotor().resistance),
+    "backlash": smc.Backlash(0.02, rotor_damping=0.02),
+}
+
+
+def halving(plant: str) -> None:
+    """Print which laws with tuned gains half the physics step changes by more than 10 %, behind each drive."""
+    marked, cases = Counter(), Counter()
+    for name, drive in DRIVES.items():
+        changes = {} if drive is None else {"actuator": drive}
+        runs = smc.run([case(plant, law, "nominal", 5.0, "tuned", changes=changes) for law in gain_sets.general()])
+        integrator = runs[0].scenario.resolved.integrator
+        found = {t.scenario.law.name: c for t, c in zip(runs, smc.step_halving(runs, 0), strict=True) if c.marked}
+        marked[integrator] += len(found)
+        cases[integrator] += len(runs)
+        parts = [
+            f"{law} {100 * change.amplitude:.0f} %, {100 * change.frequency:.0f} %" for law, change in found.items()
+        ]
+        print(f"{name}: {len(found)} of {len(runs)}{', amplitude and frequency: ' * bool(parts)}{'; '.join(parts)}")
+    print(*(f"{name}: {marked[name]} of {cases[name]}" for name in cases), sep=", ")
 
 
 def main() -> None:
@@ -33,8 +65,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--loops", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--halving", metavar="PLANT", help="what half the physics step changes on this plant instead")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
+    if given.halving:
+        halving(given.halving)
+        return
     rng, rows, none = np.random.default_rng(given.seed), [], 0
     while len(rows) < given.loops:
         loop = random_loop(rng)
