@@ -56,7 +56,7 @@ from smc_mujoco.studies.fair_gains import Candidate, asking, fair_gains
 from smc_mujoco.studies.needs import NEEDS, ROBUST, Choice, Need, Runs, ties
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import study
-from smc_mujoco.studies.worst_case import DURATION, WorstCase, default_budget, kept
+from smc_mujoco.studies.worst_case import DURATION, WorstCase, cached_worst_case, default_budget
 
 USUAL = ("fast", "accurate", "calm")  # what is compared where nothing is asked
 CONDITIONS = ("nominal", "noise", "sine")  # where none is given
@@ -265,7 +265,7 @@ def _worst(
     worst: dict[str, list[WorstCase]] = {}
     for i, one in (numbered for its in cases for numbered in enumerate(its)):
         file = Path(f"{path}-{i}-{one.plant.name}-{one.law.name}.json")
-        worst.setdefault(one.law.name, []).append(kept(file, one, within, budget, **options))
+        worst.setdefault(one.law.name, []).append(cached_worst_case(file, one, within, budget, **options))
     return worst
 
 

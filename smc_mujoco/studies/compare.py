@@ -1,11 +1,11 @@
 """Comparison of laws on plants in conditions, in one call: gains, runs, tables, verdicts, figures.
 
-    found = smc.compare([my_law, "classical"], ["duffing", "inverted_pendulum"], ["friction", "encoder"])
-    print(found)                                   # tables of at most 80 columns, and a verdict on every metric
-    found.plot("compared.pdf")
-    found.to_latex("compared.tex")
+    compared = smc.compare([my_law, "classical"], ["duffing", "inverted_pendulum"], ["friction", "encoder"])
+    print(compared)                                # tables of at most 80 columns, and a verdict on every metric
+    compared.plot("compared.pdf")
+    compared.to_latex("compared.tex")
 
-It is made of parts that can be used alone: `fair_gains`, `smc.grid`, `smc.study` and `smc.leaderboard`.
+Its parts can be used alone: `fair_gains`, `smc.grid`, `smc.study` and `smc.leaderboard`.
 """
 
 import dataclasses
@@ -46,13 +46,13 @@ from smc_mujoco.studies.leaderboard import METRICS, Boards, leaderboard
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, study
 from smc_mujoco.studies.table import Table
-from smc_mujoco.studies.worst_case import DURATION, WorstCase, kept
+from smc_mujoco.studies.worst_case import DURATION, WorstCase, WorstCases, cached_worst_case
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure, SubFigure
 
-MAX_BLOCKS = 12  # plants times conditions that have a table each; of more, each plant has one over its conditions
+MAX_BLOCKS = 12  # plants times conditions with a table each; beyond, each plant has one table over all conditions
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -61,13 +61,12 @@ class Compared(Tables):
 
     Attributes:
       table: a row for each run, with all its scores, as `smc.study` returns it.
-      gains: plant -> law -> the law with its gains, `gains["duffing"]["classical"].source` tells where they come from.
       candidates: plant -> the laws with all sets of gains that their runs used, and remarks on them.
       metrics: names of the metrics that are compared.
       defaults: whether a winner may be named over laws with default gains.
       relevant: the least relevant difference, as a share of the larger value.
       out: the folder with the gains and the runs.
-      worst: plant -> law -> the worst case that was found; empty if it was not searched.
+      worst: plant -> law -> its `worst_case`; empty if it was not searched.
     """
 
     table: Table
@@ -80,8 +79,8 @@ class Compared(Tables):
 
     @property
     def gains(self) -> dict[str, dict[str, Law]]:
-        """Plant -> law -> the law with its best gains."""
-        return {plant: {one.law.name: one.law for one in its} for plant, its in self.candidates.items()}
+        """Plant -> law -> the law with its best gains; `gains["duffing"]["classical"].source` says their source."""
+        return {plant: {each.law.name: each.law for each in laws} for plant, laws in self.candidates.items()}
 
     @functools.cached_property
     def leaderboard(self) -> Boards:
@@ -105,44 +104,30 @@ class Compared(Tables):
 
     @property
     def remarks(self) -> list[str]:
-        """What is to be known of the gains: the laws with defaults, and why."""
-        remarked: dict[str, list[str]] = {}
-        for plant, its in self.candidates.items():
-            for one in its:
-                default = "default gains" * (one.law.source.kind == source.DEFAULT)
-                if words := "; ".join(filter(None, (default, one.remark))):
-                    remarked.setdefault(f"{one.law.name}: {words}", []).append(plant)
-        return [f"{words} (on {joined(plants)})" for words, plants in remarked.items()]
+        """Remarks on the gains: which laws have their defaults, and why."""
+        plants_of: dict[str, list[str]] = {}
+        for plant, candidates in self.candidates.items():
+            for candidate in candidates:
+                default = "default gains" * (candidate.law.source.kind == source.DEFAULT)
+                if words := "; ".join(filter(None, (default, candidate.remark))):
+                    plants_of.setdefault(f"{candidate.law.name}: {words}", []).append(plant)
+        return [f"{words} (on {joined(plants)})" for words, plants in plants_of.items()]
 
     @property
     def tables(self) -> list[Tabular]:
         """The tables of the `leaderboard`, then one of the gains with their sources."""
-        lines = [
-            (plant, one.law.name, one.law.source.kind, f"{len(one.sets)}", _gains(one.law))
-            for plant, its in self.candidates.items()
-            for one in its
-        ]
+        rows = []
+        for plant, candidates in self.candidates.items():
+            for law, sets, _ in candidates:
+                best = ", ".join(f"{name}={written(value)}" for name, value in law.gains.items())
+                rows.append((plant, law.name, law.source.kind, f"{len(sets)}", best))
         heads = ["plant", "law", "gains", "sets", "best set"]
-        gains = Tabular(headings=heads, rows=lines, title="Gains", notes=self.remarks, left=len(heads))
-        return [*self.leaderboard.tables, *self._worst_tables(), gains]
+        gains = Tabular(headings=heads, rows=rows, title="Gains", notes=self.remarks, left=len(heads))
+        return [*self.leaderboard.tables, *self._worst_tables, gains]
 
-    def _worst_tables(self) -> Iterator[Tabular]:
-        """Yield a table of the worst cases for each plant, the law with the least of them first."""
-        for plant, its in self.worst.items():
-            ordered = sorted(its.items(), key=lambda pair: pair[1].value)
-            first = ordered[0][1]
-            what = CATALOGUE[first.metric].label
-            yield Tabular(
-                headings=["law", "gains", f"worst found ({first.unit})", f"median ({first.unit})", "found by"],
-                rows=[
-                    (law, each.nominal.law.source.kind, each.shown(each.value), each.shown(each.median), each.found_by)
-                    for law, each in ordered
-                ],
-                title=f"{plant}: {what}, worst of {first.tried} runs within {first.class_words}",
-                notes=["The median is that of random members of the class. The true worst case may be worse."],
-                left=2,
-                stacked=True,
-            )
+    @property
+    def _worst_tables(self) -> list[Tabular]:
+        return [table for cases in self.worst.values() for table in WorstCases(cases.values()).tables]
 
     def to_latex(self, path: str | os.PathLike[str] | None = None) -> str:
         """Return a LaTeX tabular for each plant in each condition, below comments with the verdicts; needs booktabs.
@@ -150,7 +135,7 @@ class Compared(Tables):
         Args:
           path: of a file to which it is written too.
         """
-        text = "\n".join(table.to_latex() for table in [*self.leaderboard.tables, *self._worst_tables()])
+        text = "\n".join(table.to_latex() for table in [*self.leaderboard.tables, *self._worst_tables])
         if path is not None:
             with replacing(Path(path)) as file:
                 file.write_text(text, encoding="utf-8")
@@ -161,7 +146,7 @@ class Compared(Tables):
 
         Its columns are plant, condition, law, gains (their source), metric, unit, median, low and high (the interval),
         failed (runs without a value), runs, best (whether no law is better), winner, and worst_found: the rms error of
-        the worst run that an adversary found on the plant, NaN if none was asked for. All runs are in
+        the worst run that an adversary found on the plant, NaN without a search. All runs are in
         `table.data.to_pandas()`.
 
         Raises:
@@ -306,7 +291,7 @@ def compare(
     def attacked(plant: Plant, law: Law) -> WorstCase:
         scenario = case(plant, law, "nominal", attacked_for, starts=starts)
         within, path = None if worst is True else worst, folder / "worst" / f"{plant.name}-{law.name}.json"
-        return kept(path, scenario, within or None, None, threads, progress)
+        return cached_worst_case(path, scenario, within or None, None, threads, progress)
 
     worst_cases = {
         plant.name: {one.law.name: attacked(plant, one.law) for one in candidates[plant.name]}
@@ -330,8 +315,3 @@ def _chosen(laws: Any, plant: Plant) -> list[Any]:
     known = [name for name in gain_sets.LAWS if fits(catalogue()[name], plant)]
     left_out = {"none", *gain_sets.FORMS}  # FORMS are other implementations of laws that are there already
     return known or [law for law in suitable(plant=plant) if law.name not in left_out]
-
-
-def _gains(law: Law) -> str:
-    """Return gains as text, such as "k1=3, c=2"."""
-    return ", ".join(f"{name}={written(value)}" for name, value in law.gains.items())

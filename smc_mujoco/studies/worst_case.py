@@ -5,8 +5,8 @@
     smc.run(worst.scenario)                  # the worst run, to the last bit
 
 Sliding mode promises that the error stays small whatever a disturbance does within its bound. A median over random
-seeds does not test this. The class is the user's, and the search has no parameters, so that no law gets a milder
-adversary than another: `analysis.worst_case` describes both. What it finds is a lower bound of the worst case.
+seeds does not test this. The user gives the class. The search has no parameters, so that no law gets a milder adversary
+than another. `analysis.worst_case` describes both. The worst run that is found is a lower bound of the worst case.
 """
 
 import dataclasses
@@ -38,28 +38,28 @@ if TYPE_CHECKING:
 
 METRIC = "rms_error"
 DURATION = 8.0  # s, of attacked runs where none is given: the error counts from a quarter on, when laws have settled
-STEPS = 1_250_000  # physics steps of the search in the default budget, for a plant of one channel: 4 s of a core
+DEFAULT_STEPS = 1_250_000  # physics steps of a search by default, for a plant of one channel: 4 s of a core
 MIN_RUNS, MAX_RUNS = 24, 1024  # of the default budget
-MOST_RUNS = 1_000_000
+MAX_BUDGET = 1_000_000
 PANELS = "error", "d", "u", "phase"  # of a figure
 HEADINGS = "law", "worst found", "median", "place by median", "found by"
-MAX_WORDS = 48  # letters of a class in a picture's title, which is cropped if it is longer; chosen
-BEGIN = 2  # random members that the search also changes, the worst of them
+MAX_LETTERS = 48  # of a class in a picture's title, which would be cropped; chosen
+FIRST_MEMBERS = 2  # the worst random members, from which the search begins
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class WorstCase(Tables):
-    """The worst member of a class that was found for a scenario.
+    """The worst run of a scenario that was found within a class.
 
     Attributes:
       value: the metric of the worst run; inf if it failed.
       median: the metric's median over as many random members as the search had runs.
       unit: of both.
       scenario: the worst run, an ordinary scenario that gives this value to the last bit.
-      found_by: the strategy that found it, or from which its changes began.
+      found_by: the strategy that made the member, or the one from which it was changed.
       tried: number of runs, half of them of random members.
-      strategies: strategy -> largest value among the members that it made, also by changes.
-      nominal: the scenario that was attacked.
+      strategies: strategy -> largest value among its members, changed ones included.
+      nominal: the scenario that was given.
       within: the class.
       metric: its name.
       outside: why the theorem of the law does not cover the class; "" if nothing is known against it.
@@ -94,9 +94,9 @@ class WorstCase(Tables):
 
     @property
     def heading(self) -> str:
-        """The plant and the class, or how many bounds it has if these are too long for a picture's title."""
+        """The plant and the class; the number of its bounds if the class is too long for a picture's title."""
         words = self.class_words
-        words = words if len(words) <= MAX_WORDS else f"{words.count(', ') + 1} bounds"
+        words = words if len(words) <= MAX_LETTERS else f"{words.count(', ') + 1} bounds"
         return f"{self.nominal.plant.name}: the worst found within {words}"
 
     @property
@@ -119,12 +119,11 @@ class WorstCase(Tables):
         return self.with_unit(self.value)
 
     def about(self) -> dict[str, Any]:
-        """Return it as JSON data. `scenario` is what a trace's file has, too."""
+        """Return it as JSON data, with the scenario as in a trace's file."""
         names = "value", "median", "unit", "found_by", "tried", "metric", "outside", "seed", "sets"
-        values = {name: getattr(self, name) for name in names}
-        rest = {"strategies": dict(self.strategies)}
-        within = dataclasses.asdict(self.within)
-        return values | rest | {"within": within, "scenario": serialise.describe(self.scenario)}
+        values: dict[str, Any] = {name: getattr(self, name) for name in names}
+        values |= {"strategies": dict(self.strategies), "within": dataclasses.asdict(self.within)}
+        return values | {"scenario": serialise.describe(self.scenario)}
 
     @property
     def tables(self) -> list[Tabular]:
@@ -150,44 +149,44 @@ class WorstCase(Tables):
 
 
 class WorstCases(Tables, list[WorstCase]):
-    """Worst cases of several laws on one plant within one class, the least bad law first, as a table."""
+    """Worst cases of several laws on one plant within one class, the best law first, as a table."""
 
-    def __init__(self, found: Iterable[WorstCase]):
-        super().__init__(sorted(found, key=lambda one: (one.value, one.median)))
+    def __init__(self, cases: Iterable[WorstCase]):
+        super().__init__(sorted(cases, key=lambda case: (case.value, case.median)))
 
     @property
     def tau(self) -> float:
         """Kendall's tau between the order by median and the order by worst found; NaN for fewer than two laws."""
         from scipy.stats import kendalltau
 
-        return float(kendalltau([one.median for one in self], [one.value for one in self]).statistic)
+        return float(kendalltau([case.median for case in self], [case.value for case in self]).statistic)
 
     @property
     def title(self) -> str:
-        """Plant, metric and class."""
-        one = self[0]
-        unit = f" in {one.unit}" * bool(one.unit)
-        return f"{one.nominal.plant.name}: {CATALOGUE[one.metric].label}{unit}, {one.class_words}"
+        """Plant, metric, number of runs and class."""
+        first = self[0]
+        metric = CATALOGUE[first.metric].label + f" in {first.unit}" * bool(first.unit)
+        return f"{first.nominal.plant.name}: {metric}, worst of {first.tried} runs within {first.class_words}"
 
     @property
     def tables(self) -> list[Tabular]:
-        """One table: what was found for each law, the median of random members, and the place by median."""
-        by_median = sorted(self, key=lambda one: one.median)
-        rows = [
-            [
-                Cell(one.nominal.law.name, colour=law_colour(one.nominal.law.name)),
-                *(one.shown(one.value), one.shown(one.median), str(by_median.index(one) + 1), one.found_by),
-            ]
-            for one in self
-        ]
+        """One table: the worst run of each law, the median of random members, and the place by median."""
+        by_median = sorted(self, key=lambda case: case.median)
+        rows = []
+        for case in self:
+            law = Cell(case.nominal.law.name, colour=law_colour(case.nominal.law.name))
+            place = str(by_median.index(case) + 1)
+            rows.append([law, case.shown(case.value), case.shown(case.median), place, case.found_by])
         return [Tabular(headings=HEADINGS, rows=rows, title=self.title, notes=self.notes)]
 
     @property
     def notes(self) -> list[str]:
-        """Kendall's tau, what is known of laws whose theorem the class goes beyond, and which laws are not tuned."""
+        """The meaning of the numbers, Kendall's tau, laws whose theorem does not cover the class, and untuned laws."""
+        key = ["The median is that of random members of the class. The true worst case may be worse."]
         tau = [f"Kendall's tau between the two orders: {self.tau:.2f}"] if len(self) > 2 else []
-        beyond = [f"{one.nominal.law.name}: {one.outside}" for one in self if one.outside]
-        return [*tau, *beyond, *unequal({one.nominal.law.name: one.nominal.law.source.kind for one in self})]
+        laws = {case.nominal.law.name: case for case in self}
+        beyond = [f"{law}: {case.outside}" for law, case in laws.items() if case.outside]
+        return [*key, *tau, *beyond, *unequal({law: case.nominal.law.source.kind for law, case in laws.items()})]
 
     def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
         """Draw the worst runs of all laws; arguments as in `smc.figure`."""
@@ -196,8 +195,8 @@ class WorstCases(Tables, list[WorstCase]):
         if len(self) == 1:
             return self[0].figure(path, **options)
         options = {"title": self[0].heading, "panels": PANELS} | options
-        labels = [f"{one.nominal.law.name}: {one.words}" for one in self]
-        return figure(run([one.scenario for one in self]), path, labels, **options)
+        labels = [f"{case.nominal.law.name}: {case.words}" for case in self]
+        return figure(run([case.scenario for case in self]), path, labels, **options)
 
 
 def worst_case(
@@ -212,9 +211,8 @@ def worst_case(
     """Search for the worst that may happen to a scenario within a class of uncertainty.
 
     Args:
-      scenario: its plant, law and conditions. The class adds to its disturbances, noise, delay and parameters. Of
-        several scenarios, such as those of a rig's sets of parameters, the adversary chooses one; the first is the
-        nominal one.
+      scenario: plant, law and conditions, to whose disturbances, noise, delay and parameters the class adds. Of several
+        scenarios, such as those of a rig's sets of parameters, the first is the nominal one, and the adversary chooses.
       metric: name of any metric; more is worse. Default: the rms error from a quarter of the run on.
       within: the class, such as smc.Uncertainty(disturbance=2.0, mass=(0.7, 1.3)). Default: what the
         plant declares as `uncertain`, such as an arm's payload, or else disturbances up to a sixth of the force of the
@@ -225,7 +223,7 @@ def worst_case(
       threads, progress: as in `run`. The result does not depend on threads.
 
     Raises:
-      ScenarioError: a class that the plant cannot have; an unknown metric, or one that the plant has not.
+      ScenarioError: a class that the plant cannot have, an unknown metric, or one that the plant does not have.
     """
     scenarios = _listed(scenario)
     scenario = scenarios[0]
@@ -235,19 +233,19 @@ def worst_case(
     entry = find("metric", metric, CATALOGUE)
     if why := entry.refusal(scenario.plant):
         raise ScenarioError(why)
-    budget = default_budget(scenario, within) if budget is None else whole("budget", budget, 1, MOST_RUNS)
+    budget = default_budget(scenario, within) if budget is None else whole("budget", budget, 1, MAX_BUDGET)
     seed = whole("seed", seed, 0, 2**53 - 1)
     members = Members(scenarios, within)
     work = 2 * budget * scenario.work
     with bar(f"worst case of {scenario.law.name} on {scenario.plant.name}", work, shown=progress) as drawn:
         drawing, search = (Search(members, entry, budget, threads, drawn.advance) for _ in range(2))
         drawing.draw(np.random.default_rng([seed, 0]))
-        early = sorted(drawing.tried[:MIN_RUNS], key=lambda one: one.key, reverse=True)
-        search.search(np.random.default_rng([seed, 1]), early[:BEGIN])
-    worst = max(search.worst, drawing.worst, key=lambda one: one.key)
+        early = sorted(drawing.tried[:MIN_RUNS], key=lambda tried: tried.key, reverse=True)
+        search.search(np.random.default_rng([seed, 1]), early[:FIRST_MEMBERS])
+    worst = max(search.worst, drawing.worst, key=lambda tried: tried.key)
     return WorstCase(
         value=float(worst.key[0]),
-        median=float(np.median([one.key[0] for one in drawing.tried])),
+        median=float(np.median([tried.key[0] for tried in drawing.tried])),
         unit=entry.unit_for(scenario.plant.units[0], scenario.efforts[0]),
         scenario=members.scenario_of(worst.member),
         found_by=worst.member.kind,
@@ -263,14 +261,14 @@ def worst_case(
 
 
 def _largest_by_kind(tried: Sequence[Tried]) -> dict[str, float]:
-    """Return strategy -> largest value among the members that it made."""
+    """Return `WorstCase.strategies`."""
     largest: dict[str, float] = {}
     for one in tried:
         largest[one.member.kind] = max(largest.get(one.member.kind, -np.inf), one.key[0])
     return largest
 
 
-def kept(
+def cached_worst_case(
     path: Path,
     scenario: Scenario,
     within: Uncertainty | None = None,
@@ -286,8 +284,8 @@ def kept(
         known = serialise.restore(data.pop("scenario"))
         return WorstCase(**data, scenario=dataclasses.replace(known, law=scenario.law), nominal=scenario, within=within)
 
-    def save(found: WorstCase, file: Path) -> None:
-        about = found.about()
+    def save(worst: WorstCase, file: Path) -> None:
+        about = worst.about()
         del about["within"]
         write_json(file, about)
 
@@ -306,21 +304,20 @@ def _listed(given: object) -> list[Scenario]:
     Raises:
       ScenarioError: none, or several that differ in more than parameters.
     """
-    found: Any = list(given) if isinstance(given, list | tuple) else [given]
-    if not found or not all(isinstance(one, Scenario) for one in found):
+    scenarios: Any = list(given) if isinstance(given, list | tuple) else [given]
+    if not scenarios or not all(isinstance(each, Scenario) for each in scenarios):
         raise ScenarioError(f"worst_case attacks a Scenario, not {shown(given)}: give smc.Scenario(...)")
-    scenarios: list[Scenario] = found
-    if len({(one.samples, one.control_period, one.plant.n) for one in scenarios}) > 1:
+    if len({(each.samples, each.control_period, each.plant.n) for each in scenarios}) > 1:
         raise ScenarioError("worst_case attacks one run on several sets of parameters: give all the same duration")
     return scenarios
 
 
 def default_budget(scenario: Scenario, within: Uncertainty) -> int:
-    """Return how many runs a search has if no budget is given.
+    """Return the number of runs of a search without a given budget.
 
-    A physics step costs half as much more for each channel, and twice as much with dry friction, which MuJoCo solves.
+    Each channel adds half to the time of a physics step, and dry friction, which MuJoCo solves, doubles it.
     """
     plant = scenario.plant
-    rubs = bool(scenario.friction or within.friction[1]) or any(plant.parameters[name] for name in plant.dry)
+    dry = bool(scenario.friction or within.friction[1]) or any(plant.parameters[name] for name in plant.dry)
     channels = 1 + plant.n
-    return min(max(MIN_RUNS, 2 * STEPS // (scenario.samples * scenario.steps * channels * (1 + rubs))), MAX_RUNS)
+    return min(max(MIN_RUNS, 2 * DEFAULT_STEPS // (scenario.samples * scenario.steps * channels * (1 + dry))), MAX_RUNS)

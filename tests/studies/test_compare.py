@@ -180,7 +180,7 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
     for found in made.worst["duffing"].values():
         assert smc.score(smc.run(found.scenario))["rms_error"] == found.value >= found.median
     text = repr(made)
-    assert "duffing: rms error, worst of 16 runs within |d| <= 0.5 N" in text
+    assert "duffing: rms error in m, worst of 16 runs within |d| <= 0.5 N" in text
     assert all(number(each.value) in text for each in made.worst["duffing"].values())
     assert "worst found (m)" in made.to_latex()
     column = {row[0].text: row[-1] for row in made.leaderboard.tables[0].rows}
@@ -190,7 +190,7 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
     again = smc.compare(laws, "duffing", "nominal", 1, worst=within, out=tmp_path, **SHORT)
     assert again.worst["duffing"]["pid"].scenario == made.worst["duffing"]["pid"].scenario
     attacked = []
-    monkeypatch.setattr(compare, "kept", lambda path, scenario, *_: attacked.append(scenario.duration))
+    monkeypatch.setattr(compare, "cached_worst_case", lambda path, scenario, *_: attacked.append(scenario.duration))
     smc.compare(laws, "duffing", "nominal", 1, worst=True, quick=True, out=tmp_path / "other")
     assert attacked == [8.0, 8.0]  # s, where no duration is given, whatever that of the other runs
 

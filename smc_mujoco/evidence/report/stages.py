@@ -35,7 +35,7 @@ from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.noise_key import DRAWN, has_user_code
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
-from smc_mujoco.studies.worst_case import DURATION, WorstCase, kept
+from smc_mujoco.studies.worst_case import DURATION, WorstCase, cached_worst_case
 
 FIELD_POINTS = 121  # of a map of V', along each axis
 ON_SURFACE = 1e-6  # |s| up to this is s = 0, as in the claim on V'
@@ -173,7 +173,7 @@ def worst_cases(work: Work) -> tuple[WorstCase, ...]:
     def compute(pair: tuple[str, str], report: Report) -> WorstCase:
         plant, law = pair
         scenario = case(plant, law, "nominal", DURATION, GAINS)
-        return kept(work.folder / f"worst-{plant}-{law}.json", scenario, None, plan.attacks, work.threads)
+        return cached_worst_case(work.folder / f"worst-{plant}-{law}.json", scenario, None, plan.attacks, work.threads)
 
     return tuple(work.each("worst", "searches", [(p, law) for p in plan.attacked for law in plan.laws], compute))
 
