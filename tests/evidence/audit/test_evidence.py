@@ -1,5 +1,6 @@
 """The evidence of an audit: written twice it is the same, it leads from claims to runs, and its seal shows changes."""
 
+import colorsys
 import dataclasses
 import json
 import subprocess
@@ -17,8 +18,8 @@ from smc_mujoco.common.files import from_json
 from smc_mujoco.draw import style
 from smc_mujoco.evidence.audit import badge, evidence
 from smc_mujoco.evidence.audit.audit import audit
-from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED
-from smc_mujoco.evidence.commands import papers
+from smc_mujoco.evidence.audit.verdict import ANSWERS, PARTLY, REFUTED, SUPPORTED, VERDICTS
+from smc_mujoco.evidence.commands import papers, tables
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies.run_key import portable_key
 
@@ -182,6 +183,15 @@ def test_a_badge_has_a_field_for_each_verdict_that_occurs(tmp_path):
         assert float(box.attrib["width"]) > style.width(word, badge.SIZE) + badge.MARGIN
     with pytest.raises(ScenarioError, match=r"end the name in \.svg"):
         badge.save("a", [], tmp_path / "badge.png")
+
+
+def test_verdicts_have_colours_of_their_own_from_green_to_red_and_answers_another():
+    for colours in (badge.COLOURS, tables.COLOURS):
+        answers = {colours[answer] for answer in ANSWERS.values()}
+        assert len(answers) == 1
+        assert len({colours[verdict] for verdict in VERDICTS} | answers) == 5
+    refuted, partly, supported = (colorsys.rgb_to_hls(*style.rgb(badge.COLOURS[v]))[0] for v in VERDICTS[2::-1])
+    assert 0.0 < refuted < 0.05 < partly < 0.15 < supported < 0.4  # red, amber, green
 
 
 # the command

@@ -85,6 +85,17 @@ def test_the_page_has_every_claim_its_numbers_and_gains(made):
     assert "0.125" in words
 
 
+def test_a_part_of_the_page_has_the_heading_of_what_it_holds(made):
+    home, _ = made
+    headings = re.findall(r'<h2 id="(\w+)-title">.*?</span>(.*?)</h2>', (home / "out" / "report.html").read_text())
+    assert dict(headings) == {
+        "claims": "The claims",
+        "checks": "How far from the thresholds",
+        "gains": "Gains",
+        "method": "How it was computed",
+    }
+
+
 def test_every_link_of_the_page_leads_to_a_part_of_it_and_nothing_comes_from_outside(made):
     _, page = made
     assert {link[1:] for link in page.links} <= set(page.ids)

@@ -197,6 +197,25 @@ def test_a_score_counts_its_law_s_failed_runs(made, folder):
     assert {s.failed for s in rows} == {0, 1}
 
 
+def test_the_first_line_counts_what_was_run(text, findings):
+    (line,) = re.findall(r'<p class="sub">(\d+) runs .*?>(\w+) failed</a>(.*?) seeds each', text)
+    runs, failed, factors = int(line[0]), line[1], [int(number) for number in re.findall(r"\d+", line[2])]
+    assert (runs, failed, factors) == (12, "none", [1, 3, 2, 2])  # plants, laws, conditions, seeds
+    assert math.prod(factors) == runs == findings.about.runs
+
+
+def test_a_scene_has_the_gains_of_the_report(findings):
+    (scene,) = findings.scenes
+    runs = scenarios.comparison(scene.plant, scene.condition, TINY.scene_laws, duration=TINY.scene, gains="tuned")
+    for curve, trace in zip(scene.curves, run(list(runs.values())), strict=True):
+        np.testing.assert_array_equal(curve.u, films.curve(trace).u)
+
+
+def test_plants_have_the_short_names_that_they_give_themselves():
+    names = [words.plant(name) for name in ("van_der_pol", "duffing", "cart_pole", "no_plant")]
+    assert names == ["Van der Pol", "Duffing", "Cart pole", "No plant"]
+
+
 def test_margins_and_fronts_are_told_as_found(reader, findings):
     rows = [row[1] for row in reader.rows["margins-table"] if row[1]]
     assert [float(cells[3][0]["data-v"]) for cells in rows] == [m.value for m in findings.margins]
