@@ -30,8 +30,8 @@ from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
-from smc_mujoco.mechanisms.hardware.drives import DCMotor, drive_step
-from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids
+from smc_mujoco.mechanisms.hardware.drives import DCMotor
+from smc_mujoco.mechanisms.hardware.part import Actuator, dof_ids, drive_ids
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import native
 from smc_mujoco.simulation.scenario import Scenario
@@ -106,10 +106,12 @@ class Loop:
     def _linearise(self) -> None:
         """Linearise MuJoCo's model about rest at x = 0, without contacts, limits, dry friction and gaps."""
         s = self.scenario.resolved
-        closed = tuple(part for part in s.actuator if part.drives)
+        motor = next((part for part in s.actuator if isinstance(part, DCMotor)), None)
         ideal = dataclasses.replace(
-            self.scenario, actuator=closed, contact="none", x0=None, v0=None, jump=None, integrator=s.integrator
-        )
+            self.scenario,
+            actuator=None if motor is None else dataclasses.replace(motor, inductance=0.0),
+            contact="none", x0=None, v0=None, jump=None, integrator=s.integrator, physics_step=s.physics_step,
+        )  # fmt: skip
         with installed(None):
             compiled = models.compile_model(ideal)
             made = models.with_values(compiled, ideal)
@@ -124,7 +126,7 @@ class Loop:
             data = mujoco.MjData(made)
             key = models.initial_state(made, dataclasses.replace(ideal, x0=0.0, v0=0.0))
             data.qpos[:], data.qvel[:] = key
-            self.a, b = transition(made, data)
+            self.a, b = transition(made, data, s.actuator)
             self.b = b[:, drive_ids(made)[self.channel]] * math.prod(part.scale for part in s.actuator)
             self.rows, self.nv = dof_ids(made), made.nv
             self.gap = 0.0 if gear is None else self._gap(gear, made, data)
@@ -156,22 +158,9 @@ class Loop:
         z = np.exp(1j * (omega * self.step + math.tau * np.arange(count) / count))
         passed = sum(z**-i for i in range(count)) / count  # by the hold
         passed = passed * z ** -round(s.input_delay / self.step)
-        passed *= self._driven(z)
         answers = np.linalg.solve(z[:, None, None] * np.eye(len(self.a)) - self.a, self.b[:, None])[:, :, 0]
         late = s.sensor.delay if s.sensor else 0.0
         return passed @ answers * np.exp(-1j * omega * late)
-
-    def _driven(self, z: np.ndarray) -> np.ndarray | float:
-        """Return the gain from u to what MuJoCo gets from the drives in the callback, for u = z^k at steps k."""
-        drives = drive_step(self.scenario.actuator, self.step)
-        if drives is None:
-            return 1.0
-        if any(part.stateful for part in self.scenario.actuator):  # the winding itself is in the model
-            drives = drives._replace(force_first=drives.second_first, force_second=0.0)
-        first = (1.0 - drives.first_left) / (z - drives.first_left)  # the outputs of the drives
-        passed, left = drives.second_first, drives.second_left
-        second = (1.0 - passed - left + passed * first) / (z - left)
-        return 1.0 + drives.force_first * (first - 1.0) + drives.force_second * (second - 1.0)
 
     @functools.cached_property
     def count(self) -> float:
@@ -362,16 +351,37 @@ class Controller:
         return out[:, 0], out[:, 1]
 
 
-def transition(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+def transition(
+    model: mujoco.MjModel, data: mujoco.MjData, actuator: Sequence[Actuator] = ()
+) -> tuple[np.ndarray, np.ndarray]:
     """Return A (n, n) and B (n, nu) of a physics step without any integrator's error, linearised at `data`.
 
-    The state is positions, velocities and activations. Its rates are linearised, and A and B are their exponentials.
+    The state is positions, velocities and activations, then what the drives of an `actuator` give, see `_behind`. Its
+    rates are linearised, and A and B are their exponentials.
     """
     from scipy.linalg import expm
 
-    n, block = 2 * model.nv + model.na, rates(model, data)
+    block = rates(model, data)
+    for drive in reversed([part for part in actuator if part.delay]):
+        block = _behind(drive, block, model)
+    n = len(block) - model.nu
     stepped = expm(block * float(model.opt.timestep))
     return stepped[:n, :n], stepped[:n, n:]
+
+
+def _behind(drive: Actuator, block: np.ndarray, model: mujoco.MjModel) -> np.ndarray:
+    """Return the `rates` of a model behind a drive, whose outputs are then states and its inputs the commands.
+
+    A motor's model has no inductance: the voltage V - gear k v becomes the state R i.
+    """
+    ids = drive_ids(model)
+    outputs, speeds = len(block) - model.nu + ids, model.nv + model.jnt_dofadr[model.actuator_trnid[ids, 0]]
+    made = np.pad(block, (0, model.nu))
+    if isinstance(drive, DCMotor):
+        made[:, speeds] += drive.constant * made[:, outputs]
+        made[outputs, speeds] = -drive.constant / drive.delay
+    made[outputs, outputs], made[outputs, len(block) + ids] = -1.0 / drive.delay, 1.0 / drive.delay
+    return made
 
 
 def describing_function(

@@ -42,10 +42,10 @@ class Setting:
       scenario: the run that equals an episode, with the law `none`.
       model: its compiled model.
       qpos, qvel: addresses of the n channels, (n,) each.
-      ctrl: addresses of the driven channels' actuators.
+      ctrl, shafts: addresses of the driven channels' actuators, and in qvel of what they drive.
       rotors: channels with a separate rotor, and its addresses in qpos and qvel, (3, rotors).
       initial_state: qpos (nq,) and qvel (nv,), into which x and v of an episode's start are written.
-      ctrl_limits: the largest inputs of the model's actuators, (driven,).
+      limits, scale: the largest commands, (driven,), and the actuators' inputs per unit of them.
       selected: the channels that the task treats differently, (n,) of bool, see `Task.selected`.
       rest_x: the plant's rest, from which positions count in errors, (n,).
       rest_r: the same for the references: the rest of each channel that has one, then zeros, (3 m,).
@@ -86,10 +86,11 @@ class Setting:
         self.low, self.high = starts(self.task, plant) if changes.get("x0") is None else (fixed, fixed)
         self.model = _compiled(self.scenario, edit)
         table = channels(self.model)
-        self.qpos, self.qvel, self.ctrl = table["qpos"], table["qvel"], table["ctrl"][: plant.driven]
+        self.qpos, self.qvel = table["qpos"], table["qvel"]
+        self.ctrl, self.shafts = (table[name][: plant.driven] for name in ("ctrl", "shaft"))
         self.rotors = _rotors(self.model)
         self.initial_state = models.initial_state(self.model, self.scenario)
-        self.ctrl_limits = math.prod(part.scale for part in self.scenario.actuator) * np.array(self.scenario.limits)
+        self.limits, self.scale = np.array(self.scenario.limits), math.prod(p.scale for p in self.scenario.actuator)
         self.selected, self.rest_x = self.task.selected(plant), rest(plant)
         self.references = _references(self.scenario, self.scenario.samples + 1 if self.task.moving else 1)
         width = self.references.shape[1]
@@ -98,7 +99,7 @@ class Setting:
         self.rest_r[: width // 3] = self.rest_x[: width // 3] if plant.rest else 0.0
 
     def command(self, action: Any, copies: tuple[int, ...] = ()) -> np.ndarray:
-        """Return the actuators' inputs for an action, (*copies, driven): its saturated values times the limits.
+        """Return the commands of an action, (*copies, driven): its saturated values times the limits.
 
         Raises:
           ScenarioError: an action of another shape, or not of finite numbers.
@@ -114,23 +115,33 @@ class Setting:
                 i = int(np.argmin(np.isfinite(a).all(axis=-1)))
                 wrong = f"{shown(a[i].tolist())} for copy {i}"
             raise ScenarioError(f"action is {wrong}: give finite numbers, of shape {shape}")
-        return self.ctrl_limits * np.minimum(np.maximum(a, -1.0), 1.0)
+        return self.limits * np.minimum(np.maximum(a, -1.0), 1.0)
 
-    def apply_command(self, ctrl: np.ndarray, command: np.ndarray, drive_states: np.ndarray) -> Iterator[int]:
+    def drive_start(self, qvel: np.ndarray) -> np.ndarray | float:
+        """Return both states of `DriveStep` at the start of episodes with velocities qvel (..., nv)."""
+        effect = self.scenario.drive_step
+        return 0.0 if effect is None else effect.start(qvel[..., self.shafts])
+
+    def apply_command(
+        self, ctrl: np.ndarray, command: np.ndarray, drive_states: np.ndarray, qvel: np.ndarray
+    ) -> Iterator[int]:
         """Write inputs into ctrl over a control period; yield after each for how many physics steps it lasts.
 
         Args:
           ctrl: of one simulation, (nu,), or of several, (..., nu).
           command: the return value of `command`, (..., driven).
           drive_states: both states of `DriveStep`, (2, ..., driven); updated in place.
+          qvel: velocities, (..., nv).
         """
         effect, steps = self.scenario.drive_step, self.scenario.steps
         if effect is None:
-            ctrl[..., self.ctrl] = command
+            ctrl[..., self.ctrl] = self.scale * command
             yield steps
             return
         for _ in range(steps):
-            ctrl[..., self.ctrl], drive_states[0], drive_states[1] = effect(command, *drive_states)
+            states = drive_states[0], drive_states[1]
+            force, drive_states[0], drive_states[1] = effect(command, *states, qvel[..., self.shafts])
+            ctrl[..., self.ctrl] = self.scale * force
             yield 1
 
     def formula_friction(self, count: int = 1) -> FormulaFriction | None:
@@ -203,7 +214,8 @@ class Episode:
         x, v = self.setting.draw_start(random, options)
         mujoco.mj_resetData(self.setting.model, data)
         self.setting.write_start(data.qpos, data.qvel, x, v)
-        self.episodes, self.sample, self.drive_states[:] = self.episodes + 1, 0, 0.0
+        self.episodes, self.sample = self.episodes + 1, 0
+        self.drive_states[:] = self.setting.drive_start(data.qvel)
         if self.friction:
             self.friction.begin([0])
         self.read_state(data)
@@ -214,7 +226,7 @@ class Episode:
 
     def apply_action(self, data: mujoco.MjData, action: Any) -> Iterator[int]:
         """Apply an action over a control period, see `Setting.apply_command`."""
-        return self.setting.apply_command(data.ctrl, self.setting.command(action), self.drive_states)
+        return self.setting.apply_command(data.ctrl, self.setting.command(action), self.drive_states, data.qvel)
 
     def read_state(self, data: mujoco.MjData) -> None:
         """Read the state."""

@@ -155,7 +155,8 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
             self.batch.reset(ids.astype(np.int32), stage=0)
         for i in ids:
             self.setting.write_start(self.qpos[i], self.qvel[i], *self.setting.draw_start(self.randoms[i], options))
-        self.samples[mask], self.ended[mask], self.drive_states[:, mask] = 0, False, 0.0
+        self.samples[mask], self.ended[mask] = 0, False
+        self.drive_states[:, mask] = self.setting.drive_start(self.qvel[mask])
         if self.friction:
             self.friction.begin(ids)
             self.batch.bind("userdata")[ids] = self.friction.userdata[ids]
@@ -163,7 +164,7 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
     def advance(self, ids: np.ndarray | None, commands: np.ndarray) -> np.ndarray:
         """Take one control period in the copies `ids`, None for all. Return those that failed, (num_envs,) of bool."""
         failed = np.zeros(self.num_envs, bool)
-        for steps in self.setting.apply_command(self.ctrl, commands, self.drive_states):
+        for steps in self.setting.apply_command(self.ctrl, commands, self.drive_states, self.qvel):
             try:
                 # a Batch refuses Python callbacks, which runs of other threads may have set
                 with callback.installed() if self.friction else mjcb.installed(None):

@@ -101,7 +101,7 @@ def knows_contacts(scenario: Scenario) -> bool:
 
 def _with_hidden_state(scenario: Scenario) -> list:
     """Return the actuators with a state that a trace lacks."""
-    return [part for part in scenario.actuator if part.stateful or part.in_callback or not part.drives]
+    return [part for part in scenario.actuator if part.in_callback or part.delay or not part.drives]
 
 
 @once_per_trace

@@ -11,6 +11,7 @@ from smc_mujoco.mechanisms.plant import DIRECTLY
 
 # Indices of a channel in mjData, -1 if it has no such thing:
 #   qpos, qvel, x_sensor and v_sensor (in sensordata), ctrl, force (in actuator_force)
+#   shaft: of what the actuator itself drives, joint or rotor, in qvel
 #   xfrc: of a generalised force d in xfrc_applied, which enters there with `sign`
 #   push: of a horizontal force on the body in xfrc_applied, for a hinge along the axis `along` of the world, 0 or 1
 #   tip, anchor: of the ends of that force's lever arm, in xipos and xanchor, and of the axis in xaxis; -1 for a slide
@@ -20,8 +21,8 @@ CHANNEL = np.dtype(
     [
         (name, "i8")
         for name in (
-            "qpos", "qvel", "x_sensor", "v_sensor", "ctrl", "force", "xfrc", "sign", "push", "along", "tip",
-            "anchor", "friction", "brake", "direct",
+            "qpos", "qvel", "x_sensor", "v_sensor", "ctrl", "force", "shaft", "xfrc", "sign", "push", "along",
+            "tip", "anchor", "friction", "brake", "direct",
         )
     ]
 )  # fmt: skip
@@ -75,6 +76,7 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
         "qvel": model.jnt_dofadr[joint],
         "ctrl": model.actuator_ctrladr[drive] if drive >= 0 else -1,
         "force": model.actuator_outadr[drive] if drive >= 0 else -1,
+        "shaft": model.jnt_dofadr[model.actuator_trnid[drive, 0]] if drive >= 0 else -1,
         "xfrc": xfrc,
         "sign": sign,
         "push": xfrc,

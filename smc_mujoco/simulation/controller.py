@@ -342,16 +342,23 @@ def _actuate(sim, data, step):
                 data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * buffer[i]
     if sim.has_drives != 0:
         for i in range(sim.driven):
-            data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * _drive(sim.drive_step, state_at(sim.states, i))
+            channel = channel_at(sim.channels, i)
+            mean = _drive(sim.drive_step, state_at(sim.states, i), data.qvel[channel.shaft])
+            data.ctrl[channel.ctrl] = sim.scale * mean
 
 
 @njit(error_model="numpy", inline="always")
-def _drive(factors, state):
-    """Advance a channel's drives by a physics step, see DriveStep. Return the mean force, or a motor's command."""
+def _drive(factors, state, v):
+    """Advance a channel's drives by a physics step, see DriveStep. Return the mean force. v: the drive's speed."""
     u, second = state.arrived, state.second
     a, b = state.first - u, second - u
     force = u + factors.force_first * a
     state.first = u + factors.first_left * a
+    if factors.voltage != 0.0:
+        bound, torque = factors.voltage, second - factors.drag * v
+        mean, end = min(max(force, -bound), bound), min(max(u + factors.second_first * a, -bound), bound)
+        state.second = end + factors.second_left * (torque - end) - factors.second_drag * v
+        return mean + factors.force_second * (torque - mean) - factors.force_drag * v
     if factors.reach == 0.0:
         state.second = u + factors.second_first * a + factors.second_left * b
         return force + factors.force_second * b

@@ -271,11 +271,19 @@ def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
         "a": buffer.reserve(n),
         "width": width,
         "commands": buffer.reserve(2 * width),
-        "states": buffer.reserve(state.CHANNEL_STATE.itemsize // 8 * n),
+        "states": buffer.put(_states(s)),
         "limits": buffer.put(s.limits),
         "delay_slots": slots,
         "delay_buffer": buffer.reserve(slots * n),
     }
+
+
+def _states(s: Resolved) -> list[float]:
+    """Return the channels' states at the start of a run."""
+    states = np.zeros(s.plant.n, state.CHANNEL_STATE)
+    if s.drive_step is not None:
+        states["first"], states["second"] = s.drive_step.start(np.array(s.v0))
+    return states.view(float).tolist()
 
 
 def _joint_measurement(

@@ -92,7 +92,9 @@ class Loop:
         self.last_reading = np.zeros((n, 2))  # that was not lost
         self.forces = np.zeros((2, n))  # sums over a control period: of the drives, of friction and contacts
         self.scale = math.prod(part.scale for part in scenario.actuator)
-        self.drive_step, self.first, self.second = scenario.drive_step, np.zeros(n), np.zeros(n)  # drives' states
+        self.drive_step = scenario.drive_step
+        if self.drive_step:  # both states of the drives
+            self.first, self.second = self.drive_step.start(self.data.qvel[self.channels["shaft"]])
         self.limits = np.array(scenario.limits)
         inertia, formula = self.model.dof_M0[self.channels["qvel"]], self.scenario.sliding
         self.sliding = [] if formula is None else [PythonFriction(formula, i) for i in range(n)]
@@ -165,7 +167,9 @@ class Loop:
             self.arrived = self.commands[past // self.scenario.steps]
         command = self.arrived
         if self.drive_step:
-            command, self.first, self.second = self.drive_step(command, self.first, self.second)
+            command, self.first, self.second = self.drive_step(
+                command, self.first, self.second, data.qvel[self.channels["shaft"]]
+            )
         data.ctrl[self.channels["ctrl"][self.driven]] = (self.scale * command)[self.driven]
 
     def late(self, k: int) -> int:

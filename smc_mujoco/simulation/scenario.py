@@ -45,7 +45,8 @@ U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
 JITTER_STEPS = 4  # physics steps in the clock's jitter, at least; chosen: it takes five values or more
-SHORT_LAG = 0.2  # control periods: a shorter lag needs no shorter physics step, see `longest_step`
+SHORT_LAG = 0.02  # control periods: a shorter lag needs no shorter physics step, see `longest_step`
+DRIVE_STEPS = 4  # per control period, that are enough behind any drive, see `longest_step`
 MAX_DEFAULT_STEPS = 100_000  # per control period, if no physics step is given
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
@@ -80,8 +81,8 @@ class Scenario:
       duration: s. The run lasts as many whole control periods as fit into it.
       control_period: s; the law runs this often and its command is held in between.
       physics_step: s; must divide the control period. Default: the largest such step up to 1 ms for the plant's plain
-        equation, also behind a Lag (half of it at most), a RateLimit or a DCMotor without inductance; up to 0.25 ms
-        with friction, contact, a mechanism or another actuator; up to a quarter of the clock's jitter.
+        equation, also behind a Lag, a RateLimit or a DCMotor (see `longest_step`); up to 0.25 ms with friction,
+        contact, a mechanism or a Backlash; up to a quarter of the clock's jitter.
       u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest motor of your own model.
         A motor's own limit holds too: see `limits`. In V, with the motor's voltage as default, if u is a voltage.
       x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the plant's x0, and 0.
@@ -101,7 +102,7 @@ class Scenario:
       noise_key: a number with which the random numbers of all seeds are keyed. Comparisons draw one after the laws are
         fixed, so that no law can know its noise. 0: the seed alone.
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation, also behind
-        a Lag, a RateLimit or a DCMotor without inductance, else implicitfast.
+        a Lag, a RateLimit or a DCMotor, else implicitfast.
       friction: of every joint, beside the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or several of them.
       contact: what the mechanism touches: a Contact or its kind, one of those the plant offers, or "none".
       mechanism: "equation", or the name of another mechanism that the plant offers.
@@ -272,9 +273,9 @@ class Scenario:
 
     @property
     def ideal(self) -> bool:
-        """Whether MuJoCo integrates the plant's plain equation, behind drives without a state of MuJoCo or none."""
+        """Whether MuJoCo integrates the plant's plain equation, behind drives or none."""
         bare = not self.friction and self.contact.kind == "none" and self.mechanism == "equation"
-        return bare and self.plant.smooth and all(part.drives and not part.stateful for part in self.actuator)
+        return bare and self.plant.smooth and all(part.drives for part in self.actuator)
 
     @property
     def amplifier(self) -> DCMotor | None:
@@ -340,7 +341,7 @@ class Scenario:
     @property
     def drive_step(self) -> DriveStep | None:
         """What the drives do in a physics step; None if the actuators get the command itself."""
-        return drive_step(self.actuator, self.resolved.physics_step)
+        return drive_step(self.actuator, self.resolved.physics_step, self.resolved.integrator == "RK4")
 
     @property
     def work(self) -> int:
@@ -415,14 +416,16 @@ def _defaults(s: Scenario) -> dict[str, Any]:
 def longest_step(s: Scenario) -> float:
     """Return the largest default physics step, s.
 
-    A Lag that is about as short as the control period moves its force within a step, of which RK4 gets the mean. Half
-    of such a lag keeps the amplitudes of limit cycles right to 2 %; much shorter lags have no such effect.
+    A drive moves its force within a step, of which RK4 gets the mean. So velocities at the ends of steps are exact, and
+    positions are late by a twelfth of the square of the step times the acceleration's change: in a cycle of omega, by
+    (omega step)^2/12 of it. With four steps that is 5 % for the fastest cycle of a sampled law, of two samples. Half of
+    a long lag, behind which cycles are slower, does as well. A force that follows at once stays where it is in a step.
     """
     jitter = s.clock.jitter / JITTER_STEPS or MAX_STEP
     if not s.ideal:
         return min(REALISTIC_STEP, jitter)
-    lags = (0.5 * part.delay for part in s.actuator if part.delay >= SHORT_LAG * s.control_period)
-    return min(MAX_STEP, jitter, *lags)
+    moving = [part for part in s.actuator if part.delay >= SHORT_LAG * s.control_period or part.limited]
+    return min(MAX_STEP, jitter, *(max(0.5 * part.delay, s.control_period / DRIVE_STEPS) for part in moving))
 
 
 def _steps(s: Scenario) -> int:
@@ -621,7 +624,7 @@ def check_names(s: Resolved) -> None:
 
 def check_mechanism(s: Resolved) -> None:
     """Check that the integrator suits the parts, and mechanism and contact the parameters at any time."""
-    if s.integrator == "RK4" and (states := [p for p in (*s.friction, *s.actuator) if p.stateful]):
+    if s.integrator == "RK4" and (states := [p for p in s.friction if p.stateful]):
         raise ScenarioError(
             f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the integrator out"
         )

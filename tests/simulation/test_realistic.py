@@ -666,7 +666,6 @@ def test_what_does_not_fit_is_refused_in_one_sentence():
         ({"mechanism": None}, "unknown mechanism of duffing None: choose from equation, springs"),
         ({"mechanism": ["springs"]}, "unknown mechanism of duffing"),
         ({"integrator": "RK4", "friction": LUGRE}, "integrator RK4 does not integrate the state of LuGre"),
-        ({"integrator": "RK4", "actuator": smc.DCMotor()}, "integrator RK4 does not integrate the state of DCMotor"),
         ({"integrator": "rk4"}, "unknown integrator 'rk4': did you mean 'RK4'?"),
         ({"reference": smc.Gust(1.0, 0.0, 1.0)}, "reference is Gust, which is a force"),
         ({"reference": smc.BandLimited(1.0, 0.0, 1.0)}, "reference is BandLimited"),
@@ -799,18 +798,22 @@ def test_defaults_follow_the_fields_that_are_given():
 
 def test_every_realism_brings_its_defaults():
     for field in ("contact", "mechanism", "actuator", "friction"):
-        value = {"contact": "stops", "mechanism": "springs", "actuator": smc.DCMotor(), "friction": LUGRE}[field]
+        value = {"contact": "stops", "mechanism": "springs", "actuator": smc.Backlash(0.1), "friction": LUGRE}[field]
         made = dataclasses.replace(scenario(), **{field: value})
         assert (made.resolved.integrator, made.resolved.physics_step) == ("implicitfast", REALISTIC_STEP)
 
 
-def test_lags_and_rate_limits_keep_the_plain_integrator():
+def test_drives_keep_the_plain_integrator():
     for actuator, step in (
         (smc.Lag(0.01), 1e-3),
-        (smc.RateLimit(50.0), 1e-3),
+        (smc.RateLimit(50.0), 2.5e-4),
+        (smc.RateLimit(math.inf), 1e-3),
         (smc.Lag(1e-3), 5e-4),  # half of the lag
+        (smc.Lag(1e-4), 2.5e-4),
         (smc.Lag(1e-5), 1e-3),  # much shorter than the control period
         ((smc.Lag(6e-4), smc.Lag(0.01)), 2.5e-4),
+        (smc.DCMotor(), 2.5e-4),  # L/R = 0.28 ms
+        (smc.DCMotor(inductance=0.0), 1e-3),
     ):
         made = scenario(actuator=actuator)
         assert (made.resolved.integrator, made.resolved.physics_step) == ("RK4", pytest.approx(step))

@@ -336,10 +336,11 @@ def _norm(values: np.ndarray) -> float:
 def _steps(scenario: Scenario, halvings: int) -> dict[str, Any]:
     """Return integrator and step of a corrected replay.
 
-    RK4 has errors of first order only where dry friction changes its direction. It cannot integrate drives with states.
+    RK4 has errors of first order only where dry friction changes its direction. It cannot integrate friction that has a
+    state.
     """
     integrator, step = "RK4", scenario.control_period / math.ceil(scenario.control_period / LARGEST_STEP - 1e-9)
-    if scenario.input_delay or any(part.stateful for part in (*scenario.friction, *scenario.actuator)):
+    if scenario.input_delay or any(part.stateful for part in scenario.friction):
         integrator, step = scenario.resolved.integrator, scenario.resolved.physics_step
     return {"integrator": integrator, "physics_step": step / 2**halvings}
 

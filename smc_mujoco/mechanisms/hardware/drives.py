@@ -2,22 +2,22 @@
 
 A scenario takes one drive, or a Lag and another drive in series, and a Backlash after them.
 
-The callback simulates Lag and RateLimit (`DriveStep`) and gives MuJoCo the mean of their force over each physics step.
-So the velocities at the ends of the steps are those of the equations, whatever the step is, and any integrator may be
-used; only a RateLimit behind a Lag is not exact, see there. A state that MuJoCo integrates would give each step the
-force of its end. Such a lead of half a step takes away a part of the delay that a limit cycle depends on: behind one
-lag, most of it.
+The callback simulates Lag, RateLimit and the winding of a DCMotor (`DriveStep`) and gives MuJoCo the mean of their
+force over each physics step. So the velocities at the ends of the steps are those of the equations, whatever the step
+is, and any integrator may be used; only a RateLimit behind a Lag is not exact, see there. A state that MuJoCo
+integrates would give each step the force of its end. Such a lead of half a step takes away a part of the delay that a
+limit cycle depends on: behind one lag, most of it.
 
-MuJoCo simulates a DCMotor and its current, under implicitfast. It gets such a voltage that the mean of the current over
-a step is right for a held voltage, see `drive_step`.
+A winding also feels the joint's speed, which only MuJoCo knows within a step. `winding_step` is exact for a speed that
+changes linearly there.
 """
 
 # pyright: reportIncompatibleVariableOverride=false
 # (a constant of the base class is a property here)
 import dataclasses
 import math
-from collections.abc import Hashable, Iterator
-from typing import ClassVar, NamedTuple
+from collections.abc import Iterator
+from typing import Any, ClassVar, NamedTuple
 
 import mujoco
 import numpy as np
@@ -28,12 +28,12 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 # Where a dcmotor's numbers lie in the compiled model:
 WINDING = slice(0, 2)  # of actuator_gainprm: resistance, ohm, and torque constant, N m/A at the joint
-SUDDEN = 1e-12  # s: a winding with a shorter time constant counts as instantaneous, else MuJoCo divides by about 0
+SUDDEN = 1e-12  # s: a winding with a shorter time constant counts as instantaneous
 MIN_RESISTANCE = 1e-9  # ohm: with less, the voltage of a command is lost in rounding
 MAX_TIME_CONSTANTS = 1e9  # of a lag in a physics step: more count as this many
-SHORT_STEP = 1e-3  # time constants: the series of `_current_weight` errs by less than 2e-12 below it
+SHORT_STEP = 1e-3  # time constants: the series in `winding_step` errs by less than 1e-11 below it
+MIN_SHARE = 1e-9  # of a winding's drag that MuJoCo gets, so that it does not divide by 0
 MIN_CONSTANT = 1e-9  # N m/A at the joint, of the weakest motor
-TIME_CONSTANT = 0  # of actuator_dynprm, s
 COMMANDS = ("torque", "voltage")
 COGGING = slice(0, 2)  # of actuator_biasprm: amplitude, N m at the joint, and periods a radian of it
 
@@ -85,6 +85,11 @@ class RateLimit(Drive):
     def __post_init__(self) -> None:
         self.check_numbers("rate", above=0.0, high=math.inf, infinite=True)
 
+    @property
+    def limited(self) -> bool:
+        """Whether the rate is finite."""
+        return self.rate < math.inf
+
 
 @dataclasses.dataclass(frozen=True)
 class DCMotor(Drive):
@@ -105,8 +110,6 @@ class DCMotor(Drive):
     49:4, the 30 A peak of an ESCON 70/10 amplifier: 11.1 N m and 65 rad/s at most, 0.46 N m s/rad of back-EMF. On a
     slide gear is in rad/m: a pinion of 82 mm. The gearbox has no losses: add a friction. A scenario warns of a motor
     whose torque at rest, `stall`, is less than a joint needs to stay at its initial position.
-
-    Limits: implicitfast or Euler; with inductance 0, which is compiled into another model, RK4 too.
 
     Attributes:
       resistance: ohm, 1e-9 or more.
@@ -146,11 +149,6 @@ class DCMotor(Drive):
             )
 
     @property
-    def stateful(self) -> bool:
-        """Whether it has a state that MuJoCo integrates, inaccurately under RK4: the winding's current."""
-        return self.delay > 0.0
-
-    @property
     def constant(self) -> float:
         """Torque at the joint per ampere, N m/A (N/A)."""
         return self.gear * self.torque_constant
@@ -181,7 +179,6 @@ class DCMotor(Drive):
             actuator.set_to_dcmotor(
                 motorconst=(self.constant, self.constant),
                 resistance=self.resistance,
-                inductance=(self.inductance if self.delay else 0.0, 0.0),
                 ctrlspec=int(mujoco.mjtCtrlInput.mjINPUT_VOLTAGE),
             )
             actuator.ctrllimited, actuator.ctrlrange = True, (-1.0, 1.0)
@@ -190,16 +187,16 @@ class DCMotor(Drive):
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         ids = drive_ids(model)
         torque = self.constant * self.current
-        yield Field("actuator_gainprm", (ids, WINDING), (self.resistance, self.constant))
-        yield Field("actuator_dynprm", (ids, TIME_CONSTANT), self.delay)
+        share, voltage = 1.0, self.voltage
+        if self.delay:  # the callback simulates the winding, and bounds its voltage
+            rk4 = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
+            share, voltage = winding_step(model.opt.timestep / self.delay, rk4).share, math.inf
+        yield Field("actuator_gainprm", (ids, WINDING), (share * self.resistance, share * self.constant))
         yield Field("actuator_biasprm", (ids, COGGING), (self.gear * self.cogging, self.gear * self.poles))
-        yield Field("actuator_ctrlrange", ids, (-self.voltage, self.voltage))
+        yield Field("actuator_ctrlrange", ids, (-voltage, voltage))
         yield Field("actuator_forcerange", ids, (-torque, torque))
         driven = model.jnt_dofadr[model.actuator_trnid[ids, 0]]
         yield Field("dof_armature", driven, self.gear**2 * self.rotor_inertia, adds=True)
-
-    def structure(self) -> Hashable:
-        return type(self), self.delay > 0.0
 
     @property
     def delay(self) -> float:
@@ -208,17 +205,22 @@ class DCMotor(Drive):
 
 
 class DriveStep(NamedTuple):
-    """Effect of a physics step on the drives that the callback simulates, or whose voltage it prepares.
+    """Effect of a physics step on the drives that the callback simulates.
 
     `first` is the output of the first lag. `second` is that of the second lag, or the force behind a RateLimit, or the
-    last step's command of a DCMotor. All start from 0. All factors are shares of a state's distance from u.
+    torque of a winding's current, plus `drag` times the speed. All are in the unit of u, in which a winding's torque is
+    that of a rotor at rest. All factors without a unit are shares of a state's distance from u.
 
     Attributes:
-      force_first, force_second: of `first` and `second` in the mean force, or the motor's command, over the step.
+      force_first, force_second: of `first` and `second` in the mean force over the step.
       first_left: of `first` in itself at the end of the step.
       second_first, second_left: of `first` and `second` in `second` at the end of the step.
       lagged: 1 with a lag, 0 without one.
       reach: largest change of the force in a step, in the unit of u; 0 without a RateLimit.
+      voltage: bound on a winding's voltage, in the unit of u; 0 without a winding.
+      drag, force_drag, second_drag: of a winding, for the speed v at the start of the step, in the unit of u: what it
+        takes from `second` to make it the torque, from the mean force beside MuJoCo's own share of the drag, and from
+        `second` at the end of the step.
     """
 
     force_first: float = 0.0
@@ -228,11 +230,24 @@ class DriveStep(NamedTuple):
     second_left: float = 0.0
     lagged: float = 0.0
     reach: float = 0.0
+    voltage: float = 0.0
+    drag: float = 0.0
+    force_drag: float = 0.0
+    second_drag: float = 0.0
 
-    def __call__(self, u: np.ndarray, first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return the mean force over a step, and both states at its end; all have the shape of u."""
+    def start(self, v: Any) -> np.ndarray:
+        """Return both states at the start of a run at the speeds v, (2, ...): no force, and no current."""
+        return np.array([np.zeros_like(v), self.drag * v])
+
+    def __call__(self, u: np.ndarray, first: np.ndarray, second: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the mean force over a step, and both states at its end; all have the shape of u and the speeds v."""
         a, b = first - u, second - u
         force, first_after = u + self.force_first * a, u + self.first_left * a
+        if self.voltage:
+            torque, mean = second - self.drag * v, np.clip(force, -self.voltage, self.voltage)
+            end = np.clip(u + self.second_first * a, -self.voltage, self.voltage)
+            force = mean + self.force_second * (torque - mean) - self.force_drag * v
+            return force, first_after, end + self.second_left * (torque - end) - self.second_drag * v
         if not self.reach:
             return force + self.force_second * b, first_after, u + self.second_first * a + self.second_left * b
         end = np.clip(first_after, second - self.reach, second + self.reach)
@@ -241,29 +256,20 @@ class DriveStep(NamedTuple):
         return np.where(end == first_after, passing, 0.5 * (second + end)), first_after, end
 
 
-def drive_step(actuator: tuple[Actuator, ...], step: float) -> DriveStep | None:
-    """Return the effect of a physics step of `step` s on drives; None if MuJoCo needs nothing but u.
-
-    MuJoCo gives a step the current of its end. The current of its mean, for a voltage V that is held over each step, is
-    the end's for the voltage w V + (1 - w) V', with V' of the step before and w of `_current_weight`. Behind a lag, V
-    is the mean of the lag's output with the winding's weights exp(-(step - t) R/L). That has the same effect at the end
-    of the step.
-    """
+def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveStep | None:
+    """Return the effect of a physics step of `step` s, of RK4 or another integrator; None if MuJoCo needs only u."""
     drives = [part for part in actuator if part.drives]
     lags = [min(step / part.tau, MAX_TIME_CONSTANTS) for part in drives if isinstance(part, Lag) and part.tau]
     rate = next((part.rate for part in drives if isinstance(part, RateLimit)), None)
-    windings = [step / part.delay for part in drives if isinstance(part, DCMotor) and part.delay]
-    if not lags and not windings and rate is None:
+    motor = next((part for part in drives if isinstance(part, DCMotor) and part.delay), None)
+    if not lags and motor is None and rate is None:
         return None
     a = lags[0] if lags else math.inf
     made = DriveStep(force_first=_mean(a), first_left=math.exp(-a), lagged=float(bool(lags)))
     if rate is not None:
         return made._replace(reach=rate * step)
-    if windings:
-        (b,) = windings
-        last = 1.0 - _current_weight(b)
-        remaining = _passed(a, b) / -math.expm1(-b) if lags else 0.0
-        return made._replace(force_first=(1.0 - last) * remaining, force_second=last, second_first=remaining)
+    if motor is not None:
+        return _wound(made, motor, a, step, rk4)
     if len(lags) < 2:
         return made
     b = lags[1]
@@ -271,6 +277,52 @@ def drive_step(actuator: tuple[Actuator, ...], step: float) -> DriveStep | None:
     return made._replace(
         force_first=_mean(a) - passed / b, force_second=_mean(b), second_first=passed, second_left=math.exp(-b)
     )
+
+
+def _wound(made: DriveStep, motor: DCMotor, a: float, step: float, rk4: bool) -> DriveStep:
+    """Return the effect of a step on a motor's winding, behind a lag of which the step is `a` time constants.
+
+    Behind a lag, the winding gets two voltages that are held over the step: one that gives the mean of its torque, and
+    one that gives its end. So both are exact, unless the supply's bound cuts the lag's output within the step.
+    """
+    b = step / motor.delay
+    own, left = winding_step(b, rk4), math.exp(-b)
+    passed = 0.0 if a == math.inf else _passed(a, b)
+    emf = motor.constant / motor.scale
+    return made._replace(
+        force_first=(made.force_first - passed / b) / own.drag,
+        force_second=1.0 - own.drag,
+        second_first=passed / -math.expm1(-b),
+        second_left=left,
+        voltage=motor.voltage / motor.scale,
+        drag=own.drag * emf,
+        force_drag=(own.drag - own.share) * emf,
+        second_drag=(-math.expm1(-b) - own.drag) * emf,
+    )
+
+
+class WindingStep(NamedTuple):
+    """Effect of the speed on a winding in a physics step, in which it changes linearly.
+
+    Attributes:
+      drag: of the speed at the start in the mean torque, if it stayed; and of its change in the torque at the end.
+      share: what MuJoCo gets of the drag of a motor without inductance, so that the speed's change in the step has its
+        effect on the mean torque.
+    """
+
+    drag: float
+    share: float
+
+
+def winding_step(b: float, rk4: bool) -> WindingStep:
+    """Return the effect of the speed in a physics step of b time constants.
+
+    A change of the speed by 1 in the step has the effect `late` on the mean torque. RK4 gives a drag the mean speed, so
+    half of the change, and implicit integrators give it the speed at the end.
+    """
+    drag = 1.0 - _mean(b)
+    late = b / 6.0 - b**2 / 24.0 if b < SHORT_STEP else 0.5 - drag / b
+    return WindingStep(drag, max(2.0 * late if rk4 else late, MIN_SHARE))
 
 
 def _mean(a: float) -> float:
@@ -282,8 +334,3 @@ def _passed(a: float, b: float) -> float:
     """Return what a second lag has at the end of a step of a first lag's 1 at its start, of a and b time constants."""
     apart = abs(b - a)
     return b * math.exp(-min(a, b)) * (_mean(apart) if apart else 1.0)
-
-
-def _current_weight(b: float) -> float:
-    """Return (1 - mean of exp(-t) over 0 .. b) / (1 - exp(-b)): 1/2 for a short step, 1 for a long one."""
-    return 0.5 + b / 12.0 if b < SHORT_STEP else (1.0 - _mean(b)) / -math.expm1(-b)

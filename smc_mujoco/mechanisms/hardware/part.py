@@ -32,8 +32,6 @@ START = "smc:start"  # keyframe with the initial positions of joints without a c
 class Part:
     """Base of all parts."""
 
-    stateful: ClassVar[bool] = False  # whether it has a state that MuJoCo integrates, inaccurately under RK4
-
     def check_numbers(self, *names: str, **bounds: Any) -> None:
         """Replace fields by floats. None stays if it is the field's default.
 
@@ -67,6 +65,7 @@ class Part:
 class Friction(Part):
     """Base of frictions, which resist a channel's joint beside the plant's own damping."""
 
+    stateful: ClassVar[bool] = False  # whether it has a state that MuJoCo integrates, inaccurately under RK4
     bristles: ClassVar[bool] = False  # whether it holds a joint at rest by bristles; at most one friction may
     forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
 
@@ -103,10 +102,11 @@ class Actuator(Part):
     """Base of actuators, which stand between the command u, the wanted force or a voltage, and the joint."""
 
     drives: ClassVar[bool] = True  # whether it turns u into force; else it stands after a drive
-    in_callback: ClassVar[bool] = False  # whether the callback simulates it, and MuJoCo gets its force
+    in_callback: ClassVar[bool] = False  # whether the callback simulates all of it
 
     scale: ClassVar[float] = 1.0  # control of the model's actuator per unit of u
     delay: ClassVar[float] = 0.0  # s, time constant with which the force follows a held u; 0 for none
+    limited: ClassVar[bool] = False  # whether the rate of the force is limited
     unit: ClassVar[str] = ""  # of u; "" for that of the joint's force
     nominal: ClassVar[Nominal] = Nominal()  # what the law's model knows of it
 

@@ -61,7 +61,7 @@ def test_a_lag_gives_a_free_mass_its_exact_velocity(tau):
 
 
 def test_lags_that_are_nearly_equal_are_nearly_equal_lags():
-    equal, nearly = (drive_step((smc.Lag(0.01), smc.Lag(tau)), H) for tau in (0.01, 0.01 * (1.0 + 1e-13)))
+    equal, nearly = (drive_step((smc.Lag(0.01), smc.Lag(tau)), H, True) for tau in (0.01, 0.01 * (1.0 + 1e-13)))
     assert equal == pytest.approx(nearly, rel=1e-9)
 
 
@@ -132,9 +132,9 @@ def test_a_rate_limit_behind_a_lag_errs_by_less_than_the_lag_moves_in_a_step(tau
     step, parts = 1e-3, 2000
     u, first, gap = np.random.default_rng(0).normal(size=(3, 500))
     second = first + gap * np.repeat([0.0, 0.01, 0.1, 1.0, 3.0], 100)
-    advance = drive_step((smc.Lag(tau), smc.RateLimit(rate)), step)
+    advance = drive_step((smc.Lag(tau), smc.RateLimit(rate)), step, True)
     assert advance is not None
-    mean, last, _ = advance(u, first, second)
+    mean, last, _ = advance(u, first, second, np.zeros(500))
     lagged, force, total, above, below = first, second, 0.0, 0, 0
     for t in step * np.arange(1, parts + 1) / parts:
         lagged, before = u + (first - u) * np.exp(-t / tau), force
@@ -148,34 +148,83 @@ def test_a_rate_limit_behind_a_lag_errs_by_less_than_the_lag_moves_in_a_step(tau
 
 
 def moved(s, u):
-    """x of the scenario's Duffing block behind its Lag and its DCMotor, by SciPy, under the commands of its samples."""
-    lag, motor = s.actuator
+    """x of the scenario's Duffing block behind its Lag, if any, and its DCMotor, by SciPy, under its samples' u."""
+    *lags, motor = s.actuator
     inertia = 1.0 + motor.gear**2 * motor.rotor_inertia
     p = s.plant.values({})
 
     def rates(t, z, u):
         x, v, a, i = z
         f, _ = s.plant.nominal(np.array([x]), np.array([v]), 0, p)  # of 1 kg
-        volts = motor.scale * a - motor.resistance * i - motor.constant * v
-        return v, (f + motor.constant * i) / inertia, (u - a) / lag.tau, volts / motor.inductance
+        volts = min(max(motor.scale * (a if lags else u), -motor.voltage), motor.voltage)
+        lagged = (u - a) / lags[0].tau if lags else 0.0
+        current = (volts - motor.resistance * i - motor.constant * v) / motor.inductance
+        return v, (f + motor.constant * i) / inertia, lagged, current
 
-    z, x = [s.resolved.x0[0], 0.0, 0.0, 0.0], [s.resolved.x0[0]]
+    z = [s.resolved.x0[0], s.resolved.v0[0], 0.0, 0.0]
+    x = [z[0]]
     for held in u[:-1, 0]:
-        z = solve_ivp(rates, (0.0, s.control_period), z, "LSODA", args=(held,), rtol=1e-8, atol=1e-11).y[:, -1]
+        z = solve_ivp(rates, (0.0, s.control_period), z, "LSODA", args=(held,), rtol=1e-10, atol=1e-13).y[:, -1]
         x.append(z[0])
     return np.array(x)
 
 
-def test_a_lag_and_a_motor_move_the_block_as_scipy_says():
-    """To first order in the step, as behind one drive: implicitfast moves the block by its speed at a step's end."""
-    law = asking(u=3.0, omega=5.0)
-    base = scenario(smc.Lag(0.02), MOTOR, law=law, x0=0.3, duration=0.3, control_period=2e-3)
+WEAK = smc.DCMotor(0.5, 4e-4, 0.4, 2.0, 1e-4, voltage=3.0, command="voltage")  # L/R = 0.8 ms; 1.3 N m s/rad of back-EMF
+
+
+@pytest.mark.parametrize("actuator", [(smc.Lag(0.02), MOTOR), (MOTOR,), (WEAK,)], ids=["lag", "alone", "weak"])
+@pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
+def test_a_motor_moves_the_block_as_scipy_says(actuator, integrator):
+    """To second order in the step; under implicitfast to first, because it moves the block by its speed at the end."""
+    law = asking(u=4.0, omega=5.0)
+    base = scenario(
+        *actuator, law=law, x0=0.3, v0=1.0, duration=0.3, control_period=2e-3, integrator=integrator, u_max=4.0
+    )
     traces = smc.run([dataclasses.replace(base, physics_step=step) for step in (1e-3, 2.5e-4)])
     exact = moved(base, traces[0].u)
     errors = [np.abs(trace.x[:, 0] - exact).max() for trace in traces]
     assert np.ptp(exact) > 0.05
-    assert errors[1] < 2.5e-4 * np.abs(traces[1].v).max()
-    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+    if integrator == "RK4":
+        assert errors[0] < 1e-5
+        assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.1)
+    else:
+        assert errors[1] < 2.5e-4 * np.abs(traces[1].v).max()
+        assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_a_free_rotor_is_the_second_order_system_of_its_equations_with_any_step():
+    """Under a held voltage it has the exact speed and current but for the bend of the speed within a step."""
+    motor = smc.DCMotor(inductance=20e-3)
+    free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0)
+    trace = smc.run(scenario(motor, plant=free, law=asking(u=6.0 / motor.scale), x0=0.0, u_max=99.0, duration=3.0))
+    inertia = 1.0 + motor.gear**2 * motor.rotor_inertia
+    system = np.array(
+        [
+            [-motor.resistance / motor.inductance, -motor.constant / motor.inductance],
+            [motor.constant / inertia, 0.0],
+        ]
+    )
+    rates, modes = np.linalg.eig(system)
+    rest = np.array([0.0, 6.0 / motor.constant])
+    exact = rest[:, None] + ((modes * np.linalg.solve(modes, -rest)) @ np.exp(np.outer(rates, trace.t))).real
+    np.testing.assert_allclose(trace.v[:, 0], exact[1], atol=1e-7 * exact[1].max())
+    means = 0.5 * motor.constant * (exact[0][1:] + exact[0][:-1])
+    np.testing.assert_allclose(trace.force[1:, 0], means, atol=1e-3 * means.max())
+
+
+@pytest.mark.parametrize("inductance", [0.0, 8e-5])
+def test_the_supply_and_the_amplifier_limit_the_torque(inductance):
+    by_current = smc.DCMotor(inductance=inductance)
+    cases = [
+        (by_current, 30.0 * by_current.constant),
+        (smc.DCMotor(inductance=inductance, voltage=6.0), 6.0 / by_current.scale),
+        (smc.DCMotor(inductance=inductance, voltage=math.inf, current=math.inf), 100.0),
+    ]
+    for motor, most in cases:
+        held = scenario(motor, law=asking(u=100.0), u_max=math.inf, mismatch={"mass": 1e9}, x0=0.0, duration=0.05)
+        torque = smc.run(held).force[:, 0]
+        assert torque.max() == pytest.approx(most, rel=1e-6)
+        assert torque[-1] == pytest.approx(most, rel=1e-6)
 
 
 HARD = [

@@ -72,16 +72,6 @@ def sine(t):
     return 2.0 * math.sin(5.0 * t)
 
 
-def test_a_locked_rotors_current_rises_in_l_over_r_to_the_asked_torque():
-    motor = DCMotor(inductance=5e-3)  # L/R = 16.7 ms
-    t, _, speed, torque, current = driven(locked(motor), lambda t: 4.0 * motor.scale, 0.1).T
-    rise = 1.0 - np.exp(-t * motor.resistance / motor.inductance)
-    assert current == pytest.approx(4.0 / motor.constant * rise, rel=1e-2)
-    assert torque == pytest.approx(4.0 * rise, rel=1e-2)
-    assert torque[-1] == pytest.approx(4.0, rel=1e-2)
-    assert np.abs(speed).max() < 1e-10
-
-
 def test_a_locked_rotors_torque_comes_at_once_without_inductance():
     motor = DCMotor(inductance=0.0)
     assert driven(locked(motor), lambda t: 4.0 * motor.scale, 0.01)[:, 3] == pytest.approx(4.0, rel=1e-9)
@@ -98,24 +88,6 @@ def test_a_free_rotors_speed_rises_in_its_mechanical_time_constant():
     assert torque[early] == pytest.approx(motor.constant * volts / motor.resistance * left[early], rel=1e-2)
 
 
-def test_a_free_rotor_with_inductance_is_the_second_order_system_of_its_equations():
-    motor = DCMotor(inductance=20e-3)
-    inertia, volts = 1.0 + motor.gear**2 * motor.rotor_inertia, 6.0
-    t, _, speed, torque, current = driven(bare(motor), lambda t: volts, 3.0).T
-    system = np.array(
-        [
-            [-motor.resistance / motor.inductance, -motor.constant / motor.inductance],
-            [motor.constant / inertia, 0.0],
-        ]
-    )
-    rates, modes = np.linalg.eig(system)
-    rest = np.array([0.0, volts / motor.constant])
-    exact = rest[:, None] + ((modes * np.linalg.solve(modes, -rest)) @ np.exp(np.outer(rates, t))).real
-    assert np.abs(current - exact[0]).max() < 0.01 * np.abs(exact[0]).max()
-    assert np.abs(speed - exact[1]).max() < 0.01 * exact[1].max()
-    assert torque == pytest.approx(motor.constant * current, rel=1e-12)
-
-
 def test_the_defaults_are_the_datasheets_motor():
     stall_current, no_load_speed = 24.0 / MOTOR.resistance, 24.0 / MOTOR.torque_constant
     assert stall_current == pytest.approx(80.2, rel=0.01)  # A
@@ -123,19 +95,6 @@ def test_the_defaults_are_the_datasheets_motor():
     mechanical = MOTOR.resistance * MOTOR.rotor_inertia / MOTOR.torque_constant**2
     assert mechanical == pytest.approx(4.67e-3, rel=0.01)  # s
     assert min(MOTOR.constant * MOTOR.current, MOTOR.voltage / MOTOR.scale) > 1.5 * 6.0  # N m, the laws' usual limit
-
-
-@pytest.mark.parametrize("inductance", [0.0, MOTOR.inductance])
-def test_the_supply_and_the_amplifier_limit_the_torque(inductance):
-    by_current = DCMotor(inductance=inductance)
-    by_voltage = DCMotor(inductance=inductance, voltage=6.0)
-    for motor, most in ((by_current, 30.0 * by_current.constant), (by_voltage, 6.0 / by_voltage.scale)):
-        torque = driven(locked(motor), lambda t, motor=motor: 100.0 * motor.scale, 0.05)[:, 3]
-        assert torque.max() == pytest.approx(most, rel=1e-6)
-        assert torque[-1] == pytest.approx(most, rel=1e-6)
-    boundless = DCMotor(inductance=inductance, voltage=math.inf, current=math.inf)
-    torque = driven(locked(boundless), lambda t: 100.0 * boundless.scale, 0.05)[:, 3]
-    assert torque[-1] == pytest.approx(100.0, rel=1e-6)
 
 
 def test_cogging_is_a_sine_of_the_rotors_angle():
