@@ -1,11 +1,11 @@
-"""An adviser: which law suits a plant, its conditions and what is asked, with which gains, and how sure that is.
+"""An adviser: which law suits a plant, its conditions and the needs of a user, with which gains, and how sure that is.
 
     advice = smc.which("duffing", ["noise", "coulomb"], needs=["fast", "calm"])
     print(advice)                                  # a table, and "Use ... because ... Second choice ... How sure ..."
     smc.Scenario(plant="duffing", law=advice.law)
 
-What is asked is a metric to compare (fast, accurate, calm ...) or a property that a law must have (continuous,
-two-gains ...). With "no-velocity", laws that read a velocity get one that is differentiated from the position.
+A need is a metric to compare (fast, accurate, calm ...) or a property that a law must have (continuous, two-gains ...).
+With "no-velocity", laws that read a velocity get one that is differentiated from the position.
 
 1. Every law that suits gets gains for the plant: those that come with the package, or by the same rule from `tune`,
    with the same bound on u, the same starts and as many evaluations as those of the package. A law's own gains are one
@@ -16,14 +16,14 @@ two-gains ...). With "no-velocity", laws that read a velocity get one that is di
    advantage. They are compared by the rules of `ranking`. A block is a need in a condition, so every need weighs the
    same in every condition, and the tests are corrected for all pairs of finalists in all blocks.
 
-A law is not fit if it settles in less than half as many runs of a condition as the law that settles in the most: to do
-nothing would be calmest. Laws that are not fit are not compared. A law is reliable if it settles in 90 % of the runs of
-every condition; otherwise the answer is that no law is. Laws with gains of the package run with all sets of these, a
-run with each in turn, so that the answer holds over the gains that a tuning may end with.
+A law is not fit if, in some condition, it settles in less than half as many runs as the law that settles most often.
+Otherwise a law that does nothing would be the calmest. Laws that are not fit are not compared. A law is reliable if it
+settles in 90 % of the runs of every condition; otherwise the answer is that no law is. Laws with gains of the package
+run with all sets of these, a run with each in turn, so that the answer holds over the gains that a tuning may end with.
 
 A law dominates another if it is better in some block and worse in none. Laws with fewer runs that fail come first, then
-laws by mean rank, but none before a law that dominates it. Laws that tie with the one whose turn it is are ordered
-among themselves: less overshoot first, then less energy of u. The first law is advised, unless all are level.
+laws by mean rank, but none before a law that dominates it. Laws that tie with the next law in this order stand by their
+overshoot, and then by their energy of u, less first. The first law is advised, unless all are level.
 
 "robust" is the one need that is not a metric of these runs. An adversary attacks each law in each condition, with few
 runs in the screening and with the default budget of `worst_case`, over all conditions, in the finals. A law is better
@@ -52,18 +52,18 @@ from smc_mujoco.simulation.grid import all_combinations, case, check_moving, lis
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.advice import Advice
-from smc_mujoco.studies.fair_gains import Candidate, asking, fair_gains
+from smc_mujoco.studies.fair_gains import Candidate, fair_gains, law_or_template
 from smc_mujoco.studies.needs import NEEDS, ROBUST, Choice, Need, Runs, ties
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.worst_case import DURATION, WorstCase, cached_worst_case, default_budget
 
-USUAL = ("fast", "accurate", "calm")  # what is compared where nothing is asked
-CONDITIONS = ("nominal", "noise", "sine")  # where none is given
+DEFAULT_NEEDS = ("fast", "accurate", "calm")
+DEFAULT_CONDITIONS = ("nominal", "noise", "sine")
 NO_VELOCITY = "no-velocity"
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
-GLANCE = 16  # runs of an adversary in the screening, and as many random ones; chosen
-MIN_SETTLED = 0.5  # of the share of runs that settle under the law that settles in the most; chosen
+SCREENING_BUDGET = 16  # runs of an adversary in the screening, and as many random ones; chosen
+MIN_SETTLED = 0.5  # of the largest share of runs that settle under a law; chosen
 
 
 class Extent(NamedTuple):
@@ -109,7 +109,7 @@ def which(
       seeds: of the finals, the number of runs of a law in a condition. Default: 24.
       duration: of a run, s. Default: 5, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`.
-      out: folder for gains and runs. Another call takes from there what it needs again.
+      out: folder for gains and runs, which another call reads.
       quick: fewer seeds and finalists, shorter runs, a third of the evaluations of a tuning.
       threads: simulations at once; None for one per available core.
       progress: whether to show progress bars.
@@ -152,7 +152,7 @@ def which(
 
     names, others = list(candidates), []
     if len(names) > extent.finalists:
-        screening = contest(names, range(extent.screening), "screening", GLANCE)
+        screening = contest(names, range(extent.screening), "screening", SCREENING_BUDGET)
         first = {rank.law for rank in screening.order[: extent.finalists]} | set(screening.specialists)
         others = [rank.law for rank in screening.order if rank.law not in first]
         names = [name for name in names if name in first]
@@ -176,15 +176,15 @@ def which(
 
 
 def _needs(needs: str | Sequence[str], plant: Plant) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the needs to compare, and the properties to have.
+    """Return the needs that are metrics, and those that are properties.
 
     Raises:
       ScenarioError: an unknown need, or one that has no number on this plant.
     """
     if isinstance(needs, str):
         needs = [name.strip() for name in needs.split(",") if name.strip()]
-    nothing = isinstance(needs, list | tuple) and not needs
-    names = [] if nothing else list(dict.fromkeys(listed("needs", needs)))
+    none = isinstance(needs, list | tuple) and not needs
+    names = [] if none else list(dict.fromkeys(listed("needs", needs)))
     for name in names:
         if name not in NEEDS and name not in PROPERTIES:
             raise unknown("need", name, [*NEEDS, *PROPERTIES])
@@ -192,51 +192,48 @@ def _needs(needs: str | Sequence[str], plant: Plant) -> tuple[tuple[str, ...], t
     for name in compared:
         if why := NEEDS[name].metric.refusal(plant):
             raise ScenarioError(f"need {name!r} cannot be compared on {plant.name}: {why}")
-    compared = compared or [name for name in USUAL if not NEEDS[name].metric.refusal(plant)]
+    compared = compared or [name for name in DEFAULT_NEEDS if not NEEDS[name].metric.refusal(plant)]
     return tuple(compared), tuple(name for name in names if name in PROPERTIES)
 
 
 def _conditions(conditions: Any, plant: Plant, duration: float) -> Sequence[str | Condition]:
-    """Return the conditions that were given, or the usual ones that have numbers for the plant."""
-    return applicable(CONDITIONS, [plant], duration) if conditions is None else listed("conditions", conditions)
+    """Return the given conditions, or the default ones that have numbers for the plant."""
+    return applicable(DEFAULT_CONDITIONS, [plant], duration) if conditions is None else listed("conditions", conditions)
 
 
 def _without_velocity(condition: Condition) -> Condition:
-    """Return a condition without a velocity sensor, where it says nothing of velocity itself."""
+    """Return a condition without a velocity sensor, unless it has its own sensor or velocity."""
 
     def fields(plant: Plant, duration: float) -> dict[str, Any]:
-        own = condition.on(plant, duration)
-        return own if own.keys() & {"velocity", "sensor"} else own | {"velocity": DIFFERENCED}
+        given = condition.on(plant, duration)
+        return given if given.keys() & {"velocity", "sensor"} else given | {"velocity": DIFFERENCED}
 
     return Condition(f"{condition.name} (no velocity sensor)", fields)
 
 
-def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> list[Component | Template]:
-    """Return the laws to compare; those without given gains as templates.
+def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> Sequence[Component | Template]:
+    """Return the laws to compare. Those without given gains are templates.
 
     Raises:
       ScenarioError: an unknown law, or none that has the properties.
     """
     if laws is None:
         left_out = {"none", *gain_sets.FORMS}  # FORMS are other implementations of laws that are there already
-        return _some([law for law in suitable(properties, plant=plant) if law.name not in left_out], plant, properties)
-    chosen, wanted = [], [PROPERTIES[name] for name in properties]
-    for one in listed_laws(laws):
-        law = asking(one)
-        template = law if isinstance(law, Template) else law.template
-        if template is None or all(each.holds(template) for each in wanted):
-            chosen.append(law)
-    return _some(chosen, plant, properties)
-
-
-def _some(found: list, plant: Plant, properties: Sequence[str]) -> list[Component | Template]:
-    """Return the laws that were found, or raise ScenarioError if there is none."""
-    if not found and not properties:
+        chosen = [law for law in suitable(properties, plant=plant) if law.name not in left_out]
+    else:
+        chosen = [law for law in map(law_or_template, listed_laws(laws)) if _has(law, properties)]
+    if not chosen and not properties:
         raise ScenarioError(f"the package has no law for {plant.name}: give your own with laws, as [my_law]")
-    if not found:
-        said = " and ".join(PROPERTIES[name].words for name in properties) or "suit"
-        raise ScenarioError(f"no law for {plant.name} is among those that {said}: ask for less")
-    return found
+    if not chosen:
+        words = " and ".join(PROPERTIES[name].words for name in properties)
+        raise ScenarioError(f"no law for {plant.name} is among those that {words}: ask for less")
+    return chosen
+
+
+def _has(law: Component | Template, properties: Sequence[str]) -> bool:
+    """Return whether a law has the properties, as far as that is known."""
+    template = law if isinstance(law, Template) else law.template
+    return template is None or all(PROPERTIES[name].holds(template) for name in properties)
 
 
 # the comparison
@@ -250,31 +247,36 @@ def _worst(
     path: Path,
     **options: Any,
 ) -> dict[str, list[WorstCase]]:
-    """Return law -> what an adversary finds in each condition, by default within the class of the first.
+    """Return law -> its worst case in each condition, by default within the class of the first scenario.
 
     Args:
       cases: of each law, a scenario for each condition.
-      budget: runs of a search. Default: as many in all conditions together as one part of the default of `worst_case`.
-      parts: number of parts of that default.
-      path: beginning of the names of the files that are kept.
+      budget: runs of a search. Default: the default of `worst_case`, divided by the conditions and by `parts`.
+      path: beginning of the names of the files of results.
       options: threads and progress, as in `run`.
     """
     first = cases[0][0]
     within = within or usual(first)
-    budget = budget or max(GLANCE, default_budget(first, within) // (len(cases[0]) * parts))
+    budget = budget or max(SCREENING_BUDGET, default_budget(first, within) // (len(cases[0]) * parts))
     worst: dict[str, list[WorstCase]] = {}
-    for i, one in (numbered for its in cases for numbered in enumerate(its)):
-        file = Path(f"{path}-{i}-{one.plant.name}-{one.law.name}.json")
-        worst.setdefault(one.law.name, []).append(cached_worst_case(file, one, within, budget, **options))
+    for law in cases:
+        for i, scenario in enumerate(law):
+            file = Path(f"{path}-{i}-{scenario.plant.name}-{scenario.law.name}.json")
+            case = cached_worst_case(file, scenario, within, budget, **options)
+            worst.setdefault(scenario.law.name, []).append(case)
     return worst
 
 
 class Contest(NamedTuple):
-    """Runs of laws and what follows from them.
+    """Runs of laws and their comparison.
 
-    `scores`: need -> the scores of all laws. `comparison`: of the laws that are fit, or of all if none is. `order`: all
-    laws, best first; those that are not fit come last and have NaN for a rank. `settled`: share of runs that settle,
-    (laws, conditions). `specialists`: the law with the best mean rank on each need.
+    Attributes:
+      scores: need -> the scores of all laws.
+      comparison: of the laws that are fit, or of all if none is.
+      order: all laws, best first. Those that are not fit come last, with NaN for a rank.
+      settled: share of runs that settle, (laws, conditions).
+      fit: names of the laws that are fit.
+      specialists: the law with the best mean rank on each need.
     """
 
     runs: Runs
@@ -300,10 +302,10 @@ def _contest(runs: Runs, plant: Plant, needs: Sequence[str], relevant: float) ->
     blocks = [(NEEDS[need], k) for need, each in scores.items() for k in each.blocks]
     ran = paired_runs.scenarios(table, group)
     comparison = compare(
-        _joined([each.values for each in scores.values()], laws, math.nan),
+        _stacked([each.values for each in scores.values()], laws, math.nan),
         [paired_runs.floor(ran[k], need.metric.unit) for need, k in blocks],
-        outcomes=_joined([each.outcomes for each in scores.values()], laws),
-        sets=_joined([each.sets for each in scores.values()], laws),
+        outcomes=_stacked([each.outcomes for each in scores.values()], laws),
+        sets=_stacked([each.sets for each in scores.values()], laws),
         relevant=relevant,
         untested=[not need.tested for need, _ in blocks],
     )
@@ -314,22 +316,18 @@ def _contest(runs: Runs, plant: Plant, needs: Sequence[str], relevant: float) ->
     return Contest(runs, scores, comparison, order, settled, fit, specialists)
 
 
-def _joined(parts: Sequence[Mapping[str, np.ndarray]], laws: Sequence[str], fill: float = -1) -> dict[str, np.ndarray]:
+def _stacked(parts: Sequence[Mapping[str, np.ndarray]], laws: Sequence[str], fill: float = -1) -> dict[str, np.ndarray]:
     """Return law -> the blocks of all parts, (blocks, columns). Parts with fewer columns are filled up."""
-    columns = max(each.shape[1] for part in parts for each in part.values())
-    return {
-        law: np.concatenate(
-            [
-                np.pad(one, ((0, 0), (0, columns - one.shape[1])), constant_values=fill)
-                for one in (part[law] for part in parts)
-            ]
-        )
-        for law in laws
-    }
+    columns = max(values.shape[1] for part in parts for values in part.values())
+
+    def filled(values: np.ndarray) -> np.ndarray:
+        return np.pad(values, ((0, 0), (0, columns - values.shape[1])), constant_values=fill)
+
+    return {law: np.concatenate([filled(part[law]) for part in parts]) for law in laws}
 
 
 def _restraint(runs: Runs, ran: Sequence, plant: Plant) -> dict[str, tuple[float, ...]]:
-    """Return the mean rank of each law on each of the metrics that order laws which tie, less is first."""
+    """Return law -> its mean rank on each of the metrics of `ties`."""
     mean_ranks, laws = [], runs.group.laws
     for metric in ties(plant):
         scores = Need(metric).scores(runs)
@@ -341,17 +339,18 @@ def _restraint(runs: Runs, ran: Sequence, plant: Plant) -> dict[str, tuple[float
 
 
 def _order(comparison: Comparison, restraint: Mapping[str, tuple[float, ...]]) -> list[Rank]:
-    """Return the laws by mean rank, each behind all that dominate it, and laws that tie in the order of `restraint`."""
+    """Return the laws by mean rank, but none before a law that dominates it, and laws that tie by `restraint`."""
     ahead = np.any(comparison.better, axis=0)
     dominates = np.logical_and(ahead, ~ahead.T)
     place = {law: k for k, law in enumerate(comparison.laws)}
     left, ordered = ranks(comparison), []
     while left:
         at = [place[rank.law] for rank in left]
-        free = [rank for rank in left if not dominates[at, place[rank.law]].any()]
-        free = free or left[:1]  # none is free only if the laws dominate each other in a circle
-        equals = [rank for rank in free if comparison.tied[place[free[0].law], place[rank.law]]]
-        ordered.append(min(equals, key=lambda rank: restraint[rank.law]))
+        undominated = [rank for rank in left if not dominates[at, place[rank.law]].any()]
+        undominated = undominated or left[:1]  # laws may dominate each other in a circle
+        next_law = place[undominated[0].law]
+        tied = [rank for rank in undominated if comparison.tied[next_law, place[rank.law]]]
+        ordered.append(min(tied, key=lambda rank: restraint[rank.law]))
         left.remove(ordered[-1])
     return ordered
 
@@ -359,11 +358,11 @@ def _order(comparison: Comparison, restraint: Mapping[str, tuple[float, ...]]) -
 def _fit(laws: Sequence[str], settled: np.ndarray) -> set[str]:
     """Return the laws that settle in enough runs of every condition."""
     enough = np.all(settled >= MIN_SETTLED * settled.max(axis=0), axis=1)
-    return {law for law, one in zip(laws, enough.tolist(), strict=True) if one}
+    return {law for law, fit in zip(laws, enough.tolist(), strict=True) if fit}
 
 
 def _choices(finals: Contest, candidates: Mapping[str, Candidate]) -> tuple[Choice, ...]:
-    """Return the finalists with all that is said of them, best first."""
+    """Return the finalists, best first."""
     shares = dict(zip(finals.runs.group.laws, finals.settled, strict=True))
     return tuple(
         Choice(

@@ -41,7 +41,7 @@ from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import executors
-from smc_mujoco.studies.fair_gains import Candidate, asking, fair_gains
+from smc_mujoco.studies.fair_gains import Candidate, fair_gains, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, Boards, leaderboard
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, study
@@ -271,14 +271,14 @@ def compare(
         applicable(extent.conditions, machines, duration) if conditions is None else listed("conditions", conditions)
     )
     tested = [find_condition(one) for one in names]
-    compared = {plant.name: [asking(law) for law in _chosen(laws, plant)] for plant in machines}
+    compared = {plant.name: [law_or_template(law) for law in _chosen(laws, plant)] for plant in machines}
     every = {id(law): law for its in compared.values() for law in its}.values()
     check_names(machines, [coerce.law(law) for law in every], tested)
     all_combinations(
         machines, lambda _: [lambda _: coerce.law("none")], tested, [0], duration, starts
     )  # refused before tuning
     folder = Path(out)
-    options = {"tune": tune and gains == "tuned", "gains": gains, "alike": budget is None}
+    options = {"tune": tune and gains == "tuned", "gains": gains, "shipped_budget": budget is None}
     candidates = {
         plant.name: fair_gains(
             plant, compared[plant.name], folder / "gains", tries, starts, threads, progress, **options

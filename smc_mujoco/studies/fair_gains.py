@@ -3,11 +3,11 @@
     for candidate in fair_gains("duffing", ["classical", my_law], Path("folder")):
         print(candidate.law.name, candidate.law.source, candidate.remark)
 
-A law has the gains that the user gave it, or else those that come with the package for the plant, or else those of a
-search by the same rule: the same bound on u, the same starts and as many evaluations as those of the package. A law
-that cannot be tuned keeps its defaults, and its remark says why. A law whose gains were searched has several sets of
-near-optimal gains. Run s uses set s modulo their number, so that a comparison holds over the gains that a tuning may
-end with.
+A law has the gains that the user gave it. Otherwise it has those that come with the package for the plant. Otherwise a
+search by the same rule finds them: with the same bound on u, the same starts and as many evaluations as those of the
+package. A law that cannot be tuned keeps its defaults, and its remark says why. A search ends with several sets of
+near-optimal gains. The run of seed s has set s modulo their number, so that a comparison holds over the gains with
+which a tuning may end.
 """
 
 import dataclasses
@@ -38,8 +38,8 @@ class Candidate(NamedTuple):
 
     Attributes:
       law: with the best gains.
-      sets: the law with each set of gains that its runs use in turn.
-      remark: what is to be said of the gains besides their source.
+      sets: the law with each of the sets of gains that runs have in turn.
+      remark: what there is to say of the gains besides their source.
     """
 
     law: Component
@@ -47,7 +47,7 @@ class Candidate(NamedTuple):
     remark: str = ""
 
     def __call__(self, seed: int) -> Component:
-        """Return the law with the gains of a run."""
+        """Return the law with the gains of the run with this seed."""
         return self.sets[seed % len(self.sets)]
 
 
@@ -61,33 +61,34 @@ def fair_gains(
     progress: bool = False,
     tune: bool = True,
     gains: str = "tuned",
-    alike: bool = True,
+    shipped_budget: bool = True,
 ) -> list[Candidate]:
     """Return laws with gains for a plant: given, shipped, tuned or default ones, in this order of preference.
 
-    Laws that are tuned beside shipped gains are tuned as these were: from the same starts, with the same budget.
+    If some laws have shipped gains, the others are tuned like these, from the same starts.
 
     Args:
       laws: those without given gains as templates.
-      folder: for the results of searches; another call takes from there what it needs again.
+      folder: for the results of searches, which another call reads.
       budget, starts: of searches, see `smc.tune`.
       threads, progress: as in `smc.run`.
       tune: whether to search gains; otherwise laws without shipped ones keep their defaults.
       gains: the set of shipped gains.
-      alike: whether laws that are tuned beside shipped gains have the budget of these.
+      shipped_budget: whether, if some laws have shipped gains, the others are tuned with the budget of these.
     """
     candidates = [_known(plant, law, gains) for law in laws]
     if any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in candidates):
         starts = None
-        budget = search.BUDGET if alike else budget
-    missing = [k for k, candidate in enumerate(candidates) if candidate is None]
-    for k in missing:
-        candidates[k] = _tuned(plant, laws[k], budget, starts, folder, threads, progress) if tune else _default(laws[k])
-    return [candidate for candidate in candidates if candidate is not None]
+        budget = search.BUDGET if shipped_budget else budget
+
+    def missing(law: Component | Template) -> Candidate:
+        return _tuned(plant, law, budget, starts, folder, threads, progress) if tune else _default(law)
+
+    return [candidate or missing(law) for law, candidate in zip(laws, candidates, strict=True)]
 
 
-def asking(law: Component | Template | str) -> Component | Template:
-    """Return a law as a template if its gains were not given by the user."""
+def law_or_template(law: Component | Template | str) -> Component | Template:
+    """Return the law if the user gave its gains, else its template."""
     if isinstance(law, str):
         return known_laws()[law]
     if isinstance(law, Template):
@@ -102,17 +103,17 @@ def _known(plant: Plant, law: Component | Template, gains: str) -> Candidate | N
         return Candidate(law, (law,))
     if not law.gains or gains == "default":
         return _default(law)
-    own = plants_known().get(plant.name)
-    alike = own is not None and own.parameters == plant.parameters and catalogue().get(law.name) is law
-    if alike and not plant.unscaled and _there(plant, law.name, gains):
+    library = plants_known().get(plant.name)
+    same_plant = library is not None and library.parameters == plant.parameters
+    if same_plant and catalogue().get(law.name) is law and not plant.unscaled and in_set(plant, law.name, gains):
         count = 1 if gains == "study" else len(gain_sets.tuned(plant, law.name, gains).sets)
         sets = tuple(gain_sets.law(plant, law.name, gains, seed) for seed in range(count))
         return Candidate(sets[0], sets)
     return _default(law, f"tuning is not possible here: {plant.unscaled.partition(':')[0]}") if plant.unscaled else None
 
 
-def _there(plant: Plant, name: str, gains: str) -> bool:
-    """Return whether a set has gains for a law on a plant."""
+def in_set(plant: Plant, name: str, gains: str) -> bool:
+    """Return whether a set of gains has some for a law on a plant."""
     try:
         gain_sets.law(plant, name, gains)
     except ScenarioError:
@@ -121,7 +122,7 @@ def _there(plant: Plant, name: str, gains: str) -> bool:
 
 
 def _default(law: Component | Template, remark: str = "") -> Candidate:
-    """Return a law with its defaults."""
+    """Return a law with its default gains."""
     made = coerce.law(law)
     return Candidate(made, (made,), remark)
 
@@ -136,14 +137,14 @@ def _tuned(
     progress: bool = False,
 ) -> Candidate:
     """Return a law with gains from `tune`, or from the file of an earlier call; its defaults if it cannot be tuned."""
-    usual, chosen = Objective(), coerce.law(law)
-    conditions = tuple(one for one in usual.conditions if applicable([one.name], [plant], usual.duration))
+    usual, default = Objective(), coerce.law(law)
+    conditions = tuple(each for each in usual.conditions if applicable([each.name], [plant], usual.duration))
     goal = dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
     try:
-        (first, *_) = goal.scenarios(plant, chosen, 0)
-        template = law if isinstance(law, Template) else chosen.template
-        searched = template and (dict(template.gains), dict(template.conditions))  # which gains, and where
-        depends = [run_key.key(first), goal.describe(), fingerprint.of((chosen.function, searched))]
+        (first, *_) = goal.scenarios(plant, default, 0)
+        template = law if isinstance(law, Template) else default.template
+        ranges = template and (dict(template.gains), dict(template.conditions))
+        depends = [run_key.key(first), goal.describe(), fingerprint.of((default.function, ranges))]
         with warnings.catch_warnings():
             for words in ("no set of gains tried", ".* no unit, and so a search"):  # the remark says so
                 warnings.filterwarnings("ignore", words, ScenarioWarning)
@@ -158,14 +159,18 @@ def _tuned(
         raise
     except ScenarioError as error:
         return _default(law, f"not tuned: {error}")
+    return _candidate(default, tuned)
+
+
+def _candidate(default: Component, tuned: result.Tuned) -> Candidate:
+    """Return a law, given with its defaults, with the gains of a search."""
     its = tuned.law.source
     if tuned.before < tuned.objective:
-        chosen = chosen.sourced(its.kind, its.search)
-        return Candidate(chosen, (chosen,), "its defaults, better than those tried")
-    every = [dict(zip(tuned.bounds, one.gains, strict=True)) for one in tuned.sets]
-    tuned_laws = (dataclasses.replace(chosen, gains=dict(chosen.gains) | own) for own in every)
-    sets = tuple(one.sourced(its.kind, its.search) for one in tuned_laws)
-    about = list(search_space.without_unit(chosen))
-    have = "have no unit, so their" if len(about) > 1 else "has no unit, so its"
-    words = f"{joined(about)} {have} search is about the defaults and not by the rule"
-    return Candidate(sets[0], sets, words * bool(about))
+        default = default.sourced(its.kind, its.search)
+        return Candidate(default, (default,), "its defaults, better than those tried")
+    gains = (dict(default.gains) | dict(zip(tuned.bounds, each.gains, strict=True)) for each in tuned.sets)
+    sets = tuple(dataclasses.replace(default, gains=each).sourced(its.kind, its.search) for each in gains)
+    without_unit = list(search_space.without_unit(default))
+    have = "have no unit, so their" if len(without_unit) > 1 else "has no unit, so its"
+    words = f"{joined(without_unit)} {have} search is about the defaults and not by the rule"
+    return Candidate(sets[0], sets, words * bool(without_unit))

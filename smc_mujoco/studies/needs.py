@@ -1,4 +1,4 @@
-"""What may be asked of a law: that a metric of its runs is small, or that the worst which an adversary finds is."""
+"""Needs: what a law should be, such as "fast". A need is a metric to keep small, in runs or in the worst case."""
 
 import dataclasses
 import math
@@ -20,11 +20,11 @@ from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import METRIC, WorstCase
 
 ROBUST = "robust"
-TIES = {"no-overshoot": "overshoot", "frugal": "energy of u"}  # what orders laws that tie, least first, in words
+TIES = {"no-overshoot": "overshoot", "frugal": "energy of u"}  # need -> its metric in words, in the order of ties
 
 
 class Runs(NamedTuple):
-    """Runs of laws on one plant, and law -> what an adversary found in each condition if "robust" is asked, else {}."""
+    """Runs of laws on one plant; for the need "robust" law -> its worst case in each condition, else {}."""
 
     table: Table
     group: Group
@@ -37,13 +37,13 @@ class Choice:
 
     Attributes:
       law: with its gains for the plant.
-      remark: what is to be said of the gains besides their source.
+      remark: what there is to say of the gains besides their source.
       rank: its mean rank over the blocks, and its place; NaN if it is not compared.
       settles: share of its runs that settle.
       reliable: whether it settles in nearly all runs of every condition.
       fit: whether it settles often enough to be advised.
       medians: need -> median over the conditions, with its interval; of "robust" the largest over the conditions.
-      worst: what an adversary found in each condition, for the need "robust"; else empty.
+      worst: its worst case in each condition, for the need "robust"; else empty.
     """
 
     law: Component
@@ -57,8 +57,8 @@ class Choice:
 
     @property
     def worst_found(self) -> WorstCase:
-        """The worst of them."""
-        return max(self.worst, key=lambda one: one.value)
+        """The worst case of all conditions."""
+        return max(self.worst, key=lambda case: case.value)
 
     @property
     def gains(self) -> str:
@@ -87,28 +87,28 @@ class Need:
         return median_of(scores.values[law], samples=samples_of(scores.sets[law]))
 
     def below(self, choice: Choice) -> str:
-        """Return what a table shows below the median of a finalist: its interval, if that has a width."""
+        """Return the text below the median of a finalist in a table: its interval, if that has a width."""
         median = choice.medians[self.metric.need]
         return spread(median, self.metric.name) * (median.low < median.high)
 
     def remark(self, choices: Sequence[Choice]) -> str:
-        """Return what an answer says of the need besides, the first of the choices being advised."""
+        """Return an additional sentence of the answer. The first of the choices is advised."""
         return ""
 
 
 class Robust(Need):
-    """The metric of the worst run that an adversary finds: one value of a law in a condition, compared without a test.
+    """The metric of the worst case: one value of a law in a condition, so laws are compared without a test.
 
-    The median over the conditions is here the largest value.
+    Its median over the conditions is their largest value.
     """
 
     tested = False
 
     def scores(self, runs: Runs) -> Scores:
-        """Return what was found, (conditions, 1) of each law."""
-        values = {law: np.array([[one.value] for one in its]) for law, its in runs.worst.items()}
-        alike = dict.fromkeys(values, np.zeros((len(runs.group.blocks), 1), np.int64))
-        return Scores([*range(len(runs.group.blocks))], values, alike, alike)
+        """Return the value of each law, (conditions, 1)."""
+        values = {law: np.array([[case.value] for case in cases]) for law, cases in runs.worst.items()}
+        zeros = dict.fromkeys(values, np.zeros((len(runs.group.blocks), 1), np.int64))
+        return Scores([*range(len(runs.group.blocks))], values, zeros, zeros)
 
     def median(self, scores: Scores, law: str) -> Interval:
         """Return the largest value over the conditions."""
@@ -116,30 +116,30 @@ class Robust(Need):
 
     def below(self, choice: Choice) -> str:
         """Return the median of the random members of the class."""
-        one = choice.worst_found
-        return f"median {one.shown(one.median)}"
+        worst = choice.worst_found
+        return f"median {worst.shown(worst.median)}"
 
     def remark(self, choices: Sequence[Choice]) -> str:
         """Return what the adversary did, and which law the median of its random runs puts first."""
-        one, fit = choices[0].worst_found, [choice for choice in choices if choice.fit] or choices
-        least = min(fit, key=lambda choice: choice.worst_found.median)
+        advised, fit = choices[0].worst_found, [choice for choice in choices if choice.fit] or choices
+        lowest = min(fit, key=lambda choice: choice.worst_found.median)
         text = (
-            f"Robust is by the worst found in {one.tried} runs of each law in each condition, half of them random, "
-            f"within {one.class_words}, with its best set of gains from the first start; there may be worse."
+            f"Robust is by the worst found in {advised.tried} runs of each law in each condition, half of them random, "
+            f"within {advised.class_words}, with its best set of gains from the first start; there may be worse."
         )
-        if least is choices[0]:
+        if lowest is choices[0]:
             return text
-        found = least.worst_found
-        first = f"The median of the random runs would put {least.law.name} first, with {found.with_unit(found.median)}"
-        return f"{text} {first}: its worst found is {found.words}."
+        other = lowest.worst_found
+        first = f"The median of the random runs would put {lowest.law.name} first, with {other.with_unit(other.median)}"
+        return f"{text} {first}: its worst found is {other.words}."
 
 
 NEEDS: Mapping[str, Need] = {metric.need: Need(metric) for metric in metrics() if metric.need}
-_worst = CATALOGUE[METRIC]
-NEEDS |= {ROBUST: Robust(dataclasses.replace(_worst, need=ROBUST, label=f"worst found {_worst.label}"))}
+NEEDS |= {
+    ROBUST: Robust(dataclasses.replace(CATALOGUE[METRIC], need=ROBUST, label=f"worst found {CATALOGUE[METRIC].label}"))
+}
 
 
 def ties(plant: Plant) -> list[Metric]:
     """Return the metrics that order laws which tie on a plant."""
-    of = [NEEDS[need].metric for need in TIES]
-    return [metric for metric in of if not metric.refusal(plant)]
+    return [NEEDS[need].metric for need in TIES if not NEEDS[need].metric.refusal(plant)]

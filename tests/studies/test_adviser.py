@@ -105,7 +105,7 @@ def test_the_answer_says_what_why_and_how_sure(advice):
 
 
 def test_robust_goes_by_the_worst_found_and_tells_the_median_too(folder, monkeypatch):
-    monkeypatch.setattr(adviser, "GLANCE", 9)
+    monkeypatch.setattr(adviser, "SCREENING_BUDGET", 9)
     monkeypatch.setattr(adviser, "default_budget", lambda scenario, within: 9)
     options = {"laws": ["classical", FAST, SLOW], "within": smc.Uncertainty(disturbance=2.0), "out": folder}
     made = smc.which("duffing", needs="robust", conditions="nominal", duration=2.5, seeds=6, **options)
@@ -343,7 +343,7 @@ def test_if_nothing_settles_nothing_is_advised(folder):
 
 def test_one_law_is_the_only_one(folder):
     found = smc.which("duffing", laws=FAST, out=folder, **COMMON)
-    assert (found.second, found.needs) == (None, adviser.USUAL)
+    assert (found.second, found.needs) == (None, adviser.DEFAULT_NEEDS)
     assert found.answer == [
         f"Use {FAST} (gains: yours).",
         "Because it is the only law here that suits. It settles in 100 % of its runs.",
@@ -478,7 +478,7 @@ def test_a_plant_that_cannot_be_tuned_has_default_gains_and_says_so(folder):
 def test_needs_are_metrics_to_compare_and_properties_to_have():
     machine = smc.plant("duffing")
     assert adviser._needs("calm, continuous,fast", machine) == (("calm", "fast"), ("continuous",))
-    assert adviser._needs(["two-gains"], machine) == (adviser.USUAL, ("two-gains",))
+    assert adviser._needs(["two-gains"], machine) == (adviser.DEFAULT_NEEDS, ("two-gains",))
     names = {law.name for law in adviser._suited(machine, ["continuous", "two-gains"], None)}
     assert "observer_free" in names
     assert not names & {"none", "classical", "observer_free_q15", "hierarchical"}
