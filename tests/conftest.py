@@ -4,12 +4,13 @@
     pytest -m "not slow"      # all but the tests that take over about 4 s, or show what a faster one does
 
 Compiled code is kept in one folder, so that all workers, all child processes, and copies of the package that tests
-install elsewhere compile a function once.
+install elsewhere compile a function once. Bytecode is kept too: otherwise each worker would compile all tests again.
 """
 
 import gc
 import importlib
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,8 @@ pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).parents[1]
 os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".pytest_cache" / "numba"))
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 
 def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
@@ -58,12 +61,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture
 def coarse_grid(monkeypatch):
-    """Seek limit cycles on a sixth of the grid's points, and gains at a quarter of the speeds.
+    """Seek limit cycles on a thirteenth of the grid's points, and gains at a quarter of the speeds.
 
     What is found there is refined as ever; a law with several cycles may lose one.
     """
-    monkeypatch.setattr("smc_mujoco.analysis.chattering.FREQUENCIES", 24)
-    monkeypatch.setattr("smc_mujoco.analysis.chattering.AMPLITUDES", 15)
+    monkeypatch.setattr("smc_mujoco.analysis.chattering.FREQUENCIES", 16)
+    monkeypatch.setattr("smc_mujoco.analysis.chattering.AMPLITUDES", 10)
     monkeypatch.setattr("smc_mujoco.analysis.gains_for.SPEEDS", tuple(10.0 ** (0.4 * k - 1.0) for k in range(6)))
 
 

@@ -21,6 +21,7 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.cli import main
 from smc_mujoco.cli import scene as show
 from smc_mujoco.common import gl
+from smc_mujoco.evidence.rigs import ensemble
 from smc_mujoco.studies import fair_gains, scene
 
 pytestmark = [pytest.mark.quick, pytest.mark.usefixtures("replayed_here")]
@@ -58,6 +59,7 @@ LITTLE = {
     "tune": {"objective": SHORTLY},
     "identify": {"most": 2},
     "worst_case": {"budget": 8},
+    "still": {"size": (640, 360)},
 }
 
 
@@ -99,6 +101,7 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
     monkeypatch.setattr(search, "BUDGET", 8)  # of the tunings in `smc.compare`
     monkeypatch.setattr(fair_gains, "Objective", lambda: BRIEFLY)
+    monkeypatch.setattr(ensemble, "runs", with_little(ensemble.runs, {"seeds": 2, "duration": 0.3}))
     for name, little in LITTLE.items():
         monkeypatch.setattr(smc, name, with_little(getattr(smc, name), little))
     monkeypatch.setattr(sys, "argv", ["block.py", "--no-film"])  # read by a scene that plays itself

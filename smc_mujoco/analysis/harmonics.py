@@ -15,6 +15,7 @@ see `play`, and multiplies the gain.
 import copy
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 
@@ -238,9 +239,10 @@ class Loop:
 
     def _followed(self, amplitude: float, omega: float, u: np.ndarray, angles: np.ndarray) -> list[complex]:
         """Return the harmonics of e = amplitude sin(omega t) and of the mechanism's answer to those of u."""
-        first = _harmonic(u, angles)
         highest = min(HARMONICS, math.ceil(math.pi / self.scenario.control_period / omega) - 1)
-        rest = [self.response(n * omega) * _harmonic(u, n * angles) / 1j for n in range(2, highest + 1)]
+        powers = itertools.accumulate(itertools.repeat(np.exp(-1j * angles), max(highest, 1)), np.multiply)
+        first = _first(u, next(powers))
+        rest = [self.response(n * omega) * _first(u, power) / 1j for n, power in enumerate(powers, 2)]
         # the phase of u's first harmonic is that which the balance gives it
         turned = 1j * amplitude / (first * self.response(omega)) if first else 0j
         return [amplitude, *(x * (turned / abs(turned)) ** n if turned else 0j for n, x in enumerate(rest, 2))]

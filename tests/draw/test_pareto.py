@@ -55,8 +55,6 @@ def test_writes_svg_and_png_that_name_the_laws_what_they_cost_and_the_axes(pair,
         assert words in text
     with Image.open(png) as image:
         assert image.size == (1920, 960)
-    again = pareto(pair, tmp_path / "again")
-    assert [p.read_bytes() for p in again] == [svg.read_bytes(), png.read_bytes()]
 
 
 def test_no_tried_gains_lie_below_the_staircase_and_the_chosen_ones_are_on_it(pair, page, tmp_path):

@@ -212,7 +212,7 @@ def test_a_replay_tells_cheats_from_honest_laws():
 
 @pytest.mark.filterwarnings("ignore:.*the run takes the reference loop")
 def test_a_cheat_is_a_failure_in_the_table(tmp_path):
-    runs = smc.grid("duffing", [honest, peeks, counts_calls, "pid"], "noise", seeds=2, duration=1.0)
+    runs = smc.grid("duffing", [honest, peeks, counts_calls, "pid"], "noise", seeds=2, duration=0.4)
     table = smc.study(runs, tmp_path, noise_key=5, replay=True)
     rows = {}
     for row in table.rows():

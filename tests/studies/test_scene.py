@@ -108,6 +108,8 @@ def test_a_scene_of_each_kind_of_figure_is_drawn(name, tmp_path, monkeypatch):
     monkeypatch.setattr(page, "lay_out", lambda *_: None)
     monkeypatch.setattr(page, "write", render_the_first)
     scene = declared_shortly(FOLDER / f"{name}.py")
+    two = {condition: dict([*runs.items()][:2]) for condition, runs in [*scene.conditions.items()][:2]}
+    scene = dataclasses.replace(scene, conditions=two, film="")
     with contextlib.redirect_stdout(io.StringIO()):
         traces = show.simulate(scene, threads=None)
     drawn = show.figures(scene, traces, tmp_path)

@@ -16,7 +16,7 @@ LAWS = (smc.law("pid", kp=30.0, kd=6.0), smc.law("super_twisting"))
 
 @pytest.fixture(scope="module")
 def boards(tmp_path_factory):
-    runs = ensemble.runs(PENDULUM, LAWS, seeds=16, duration=1.5, starts=smc.starts(0.3))
+    runs = ensemble.runs(PENDULUM, LAWS, seeds=16, duration=0.75, starts=smc.starts(0.3))
     table = smc.study(runs, tmp_path_factory.mktemp("study"), progress=False)
     return smc.leaderboard(table, defaults=True)  # super_twisting has its default gains
 

@@ -64,7 +64,7 @@ def axis_record(seconds, begin=0.0, speed=4.0):
 def test_columns_of_the_axis_give_all_four_however_they_begin(begin):
     """By another simulator without steps; a cubic through the first samples would err by 8 % in the offset."""
     near = AXIS.with_values({name: 1.05 * AXIS.values[name] for name in AXIS.free})
-    result = smc.identify(near, axis_record(0.6 + begin, begin), starts=1, most=4)
+    result = smc.identify(near, axis_record(0.6 + begin, begin), starts=1, most=3)
     for name, value in result.values.items():
         assert value == pytest.approx(AXIS.values[name], rel=0.02)
     assert min(result.fits[0].values()) > 99.0
@@ -100,10 +100,11 @@ def test_the_published_axis_is_found_within_two_percent(found):
     assert found.rig.quantities["mass"].source == "identified from records"
 
 
-def test_equal_seeds_give_equal_results_and_another_seed_begins_elsewhere(moved):
+def test_equal_seeds_give_equal_results_and_another_seed_begins_elsewhere():
     """From a mass so far off that a random start is better, and with a single step from it."""
     far = AXIS.with_values({"mass": 2000.0})
-    one, again, other = (smc.identify(far, moved, ["mass"], starts=2, seed=seed, most=1) for seed in (5, 5, 6))
+    brief = smc.run(AXIS.scenario(duration=0.5, reference=smc.Sine(0.05, 8.0), x0=0.0))
+    one, again, other = (smc.identify(far, brief, ["mass"], starts=2, seed=seed, most=1) for seed in (5, 5, 6))
     assert (one.values, one.errors) == (again.values, again.errors)
     assert one.values != other.values
     for found in (one, other):
@@ -222,7 +223,7 @@ FAR = {"M": 95.0, "b": 203.0, "cf": 20.4, "offset": -3.2}
 
 
 @pytest.mark.parametrize(
-    ("start", "seconds"), [({}, 0.75), pytest.param(FAR, 1.5, marks=pytest.mark.slow)], ids=["near", "95 kg"]
+    ("start", "seconds"), [({}, 0.4), pytest.param(FAR, 1.5, marks=pytest.mark.slow)], ids=["near", "95 kg"]
 )
 def test_standard_errors_cover_the_truth_from_any_start(start, seconds):
     """The full coverage, three machines and 20 seeds, is in benchmarks/identification.py.
