@@ -128,6 +128,17 @@ def test_command_lines_name_commands_options_and_files_that_exist(page):
         check_command(line, known)
 
 
+def test_a_flag_of_a_command_is_off_unless_it_is_given():
+    commands = typer.main.get_command(main.app).commands  # pyright: ignore[reportAttributeAccessIssue]
+    on = {
+        (name, *parameter.opts)
+        for name, command in commands.items()
+        for parameter in command.params
+        if getattr(parameter, "is_flag", False) and parameter.default and not parameter.secondary_opts
+    }
+    assert on == set()
+
+
 def check_command(line: str, known: dict) -> None:
     word, *rest = shlex.split(line)[1:]
     assert word in known, line

@@ -240,6 +240,8 @@ def test_feedback_of_a_control_experiment_is_what_its_name_says():
         assert u["clipped"] == pytest.approx(s, rel=1e-9)
     assert law().gains == rows["Riccati"]
     assert boards.entry("acrobot", "clipped").law.of_channel(0).gains == rows["clipped"]
+    assert str(boards.entry("acrobot").velocity).startswith("savitzky_golay(")
+    assert str(boards.on_board("acrobot", "none").velocity).startswith("measured")
 
 
 def test_with_measured_velocities_the_acrobots_entry_is_less_robust_than_two_published_rows():

@@ -735,16 +735,17 @@ def random_runs(draw):
 
 
 @settings(max_examples=40, deadline=None)
-@given(random_runs(), st.sampled_from([-8.0, -1.0, 0.125, 4.0]))
-def test_scaling_x_and_r_scales_lengths_and_leaves_times_and_percentages(trace, c):
+@given(random_runs(), st.sampled_from([-8.0, -1.0, 0.125, 4.0]), st.sampled_from([-4.0, 0.5]))
+def test_scaling_x_or_u_scales_what_has_its_unit_and_leaves_times_and_percentages(trace, c, k):
     if not np.any(trace.x[0] - trace.r[0]) and not np.any(np.ptp(trace.r, axis=0)):
         return  # the scale is then 1 by convention
     before = m.score(trace)
-    after = m.score(dataclasses.replace(trace, x=c * trace.x, r=c * trace.r))
+    after = m.score(dataclasses.replace(trace, x=c * trace.x, r=c * trace.r, u=k * trace.u))
     for metric in m.metrics():
-        power = 2 if "({x})^2" in metric.unit else int("{x}" in metric.unit)
+        power, of_u = (2 if f"({one})^2" in metric.unit else int(one in metric.unit) for one in ("{x}", "{u}"))
         if metric.name in before:
-            value = pytest.approx(abs(c) ** power * before[metric.name], rel=1e-12, abs=1e-12, nan_ok=True)
+            factor = abs(c) ** power * abs(k) ** of_u
+            value = pytest.approx(factor * before[metric.name], rel=1e-12, abs=1e-12, nan_ok=True)
             assert after[metric.name] == value, metric.name
 
 

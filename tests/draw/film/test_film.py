@@ -130,6 +130,7 @@ def test_arrows_are_to_scale_and_a_bar_shows_switching():
     arrow, bar, push = arrows(acting, 1, 0, Scale(6.0, 0.2), "#0072B2")
     assert arrow.high == pytest.approx(0.25, abs=0.02)
     assert (bar.low, bar.high, bar.head) == (-0.5, 1.0, False)
+    assert [part.layer for part in (arrow, bar, push)] == [0, 0, 1]  # each arrow is beyond the one before
     assert push.high == pytest.approx(np.sin(5 * trace.t[101:201]).mean(), abs=0.02)
 
 
@@ -577,6 +578,7 @@ def test_behind_a_drive_the_force_is_shown_and_the_command_pale():
     solid, pale = (arrow for arrow in both if arrow.head)
     assert abs(solid.high) < 0.5 * abs(pale.high)  # a quarter of the lag's time constant
     assert (solid.rgba[3], pale.rgba[3]) == (1.0, 0.45)
+    assert (solid.layer, pale.layer) == (0, 1)
     assert "pale arrow: command" in key([slow], found)
     assert not any("pale" in words for words in key(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1]))))
 

@@ -381,6 +381,19 @@ def sanitizers():
         pytest.skip("the C compiler here has no sanitizers")
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="the compiler is a shell script")
+@pytest.mark.parametrize(("compiler_ends", "program_ends"), [(0, 0), (0, 1), (1, 0)])
+def test_sanitizers_work_where_a_program_with_them_compiles_and_runs(tmp_path, compiler_ends, program_ends):
+    compiler = tmp_path / "cc"
+    program = f"'#!/bin/sh\\nexit {program_ends}\\n'"
+    compiler.write_text(f"""#!/bin/sh
+while [ "$1" != -o ]; do shift; done
+printf {program} > "$2"; chmod +x "$2"; exit {compiler_ends}
+""")
+    compiler.chmod(0o755)
+    assert (build.replayer((str(compiler),)) is None) == (compiler_ends + program_ends > 0)
+
+
 @pytest.mark.parametrize(("body", "words"), HARM.items())
 @pytest.mark.usefixtures("sanitizers")
 def test_isolated_what_sanitizers_see_is_one_sentence(file, body, words):
