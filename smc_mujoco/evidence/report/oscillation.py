@@ -99,5 +99,6 @@ def sentence(found: tuple[Oscillation, ...]) -> str:
         text += f"; for {wrong} prediction and run disagree"
     if not both:
         return f"{text}."
-    error = statistics.median(abs(one.error) for one in both)
-    return f"{text}. The median error of the predicted amplitude is {error:.2g} %."
+    errors = [abs(one.error) for one in both]
+    median, largest = statistics.median(errors), max(errors)
+    return f"{text}. The median error of the predicted amplitude is {median:.2g} %, the largest {largest:.0f} %."

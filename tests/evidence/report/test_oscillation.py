@@ -44,6 +44,8 @@ def test_the_sentence_counts_pairs_and_takes_the_median_error(found):
     assert "2 are predicted to oscillate and do; 0 do neither; for 1 prediction and run disagree." in (
         oscillation.sentence((*worse, unseen))
     )
-    assert said.endswith("is 30 %.")
+    assert said.endswith("is 30 %, the largest 50 %.")
     better = dataclasses.replace(switching, amplitude=1.1 * switching.measured_amplitude)
-    assert oscillation.sentence((worse[0], better)).endswith("is 20 %.")  # midway between 10 % and 30 %
+    assert oscillation.sentence((worse[0], better)).endswith(
+        "is 20 %, the largest 30 %."
+    )  # midway between 10 % and 30 %
