@@ -37,23 +37,26 @@ from numba import carray, njit
 
 from smc_mujoco.common import libmujoco
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.jit import Function, floats, integers, pointer, record_at
+from smc_mujoco.common.jit import Function, floats, pointer, record_at
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
 from smc_mujoco.mechanisms.plant import SEEN, Dynamics, Field, Native, Values, ready, write
 
 _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
 # Parameters of the C functions: numbers of channels, of driven ones and of degrees of freedom; addresses of model and
-# data, of their arrays, and of arrays of this simulation's own.
+# data, of their arrays, and of arrays of this simulation's own: the channels' places, the state that was evaluated, a
+# unit force and its acceleration.
 NOMINAL = floats(
-    ("n", "driven", "nv", "model", "data", "qpos", "qvel", "ctrl", "acceleration", "places", "seen", "solved")
+    ("n", "driven", "nv", "model", "data", "qpos", "qvel", "ctrl", "acceleration", "places", "x", "v", "unit", "moved")
 )
 # The same of M, h and g; then whether h is of passive forces alone, the tip's site or -1, whether to compute g.
 DYNAMICS = floats(
-    ("n", "nv", "model", "data", "qpos", "qvel", "bias", "passive", "actuator", "places", "dense", "state", "moves",
+    ("n", "nv", "model", "data", "qpos", "qvel", "bias", "passive", "actuator", "places", "dense", "v", "moves",
      "alone", "site", "at_rest")
 )  # fmt: skip
-nominal_at, dynamics_at, seen_at = map(record_at, (NOMINAL, DYNAMICS, SEEN))
+# Indices of a channel in qpos, qvel and ctrl; the last is -1 without an actuator.
+PLACE = np.dtype([(name, "i8") for name in ("qpos", "qvel", "ctrl")])
+nominal_at, dynamics_at, seen_at, place_at = map(record_at, (NOMINAL, DYNAMICS, SEEN, PLACE))
 _SLEEP = mujoco.mjtEnableBit.mjENBL_SLEEP.value
 _lock = threading.Lock()  # held while Python computes with the mjData of a model
 free_after_fork(_lock)
@@ -65,6 +68,13 @@ class Places(NamedTuple):
     qpos: np.ndarray
     qvel: np.ndarray
     ctrl: np.ndarray
+
+    @property
+    def table(self) -> np.ndarray:
+        """The same as an array of channels, (n,) PLACE."""
+        made = np.full(len(self.qpos), -1, PLACE)
+        made["qpos"], made["qvel"], made["ctrl"][: len(self.ctrl)] = self
+        return made
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,10 +113,8 @@ class NominalModel:
         if self.why_not:
             return Native(unknown().address, (), ())
         model, places, borrowed = self._borrow(parameters)
-        data, seen = borrowed.data, np.full(2 * len(places.qpos), np.nan)
-        table = np.concatenate([places.qpos, places.qvel, places.ctrl]).astype(np.int64)
-        solved = np.zeros(2 * model.nv)
-        arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, table, seen, solved
+        data, seen, solved = borrowed.data, np.full((2, len(places.qpos)), np.nan), np.zeros((2, model.nv))
+        arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, places.table, *seen, *solved
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
         sizes = len(places.qpos), len(places.ctrl), model.nv
         return Native(native().address, tuple(map(float, (*sizes, *addresses))), (model, borrowed, *arrays))
@@ -171,10 +179,9 @@ class NominalModel:
         model, places, borrowed = self._borrow(parameters)
         data = borrowed.data
         data.ctrl[:] = data.qfrc_actuator[:] = 0.0
-        table = np.concatenate([places.qpos, places.qvel]).astype(np.int64)
-        dense, state, moves = np.zeros(model.nv**2), np.zeros(2 * len(places.qpos)), np.zeros(3 * model.nv)
+        dense, v, moves = np.zeros(model.nv**2), np.zeros(len(places.qpos)), np.zeros(3 * model.nv)
         forces = data.qfrc_bias, data.qfrc_passive, data.qfrc_actuator
-        arrays = data.qpos, data.qvel, *forces, table, dense, state, moves
+        arrays = data.qpos, data.qvel, *forces, places.table, dense, v, moves
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
         site = model.site(tip).id if tip else -1
         values = (len(places.qpos), model.nv, *addresses, passive_alone(model), site, at_rest)
@@ -286,31 +293,29 @@ def native_dynamics() -> Function:
         at, read = dynamics_at(p, 0), seen_at(y, 0)
         n, nv, model, data = int(at.n), int(at.nv), int(at.model), int(at.data)
         biases, alone = int(at.bias), at.alone != 0.0
-        x, v, state = pointer(read.x), pointer(read.v), carray(pointer(int(at.state)), (2 * n,))
+        x, v, kept, places = pointer(read.x), pointer(read.v), pointer(int(at.v)), int(at.places)
         qpos, qvel = carray(pointer(int(at.qpos)), (1 << 40,)), carray(pointer(int(at.qvel)), (nv,))
         bias, passive = carray(pointer(biases), (nv,)), carray(pointer(int(at.passive)), (nv,))
-        actuator, table = carray(pointer(int(at.actuator)), (nv,)), carray(integers(int(at.places)), (2 * n,))
-        dense, output = carray(pointer(int(at.dense)), (nv, nv)), carray(pointer(out), (n * n + 2 * n,))
+        actuator, dense = carray(pointer(int(at.actuator)), (nv,)), carray(pointer(int(at.dense)), (nv, nv))
+        M, h, g = carray(pointer(out), (n, n)), pointer(out + 8 * n * n), pointer(out + 8 * (n * n + n))
         for j in range(n):
-            state[j], state[n + j] = x[j], v[j]
-            qpos[table[j]] = x[j]
+            kept[j] = v[j]
+            qpos[place_at(places, j).qpos] = x[j]
         positions(model, data, biases, alone)
         full(model, data, int(at.dense))
         for i in range(n):
             for j in range(n):
-                output[n * i + j] = dense[table[n + i], table[n + j]]
-        first = 0
-        if at.at_rest == 0.0:  # without g
-            first = 1
+                M[i, j] = dense[place_at(places, i).qvel, place_at(places, j).qvel]
+        for j in range(n):
+            g[j] = math.nan
+        for part in range(0 if at.at_rest else 1, 2):  # g, then h, so that the last velocities are those of the sample
             for j in range(n):
-                output[n * n + n + j] = math.nan
-        for part in range(first, 2):  # g, then h, so that the velocities are those of the sample afterwards
-            for j in range(n):
-                qvel[table[n + j]] = part * v[j]
+                qvel[place_at(places, j).qvel] = part * v[j]
             velocities(model, data, biases, alone)
+            forces = h if part == 1 else g
             for j in range(n):
-                k = table[n + j]
-                output[n * n + (1 - part) * n + j] = bias[k] - passive[k] - actuator[k]
+                k = place_at(places, j).qvel
+                forces[j] = bias[k] - passive[k] - actuator[k]
         return 0
 
     return Function(native)
@@ -325,21 +330,21 @@ def native_coriolis() -> Function:
         at = dynamics_at(p, 0)
         n, nv, model, data = int(at.n), int(at.nv), int(at.model), int(at.data)
         w, output = carray(pointer(y), (n,)), carray(pointer(out), (n,))
-        state, qvel = carray(pointer(int(at.state)), (2 * n,)), carray(pointer(int(at.qvel)), (nv,))
-        bias, table = carray(pointer(int(at.bias)), (nv,)), carray(integers(int(at.places)), (2 * n,))
+        v, qvel = pointer(int(at.v)), carray(pointer(int(at.qvel)), (nv,))
+        bias, places = carray(pointer(int(at.bias)), (nv,)), int(at.places)
         for j in range(n):
             output[j] = 0.0
         for part in range(2):
             sign = 1.0 - 2.0 * part
             for j in range(n):
-                qvel[table[n + j]] = state[n + j] + sign * w[j]
+                qvel[place_at(places, j).qvel] = v[j] + sign * w[j]
             if at.alone != 0.0:
                 rates(model, data)
                 newton_euler(model, data, 0, int(at.bias))
             else:
                 velocity(model, data)
             for j in range(n):
-                output[j] += sign * 0.25 * bias[table[n + j]]
+                output[j] += sign * 0.25 * bias[place_at(places, j).qvel]
         return 0
 
     return Function(native)
@@ -353,14 +358,13 @@ def native_jacobian() -> Function:
     def native(y, p, m, out):
         at = dynamics_at(p, 0)
         n, nv, site = int(at.n), int(at.nv), int(at.site)
-        output, table = carray(pointer(out), (3, n)), carray(integers(int(at.places)), (2 * n,))
-        moves = carray(pointer(int(at.moves)), (3, nv))
+        output, moves = carray(pointer(out), (3, n)), carray(pointer(int(at.moves)), (3, nv))
         if site < 0:
             return 1
         of_site(int(at.model), int(at.data), int(at.moves), 0, site)
         for i in range(3):
             for j in range(n):
-                output[i, j] = moves[i, table[n + j]]
+                output[i, j] = moves[i, place_at(int(at.places), j).qvel]
         return 0
 
     return Function(native)
@@ -379,30 +383,30 @@ def native() -> Function:
         read, at = seen_at(y, 0), nominal_at(p, 0)
         i, n, driven, nv = read.i, int(at.n), int(at.driven), int(at.nv)
         x, v, u = pointer(read.x), pointer(read.v), pointer(read.u)
-        model, data = int(at.model), int(at.data)
+        model, data, places = int(at.model), int(at.data), int(at.places)
         qpos, qvel = carray(pointer(int(at.qpos)), (1 << 40,)), carray(pointer(int(at.qvel)), (1 << 40,))
         ctrl, qacc = carray(pointer(int(at.ctrl)), (1 << 40,)), carray(pointer(int(at.acceleration)), (nv,))
-        table, seen = carray(integers(int(at.places)), (2 * n + driven,)), carray(pointer(int(at.seen)), (2 * n,))
-        solved = carray(pointer(int(at.solved)), (2 * nv,))
+        last_x, last_v = carray(pointer(int(at.x)), (n,)), carray(pointer(int(at.v)), (n,))
+        unit, moved = carray(pointer(int(at.unit)), (nv,)), carray(pointer(int(at.moved)), (nv,))
         fresh = False
         for j in range(n):
-            if seen[j] != x[j] or seen[n + j] != v[j]:  # NaN, the initial value, differs from everything
-                fresh, seen[j], seen[n + j] = True, x[j], v[j]
+            if last_x[j] != x[j] or last_v[j] != v[j]:  # NaN, the initial value, differs from everything
+                fresh, last_x[j], last_v[j] = True, x[j], v[j]
         if fresh:  # the first channel of a sample; the others have the same state
             for j in range(n):
-                qpos[table[j]], qvel[table[n + j]] = x[j], v[j]
+                qpos[place_at(places, j).qpos], qvel[place_at(places, j).qvel] = x[j], v[j]
             positions(model, data)
             velocities(model, data)
         for j in range(driven):
-            ctrl[table[2 * n + j]] = 0.0 if j == i % driven else u[j]
+            ctrl[place_at(places, j).ctrl] = 0.0 if j == i % driven else u[j]
         actuation(model, data)
         accelerations(model, data)
         for j in range(nv):
-            solved[nv + j] = 0.0
-        solved[nv + table[n + i % driven]] = 1.0
-        solve(model, data, int(at.solved), int(at.solved) + 8 * nv, 1)
-        output = carray(pointer(out), (2,))
-        output[0], output[1] = qacc[table[n + i]], solved[table[n + i]]
+            unit[j] = 0.0
+        unit[place_at(places, i % driven).qvel] = 1.0
+        solve(model, data, int(at.moved), int(at.unit), 1)
+        output, dof = carray(pointer(out), (2,)), place_at(places, i).qvel
+        output[0], output[1] = qacc[dof], moved[dof]
         return 0
 
     return Function(native)
