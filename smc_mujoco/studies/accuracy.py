@@ -5,14 +5,14 @@
     table[0].e.order, table[0].e.theory           # exponent of the control period, measured and promised
 
 Runs have no noise. The error of a run is the largest |e|, or |s|, at the control samples of its last 20 %, over all
-driven channels: an ultimate bound, as the theorems on accuracy state it, |e| <= C h^r for a control period h.
-`analysis.scaling` determines the exponent r and says which errors do not count. Every law states what theory promises
-in its own file, see `law_function`. It promises nothing of the period where a drive, a delay, a sensor or an estimate
-of the velocity stands between law and mechanism.
+driven channels. That is an ultimate bound, as the theorems on accuracy state it: |e| <= C h^r for a control period h.
+`analysis.scaling` determines the exponent r and says which errors do not count. The file of a law states the order that
+theory promises, see `law_function`. Theory promises no order if there is a drive, a delay, a sensor or an estimate of
+the velocity between law and mechanism.
 
-A mechanism with friction, contacts or other parts takes at least 16 physics steps in each control period, because the
-error of an integrator of first order must not grow beside the period. The run of the shortest period is repeated with
-half the step. RK4, for plain equations, keeps the scenario's own step.
+A mechanism with friction, contacts or other parts takes at least 16 physics steps in each control period, so that the
+error of the first-order integrator does not count. The run of the shortest period is repeated with half the step. RK4,
+for plain equations, keeps the scenario's step.
 """
 
 import dataclasses
@@ -57,21 +57,22 @@ from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import MIN_TIME, Scenario
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.fair_gains import in_set
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure, SubFigure
 
 PERIODS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)  # s
-CONDITION = "constant"  # chosen: a disturbance that every law can bear, and that leaves an error to smooth laws
-STARTS = 3  # initial states of each law at each period; chosen
+DEFAULT_CONDITION = "constant"  # chosen: a disturbance that every law can bear, and that leaves smooth laws an error
+DEFAULT_SEEDS = 3  # initial states of each law at each period; chosen
 MIN_STEPS = 16  # physics steps in a control period of a mechanism with friction, contacts or other parts
 RESOLUTION = 1e-11  # of the initial error; chosen, above rounding and the creep of stuck joints
-STEP_CHANGE = 0.25  # of an error when the physics step is halved, from which on it is said; chosen
-SATURATED = 0.05  # of the last samples at the bound on u, from which on it is said; chosen
+MAX_STEP_CHANGE = 0.25  # of an error with half the physics step; a larger one is remarked; chosen
+MIN_SATURATED = 0.05  # share of the last samples at the bound on u; it is remarked from there on; chosen
 PARTS = 3  # of a run, each as long as its last part, in which errors are compared
 MAX_SEEDS = 10_000
-FULL = 1.0 - 1e-9  # of the bound on u, above the rounding of a saturated u
+FULL_SHARE = 1.0 - 1e-9  # of the bound on u: a larger |u| is saturated
 RELATIVE_DEGREE = 2  # of a mechanism without a drive
 KEY = (
     "|e| is the largest at the samples of the last 20 % of all runs, without noise, at the longest and the shortest "
@@ -81,7 +82,7 @@ KEY = (
 
 
 class AccuracyTable(Tables, list[Accuracy]):
-    """Accuracies of laws, for each plant and condition the most accurate law first. They are shown as tables."""
+    """Accuracies of laws, shown as tables; for each plant and condition the most accurate law is first."""
 
     @property
     def groups(self) -> dict[str, list[Accuracy]]:
@@ -126,24 +127,19 @@ def load(path: str | os.PathLike) -> AccuracyTable:
       ScenarioError: no such file, or not a file of accuracies.
     """
     with reading(path, "file of accuracies", "give a .json file that AccuracyTable.save wrote") as file:
-        return AccuracyTable(_loaded(entry) for entry in read_json(file))
+        rows = [_with_tuples(entry) for entry in read_json(file)]
+        return AccuracyTable(Accuracy(**row | {name: Scaling(**row[name]) for name in QUANTITIES}) for row in rows)
 
 
-def _loaded(entry: dict[str, Any]) -> Accuracy:
-    """Return the row in a file."""
-    fields = _tuples(entry)
-    return Accuracy(**fields | {name: Scaling(**fields[name]) for name in QUANTITIES})
-
-
-def _tuples(data: Any) -> Any:
-    """Return data of a file with tuples for its lists."""
+def _with_tuples(data: Any) -> Any:
+    """Return the data of a file with tuples for its lists."""
     if isinstance(data, dict):
-        return {name: _tuples(value) for name, value in data.items()}
-    return tuple(map(_tuples, data)) if isinstance(data, list) else data
+        return {name: _with_tuples(value) for name, value in data.items()}
+    return tuple(map(_with_tuples, data)) if isinstance(data, list) else data
 
 
 def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:
-    """Return the table of rows that share plant and condition; the title says where the laws' gains come from."""
+    """Return the table of rows that share plant and condition. Its title also says where the laws' gains come from."""
     first, *_, last = rows[0].periods
     gains = {row.law: row.gains for row in rows}
     cells = [
@@ -165,8 +161,8 @@ def accuracy(
     laws: str | Law | Template | Sequence[str | Law | Template],
     plants: str | Plant | Sequence[str | Plant],
     periods: Sequence[float] = PERIODS,
-    conditions: str | Condition | Sequence[str | Condition] = CONDITION,
-    seeds: int | Iterable[int] = STARTS,
+    conditions: str | Condition | Sequence[str | Condition] = DEFAULT_CONDITION,
+    seeds: int | Iterable[int] = DEFAULT_SEEDS,
     gains: str = "tuned",
     duration: float = DURATION,
     starts: Starts | None = None,
@@ -199,10 +195,10 @@ def accuracy(
     Warns:
       ScenarioWarning: laws that have no gains in the set.
     """
-    h = _longest_first(periods)
+    descending = _longest_first(periods)
     numbers = listed("seeds", seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_SEEDS)))
     setups = [
-        _setup(as_plant(plant), find_condition(condition), law, h, numbers, gains, duration, starts)
+        _setup(as_plant(plant), find_condition(condition), law, descending, numbers, gains, duration, starts)
         for plant in listed("plants", plants)
         for condition in listed("conditions", conditions)
         for law in listed_laws(laws)
@@ -229,14 +225,14 @@ def _longest_first(periods: Sequence[float]) -> tuple[float, ...]:
     Raises:
       ScenarioError: fewer than two, two that are equal, or one that is no period.
     """
-    found = {number("a period", h, above=0.0, low=MIN_TIME) for h in taken("periods", periods)}
-    if len(found) < 2 or len(found) < len(taken("periods", periods)):
+    numbers = [number("a period", h, above=0.0, low=MIN_TIME) for h in taken("periods", periods)]
+    if len(numbers) < 2 or len(set(numbers)) < len(numbers):
         raise ScenarioError(f"periods is {shown(periods)}: give two or more different ones in s, such as {PERIODS}")
-    return tuple(sorted(found, reverse=True))
+    return tuple(sorted(numbers, reverse=True))
 
 
 class Run(NamedTuple):
-    """What is kept of a run.
+    """The numbers of a run that its row needs.
 
     Attributes:
       parts: "e" and "s" -> largest magnitude in each of the last three parts of the run; inf if it failed.
@@ -250,7 +246,7 @@ class Run(NamedTuple):
 
 
 def _measured(trace: Trace) -> Run:
-    """Return what is kept of a run, over its driven channels."""
+    """Return the numbers of a run, over its driven channels."""
     if trace.diverged_at is not None:
         return Run(
             dict.fromkeys(QUANTITIES, (math.inf,) * PARTS),
@@ -261,24 +257,24 @@ def _measured(trace: Trace) -> Run:
     count = len(trace.t) - end.start
     sizes = {"e": np.abs(trace.x - trace.r)[-PARTS * count :, driven], "s": np.abs(trace.s)[-PARTS * count :, driven]}
     parts = {name: [float(part.max()) for part in np.array_split(size, PARTS)] for name, size in sizes.items()}
-    return Run(parts, float((np.abs(trace.u[end, driven]) >= FULL * np.array(trace.scenario.limits)).mean()))
+    return Run(parts, float((np.abs(trace.u[end, driven]) >= FULL_SHARE * np.array(trace.scenario.limits)).mean()))
 
 
 class Setup(NamedTuple):
     """A law on a plant in a condition.
 
     Attributes:
-      scenarios: its runs: for each start one for each period, and last the run of the first start at the shortest
-        period with half the physics step.
+      scenarios: for each start one for each period. The last one is that of the first start at the shortest period,
+        with half the physics step.
       periods: s, longest first.
-      starts: their number.
-      lacking: whether the law has its default gains because the set of gains lacks it.
+      starts: number of starts.
+      untuned: whether the law has its default gains, because the set of gains has none for it.
     """
 
     scenarios: list[Scenario]
     periods: tuple[float, ...]
     starts: int
-    lacking: bool
+    untuned: bool
 
 
 def _setup(
@@ -301,19 +297,17 @@ def _setup(
         raise ScenarioError(f"condition {condition.name!r} sets control_period, which accuracy varies: leave it out")
     if len(units := set(plant.units[: plant.driven])) > 1:
         raise ScenarioError(f"{plant.name} has driven channels in {joined(sorted(units))}: give a plant with one unit")
-    lacking = isinstance(law, str) and not _has_gains(plant, law, gains)
+    untuned = isinstance(law, str) and not _has_gains(plant, law, gains)
 
-    def at(seed: int, h: float, finer: int = 1) -> Scenario:
-        made = case(
-            plant, law, condition, duration, "default" if lacking else gains, seed, starts, {"control_period": h}
-        )
-        if "physics_step" in fields:
-            return dataclasses.replace(made, physics_step=fields["physics_step"] / finer).named(made.condition)
+    def scenario(seed: int, h: float, divisor: int = 1) -> Scenario:
+        gain_set = "default" if untuned else gains
+        made = case(plant, law, condition, duration, gain_set, seed, starts, {"control_period": h})
         steps = made.steps if made.resolved.integrator == "RK4" else max(made.steps, MIN_STEPS)
-        return dataclasses.replace(made, physics_step=h / (steps * finer)).named(made.condition)
+        step = fields["physics_step"] / divisor if "physics_step" in fields else h / (steps * divisor)
+        return dataclasses.replace(made, physics_step=step).named(made.condition)
 
-    runs = [at(seed, h) for seed in seeds for h in periods]
-    return Setup([*runs, at(seeds[0], periods[-1], finer=2)], periods, len(seeds), lacking)
+    runs = [scenario(seed, h) for seed in seeds for h in periods]
+    return Setup([*runs, scenario(seeds[0], periods[-1], divisor=2)], periods, len(seeds), untuned)
 
 
 def _has_gains(plant: Plant, law: str, gains: str) -> bool:
@@ -325,18 +319,13 @@ def _has_gains(plant: Plant, law: str, gains: str) -> bool:
     if not sets.law(plant, law, "default").gains:
         return True
     find("set of gains", gains, dict.fromkeys((*sets.SETS, "default")))
-    try:
-        sets.law(plant, law, gains)
-    except ScenarioError:
-        return False
-    return True
+    return in_set(plant, law, gains)
 
 
 def _warn_of_defaults(setups: Sequence[Setup], gains: str) -> None:
-    """Warn of laws that have no gains in the set that was asked for."""
-    pairs = {
-        f"{setup.scenarios[0].law.name} on {setup.scenarios[0].plant.name}": None for setup in setups if setup.lacking
-    }
+    """Warn of laws that have no gains in the set."""
+    untuned = [setup.scenarios[0] for setup in setups if setup.untuned]
+    pairs = dict.fromkeys(f"{scenario.law.name} on {scenario.plant.name}" for scenario in untuned)
     if pairs:
         warnings.warn(
             f"no gains in set {gains!r} for {', '.join(pairs)}: these have their default gains; tune them, or give "
@@ -353,25 +342,22 @@ def _row(setup: Setup, runs: Sequence[Run]) -> Accuracy:
     failures = [run.failure for run in counted if run.failure]
     shape = setup.starts, len(setup.periods), PARTS
     floor = RESOLUTION * (max(map(abs, base.resolved.x0)) or 1.0)
-    outside = _outside(base)
+    no_promise = _why_no_promise(base)
+    failed = f"{len(failures)} of {len(counted)} runs failed, the first: {one_line(failures[0])}" if failures else ""
+    reasons = dict(_reasons(setup, counted)) | {"always": "; ".join(filter(None, [failed, no_promise]))}
     law = base.law
     scalings = {}
     for name in QUANTITIES:
         parts = np.reshape([run.parts[name] for run in counted], shape)
-        reasons = dict(_reasons(setup, counted))
-        if failures:
-            reasons["always"] = f"{len(failures)} of {len(counted)} runs failed, the first: {one_line(failures[0])}"
-        if change := _step_change(parts[0, -1, -1], halved.parts[name][-1], floor):
-            reasons["step"] = change
-        theory = None if outside or law.template is None else law.template.order(name, law.gains)
-        if outside:
-            reasons["always"] = "; ".join(filter(None, [reasons.get("always"), outside]))
-        scalings[name] = scaling(parts, setup.periods, theory, floor, reasons)
+        change = {"step": _step_change(parts[0, -1, -1], halved.parts[name][-1], floor)}
+        theory = None if no_promise or law.template is None else law.template.order(name, law.gains)
+        given = {reason: words for reason, words in (reasons | change).items() if words}
+        scalings[name] = scaling(parts, setup.periods, theory, floor, given)
     return Accuracy(
         plant=base.plant.name,
         condition=base.condition or "",
         law=law.name,
-        gains=kinds(one.law.source for one in setup.scenarios),
+        gains=kinds(scenario.law.source for scenario in setup.scenarios),
         unit=base.plant.units[0],
         periods=setup.periods,
         runs=len(counted),
@@ -381,7 +367,7 @@ def _row(setup: Setup, runs: Sequence[Run]) -> Accuracy:
     )
 
 
-def _outside(scenario: Scenario) -> str:
+def _why_no_promise(scenario: Scenario) -> str:
     """Return why theory promises no order in the control period here; "" if it does."""
     if scenario.actuator:
         return "no promise behind a drive, which adds to the relative degree"
@@ -397,19 +383,19 @@ def _outside(scenario: Scenario) -> str:
 
 
 def _reasons(setup: Setup, runs: Sequence[Run]) -> Iterator[tuple[str, str]]:
-    """Yield what may keep a law from the order that theory promises: name -> words."""
+    """Yield name and words of what may keep a law from the order that theory promises."""
     laws = [scenario.law for scenario in setup.scenarios]
     unmet = {words for law in laws if law.template for words in law.template.unmet(law.gains)}
     if unmet:
         yield "conditions", f"the gains violate {joined(sorted(unmet))}"
     saturated = max((run.saturated for run in runs), default=0.0)
-    if saturated >= SATURATED:
+    if saturated >= MIN_SATURATED:
         yield "saturated", f"u is at its bound in up to {100 * saturated:.0f} % of the last samples"
 
 
 def _step_change(error: float, halved: float, floor: float) -> str:
-    """Return how an error changes with half the physics step, in words; "" if it hardly does."""
+    """Return how an error changes with half the physics step, in words; "" for a small change."""
     if not (math.isfinite(error) and math.isfinite(halved)) or max(error, halved) <= floor:
         return ""
     change = halved / max(error, floor) - 1.0
-    return f"with half the physics step it is {100 * change:+.0f} %" if abs(change) > STEP_CHANGE else ""
+    return f"with half the physics step it is {100 * change:+.0f} %" if abs(change) > MAX_STEP_CHANGE else ""

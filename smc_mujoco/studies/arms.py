@@ -17,6 +17,7 @@ from smc_mujoco.control.law import Law, law
 from smc_mujoco.control.source import SHIPPED, Search
 from smc_mujoco.mechanisms.plant import Plant, Values, plant
 from smc_mujoco.metrics.catalogue import tv_rate
+from smc_mujoco.metrics.conventions import last_exit
 from smc_mujoco.metrics.tip import tip_error, tip_scores
 from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.run import run
@@ -28,14 +29,16 @@ from smc_mujoco.simulation.waypoints import Waypoints, cartesian_path
 NOISE = Noise(position=1e-5, velocity=1e-3)  # rad, rad/s: chosen, as of an encoder and a filtered difference
 SWAY = (0.3, 0.25, 0.3, 0.35, 0.4, 0.4, 0.5)  # rad: amplitude of each joint's sway, chosen for speeds up to 1 rad/s
 BEAT = 0.6  # s: time from one end of a sway to the other, chosen
-DRAWS, SEARCH_SEED, SEARCH_PAYLOAD = 32, 1000, 1.0  # draws of a search, its seed, and kg of payload
-ROUGH = 1000.0  # N m/s: variation of u that doubles the cost of a draw; chosen before any search
-BEFORE, BEHIND, PROBE = 0.0005, 0.004, 0.012  # m, from the wall's face: chosen; the radius of the probe
+DRAWS, SEARCH_SEED = 32, 1000
+SEARCH_PAYLOAD = 1.0  # kg
+ROUGH_TV_RATE = 1000.0  # N m/s: TV rate of u that doubles the cost of a draw; chosen before any search
+PATH_BEFORE, PATH_BEHIND = 0.0005, 0.004  # m: distances of paths from the wall's face; chosen
+PROBE = 0.012  # m: radius of the probe
 SPREAD = 0.05  # rad: largest distance of each joint's start from the task's own start; chosen
-BLOW = 1.0  # s: when the blow comes in its task
-STEP_CHANGE = 0.1  # relative change of an error by a halved physics step, beyond which a run is called unstable; chosen
-PRESS = 20.0  # N: with which the tip is to press on the wall; chosen
-REACH = (0.0, 0.3, 0.0, -2.0, 0.0, 3.1, math.pi / 4)  # rad: pose from which the path along the wall is solved for
+BLOW = 1.0  # s: time of the blow in its task
+MAX_STEP_CHANGE = 0.1  # of an error, relative, with half the physics step; with a larger one runs are unstable; chosen
+PRESS = 20.0  # N: wanted force of the tip on the wall; chosen
+WALL_POSE = (0.0, 0.3, 0.0, -2.0, 0.0, 3.1, math.pi / 4)  # rad: pose from which the path along the wall is solved
 
 # Law -> gain -> range of the search. For a gain in BY_LIMIT or BY_INERTIA, the range is that of its factor.
 RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
@@ -66,8 +69,8 @@ def arm() -> Plant:
 @functools.cache
 def inertia() -> tuple[float, ...]:
     """Return the inertia of each joint in the ready pose, kg m^2: the diagonal of M."""
-    one = arm()
-    M = one.nominal.dynamics(np.array(one.rest), np.zeros(one.n), Values(**one.parameters)).M  # pyright: ignore
+    panda = arm()
+    M = panda.nominal.dynamics(np.array(panda.rest), np.zeros(panda.n), Values(**panda.parameters)).M  # pyright: ignore
     return tuple(np.diag(M).tolist())
 
 
@@ -82,7 +85,7 @@ def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
     for gain in BY_LIMIT.get(name, ()):
         values[gain] = [values[gain] * limit for limit in arm().limits]  # pyright: ignore[reportArgumentType]
     for gain in BY_INERTIA.get(name, ()):
-        values[gain] = [values[gain] * one for one in inertia()]  # pyright: ignore[reportArgumentType]
+        values[gain] = [values[gain] * joint for joint in inertia()]  # pyright: ignore[reportArgumentType]
     made = law(name, **values)
     return made if gains else made.sourced(SHIPPED, Search(rule="random draws", evaluations=DRAWS))
 
@@ -116,7 +119,7 @@ def pick_and_place() -> tuple[Waypoints, ...]:
 
 
 @functools.cache
-def wall_path(behind: float = -BEFORE) -> tuple[Waypoints, ...]:
+def wall_path(behind: float = -PATH_BEFORE) -> tuple[Waypoints, ...]:
     """Return references on which the tip rests until 0.4 s, and then slides along the wall, across and up.
 
     Args:
@@ -126,7 +129,7 @@ def wall_path(behind: float = -BEFORE) -> tuple[Waypoints, ...]:
 
     x = WALL - PROBE + behind
     points = [(x, -0.2, 0.40), (x, 0.2, 0.40), (x, 0.2, 0.55)]
-    return tuple(cartesian_path(arm(), [0.4, 2.4, 3.4], points, site="tip", x0=REACH))
+    return tuple(cartesian_path(arm(), [0.4, 2.4, 3.4], points, site="tip", x0=WALL_POSE))
 
 
 def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenario:
@@ -135,22 +138,22 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
     Args:
       task: "sway"; "payload", a pick and place with 2 kg from 1 s on; "wall", where the tip slides on the wall and
         presses; "behind", the same path but 4 mm behind the wall's face; or "blow", a sway with a blow at 1 s.
-      seed: of the noise and of the start, which is within SPREAD of the task's own start. Seed 0, and every seed at the
-        wall, starts at the task's own start; at the wall the tip must begin in front of it.
+      seed: of the noise and of the start, which is within SPREAD of the task's start. Seed 0 starts there, and so does
+        every seed at the wall, in front of which the tip must begin.
       payload: kg that the arm carries from the start, unknown to the law.
     """
-    one = arm()
+    panda = arm()
     references: dict[str, Callable[[], tuple[Waypoints, ...]]] = {
         "sway": sway,
         "blow": sway,
         "payload": pick_and_place,
         "wall": wall_path,
-        "behind": lambda: wall_path(BEHIND),
+        "behind": lambda: wall_path(PATH_BEHIND),
     }
     wanted = find("task of the arm", task, references)()
     start = np.array([signal.values[0] for signal in (wall_path() if task == "behind" else wanted)])
     if seed and task not in ("wall", "behind"):
-        start = start + np.random.default_rng(seed).uniform(-SPREAD, SPREAD, one.n)
+        start = start + np.random.default_rng(seed).uniform(-SPREAD, SPREAD, panda.n)
     fields = {
         "sway": {"duration": 3.5},
         "blow": {"duration": 3.5, "disturbance": Push("link5", y=400.0, time=BLOW, width=0.02)},
@@ -159,7 +162,7 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
         "behind": {"duration": 3.8, "contact": "wall"},
     }[task]
     return Scenario(
-        plant=one,
+        plant=panda,
         law=law,
         reference=wanted,
         x0=tuple(start),
@@ -167,7 +170,7 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
         noise=NOISE,
         model="nominal",  # so that observer_free_joint compensates the gravity of the arm without payload
         mismatch={"payload": payload} if payload else {},
-        friction=one.friction,
+        friction=panda.friction,
         control_period=1e-3,
         **fields,
     )
@@ -179,29 +182,18 @@ def off_path(trace: Trace, after: float = 0.0) -> np.ndarray:
 
 
 def back_within(trace: Trace, distance: float, after: float) -> float:
-    """Return how long after a time the tip has come within a distance of its path for good, s; inf if it never does.
+    """Return how long after the time `after`, s, the tip stays within `distance`, m, of its path; inf if never.
 
-    A run that fails never does.
-
-    Args:
-      distance: m.
-      after: s.
+    A run that fails does not stay there.
     """
-    t = trace.t[trace.t >= after]
-    out = np.flatnonzero(~(off_path(trace, after) <= distance))  # NaN, after a failure, is out
-    if not len(out):
-        return 0.0
-    return math.inf if out[-1] == len(t) - 1 else float(t[out[-1] + 1]) - after
+    distances = np.nan_to_num(off_path(trace, after), nan=math.inf)  # NaN after a failure
+    return last_exit(trace.t[trace.t >= after], distances, distance)
 
 
 def unstable(scenarios: Sequence[Scenario], traces: Sequence[Trace]) -> bool:
-    """Return whether half the physics step changes the tip's rms error by more than STEP_CHANGE, in the median of runs.
+    """Return whether the tip's rms error changes with half the physics step, by MAX_STEP_CHANGE in the median of runs.
 
-    The numbers of such runs are those of their step and not of the machine.
-
-    Args:
-      scenarios: of the runs.
-      traces: of the runs.
+    The numbers of such runs depend on their step, and say nothing of the arm.
     """
     halves = [dataclasses.replace(each, physics_step=each.resolved.physics_step / 2.0) for each in scenarios]
     errors, finer = (
@@ -209,14 +201,14 @@ def unstable(scenarios: Sequence[Scenario], traces: Sequence[Trace]) -> bool:
         for each in (traces, run(halves))
     )
     change = np.abs(finer / errors - 1.0)  # NaN where both fail, which counts as a change
-    return not np.median(change) <= STEP_CHANGE
+    return not np.median(change) <= MAX_STEP_CHANGE
 
 
 def cost(trace: Trace) -> float:
-    """Return the cost of the search: the tip's rms error, mm, times 1 + variation of u / ROUGH."""
+    """Return the cost of the search: the tip's rms error, mm, times 1 + variation of u / ROUGH_TV_RATE."""
     if trace.failure is not None:
         return math.inf
-    return 1e3 * tip_scores(trace)["rms_error"] * (1.0 + tv_rate(trace) / ROUGH)
+    return 1e3 * tip_scores(trace)["rms_error"] * (1.0 + tv_rate(trace) / ROUGH_TV_RATE)
 
 
 def search(name: str, draws: int = DRAWS) -> tuple[dict[str, float], float]:

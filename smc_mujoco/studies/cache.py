@@ -1,4 +1,4 @@
-"""Results that are kept in files, so that what was killed and is started again computes nothing twice."""
+"""Results in files, so that a computation that was killed and is started again computes nothing twice."""
 
 import contextlib
 import hashlib
@@ -18,11 +18,11 @@ T = TypeVar("T")
 def cached(
     path: Path, depends: object, make: Callable[[], T], save: Callable[[T, Path], object], load: Callable[[Path], T]
 ) -> T:
-    """Return what `make` returns, from its file if there is one.
+    """Return the result of `make`, from its file if there is one.
 
-    The file's name ends in two hashes: of what the result depends on (`depends`, the package's code, models and gains,
-    and the versions of the packages below), and of its content, so that a file that was changed is not read. Files with
-    other hashes are removed when a new one is written.
+    The file's name ends in two hashes. The first is of all that the result depends on: `depends`, the package's code,
+    models and gains, and the versions of other packages. The second is of its content, so that a changed file is not
+    read. When a file is written, files with other hashes are removed.
 
     Args:
       path: of the file, without the hash.
@@ -31,20 +31,20 @@ def cached(
     text = json.dumps([depends, fingerprint.package(), result.versions()], sort_keys=True, default=str)
     stem = f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
     for file in path.parent.glob(f"{stem}-{'?' * 12}{path.suffix}"):
-        with contextlib.suppress(Exception):  # damaged bytes raise any exception there is; compute it again
+        with contextlib.suppress(Exception):  # damaged bytes may raise any exception: compute the result again
             if file.stem.endswith(_seal(path.parent.glob(f"{file.stem}.*"))):
                 return load(file)
     writable(path)
     made = make()
     with tempfile.TemporaryDirectory(prefix=f".{path.stem}-", dir=path.parent) as scratch:
         save(made, Path(scratch, path.name))
-        written = sorted(Path(scratch).iterdir(), key=lambda file: file.suffix == path.suffix)  # beside it, then itself
-        kept = path.with_stem(f"{stem}-{_seal(written)}")
+        written = sorted(Path(scratch).iterdir(), key=lambda file: file.suffix == path.suffix)  # the file itself last
+        final = path.with_stem(f"{stem}-{_seal(written)}")
         for old in path.parent.glob(f"{path.stem}-{'?' * 12}-{'?' * 12}.*"):
             old.unlink()
         for file in written:
-            file.replace(kept.with_suffix(file.suffix))
-    return load(kept)
+            file.replace(final.with_suffix(file.suffix))
+    return load(final)
 
 
 def _seal(files: Iterable[Path]) -> str:

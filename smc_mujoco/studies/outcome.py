@@ -1,4 +1,4 @@
-"""What came of a scene's runs, in words: the parts of the sentence that answers the scene's question.
+"""The outcome of a scene's runs in words: the parts of the sentence that answers the scene's question.
 
     def answer(runs):
         return f"{runs.who('settles', 'settle')}; first: {runs.least('settling_time')}"
@@ -30,10 +30,10 @@ def settles(trace: Trace) -> bool:
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Outcome:
-    """The runs of a scene, and what came of them in words: what `Scene.answer` is called with.
+    """The runs of a scene, and their outcome in words: the argument of `Scene.answer`.
 
-    A measure is the name of a metric, or a function Trace -> float whose smaller values are better for `least`. A run
-    that failed has no value, and nothing holds for it.
+    A measure is the name of a metric, or a function Trace -> float. A run that failed has no value, and no statement
+    `holds` is true of it.
 
     Attributes:
       traces: condition -> label -> Trace.
@@ -84,17 +84,17 @@ class Outcome:
         Args:
           unit: of a measure that is a function.
         """
-        values = [value for found in self.values(measure, group).values() for value in found.values()]
+        values = [value for by_label in self.values(measure, group).values() for value in by_label.values()]
         units = {unit or _unit(measure, run, group) for _, runs in self for run in runs.values()}
         return _range(values, units.pop() if len(units) == 1 else "") if values else "none"
 
     def leaders(self, *measures: Measure) -> list[str]:
-        """Return the labels that have the least value, or are level with it, in every measure and condition."""
-        level = [self._level(name, measure, "", smallest=True) for name in self.traces for measure in measures]
-        return [label for label in self.labels if all(label in found for found in level)]
+        """Return the labels whose value is smallest, or level with it, in every measure and condition."""
+        winners = [self._level(name, measure, "", smallest=True) for name in self.traces for measure in measures]
+        return [label for label in self.labels if all(label in level for level in winners)]
 
     def least(self, measure: Measure, group: str = "", unit: str = "") -> str:
-        """Return whose value is least, with the value: "classical (1.12 s)", "a and b tied (1.12 to 1.13 s)".
+        """Return whose value is smallest, with the value: "classical (1.12 s)", "a and b tied (1.12 to 1.13 s)".
 
         Several conditions have a winner each: "classical (10 ms, 20 ms), adaptive (50 ms)". "none" where all fail.
         """
@@ -129,10 +129,10 @@ class Outcome:
         return ", ".join([sentence, *(f"{joined(parts[part])} {part[0]}" for part in others)])
 
     def up_to(self, holds: Callable[[Trace], bool] = settles) -> str:
-        """Return the last condition that each label tolerates, conditions ordered from weak to strong.
+        """Return the last condition that each label tolerates, if the conditions are ordered from weak to strong.
 
-        That is the last before the first one in which something does not hold: "a and b 20 ms, c 10 ms, d none". The
-        sentence also says if it holds again in a later one.
+        It is the last one before something does not hold: "a and b 20 ms, c 10 ms, d none". The sentence also names
+        later conditions in which it holds again.
         """
         where, words = self._where(holds), {}
         for label, names in where.items():
@@ -180,9 +180,9 @@ class Outcome:
         return lambda run: math.nan if run.failure is not None else float(value(run))
 
     def _level(self, condition: str, measure: Measure, group: str, smallest: bool) -> dict[str, float]:
-        """Return label -> value of the runs with the smallest or largest value, or level with it, in a condition.
+        """Return label -> value of the runs with the smallest or largest value in a condition, or level with it.
 
-        It is empty if all fail, or if the smallest value is "never".
+        There are none if all fail, or if the smallest value is "never".
         """
         values = self[condition].values(measure, group)[condition]
         known = {label: value for label, value in values.items() if not math.isnan(value)}
@@ -248,14 +248,14 @@ def _everywhere(conditions: int) -> str:
 
 
 def _all(some: Sequence[str], labels: Sequence[str]) -> str:
-    """Return labels in a row, or that they are all, if there are several."""
+    """Return labels in a row, or "both" or "all 3" if these are all of several."""
     if len(some) == len(labels) > 1:
         return "both" if len(some) == 2 else f"all {len(some)}"
     return joined(some)
 
 
 def _exceeds(a: float, b: float, resolution: float) -> bool:
-    """Return whether a is larger than b by more than the least relevant difference; never is no later than never."""
+    """Return whether a is larger than b by more than the least relevant difference; inf is not larger than inf."""
     return a != b and bool(exceeds(a, b, resolution=resolution))
 
 
@@ -265,7 +265,7 @@ def _of_group(trace: Trace, name: str, group: str) -> float:
 
 
 def _floor(measure: Measure, run: Trace, group: str) -> float:
-    """Return the least relevant difference of any two values of a measure: that of leaderboards, 0 for a function."""
+    """Return the smallest relevant difference that a sensor resolves, as on leaderboards; 0 for a function."""
     return floor(run.scenario, CATALOGUE[measure].unit) if isinstance(measure, str) and not group else 0.0
 
 
@@ -276,7 +276,7 @@ def _unit(measure: Measure, run: Trace, group: str) -> str:
 
 
 def _range(values: Sequence[float], unit: str) -> str:
-    """Return the value, or the least and the largest: "0.323 s", "1.12 to 1.13 s, 1 failed", "never"."""
+    """Return the value, or the smallest and the largest: "0.323 s", "1.12 to 1.13 s, 1 failed", "never"."""
     known = [value for value in values if not math.isnan(value)]
     if not known:
         return "failed"
@@ -285,7 +285,7 @@ def _range(values: Sequence[float], unit: str) -> str:
 
 
 def _from_to(pair: Sequence[float], unit: str) -> str:
-    """Return two values, or one if they look the same: "1.12 to 1.13 s", "0.4 s to never"."""
+    """Return two values, or one if their texts are equal: "1.12 to 1.13 s", "0.4 s to never"."""
     texts = ["failed" if math.isnan(value) else number(value) for value in pair]
     if all(map(math.isfinite, pair)):
         return f"{' to '.join(dict.fromkeys(texts))} {unit}".rstrip()

@@ -1,6 +1,7 @@
-"""A scene: one question, the runs that answer it, and how they are shown. scenes/ holds one script each.
+"""A scene: one question, the runs that answer it, and how they are shown. The folder scenes/ has a script for each.
 
-A scene file has a docstring - the question, the figure of the paper it answers, what to look for - and a `scene`:
+The docstring of a scene file says the question, the figure of the paper that it answers, and what to look for. The file
+defines `scene`:
 
     scene = smc.Scene(title="Duffing", conditions={"nominal": smc.paper.comparison("duffing")})
 """
@@ -39,11 +40,11 @@ class Scene:
       title: shown on figures and films.
       conditions: condition -> label -> Scenario. Each condition gets a figure, which compares its labelled runs.
       film: the condition that is filmed; by default the first.
-      figure: "overview" (x, u, s and phase portrait, a figure a condition), "signals" (u of all conditions in one) or
-        "chattering" (amplitude over the actuator's lag, predicted and run, all conditions in one) or "joints" (a small
-        panel for each joint of an arm, a figure a condition).
+      figure: "overview" (x, u, s and phase portrait, a figure for each condition), "signals" (u of all conditions in
+        one), "chattering" (amplitude over the actuator's lag, predicted and run, all conditions in one) or "joints" (a
+        small panel for each joint of an arm, a figure for each condition).
       answers: metrics of the driven channels that answer the scene's question, printed after the scores.
-      facts: label -> sentence, printed under the answers: what else was measured.
+      facts: label -> sentence on another measurement, printed under the answers.
       answer: function of the `Outcome` of all runs that returns the sentence which answers the scene's question. The
         default says who settles, and who is first.
       camera: of the film, as `smc.film` takes it; default: the plant's own.
@@ -168,14 +169,14 @@ def question(path: Path) -> str:
     return (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n")[0]
 
 
-def slug(name: str, longest: int = MAX_NAME) -> str:
+def slug(name: str, max_bytes: int = MAX_NAME) -> str:
     """Return a name as part of a file name: letters, digits, and _ . + - between them.
 
-    It has no separator of folders, begins with no dot, and is at most `longest` bytes; a longer one ends in a hash.
+    It has no separator of folders and begins with no dot. Beyond `max_bytes` it is cut and ends in a hash.
     """
     words = re.sub(r"\s*=\s*", "-", name.lower())
     part = re.sub(r"[^\w.+-]+", "_", words).lstrip("._").rstrip("_") or "run"
-    if len(part.encode()) > longest:
-        start = part.encode()[: longest - 9].decode(errors="ignore")
+    if len(part.encode()) > max_bytes:
+        start = part.encode()[: max_bytes - 9].decode(errors="ignore")
         part = f"{start}-{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:8]}"
     return part
