@@ -1,4 +1,4 @@
-"""Advice: the finalists of a comparison of laws, and the answer in sentences; see `adviser`.
+"""Advice, the result of `adviser`: the finalists of a comparison of laws, as a table and as an answer in sentences.
 
 Every sentence is made from the numbers of the comparison, so it changes when they do.
 """
@@ -22,7 +22,7 @@ from smc_mujoco.studies.leaderboard import size_in_words
 from smc_mujoco.studies.needs import NEEDS, TIES, Choice, ties
 from smc_mujoco.studies.table import Table
 
-NAMED = 6  # names of laws that the screening left out
+MAX_NAMES = 6  # of laws that the screening left out
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -32,14 +32,14 @@ class Advice(Tables):
     Attributes:
       plant: the plant.
       conditions: names of the conditions.
-      needs: names of what was compared, such as "fast".
-      wanted: properties that every law here has, in words.
+      needs: names of the compared needs, such as "fast".
+      wanted: properties that every law has, in words.
       choices: the finalists, the advised one first.
       others: names of the laws that the screening left out, in its order.
       comparison: of the finalists that are fit, or of all if none is; its blocks are those of `blocks`.
       table: the finalists' runs.
       effort: unit of u, "N m", "N" or "V"; "" for that of a force, or where conditions differ.
-      untuned: names of the laws with default gains, also of those left out, over which no other law is advised.
+      untuned: names of the laws with default gains, over which no other law is advised; the screened ones too.
     """
 
     plant: Plant
@@ -74,21 +74,21 @@ class Advice(Tables):
         return [(need, condition) for need in self.needs for condition in self.conditions]
 
     def wins(self, law: str, rival: str) -> list[tuple[str, str]]:
-        """Return the need and the condition of each block in which a law is better than a rival; both are compared."""
+        """Return the need and the condition of each block in which a law is better than a rival."""
         a, b = (self.comparison.laws.index(name) for name in (law, rival))
         return [block for block, better in zip(self.blocks, self.comparison.better[:, a, b], strict=True) if better]
 
     def better(self, law: str, need: str) -> dict[str, list[str]]:
-        """Return finalist -> the conditions in which it is better than a law on a need, those with most first."""
-        conditions = {}
+        """Return finalist -> the conditions in which it is better than a law on a need; most conditions first."""
+        by_rival = {}
         for rival in self.compared:
-            if its := [condition for compared, condition in self.wins(rival, law) if compared == need]:
-                conditions[rival] = its
-        return dict(sorted(conditions.items(), key=lambda item: -len(item[1])))
+            if conditions := [condition for other, condition in self.wins(rival, law) if other == need]:
+                by_rival[rival] = conditions
+        return dict(sorted(by_rival.items(), key=lambda item: -len(item[1])))
 
-    def _any(self, of: np.ndarray, law: str, need: str) -> bool:
-        """Whether numbers (laws, blocks) of the comparison are not all 0 for a law on a need."""
-        row = of[self.comparison.laws.index(law)].tolist()
+    def _any(self, flags: np.ndarray, law: str, need: str) -> bool:
+        """Return whether flags of the comparison, (laws, blocks), are true of a law in some block of a need."""
+        row = flags[self.comparison.laws.index(law)].tolist()
         return any(value for (compared, _), value in zip(self.blocks, row, strict=True) if compared == need)
 
     def dominated(self, law: str) -> list[str]:
@@ -109,7 +109,7 @@ class Advice(Tables):
 
     @property
     def all_level(self) -> bool:
-        """Whether no finalist is better than the advised law or worse, among several."""
+        """Whether there are several finalists, none better or worse than the advised law."""
         return 1 < len(self.compared) == len(self.level) + 1
 
     @property
@@ -143,8 +143,8 @@ class Advice(Tables):
     @property
     def tables(self) -> list[Tabular]:
         """One table with a row for each finalist, above the answer; marked where no finalist is better."""
-        of = [NEEDS[need].metric for need in self.needs]
-        units = [f"{metric.need}: {metric.label} ({metric.unit_for(self.plant.unit, self.effort)})" for metric in of]
+        metrics = [NEEDS[need].metric for need in self.needs]
+        units = [f"{each.need}: {each.label} ({each.unit_for(self.plant.unit, self.effort)})" for each in metrics]
         rows = []
         for choice in self.choices:
             place, name = f"{choice.rank.place:g}" if choice.fit else "–", choice.law.name
@@ -204,20 +204,20 @@ class Advice(Tables):
 
     @property
     def _untested(self) -> bool:
-        """Whether all laws are compared without a test, by what an adversary found."""
+        """Whether all laws are compared by their worst cases, without a test."""
         return bool(self.comparison.untested.all())
 
     @property
     def _too_few(self) -> bool:
         """Whether no comparison can tell two laws apart, with the samples that there are."""
-        least = 2 * least_p(int(self.comparison.samples.max()))
-        return not self.comparison.untested.any() and least > (1 - self.comparison.level) / len(self.blocks)
+        smallest_p = 2 * least_p(int(self.comparison.samples.max()))
+        return not self.comparison.untested.any() and smallest_p > (1 - self.comparison.level) / len(self.blocks)
 
     # the answer
 
     @property
     def answer(self) -> list[str]:
-        """The advice in sentences: what to use and why, what to use for one need, the second choice, how sure it is."""
+        """The advice in sentences: the law and why, laws for single needs, the second choice, how sure it is."""
         remarks = [NEEDS[need].remark(self.choices) for need in self.needs]
         advice = [self._use(), self._because(), *remarks, *self._instead(), self._second(), self._sure()]
         parts = [self._refusal(), *remarks] if self.barred else advice
@@ -258,8 +258,8 @@ class Advice(Tables):
         if not first.reliable or not first.fit:
             return ""
         if self.all_level:
-            least = min(choice.settles for choice in self.choices if choice.fit)
-            return f"Each settles in {'at least ' * (least < 1)}{100 * least:.0f} % of its runs."
+            share = min(choice.settles for choice in self.choices if choice.fit)
+            return f"Each settles in {'at least ' * (share < 1)}{100 * share:.0f} % of its runs."
         leads = first.rank.mean == min(choice.rank.mean for choice in self.choices if choice.fit)
         equals = [c.law.name for c in self.choices[1:] if c.fit and c.rank.mean == first.rank.mean]
         why = f"it has the best mean rank of {count} finalists"
@@ -277,7 +277,7 @@ class Advice(Tables):
         return " ".join(parts)
 
     def _standing(self, choice: Choice, need: str) -> str:
-        """Return how a law does on a need, and who is better."""
+        """Return the median of a law on a need, and who is better."""
         value, better = self._value(choice, need), self.better(choice.law.name, need)
         if not better:
             few = ", as far as so few sets of gains tell" * self._any(self.comparison.undecided, choice.law.name, need)
@@ -289,28 +289,28 @@ class Advice(Tables):
         return f"{need.capitalize()}: {value}; better {'is' if len(better) == 1 else 'are'} {'; '.join(rivals)}."
 
     def _instead(self) -> list[str]:
-        """Return for each need on which a finalist is better than the advised law: which, what it gives and costs."""
+        """Return for each need the finalist that is better than the advised law, if there is one, and what it costs."""
         first, sentences = self.choices[0], []
         if len(self.needs) == 1 or not first.fit or not first.reliable or self.all_level:
             return []
         known = {choice.law.name: choice for choice in self.choices}
         for need in self.needs:
-            least = first.medians[need].median
             better = {  # also over all conditions, not only in some
                 law: where
                 for law, where in self.better(first.law.name, need).items()
-                if known[law].medians[need].median < least
+                if known[law].medians[need].median < first.medians[need].median
             }
             if not better:
                 continue
-            name = min(better, key=lambda one: (-len(better[one]), known[one].medians[need].median))
+            name = min(better, key=lambda law: (-len(better[law]), known[law].medians[need].median))
             other = known[name]
             costs = [
-                one
-                for one in self.needs
-                if self.better(name, one).get(first.law.name) and other.medians[one].median > first.medians[one].median
+                cost
+                for cost in self.needs
+                if self.better(name, cost).get(first.law.name)
+                and other.medians[cost].median > first.medians[cost].median
             ]
-            changes = [f"{self._value(other, one)} instead of {self._number(first, one)}" for one in (need, *costs)]
+            changes = [f"{self._value(other, each)} instead of {self._number(first, each)}" for each in (need, *costs)]
             text = f"If only {need} counts: {other.law}, with {changes[0]}"
             sentences.append(text + f"; it costs {joined(changes[1:])}." if costs else text + ".")
         return sentences
@@ -347,7 +347,7 @@ class Advice(Tables):
         return f"How sure: {'; '.join(filter(None, parts))}. {self._holds} {self._luck}".strip()
 
     def _against(self, rival: str) -> str:
-        """Return how the first law compares with a rival on each need, in the condition in which it does worst."""
+        """Return how the first law compares with a rival on each need, in the condition that is worst for the first."""
         first = self.compared[0]
         a, b = (self.comparison.laws.index(name) for name in (first, rival))
         parts = []
@@ -359,9 +359,9 @@ class Advice(Tables):
                 )
                 parts.append(f"{need} {one} to {other}")
                 continue
-            least = max(blocks, key=lambda k: self.comparison.p[k, a, b])
-            effect = self.comparison.effect(least, first, rival, winner=False)
-            where = f" under {self.blocks[least][1]}, where it does worst," * (len(blocks) > 1)
+            worst = max(blocks, key=lambda k: self.comparison.p[k, a, b])
+            effect = self.comparison.effect(worst, first, rival, winner=False)
+            where = f" under {self.blocks[worst][1]}, where it does worst," * (len(blocks) > 1)
             if math.isfinite(effect.value):
                 samples = "sets of gains" if effect.sets else "runs"
                 ahead = f"ahead with {effect.ahead} of {effect.samples} {samples}"
@@ -377,8 +377,8 @@ class Advice(Tables):
         several = self.comparison.sets.max(axis=1) > 1
         gains = "over sets of gains" if several.all() else "for these gains"
         if several.any() and not several.all():
-            ones = [law for law, its in zip(self.comparison.laws, several.tolist(), strict=True) if not its]
-            gains = f"over sets of gains, but for these gains of {joined(ones)}"
+            single = [law for law, many in zip(self.comparison.laws, several.tolist(), strict=True) if not many]
+            gains = f"over sets of gains, but for these gains of {joined(single)}"
         others = [need for need in self.needs if not NEEDS[need].tested]
         these = f"Except for {joined(others)}, these" if others else "These"
         return f"{these} comparisons hold {gains}, over starts and noise."
@@ -397,7 +397,7 @@ class Advice(Tables):
     def _left_out(self) -> str:
         if not self.others:
             return ""
-        names, more = self.others[:NAMED], ", ..." * (len(self.others) > NAMED)
+        names, more = self.others[:MAX_NAMES], ", ..." * (len(self.others) > MAX_NAMES)
         laws = "law" if len(self.others) == 1 else "laws"
         left = f"A screening with fewer runs left out {len(self.others)} other {laws}, best first"
         return f"{left}: {', '.join(names)}{more}"
@@ -420,9 +420,9 @@ class Advice(Tables):
         by_need: dict[str, list[str]] = {}
         for need, condition in blocks:
             by_need.setdefault(need, []).append(condition)
-        whole = [need for need, its in by_need.items() if len(its) == len(self.conditions)]
-        parts = [f"on {joined(whole)}"] if whole else []
-        parts += [f"on {need} under {joined(its)}" for need, its in by_need.items() if need not in whole]
+        everywhere = [need for need, conditions in by_need.items() if len(conditions) == len(self.conditions)]
+        parts = [f"on {joined(everywhere)}"] if everywhere else []
+        parts += [f"on {need} under {joined(where)}" for need, where in by_need.items() if need not in everywhere]
         return ", ".join(parts)
 
     def __repr__(self) -> str:
