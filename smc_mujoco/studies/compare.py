@@ -257,8 +257,7 @@ def compare(
     """
     extent = QUICK if quick else FULL
     count, relevant = whole("seeds", seeds, 1, MAX_ITEMS), share_that_matters(relevant)
-    attacked_for = DURATION if duration is None else duration
-    duration = extent.duration if duration is None else checked("duration", duration, above=0.0)
+    length = extent.duration if duration is None else checked("duration", duration, above=0.0)
     tries = search.BUDGET // (3 if quick else 1) if budget is None else whole("budget", budget, 1, MAX_ITEMS)
     where = executors.as_executor("local" if executor is None else executor)
     for name in taken("metrics", metrics):
@@ -267,16 +266,9 @@ def compare(
     if not isinstance(out, str | os.PathLike):
         raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
     machines = [as_plant(plant) for plant in (extent.plants if plants is None else listed("plants", plants))]
-    names = (
-        applicable(extent.conditions, machines, duration) if conditions is None else listed("conditions", conditions)
-    )
-    tested = [find_condition(one) for one in names]
-    compared = {plant.name: [law_or_template(law) for law in _chosen(laws, plant)] for plant in machines}
-    every = {id(law): law for its in compared.values() for law in its}.values()
-    check_names(machines, [coerce.law(law) for law in every], tested)
-    all_combinations(
-        machines, lambda _: [lambda _: coerce.law("none")], tested, [0], duration, starts
-    )  # refused before tuning
+    usual = applicable(extent.conditions, machines, length) if conditions is None else listed("conditions", conditions)
+    tested = [find_condition(one) for one in usual]
+    compared = _checked(machines, tested, laws, length, starts)
     folder = Path(out)
     options = {"tune": tune and gains == "tuned", "gains": gains, "shipped_budget": budget is None}
     candidates = {
@@ -285,18 +277,15 @@ def compare(
         )
         for plant in machines
     }
-    runs = all_combinations(machines, lambda plant: candidates[plant.name], tested, range(count), duration, starts)
+    runs = all_combinations(machines, lambda plant: candidates[plant.name], tested, range(count), length, starts)
     table = study(runs, folder, not fresh, where, threads, progress, traces, noise_key, replay=True)
 
     def attacked(plant: Plant, law: Law) -> WorstCase:
-        scenario = case(plant, law, "nominal", attacked_for, starts=starts)
+        scenario = case(plant, law, "nominal", DURATION if duration is None else length, starts=starts)
         within, path = None if worst is True else worst, folder / "worst" / f"{plant.name}-{law.name}.json"
         return cached_worst_case(path, scenario, within or None, None, threads, progress)
 
-    worst_cases = {
-        plant.name: {one.law.name: attacked(plant, one.law) for one in candidates[plant.name]}
-        for plant in (machines if worst else ())
-    }
+    attacked_plants = machines if worst else ()
     return Compared(
         table=table,
         candidates=candidates,
@@ -304,8 +293,22 @@ def compare(
         defaults=defaults,
         relevant=relevant,
         out=folder,
-        worst=worst_cases,
+        worst={
+            plant.name: {one.law.name: attacked(plant, one.law) for one in candidates[plant.name]}
+            for plant in attacked_plants
+        },
     )
+
+
+def _checked(
+    plants: Sequence[Plant], conditions: Sequence[Condition], laws: Any, duration: float, starts: Starts | None
+) -> dict[str, list[Law | Template]]:
+    """Return plant -> laws to compare on it. What cannot run is refused here, before gains are searched."""
+    compared = {plant.name: [law_or_template(law) for law in _chosen(laws, plant)] for plant in plants}
+    every = {id(law): law for its in compared.values() for law in its}.values()
+    check_names(plants, [coerce.law(law) for law in every], conditions)
+    all_combinations(plants, lambda _: [lambda _: coerce.law("none")], conditions, [0], duration, starts)
+    return compared
 
 
 def _chosen(laws: Any, plant: Plant) -> list[Any]:

@@ -148,17 +148,7 @@ def tune(
         searched = search_space.widened(law, start)
         ends = _search(ledger, start, searched, seed)
     best = min(ledger.evaluations, key=lambda e: e.objective)
-    if best.objective > before:
-        _warn(
-            f"no set of gains tried for {law.name} on {plant.name} is better than the law's own, with an objective of "
-            f"{best.objective:.3g} s² instead of {before:.3g} s²: give a larger budget"
-        )
-    if ledger.excess(best.gains):
-        _warn(
-            f"all gains tried for {law.name} on {plant.name} are predicted to chatter with more than "
-            f"{goal.chattering:g}: give a larger budget, or a larger chattering"
-        )
-    return Tuned(
+    made = Tuned(
         law=_with(law, tuple(start), best.gains),
         objective=best.objective,
         history=tuple(ledger.evaluations),
@@ -174,7 +164,24 @@ def tune(
         bounds=start,
         searched=searched,
         versions=versions(),
-    ).sourced()
+    )
+    _warn_of_result(made, chatters=bool(ledger.excess(best.gains)))
+    return made.sourced()
+
+
+def _warn_of_result(made: Tuned, chatters: bool) -> None:
+    """Warn if a search ends with gains that are worse than the law's own, or chatter more than is wanted."""
+    tried = f"tried for {made.law.name} on {made.plant.name}"
+    if made.objective > made.before:
+        _warn(
+            f"no set of gains {tried} is better than the law's own, with an objective of {made.objective:.3g} s² "
+            f"instead of {made.before:.3g} s²: give a larger budget"
+        )
+    if chatters:
+        _warn(
+            f"all gains {tried} are predicted to chatter with more than {made.definition.chattering:g}: give a larger "
+            "budget, or a larger chattering"
+        )
 
 
 def _refuse_broken(law: Component, traces: Sequence[Trace]) -> None:
