@@ -73,6 +73,7 @@ bench: ## speed, beside bare MuJoCo and other packages
 	$(BIN)/python benchmarks/realistic.py
 	$(BIN)/python benchmarks/laws.py
 	$(BIN)/python benchmarks/study.py --quick
+	$(BIN)/python benchmarks/memory.py
 	$(BIN)/python benchmarks/agents.py --quick
 
 lock: ## the locks again from pyproject.toml, needs uv; delete a lock first to upgrade its packages

@@ -25,6 +25,7 @@ from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import known_laws
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics.channel_groups import Group, group_trace, groups
+from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation.conditions import FIELDS
 from smc_mujoco.simulation.perturbations import Jump
 from smc_mujoco.simulation.signals import Push
@@ -258,6 +259,7 @@ def _differing(
     return {name: value for name, value in settings(trace).items() if any(t.get(name) != value for t in tables)}
 
 
+@once_per_trace
 def _settings(trace: Trace) -> Mapping[str, object]:
     """Return the gains of a run, and the fields of its scenario."""
     scenario = trace.scenario
@@ -266,6 +268,7 @@ def _settings(trace: Trace) -> Mapping[str, object]:
     return dict(scenario.law.gains) | kept
 
 
+@once_per_trace
 def _machine(trace: Trace) -> Mapping[str, object]:
     """Return the true parameters of a run's machine."""
     return vars(trace.scenario.plant.values(trace.scenario.mismatch))

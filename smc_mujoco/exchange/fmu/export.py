@@ -36,6 +36,7 @@ from smc_mujoco.simulation.scenario import Scenario, check_surface
 HERE, MIXED = Path(__file__).parent, "mixed"  # kind of joints of which some turn and some slide: without units
 HEADERS = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")  # of the standard
 # Only the symbols of FMI, and no paths of the build, so that the same law gives the same bytes.
+COMPILING = 120.0  # s, that a compiler may take
 HIDDEN = ("-std=c99", "-fvisibility=hidden", "-s")
 SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 MACHINES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64", "i686": "x86"}
@@ -218,8 +219,14 @@ def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
                 (folder / name).write_text(text, encoding="utf-8")
         compiled = [str(folder / name) for name in sources if name.endswith(".c")]
         try:
-            done = build.run_compiler([*command, *build.FLAGS, *HIDDEN, *compiled, "-o", str(target), "-lm"], 120.0)
-        except (OSError, TimedOut):
+            line = [*command, *build.FLAGS, *HIDDEN, *compiled, "-o", str(target), "-lm"]
+            done = build.run_compiler(line, COMPILING)
+        except TimedOut:
+            raise ScenarioError(
+                f"{command[0]} takes more than {COMPILING:g} s to compile the FMU: set another compiler in CC, or "
+                "leave the binary out (binary=False, --no-binary)"
+            ) from None
+        except OSError:
             raise ScenarioError(
                 f"the FMU cannot be compiled, as there is no C compiler {command[0]!r}: install one, set CC, or leave "
                 "the binary out (binary=False, --no-binary)"

@@ -26,7 +26,7 @@ from smc_mujoco.control.law import catalogue  # noqa: E402
 from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_PER_SPEED, RATE  # noqa: E402
 from smc_mujoco.exchange.c import build  # noqa: E402
 from smc_mujoco.exchange.c import export as c_export  # noqa: E402
-from smc_mujoco.exchange.fmu import description  # noqa: E402
+from smc_mujoco.exchange.fmu import description, export  # noqa: E402
 
 pytestmark = needs_compiler
 
@@ -451,6 +451,16 @@ def test_without_a_compiler_the_cure_is_said(tmp_path, monkeypatch):
     with pytest.raises(smc.ScenarioError, match=r"no C compiler 'nocc': install one, set CC, or leave the binary out"):
         smc.export_fmu("pid", tmp_path / "pid.fmu")
     assert smc.export_fmu("pid", tmp_path / "pid.fmu", binary=False).exists()
+
+
+def test_a_compiler_that_does_not_end_is_not_a_missing_one(tmp_path, monkeypatch):
+    slow = tmp_path / "slow"
+    slow.write_text("#!/bin/sh\nexec sleep 60\n")
+    slow.chmod(0o755)
+    monkeypatch.setenv("CC", str(slow))
+    monkeypatch.setattr(export, "COMPILING", 0.1)
+    with pytest.raises(smc.ScenarioError, match=r"slow takes more than 0\.1 s to compile the FMU"):
+        smc.export_fmu("pid", tmp_path / "pid.fmu")
 
 
 def test_the_command_writes_what_it_is_told(tmp_path, capsys):
