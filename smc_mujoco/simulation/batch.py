@@ -38,7 +38,8 @@ class ScenarioBatch:
         first, count = scenarios[0], len(scenarios)
         self.base, self.model = prepared[0].mechanism.model, copy.copy(prepared[0].mechanism.model)
         set_fields = models.put_values(self.model, self.base, first, 0)
-        mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
+        self.scratch = mujoco.MjData(self.model)
+        mujoco.mj_setConst(self.model, self.scratch)
         # The shared model has the first scenario's values. Scenarios that do not set these fields need the base values.
         self.base_values = {name: field_array(self.base, name) for name in set_fields}
         self.logs = [np.full((first.samples + 1, first.plant.n), np.nan, state.LOG) for _ in scenarios]
@@ -56,7 +57,6 @@ class ScenarioBatch:
         self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
         self.errors: dict[int, str] = {}  # simulation -> MuJoCo's error
         self.calls = 0  # callbacks that each simulation should have had by now
-        self.scratch = mujoco.MjData(self.model)  # for `lost_contacts`
         self.set_parameters(0, range(count))
 
     def run(self, report: Report) -> list[Trace]:
@@ -88,7 +88,7 @@ class ScenarioBatch:
         """Put all simulations at t = 0, with the past readings of delayed sensors."""
         delayed = bool(self.model.nhistory)
         arrays = {name: self.batch.bind(name) for name in ("qpos", "qvel", *["history"] * delayed)}
-        model, data = copy.copy(self.model), mujoco.MjData(self.model)
+        model, data = copy.copy(self.model) if delayed else self.model, self.scratch
         for i, scenario in enumerate(self.scenarios):
             if delayed:  # the periods of the readings differ between scenarios
                 models.put_values(model, self.base, scenario, 0)

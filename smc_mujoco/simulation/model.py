@@ -4,6 +4,7 @@ Scenarios of the same `structure` share a `Mechanism`, with one compiled base mo
 values of model fields. A Batch has those values separately for each simulation.
 """
 
+import collections
 import copy
 import dataclasses
 import itertools
@@ -23,6 +24,7 @@ from smc_mujoco.simulation.scenario import Scenario
 
 USERDATA = 2  # numbers in mjData.userdata: callback.magic() and the address of the simulation's record
 PATH_POINTS = 400  # points that are checked on the path to a start: 1 cm apart on the longest rail
+SHARED = 16  # mechanisms made last that later runs share, as those of a search for gains do: chosen
 MAX_OVERLAP = 1e-3  # m, at a start; chosen: bodies in contact overlap by less, so a deeper start begins with a blow
 
 
@@ -72,14 +74,17 @@ class Mechanism:
 
 
 _mechanisms: weakref.WeakValueDictionary[Hashable, Mechanism] = weakref.WeakValueDictionary()  # by structure
+_last: collections.deque[Mechanism] = collections.deque(maxlen=SHARED)
 
 
 def mechanism(scenario: Scenario) -> Mechanism:
-    """Return the Mechanism of a scenario. It is kept as long as a prepared scenario uses it."""
+    """Return the Mechanism of a scenario. It is kept while a prepared scenario uses it, or it is one of the last."""
     key = structure(scenario)
     if (shared := _mechanisms.get(key)) is None:
         base = compile_model(scenario, USERDATA, scenery=False)
         shared = _mechanisms[key] = Mechanism(base, channels(base))
+        if not scenario.plant.own:  # a user's file may change, which is told when it is read
+            _last.append(shared)
     return shared
 
 

@@ -1,9 +1,13 @@
 """Models of runs: what only a picture needs is deleted, everything else stays."""
 
+import weakref
+
 import mujoco
+import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.simulation import model
 from smc_mujoco.simulation.model import compile_model, without_scenery
 
 pytestmark = pytest.mark.quick
@@ -57,3 +61,16 @@ def test_the_scenery_of_a_users_model_stays():
     )
     made = compile_model(smc.Scenario(plant=plant, law="classical"), scenery=False)
     assert (made.ngeom, made.nlight) == (2, 1)
+
+
+def test_runs_one_after_another_share_a_model_that_none_of_them_changes(monkeypatch):
+    made, compiled = [], model.compile_model
+    monkeypatch.setattr(model, "_mechanisms", weakref.WeakValueDictionary())
+    monkeypatch.setattr(model, "compile_model", lambda *args, **named: made.append(args) or compiled(*args, **named))
+    numbers = (2.0, 1.0, 1.5), (3.0, 2.0, 0.5), (2.0, 1.0, 1.5)
+    first, _, again = (
+        smc.run(smc.Scenario(plant="duffing", law=smc.law("classical", k=k), mismatch={"M": M}, x0=x0, duration=0.01))
+        for k, M, x0 in numbers
+    )
+    assert len(made) == 1
+    np.testing.assert_array_equal(again.x, first.x)
