@@ -10,7 +10,7 @@ of the channels run one after the other, so each sample is one Gauss-Seidel swee
 sweeps converge for every positive definite M. A joint q without an actuator that moves with channel i has g =
 (M^-1)_qi.
 
-The compiled path calls MuJoCo's own functions by address, with a copy of the model that has the nominal parameters and
+The compiled path calls MuJoCo's own functions by name, with a copy of the model that has the nominal parameters and
 an mjData for each simulation.
 
 Laws of many joints see the mechanism as a whole instead,
@@ -26,19 +26,24 @@ in another kinematic tree, is taken to be the model's initial one.
 import ctypes
 import dataclasses
 import functools
+import hashlib
 import math
+import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
-from numba import carray, njit
+from llvmlite import binding
+from numba import carray, njit, types
 
-from smc_mujoco.common import libmujoco
+from smc_mujoco.common import jit, libmujoco
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.jit import Function, floats, pointer, record_at
 from smc_mujoco.common.process import free_after_fork
+from smc_mujoco.mechanisms import plant
 from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
 from smc_mujoco.mechanisms.plant import SEEN, Dynamics, Field, Native, Values, ready, write
 
@@ -228,14 +233,22 @@ def unknown() -> Function:
         output[0], output[1] = np.nan, np.nan
         return 0
 
-    return Function(native)
+    return _kept(native)
 
 
 def _called(name: str, more: int = 0) -> Callable:
-    """Return a function of MuJoCo's library, for numba. It takes model, data and as many more addresses."""
-    function = libmujoco.library()[name]  # a new object, so that its types are its own
-    function.restype, function.argtypes = None, [ctypes.c_int64] * (2 + more)
-    return function
+    """Return a function of MuJoCo's library, for numba. It takes model, data and as many more addresses.
+
+    Compiled code has its name, not its address, so that another process can load the code from the disk.
+    """
+    binding.add_symbol(name, ctypes.cast(libmujoco.library()[name], ctypes.c_void_p).value)
+    return types.ExternalFunction(name, types.void(*[types.int64] * (2 + more)))
+
+
+def _kept(native: Callable) -> Function:
+    """Return a C function of this file, kept on disk under a hash of the sources that it is made of."""
+    sources = b"".join(Path(str(module.__file__)).read_bytes() for module in (sys.modules[__name__], jit, plant))
+    return Function(native, ("nominal-model", hashlib.sha256(sources).hexdigest()))
 
 
 def passive_alone(model: mujoco.MjModel) -> bool:
@@ -318,7 +331,7 @@ def native_dynamics() -> Function:
                 forces[j] = bias[k] - passive[k] - actuator[k]
         return 0
 
-    return Function(native)
+    return _kept(native)
 
 
 @functools.cache
@@ -347,7 +360,7 @@ def native_coriolis() -> Function:
                 output[j] += sign * 0.25 * bias[place_at(places, j).qvel]
         return 0
 
-    return Function(native)
+    return _kept(native)
 
 
 @functools.cache
@@ -367,7 +380,7 @@ def native_jacobian() -> Function:
                 output[i, j] = moves[i, place_at(int(at.places), j).qvel]
         return 0
 
-    return Function(native)
+    return _kept(native)
 
 
 @functools.cache
@@ -409,4 +422,4 @@ def native() -> Function:
         output[0], output[1] = qacc[dof], moved[dof]
         return 0
 
-    return Function(native)
+    return _kept(native)
