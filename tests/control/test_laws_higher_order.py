@@ -85,11 +85,11 @@ def test_implicit_laws_vary_their_command_as_the_disturbance_does_and_the_explic
 
 @pytest.mark.parametrize("name", ["implicit_super_twisting", "proper_super_twisting"])
 def test_implicit_laws_solve_their_inclusion(name):
-    """20,000 random gains, periods and states: u + k1 [z]^(1/2) - w+ is 0, and w+ is in w - dt k2 sgn(z)."""
+    """5,000 random gains, periods and states: u + k1 [z]^(1/2) - w+ is 0, and w+ is in w - dt k2 sgn(z)."""
     rng = np.random.default_rng(12)
-    k1, k2, dt = 10.0 ** rng.uniform((-1, -1, -4), (1, 1, 0), (20_000, 3)).T
-    s, w = rng.normal(size=(2, 20_000)) * 10.0 ** rng.uniform(-6, 0, (2, 20_000))
-    s *= np.where(rng.random(20_000) < 0.3, dt * dt * k2, 1.0)  # inside the sliding layer too
+    k1, k2, dt = 10.0 ** rng.uniform((-1, -1, -4), (1, 1, 0), (5_000, 3)).T
+    s, w = rng.normal(size=(2, 5_000)) * 10.0 ** rng.uniform(-6, 0, (2, 5_000))
+    s *= np.where(rng.random(5_000) < 0.3, dt * dt * k2, 1.0)  # inside the sliding layer too
     function, on = law(name).function, 0
     assert function is not None
     for values in zip(k1.tolist(), k2.tolist(), dt.tolist(), s.tolist(), w.tolist(), strict=True):
@@ -107,7 +107,7 @@ def test_implicit_laws_solve_their_inclusion(name):
             assert abs(after - w_) <= h * k2_ * (1.0 + 1e-12) + 1e-15, values
         else:
             assert after == pytest.approx(w_ - h * k2_ * math.copysign(1.0, z), rel=1e-12, abs=1e-15), values
-    assert 1_000 < on < 19_000
+    assert 250 < on < 4_750
 
 
 @pytest.mark.parametrize("name", TWISTED)
