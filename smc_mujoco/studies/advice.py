@@ -18,7 +18,7 @@ from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw.style import law_colour
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.studies.leaderboard import size_in_words
+from smc_mujoco.studies.board import size_in_words
 from smc_mujoco.studies.needs import NEEDS, TIES, Choice, ties
 from smc_mujoco.studies.table import Table
 

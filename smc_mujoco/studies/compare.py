@@ -41,8 +41,9 @@ from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import executors
+from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.fair_gains import Candidate, fair_gains, law_or_template
-from smc_mujoco.studies.leaderboard import METRICS, Boards, leaderboard
+from smc_mujoco.studies.leaderboard import METRICS, leaderboard
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, study
 from smc_mujoco.studies.table import Table

@@ -15,7 +15,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.conventions import Metric
-from smc_mujoco.studies.board_tables import spread
+from smc_mujoco.studies.board import spread
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import METRIC, WorstCase
 

@@ -22,7 +22,8 @@ from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.metrics.catalogue import metrics as every_metric
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies.leaderboard import METRICS, Board, Boards, leaderboard, size_in_words
+from smc_mujoco.studies.board import Board, Boards, size_in_words
+from smc_mujoco.studies.leaderboard import METRICS, leaderboard
 from smc_mujoco.studies.study import study as run_study
 
 INF = math.inf

@@ -17,7 +17,8 @@ from smc_mujoco.evidence.rigs import ensemble, records
 from smc_mujoco.evidence.rigs.rig import Fall, Rig, rig, rigs
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.leaderboard import Board, leaderboard
+from smc_mujoco.studies.board import Board
+from smc_mujoco.studies.leaderboard import leaderboard
 from smc_mujoco.studies.study import study
 
 POINTS = 1200  # of a curve; chosen

@@ -17,7 +17,8 @@ from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.ranking import samples_of
 from smc_mujoco.evidence.report import words
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.studies.leaderboard import Board, leaderboard
+from smc_mujoco.studies.board import Board
+from smc_mujoco.studies.leaderboard import leaderboard
 
 if TYPE_CHECKING:
     from smc_mujoco.studies.table import Table

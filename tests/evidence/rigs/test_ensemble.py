@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 import smc_mujoco as smc
 from smc_mujoco.cli.main import app
 from smc_mujoco.evidence.rigs import ensemble
-from smc_mujoco.studies.board_tables import heading
+from smc_mujoco.studies.board import heading
 
 PENDULUM = smc.rig("simple_pendulum_ak80")
 LAWS = (smc.law("pid", kp=30.0, kd=6.0), smc.law("super_twisting"))

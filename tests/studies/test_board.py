@@ -14,9 +14,9 @@ from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.html import text
 from smc_mujoco.common.tabular import TEX, plain
 from smc_mujoco.evidence.report import words
-from smc_mujoco.studies import board_tables
-from smc_mujoco.studies.board_tables import spread
-from smc_mujoco.studies.leaderboard import Boards, leaderboard
+from smc_mujoco.studies import board
+from smc_mujoco.studies.board import Boards, spread
+from smc_mujoco.studies.leaderboard import leaderboard
 
 pytestmark = pytest.mark.quick
 
@@ -97,12 +97,12 @@ def test_printed_median_lies_in_its_printed_interval(values):
 
     low, median, high = values
     interval = Interval(median, low, high, 20)
-    middle = board_tables.size(median, "settling_time")
+    middle = board.size(median, "settling_time")
     for ends in (spread(interval, "settling_time").split("–"), words.interval(median, low, high).split(" – ")):
         if any(ends):
             assert size(ends[0]) <= size(middle) <= size(ends[1])
     assert middle == words.number(median)
-    assert board_tables.size(math.inf, "itae") == "fails"
+    assert board.size(math.inf, "itae") == "fails"
 
 
 def test_only_what_no_law_beats_is_bold(boards):
