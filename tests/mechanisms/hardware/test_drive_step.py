@@ -103,7 +103,7 @@ def test_a_lag_of_none_leaves_the_other_alone():
 def test_a_motors_winding_counts_as_its_lag():
     """A joint that hardly moves: the torque is that of two lags, mu and L/R."""
     trace = smc.run(scenario(smc.Lag(0.01), MOTOR, mismatch={"mass": 1e9}, x0=0.0))
-    assert trace.force[1:, 0] == pytest.approx(mean_risen(trace.t, 0.01, MOTOR.delay), abs=1e-3)
+    assert trace.force[1:, 0] == pytest.approx(mean_risen(trace.t, 0.01, MOTOR.delay), abs=1e-8)
 
 
 @pytest.mark.parametrize("inductance", [1e-4, 5e-3])
