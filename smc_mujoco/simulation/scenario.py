@@ -81,8 +81,9 @@ class Scenario:
       duration: s. The run lasts as many whole control periods as fit into it.
       control_period: s; the law runs this often and its command is held in between.
       physics_step: s; must divide the control period. Default: the largest such step up to 1 ms for the plant's plain
-        equation, also behind a Lag, a RateLimit or a DCMotor (see `longest_step`); up to 0.25 ms with friction,
-        contact, a mechanism or a Backlash; up to a quarter of the clock's jitter.
+        equation; behind drives whose force changes within a control period, up to a quarter of it or half of their
+        time constant, whichever is longer; up to 0.25 ms with friction, contact, a mechanism or a Backlash; up to a
+        quarter of the clock's jitter.
       u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest motor of your own model.
         A motor's own limit holds too: see `limits`. In V, with the motor's voltage as default, if u is a voltage.
       x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the plant's x0, and 0.
