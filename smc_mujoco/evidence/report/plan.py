@@ -10,7 +10,7 @@ from typing import TypeVar
 from smc_mujoco.analysis.differences import RELEVANT
 from smc_mujoco.common import progress
 from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.studies.accuracy import PERIODS, STARTS
+from smc_mujoco.studies.accuracy import DEFAULT_SEEDS, PERIODS
 from smc_mujoco.studies.study import FULL as GRID
 from smc_mujoco.studies.study import QUICK as QUICK_GRID
 from smc_mujoco.studies.study import Extent
@@ -68,7 +68,7 @@ class Plan(Extent):
     rigs: tuple[str, ...] = ("qube_servo", "simple_pendulum_ak80")
     accurate: tuple[str, ...] = ("duffing",)
     periods: tuple[float, ...] = PERIODS
-    accuracy_starts: int = STARTS
+    accuracy_starts: int = DEFAULT_SEEDS
 
 
 FULL = Plan(quick=False)
