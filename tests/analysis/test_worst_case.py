@@ -2,13 +2,14 @@
 
 import dataclasses
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.worst_case.search import Search
-from smc_mujoco.analysis.worst_case.strategies import recorded
+from smc_mujoco.analysis.worst_case.strategies import frequency, recorded
 from smc_mujoco.analysis.worst_case.uncertainty import Members, usual
 from smc_mujoco.control import gain_sets
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -78,6 +79,14 @@ def test_the_loop_s_frequency_is_read_of_a_run_under_a_relay_of_the_rate_or_with
     searcher.search(np.random.default_rng(0), [])
     assert searcher.swing
     assert searcher.swing.scenario.disturbance == disturbance
+
+
+@pytest.mark.parametrize("hertz", [2.0, 5.0])
+def test_the_frequency_of_a_sine_is_its_own(hertz):
+    t = np.linspace(0.0, 8.0, 8001)
+    x, clock = np.sin(2.0 * np.pi * hertz * t + 0.1)[:, None], SimpleNamespace(control_period=1e-3)
+    found = frequency(SimpleNamespace(t=t, x=x, r=0.0 * x, scenario=clock))
+    assert found == pytest.approx(hertz, abs=0.5 / 6.0)  # half a period of the last 6 s
 
 
 def test_a_relay_replays_from_its_record_to_the_last_bit():

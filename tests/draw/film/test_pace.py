@@ -129,3 +129,8 @@ def test_most_frames_of_a_settling_run_show_motion():
         shares.append((pace.motion(traces, found.times) > pace.STILL * found.speeds[:-1]).mean())
     assert shares[0] < 0.3
     assert shares[1] > 0.6
+
+
+def test_a_part_of_a_film_has_both_its_ends():
+    whole = pace.Clock(np.linspace(0.0, 0.5, 6), np.ones(6))
+    np.testing.assert_allclose(whole.part(0.1, 0.3).times, [0.1, 0.2, 0.3])

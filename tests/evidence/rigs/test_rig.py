@@ -67,6 +67,13 @@ def test_a_quanser_motor_pushes_and_brakes_as_published(name, stall, brake):
     assert (lever / motor.resistance, lever) == pytest.approx((stall, brake), rel=5e-3)
 
 
+def test_a_simple_pendulum_has_the_inertia_and_the_moment_of_its_rig():
+    rig = smc.rig("simple_pendulum_ak80")
+    m, l = (rig.scenario("none").plant.parameters[name] for name in ("m", "l"))
+    found = rig.quantities["inertia"].value, rig.quantities["mass_moment"].value
+    assert (m * l * l, m * l) == pytest.approx(found)
+
+
 def test_a_changed_quantity_changes_the_machine_and_its_source():
     other = smc.rig("qube_servo", arm_length=0.1)
     assert other.scenario("none").plant.parameters["L"] == 0.1

@@ -465,6 +465,7 @@ def test_a_delay_beyond_the_run_leaves_the_initial_state():
 
 @pytest.mark.parametrize("times", [{"delay": 1e9}, {"delay": 1e6, "period": 1e-3}])
 def test_a_delay_that_no_buffer_holds_is_refused_in_one_sentence(times):
+    smc.Encoder(math.inf, delay=100.0).check(1e-3)  # as many readings as a buffer holds
     with pytest.raises(smc.ScenarioError, match=r"^Encoder's delay .* give"):
         smc.run(scenario(smc.Encoder(math.inf, **times), duration=0.01))
 
