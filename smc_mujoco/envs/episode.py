@@ -80,6 +80,8 @@ class Setting:
             raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(known)}")
         changes = _checked({} if changes is None else changes, task)
         self.scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes)).resolved
+        if self.scenario.drive_step and self.scenario.drive_step.ripple:
+            raise ScenarioError("environments have no DCMotor with a ripple: give ripple=0")
         if math.inf in self.scenario.limits:
             raise ScenarioError("u_max is inf: give a finite one, because actions are fractions of it")
         fixed = np.array(self.scenario.x0)

@@ -23,6 +23,7 @@ from numba import njit
 
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.joint_law import head_at
+from smc_mujoco.mechanisms.hardware.drives import rippled
 from smc_mujoco.mechanisms.hardware.sliding import SLOW
 from smc_mujoco.simulation import clock, philox
 from smc_mujoco.simulation import state as record
@@ -343,8 +344,11 @@ def _actuate(sim, data, step):
     if sim.has_drives != 0:
         for i in range(sim.driven):
             channel = channel_at(sim.channels, i)
-            mean = _drive(sim.drive_step, state_at(sim.states, i), data.qvel[channel.shaft])
-            data.ctrl[channel.ctrl] = sim.scale * mean
+            v = data.qvel[channel.shaft]
+            V = sim.scale * _drive(sim.drive_step, state_at(sim.states, i), v)
+            if sim.drive_step.ripple != 0.0:
+                V = _rippled(sim.drive_step, V, data.qpos[channel.qpos], v)
+            data.ctrl[channel.ctrl] = V
 
 
 @njit(error_model="numpy", inline="always")
@@ -368,6 +372,9 @@ def _drive(factors, state, v):
         return 0.5 * (second + state.second)
     gap = min(max(u + factors.lagged * a - second, -reach), reach)
     return force - 0.5 * gap * abs(gap) / reach
+
+
+_rippled = njit(error_model="numpy", inline="always")(rippled)
 
 
 @njit(error_model="numpy", inline="always")

@@ -19,6 +19,7 @@ from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
+from smc_mujoco.mechanisms.hardware.drives import rippled
 from smc_mujoco.mechanisms.hardware.sliding import SLOW, Sliding
 from smc_mujoco.mechanisms.plant import Dynamics, Plant, Values
 from smc_mujoco.simulation import model as models
@@ -165,12 +166,14 @@ class Loop:
         past = step - self.scenario.delay_steps
         if past >= 0 and past % self.scenario.steps >= self.late(past // self.scenario.steps):
             self.arrived = self.commands[past // self.scenario.steps]
-        command = self.arrived
+        command, v = self.arrived, data.qvel[self.channels["shaft"]]
         if self.drive_step:
-            command, self.first, self.second = self.drive_step(
-                command, self.first, self.second, data.qvel[self.channels["shaft"]]
-            )
-        data.ctrl[self.channels["ctrl"][self.driven]] = (self.scale * command)[self.driven]
+            command, self.first, self.second = self.drive_step(command, self.first, self.second, v)
+        control = self.scale * command
+        if self.drive_step and self.drive_step.ripple:
+            moving = zip(control, data.qpos[self.channels["qpos"]], v, strict=True)
+            control = np.array([rippled(self.drive_step, *each) for each in moving])
+        data.ctrl[self.channels["ctrl"][self.driven]] = control[self.driven]
 
     def late(self, k: int) -> int:
         """Return by how many physics steps sample k is late."""

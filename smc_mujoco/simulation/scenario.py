@@ -629,6 +629,8 @@ def check_mechanism(s: Resolved) -> None:
         raise ScenarioError(
             f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the integrator out"
         )
+    if len(s.actuator) > 1 and any(isinstance(part, DCMotor) and part.ripple for part in s.actuator):
+        raise ScenarioError("DCMotor has a ripple beside another part: give the motor alone, or ripple=0")
     for part in s.friction:
         part.check(s.plant)
     for step in (0, s.samples * s.steps):

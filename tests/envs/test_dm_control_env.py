@@ -330,6 +330,9 @@ class Lost(smc.Signal):
         return (math.nan if t > p.after else 0.0), 0.0, 0.0
 
 
+UNEVEN = smc.DCMotor(inductance=0.0, ripple=0.1)
+
+
 def test_bad_input_is_one_sentence():
     for make, words in (
         (lambda: suite.load("dufing"), "did you mean 'duffing'"),
@@ -339,6 +342,7 @@ def test_bad_input_is_one_sentence():
         (lambda: suite.load("duffing", random="a"), "random is 'a'"),
         (lambda: suite.load("duffing", changes={"noise": smc.Noise(0.1)}), "unknown field of an environment"),
         (lambda: suite.load("duffing", changes={"u_max": np.inf}), "u_max is inf"),
+        (lambda: suite.load("duffing", changes={"actuator": UNEVEN}), "environments have no DCMotor with a ripple"),
         (lambda: suite.load("duffing", changes={"reference": smc.Sine(0.1, 1.0)}), "take 'track'"),
         (lambda: suite.load("duffing", "track", changes={"reference": Lost(1.0)}), "finite number at t = 1.001 s"),
         (lambda: suite.load("duffing", changes=3), "changes is 3"),

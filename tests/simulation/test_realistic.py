@@ -66,7 +66,7 @@ PARTS = {
     "lag": {"actuator": smc.Lag(0.01)},
     "rate limit": {"actuator": smc.RateLimit(100.0)},
     "motor": {"actuator": MOTOR},
-    "motor, no inductance, cogging": {"actuator": smc.DCMotor(inductance=0.0, cogging=0.02)},
+    "motor, no inductance, cogging, ripple": {"actuator": smc.DCMotor(inductance=0.0, cogging=0.02, ripple=0.3)},
     "backlash": {"actuator": smc.Backlash(0.02)},
     "motor and backlash": {"actuator": (MOTOR, smc.Backlash(0.02))},
     "backlash and lugre": {"actuator": (smc.Lag(0.01), smc.Backlash(0.02)), "friction": LUGRE},

@@ -86,12 +86,14 @@ class Part:
       state: measured positions and velocities at the start, (2n,).
       first: index of its first sample.
       largest_u: of the recorded command, in the unit of u.
+      zero: quantities that the record determines, see `Rig.zero`.
     """
 
     fields: Mapping[str, Any]
     state: np.ndarray
     first: int
     largest_u: float
+    zero: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -125,6 +127,8 @@ class Rig:
       columns: names of its records' columns.
       commands: function of a record and the index of the start, that returns what the rig adds to its controller's u
         from there on, (K,). None: only the column of the feedforward, if there is one.
+      zero: function of the quantities, by name, and a record that returns quantities which differ between records,
+        such as angles from where an encoder was switched on. None: there are none.
       start, score_from: s after a record's first sample, at which a replay starts, and from which its fit counts.
       dynamics: function of the quantities, by name, that returns a plant with the joints of the record, for records
         whose torques are predicted from the measured motion. None: records are replayed.
@@ -145,6 +149,7 @@ class Rig:
     controller: Law | None = None
     columns: Columns = dataclasses.field(default_factory=Columns)
     commands: Callable[[Record, int], np.ndarray] | None = None
+    zero: Callable[[Values, Record], dict[str, float]] | None = None
     start: float = 0.0
     score_from: float = 0.0
     dynamics: Callable[[Values], Plant] | None = None
@@ -277,7 +282,8 @@ class Rig:
             fields["feedforward"] = signal(added if self.commands is None else self.commands(data, first))
         largest = float(np.abs(data[self.columns.u][first : last + 1]).max())
         state = np.concatenate(records.state(data, self.columns, period, first))
-        return Part(fields=fields, state=state, first=first, largest_u=largest)
+        zero = self.zero(Values(**self.values), data) if self.zero else {}
+        return Part(fields=fields, state=state, first=first, largest_u=largest, zero=zero)
 
     def repeated(self, part: "Part", rounded: bool = True, state: np.ndarray | None = None, **changes: Any) -> Scenario:
         """Return the scenario that repeats a part of a record.
@@ -287,7 +293,7 @@ class Rig:
           rounded, state: as in `replay`.
           changes: fields of the Scenario that differ.
         """
-        fields = self.machine(Values(**self.values))
+        fields = self.machine(Values(**self.values | dict(part.zero)))
         sensor = fields.get("sensor")
         if sensor is not None and not rounded:
             fields["sensor"] = sensor = dataclasses.replace(sensor, counts=np.inf)

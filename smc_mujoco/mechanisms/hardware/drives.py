@@ -104,12 +104,17 @@ class DCMotor(Drive):
 
     With command="voltage" u is the voltage itself, in V, as on a rig whose amplifier takes volts. |u| is then bounded
     by `voltage`, too, and a law that has the nominal model has it per volt: gear k/R is part of its g, and the back-EMF
-    of its f. The law's model never has the inductance, the cogging, and the limit of the current.
+    of its f. The law's model never has the inductance, the cogging, the ripple, and the limit of the current.
 
     Defaults: maxon RE 40, 24 V, number 148867 (data sheet; ironless: no cogging), gearhead GP 42 C 12:1, exactly
     49:4, the 30 A peak of an ESCON 70/10 amplifier: 11.1 N m and 65 rad/s at most, 0.46 N m s/rad of back-EMF. On a
     slide gear is in rad/m: a pinion of 82 mm. The gearbox has no losses: add a friction. A scenario warns of a motor
     whose torque at rest, `stall`, is less than a joint needs to stay at its initial position.
+
+    A commutator shorts a coil whenever one of its two brushes bridges two bars. Then V - gear k v drives more current,
+    and the torque of that current grows by a share, the sum over both brushes of
+
+        ripple exp((cos(bars (gear x - brush)) - 1) / (bars bridge)^2)
 
     Attributes:
       resistance: ohm, 1e-9 or more.
@@ -121,6 +126,10 @@ class DCMotor(Drive):
       poles: periods of cogging per turn of the motor, 0 or more; the default is chosen.
       voltage: V, the supply; math.inf for no limit.
       current: A, the amplifier's limit; math.inf for none.
+      ripple: share of the torque that a brush adds, 0 or more; 0 for an even torque. It needs inductance 0.
+      bars: of the commutator, greater than 0; the default is chosen.
+      bridge, bridge_2: rad at the motor, over which each brush bridges two bars, greater than 0; chosen.
+      brush, brush_2: rad at the motor, an angle at which each does; chosen.
       command: what u is: "torque", N m (N) at the joint, or "voltage", V.
     """
 
@@ -133,14 +142,26 @@ class DCMotor(Drive):
     poles: float = 12.0
     voltage: float = 24.0
     current: float = 30.0
+    ripple: float = 0.0
+    bars: float = 9.0
+    bridge: float = 0.01
+    bridge_2: float = 0.01
+    brush: float = 0.0
+    brush_2: float = 0.35
     command: str = "torque"
 
     def __post_init__(self) -> None:
         if self.command not in COMMANDS:
             raise unknown("command of DCMotor", self.command, COMMANDS)
         self.check_numbers("resistance", above=0.0, low=MIN_RESISTANCE)
-        self.check_numbers("torque_constant", "gear", above=0.0)
-        self.check_numbers("inductance", "rotor_inertia", "cogging", "poles", low=0.0)
+        self.check_numbers("torque_constant", "gear", "bars", "bridge", "bridge_2", above=0.0)
+        self.check_numbers("inductance", "rotor_inertia", "cogging", "poles", "ripple", low=0.0)
+        self.check_numbers("brush", "brush_2", low=-MAX_PARAMETER)
+        if self.ripple and self.delay:
+            raise ScenarioError(
+                f"DCMotor has ripple {self.ripple:g} and inductance {self.inductance:g} H: its ripple is that of a "
+                "current without delay: give inductance=0"
+            )
         self.check_numbers("voltage", "current", above=0.0, high=math.inf, infinite=True)
         if not self.constant >= MIN_CONSTANT or not self.resistance / self.constant <= MAX_PARAMETER:
             raise ScenarioError(
@@ -187,7 +208,7 @@ class DCMotor(Drive):
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         ids = drive_ids(model)
         torque = self.constant * self.current
-        share, voltage = 1.0, self.voltage
+        share, voltage = 1.0, math.inf if self.ripple else self.voltage  # `rippled` bounds it before the ripple
         if self.delay:  # the callback simulates the winding, and bounds its voltage
             rk4 = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
             share, voltage = winding_step(model.opt.timestep / self.delay, rk4).share, math.inf
@@ -221,6 +242,7 @@ class DriveStep(NamedTuple):
       drag, force_drag, second_drag: of a winding, for the speed v at the start of the step, in the unit of u: what it
         takes from `second` to make it the torque, from the mean force beside MuJoCo's own share of the drag, and from
         `second` at the end of the step.
+      ripple and all after it: of a DCMotor, see `rippled`; ripple 0 for an even torque.
     """
 
     force_first: float = 0.0
@@ -234,6 +256,14 @@ class DriveStep(NamedTuple):
     drag: float = 0.0
     force_drag: float = 0.0
     second_drag: float = 0.0
+    ripple: float = 0.0
+    turns: float = 0.0
+    angle: float = 0.0
+    angle_2: float = 0.0
+    sharpness: float = 0.0
+    sharpness_2: float = 0.0
+    supply: float = 0.0
+    constant: float = 0.0
 
     def start(self, v: Any) -> np.ndarray:
         """Return both states at the start of a run at the speeds v, (2, ...): no force, and no current."""
@@ -256,14 +286,29 @@ class DriveStep(NamedTuple):
         return np.where(end == first_after, passing, 0.5 * (second + end)), first_after, end
 
 
+def rippled(motor, V, x, v):
+    """Return the voltage at which an even motor has the torque of a motor with ripple, at V, x and v of its joint."""
+    V = min(max(V, -motor.supply), motor.supply)
+    share = math.exp(motor.sharpness * (math.cos(motor.turns * x - motor.angle) - 1.0))
+    share += math.exp(motor.sharpness_2 * (math.cos(motor.turns * x - motor.angle_2) - 1.0))
+    return V + motor.ripple * share * (V - motor.constant * v)
+
+
 def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveStep | None:
     """Return the effect of a physics step of `step` s, of RK4 or another integrator; None if MuJoCo needs only u."""
     drives = [part for part in actuator if part.drives]
     lags = [min(step / part.tau, MAX_TIME_CONSTANTS) for part in drives if isinstance(part, Lag) and part.tau]
     rate = next((part.rate for part in drives if isinstance(part, RateLimit)), None)
-    motor = next((part for part in drives if isinstance(part, DCMotor) and part.delay), None)
+    motor = next((part for part in drives if isinstance(part, DCMotor) and (part.delay or part.ripple)), None)
     if not lags and motor is None and rate is None:
         return None
+    if motor is not None and motor.ripple:
+        n = motor.bars
+        return DriveStep(
+            ripple=motor.ripple, turns=n * motor.gear, angle=n * motor.brush, angle_2=n * motor.brush_2,
+            sharpness=(n * motor.bridge) ** -2, sharpness_2=(n * motor.bridge_2) ** -2, supply=motor.voltage,
+            constant=motor.constant,
+        )  # fmt: skip
     a = lags[0] if lags else math.inf
     made = DriveStep(force_first=_mean(a), first_left=math.exp(-a), lagged=float(bool(lags)))
     if rate is not None:

@@ -10,7 +10,7 @@ from mujoco.batch import Batch
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
-from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag, RateLimit
+from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag, RateLimit, drive_step, rippled
 from smc_mujoco.mechanisms.hardware.friction import LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import ROTOR, dof_ids, drive_ids
 from smc_mujoco.mechanisms.plant import field_array, plant, write
@@ -106,6 +106,26 @@ def test_cogging_is_a_sine_of_the_rotors_angle():
         mujoco.mj_forward(model, data)
         expected = motor.gear * 5e-3 * math.sin(14.0 * motor.gear * x)
         assert data.actuator_force[0] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_commutator_raises_the_torque_where_a_brush_bridges_two_bars():
+    """By the formula: all of the ripple at either brush, 1/e of it where the cosine has fallen by (bars bridge)^2."""
+    motor = DCMotor(inductance=0.0, gear=2.0, ripple=0.2, bars=9.0, bridge=0.02, brush=0.1, bridge_2=0.01, brush_2=0.4)
+    step, even = drive_step((motor,), 1e-3, True), motor.constant / motor.resistance * (3.0 - motor.constant * 5.0)
+    beside = 0.1 + math.acos(1.0 - (9.0 * 0.02) ** 2) / 9.0
+    for turned, share in ((0.1, 0.2), (0.4 - math.tau / 9.0, 0.2), (beside, 0.2 / math.e), (0.25, 0.0)):
+        V = rippled(step, 3.0, turned / 2.0, 5.0)
+        torque = motor.constant / motor.resistance * (V - motor.constant * 5.0)
+        assert torque == pytest.approx((1.0 + share) * even, rel=1e-6)
+    assert rippled(step, 100.0, 0.125, 0.0) == pytest.approx(motor.voltage, rel=1e-6)
+
+
+def test_a_ripple_needs_a_motor_alone_whose_current_follows_at_once():
+    with pytest.raises(ScenarioError, match="DCMotor has ripple 0"):
+        DCMotor(ripple=0.1)
+    uneven = DCMotor(inductance=0.0, ripple=0.1)
+    with pytest.raises(ScenarioError, match="DCMotor has a ripple beside another part"):
+        smc.run(smc.Scenario(plant="duffing", law="none", actuator=(uneven, Backlash(0.02)), duration=0.01))
 
 
 @NAMES
