@@ -47,7 +47,7 @@ TINY = dataclasses.replace(
     claims=("3", "18"),
     scenes=(("duffing", "nominal"),),
     scene_laws=("observer_free", "classical"),
-    scene=0.3,
+    scene=0.1,
     rigs=("qube_servo",),
     periods=(4e-3, 2e-3),
 )
