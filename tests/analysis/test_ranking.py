@@ -173,6 +173,12 @@ def test_ranks_are_those_of_the_medians_of_each_block():
     assert {law: rank.mean for law, rank in by_law(ranks(scores)).items()} == {"a": 1.75, "b": 2.25, "c": 2.0}
 
 
+def test_ranks_of_shares_are_those_of_their_means():
+    scores = {"a": np.arange(10) < 3, "b": np.arange(10) < 4}  # of runs that do not settle; both medians are 0
+    found = by_law(ranks(scores, shares=True))
+    assert {law: rank.mean for law, rank in found.items()} == {"a": 1.0, "b": 2.0}
+
+
 def test_a_law_that_fails_less_often_comes_first_whatever_its_median():
     scores = {"never_fails": [5.0] * 4, "fails": [1.0, 1.0, 1.0, INF], "also": [1.0, 2.0, 3.0, INF]}
     found = ranks(scores)
