@@ -135,18 +135,20 @@ def which(
     folder, relevant, properties = Path(out), share_that_matters(relevant), [n for n in properties if n != NO_VELOCITY]
     options: dict[str, Any] = {"threads": threads, "progress": progress}
     chosen = _suited(machine, properties, laws)
-    found = fair_gains(machine, chosen, folder / "gains", extent.budget, starts, **options)
-    candidates = {candidate.law.name: candidate for candidate in found}
-    if len(candidates) < len(found):
+    with_gains = fair_gains(machine, chosen, folder / "gains", extent.budget, starts, **options)
+    candidates = {candidate.law.name: candidate for candidate in with_gains}
+    if len(candidates) < len(with_gains):
         raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")
 
     def contest(names: Sequence[str], numbers: range, part: str, budget: int | None = None) -> Contest:
-        its = [candidates[name] for name in names]
-        runs = all_combinations([machine], lambda _: its, tested, numbers, length, starts)
+        contestants = [candidates[name] for name in names]
+        runs = all_combinations([machine], lambda _: contestants, tested, numbers, length, starts)
         table = study(runs, folder / part, noise_key=noise_key, replay=True, **options)
         (group,) = paired_runs.groups(table, by=("plant",))
-        worst, cases = {}, [[case(machine, one.law, on, attacked_for, starts=starts) for on in tested] for one in its]
+        worst = {}
         if ROBUST in compared:
+            best = [each.law for each in contestants]
+            cases = [[case(machine, law, on, attacked_for, starts=starts) for on in tested] for law in best]
             worst = _worst(cases, within, budget, 3 if quick else 1, folder / "worst" / part, **options)
         return _contest(Runs(table, group, worst), machine, compared, relevant)
 
@@ -168,7 +170,7 @@ def which(
         comparison=finals.comparison,
         table=finals.runs.table,
         effort=efforts.pop() if len(efforts) == 1 else "",
-        untuned=() if defaults else tuple(one.law.name for one in found if one.law.source.kind == source.DEFAULT),
+        untuned=() if defaults else tuple(one.law.name for one in with_gains if one.law.source.kind == source.DEFAULT),
     )
 
 
