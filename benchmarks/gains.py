@@ -75,7 +75,7 @@ def write(path: Path, data: dict[str, Any]) -> None:
 def wanted(again: bool) -> Iterator[Task]:
     """Yield the tasks to do: all of them, or those whose gains are missing or have another rule."""
     for gains, plant, law in tasks():
-        if again or law not in known(gain_sets.file(gains))["plants"].get(plant, {}):
+        if again or law not in known(gain_sets.file_of(gains))["plants"].get(plant, {}):
             yield gains, plant, law
 
 
@@ -90,7 +90,7 @@ def main() -> None:
         running = {pool.submit(tune, task): task for task in todo}
         for done in as_completed(running):
             (gains, plant, law), record = running[done], done.result()
-            store(gain_sets.file(gains), plant, law, record)
+            store(gain_sets.file_of(gains), plant, law, record)
             ended = {True: "converged", False: "not converged", None: "too few starts"}[record["converged"]]
             print(f"{gains}: {plant}, {law}: {record['objective']:.4g} s², {ended}", flush=True)
 

@@ -27,7 +27,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.law import catalogue as laws
-from smc_mujoco.simulation import native
+from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation.batch import ScenarioBatch
 from smc_mujoco.simulation.callback import callback, installed
 from smc_mujoco.simulation.prepare import prepare
@@ -65,7 +65,7 @@ def read(function, y, gains, memory, out, states, addresses):
 
 def nanoseconds(component: Component, loop: Callable, model: float = 0.0) -> float:
     """Least time per call over the rounds, with the loop that calls."""
-    function = native.component(component)
+    function = cfunctions.compile_component(component)
     y, out = np.zeros(len(AT)), np.zeros(3)
     if loop is drive:
         for name, value in (("dt", 1e-3), ("g", 8.0), ("limit", 6.0), ("model", model), ("f", 1.0)):

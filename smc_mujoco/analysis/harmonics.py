@@ -33,8 +33,8 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.part import Actuator, dof_ids, drive_ids
+from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation import native
 from smc_mujoco.simulation.scenario import Scenario
 
 STEP = 1e-6  # SI units, of finite differences
@@ -309,7 +309,7 @@ class Controller:
 
     def __init__(self, *parts: Component | None):
         try:
-            functions = [None if one is None else native.component(one) for one in parts]
+            functions = [None if one is None else cfunctions.compile_component(one) for one in parts]
         except NotCompilable as error:
             raise ScenarioError(f"chattering is not predicted for a law that does not compile: {error}") from None
         self.functions, self.parts = functions, parts  # the functions keep their addresses alive

@@ -17,7 +17,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.frozen import Frozen, frozen
-from smc_mujoco.control.design import STEP
+from smc_mujoco.control.design import DIFFERENCE_STEP
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
 
@@ -65,8 +65,8 @@ def _linear(plant: Plant, factors: Frozen[float]) -> Linear:
 
     def slopes(at: Callable[[np.ndarray, int], float]) -> np.ndarray:
         """Return -d f_i / d z_j / g, (n, n), by central differences."""
-        steps = STEP * np.eye(n)
-        return np.array([[(at(-z, i) - at(z, i)) / (2.0 * STEP * g[i]) for z in steps] for i in range(n)])
+        steps = DIFFERENCE_STEP * np.eye(n)
+        return np.array([[(at(-z, i) - at(z, i)) / (2.0 * DIFFERENCE_STEP * g[i]) for z in steps] for i in range(n)])
 
     stiffness = slopes(lambda x, i: plant.nominal(x, rest, i, p)[0])
     damping = slopes(lambda v, i: plant.nominal(rest, v, i, p)[0])

@@ -16,7 +16,7 @@ import numpy as np
 from smc_mujoco.analysis.differences import coarse
 from smc_mujoco.analysis.ranking import first_of_kind
 from smc_mujoco.common.errors import ScenarioError, shown, taken, unknown
-from smc_mujoco.control.source import Source, restored
+from smc_mujoco.control.source import Source, restore
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.channel_groups import groups as channel_groups
 from smc_mujoco.simulation.scenario import Scenario
@@ -35,7 +35,7 @@ class Columns(Protocol):
         ...
 
     def scenario(self, i: int) -> Scenario:
-        """Return the scenario of row i. Raise ScenarioError if it cannot be restored."""
+        """Return the scenario of row i. Raise ScenarioError if it cannot be restore."""
         ...
 
 
@@ -253,7 +253,7 @@ def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[S
     by_law: dict[str, list[Source]] = {}
     every = zip(*(column if rows is None else column[rows] for column in columns), strict=True)
     for law, kind, search in sorted(dict.fromkeys(every), key=str):
-        by_law.setdefault(law, []).append(restored({"kind": kind, "search": search and json.loads(search)}))
+        by_law.setdefault(law, []).append(restore({"kind": kind, "search": search and json.loads(search)}))
     return {law: tuple(its) for law, its in by_law.items()}
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.mjcb import installed
-from smc_mujoco.control.design import STEP
+from smc_mujoco.control.design import DIFFERENCE_STEP
 from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids, joint_names
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
@@ -103,8 +103,8 @@ def rates(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
         return np.concatenate((data.qvel, data.qacc, data.act_dot))
 
     block = np.zeros((n + model.nu, n + model.nu))
-    for i, moved in enumerate(STEP * np.eye(n + model.nu)):
-        block[:n, i] = (moving(moved) - moving(-moved)) / (2.0 * STEP)
+    for i, moved in enumerate(DIFFERENCE_STEP * np.eye(n + model.nu)):
+        block[:n, i] = (moving(moved) - moving(-moved)) / (2.0 * DIFFERENCE_STEP)
     model.opt.timestep = step
     data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = rest
     return block

@@ -25,14 +25,14 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
 from smc_mujoco.control.units import Gain
 
-Conditions = Mapping[str, Callable[[SimpleNamespace], bool]]
-Value = float | tuple[float, ...]  # of a gain: one number for all channels, or one for each driven channel
-FINITE = ("", "s", "e")  # what a law brings to 0 in finite time
-Order = float | Callable[[SimpleNamespace], float]  # of accuracy: a number, or a function of the gains
+GainConditions = Mapping[str, Callable[[SimpleNamespace], bool]]
+GainValue = float | tuple[float, ...]  # one number for all channels, or one for each driven channel
+FINITE_TIME = ("", "s", "e")  # values of the option: what a law brings to 0 in finite time
+AccuracyOrder = float | Callable[[SimpleNamespace], float]  # a number, or a function of the gains
 
 
 class Rest(NamedTuple):
-    """The part of a law that linear theory uses, for a law that is linear near s = 0.
+    """The linear part of a law that is linear near s = 0.
 
     Attributes:
       linear: gains -> (lam, k1) of u = -lam (e' + k1 e), the law near s = 0. Gains are read by attribute.
@@ -50,7 +50,7 @@ class Options(TypedDict, total=False):
     memory: int
     positive: Iterable[str]
     nonnegative: Iterable[str]
-    conditions: Conditions | None
+    conditions: GainConditions | None
     label: str
 
 
@@ -71,13 +71,13 @@ class LawOptions(SurfaceOptions, total=False):
     family: str
     continuous: bool
     finite_time: str
-    accuracy: Mapping[str, Order]
+    accuracy: Mapping[str, AccuracyOrder]
     admits: Mapping[str, Callable[[SimpleNamespace], float]]
     joint: bool
 
 
 OPTIONS = {"law": LawOptions, "surface": SurfaceOptions, "estimator": Options}
-QUANTITIES = {"accuracy": ("s", "e"), "admits": ("d", "d'")}  # option -> what it may give a number for
+OPTION_KEYS = {"accuracy": ("s", "e"), "admits": ("d", "d'")}  # option that is a mapping -> its possible keys
 
 
 class GainWarning(UserWarning):
@@ -92,15 +92,15 @@ class Component:
       gains: name -> value; of a law also a tuple with a value for each driven channel.
       function: None if a loaded trace names one that is not available.
       joint: whether it is a law of many joints.
-      shared: gains of which a law of many joints has one number for all joints.
-      each: the laws of the driven channels, where they are not the same law; then `function` is None.
+      shared: gains that are one number for all joints in a law of many joints.
+      each: the laws of the driven channels if they are different laws; then `function` is None.
       template: the Template it was made from; None if that is not available.
       source: where the gains come from. Laws with equal gains are equal, whatever their sources.
     """
 
     kind: str
     name: str
-    gains: Mapping[str, Any]  # of Value
+    gains: Mapping[str, Any]  # of GainValue
     memory: int
     function: Callable | None
     relative_degree: int = 1
@@ -113,10 +113,10 @@ class Component:
     source: Source = dataclasses.field(default=Source(), compare=False, repr=False)
 
     def __repr__(self) -> str:
-        return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={written(v)}' for k, v in self.gains.items())])})"
+        return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={gain_text(v)}' for k, v in self.gains.items())])})"
 
     def __reduce__(self):
-        """Pickle the name of the template: a decorated function's own name leads to its template, not to itself."""
+        """Pickle the name of the template: in its module, a decorated function's name is that of the template."""
         name = getattr(self.function, "__module__", ""), getattr(self.function, "__qualname__", "?")
         template = _template_at(*name)
         if template is not None and template.function is self.function:
@@ -126,7 +126,7 @@ class Component:
     def __post_init__(self):
         if not isinstance(self.name, str):
             raise ScenarioError(f"name of a {self.kind} is {shown(self.name)}: give a text")
-        gains = {name: _value(f"{self.name}'s {name}", gain, infinite=True) for name, gain in self.gains.items()}
+        gains = {name: _checked_gain(f"{self.name}'s {name}", gain, infinite=True) for name, gain in self.gains.items()}
         object.__setattr__(self, "gains", frozen(gains))
         if self.source.gains != self.gains:  # the gains were replaced
             object.__setattr__(self, "source", Source(kind=YOURS if gains else NONE, gains=self.gains))
@@ -147,7 +147,7 @@ class Component:
         return dataclasses.replace(self, name=name, template=template)
 
     def sourced(self, kind: str, search: Search | None = None) -> "Component":
-        """Return the same law with another source of its gains, a key of `source.KINDS`. A law without gains has none.
+        """Return the same law with another source of its gains, a key of `source.KINDS`; a law without gains has none.
 
         Raises:
           ScenarioError: an unknown kind.
@@ -162,7 +162,7 @@ class Component:
 
     @property
     def parts(self) -> "tuple[Component, ...]":
-        """The components whose functions it needs: itself, or the laws of its channels."""
+        """The laws of its channels if they are different laws, else itself."""
         return self.each or (self,)
 
     def of_channel(self, i: int) -> "Component":
@@ -177,23 +177,23 @@ class Component:
             return self
         if self.each:
             return self.each[min(i, len(self.each) - 1)]
-        gains = {name: at(value, i) for name, value in self.gains.items()}
-        return dataclasses.replace(self, gains=gains, source=self.source.of(gains))
+        gains = {name: gain_at(value, i) for name, value in self.gains.items()}
+        return dataclasses.replace(self, gains=gains, source=self.source.with_gains(gains))
 
     def of_channels(self, n: int) -> "list[Component]":
-        """Return the component of all channels, or those of n channels if they differ or have other gains."""
+        """Return one component for all n channels, or one for each if laws or gains differ."""
         return [self] if self.joint or self.uniform else [self.of_channel(i) for i in range(n)]
 
     def __str__(self):
-        return f"{self.name}({', '.join(f'{k}={written(v)}' for k, v in self.gains.items())})"
+        return f"{self.name}({', '.join(f'{k}={gain_text(v)}' for k, v in self.gains.items())})"
 
 
-def written(value: Value) -> str:
+def gain_text(value: GainValue) -> str:
     """Return a gain as text, such as 3 or (3, 4.5)."""
     return f"({', '.join(f'{one:g}' for one in value)})" if isinstance(value, tuple) else f"{value:g}"
 
 
-def _value(name: str, value: object, **limits: Any) -> Value:
+def _checked_gain(name: str, value: object, **limits: Any) -> GainValue:
     """Return a gain, one number or a tuple of one for each channel, checked as `number` checks it."""
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
         listed = value.tolist() if isinstance(value, np.ndarray) else taken(name, value)
@@ -246,7 +246,7 @@ class Template:
     gains: Mapping[str, Gain]
     memory: int
     relative_degree: int = 1
-    conditions: Conditions = dataclasses.field(default_factory=dict)
+    conditions: GainConditions = dataclasses.field(default_factory=dict)
     plants: tuple[str, ...] = ()
     requires_model: bool = False
     label: str = ""
@@ -256,12 +256,12 @@ class Template:
     family: str = ""
     continuous: bool = False
     finite_time: str = ""
-    accuracy: Mapping[str, Order] = dataclasses.field(default_factory=dict)
+    accuracy: Mapping[str, AccuracyOrder] = dataclasses.field(default_factory=dict)
     admits: Mapping[str, Callable[[SimpleNamespace], float]] = dataclasses.field(default_factory=dict)
     joint: bool = False
 
     def __repr__(self) -> str:
-        gains = "".join(f", {name}={written(gain.default)}" for name, gain in self.gains.items())
+        gains = "".join(f", {name}={gain_text(gain.default)}" for name, gain in self.gains.items())
         return f"<Template of {self.kind}({self.name!r}{gains})>"
 
     @property
@@ -271,20 +271,20 @@ class Template:
 
     @property
     def doc(self) -> str:
-        """The docstring of the function's module if the module has the function's name, else the function's."""
+        """The docstring of the function, or of its module if both have the same name."""
         module = inspect.getmodule(self.function)
-        named_alike = module is not None and module.__name__.rsplit(".", 1)[-1] == self.name
-        return inspect.cleandoc((module.__doc__ if named_alike and module else self.function.__doc__) or self.name)
+        same_name = module is not None and module.__name__.rsplit(".", 1)[-1] == self.name
+        return inspect.cleandoc((module.__doc__ if same_name and module else self.function.__doc__) or self.name)
 
-    def order(self, quantity: str, gains: Mapping[str, Value]) -> float | None:
+    def order(self, quantity: str, gains: Mapping[str, GainValue]) -> float | None:
         """Return theory's order of accuracy of "s" or "e" with these gains; None if the law does not state it."""
-        stated = self.accuracy.get(quantity)
-        return min(map(stated, _per_channel(gains))) if callable(stated) else stated
+        order = self.accuracy.get(quantity)
+        return min(map(order, _per_channel(gains))) if callable(order) else order
 
-    def unmet(self, gains: Mapping[str, Value]) -> list[str]:
+    def unmet(self, gains: Mapping[str, GainValue]) -> list[str]:
         """Return the conditions of the theorem that these gains violate, in words."""
         channels = list(_per_channel(gains))
-        return [words for words, holds in self.conditions.items() if not all(_holds(holds, one) for one in channels)]
+        return [words for words, test in self.conditions.items() if not all(_holds(test, gains) for gains in channels)]
 
     def __call__(self, **gains: float | Sequence[float]) -> Component:
         """Return `bind(gains, warn=True)`."""
@@ -303,7 +303,7 @@ class Template:
         Warns:
           GainWarning: gains violate a condition of the theorem.
         """
-        values: dict[str, Value] = {**self.defaults}
+        values: dict[str, GainValue] = {**self.defaults}
         for key, value in gains.items():
             if key not in values:
                 raise unknown(f"gain of {self.name}", key, values)
@@ -311,13 +311,15 @@ class Template:
             above = 0.0 if gain.positive else -math.inf
             low = 0.0 if gain.nonnegative else -math.inf
             infinite = bool(np.isinf(gain.default).any())
-            values[key] = _value(f"{self.name}'s {key}", value, above=above, low=low, infinite=infinite)
+            values[key] = _checked_gain(f"{self.name}'s {key}", value, above=above, low=low, infinite=infinite)
             if isinstance(values[key], tuple) and (gain.shared or self.kind != "law"):
-                raise ScenarioError(f"{self.name}'s {key} is {written(values[key])}: give one number for all channels")
+                raise ScenarioError(
+                    f"{self.name}'s {key} is {gain_text(values[key])}: give one number for all channels"
+                )
         for words in self.unmet(values) if warn else ():
-            text = ", ".join(f"{name} = {written(value)}" for name, value in values.items())
+            text = ", ".join(f"{name} = {gain_text(value)}" for name, value in values.items())
             warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {text}", GainWarning, users_frame())
-        made = Component(
+        component = Component(
             kind=self.kind,
             name=self.name,
             gains=values,
@@ -330,31 +332,31 @@ class Template:
             shared=tuple(name for name, gain in self.gains.items() if gain.shared),
             template=self,
         )
-        return made if gains else made.sourced(DEFAULT)
+        return component if gains else component.sourced(DEFAULT)
 
 
-def _per_channel(gains: Mapping[str, Value]) -> Iterable[SimpleNamespace]:
-    """Yield the gains of each channel that tuples among them tell apart."""
+def _per_channel(gains: Mapping[str, GainValue]) -> Iterable[SimpleNamespace]:
+    """Yield the gains of each channel; once if all are the same in all channels."""
     count = max((len(value) for value in gains.values() if isinstance(value, tuple)), default=1)
     for i in range(count):
-        yield SimpleNamespace(**{name: at(value, i) for name, value in gains.items()})
+        yield SimpleNamespace(**{name: gain_at(value, i) for name, value in gains.items()})
 
 
 def by_channel(laws: "Sequence[Component]") -> Component:
-    """Return the law that gives each driven channel one of these laws of one channel."""
+    """Return the law of a plant with one of these laws for each driven channel."""
     first = laws[0]
     for i, law in enumerate(laws):
         if law.joint or not law.uniform:
-            kind = "of many joints" if law.joint else f"{law}, with gains by channel,"
-            raise ScenarioError(f"the law of channel {i} is {law.name!r}, {kind}: give it a law of one channel")
+            fact = "of many joints" if law.joint else f"{law}, with gains by channel,"
+            raise ScenarioError(f"the law of channel {i} is {law.name!r}, {fact}: give it a law of one channel")
     source = combined([law.source for law in laws])
     if all(law == first for law in laws):
-        return dataclasses.replace(first, source=source.of(first.gains))
+        return dataclasses.replace(first, source=source.with_gains(first.gains))
     if all(law.function is first.function and law.name == first.name for law in laws):
-        each = {name: tuple(law.gains[name] for law in laws) for name in first.gains}
-        gains = {name: values if len(set(values)) > 1 else values[0] for name, values in each.items()}
-        return dataclasses.replace(first, gains=gains, source=source.of(gains))
-    made = Component(
+        by_name = {name: tuple(law.gains[name] for law in laws) for name in first.gains}
+        gains = {name: values if len(set(values)) > 1 else values[0] for name, values in by_name.items()}
+        return dataclasses.replace(first, gains=gains, source=source.with_gains(gains))
+    component = Component(
         kind=first.kind,
         name=" + ".join(dict.fromkeys(law.name for law in laws)),
         gains={f"{name}[{i}]": value for i, law in enumerate(laws) for name, value in law.gains.items()},
@@ -364,10 +366,10 @@ def by_channel(laws: "Sequence[Component]") -> Component:
         requires_model=any(law.requires_model for law in laws),
         each=tuple(laws),
     )
-    return made.sourced(source.kind, source.search)
+    return component.sourced(source.kind, source.search)
 
 
-def at(value: Value, i: int) -> float:
+def gain_at(value: GainValue, i: int) -> float:
     """Return a gain's value in channel i. A tuple that is too short, which a scenario refuses, gives its last value."""
     return value[min(i, len(value) - 1)] if isinstance(value, tuple) else value
 
@@ -380,7 +382,7 @@ def _holds(condition: Callable[[SimpleNamespace], bool], gains: SimpleNamespace)
         return False
 
 
-def as_gains(gains: object, known: Mapping[str, Value] = frozen({})) -> dict[str, Gain]:
+def as_gains(gains: object, known: Mapping[str, GainValue] = frozen({})) -> dict[str, Gain]:
     """Return the gains of a decorator, numbers or Gains, as Gains.
 
     Args:
@@ -393,7 +395,9 @@ def as_gains(gains: object, known: Mapping[str, Value] = frozen({})) -> dict[str
         if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
             raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
         gain = value if isinstance(value, Gain) else Gain(value)
-        checked[key] = dataclasses.replace(gain, default=_value(f"default of gain {key}", gain.default, infinite=True))
+        checked[key] = dataclasses.replace(
+            gain, default=_checked_gain(f"default of gain {key}", gain.default, infinite=True)
+        )
     for key, gain in checked.items():
         if gain.over is not None and gain.over not in checked:
             raise unknown(f"gain that {key} is divided by", gain.over, checked)
@@ -405,47 +409,47 @@ def decorated(kind: str, function: Callable | None, options: Mapping) -> "Callab
     options = dict(options)
     if foreign := options.keys() - OPTIONS[kind].__optional_keys__:
         raise unknown(f"option of {kind}_function", min(foreign), OPTIONS[kind].__optional_keys__)
-    decorate = template(kind, **options)
+    decorate = template_decorator(kind, **options)
     return decorate if function is None else decorate(function)
 
 
-def _check_words(words: Mapping[str, Any]) -> None:
-    """Check what a decorator says of a component to figures, tables and measurements, which read it long after."""
+def _check_options(options: Mapping[str, Any]) -> None:
+    """Raise ScenarioError for wrong options that are read only later, by figures, tables and measurements."""
     for option in ("label", "short", "family"):
-        if not isinstance(words.get(option, ""), str):
-            raise ScenarioError(f"{option} is {shown(words[option])}: give a text")
-    for option, known in QUANTITIES.items():
-        if not isinstance(given := words.get(option, {}), Mapping) or not given.keys() <= {*known}:
-            names = " and ".join(map(repr, known))
-            raise ScenarioError(f"{option} is {shown(given)}: give numbers, or functions of the gains, for {names}")
-    if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(words.get("colour", ""))):
-        raise ScenarioError(f"colour is {shown(words['colour'])}: give one like '#0072B2'")
-    if words.get("finite_time", "") not in FINITE:
-        raise ScenarioError(f"finite_time is {shown(words['finite_time'])}: give 's', 'e' or ''")
+        if not isinstance(options.get(option, ""), str):
+            raise ScenarioError(f"{option} is {shown(options[option])}: give a text")
+    for option, keys in OPTION_KEYS.items():
+        if not isinstance(value := options.get(option, {}), Mapping) or not value.keys() <= {*keys}:
+            names = " and ".join(map(repr, keys))
+            raise ScenarioError(f"{option} is {shown(value)}: give numbers, or functions of the gains, for {names}")
+    if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(options.get("colour", ""))):
+        raise ScenarioError(f"colour is {shown(options['colour'])}: give one like '#0072B2'")
+    if options.get("finite_time", "") not in FINITE_TIME:
+        raise ScenarioError(f"finite_time is {shown(options['finite_time'])}: give 's', 'e' or ''")
 
 
-def template(
+def template_decorator(
     kind: str,
     gains: Mapping[str, float | Gain] | None = None,
     memory: int = 8,
     positive: Iterable[str] = (),
     nonnegative: Iterable[str] = (),
     relative_degree: int = 1,
-    conditions: Conditions | None = None,
+    conditions: GainConditions | None = None,
     plants: Iterable[str] = (),
-    **words: object,
+    **options: object,
 ) -> Callable[[Callable], Template]:
     """Return a decorator that turns a function into a Template."""
-    stated = as_gains(gains)
+    checked = as_gains(gains)
     memory, relative_degree = whole("memory", memory, 1, 10_000), whole("relative_degree", relative_degree, 1, 10)
     if isinstance(plants, str):
         raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")
-    _check_words(words)
+    _check_options(options)
     for sign, names in (("positive", positive), ("nonnegative", nonnegative)):
         for name in names:
-            if name not in stated:
-                raise unknown(f"gain that is {sign}", name, stated)
-            stated[name] = dataclasses.replace(stated[name], **{sign: True})
+            if name not in checked:
+                raise unknown(f"gain that is {sign}", name, checked)
+            checked[name] = dataclasses.replace(checked[name], **{sign: True})
 
     def decorate(function: Callable) -> Template:
         if not callable(function):
@@ -459,31 +463,12 @@ def template(
             kind=kind,
             name=name,
             function=function,
-            gains=stated,
+            gains=checked,
             memory=memory,
             relative_degree=relative_degree,
             conditions=dict(conditions or {}),
             plants=tuple(plants),
-            **words,  # pyright: ignore[reportArgumentType]
+            **options,  # pyright: ignore[reportArgumentType]
         )
 
     return decorate
-
-
-def parsed_gains(text: str, what: str) -> dict[str, Any]:
-    """Return the gains in a text such as "lam=6,k1=3 5", with two joints' k1. `what` names the text in errors."""
-    parsed: dict[str, Value] = {}
-    for part in filter(None, (p.strip() for p in text.split(","))):
-        name, equals, value = (word.strip() for word in part.partition("="))
-        if name in parsed:
-            raise ScenarioError(f"{what} is {shown(text)}: give {name} once")
-        try:
-            values = tuple(map(float, value.split()))
-        except ValueError:
-            values = ()
-        parsed[name] = values[0] if len(values) == 1 else values
-        if not (equals and name.isidentifier() and values):
-            raise ScenarioError(f"{what} is {shown(text)}: give names and numbers, such as lam=6,k1=3")
-        if any(map(math.isnan, values)):
-            raise ScenarioError(f"{what} is {shown(text)}, and {name} is nan: give it a number")
-    return parsed

@@ -10,13 +10,13 @@ from smc_mujoco.control.law import Law, law
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 
-STEP = 1e-6  # rad or m, and per second: of the central differences, about the cube root of a float's precision
+DIFFERENCE_STEP = 1e-6  # rad or m, and per second, of central differences: about the cube root of the rounding error
 
 
 def linearised(plant: Plant) -> tuple[float, float, float]:
-    """Return a1, a2, b of x'' = a1 x + a2 x' + b u at the origin; for a network, of its least stable channel.
+    """Return a1, a2, b of x'' = a1 x + a2 x' + b u at the origin. A network has those of its least stable channel.
 
-    The motion of neighbours is not included.
+    Neighbours are at rest.
     """
     if plant.unmodelled:
         raise ScenarioError(f"{plant.name} has no nominal model: {plant.unmodelled}")
@@ -34,10 +34,10 @@ def linearised(plant: Plant) -> tuple[float, float, float]:
 
 def _channel(plant: Plant, i: int) -> tuple[float, float, float]:
     p, rest, moved = SimpleNamespace(**plant.parameters), np.zeros(plant.n), np.zeros(plant.n)
-    moved[i] = STEP
+    moved[i] = DIFFERENCE_STEP
 
-    def slope(at: Callable[[np.ndarray], tuple[float, float]]) -> float:
-        return (at(moved)[0] - at(-moved)[0]) / (2.0 * STEP)
+    def slope(model: Callable[[np.ndarray], tuple[float, float]]) -> float:
+        return (model(moved)[0] - model(-moved)[0]) / (2.0 * DIFFERENCE_STEP)
 
     a1 = slope(lambda x: plant.nominal(x, rest, i, p))
     a2 = slope(lambda v: plant.nominal(rest, v, i, p))
@@ -45,7 +45,7 @@ def _channel(plant: Plant, i: int) -> tuple[float, float, float]:
 
 
 def lqr(of: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1.0) -> Law:
-    """Design the law `lqr` for a plant at the origin, for the least integral of q[0] e^2 + q[1] de^2 + r u^2.
+    """Return the law `lqr` for a plant at the origin, which minimises the integral of q[0] e^2 + q[1] de^2 + r u^2.
 
     Args:
       of: a Plant or the name of one.

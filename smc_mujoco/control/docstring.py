@@ -1,6 +1,6 @@
 """The docstring of a law, surface or velocity estimator, in parts.
 
-It begins with `Name: formula`, continues with sentences on what is known, and ends with `Source: ...`.
+It begins with `Name: formula`, continues with sentences on properties, and ends with `Source: ...`.
 """
 
 import re

@@ -1,15 +1,16 @@
-"""Laws and other components as text: `pid`, `pid(kp=50, ki=1)`, or a file with a law in it.
+"""Laws and other components from text: `pid`, `pid(kp=50, ki=1)`, or a file with a law in it.
 
     smc.law("gains.json")        # what `smc-mujoco tune --out gains.json` wrote
     smc.law("my_law.py", lam=5)  # a law made by @smc.law_function
     smc.law("slow: classical(k=2, c=3)")
 
 Files are Python (.py), tunings (.json), C (.c, .so) and FMUs (.fmu). Gains in brackets may follow a file, too. A text
-is parsed and never evaluated, but the code of a file is run. So names in data that others wrote are looked up in the
-catalogue instead.
+is parsed and never evaluated, but the code of a file is run. So data that others wrote is restored by serialise.py,
+which runs no files.
 """
 
 import ast
+import math
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -20,12 +21,12 @@ from smc_mujoco.common import annexes
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json, reading
 from smc_mujoco.common.scripts import execute
-from smc_mujoco.control import as_data
-from smc_mujoco.control.component import Component, Template, Value
+from smc_mujoco.control import serialise
+from smc_mujoco.control.component import Component, GainValue, Template
 from smc_mujoco.control.law import Law, known_laws
 
-GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DOTALL)  # pid(kp=50, ki=1)
-LABEL = re.compile(r"(?P<label>[^:()]+):\s*(?P<rest>.+(?:\(.*\)|\.\w+)\s*)", re.DOTALL)  # slow: pid(kp=50)
+NAME_AND_GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DOTALL)  # pid(kp=50, ki=1)
+LABELLED = re.compile(r"(?P<label>[^:()]+):\s*(?P<rest>.+(?:\(.*\)|\.\w+)\s*)", re.DOTALL)  # slow: pid(kp=50)
 
 
 def law(text: str, **gains: float | Sequence[float]) -> Law:
@@ -39,15 +40,15 @@ def law(text: str, **gains: float | Sequence[float]) -> Law:
     Raises:
       ScenarioError: an unknown law or gain, a gain out of range, or a file without a law or with several.
     """
-    made, *others = (known_laws()[one]() if isinstance(one, str) else one for one in laws(text))
+    first, *others = (known_laws()[item]() if isinstance(item, str) else item for item in laws(text))
     if others:
-        names = ", ".join(one.name for one in (made, *others))
+        names = ", ".join(law.name for law in (first, *others))
         raise ScenarioError(f"{text} has several laws, {names}: give a file with one")
-    return _with(made, gains)
+    return _with_gains(first, gains)
 
 
 def laws(text: object) -> list[str | Law]:
-    """Return the laws of a text. The name of a law of the library stays a name: sets of gains go by it.
+    """Return the laws of a text. The name of a law of the library stays a name, which sets of gains need.
 
     Raises:
       ScenarioError: as `law`, but a file of Python may have several laws.
@@ -57,12 +58,12 @@ def laws(text: object) -> list[str | Law]:
         return [str(text)]
     if os.path.exists(text):
         head, gains = text, {}
-    elif labelled := LABEL.fullmatch(text):
+    elif labelled := LABELLED.fullmatch(text):
         return [law(labelled["rest"]).named(labelled["label"].strip())]
     else:
         head, gains = _parts("law", text, "pid(kp=50, ki=1)")
     if read := _reader(head):
-        return [_with(one, gains) for one in read(head)]
+        return [_with_gains(law, gains) for law in read(head)]
     return [find("law", head, known_laws()).bind(gains, warn=True)]
 
 
@@ -79,10 +80,10 @@ def component(kind: str, text: str, known: Mapping[str, Template], example: str)
     return find(kind, head, known).bind(gains, warn=True)
 
 
-def _parts(kind: str, text: str, example: str) -> tuple[str, dict[str, Value]]:
-    """Return what stands before the brackets of a text, and the gains in them."""
+def _parts(kind: str, text: str, example: str) -> tuple[str, dict[str, GainValue]]:
+    """Return the part of a text before its brackets, and the gains in the brackets."""
     try:
-        matched = GAINS.fullmatch(text.strip())
+        matched = NAME_AND_GAINS.fullmatch(text.strip())
         call = matched and ast.parse(f"f({matched['gains'] or ''})", mode="eval").body
         if not matched or not isinstance(call, ast.Call) or call.args:
             raise ValueError
@@ -91,48 +92,49 @@ def _parts(kind: str, text: str, example: str) -> tuple[str, dict[str, Value]]:
         raise ScenarioError(f"{kind} {shown(text)} cannot be read: write it as {example}") from None
 
 
-def _value(node: ast.expr) -> Value:
+def _value(node: ast.expr) -> GainValue:
     """Return a gain from its text: a number, or several in brackets."""
     if isinstance(node, ast.Tuple | ast.List):
         return tuple(float(ast.unparse(one)) for one in node.elts)
     return float(ast.unparse(node))
 
 
-def _with(made: Law, gains: Mapping[str, float | Sequence[float]]) -> Law:
+def _with_gains(law: Law, gains: Mapping[str, float | Sequence[float]]) -> Law:
     """Return a law with some gains changed."""
     if not gains:
-        return made
-    if made.template is None:
-        raise ScenarioError(f"law {made} takes no gains here: leave {', '.join(gains)} out")
-    return made.template.bind({**made.gains, **gains}, warn=True)
+        return law
+    if law.template is None:
+        raise ScenarioError(f"law {law} takes no gains here: leave {', '.join(gains)} out")
+    return law.template.bind({**law.gains, **gains}, warn=True)
 
 
 def _of_python(path: str) -> list[Law]:
     """Return the laws that a file of Python makes with @smc.law_function, with their default gains."""
     values = execute(Path(path)).values()
     templates = {value.name: value for value in values if isinstance(value, Template) and value.kind == "law"}
-    made = [each() for name, each in templates.items() if each is not known_laws().get(name)]
-    if not made:
+    laws = [template() for name, template in templates.items() if template is not known_laws().get(name)]
+    if not laws:
         raise ScenarioError(f"{path} has no law: write @smc.law_function above a function (y, gains, memory)")
-    return made
+    return laws
 
 
 def _of_tuning(path: str) -> list[Law]:
-    """Return the law of a tuning, whose gains have that search as their source."""
+    """Return the law of a tuning, with its search as the source of the gains."""
     with reading(path, "tuning", "give a .json file that smc-mujoco tune or Tuned.save wrote") as file:
         scenario = read_json(file)["scenario"]
-        made = as_data.law(scenario["law"], scenario["source"])
-    if any(part.function is None for part in made.parts):
-        gains = ", ".join(f"{name}={value!r}" for name, value in made.gains.items())
-        own = f"law {made.name} of {path} is your own"
-        raise ScenarioError(f"{own}: give its file with these gains, as FILE.py({gains})")
-    return [made]
+        law = serialise.law(scenario["law"], scenario["source"])
+    if any(part.function is None for part in law.parts):
+        gains = ", ".join(f"{name}={value!r}" for name, value in law.gains.items())
+        raise ScenarioError(
+            f"law {law.name} of {path} is your own: give its file with these gains, as FILE.py({gains})"
+        )
+    return [law]
 
 
 def _of_annex(kind: str) -> Callable[[str], list[Law]]:
     """Return the function that reads the law of a file of a kind, "c" or "fmu"."""
-    home = f"smc_mujoco.exchange.{kind}.load"
-    return lambda path: [getattr(annexes.module(home, f"law {path}"), f"law_from_{kind}")(path)()]
+    module = f"smc_mujoco.exchange.{kind}.load"
+    return lambda path: [getattr(annexes.module(module, f"law {path}"), f"law_from_{kind}")(path)()]
 
 
 READERS = {".py": _of_python, ".json": _of_tuning}  # by suffix
@@ -140,10 +142,29 @@ READERS |= {**dict.fromkeys((".c", ".so"), _of_annex("c")), ".fmu": _of_annex("f
 
 
 def _reader(text: str) -> Callable[[str], list[Any]] | None:
-    """Return the function that reads the laws of a file; None for the text of no file."""
+    """Return the function that reads the laws of a file; None if the text names no file."""
     suffix, exists = Path(text).suffix, os.path.exists(text)
     if suffix in READERS and not exists:
         raise ScenarioError(f"no file {text!r}: give a file with a law in it, or a name")
     if suffix not in READERS and exists:
         raise ScenarioError(f"{text} is no file of a law: give {', '.join(READERS)}, or a name")
     return READERS.get(suffix)
+
+
+def parsed_gains(text: str, what: str) -> dict[str, Any]:
+    """Return the gains in a text such as "lam=6,k1=3 5", with two joints' k1. `what` names the text in errors."""
+    parsed: dict[str, GainValue] = {}
+    for part in filter(None, (p.strip() for p in text.split(","))):
+        name, equals, value = (word.strip() for word in part.partition("="))
+        if name in parsed:
+            raise ScenarioError(f"{what} is {shown(text)}: give {name} once")
+        try:
+            values = tuple(map(float, value.split()))
+        except ValueError:
+            values = ()
+        parsed[name] = values[0] if len(values) == 1 else values
+        if not (equals and name.isidentifier() and values):
+            raise ScenarioError(f"{what} is {shown(text)}: give names and numbers, such as lam=6,k1=3")
+        if any(map(math.isnan, values)):
+            raise ScenarioError(f"{what} is {shown(text)}, and {name} is nan: give it a number")
+    return parsed

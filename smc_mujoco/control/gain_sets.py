@@ -5,13 +5,13 @@
 
 - study: a first tuning of the paper's laws to the same bound |u| <= 6. It is never changed in the light of results.
 - tuned: the near-optimal gains of a search by `tuning`, for every general law, with a cost of the variation of u: up to
-  24 sets of gains. Run i of a study uses its own set, so that gains are part of the sample. `tuned(...).converged`
+  24 sets of gains. The runs of a study use them in turn, so that gains are part of the sample. `tuned(...).converged`
   tells whether the starts of the search agree. The laws of LAWS have a search of the full budget, all others of three
   starts.
 - tracking: the same for the laws of LAWS, of one start, without that cost.
-- default: the law's own.
+- default: the default gains of the law.
 
-`tuned_gains/` has a file for each set. `make gains` computes those that were tuned again.
+`tuned_gains/` has a file for each set. `make gains` computes them again, except the set "study".
 """
 
 import dataclasses
@@ -33,34 +33,34 @@ from smc_mujoco.mechanisms.plant import catalogue as plants_known
 
 SETS = ("study", "tuned", "tracking")
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
-# The laws on the report's first page: the four of the paper, two added by its first study, and the first law of each
+# The laws on the report's first page: the four of the paper, two more of its first study, and the first law of each
 # other family in the table of docs/catalogue.md, which was written before any tuning.
 LAWS = (
     "observer_free", "classical", "boundary_layer", "adaptive", "super_twisting", "conditioned_super_twisting",
     "implicit_first_order", "twisting", "terminal", "extended_state", "pid",
 )  # fmt: skip
 
-# Other implementations or names of a law -> the law, whose gains they use.
-FORMS = {f"observer_free_{form}": "observer_free" for form in ("q15", "single", "table", "taylor")}
-FORMS["super_twisting_unclamped"] = "super_twisting"
-FORMS["proper_conditioned_super_twisting"] = "proper_super_twisting"  # the same law while u is not saturated
-SAME = FORMS | {"conditioned_super_twisting": "super_twisting"}  # in the set "study"
+# Other implementation or name of a law -> the law whose gains it uses.
+ALIASES = {f"observer_free_{form}": "observer_free" for form in ("q15", "single", "table", "taylor")}
+ALIASES["super_twisting_unclamped"] = "super_twisting"
+ALIASES["proper_conditioned_super_twisting"] = "proper_super_twisting"  # the same law while u is not saturated
+STUDY_ALIASES = ALIASES | {"conditioned_super_twisting": "super_twisting"}  # in the set "study"
 
 
-def file(gains: str) -> Path:
-    """Return the package's file of a set."""
+def file_of(gains: str) -> Path:
+    """Return the path of a set's file."""
     return Path(__file__).parent / "tuned_gains" / f"{gains}.json"
 
 
 # The set "study": plant -> law -> gains. Super-twisting was tuned with w_max = u_max, and runs with it.
-STUDY: dict[str, dict[str, dict[str, float]]] = read_json(file("study"))
+STUDY: dict[str, dict[str, dict[str, float]]] = read_json(file_of("study"))
 
 
 def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> Component:
     """Return the law with its gains for a plant, from a set, without warnings of conditions that they violate.
 
     Args:
-      seed: of a run. It uses the set of gains number `seed` modulo the number of sets. Set 0 is the best.
+      seed: of a run. Its remainder by the number of sets of gains is the number of the set. Set 0 is the best.
 
     Raises:
       ScenarioError: an unknown set, or a set without gains for this law on this plant.
@@ -71,17 +71,18 @@ def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> C
         return base
     plant = as_plant(plant)
     if gains == "study":
-        values, search = find("law of the paper's study", SAME.get(name, name), STUDY[paper_plant(plant.name)]), None
+        of_plant, search = STUDY[paper_plant(plant.name)], None
+        values = find("law of the paper's study", STUDY_ALIASES.get(name, name), of_plant)
     else:
         shipped = tuned(plant, name, gains)
         values, search = shipped.sets[seed % len(shipped.sets)], shipped.search
-    made = dataclasses.replace(base, gains={gain: values.get(gain, value) for gain, value in base.gains.items()})
-    return made.sourced(source.SHIPPED if search else source.STUDY, search)
+    law = dataclasses.replace(base, gains={gain: values.get(gain, value) for gain, value in base.gains.items()})
+    return law.sourced(source.SHIPPED if search else source.STUDY, search)
 
 
 def general() -> tuple[str, ...]:
     """List every law that can be compared on some plant: those of LAWS, then all others by name."""
-    others = {name for name, each in catalogue().items() if not each.plants} - {"none", *FORMS, *LAWS}
+    others = {name for name, template in catalogue().items() if not template.plants} - {"none", *ALIASES, *LAWS}
     return *LAWS, *sorted(others)
 
 
@@ -103,7 +104,7 @@ def general_laws(plants: Sequence[str | Plant], gains: str) -> list[str]:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class TunedGains:
-    """The near-optimal gains of a law on a plant, and the search that found them.
+    """The near-optimal gains of a law on a plant, and the result of their search.
 
     Attributes:
       sets: sets of gains, each name -> value; the best first.
@@ -112,7 +113,7 @@ class TunedGains:
       ends: best J of each start, s^2.
       evaluations: number of sets of gains that were evaluated.
       seed: of the search.
-      at_bound: gain -> "lower" or "upper", for those of the best gains that are at a bound of the search.
+      at_bound: gain -> "lower" or "upper", for those of the best gains at a bound of the search.
       front: tracking in s^2 and variation in 1/s of the Pareto front.
       best: tracking and variation of the best gains, which are on the front.
       rule: the search, in words.
@@ -133,16 +134,16 @@ class TunedGains:
 
     @property
     def search(self) -> source.Search:
-        """The search that found them: its rule, evaluations, and whether its starts agree."""
+        """The search: its rule, evaluations, and whether its starts agree."""
         return source.Search(rule=self.rule, evaluations=self.evaluations, converged=self.converged)
 
 
 def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:
     """Return the gains of a law on a plant from a set that was tuned, and the search behind them."""
     find("set of tuned gains", gains, OBJECTIVES)
-    plant, name = as_plant(plant), FORMS.get(name, name)
-    if (known := _known(plant.name, name, gains)) is not None:
-        return known
+    plant, name = as_plant(plant), ALIASES.get(name, name)
+    if (stored := _stored(plant.name, name, gains)) is not None:
+        return stored
     example = next(iter(find_law(name).gains), "k")
     cure = f"give the law's gains yourself, as {name}({example}=...)"
     if not plant.unscaled:
@@ -162,37 +163,37 @@ def paper_plant(plant: object) -> str:
     )
 
 
-def _known(plant: str, name: str, gains: str) -> TunedGains | None:
-    """Return a law's gains on a plant, from this package or from the law's or the plant's; None if there are none.
+def _stored(plant: str, name: str, gains: str) -> TunedGains | None:
+    """Return a law's gains on a plant, from this package or that of the law or the plant; None if there are none.
 
-    Another package has them in a file of `smc.tune`, tuned_gains/SET/PLANT-LAW.json beside its code.
+    Other packages have files that `smc.tune` wrote, tuned_gains/SET/PLANT-LAW.json beside their code.
     """
-    if (known := _collection(gains).get((plant, name))) is not None:
-        return known
-    for home in _homes(plant, name):
-        if (path := home / "tuned_gains" / gains / f"{plant}-{name}.json").is_file():
-            return _of_package(path)
+    if (stored := _package_gains(gains).get((plant, name))) is not None:
+        return stored
+    for folder in _code_folders(plant, name):
+        if (path := folder / "tuned_gains" / gains / f"{plant}-{name}.json").is_file():
+            return _gains_in_file(path)
     return None
 
 
 @functools.cache
-def _collection(gains: str) -> dict[tuple[str, str], TunedGains]:
+def _package_gains(gains: str) -> dict[tuple[str, str], TunedGains]:
     """Return the gains of a set in this package, by plant and law."""
-    data = read_json(file(gains))
+    data = read_json(file_of(gains))
     return {
-        (plant, name): _restored(record | {"rule": data["rule"]})
+        (plant, name): _from_record(record | {"rule": data["rule"]})
         for plant, laws in data["plants"].items()
         for name, record in laws.items()
     }
 
 
 @functools.cache
-def _of_package(path: Path) -> TunedGains:
+def _gains_in_file(path: Path) -> TunedGains:
     """Return the gains in a file that `Tuned.save` wrote."""
-    return _restored(read_json(path)["record"])
+    return _from_record(read_json(path)["record"])
 
 
-def _restored(record: Mapping[str, Any]) -> TunedGains:
+def _from_record(record: Mapping[str, Any]) -> TunedGains:
     """Return the gains that `Tuned.record` described."""
     fields = dict(record)
     names = fields.pop("gains")
@@ -201,9 +202,9 @@ def _restored(record: Mapping[str, Any]) -> TunedGains:
     return TunedGains(sets=sets, ends=tuple(fields.pop("ends")), **pairs, **fields)
 
 
-def _homes(plant: str, name: str) -> Iterator[Path]:
-    """Yield the folders with the code of a law and of a plant that are other packages'."""
-    if catalogue().package(name) and (law := catalogue().get(name)):
-        yield Path(inspect.getfile(law.function)).parent
-    if plants_known().package(plant) and (made := plants_known().get(plant)):
-        yield Path(inspect.getfile(made.build)).parent
+def _code_folders(plant: str, name: str) -> Iterator[Path]:
+    """Yield the code folders of a law and of a plant, if they are from other packages."""
+    if catalogue().package(name) and (template := catalogue().get(name)):
+        yield Path(inspect.getfile(template.function)).parent
+    if plants_known().package(plant) and (known_plant := plants_known().get(plant)):
+        yield Path(inspect.getfile(known_plant.build)).parent

@@ -51,11 +51,12 @@ class JointMeasurement(NamedTuple):
 
 
 ARRAYS = JointMeasurement._fields[4:]  # the vectors, M, h and g, in the order in which they are stored
-# What is stored before the arrays. `dynamics` is 0, or the address of a record REQUESTS.
+# What is stored before the arrays. `dynamics` is 0, or the address of a HANDLE.
 HEAD = floats(("t", "dt", "model", "dynamics", "n"))
-# Of C(x, v) w and of the tip's Jacobian: addresses of both functions and of their parameters; force per unit of u.
-REQUESTS = floats(("coriolis", "jacobian", "parameters", "unit"))
-head_at, requests_at, HEAD_BYTES = record_at(HEAD), record_at(REQUESTS), HEAD.itemsize
+# The nominal mechanism: addresses of the functions for C(x, v) w and the tip's Jacobian, and of their parameters, and
+# the force per unit of u.
+HANDLE = floats(("coriolis", "jacobian", "parameters", "unit"))
+head_at, handle_at, HEAD_BYTES = record_at(HEAD), record_at(HANDLE), HEAD.itemsize
 
 
 def stored_dtype(n: int) -> np.dtype:
@@ -75,8 +76,8 @@ def measurement_of(stored: np.void, dynamics: Any) -> JointMeasurement:
 
 
 @njit
-def _behind(array, shape):
-    """Return the array of a shape that is stored behind another one."""
+def _array_after(array, shape):
+    """Return the array of this shape that is stored after another array."""
     return carray(pointer(array.ctypes.data + 8 * array.size), shape)
 
 
@@ -86,17 +87,17 @@ def measurement_at(address):
     head = head_at(address, 0)
     n = int(head.n)
     x = carray(pointer(address + HEAD_BYTES), (n,))
-    v = _behind(x, (n,))
-    e = _behind(v, (n,))
-    de = _behind(e, (n,))
-    r = _behind(de, (n,))
-    dr = _behind(r, (n,))
-    ddr = _behind(dr, (n,))
-    a = _behind(ddr, (n,))
-    limit = _behind(a, (n,))
-    M = _behind(limit, (n, n))
-    h = _behind(M, (n,))
-    g = _behind(h, (n,))
+    v = _array_after(x, (n,))
+    e = _array_after(v, (n,))
+    de = _array_after(e, (n,))
+    r = _array_after(de, (n,))
+    dr = _array_after(r, (n,))
+    ddr = _array_after(dr, (n,))
+    a = _array_after(ddr, (n,))
+    limit = _array_after(a, (n,))
+    M = _array_after(limit, (n, n))
+    h = _array_after(M, (n,))
+    g = _array_after(h, (n,))
     return JointMeasurement(head.t, head.dt, head.model, int(head.dynamics), x, v, e, de, r, dr, ddr, a, limit, M, h, g)
 
 
@@ -113,14 +114,14 @@ def coriolis(y, w):
 def _coriolis(y, w):
     def compiled(y, w):
         n = len(y.x)
-        given, forces = np.empty(n), np.zeros(n)
+        vector, forces = np.empty(n), np.zeros(n)
         for i in range(n):
-            given[i] = w[i]
+            vector[i] = w[i]
         if y.dynamics != 0:
-            request = requests_at(y.dynamics, 0)
-            call(int(request.coriolis), given.ctypes.data, int(request.parameters), 0, forces.ctypes.data)
+            handle = handle_at(y.dynamics, 0)
+            call(int(handle.coriolis), vector.ctypes.data, int(handle.parameters), 0, forces.ctypes.data)
             for i in range(n):
-                forces[i] /= request.unit
+                forces[i] /= handle.unit
         return forces
 
     return compiled
@@ -143,8 +144,8 @@ def _jacobian(y):
         rows = np.zeros((3, len(y.x)))
         if y.dynamics == 0:
             raise ValueError
-        request = requests_at(y.dynamics, 0)
-        if call(int(request.jacobian), 0, int(request.parameters), 0, rows.ctypes.data) != 0:
+        handle = handle_at(y.dynamics, 0)
+        if call(int(handle.jacobian), 0, int(handle.parameters), 0, rows.ctypes.data) != 0:
             raise ValueError
         return rows
 
@@ -193,7 +194,7 @@ def solve(M, b):
 
 @njit
 def torque(y, v):
-    """Return the u that gives the errors the accelerations v: M (v + r'') + h. Without the model it is v itself."""
+    """Return the u for the accelerations v of the errors: M (v + r'') + h with the model, v without."""
     if y.model == 0.0:
         return v
     return product(y.M, v + y.ddr) + y.h
@@ -216,11 +217,8 @@ def tanh(a):
 
 @njit
 def norm(a):
-    """Return the Euclidean norm of a vector, added in the same order in Python and compiled."""
-    total = 0.0
-    for each in a:
-        total += each * each
-    return math.sqrt(total)
+    """Return the Euclidean norm of a vector. The bits are the same in Python and compiled."""
+    return math.sqrt(inner(a, a))
 
 
 @functools.cache

@@ -5,8 +5,8 @@
         s = y.de + gains.k1 * y.e
         return -gains.lam * math.tanh(s), s        # commanded control before saturation, sliding variable
 
-The law runs once per control sample. Its u is clipped to +-limit and held until the next sample. A law knows nothing of
-the simulator, and nothing of the plant except the nominal f and g in its measurement.
+The law runs once per control sample. Its u is clipped to +-limit and stays until the next sample. A law knows nothing
+of the simulator, and nothing of the plant except the nominal f and g in its measurement.
 
 The laws of this library compute a desired acceleration v of the error. `sliding` returns the sliding variable and the
 acceleration that keeps it constant. `command` converts v to u: with the nominal model if the scenario gives it to the
@@ -160,7 +160,11 @@ def known_laws() -> Catalogue[Template]:
 def checked_name(law: Law) -> Law:
     """Return the law. Raise ScenarioError if it is a user's with the name of a law of the catalogue."""
     known = known_laws().get(law.name) if law.kind == "law" else None
-    if known is None or law.function in (None, known.function) or _place(law.function) == _place(known.function):
+    if (
+        known is None
+        or law.function in (None, known.function)
+        or _module_and_name(law.function) == _module_and_name(known.function)
+    ):
         return law
     package = known_laws().package(law.name)
     raise ScenarioError(
@@ -169,8 +173,8 @@ def checked_name(law: Law) -> Law:
     )
 
 
-def _place(function: object) -> tuple[object, object]:
-    """Return the module and the name of a function, which stay when a module is loaded again."""
+def _module_and_name(function: object) -> tuple[object, object]:
+    """Return the module and the name of a function. They stay the same when the module is loaded again."""
     return getattr(function, "__module__", None), getattr(function, "__qualname__", function)
 
 
@@ -186,11 +190,11 @@ def law(name: str, **gains: float | Sequence[float]) -> Law:
 
 
 def fits(law: Law | Template, plant: Plant) -> bool:
-    """Return whether a law is for a plant: by name, for models of the same kind, or because it is for all plants."""
+    """Return whether a law is for a plant: for all plants, for this one, or for user's models of the same kind."""
     if not law.plants or plant.name in law.plants:
         return True
-    known = [plants_known()[name] for name in law.plants if name in plants_known()]
-    return plant.own and plant.underactuated and any(each.underactuated for each in known)
+    plants = [plants_known()[name] for name in law.plants if name in plants_known()]
+    return plant.own and plant.underactuated and any(known.underactuated for known in plants)
 
 
 def laws(plant: Plant | str | None = None) -> list[str]:

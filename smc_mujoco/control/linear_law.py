@@ -23,11 +23,11 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.control.law import Law, law_function
 from smc_mujoco.control.units import Gain, Unit
 
-INPUTS = {  # what a controller may read -> of the law's measurement
+INPUTS = {  # what a controller may read -> expression of the law's measurement
     "error": "y.r - y.x", "error_rate": "y.dr - y.v",
     **{name: f"y.{name}" for name in ("x", "v", "q", "dq", "r", "dr", "ddr")},
 }  # fmt: skip
-USUAL = ("error", "error_rate")
+DEFAULT_INPUTS = ("error", "error_rate")
 MAX_STATES = 50
 CURE = "give a TransferFunction or StateSpace of python-control, or (A, B, C, D, dt)"
 Matrix = tuple[tuple[float, ...], ...]
@@ -81,39 +81,44 @@ class LinearLaw:
     def text(self) -> str:
         """The law in Python."""
         lines = [f"w{j} = {INPUTS[name]}" for j, name in enumerate(self.inputs)]
-        lines += self._step() if self.discrete else self._tustin()
+        lines += self._step_lines() if self.discrete else self._tustin_lines()
         return "def controller(y, gains, memory):\n" + "".join(f"    {line}\n" for line in [*lines, "return u, y.e"])
 
     @functools.cached_property
     def py_func(self) -> Any:
         """The compiled text, as a plain function of Python."""
         file, space = f"<controller {self.name} {hash(self):x}>", {"__name__": "law_from_control"}
-        linecache.cache[file] = (len(self.text), None, self.text.splitlines(keepends=True), file)  # for its translation
+        linecache.cache[file] = (
+            len(self.text),
+            None,
+            self.text.splitlines(keepends=True),
+            file,
+        )  # for the translation to C
         exec(compile(self.text, file, "exec"), space)
         return space["controller"]
 
-    def _output(self) -> str:
-        return f"u = gains.scale * ({_sum([(self.c, 'x'), (self.d, 'w')])})"
+    def _output_line(self) -> str:
+        return f"u = gains.scale * ({_sum_of_products([(self.c, 'x'), (self.d, 'w')])})"
 
-    def _step(self) -> list[str]:
+    def _step_lines(self) -> list[str]:
         n = range(len(self.a))
-        lines = [*(f"x{i} = memory[{i}]" for i in n), self._output()]
-        return lines + [f"memory[{i}] = {_sum([(self.a[i], 'x'), (self.b[i], 'w')])}" for i in n]
+        lines = [*(f"x{i} = memory[{i}]" for i in n), self._output_line()]
+        return lines + [f"memory[{i}] = {_sum_of_products([(self.a[i], 'x'), (self.b[i], 'w')])}" for i in n]
 
-    def _tustin(self) -> list[str]:
+    def _tustin_lines(self) -> list[str]:
         """Return the lines of x = (I - A h/2)^-1 (z + h/2 B w), u = C x + D w, z+ = 2 x - z, with z in memory."""
-        n, i, lines = len(self.a), len(self.a) - 1, ["h = 0.5 * y.dt"] if self.a else []
-        while i >= 0:
-            first = i - 1 if i > 0 and self.a[i][i - 1] else i  # of a block
-            for k in range(first, i + 1):
-                known = [0.0] * (i + 1) + list(self.a[k][i + 1 :])
-                lines.append(f"f{k} = memory[{k}] + h * ({_sum([(known, 'x'), (self.b[k], 'w')])})")
-            lines += _solved(self.a, first, i)
-            i = first - 1
-        return [*lines, self._output(), *(f"memory[{i}] = 2.0 * x{i} - memory[{i}]" for i in range(n))]
+        n, last, lines = len(self.a), len(self.a) - 1, ["h = 0.5 * y.dt"] if self.a else []
+        while last >= 0:  # blocks, from below
+            first = last - 1 if last > 0 and self.a[last][last - 1] else last
+            for k in range(first, last + 1):
+                solved = [0.0] * (last + 1) + list(self.a[k][last + 1 :])
+                lines.append(f"f{k} = memory[{k}] + h * ({_sum_of_products([(solved, 'x'), (self.b[k], 'w')])})")
+            lines += _block_lines(self.a, first, last)
+            last = first - 1
+        return [*lines, self._output_line(), *(f"memory[{i}] = 2.0 * x{i} - memory[{i}]" for i in range(n))]
 
 
-def _solved(a: Matrix, first: int, last: int) -> list[str]:
+def _block_lines(a: Matrix, first: int, last: int) -> list[str]:
     """Return the lines that solve a block of (I - A h/2) x = f: one equation, or two by Cramer's rule."""
     if first == last:
         return [f"x{first} = f{first} / (1.0 - h * {a[first][first]!r})"]
@@ -127,7 +132,7 @@ def _solved(a: Matrix, first: int, last: int) -> list[str]:
     ]
 
 
-def _sum(parts: Sequence[tuple[Sequence[float], str]]) -> str:
+def _sum_of_products(parts: Sequence[tuple[Sequence[float], str]]) -> str:
     """Return a sum of products as text, without those with 0."""
     terms = [f"{value!r} * {name}{i}" for values, name in parts for i, value in enumerate(values) if value]
     return " + ".join(terms) or "0.0"
@@ -154,12 +159,12 @@ def law_from_control(K: Any, inputs: Sequence[str] | str | None = None, name: st
     """
     errors.name("name of the controller", name)
     system = _checked(_system(K))
-    states, given = len(system.a), system.b.shape[1]
-    chosen = USUAL[:given] if inputs is None else (inputs,) if isinstance(inputs, str) else tuple(inputs)
-    for one in chosen:
-        errors.find("input of a controller", one, INPUTS)
-    if len(chosen) != given:
-        raise ScenarioError(f"K has {given} inputs, and {len(chosen)} are named: give inputs=, such as ['r', 'x']")
+    states, count = len(system.a), system.b.shape[1]
+    names = DEFAULT_INPUTS[:count] if inputs is None else (inputs,) if isinstance(inputs, str) else tuple(inputs)
+    for input_name in names:
+        errors.find("input of a controller", input_name, INPUTS)
+    if len(names) != count:
+        raise ScenarioError(f"K has {count} inputs, and {len(names)} are named: give inputs=, such as ['r', 'x']")
     a, b, c, discrete = system.a, system.b, system.c, system.dt is not None
     if states and not discrete:
         from scipy.linalg import schur
@@ -171,7 +176,7 @@ def law_from_control(K: Any, inputs: Sequence[str] | str | None = None, name: st
         b=_rows(b),
         c=_rows(c)[0],
         d=_rows(system.d)[0],
-        inputs=chosen,
+        inputs=names,
         name=name,
         discrete=discrete,
         control_period=None if system.dt in (None, True) else float(system.dt),
@@ -193,19 +198,19 @@ def _system(K: Any) -> System:
     if all(hasattr(K, name) for name in "ABCD"):
         return _matrices(K.A, K.B, K.C, K.D, getattr(K, "dt", None))
     if all(hasattr(K, name) for name in ("num", "den")):
-        return _realised(K.num, K.den, getattr(K, "dt", None))
+        return _realisation(K.num, K.den, getattr(K, "dt", None))
     raise ScenarioError(f"K is {shown(K)}: {CURE}")
 
 
 def _matrices(a: Any, b: Any, c: Any, d: Any, dt: Any) -> System:
     """Return matrices as arrays of two axes; a number is a matrix of 1 x 1, and a list is the column b or a row."""
     try:
-        arrays = [np.asarray(each) for each in (a, b, c, d)]
-        if any(np.iscomplexobj(each) for each in arrays):
+        arrays = [np.asarray(array) for array in (a, b, c, d)]
+        if any(np.iscomplexobj(array) for array in arrays):
             raise ValueError
-        a, b, c, d = (each.astype(float) for each in arrays)
+        a, b, c, d = (array.astype(float) for array in arrays)
         b = b[:, None] if b.ndim == 1 else b
-        a, b, c, d = (np.atleast_2d(each) for each in (a, b, c, d))
+        a, b, c, d = (np.atleast_2d(array) for array in (a, b, c, d))
         if not a.size:
             a, b, c = np.zeros((0, 0)), np.zeros((0, d.shape[1])), np.zeros((len(d), 0))
     except (TypeError, ValueError):
@@ -213,8 +218,8 @@ def _matrices(a: Any, b: Any, c: Any, d: Any, dt: Any) -> System:
     return System(a, b, c, d, dt)
 
 
-def _realised(num: Any, den: Any, dt: Any) -> System:
-    """Return matrices of a row of transfer functions, each with its own states."""
+def _realisation(num: Any, den: Any, dt: Any) -> System:
+    """Return matrices of a row of transfer functions, each with separate states."""
     from scipy.linalg import block_diag
     from scipy.signal import BadCoefficients, tf2ss
 
@@ -229,7 +234,7 @@ def _realised(num: Any, den: Any, dt: Any) -> System:
             try:
                 forms.append(tf2ss(np.atleast_1d(above), np.atleast_1d(below)))
             except ValueError:
-                order = " over ".join(str(len(np.trim_zeros(each, "f")) - 1) for each in (above, below))
+                order = " over ".join(str(len(np.trim_zeros(array, "f")) - 1) for array in (above, below))
                 cure = "filter its derivative, as s / (tau s + 1)"
                 raise ScenarioError(f"K is improper, of order {order}: {cure}") from None
     a, b = (block_diag(*(form[k] for form in forms)) for k in (0, 1))

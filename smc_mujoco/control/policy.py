@@ -31,17 +31,19 @@ from smc_mujoco.common.jit import Uncompiled
 from smc_mujoco.control.law import Law, Measurement, law_function
 
 Act = Callable[[np.ndarray], Any]
-CURE = "give a callable from an observation to an action"
-SCRIPT = "give TorchScript, as torch.jit.script(module).save writes it, and no state_dict"
+CALLABLE_CURE = "give a callable from an observation to an action"
+TORCHSCRIPT_CURE = "give TorchScript, as torch.jit.script(module).save writes it, and no state_dict"
 FORMATS = {  # suffix of a file -> library that reads it, cure if it does not
     ".onnx": ("onnxruntime", "give what torch.onnx.export writes"),
-    ".pt": ("torch", SCRIPT),
-    ".pth": ("torch", SCRIPT),
-    ".ts": ("torch", SCRIPT),
+    ".pt": ("torch", TORCHSCRIPT_CURE),
+    ".pth": ("torch", TORCHSCRIPT_CURE),
+    ".ts": ("torch", TORCHSCRIPT_CURE),
     ".pt2": ("torch", "give what torch.export.save writes"),
 }
-TIMEOUT = 120.0  # s in which a library must read a file; chosen
-ONNX = {"tensor(float)": np.float32, "tensor(double)": np.float64, "tensor(float16)": np.float16}
+LOAD_TIMEOUT = 120.0  # s in which a library must read a file; chosen
+ONNX_DTYPES = {"tensor(float)": np.float32, "tensor(double)": np.float64, "tensor(float16)": np.float16}
+
+_arithmetic = functools.cache(Arithmetic)  # of this process
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,25 +91,20 @@ class File:
 
     def __call__(self, observation: np.ndarray) -> Any:
         """Return the action."""
-        return opened(self)(observation)
-
-
-@functools.cache
-def _arithmetic() -> Arithmetic:
-    return Arithmetic()
+        return load_network(self)(observation)
 
 
 def attempt(order: Mapping[str, Any], say: Callable) -> None:
     """Read the network in a file, in the process of a trial."""
     say("reading it")
     try:
-        opened(File(**order))
+        load_network(File(**order))
     except ScenarioError as error:
         raise Fault(str(error)) from None
 
 
 @functools.lru_cache(maxsize=8)
-def opened(file: File) -> Act:
+def load_network(file: File) -> Act:
     """Return the network in a file."""
     path = Path(file.path)
     if not path.is_file() or _digest(path) != file.digest:
@@ -128,9 +125,9 @@ def _onnx(onnxruntime: ModuleType, path: Path) -> Act:
     options.intra_op_num_threads = 1  # more would only spin: the batch is one observation
     session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     inputs = session.get_inputs()
-    dtype, shape = ONNX.get(inputs[0].type), list(inputs[0].shape)
+    dtype, shape = ONNX_DTYPES.get(inputs[0].type), list(inputs[0].shape)
     if len(inputs) != 1 or dtype is None or len(shape) != 2 or (shape[0] != 1 and isinstance(shape[0], int)):
-        text = ", ".join(f"{each.name} {each.type} {each.shape}" for each in inputs)
+        text = ", ".join(f"{tensor.name} {tensor.type} {tensor.shape}" for tensor in inputs)
         raise ScenarioError(f"policy {path.name!r} takes {text}: export it for one input of floats, of shape (1, n)")
     return lambda observation: session.run(None, {inputs[0].name: observation[None].astype(dtype)})[0]
 
@@ -167,7 +164,7 @@ class Network:
     def __reduce__(self) -> tuple:
         """Return what pickle and run keys contain: the module's bytes, its classes, and torch's version."""
         torch, file = sys.modules["torch"], io.BytesIO()
-        _settle(self.module)
+        _reset_distribution(self.module)
         torch.save(self.module, file)
         classes = {type(part) for part in self.module.modules()}
         ordered = sorted(classes, key=lambda kind: (kind.__module__, kind.__qualname__))
@@ -201,7 +198,7 @@ def policy(act: Any, *, reference: bool = False) -> Law:
     except ScenarioError:
         raise
     except Exception as error:  # of the object itself, when it is inspected
-        raise ScenarioError(f"policy is {shown(act)}: {CURE}") from error
+        raise ScenarioError(f"policy is {shown(act)}: {CALLABLE_CURE}") from error
     return law_function(Policy(function, name, reference))()
 
 
@@ -214,7 +211,7 @@ def _callable(act: Any) -> tuple[Act, str]:
         with reading(path, "policy", "give the path of a file that a library wrote"):
             file = File(str(path.resolve()), _digest(path))
         try:
-            tried(__name__, dataclasses.asdict(file), TIMEOUT)
+            tried(__name__, dataclasses.asdict(file), LOAD_TIMEOUT)
         except Failed as failed:
             raise ScenarioError(failed.fault or f"policy {path.name!r}: {failed}") from None
         return file, path.stem
@@ -225,11 +222,11 @@ def _callable(act: Any) -> tuple[Act, str]:
     if predicts and not callable(act):  # a model of stable-baselines3 predicts by its policy
         act = getattr(act, "policy", act)
     elif not callable(act):
-        raise ScenarioError(f"policy is {shown(act)}: {CURE}")
+        raise ScenarioError(f"policy is {shown(act)}: {CALLABLE_CURE}")
     if torch is None or not isinstance(act, torch.nn.Module):
         return (act if callable(act) else functools.partial(_predict, act)), getattr(act, "__name__", name)
     try:
-        _settle(act)
+        _reset_distribution(act)
         module: Any = copy.deepcopy(act)
         return Network(module.to("cpu").eval(), predicts), name
     except Exception as error:
@@ -253,7 +250,7 @@ def _forward(torch: ModuleType, module: Any, observation: np.ndarray) -> np.ndar
     return action.double().numpy()
 
 
-def _settle(module: Any) -> None:
+def _reset_distribution(module: Any) -> None:
     """Let a policy of stable-baselines3 predict at 0, because it stores the distribution of its last action.
 
     After training that distribution has a graph, which cannot be copied. After a run it depends on the run.

@@ -3,8 +3,8 @@
     suitable(["continuous", "two-gains"], family="terminal")     # templates of laws
     reads(smc.law("pid").template)                               # {"e", "de", ...}: what the law measures
 
-A property is derived from the law's code where that is possible. Continuity and finite time, which only theory tells,
-are given in the law's decorator. Tests compare both kinds with what the law does.
+Most properties are derived from the law's code. Continuity and finite time follow from theory alone, so the law's
+decorator states them. Tests compare both kinds with what the law does.
 """
 
 import ast
@@ -24,7 +24,7 @@ VELOCITY = {"v", "de", "dq"}  # fields of the measurement that a velocity sensor
 
 
 class Property(NamedTuple):
-    """A property of a law: its words, as in "laws that need no model", and the function that tests it."""
+    """A property of a law in words, as in "laws that need no model", and the function that tests it."""
 
     words: str
     holds: Callable[[Template], bool]
@@ -37,7 +37,7 @@ def reads(law: Template) -> frozenset[str]:
 
 @functools.cache
 def read_by(function: Callable) -> frozenset[str]:
-    """Return what `reads` returns, for a law's function."""
+    """Return the fields of the measurement that a law's function reads; see `reads`."""
     return frozenset(_reads(function, 0, set()))
 
 
@@ -46,7 +46,7 @@ def searched(law: Template) -> list[str]:
     return [name for name, gain in law.gains.items() if not gain.held]
 
 
-def _at_most(count: int) -> Callable[[Template], bool]:
+def _max_searched(count: int) -> Callable[[Template], bool]:
     return lambda law: 0 < len(searched(law)) <= count
 
 
@@ -57,8 +57,8 @@ PROPERTIES: Mapping[str, Property] = {
     "continuous": Property("have a continuous u", lambda law: law.continuous),
     "finite-time": Property("bring the error to 0 in finite time", lambda law: law.finite_time == "e"),
     "finite-reaching": Property("bring s or the error to 0 in finite time", lambda law: law.finite_time != ""),
-    "one-gain": Property("have one gain to choose", _at_most(1)),
-    "two-gains": Property("have at most two gains to choose", _at_most(2)),
+    "one-gain": Property("have one gain to choose", _max_searched(1)),
+    "two-gains": Property("have at most two gains to choose", _max_searched(2)),
 }
 
 
@@ -81,12 +81,12 @@ def suitable(needs: Iterable[str] = (), family: str | None = None, plant: Plant 
     Raises:
       ScenarioError: an unknown name.
     """
-    wanted = [find("property of a law", need, PROPERTIES) for need in needs]
+    properties = [find("property of a law", need, PROPERTIES) for need in needs]
     names = laws(plant)
     if family is not None:
         names = [name for name in names if name in find("family of laws", family, families())]
     templates = [catalogue()[name] for name in names]
-    return [law for law in templates if all(one.holds(law) for one in wanted)]
+    return [law for law in templates if all(needed.holds(law) for needed in properties)]
 
 
 def _reads(function: object, position: int, seen: set[object]) -> set[str]:
@@ -101,15 +101,15 @@ def _reads(function: object, position: int, seen: set[object]) -> set[str]:
         assert isinstance(tree, ast.FunctionDef)
     except (AssertionError, OSError, SyntaxError, ValueError):
         return set(Measurement._fields)
-    name, fields, known = tree.args.args[position].arg, set(), 0
+    name, fields, understood = tree.args.args[position].arg, set(), 0
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == name:
             fields.add(node.attr)
-            known += 1
+            understood += 1
         elif isinstance(node, ast.Call):
             for i, argument in enumerate(node.args):
                 if isinstance(argument, ast.Name) and argument.id == name:
                     fields |= _reads(function.__globals__.get(ast.unparse(node.func)), i, seen)
-                    known += 1
+                    understood += 1
     uses = sum(isinstance(node, ast.Name) and node.id == name for node in ast.walk(tree))
-    return fields if uses == known else set(Measurement._fields)
+    return fields if uses == understood else set(Measurement._fields)

@@ -4,7 +4,7 @@
     smc.law("classical", k=3).source                       # yours
     smc.tune("duffing", "classical").law.source            # tuned here (CMA-ES and COBYQA from several starts, ...)
 
-A source is of one set of gains. A law whose gains are replaced has the source "yours", so no law keeps a wrong one.
+A source belongs to one set of gains. A law whose gains are replaced has the source "yours".
 """
 
 import dataclasses
@@ -19,7 +19,7 @@ NONE, DEFAULT, TUNED, SHIPPED, STUDY, YOURS = "none", "default", "tuned here", "
 KINDS = {  # kind -> what it means
     NONE: "the law has no gains",
     DEFAULT: "the defaults of the law's own file",
-    TUNED: "found by a search that the user ran",
+    TUNED: "result of a search that the user ran",
     SHIPPED: "those of the package for this plant",
     STUDY: "those of a published study",
     YOURS: "given by the user",
@@ -30,13 +30,13 @@ ENDED = {True: "converged", False: "not converged", None: "convergence not teste
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Search:
-    """The search that found gains.
+    """A search for gains.
 
     Attributes:
       rule: how it searches, in words; its name stands before the first comma, colon or bracket.
       evaluations: number of sets of gains that it tried.
-      converged: whether its starts agree, see `analysis.tuning`; None if it made too few to tell.
-      about_defaults: whether it drew its starts about the law's defaults, as a gain has no unit.
+      converged: whether its starts agree, see `analysis.tuning`; None if it had too few starts.
+      about_defaults: whether its starts were drawn about the law's defaults, because a gain has no unit.
     """
 
     rule: str
@@ -68,7 +68,7 @@ class Source:
     Attributes:
       kind: a key of KINDS.
       gains: the set.
-      search: the search that found the gains; None if no search did.
+      search: the search that the gains are the result of, or None.
     """
 
     kind: str = NONE
@@ -81,8 +81,8 @@ class Source:
     def __str__(self) -> str:
         return f"{self.kind} ({self.search})" if self.search else self.kind
 
-    def of(self, gains: Mapping[str, Any]) -> "Source":
-        """Return the same source of another set of gains."""
+    def with_gains(self, gains: Mapping[str, Any]) -> "Source":
+        """Return this source for another set of gains."""
         return dataclasses.replace(self, gains=gains)
 
     def about(self) -> dict[str, Any]:
@@ -90,16 +90,16 @@ class Source:
         return {"kind": self.kind, "search": self.search and dataclasses.asdict(self.search)}
 
 
-def restored(data: Mapping[str, Any]) -> Source:
+def restore(data: Mapping[str, Any]) -> Source:
     """Return the source that `Source.about` wrote, without its gains."""
     return Source(kind=data["kind"], search=data["search"] and Search(**data["search"]))
 
 
 def combined(sources: Sequence[Source]) -> Source:
-    """Return the source of gains that are from several sources: theirs if it is the same, else the user's choice."""
+    """Return the source of gains of several sources: the first if all are equal, else the user."""
     first = sources[0]
-    alike = all((one.kind, one.search) == (first.kind, first.search) for one in sources)
-    return first if alike else Source(kind=YOURS)
+    equal = all((source.kind, source.search) == (first.kind, first.search) for source in sources)
+    return first if equal else Source(kind=YOURS)
 
 
 def kinds(sources: Iterable[Source]) -> str:
@@ -111,45 +111,44 @@ def in_words(sources: Mapping[str, Iterable[Source]], short: bool = False) -> st
     """Return where the gains of laws come from: "gains: shipped (...)", or "gains: a and b default, c yours".
 
     Args:
-      sources: law -> the sources of its gains; one that has no gains is left out.
+      sources: law -> the sources of its gains; laws without gains are left out.
       short: whether to leave out the searches.
     """
-    known = {law: [source for source in its if source.kind != NONE] for law, its in sources.items()}
-    words = {law: kinds(its) for law, its in known.items()}
+    with_gains = {law: [source for source in all_ if source.kind != NONE] for law, all_ in sources.items()}
+    words = {law: kinds(of_law) for law, of_law in with_gains.items()}
     if short:
         return by_words(words)
-    searches: dict[str, dict[str, list[Search]]] = {}
-    for law, its in known.items():
-        if some := [source.search for source in its if source.search]:
-            searches.setdefault(words[law], {})[law] = some
-    return by_words(
-        {law: f"{its} ({_searched(searches[its])})" if its in searches else its for law, its in words.items()}
-    )
+    searches: dict[str, dict[str, list[Search]]] = {}  # kinds -> law -> its searches
+    for law, of_law in with_gains.items():
+        if of_search := [source.search for source in of_law if source.search]:
+            searches.setdefault(words[law], {})[law] = of_search
+    details = {kind: f"{kind} ({_search_text(by_law)})" for kind, by_law in searches.items()}
+    return by_words({law: details.get(kind, kind) for law, kind in words.items()})
 
 
-def _searched(searches: Mapping[str, Sequence[Search]]) -> str:
+def _search_text(searches: Mapping[str, Sequence[Search]]) -> str:
     """Return the searches of several laws in words, with the laws whose search did not converge."""
-    every = [search for its in searches.values() for search in its]
+    every = [search for of_law in searches.values() for search in of_law]
     counts = sorted({search.evaluations for search in every})
     words = [" or ".join(dict.fromkeys(search.name for search in every))]
     words.append(f"{' to '.join(map(str, dict.fromkeys([counts[0], counts[-1]])))} evaluations")
-    ends: dict[str, list[str]] = {}
-    for law, its in searches.items():
-        for end in dict.fromkeys(search.ended for search in its):
-            ends.setdefault(end, []).append(law)
-    if len(ends) == 1:
-        return ", ".join([*words, *ends])
-    return ", ".join([*words, *(f"{end}: {joined(laws)}" for end, laws in ends.items() if end != ENDED[True])])
+    laws_by_end: dict[str, list[str]] = {}
+    for law, of_law in searches.items():
+        for end in dict.fromkeys(search.ended for search in of_law):
+            laws_by_end.setdefault(end, []).append(law)
+    if len(laws_by_end) == 1:
+        return ", ".join([*words, *laws_by_end])
+    return ", ".join([*words, *(f"{end}: {joined(laws)}" for end, laws in laws_by_end.items() if end != ENDED[True])])
 
 
-def unequal(words: Mapping[str, str]) -> list[str]:
-    """Return a sentence on laws with default gains that stand beside tuned ones; [] if there are none.
+def untuned_laws(words: Mapping[str, str]) -> list[str]:
+    """Return a sentence on laws with default gains that are compared with tuned ones; [] if there are none.
 
     Args:
       words: law -> where its gains come from, see `kinds`.
     """
-    default = [law for law, its in words.items() if DEFAULT in its.split(", ")]
-    tuned = [law for law, its in words.items() if its in (TUNED, SHIPPED)]
+    default = [law for law, kind in words.items() if DEFAULT in kind.split(", ")]
+    tuned = [law for law, kind in words.items() if kind in (TUNED, SHIPPED)]
     if not default or not tuned:
         return []
     have, them = ("has its default gains", "it") if len(default) == 1 else ("have their default gains", "them")
@@ -160,9 +159,9 @@ def unequal(words: Mapping[str, str]) -> list[str]:
 def by_words(words: Mapping[str, str]) -> str:
     """Return law -> where its gains come from as one text, see `in_words`; "" stands for a law without gains."""
     laws: dict[str, list[str]] = {}
-    for law, its in words.items():
-        if its not in ("", NONE):
-            laws.setdefault(its, []).append(law)
+    for law, kind in words.items():
+        if kind not in ("", NONE):
+            laws.setdefault(kind, []).append(law)
     if len(laws) < 2:
         return "".join(f"gains: {words}" for words in laws)
     return f"gains: {', '.join(f'{joined(names)} {words}' for words, names in laws.items())}"

@@ -37,7 +37,7 @@ FORCE_RATE = Unit(force=1, time=-1)
 FORCE_PER_POSITION = Unit(force=1, position=-1)  # also of a gain that grows by |s|: F/T per X/T
 FORCE_PER_SPEED = Unit(force=1, position=-1, time=1)
 FORCE_PER_ROOT = Unit(force=1, position=-0.5, time=0.5)  # of k in k [s]^(1/2)
-PARABOLA = Unit(position=0.5, time=-1)  # of b in de = -b [e]^(1/2)
+SPEED_PER_ROOT = Unit(position=0.5, time=-1)  # of b in de = -b [e]^(1/2)
 INPUT_GAIN = Unit(force=-1, position=1, time=-2)  # of b in e'' = b u
 
 Formula = Callable[[SimpleNamespace], Unit]
@@ -48,14 +48,14 @@ class Gain:
     """A gain of a law, a surface or an estimator.
 
     Attributes:
-      default: value if none is given. A law of many joints in C may have a tuple, with one for each joint.
+      default: its default value. A law of many joints in C may have a tuple, with one for each joint.
       unit: a function of all gains, read by attribute, if an exponent among them decides the unit. None: a number
         without a unit, or an unknown unit; tuning searches it about its default.
       positive: whether it must be greater than 0.
       nonnegative: whether it must be at least 0.
-      held: whether tuning leaves it at its default, such as an initial value, an exponent or the size of a table.
+      held: whether tuning leaves it at its default: an initial value, an exponent or the size of a table.
       over: name of the gain that the law divides it by, b in the force k / b. Tuning then bounds k by u_max b.
-      shared: whether a law of many joints has one number of it for all joints, instead of a vector.
+      shared: whether it is one number for all joints in a law of many joints, instead of a vector.
     """
 
     default: float

@@ -26,7 +26,7 @@ from smc_mujoco.control.law import known_laws
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics.channel_groups import Group, group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
-from smc_mujoco.simulation.conditions import FIELDS
+from smc_mujoco.simulation.conditions import CONDITION_FIELDS
 from smc_mujoco.simulation.perturbations import Jump
 from smc_mujoco.simulation.signals import Push
 from smc_mujoco.simulation.trace import Trace
@@ -242,7 +242,7 @@ def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -
     condition = settings.pop("condition", None)
     if condition is not None:
         same = _differing(_settings, trace, [one for one in alike if one.scenario.condition == condition])
-        settings = {name: value for name, value in settings.items() if name in same or name not in FIELDS}
+        settings = {name: value for name, value in settings.items() if name in same or name not in CONDITION_FIELDS}
     machine = {
         f"plant's {name}" if name in trace.scenario.law.gains else name: value
         for name, value in _differing(_machine, trace, others).items()

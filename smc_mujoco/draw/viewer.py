@@ -103,7 +103,7 @@ class Live:
 
     def build(self, step: int) -> None:
         """Give the model on screen the true parameters that hold from a physics step on."""
-        for name, value in models.field_values(self.loop.compiled, self.loop.scenario, step).items():
+        for name, value in models.field_values(self.loop.base, self.loop.scenario, step).items():
             field_array(self.model, name)[: len(value)] = value  # sliders are the last actuators
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
 
@@ -176,10 +176,10 @@ class Pushed(Loop):
         super().__init__(scenario, mechanism)
         self.push = np.zeros_like(self.data.xfrc_applied)
 
-    def disturb(self, data: mujoco.MjData, t: float) -> np.ndarray:
+    def apply_disturbances(self, data: mujoco.MjData, t: float) -> np.ndarray:
         """Apply the disturbances and the push to the bodies. Return the disturbances without the push."""
         data.xfrc_applied[:] = 0.0
-        d = super().disturb(data, t)
+        d = super().apply_disturbances(data, t)
         data.xfrc_applied += self.push
         return d
 

@@ -73,14 +73,14 @@ class Agent:
             self.last_episode = self.episode.episodes
             for component in filter(None, (loop.law, loop.surface, loop.estimator)):
                 component.memory[:] = 0.0
-            loop.latest[:] = 0.0  # the last commands, part of the nominal model of coupled channels
+            loop.last_u[:] = 0.0  # part of the nominal model of coupled channels
         t = k * loop.scenario.control_period
         x, v = _positions_and_velocities(observation, n)
         loop.data.sensordata[loop.channels["x_sensor"]] = x
         loop.data.sensordata[loop.channels["v_sensor"]] = v
         try:
             with np.errstate(all="ignore"):
-                u, loop.s = loop.decide(*loop.measure(loop.data, k, t), t)
+                u, loop.s = loop.update_law(*loop.measure(loop.data, k, t), t)
         except reference.Failure as failure:
             raise ScenarioError(f"{failure}, at t = {t:.6g} s") from failure
         return u[: loop.scenario.plant.driven] / loop.scenario.limits

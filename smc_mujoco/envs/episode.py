@@ -148,7 +148,7 @@ class Setting:
 
     def formula_friction(self, count: int = 1) -> FormulaFriction | None:
         """Return the friction by a formula of `count` simulations; None without one."""
-        return None if self.scenario.sliding is None else FormulaFriction(self.scenario, self.model, count)
+        return None if self.scenario.formula_friction is None else FormulaFriction(self.scenario, self.model, count)
 
     def draw_start(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
         """Return a start, x and v, (n,) each: drawn from a numpy generator, or set by the options x0 and v0.
@@ -297,7 +297,7 @@ def _compiled(scenario: Resolved, edit: Callable[[mujoco.MjSpec], None]) -> mujo
     """Return the model of a scenario. `edit` changes its mechanism before."""
     spec = models.spec(scenario)
     edit(spec)
-    model = ready(spec, 0 if scenario.sliding is None else callback.USERDATA)
+    model = ready(spec, 0 if scenario.formula_friction is None else callback.USERDATA)
     model.opt.timestep = scenario.physics_step
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenario.integrator.upper()}")
     return models.with_values(model, scenario)

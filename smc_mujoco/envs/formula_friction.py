@@ -29,7 +29,7 @@ class FormulaFriction:
     def __init__(self, scenario: Resolved, model: mujoco.MjModel, count: int):
         prepared = prepare(scenario)
         if prepared.why_not:
-            name = type(scenario.sliding).__name__
+            name = type(scenario.formula_friction).__name__
             raise ScenarioError(f"friction {name} needs functions that compile, but {prepared.why_not}")
         self.scenario, self.model, self.count = scenario, model, count
         mechanism = Mechanism(prepared.mechanism.model, channels(model))

@@ -165,7 +165,7 @@ class ScenarioBatch:
             state.LAW_RAISED: f"{law} raised an exception",
             state.DISTURBANCE_RAISED: "a disturbance raised an exception",
             state.INTERRUPTED: reference.INTERRUPTED,
-            state.FRICTION_RAISED: f"friction {type(scenario.sliding).__name__} raised an exception",
+            state.FRICTION_RAISED: f"friction {type(scenario.formula_friction).__name__} raised an exception",
             state.SURFACE_RAISED: f"surface {scenario.surface and scenario.surface.name!r} raised an exception",
         }[code]
 
@@ -208,9 +208,9 @@ def repeated_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | N
             case state.DISTURBANCE_RAISED | state.DISTURBANCE_NOT_FINITE:
                 loop = record["instant"][["e", "de", "s"]].tolist()
                 for j, signal in enumerate(s.disturbance):
-                    memories = memory(packed.signals[j]["function"], signal.memory)
+                    memories = memory(packed.disturbances[j]["function"], signal.memory)
                     for channel in range(n if signal.random else 1):
-                        noise = s.noise_seed, channel, s.stream(j)
+                        noise = s.noise_seed, channel, s.noise_stream(j)
                         reference.evaluate(signal, t, memories[channel], *(loop if signal.sees else noise))
     except reference.Failure as failure:
         return str(failure)
@@ -225,7 +225,7 @@ def call_law(s: Resolved, record: np.ndarray, packed: Packed, memory: np.ndarray
     if s.law.joint:
         dtype = joint_law.stored_dtype(n)
         stored = state.view(packed.numbers, int(record["joint"]["head"]), (dtype.itemsize // 8,)).copy().view(dtype)[0]
-        function.together(joint_law.measurement_of(stored, reference.OnRequest(s, stored["x"], stored["v"])))
+        function.call_joint(joint_law.measurement_of(stored, reference.NominalDynamics(s, stored["x"], stored["v"])))
     else:
         function(i, Measurement(*record["y"].tolist()))
     u, sliding = state.view(packed.numbers, int(record["commands"]), (2, width))[:, i % width].tolist()

@@ -37,8 +37,8 @@ def magic() -> float:
     It is a hash of the sources, so that an outdated compiled callback ignores a record written by newer code.
     """
     package = Path(__file__).parents[1]
-    rooms = (package / room for room in ("simulation", "common", "control", "mechanisms", "mechanisms/hardware"))
-    sources = b"".join(path.read_bytes() for room in rooms for path in sorted(room.glob("*.py")))
+    folders = (package / name for name in ("simulation", "common", "control", "mechanisms", "mechanisms/hardware"))
+    sources = b"".join(path.read_bytes() for folder in folders for path in sorted(folder.glob("*.py")))
     return float(int.from_bytes(hashlib.sha256(sources).digest()[:6]))
 
 
@@ -76,10 +76,7 @@ def callback():
 
 @functools.cache
 def silence():
-    """Return a C function that prints nothing.
-
-    MuJoCo's warnings do not say which run they are about. The controller marks each run that diverges.
-    """
+    """Return a C function that ignores MuJoCo's warnings, which do not say which run they are about."""
 
     def silent(message):
         return

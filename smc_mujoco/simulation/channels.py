@@ -9,20 +9,20 @@ from smc_mujoco.common.jit import record_at
 from smc_mujoco.mechanisms.hardware.part import PASSIVE, drive_ids, joint_ids
 from smc_mujoco.mechanisms.plant import DIRECTLY
 
-# Indices of a channel in mjData, -1 if it has no such thing:
-#   qpos, qvel, x_sensor and v_sensor (in sensordata), ctrl, force (in actuator_force)
-#   shaft: of what the actuator itself drives, joint or rotor, in qvel
-#   xfrc: of a generalised force d in xfrc_applied, which enters there with `sign`
-#   push: of a horizontal force on the body in xfrc_applied, for a hinge along the axis `along` of the world, 0 or 1
-#   tip, anchor: of the ends of that force's lever arm, in xipos and xanchor, and of the axis in xaxis; -1 for a slide
-#   friction, brake: of a friction in actuator_force, and in ctrl if the callback computes it
-#   direct: in qfrc_applied, in users' models, whose disturbances act on the joint itself
+# Indices of a channel in arrays of mjData, -1 if there is none:
+#   qpos, qvel, ctrl: in the arrays of these names; x_sensor and v_sensor: in sensordata; force: in actuator_force
+#   shaft: in qvel, of what the actuator drives: the joint, or its rotor
+#   xfrc: of the body's force along the joint, in xfrc_applied; `sign` is 1 or -1, the sign with which d enters there
+#   horizontal: of the body's horizontal force, in xfrc_applied; for a hinge along the axis `axis` of the world, 0 or 1
+#   hinge_body: of the body of a hinge, in xipos; anchor: of a hinge, in xanchor and xaxis
+#   friction_force: of a friction's actuator, in actuator_force; friction_ctrl: in ctrl, if the callback computes it
+#   qfrc: in qfrc_applied, of users' models, whose disturbances act on joints
 CHANNEL = np.dtype(
     [
         (name, "i8")
         for name in (
-            "qpos", "qvel", "x_sensor", "v_sensor", "ctrl", "force", "shaft", "xfrc", "sign", "push", "along",
-            "tip", "anchor", "friction", "brake", "direct",
+            "qpos", "qvel", "x_sensor", "v_sensor", "ctrl", "force", "shaft", "xfrc", "sign", "horizontal", "axis",
+            "hinge_body", "anchor", "friction_force", "friction_ctrl", "qfrc",
         )
     ]
 )  # fmt: skip
@@ -34,9 +34,9 @@ _SENSORS = {"x_sensor": mujoco.mjtSensor.mjSENS_JOINTPOS, "v_sensor": mujoco.mjt
 @njit(error_model="numpy", inline="always")
 def lever(channel, xipos, xanchor, xaxis):
     """Return the torque of a horizontal force of 1 N about a hinge, m: axis . (arm x force). All are flat arrays."""
-    j, k = channel.along + 1, (channel.along + 2) % 3
-    arm_j = xipos[channel.tip + j] - xanchor[channel.anchor + j]
-    arm_k = xipos[channel.tip + k] - xanchor[channel.anchor + k]
+    j, k = channel.axis + 1, (channel.axis + 2) % 3
+    arm_j = xipos[channel.hinge_body + j] - xanchor[channel.anchor + j]
+    arm_k = xipos[channel.hinge_body + k] - xanchor[channel.anchor + k]
     return xaxis[channel.anchor + j] * arm_k - xaxis[channel.anchor + k] * arm_j
 
 
@@ -70,6 +70,7 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
         raise ScenarioError(f"the joint of {name} has axis {axis}: align it with a world axis")
     component = int(np.argmax(np.abs(axis)))
     friction = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, PASSIVE + model.joint(joint).name)
+    computed = friction >= 0 and model.actuator_ctrlnum[friction] > 0  # a friction by a formula
     xfrc, sign = 6 * body + component + 3 * hinge, int(np.sign(axis[component]))
     indices = {
         "qpos": model.jnt_qposadr[joint],
@@ -79,20 +80,20 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
         "shaft": model.jnt_dofadr[model.actuator_trnid[drive, 0]] if drive >= 0 else -1,
         "xfrc": xfrc,
         "sign": sign,
-        "push": xfrc,
-        "along": 0,
-        "tip": -1,
+        "horizontal": xfrc,
+        "axis": 0,
+        "hinge_body": -1,
         "anchor": -1,
-        "friction": -1 if friction < 0 else model.actuator_outadr[friction],
-        "brake": -1 if friction < 0 or not model.actuator_ctrlnum[friction] else model.actuator_ctrladr[friction],
-        "direct": model.jnt_dofadr[joint] if direct else -1,
+        "friction_force": -1 if friction < 0 else model.actuator_outadr[friction],
+        "friction_ctrl": model.actuator_ctrladr[friction] if computed else -1,
+        "qfrc": model.jnt_dofadr[joint] if direct else -1,
     }
     if hinge:
-        along = int(component == 0)  # across the axis
-        indices |= {"push": 6 * body + along, "along": along, "tip": 3 * body, "anchor": 3 * joint}
+        across = int(component == 0)  # a horizontal axis across that of the hinge
+        indices |= {"horizontal": 6 * body + across, "axis": across, "hinge_body": 3 * body, "anchor": 3 * joint}
     for field, kind in _SENSORS.items():
-        there = np.flatnonzero((model.sensor_type == kind) & (model.sensor_objid == joint))
-        if not len(there):
+        sensors = np.flatnonzero((model.sensor_type == kind) & (model.sensor_objid == joint))
+        if not len(sensors):
             raise ScenarioError(f"the joint of {name} has no {kind.name[7:].lower()} sensor: add one")
-        indices[field] = model.sensor_adr[there[0]]
+        indices[field] = model.sensor_adr[sensors[0]]
     return indices

@@ -1,12 +1,12 @@
-"""The controller's clock: samples that come late, and samples that are missed.
+"""The controller's clock: samples that are late, and samples that are missed.
 
 A real-time task is woken every control period T, some time after it should be. Sample k runs at
 
     t_k = k T + late_k,    late_k uniform among the physics steps from 0 to `jitter`,
 
-or not at all: then its command stays the one before, and neither estimator nor law sees that sample. The first sample
-and the last one are on time. All draws are counter-based, like the noise, so they depend on the seed and k alone.
-Lengths are counted in physics steps.
+or not at all: then the last command stays, and neither estimator nor law sees that sample. The first sample and the
+last one are on time. Which samples are late or missed depends on the seed and k alone, as all random numbers are
+counter-based.
 """
 
 # pyright: reportCallIssue=false
@@ -30,7 +30,7 @@ class Clock:
       jitter: s, the largest delay of a sample; shorter than the control period. Each sample is late by a whole number
         of physics steps, all equally probable. The law reads the true time in `y.t` and the nominal period in `y.dt`,
         as on a machine whose task does not measure its period.
-      missed: probability that a sample is missed, 0 .. 0.99. Its command stays the one before.
+      missed: probability that a sample is missed, 0 .. 0.99. The last command then stays.
     """
 
     jitter: float = 0.0
@@ -45,7 +45,7 @@ class Clock:
         """Whether all samples run, and on time."""
         return not (self.jitter or self.missed)
 
-    def steps(self, physics_step: float) -> int:
+    def jitter_steps(self, physics_step: float) -> int:
         """Return the largest delay of a sample in physics steps."""
         return math.floor(self.jitter / physics_step + 1e-6)
 
@@ -53,12 +53,12 @@ class Clock:
         """Raise ScenarioError for a jitter that reaches the next sample, or is shorter than a physics step."""
         if not self.jitter:
             return
-        if self.steps(physics_step) >= round(control_period / physics_step):
+        if self.jitter_steps(physics_step) >= round(control_period / physics_step):
             raise ScenarioError(
                 f"Clock's jitter {self.jitter:g} s is not shorter than the control period of {control_period:g} s: "
                 "give a shorter one, and missed=... for samples that do not run"
             )
-        if not self.steps(physics_step):
+        if not self.jitter_steps(physics_step):
             raise ScenarioError(
                 f"Clock's jitter {self.jitter:g} s is shorter than a physics step of {physics_step:g} s: "
                 "give a shorter physics_step"

@@ -33,7 +33,7 @@ T = TypeVar("T")
 INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
 MODELS = ("none", "nominal")
 MIN_TIME = 1e-9  # s, of periods
-MAX_SEED = 2**53 - 1  # the largest whole number that every float64 below it has
+MAX_SEED = 2**53 - 1  # a float64 holds every whole number up to it exactly
 REST = Constant(0.0)
 
 ByChannel = Mapping[str, T] | Sequence[T]  # joint -> value, or values in the order of the driven channels
@@ -46,11 +46,11 @@ def law(value: Law | Template | str) -> Law:
 
 
 def laws(name: str, value: Laws | None, s: Any) -> Law:
-    """Return the law of a plant's driven channels, from one law for all or one for each; from None the plant's."""
+    """Return the law of a plant's driven channels, from one for all, one for each, or None for the plant's."""
     value = s.plant.suggested.get("law") if value is None else value
     if not isinstance(value, Mapping | list | tuple):
         return law(value)  # pyright: ignore[reportArgumentType]
-    return by_channel([law(one) for one in each(name, value, s.plant)])  # pyright: ignore[reportArgumentType]
+    return by_channel([law(item) for item in one_per_channel(name, value, s.plant)])  # pyright: ignore[reportArgumentType]
 
 
 def plant(name: str, value: object, s: Any) -> Plant:
@@ -73,7 +73,7 @@ def seed(name: str, value: int, s: Any) -> int:
     return whole(name, value, 0, MAX_SEED)
 
 
-def each(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
+def one_per_channel(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
     """Return one value for each driven channel of a plant, in order, from a sequence, or a mapping by joint."""
     if isinstance(value, Mapping):
         joints = joint_names(plant)[: plant.driven]
@@ -98,11 +98,11 @@ def bound(name: str, value: float | ByChannel[float] | None, s: Any) -> float | 
     if not isinstance(value, Mapping | list | tuple):
         return None if value is None else number(name, value, above=0.0, infinite=True)
     joints = list(value) if isinstance(value, Mapping) else range(s.plant.driven)
-    listed = each(name, value, s.plant)
-    checked = [
-        number(f"{name}[{shown(i)}]", one, above=0.0, infinite=True) for i, one in zip(joints, listed, strict=True)
-    ]
-    return checked[0] if len(set(checked)) == 1 else tuple(checked)
+    bounds = tuple(
+        number(f"{name}[{shown(joint)}]", item, above=0.0, infinite=True)
+        for joint, item in zip(joints, one_per_channel(name, value, s.plant), strict=True)
+    )
+    return bounds[0] if len(set(bounds)) == 1 else bounds
 
 
 def surface(name: str, value: Surface | Template | str | None, s: Any) -> Surface | None:
@@ -121,30 +121,30 @@ def velocity(name: str, value: Estimator | Template | str | None, s: Any) -> Est
 
 def component(kind: str, value: object) -> Component:
     """Return a component of one kind, from itself or its template."""
-    made = value() if isinstance(value, Template) else value
-    if isinstance(made, Component) and made.kind == kind:
-        return made
+    value = value() if isinstance(value, Template) else value
+    if isinstance(value, Component) and value.kind == kind:
+        return value
     field = "velocity" if kind == "estimator" else kind
-    raise ScenarioError(f"{field} is {shown(made)}: give smc.{kind}(...), your own {kind}, or a name")
+    raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), your own {kind}, or a name")
 
 
 def state(name: str, value: float | Sequence[float] | None, s: Any) -> tuple[float, ...] | None:
-    """Return n positions or rates, from n numbers or one. A run beyond MAX_STATE has diverged, so none may be there."""
+    """Return n positions or velocities, from n numbers or one. Beyond MAX_STATE a run would have diverged."""
     if value is None:
         return None
     if isinstance(value, Mapping | Set):
         raise ScenarioError(f"{name} is {shown(value)}: give one number, or a list of one for each channel")
     value = value.tolist() if isinstance(value, np.ndarray) else value
-    listed = isinstance(value, Iterable) and not isinstance(value, str | bytes)
-    values, n = taken(name, value) if listed else [value], s.plant.n  # pyright: ignore[reportArgumentType]
+    is_sequence = isinstance(value, Iterable) and not isinstance(value, str | bytes)
+    values, n = taken(name, value) if is_sequence else [value], s.plant.n  # pyright: ignore[reportArgumentType]
     if len(values) not in (1, n):
         raise ScenarioError(f"{name} has {len(values)} values for {n} channels: give one number or {n}")
     values = values if len(values) == n else values * n
-    return tuple(number(name, one, low=-MAX_STATE, high=MAX_STATE) for one in values)
+    return tuple(number(name, item, low=-MAX_STATE, high=MAX_STATE) for item in values)
 
 
 def physics_step(name: str, value: float | None, s: Any) -> float | None:
-    """Return a step, s, that divides the control period exactly, from one that does so up to rounding."""
+    """Return the physics step, s, as an exact fraction of the control period."""
     if value is None:
         return None
     h, period = number(name, value, above=0.0, low=MIN_TIME), s.control_period
@@ -173,51 +173,51 @@ def mechanism(name: str, value: str, s: Any) -> str:
     return value
 
 
-def instance(kind: type[T], example: str, absent: Any = None) -> Callable[[str, T | None, Any], T]:
-    """Return the converter of a field with a value of a class, and `absent` for None."""
+def instance(kind: type[T], example: str, default: Any = None) -> Callable[[str, T | None, Any], T]:
+    """Return the converter of a field with a value of a class, and a default for None."""
 
     def convert(name: str, value: T | None, s: Any) -> T:
         if not isinstance(value, kind | None):
             raise ScenarioError(f"{name} is {shown(value)}: give {example} or None")
-        return absent if value is None else value  # pyright: ignore[reportReturnType]
+        return default if value is None else value  # pyright: ignore[reportReturnType]
 
     return convert
 
 
 def mismatch(name: str, value: Mapping[str, float] | None, s: Any) -> Mapping[str, float]:
-    """Return parameter factors, none from None."""
+    """Return parameter factors; None means no factors."""
     return parameter_factors(name, {} if value is None else value)
 
 
 def suggested_reference(plant: Plant) -> Signal:
     """Return the reference that the plant's channels suggest, and the plant's rest for those that suggest none."""
-    resting = [Constant(x) for x in plant.rest] or [REST]
-    given = plant.suggested.get("reference", (None,) * len(resting))
-    return _references(
-        [still if one is None else one for still, one in zip(itertools.cycle(resting), given, strict=False)], plant
-    )
+    at_rest = [Constant(x) for x in plant.rest] or [REST]
+    suggested = plant.suggested.get("reference", (None,) * len(at_rest))
+    signals = [signal or rest for rest, signal in zip(itertools.cycle(at_rest), suggested, strict=False)]
+    return _reference(signals, plant)
 
 
 def reference(name: str, value: Signal | ByChannel[Signal] | None, s: Any) -> Signal | None:
-    """Return the reference of a plant's driven channels, from one signal for all, also in a list, or one for each."""
-    return None if value is None else _references(value, s.plant)
+    """Return the reference of a plant's driven channels, from one signal or one for each channel."""
+    return None if value is None else _reference(value, s.plant)
 
 
-def _references(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
-    """Return the reference of a plant's driven channels."""
+def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
+    """Return the reference of a plant's driven channels. A list of one signal counts as the signal."""
     value = value.signals if isinstance(value, PerChannel) else value
-    listed = [value[0]] * plant.driven if isinstance(value, list | tuple) and len(value) == 1 else value
-    items: list[Any] = each("reference", listed, plant) if isinstance(listed, Mapping | list | tuple) else [listed]
+    value = value[0] if isinstance(value, list | tuple) and len(value) == 1 else value
+    several = isinstance(value, Mapping | list | tuple)
+    items: list[Any] = one_per_channel("reference", value, plant) if several else [value]
     for item in items:
         if not isinstance(item, Signal):
-            at = shown(item) if isinstance(item, int | float) else "0.0"
-            raise ScenarioError(f"reference is {shown(item)}: give one signal, such as smc.Constant({at})")
+            amplitude = shown(item) if isinstance(item, int | float) else "0.0"
+            raise ScenarioError(f"reference is {shown(item)}: give one signal, such as smc.Constant({amplitude})")
     return items[0] if all(item == items[0] for item in items) else PerChannel(tuple(items))
 
 
 def disturbance(name: str, value: Signal | Sequence[Signal] | None, s: Any) -> tuple[Signal, ...]:
     """Return signals, from one, several or None."""
-    items = several(value)
+    items = as_tuple(value)
     for item in items:
         if not isinstance(item, Signal):
             raise ScenarioError(f"{name} is {shown(item)}: give a signal such as smc.Sine(amplitude=0.2, omega=5.0)")
@@ -225,23 +225,24 @@ def disturbance(name: str, value: Signal | Sequence[Signal] | None, s: Any) -> t
 
 
 def contact(name: str, value: Contact | str | None, s: Any) -> Contact:
-    """Return a contact that the plant offers, from itself or its kind; none from None."""
-    made = Contact("none") if value is None else Contact(value) if isinstance(value, str) else value
-    if not isinstance(made, Contact):
+    """Return a contact that the plant offers, from itself or its kind; None means "none"."""
+    value = "none" if value is None else value
+    contact = Contact(value) if isinstance(value, str) else value
+    if not isinstance(contact, Contact):
         raise ScenarioError(
-            f"{name} is {shown(made)}: give smc.Contact(...) or one of {', '.join(['none', *s.plant.contacts])}"
+            f"{name} is {shown(contact)}: give smc.Contact(...) or one of {', '.join(['none', *s.plant.contacts])}"
         )
-    made.check(s.plant)
-    return made
+    contact.check(s.plant)
+    return contact
 
 
 def friction(name: str, value: Friction | Sequence[Friction] | None, s: Any) -> tuple[Friction, ...]:
     """Return frictions sorted by kind, from one, several or None. No two are of a kind, at most one has bristles."""
     items = parts(name, value, Friction, "smc.Coulomb(0.05)")
-    check_once(name, items, [type(part).__name__ for part in items])
-    if len(alone := [part for part in items if part.bristles]) > 1:
-        first, second = (type(part).__name__ for part in alone[:2])
-        raise ScenarioError(f"{name} has {first} and {second}, which both hold a joint by bristles: give one")
+    check_kinds_differ(name, items, [type(part).__name__ for part in items])
+    if len(bristles := [part for part in items if part.bristles]) > 1:
+        first, second = (type(part).__name__ for part in bristles[:2])
+        raise ScenarioError(f"{name} has {first} and {second}, which both model bristles: give one")
     return tuple(sorted(items, key=lambda part: type(part).__name__))
 
 
@@ -249,7 +250,7 @@ def actuator(name: str, value: Actuator | Sequence[Actuator] | None, s: Any) -> 
     """Return at most two drives in the given order and after them a Backlash, from one, several or None."""
     items = parts(name, value, Actuator, "smc.Lag(0.01)")
     drives = [part for part in items if part.drives]
-    check_once(name, items, [type(part).__name__ for part in items if not part.drives])
+    check_kinds_differ(name, items, [type(part).__name__ for part in items if not part.drives])
     if len(drives) > 2:
         raise ScenarioError(f"{name} has {len(drives)} drives, {shown(items)}: give one, or two in series")
     if len(drives) == 2 and not isinstance(drives[0], Lag):
@@ -262,19 +263,19 @@ def actuator(name: str, value: Actuator | Sequence[Actuator] | None, s: Any) -> 
 
 def parts(name: str, value: object, kind: type[P], example: str) -> tuple[P, ...]:
     """Return parts of one kind, from one, several or None."""
-    items = several(value)
+    items = as_tuple(value)
     for item in items:
         if not isinstance(item, kind):
             raise ScenarioError(f"{name} is {shown(item)}: give one such as {example}, or several, or None")
     return items
 
 
-def check_once(name: str, items: tuple[Part, ...], kinds: list[str]) -> None:
+def check_kinds_differ(name: str, items: tuple[Part, ...], kinds: list[str]) -> None:
     """Raise ScenarioError for two parts of the same kind."""
     if twice := [kind for kind in kinds if kinds.count(kind) > 1]:
         raise ScenarioError(f"{name} has a {twice[0]} twice, {shown(items)}: give one")
 
 
-def several(value: object) -> tuple[Any, ...]:
-    """Return one, several or None as a tuple."""
+def as_tuple(value: object) -> tuple[Any, ...]:
+    """Return one value, several or None as a tuple."""
     return () if value is None else tuple(value) if isinstance(value, tuple | list) else (value,)

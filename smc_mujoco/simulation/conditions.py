@@ -4,16 +4,16 @@
     smc.grid(["duffing"], ["classical"], ["nominal", worn, "noise + delay_10ms"], seeds=16)
 
 A condition applies to any plant. Those of the suite are in `NAMED`, under names such as "noise". Names joined by "+"
-apply together. As text, a condition is its name, a colon and its fields, written as in Python. Such a text is parsed
-and never evaluated:
+apply together. As text, a condition is its name, a colon and its fields, written as in Python. Such a text is parsed;
+nothing in it is run:
 
     worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)
 
-The levels of the suite are those of a machine of the study's size. The dry friction of 0.1 N m or N is u_max / 60, the
-viscous one of "friction" half as much at 1 rad/s or m/s. The gap is that of a worn gear, the lag that of a hydraulic
-valve, and the counts, per revolution or metre, are those of an inexpensive encoder. The pulse of "contact" is as strong
-as u_max, so that it moves whatever can move. Under "jitter" samples are late by up to half of the suite's control
-period, and one in ten is "missed".
+The levels of the suite are those of a machine of the study's size. The dry friction of 0.1 N m or N is u_max / 60. The
+viscous friction of "friction" is half as much at 1 rad/s or m/s. The backlash is that of a worn gear, the lag that of a
+hydraulic valve, and the counts, per revolution or metre, are those of an inexpensive encoder. The pulse of "contact" is
+as strong as u_max, so that it moves whatever can move. Under "jitter" samples are late by up to half of the suite's
+control period. Under "missed" one sample in ten does not run.
 """
 
 import ast
@@ -52,10 +52,10 @@ from smc_mujoco.simulation.signals import Constant, OrnsteinUhlenbeck, Pulse, Re
 Fields = Mapping[str, Any]
 Recipe = Fields | Callable[[Plant, float], Fields]  # fields, or a function of plant and duration that returns them
 
-MAX_PARTS = 20  # conditions that a name joins: chosen
-OTHERS = ("plant", "law", "model", "surface", "seed", "noise_key", "duration")  # fields that belong to no condition
-FIELDS = [name for name in Scenario.fields() if name not in OTHERS]
-SEVERAL = ("disturbance", "friction", "actuator")  # fields that add up when conditions are joined
+MAX_JOINED = 20  # conditions in one name: chosen
+GRID_FIELDS = ("plant", "law", "model", "surface", "seed", "noise_key", "duration")  # that a grid sets itself
+CONDITION_FIELDS = [name for name in Scenario.fields() if name not in GRID_FIELDS]
+ADDITIVE_FIELDS = ("disturbance", "friction", "actuator")  # their values add up when conditions are joined
 ABSTRACT = (Part, Friction, Actuator, Drive, Signal, Recorded)  # classes that a text cannot name
 CONSTANTS = {"inf": math.inf, "pi": math.pi}
 
@@ -100,17 +100,17 @@ class Condition:
         return dict(self.fields(plant, length) if callable(self.fields) else self.fields)
 
     def __add__(self, other: "Condition | str") -> "Condition":
-        """Return both at once. Disturbances, frictions and actuators add up; only one may set any other field."""
-        both = self, find_condition(other)
-        return Condition(" + ".join(one.name for one in both), lambda plant, duration: _joined(both, plant, duration))
+        """Return both at once. Disturbances, frictions and actuators add up; other fields must not differ."""
+        pair = self, find_condition(other)
+        return Condition(f"{self.name} + {pair[1].name}", lambda plant, duration: _joined_fields(pair, plant, duration))
 
     def __str__(self) -> str:
         """Return the text that `parse` reads, or the name alone for a condition of the suite."""
         if self.name in NAMED or callable(self.fields):
             return self.name
         try:
-            texts = [f"{name}={_text(value)}" for name, value in self.fields.items()]
-        except Exception:  # from the repr of a value that no scenario takes; an error tells of it
+            texts = [f"{name}={_as_text(value)}" for name, value in self.fields.items()]
+        except Exception:  # from the repr of a value that no scenario takes; the text is for its error
             texts = [f"{name}={shown(value)}" for name, value in self.fields.items()]
         return f"{self.name}: {', '.join(texts)}"
 
@@ -132,10 +132,10 @@ def condition(name: str, **fields: Any) -> Condition:
     if not fields:
         raise ScenarioError(f"condition {name!r} has no fields: give some, such as friction=smc.Coulomb(0.05)")
     for field in fields:
-        if field in OTHERS:
+        if field in GRID_FIELDS:
             raise ScenarioError(f"condition {name!r} sets {field}, which the grid sets itself: leave it out")
-        if field not in FIELDS:
-            raise unknown("field of a Scenario", field, FIELDS)
+        if field not in CONDITION_FIELDS:
+            raise unknown("field of a Scenario", field, CONDITION_FIELDS)
     return Condition(name, fields)
 
 
@@ -149,8 +149,8 @@ def find_condition(value: Condition | str) -> Condition:
         return parse(value)
     if set("=(") & set(value):
         raise ScenarioError(f"condition {shown(value)} has no colon: write a name, a colon and fields, as worn: x0=0.3")
-    if (count := value.count("+") + 1) > MAX_PARTS:
-        raise ScenarioError(f"condition {shown(value)} joins {count:,} conditions: give at most {MAX_PARTS}")
+    if (count := value.count("+") + 1) > MAX_JOINED:
+        raise ScenarioError(f"condition {shown(value)} joins {count:,} conditions: give at most {MAX_JOINED}")
     first, *others = [find("condition", part.strip(), NAMED) for part in value.split("+")]
     return sum(others, start=first)
 
@@ -182,7 +182,7 @@ def parse(text: str) -> Condition:
 
 
 def read_fields(text: str) -> dict[str, Any]:
-    """Return the fields in a text such as "friction=Coulomb(0.05), x0=0.3", see `parse`."""
+    """Return the fields in a text such as "friction=Coulomb(0.05), x0=0.3"."""
     try:
         call = ast.parse(f"_({text})", mode="eval").body
     except (ValueError, RecursionError, MemoryError):
@@ -205,19 +205,19 @@ def from_file(path: Path) -> list[Condition]:
     return conditions
 
 
-def _value(node: ast.expr) -> Any:
-    """Return the value of a literal, or of the call of a part, a signal or an estimator."""
+def _parsed(node: ast.expr) -> Any:
+    """Return the value of a literal, or of a call that makes a part, a signal or an estimator."""
     match node:
         case ast.Constant(value=value):
             return value
         case ast.Name(id=name) if name in CONSTANTS:
             return CONSTANTS[name]
         case ast.UnaryOp(op=ast.USub(), operand=operand):
-            return -errors.number("a value", _value(operand), infinite=True)
+            return -errors.number("a value", _parsed(operand), infinite=True)
         case ast.Tuple(elts=items) | ast.List(elts=items):
-            return tuple(map(_value, items))
+            return tuple(map(_parsed, items))
         case ast.Dict(keys=keys, values=values) if None not in keys:
-            return {_value(key): _value(value) for key, value in zip(keys, values, strict=True) if key is not None}
+            return {_parsed(key): _parsed(value) for key, value in zip(keys, values, strict=True) if key is not None}
         case ast.Call():
             return _call(node)
     raise ScenarioError(
@@ -229,72 +229,72 @@ def _call(node: ast.Call) -> Any:
     """Return the part, signal or estimator that a call makes."""
     name = ast.unparse(node.func).removeprefix("smc.")
     kind = find("part, signal or estimator", name, estimators() | _kinds())
-    values, named = map(_value, node.args), _keywords(node)
+    values, keywords = map(_parsed, node.args), _keywords(node)
     try:
-        return kind(*values, **named)
+        return kind(*values, **keywords)
     except TypeError:
-        known = list(inspect.signature(kind).parameters) if isinstance(kind, type) else list(kind.defaults)
-        cure = f"it takes {', '.join(known) or 'nothing'}"
+        parameters = list(inspect.signature(kind).parameters) if isinstance(kind, type) else list(kind.defaults)
+        cure = f"it takes {', '.join(parameters) or 'nothing'}"
         raise ScenarioError(f"condition has {shown(ast.unparse(node))}: {cure}") from None
 
 
 def _keywords(node: ast.Call) -> dict[str, Any]:
-    """Return keyword -> value of a call, and refuse a keyword that stands twice."""
+    """Return keyword -> value of a call, in which no keyword may stand twice."""
     keywords: dict[str, Any] = {}
     for word in node.keywords:
         if str(word.arg) in keywords:
             raise ScenarioError(f"condition has {word.arg} twice, in {shown(ast.unparse(node))}: give it once")
-        keywords[str(word.arg)] = _value(word.value)
+        keywords[str(word.arg)] = _parsed(word.value)
     return keywords
 
 
 def _kinds() -> dict[str, Any]:
-    """Return name -> class of all parts and signals, also of users'. The suite's comes before its namesakes."""
+    """Return name -> class of all parts and signals, also users'. Of equal names the suite's class is returned."""
     kinds: list[type] = [Noise, Jump, Clock, *subclasses(Part), *subclasses(Signal)]
     kinds = [kind for kind in kinds if kind not in ABSTRACT]
     kinds.sort(key=lambda kind: kind.__module__.startswith("smc_mujoco."))
     return {kind.__name__: kind for kind in kinds}
 
 
-def _text(value: Any) -> str:
+def _as_text(value: Any) -> str:
     """Return a value as `parse` reads it."""
     if isinstance(value, Component):
         return f"{value.name}({', '.join(f'{gain}={number!r}' for gain, number in value.gains.items())})"
     if isinstance(value, Part | Signal | Noise | Jump | Clock):
-        texts = [f"{f.name}={_text(getattr(value, f.name))}" for f in dataclasses.fields(value) if f.init]
+        texts = [f"{f.name}={_as_text(getattr(value, f.name))}" for f in dataclasses.fields(value) if f.init]
         return f"{type(value).__name__}({', '.join(texts)})"
     if isinstance(value, tuple):
-        return f"({', '.join(map(_text, value))},)"
+        return f"({', '.join(map(_as_text, value))},)"
     return repr(value)
 
 
 def _frozen(value: Any) -> Any:
-    """Return a field's value as something that cannot change."""
+    """Return an immutable copy of a field's value."""
     if isinstance(value, Mapping):
         return frozen(value)
     value = value.tolist() if isinstance(value, np.ndarray) else value
     return tuple(value) if isinstance(value, list) else value
 
 
-def _joined(both: tuple[Condition, Condition], plant: Plant, duration: float) -> dict[str, Any]:
+def _joined_fields(pair: tuple[Condition, Condition], plant: Plant, duration: float) -> dict[str, Any]:
     """Return the fields of two conditions at once."""
-    first, second = (one.on(plant, duration) for one in both)
-    for field in [field for field in second if field in first]:
-        if field in SEVERAL:
-            second[field] = *coerce.several(first[field]), *coerce.several(second[field])
+    first, second = (condition.on(plant, duration) for condition in pair)
+    for field in [name for name in second if name in first]:
+        if field in ADDITIVE_FIELDS:
+            second[field] = *coerce.as_tuple(first[field]), *coerce.as_tuple(second[field])
         elif first[field] != second[field]:
-            names = " and ".join(repr(one.name) for one in both)
+            names = " and ".join(repr(condition.name) for condition in pair)
             raise ScenarioError(f"conditions {names} both set {field}: give one of them, or smc.condition(...)")
     return first | second
 
 
 def _jump(size: str) -> Recipe:
-    """Return a jump of parameters at half time, with the sine disturbance; `size` is "mild" or "hard"."""
+    """Return a parameter jump at half time, with the sine disturbance; `size` is "mild" or "hard"."""
 
     def fields(plant: Plant, duration: float) -> Fields:
         if size not in plant.jumps:
-            known = [name for name, one in plants().items() if size in one.jumps]
-            cure = f"choose another condition, or one of {', '.join(known)}"
+            with_jump = [name for name, other in plants().items() if size in other.jumps]
+            cure = f"choose another condition, or one of {', '.join(with_jump)}"
             raise ScenarioError(f"condition 'jump_{size}' has no numbers for plant {plant.name!r}: {cure}")
         return {"disturbance": SINE, "jump": Jump(time=duration / 2, factors=plant.jumps[size])}
 
@@ -302,7 +302,7 @@ def _jump(size: str) -> Recipe:
 
 
 def _contact(plant: Plant, duration: float) -> Fields:
-    """Return a blow against the obstacles of a plant: its neighbours, or stops."""
+    """Return a pulse that drives a plant against its obstacles: its neighbours, or stops."""
     if kinds := [kind for kind in ("bobs", "stops") if kind in plant.contacts]:
         return {"contact": kinds[0], "disturbance": Pulse(6.0, time=duration / 2, width=0.2)}
     raise ScenarioError(f"condition 'contact' needs stops, and plant {plant.name!r} has none: choose another")

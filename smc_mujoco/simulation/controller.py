@@ -4,14 +4,17 @@ At the first stage of a control sample, for each channel:
 
     sensors -> noise, encoder -> velocity estimator -> law -> saturation -> delay buffer
 
-A sample may come late in its period, or be missed, see clock.py. Then its command in the log is the one that it holds.
+A sample may come late in its period, or be missed, see clock.py. The log then repeats the command of the sample before.
 At the first stage of a physics step, the command whose delay has passed goes to ctrl, through lags and rate limits. At
 every stage, disturbance(t) goes to xfrc_applied. A friction by a formula follows, at the first stage.
 Each sample is logged with the mean forces since the last one.
 
-Time counts in calls. RK4 calls four times a step, at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h
-again, so the clock cannot distinguish a sample from a last stage. A run that diverges, or whose law raises an
+The controller counts calls, because mjData.time does not tell a sample from a last stage: RK4 calls four times a step,
+at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h again. A run that diverges, or whose law raises an
 exception, is marked in its record and gets no more control. The other simulations of the batch continue.
+
+Private functions take the address of the record, the record `sim`, and `data`, the Arrays of its mjData. Those that
+can fail return a failure code of state.py, unless they say otherwise.
 """
 
 # pyright: reportCallIssue=false
@@ -28,7 +31,7 @@ from smc_mujoco.mechanisms.hardware.sliding import SLOW
 from smc_mujoco.simulation import clock, philox
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.channels import channel_at, lever
-from smc_mujoco.simulation.state import function_at, log_at, signal_at, state_at
+from smc_mujoco.simulation.state import disturbance_at, function_at, log_at, state_at
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo itself gives up at 1e10
 LAST_STAGE = 1.0 - 1e-8  # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
@@ -44,11 +47,11 @@ Arrays = namedtuple(
 
 
 @njit(error_model="numpy")
-def control(at, sim, data):
+def control(address, sim, data):
     """Do one callback of one simulation.
 
     Args:
-      at: the address of its record.
+      address: of its record.
       sim: the record.
       data: Arrays of its mjData.
     """
@@ -57,7 +60,7 @@ def control(at, sim, data):
     if sim.failure != record.FINE:
         return
     if sim.agent != 0:
-        sim.failure = _rub(at, sim, data)
+        sim.failure = _apply_friction(address, sim, data)
         return
     stages, steps = sim.stages, sim.steps
     step, stage = calls // stages, calls % stages
@@ -70,45 +73,45 @@ def control(at, sim, data):
         elif k >= sim.samples:  # the simulation is stepped beyond its end
             failure = record.INTERRUPTED
         else:
-            failure = _sample(at, sim, data, k, within)
+            failure = _sample(address, sim, data, k, within)
         _actuate(sim, data, step)
-    if sim.signal_count != 0 and failure == record.FINE:
+    if sim.disturbance_count != 0 and failure == record.FINE:
         fraction = 0.0 if stage == 0 else (LAST_STAGE if stage == 3 else 0.5)
         sample = k if stage + within == 0 else -1
-        failure = _disturb(at, sim, data, k * sim.period + (within + fraction) * sim.step, sample)
+        failure = _apply_disturbances(address, sim, data, k * sim.period + (within + fraction) * sim.step, sample)
     if sim.frictions != 0 and failure == record.FINE:  # an integrator of one stage
-        failure = _rub(at, sim, data)
+        failure = _apply_friction(address, sim, data)
     if failure != record.FINE:
         sim.failure, sim.failed_step = failure, step
-        _release(sim, data)
+        _zero_inputs(sim, data)
     elif stage == 0 and within == 0:
         _log(sim, data, k)
 
 
 @njit(error_model="numpy", inline="always")
-def _sample(at, sim, data, k, within):
-    """Run the law at a physics step if it is that of sample k. Until then the command stays. Return a failure code."""
+def _sample(address, sim, data, k, within):
+    """Run the law at sample k, if the sample comes in this physics step, `within` steps into its period."""
     late, missed = clock.late(sim, k), clock.missed(sim, k)
     if within == 0 and (late != 0 or missed):
-        _hold(sim, k)
+        _repeat_command(sim, k)
     if within != late or missed:
         return record.FINE
     t = k * sim.period + late * sim.step
-    failure = _measure(at, sim, data, k, t)
+    failure = _measure(address, sim, data, k, t)
     if failure == record.FINE:
-        failure = update_law(at, sim, k, t)
+        failure = update_law(address, sim, k, t)
     if failure != record.FINE and late != 0:  # some channels may have written into the log
-        _hold(sim, k)
+        _repeat_command(sim, k)
     return failure
 
 
 @njit(error_model="numpy")
-def _hold(sim, k):
-    """Keep the command of the sample before for sample k, with its u, s and r in the log."""
-    buffer, last = pointer(sim.delay_buffer + 8 * sim.n * (k % sim.delay_slots)), pointer(sim.seen.u)
+def _repeat_command(sim, k):
+    """Give sample k the command of the sample before, with its u, s and r in the log."""
+    buffer, last_u = pointer(sim.delay_buffer + 8 * sim.n * (k % sim.delay_slots)), pointer(sim.seen.u)
     for i in range(sim.n):
         sample, before = log_at(sim.log, k * sim.n + i), log_at(sim.log, (k - 1) * sim.n + i)
-        sample.u, sample.s, sample.r, buffer[i] = before.u, before.s, before.r, last[i]
+        sample.u, sample.s, sample.r, buffer[i] = before.u, before.s, before.r, last_u[i]
 
 
 @njit(error_model="numpy", inline="always")
@@ -125,13 +128,13 @@ def _diverged(sim, data):
 
 @njit(error_model="numpy", inline="always")
 def _call(function, i, inputs, outputs):
-    """Call a function for channel i, with the addresses of its inputs and outputs. Return 0, or 1 if it raised."""
+    """Call a function for channel i, with the addresses of its inputs and outputs. Return 1 if it raised, or 0."""
     return call(function.address, inputs, function.parameters, function.memory + i * function.stride, outputs)
 
 
 @njit(error_model="numpy", inline="always")
-def _read(sim, state, i, x, v, j, hinge):
-    """Return reading j of channel i: position and velocity after noise, bias, rounding and loss."""
+def _read_sensor(sim, state, i, x, v, j, hinge):
+    """Return reading j of channel i: true position x and velocity v with noise, bias, rounding and loss."""
     if sim.sigma_x != 0.0 or sim.sigma_v != 0.0:
         z = philox.normals(sim.seed, i, philox.MEASUREMENT, j)
         x, v = x + sim.sigma_x * z[0], v + sim.sigma_v * z[1]
@@ -142,70 +145,68 @@ def _read(sim, state, i, x, v, j, hinge):
         x = quantum * math.floor(x / quantum + 0.5)
     if sim.dropout != 0.0:
         if j > 0 and philox.uniform(sim.seed, i, philox.DROPOUT, j) < sim.dropout:
-            return state.held_x, state.held_v
-        state.held_x, state.held_v = x, v
+            return state.last_x, state.last_v
+        state.last_x, state.last_v = x, v
     return x, v
 
 
 @njit(error_model="numpy", inline="always")
-def _error(at, sim, function, t):
-    """Return an error of measurement at time t, s: -0 without one, which changes no bit; NaN if it raised."""
+def _measurement_error(address, sim, function, t):
+    """Return an error of measurement at time t, s; NaN if it raised. Without one return -0, which changes no bit."""
     if function.address == 0:
         return -0.0
     sim.instant.t = t
-    if _call(function, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+    if _call(function, 0, address + record.INSTANT_AT, address + record.MOTION_AT) != 0:
         return math.nan
     return sim.motion.value
 
 
 @njit(error_model="numpy")
-def _measure(at, sim, data, k, t):
-    """Measure position, and estimate velocity and acceleration, of every channel at sample k, at time t, s.
-
-    Return a failure code.
-    """
+def _measure(address, sim, data, k, t):
+    """Measure position, and estimate velocity and acceleration, of every channel at sample k, at time t, s."""
     j, x, v, a = k, pointer(sim.seen.x), pointer(sim.seen.v), pointer(sim.a)
     if sim.read_period != 0.0:
         j = max(0, math.floor((t - sim.read_delay) / sim.read_period + 1e-6))
     reading, estimate = sim.reading, sim.estimate
     reading.dt = sim.period
-    x_error, v_error = _error(at, sim, sim.position_error, t), _error(at, sim, sim.velocity_error, t)
+    x_error = _measurement_error(address, sim, sim.position_error, t)
+    v_error = _measurement_error(address, sim, sim.velocity_error, t)
     for i in range(sim.n):
         channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
         position, velocity = data.sensordata[channel.x_sensor] + x_error, data.sensordata[channel.v_sensor] + v_error
-        reading.x, reading.v = _read(sim, state, i, position, velocity, j, channel.tip >= 0)
+        reading.x, reading.v = _read_sensor(sim, state, i, position, velocity, j, channel.hinge_body >= 0)
         sim.seen.i = i
-        if _call(sim.estimator, i, at + record.READING_AT, at + record.ESTIMATE_AT) != 0:
+        if _call(sim.estimator, i, address + record.READING_AT, address + record.ESTIMATE_AT) != 0:
             return record.ESTIMATOR_RAISED
         x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
     return record.FINE
 
 
 @njit(error_model="numpy", inline="always")
-def _evaluate_model(at, sim, i):
-    """Write nominal f and g of channel i into the record. Return 0, or 1 if the model raised."""
+def _evaluate_model(address, sim, i):
+    """Write nominal f and g of channel i into the record. Return 1 if the model raised, or 0."""
     sim.seen.i = i
-    return _call(sim.nominal, 0, at + record.SEEN_AT, at + record.MODEL_AT)
+    return _call(sim.nominal, 0, address + record.SEEN_AT, address + record.MODEL_AT)
 
 
 @njit(error_model="numpy")
-def update_law(at, sim, k, t):
+def update_law(address, sim, k, t):
     """Run the law at sample k, at time t, s: once for each driven channel, or once for all. Return a failure code.
 
     The commands go into the delay buffer, and u, s and r into the log. A channel's nominal model may depend on the new
     commands of the channels before it.
     """
-    n, width, last, limits, added = sim.n, sim.width, pointer(sim.seen.u), pointer(sim.limits), 0.0
+    n, width, last_u, limits, feedforward = sim.n, sim.width, pointer(sim.seen.u), pointer(sim.limits), 0.0
     joint, commands = sim.joint.head != 0, pointer(sim.commands)
-    y = sim.joint.head if joint else at + record.MEASUREMENT_AT
+    y = sim.joint.head if joint else address + record.MEASUREMENT_AT
     buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
     sim.instant.t = t
     if sim.feedforward.address != 0:
-        if _call(sim.feedforward, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+        if _call(sim.feedforward, 0, address + record.INSTANT_AT, address + record.MOTION_AT) != 0:
             return record.FEEDFORWARD_RAISED
-        added = sim.motion.value
+        feedforward = sim.motion.value
     for first in range(0, sim.driven, width):
-        failure = _measure_joints(at, sim, k, t) if joint else _measure_channel(at, sim, k, t, first)
+        failure = _measure_joints(address, sim, k, t) if joint else _measure_channel(address, sim, k, t, first)
         if failure != record.FINE:
             return failure
         law = sim.law if sim.laws == 0 else function_at(sim.laws, first)
@@ -213,12 +214,17 @@ def update_law(at, sim, k, t):
             return record.LAW_RAISED
         for j in range(width):
             i = first + j
-            wanted, s, limit, sample = commands[j] + added, commands[width + j], limits[i], log_at(sim.log, k * n + i)
-            u = min(max(wanted, -limit), limit)
-            if not (math.isfinite(wanted) and math.isfinite(s) and abs(u) * max(1.0, sim.scale) < MAX_CONTROL):
+            command, s, limit, sample = (
+                commands[j] + feedforward,
+                commands[width + j],
+                limits[i],
+                log_at(sim.log, k * n + i),
+            )
+            u = min(max(command, -limit), limit)
+            if not (math.isfinite(command) and math.isfinite(s) and abs(u) * max(1.0, sim.scale) < MAX_CONTROL):
                 sim.seen.i = i
                 return record.NOT_FINITE
-            buffer[i], sample.u, sample.s, last[i] = u, u, s, u
+            buffer[i], sample.u, sample.s, last_u[i] = u, u, s, u
     for i in range(sim.driven, n):  # only measured
         sample = log_at(sim.log, k * n + i)
         buffer[i], sample.u, sample.s, sample.r = 0.0, 0.0, 0.0, 0.0
@@ -226,35 +232,35 @@ def update_law(at, sim, k, t):
 
 
 @njit(error_model="numpy", inline="always")
-def _evaluate_reference(at, sim, k, i):
-    """Write the reference of channel i into the record and the log. Return 0, or 1 if it raised."""
+def _evaluate_reference(address, sim, k, i):
+    """Write the reference of channel i into the record and the log. Return 1 if it raised, or 0."""
     if sim.references != 0:
-        if _call(function_at(sim.references, i), 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+        if _call(function_at(sim.references, i), 0, address + record.INSTANT_AT, address + record.MOTION_AT) != 0:
             return 1
-    elif i == 0 and _call(sim.reference, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+    elif i == 0 and _call(sim.reference, 0, address + record.INSTANT_AT, address + record.MOTION_AT) != 0:
         return 1
     log_at(sim.log, k * sim.n + i).r = sim.motion.value
     return 0
 
 
 @njit(error_model="numpy", inline="always")
-def _measure_channel(at, sim, k, t, i):
-    """Write into the record what the law of channel i reads at sample k, at time t, s. Return a failure code.
+def _measure_channel(address, sim, k, t, i):
+    """Write into the record what the law of channel i reads at sample k, at time t, s.
 
     The nominal model has the force of channel i's drive, gain u - drag v, in place of u.
     """
-    if _evaluate_reference(at, sim, k, i) != 0:
+    if _evaluate_reference(address, sim, k, i) != 0:
         return record.REFERENCE_RAISED
     y, x, v, a, motion, model = sim.y, pointer(sim.seen.x), pointer(sim.seen.v), pointer(sim.a), sim.motion, sim.model
     y.t, y.dt, y.r, y.dr, y.ddr = t, sim.period, motion.value, motion.rate, motion.acceleration
     y.q, y.dq, y.fq, y.gq = 0.0, 0.0, 0.0, 0.0
-    partner = i + sim.driven  # moves with channel i and has no actuator
+    partner = i + sim.driven  # a joint without actuator, which moves with channel i
     if partner < sim.n:
-        if _evaluate_model(at, sim, partner) != 0:
+        if _evaluate_model(address, sim, partner) != 0:
             return record.NOMINAL_RAISED
         y.q, y.dq = x[partner], v[partner]
         y.fq, y.gq = model.f - sim.drive_drag * v[i] * model.g, sim.drive_gain * model.g
-    if _evaluate_model(at, sim, i) != 0:
+    if _evaluate_model(address, sim, i) != 0:
         return record.NOMINAL_RAISED
     y.f, y.g = model.f - sim.drive_drag * v[i] * model.g, sim.drive_gain * model.g
     y.x, y.v = x[i], v[i]
@@ -263,33 +269,33 @@ def _measure_channel(at, sim, k, t, i):
     y.limit, y.model = pointer(sim.limits)[i], sim.uses_model
     y.has_surface, y.s, y.v_eq = 0.0, 0.0, 0.0
     if sim.surface.address != 0:
-        if _call(sim.surface, i, at + record.MEASUREMENT_AT, at + record.SLIDING_AT) != 0:
+        if _call(sim.surface, i, address + record.MEASUREMENT_AT, address + record.SLIDING_AT) != 0:
             return record.SURFACE_RAISED
         y.has_surface, y.s, y.v_eq = 1.0, sim.sliding.s, sim.sliding.v_eq
     return record.FINE
 
 
 @njit(error_model="numpy")
-def _measure_joints(at, sim, k, t):
-    """Write what a law of many joints reads at sample k, at time t, s. Return a failure code."""
+def _measure_joints(address, sim, k, t):
+    """Write what a law of many joints reads at sample k, at time t, s."""
     y, n, motion, seen = sim.joint, sim.n, sim.motion, sim.seen
     head = head_at(y.head, 0)
     head.t, head.dt, head.model, head.n = t, sim.period, sim.uses_model, n
-    head.dynamics = at + record.REQUESTS_AT if sim.requests.coriolis != 0.0 else 0
+    head.dynamics = address + record.HANDLE_AT if sim.handle.coriolis != 0.0 else 0
     for i in range(n):
-        if _evaluate_reference(at, sim, k, i) != 0:
+        if _evaluate_reference(address, sim, k, i) != 0:
             return record.REFERENCE_RAISED
         x, v, a = pointer(seen.x)[i], pointer(seen.v)[i], pointer(sim.a)[i]
         pointer(y.x)[i], pointer(y.v)[i] = x, v
         pointer(y.e)[i], pointer(y.de)[i] = x - motion.value, v - motion.rate
         pointer(y.r)[i], pointer(y.dr)[i], pointer(y.ddr)[i] = motion.value, motion.rate, motion.acceleration
         pointer(y.a)[i], pointer(y.limit)[i] = motion.acceleration if math.isnan(a) else a, pointer(sim.limits)[i]
-    return _measure_dynamics(at, sim)
+    return _measure_dynamics(address, sim)
 
 
 @njit(error_model="numpy")
-def _measure_dynamics(at, sim):
-    """Write nominal M, h and g of all channels, per unit of u, into a joint measurement. Return a failure code."""
+def _measure_dynamics(address, sim):
+    """Write nominal M, h and g of all channels, per unit of u, into a joint measurement."""
     n, v, M, h, g = sim.n, pointer(sim.seen.v), pointer(sim.joint.M), pointer(sim.joint.h), pointer(sim.joint.g)
     failure = record.FINE
     if sim.uses_model == 0.0:
@@ -299,8 +305,8 @@ def _measure_dynamics(at, sim):
             h[i], g[i] = 0.0, 0.0
         return failure
     if sim.dynamics.address == 0:
-        failure = _separate_equations(at, sim, M, h, g)
-    elif _call(sim.dynamics, 0, at + record.SEEN_AT, sim.joint.M) != 0:
+        failure = _separate_equations(address, sim, M, h, g)
+    elif _call(sim.dynamics, 0, address + record.SEEN_AT, sim.joint.M) != 0:
         failure = record.NOMINAL_RAISED
     for i in range(n * n):
         M[i] /= sim.drive_gain
@@ -310,8 +316,8 @@ def _measure_dynamics(at, sim):
 
 
 @njit(error_model="numpy")
-def _separate_equations(at, sim, M, h, g):
-    """Write M, h and g of channels with an equation x'' = f + g u each: M is diagonal. Return a failure code."""
+def _separate_equations(address, sim, M, h, g):
+    """Write M, h and g of channels with an equation x'' = f + g u each: M is diagonal."""
     n, v, measured = sim.n, pointer(sim.seen.v), pointer(sim.joint.v)
     for i in range(n * n):
         M[i] = 0.0
@@ -319,7 +325,7 @@ def _separate_equations(at, sim, M, h, g):
         for i in range(n):
             v[i] = measured[i] if moving else 0.0
         for i in range(n):
-            if _evaluate_model(at, sim, i) != 0:
+            if _evaluate_model(address, sim, i) != 0:
                 return record.NOMINAL_RAISED
             M[(n + 1) * i] = 1.0 / sim.model.g
             if moving:
@@ -333,28 +339,28 @@ def _separate_equations(at, sim, M, h, g):
 
 @njit(error_model="numpy", inline="always")
 def _actuate(sim, data, step):
-    """Give the command whose delay has passed at a physics step, if one arrives, to the actuators."""
+    """Give the command whose delay has passed at a physics step, if there is one, to the actuators."""
     past = step - sim.delay
     if past >= 0 and past % sim.steps == clock.late(sim, past // sim.steps):
         buffer = pointer(sim.delay_buffer + 8 * sim.n * (past // sim.steps % sim.delay_slots))
         for i in range(sim.n):
-            state_at(sim.states, i).arrived = buffer[i]
+            state_at(sim.states, i).delayed = buffer[i]
             if sim.has_drives == 0 and i < sim.driven:
                 data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * buffer[i]
     if sim.has_drives != 0:
         for i in range(sim.driven):
             channel = channel_at(sim.channels, i)
             v = data.qvel[channel.shaft]
-            V = sim.scale * _drive(sim.drive_step, state_at(sim.states, i), v)
+            V = sim.scale * _step_drives(sim.drive_step, state_at(sim.states, i), v)
             if sim.drive_step.ripple != 0.0:
                 V = _rippled(sim.drive_step, V, data.qpos[channel.qpos], v)
             data.ctrl[channel.ctrl] = V
 
 
 @njit(error_model="numpy", inline="always")
-def _drive(factors, state, v):
-    """Advance a channel's drives by a physics step, see DriveStep. Return the mean force. v: the drive's speed."""
-    u, second = state.arrived, state.second
+def _step_drives(factors, state, v):
+    """Advance a channel's drives by a physics step, see DriveStep. Return the mean force. v: speed of the drive."""
+    u, second = state.delayed, state.second
     a, b = state.first - u, second - u
     force = u + factors.force_first * a
     state.first = u + factors.first_left * a
@@ -378,38 +384,38 @@ _rippled = njit(error_model="numpy", inline="always")(rippled)
 
 
 @njit(error_model="numpy", inline="always")
-def _release(sim, data):
+def _zero_inputs(sim, data):
     """Set all commands and disturbances to 0."""
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
-        _clear(data, channel)
+        _zero_disturbance(data, channel)
         if channel.ctrl >= 0:
             data.ctrl[channel.ctrl] = 0.0
-        if channel.brake >= 0:
-            data.ctrl[channel.brake] = 0.0
+        if channel.friction_ctrl >= 0:
+            data.ctrl[channel.friction_ctrl] = 0.0
 
 
 @njit(error_model="numpy", inline="always")
-def _clear(data, channel):
+def _zero_disturbance(data, channel):
     """Set the disturbances of a channel to 0."""
-    data.xfrc_applied[channel.xfrc], data.xfrc_applied[channel.push] = 0.0, 0.0
-    if channel.direct >= 0:
-        data.qfrc_applied[channel.direct] = 0.0
+    data.xfrc_applied[channel.xfrc], data.xfrc_applied[channel.horizontal] = 0.0, 0.0
+    if channel.qfrc >= 0:
+        data.qfrc_applied[channel.qfrc] = 0.0
 
 
 @njit(error_model="numpy")
-def _push(at, sim, data):
-    """Set all forces in space to 0, and apply those that push one body each. Return a failure code."""
+def _apply_pushes(address, sim, data):
+    """Set all disturbances to 0, and apply those of kind `Push`."""
     for i in range(sim.n):
-        _clear(data, channel_at(sim.channels, i))
-    for j in range(sim.signal_count):
-        body = signal_at(sim.signals, j).body
+        _zero_disturbance(data, channel_at(sim.channels, i))
+    for j in range(sim.disturbance_count):
+        body = disturbance_at(sim.disturbances, j).body
         for k in range(3 if body >= 0 else 0):
             data.xfrc_applied[body + k] = 0.0
-    for j in range(sim.signal_count):
-        signal = signal_at(sim.signals, j)
+    for j in range(sim.disturbance_count):
+        signal = disturbance_at(sim.disturbances, j)
         if signal.body >= 0:
-            if _call(signal.function, 0, at + record.INSTANT_AT, at + record.MOTION_AT) != 0:
+            if _call(signal.function, 0, address + record.INSTANT_AT, address + record.MOTION_AT) != 0:
                 return record.DISTURBANCE_RAISED
             for k in range(3):
                 data.xfrc_applied[signal.body + k] += sim.motion.value * signal.peak[k]
@@ -417,21 +423,21 @@ def _push(at, sim, data):
 
 
 @njit(error_model="numpy", inline="always")
-def _add(data, channel, force, cartesian):
+def _add_force(data, channel, force, cartesian):
     """Add a force to a channel: a horizontal one on its body, or one on its joint, if that has an actuator."""
     if cartesian:
-        data.xfrc_applied[channel.push] += force
-    elif channel.ctrl >= 0 and channel.direct >= 0:
-        data.qfrc_applied[channel.direct] += force
+        data.xfrc_applied[channel.horizontal] += force
+    elif channel.ctrl >= 0 and channel.qfrc >= 0:
+        data.qfrc_applied[channel.qfrc] += force
     elif channel.ctrl >= 0:
         data.xfrc_applied[channel.xfrc] += channel.sign * force
 
 
 @njit(error_model="numpy")
-def _look(at, sim, data, signal, i, k):
-    """Write into the record the force of a disturbance that sees the loop, decided at sample k. k < 0: the last force.
+def _evaluate_feedback(address, sim, data, signal, i, k):
+    """Write into the record the force of a disturbance that sees the loop: a new one at sample k, the last if k < 0.
 
-    Return 0, or 1 if it raised.
+    Return 1 if it raised, or 0.
     """
     if i > 0 or k < 0:
         sim.motion.value = pointer(signal.function.memory)[0]
@@ -440,85 +446,85 @@ def _look(at, sim, data, signal, i, k):
     before = sample.r if k == 0 else log_at(sim.log, (k - 1) * sim.n).r
     instant.e = data.qpos[channel.qpos] - sample.r
     instant.de, instant.s = data.qvel[channel.qvel] - (sample.r - before) / sim.period, sample.s
-    return _call(signal.function, 0, at + record.INSTANT_AT, at + record.MOTION_AT)
+    return _call(signal.function, 0, address + record.INSTANT_AT, address + record.MOTION_AT)
 
 
 @njit(error_model="numpy")
-def _disturb(at, sim, data, t, k):
+def _apply_disturbances(address, sim, data, t, k):
     """Apply the sum of the disturbances at time t, s, to the body of each channel, or to its joint in a user's model.
 
-    `k` is the control sample whose first stage it is, else -1.
-
-    Return a failure code.
+    At the first stage of control sample k, `k` is its number, at other stages -1.
     """
     instant, motion = sim.instant, sim.motion
     instant.t, instant.seed = t, sim.seed
-    if _push(at, sim, data) != record.FINE:
+    if _apply_pushes(address, sim, data) != record.FINE:
         return record.DISTURBANCE_RAISED
-    for j in range(sim.signal_count):
-        signal = signal_at(sim.signals, j)
+    for j in range(sim.disturbance_count):
+        signal = disturbance_at(sim.disturbances, j)
         instant.stream = signal.stream
         if signal.body >= 0:
             continue
         for i in range(sim.n):
             channel = channel_at(sim.channels, i)
             if signal.sees != 0:
-                raised = _look(at, sim, data, signal, i, k)
+                raised = _evaluate_feedback(address, sim, data, signal, i, k)
             elif signal.stream != 0.0 or i == 0:  # without random numbers it is the same in every channel
                 instant.channel = i
-                raised = _call(signal.function, i, at + record.INSTANT_AT, at + record.MOTION_AT)
+                raised = _call(signal.function, i, address + record.INSTANT_AT, address + record.MOTION_AT)
             else:
                 raised = 0
             if raised != 0:
                 return record.DISTURBANCE_RAISED
-            _add(data, channel, motion.value, signal.cartesian != 0)
+            _add_force(data, channel, motion.value, signal.cartesian != 0)
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
-        if not (math.isfinite(data.xfrc_applied[channel.xfrc]) and math.isfinite(data.xfrc_applied[channel.push])):
+        if not (
+            math.isfinite(data.xfrc_applied[channel.xfrc]) and math.isfinite(data.xfrc_applied[channel.horizontal])
+        ):
             return record.DISTURBANCE_NOT_FINITE
-        if channel.direct >= 0 and not math.isfinite(data.qfrc_applied[channel.direct]):
+        if channel.qfrc >= 0 and not math.isfinite(data.qfrc_applied[channel.qfrc]):
             return record.DISTURBANCE_NOT_FINITE
     return record.FINE
 
 
 @njit(error_model="numpy", inline="always")
-def _disturbance(data, channel):
+def _generalised_disturbance(data, channel):
     """Return the generalised force on a channel's joint of the disturbances that act on its body."""
-    if channel.direct >= 0:
-        return data.qfrc_applied[channel.direct]
+    if channel.qfrc >= 0:
+        return data.qfrc_applied[channel.qfrc]
     d = channel.sign * data.xfrc_applied[channel.xfrc]
-    if channel.tip >= 0:
-        d += lever(channel, data.xipos, data.xanchor, data.xaxis) * data.xfrc_applied[channel.push]
+    if channel.hinge_body >= 0:
+        d += lever(channel, data.xipos, data.xanchor, data.xaxis) * data.xfrc_applied[channel.horizontal]
     return d
 
 
 @njit(error_model="numpy")
-def _rub(at, sim, data):
-    """Give every joint its friction by a formula for a physics step, see hardware/sliding.py. Return a failure code."""
-    rubbing, resistance = sim.rubbing, sim.resistance
+def _apply_friction(address, sim, data):
+    """Give every joint its friction by a formula for a physics step, see hardware/sliding.py."""
+    inputs, outputs = sim.friction_input, sim.friction_output
     for i in range(sim.n):
         channel, state, function = channel_at(sim.channels, i), state_at(sim.states, i), function_at(sim.frictions, i)
         x, v, joint = data.qpos[channel.qpos], data.qvel[channel.qvel], channel.qvel
-        rubbing.v, rubbing.motor = v, data.actuator_force[channel.force] if channel.force >= 0 else 0.0
-        rubbing.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
-        rubbing.load += data.qfrc_constraint[joint] + _disturbance(data, channel)
+        inputs.v, inputs.motor = v, data.actuator_force[channel.force] if channel.force >= 0 else 0.0
+        inputs.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
+        inputs.load += data.qfrc_constraint[joint] + _generalised_disturbance(data, channel)
         sim.seen.i = i
-        if _call(function, 0, at + record.RUBBING_AT, at + record.RESISTANCE_AT) != 0:
+        if _call(function, 0, address + record.FRICTION_INPUT_AT, address + record.FRICTION_OUTPUT_AT) != 0:
             return record.FRICTION_RAISED
-        f, low, high = resistance.f, resistance.low, resistance.high
+        f, low, high = outputs.f, outputs.low, outputs.high
         if state.stuck == 0.0:
             slows = abs(v) < SLOW and abs(v) <= abs(state.speed)
             if slows or v * state.speed < 0.0:
                 state.stuck, state.stuck_at = 1.0, x
         if state.stuck != 0.0:
             bristle = pointer(function.memory)
-            bend = bristle[0] * (x - state.stuck_at)
-            if low <= bend <= high and low < high:
-                f = min(max(bend + bristle[1] * v, low), high)
+            spring = bristle[0] * (x - state.stuck_at)
+            if low <= spring <= high and low < high:
+                f = min(max(spring + bristle[1] * v, low), high)
             else:
                 state.stuck = 0.0
         state.speed = v
-        data.ctrl[channel.brake] = -f
+        data.ctrl[channel.friction_ctrl] = -f
     return record.FINE
 
 
@@ -530,8 +536,8 @@ def _sum_forces(sim, data):
         if channel.force >= 0:
             state.force += data.actuator_force[channel.force]
         state.reaction += data.qfrc_constraint[channel.qvel]
-        if channel.friction >= 0:
-            state.reaction += data.actuator_force[channel.friction]
+        if channel.friction_force >= 0:
+            state.reaction += data.actuator_force[channel.friction_force]
 
 
 @njit(error_model="numpy", inline="always")
@@ -546,7 +552,7 @@ def _log(sim, data, k):
         else:
             applied, limit = data.ctrl[channel.ctrl] / sim.scale, pointer(sim.limits)[i]
             # the quotient may round to just beyond the limit
-            sample.applied = min(max(applied, -limit), limit) if sim.has_drives == 0 else state.arrived
-        sample.d = _disturbance(data, channel)
+            sample.applied = min(max(applied, -limit), limit) if sim.has_drives == 0 else state.delayed
+        sample.d = _generalised_disturbance(data, channel)
         sample.force, sample.reaction = state.force / sim.steps, state.reaction / sim.steps
         state.force, state.reaction = 0.0, 0.0

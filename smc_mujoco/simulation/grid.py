@@ -33,7 +33,7 @@ from smc_mujoco.mechanisms.plant import Plant, catalogue
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, DURATION, Condition, find_condition
-from smc_mujoco.simulation.initial_states import SEEDS, Starts
+from smc_mujoco.simulation.initial_states import GRID_SEEDS, Starts
 from smc_mujoco.simulation.model import compile_model, initial_state, with_values
 from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.scenario import U_MAX, Scenario
@@ -124,7 +124,7 @@ def case(
     Args:
       changes: Scenario field -> value, in place of what the condition sets.
     """
-    plant, condition, seed = as_plant(plant), find_condition(condition), whole("seed", seed, 0, SEEDS - 1)
+    plant, condition, seed = as_plant(plant), find_condition(condition), whole("seed", seed, 0, GRID_SEEDS - 1)
     fields: dict[str, Any] = {"plant": plant, "law": _law(plant, law, gains, seed), "duration": duration}
     if plant.name in sets.STUDY:
         fields |= {"control_period": CONTROL_PERIOD, "u_max": U_MAX}

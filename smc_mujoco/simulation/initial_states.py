@@ -1,13 +1,13 @@
 """Initial states of the runs of a grid, one for each seed.
 
-    around = smc.starts(spread=0.2)                    # within 20 % of the plant's own x0, the default of a grid
-    around = smc.starts(x0=0.0, by=0.3)                # within 0.3 rad (or m) of 0
+    smc.starts(spread=0.2)                             # within 20 % of the plant's x0, the default of a grid
+    smc.starts(x0=0.0, by=0.3)                         # within 0.3 rad (or m) of 0
 
 A seed gives every law and every condition the same start. Seed 0 is x0 itself. Seed s starts channel i from
 
     x_i = x0_i (1 + spread z_i) + by z_i,    z_i uniform in [-1, 1], drawn from (s, i)
 
-A run with contacts must start clear of its obstacles. So z_i is replaced by -|z_i|, which moves the start inwards, and
+A run with contacts must start clear of its obstacles. There -|z_i| replaces z_i, which moves the start inwards, and
 pendulums that may touch each other ("bobs") start in order from left to right.
 """
 
@@ -22,19 +22,19 @@ from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, tak
 from smc_mujoco.simulation.scenario import Scenario
 
 SPREAD = 0.2  # of x0, to either side; chosen
-SEEDS = 2**52  # number of a grid's seeds; larger ones are kept for tuning
+GRID_SEEDS = 2**52  # number of a grid's seeds; tuning takes larger ones
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Starts:
-    """Where runs begin, by seed; see `starts`, whose arguments are its fields."""
+    """Where runs begin, by seed. The fields are the arguments of `starts`."""
 
     x0: tuple[float, ...] | None = None
     spread: float = SPREAD
     by: float = 0.0
 
-    def reach(self, scenario: Scenario) -> float:
-        """Return the largest distance from 0 of any channel at a start, rad or m."""
+    def largest(self, scenario: Scenario) -> float:
+        """Return the largest |x| of any channel at the middle of the starts, or `by` if all are 0, rad or m."""
         middle = scenario.resolved.x0 if self.x0 is None else self.x0
         return max(abs(x) for x in middle) or self.by
 
@@ -49,12 +49,12 @@ class Starts:
             scenario = dataclasses.replace(scenario, x0=self.x0)
         if seed == 0:
             return dataclasses.replace(scenario, seed=0)
-        z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(scenario.plant.n)]
         kind = scenario.contact.kind
-        moves = z if kind == "none" else [-abs(factor) for factor in z]
+        z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(scenario.plant.n)]
+        z = z if kind == "none" else [-abs(factor) for factor in z]
         x0 = [
-            x * (1.0 + self.spread * move) + (self.by if x >= 0.0 else -self.by) * move
-            for x, move in zip(scenario.resolved.x0, moves, strict=True)
+            x * (1.0 + self.spread * factor) + (self.by if x >= 0.0 else -self.by) * factor
+            for x, factor in zip(scenario.resolved.x0, z, strict=True)
         ]
         return dataclasses.replace(scenario, seed=seed, x0=sorted(x0) if kind == "bobs" else x0)
 
@@ -63,7 +63,7 @@ def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by
     """Return where the runs of a grid begin, by seed.
 
     Args:
-      x0: the middle of all starts, rad or m: one number for all channels, or one for each. Default: the plant's own.
+      x0: the middle of all starts, rad or m: one number for all channels, or one for each. Default: the plant's x0.
       spread: how far starts lie to either side of the middle, as a fraction of it, 0 or more.
       by: how much farther they lie, rad or m, 0 or more; for a plant that rests at 0.
 

@@ -24,7 +24,7 @@ from smc_mujoco.simulation.scenario import Scenario
 
 USERDATA = 2  # numbers in mjData.userdata: callback.magic() and the address of the simulation's record
 PATH_POINTS = 400  # points that are checked on the path to a start: 1 cm apart on the longest rail
-SHARED = 16  # mechanisms made last that later runs share, as those of a search for gains do: chosen
+MAX_RECENT = 16  # mechanisms that are kept for later runs, as those of a search for gains; chosen
 MAX_OVERLAP = 1e-3  # m, at a start; chosen: bodies in contact overlap by less, so a deeper start begins with a blow
 
 
@@ -74,17 +74,17 @@ class Mechanism:
 
 
 _mechanisms: weakref.WeakValueDictionary[Hashable, Mechanism] = weakref.WeakValueDictionary()  # by structure
-_last: collections.deque[Mechanism] = collections.deque(maxlen=SHARED)
+_recent: collections.deque[Mechanism] = collections.deque(maxlen=MAX_RECENT)
 
 
 def mechanism(scenario: Scenario) -> Mechanism:
-    """Return the Mechanism of a scenario. It is kept while a prepared scenario uses it, or it is one of the last."""
+    """Return the Mechanism of a scenario. It is kept while a prepared scenario uses it, or it is a recent one."""
     key = structure(scenario)
     if (shared := _mechanisms.get(key)) is None:
         base = compile_model(scenario, USERDATA, scenery=False)
         shared = _mechanisms[key] = Mechanism(base, channels(base))
-        if not scenario.plant.own:  # a user's file may change, which is told when it is read
-            _last.append(shared)
+        if not scenario.plant.own:  # a user's file is read again, because it may have changed
+            _recent.append(shared)
     return shared
 
 

@@ -12,35 +12,34 @@ import numpy as np
 from smc_mujoco.common.html import Html, fields, panel
 from smc_mujoco.mechanisms.plant import Plant
 
-SECONDS = ("duration", "control_period", "physics_step", "input_delay")
+FIELDS_IN_SECONDS = ("duration", "control_period", "physics_step", "input_delay")
 MAX_CHANNELS = 8  # of one unit in a panel
-MAX_VALUE = 200  # characters of a value
+MAX_CHARACTERS = 200  # of a value
 
 
 def scenario(s: Any) -> Html:
-    """Return the fields that a scenario was given, and below them the defaults that it resolves to."""
-    defaults = {one.name: one.default for one in dataclasses.fields(s)}
-    given = {name: getattr(s, name) for name in defaults if name not in ("plant", "law")}
-    blank = (None, (), {})
-    plain = {"noise": _nothing(s.noise), "clock": _nothing(s.clock), "contact": s.contact.kind == "none"}
+    """Return the fields that differ from their defaults, and below them the defaults that depend on other fields."""
+    defaults = {f.name: f.default for f in dataclasses.fields(s)}
+    values = {name: getattr(s, name) for name in defaults if name not in ("plant", "law")}
+    absent = {"noise": _all_zero(s.noise), "clock": _all_zero(s.clock), "contact": s.contact.kind == "none"}
     shown = {
         name: value
-        for name, value in given.items()
-        if value not in blank and value != defaults[name] and not plain.get(name, False)
+        for name, value in values.items()
+        if value not in (None, (), {}) and value != defaults[name] and not absent.get(name, False)
     }
     rows = {"plant": s.plant, "law": s.law, "gains": s.law.source, "duration": s.duration} | shown
-    resolved = {name: getattr(s.resolved, name) for name, value in given.items() if value is None}
-    kept = {name: value for name, value in resolved.items() if value is not None}
-    note = ", ".join(f"{name.replace('_', ' ')} {_words(name, value, s)}" for name, value in kept.items())
-    words = {name.replace("_", " "): _words(name, value, s) for name, value in rows.items()}
-    return fields(words, "Scenario", f"by default: {note}" if note else "")
+    resolved = {name: getattr(s.resolved, name) for name, value in values.items() if value is None}
+    by_default = {name: value for name, value in resolved.items() if value is not None}
+    note = ", ".join(f"{name.replace('_', ' ')} {_value_text(name, value, s)}" for name, value in by_default.items())
+    texts = {name.replace("_", " "): _value_text(name, value, s) for name, value in rows.items()}
+    return fields(texts, "Scenario", f"by default: {note}" if note else "")
 
 
 def trace(run: Any) -> Html:
     """Return what was run, how it ended, and small figures of x with its reference, and of u."""
     s = run.scenario
     about = {
-        "plant": _words("plant", s.plant, s),
+        "plant": _value_text("plant", s.plant, s),
         "law": str(s.law),
         "gains": str(s.law.source),
         "samples": f"{len(run.t)}, every {s.control_period:g} s",
@@ -58,22 +57,22 @@ def _panels(run: Any) -> list[Html]:
     """Return a panel of x for each unit, and one of u for each unit of the driven channels."""
     s, plant, panels = run.scenario, run.scenario.plant, []
     for unit in dict.fromkeys(plant.units):
-        channels = [i for i, each in enumerate(plant.units) if each == unit][:MAX_CHANNELS]
+        channels = [i for i, name in enumerate(plant.units) if name == unit][:MAX_CHANNELS]
         reference = run.r[:, channels[0]] if np.nan_to_num(run.r[:, channels]).any() else None
         panels.append(panel(run.t, list(run.x[:, channels].T), f"x ({unit})", reference))
     for unit in dict.fromkeys(s.efforts[: plant.driven]):
-        channels = [i for i, each in enumerate(s.efforts[: plant.driven]) if each == unit][:MAX_CHANNELS]
+        channels = [i for i, name in enumerate(s.efforts[: plant.driven]) if name == unit][:MAX_CHANNELS]
         panels.append(panel(run.t, list(run.u[:, channels].T), f"u ({unit})"))
     return panels
 
 
-def _nothing(noise: object) -> bool:
+def _all_zero(field: object) -> bool:
     """Return whether all numbers of a field are 0."""
-    return dataclasses.is_dataclass(noise) and not any(vars(noise).values())
+    return dataclasses.is_dataclass(field) and not any(vars(field).values())
 
 
-def _words(name: str, value: object, s: Any) -> str:
-    """Return the value of a scenario's field in words."""
+def _value_text(name: str, value: object, s: Any) -> str:
+    """Return the value of a scenario's field as text."""
     plant = s.plant
     if isinstance(value, Plant):
         parameters = ", ".join(f"{key} = {number:g}" for key, number in value.parameters.items())
@@ -86,14 +85,14 @@ def _words(name: str, value: object, s: Any) -> str:
         text = ", ".join(map(str, value))
     elif isinstance(value, float):
         efforts = dict.fromkeys(s.efforts[: plant.driven])
-        unit = " or ".join(efforts) if name == "u_max" else "s" if name in SECONDS else ""
+        unit = " or ".join(efforts) if name == "u_max" else "s" if name in FIELDS_IN_SECONDS else ""
         text = f"{value:g} {unit}".rstrip()
     else:
         text = str(value).removesuffix("()")
-    return text if len(text) <= MAX_VALUE else f"{text[: MAX_VALUE - 3]}..."
+    return text if len(text) <= MAX_CHARACTERS else f"{text[: MAX_CHARACTERS - 3]}..."
 
 
 def _state(values: tuple[float, ...], units: tuple[str, ...], rate: str) -> str:
     """Return positions or velocities with their units, and one number where all are equal."""
-    each = [f"{value:g} {unit}{rate}" for value, unit in zip(values, units, strict=True)]
-    return each[0] if len(set(each)) == 1 else ", ".join(each)
+    texts = [f"{value:g} {unit}{rate}" for value, unit in zip(values, units, strict=True)]
+    return texts[0] if len(set(texts)) == 1 else ", ".join(texts)

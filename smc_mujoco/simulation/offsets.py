@@ -16,7 +16,7 @@ from mujoco.introspect import ast_nodes, structs
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.simulation.controller import Arrays
 
-SCALARS = {
+C_TYPES = {
     "mjtNum": ctypes.c_double,
     "mjtSize": ctypes.c_int64,
     "mjtBool": ctypes.c_bool,
@@ -27,7 +27,7 @@ SCALARS = {
     "uintptr_t": ctypes.c_size_t,
     "uint64_t": ctypes.c_uint64,
 }
-LIVE = """<mujoco><size nuserdata="12345"/><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
+PROBE_MODEL = """<mujoco><size nuserdata="12345"/><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
   <actuator><motor joint="j"/></actuator><sensor><jointpos joint="j"/></sensor></mujoco>"""
 
 
@@ -49,8 +49,8 @@ def _ctype(node: object) -> Any:
             return ctypes.c_void_p
         case ast_nodes.ArrayType():
             return functools.reduce(lambda item, extent: item * extent, reversed(node.extents), _ctype(node.inner_type))
-        case ast_nodes.ValueType() if node.name in SCALARS:
-            return SCALARS[node.name]
+        case ast_nodes.ValueType() if node.name in C_TYPES:
+            return C_TYPES[node.name]
         case ast_nodes.ValueType() if node.name in structs.STRUCTS:
             return _ctype(structs.STRUCTS[node.name])
         case ast_nodes.ValueType() if node.name.startswith("mjt"):  # an enum
@@ -63,23 +63,22 @@ def _ctype(node: object) -> Any:
 
 @functools.cache
 def offsets() -> Offsets:
-    """Return the offsets, each checked against a live MjData."""
-    model = mujoco.MjModel.from_xml_string(LIVE)
-    return checked(model, mujoco.MjData(model))
+    """Return the offsets, checked with a small model."""
+    model = mujoco.MjModel.from_xml_string(PROBE_MODEL)
+    return checked_offsets(model, mujoco.MjData(model))
 
 
-def checked(model: mujoco.MjModel, data: mujoco.MjData) -> Offsets:
+def checked_offsets(model: mujoco.MjModel, data: mujoco.MjData) -> Offsets:
     """Return the introspected offsets, each compared with a live model and its data."""
     offsets = {}
-    places = {"mjModel": ["nuserdata"], "mjData": Offsets._fields[1:]}
-    for (struct, names), live in zip(places.items(), (model, data), strict=True):
+    for struct, names, live in (("mjModel", Offsets._fields[:1], model), ("mjData", Offsets._fields[1:], data)):
         kind = _ctype(structs.STRUCTS[struct])
         for name in names:
             if not (field := getattr(kind, name, None)):
                 raise LayoutError(f"lacks the field {struct}.{name}")
-            shown = getattr(live, name)
-            there = ctypes.c_int64.from_address(live._address + field.offset).value
-            if there != (shown if live is model else shown.ctypes.data):
+            value = getattr(live, name)
+            in_memory = ctypes.c_int64.from_address(live._address + field.offset).value
+            if in_memory != (value if live is model else value.ctypes.data):
                 raise LayoutError(f"does not have {struct}.{name} at byte {field.offset}, where introspection puts it")
             offsets[name] = field.offset
     return Offsets(**offsets)

@@ -25,9 +25,9 @@ class Noise:
     def __post_init__(self):
         for name in ("position", "velocity"):
             object.__setattr__(self, name, number(f"Noise's {name}", getattr(self, name), low=0.0))
-        for error in (self.position_error, self.velocity_error):
-            known = isinstance(error, Signal | None) and not isinstance(error, PerChannel)
-            if not known or (error and (error.random or error.cartesian or error.sees)):
+        for error in self.errors:
+            is_signal = isinstance(error, Signal | None) and not isinstance(error, PerChannel)
+            if not is_signal or (error and (error.random or error.cartesian or error.sees)):
                 cure = "give a known signal, such as smc.Held(times, values)"
                 raise ScenarioError(f"Noise's error is {shown(error)}: {cure}")
 
@@ -39,10 +39,10 @@ class Noise:
 
 @dataclasses.dataclass(frozen=True)
 class Jump:
-    """A change of the plant's parameters from `time`, s, on.
+    """A change of the plant's parameters at `time`, s, for the rest of the run.
 
-    Each is multiplied by its factor in `factors` (parameter name -> factor); those in `plant.added`, such as a payload,
-    grow by it.
+    `factors` has parameter names with the factors that multiply them. For parameters in `plant.added`, such as a
+    payload, it has terms, which are added.
     """
 
     time: float
@@ -54,7 +54,7 @@ class Jump:
 
 
 def parameter_factors(name: str, value: object) -> Frozen[float]:
-    """Return parameter name -> factor, checked. Errors call it `name`."""
+    """Return parameter name -> factor, checked; `name` is for errors."""
     if not isinstance(value, Mapping):
         raise ScenarioError(f"{name} is {shown(value)}: give parameter names with their factors, such as {{'M': 1.3}}")
     return frozen({str(key): number(f"{name} of {key}", factor) for key, factor in value.items()})

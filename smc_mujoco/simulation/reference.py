@@ -1,8 +1,7 @@
 """The reference loop: mj_step, with laws, estimators and signals called as the Python functions they are.
 
 It runs what does not compile. The tests compare the compiled callback with it: the same Scenario must give the same
-Trace. It is written for reading, with numpy's own Philox and none of the callback's code. A step takes tens of
-microseconds.
+Trace. It is written to be read, with numpy's Philox and none of the callback's code. A step takes tens of microseconds.
 """
 
 import math
@@ -14,7 +13,7 @@ import numpy as np
 from smc_mujoco.common import jit
 from smc_mujoco.common.errors import one_line, shown
 from smc_mujoco.common.rebuild import rebuild
-from smc_mujoco.control.component import Component, at
+from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
@@ -32,13 +31,13 @@ from smc_mujoco.simulation.signals import Push, Signal
 from smc_mujoco.simulation.state import LOG
 from smc_mujoco.simulation.trace import Trace, from_log
 
-RAISES = (Exception, SystemExit)  # exceptions of a user's function that end only its own run
-RETURNS = {  # what a component returns, for messages
+USER_EXCEPTIONS = (Exception, SystemExit)  # of a user's function; they end one run
+RETURN_VALUES = {  # kind of a component -> what it returns, for messages
     "law": "the two numbers u, s",
     "surface": "the two numbers s, v_eq",
     "estimator": "a velocity, or a velocity and an acceleration",
 }
-PLANT_DIVERGED = f"{trace.PLANT_DIVERGED[0]} (|x| or |v| above {MAX_STATE:g}, or NaN)"
+PLANT_DIVERGED = f"{trace.PLANT_DIVERGED} (|x| or |v| above {MAX_STATE:g}, or NaN)"
 INTERRUPTED = (
     "other code replaced MuJoCo's control callback during the run, so that its law was not called: "
     "call mujoco.set_mjcb_control before or after the run, or restore what mujoco.get_mjcb_control() returned"
@@ -71,12 +70,12 @@ class Loop:
 
     def __init__(self, scenario: Scenario, mechanism: models.Mechanism):
         self.scenario, n = scenario.resolved, scenario.plant.n
-        self.compiled, table = mechanism.model, mechanism.channels
-        self.model = models.with_values(self.compiled, scenario)
+        self.base, table = mechanism.model, mechanism.channels
+        self.model = models.with_values(self.base, scenario)
         self.data = mujoco.MjData(self.model)
         self.channels = {name: table[name].copy() for name in table.dtype.names or ()}
-        self.driven, self.hinged = self.channels["ctrl"] >= 0, self.channels["tip"] >= 0  # (n,) bool
-        self.rubs, self.forced = self.channels["friction"] >= 0, self.channels["force"] >= 0
+        self.driven, self.hinged = self.channels["ctrl"] >= 0, self.channels["hinge_body"] >= 0  # (n,) bool
+        self.has_friction, self.has_drive = self.channels["friction_force"] >= 0, self.channels["force"] >= 0
         models.put_initial_state(self.model, self.data, scenario)
         self.total = scenario.samples * scenario.steps  # physics steps
         self.calls = 0
@@ -86,22 +85,25 @@ class Loop:
         if isinstance(scenario.plant.nominal, NominalModel):  # compiles, while there is no Python callback
             scenario.plant.nominal(np.zeros(n), np.zeros(n), 0, self.nominal)
         self.signal_memory = [[np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance]
-        self.streams = [scenario.stream(j) for j in range(len(scenario.disturbance))]
+        self.streams = [scenario.noise_stream(j) for j in range(len(scenario.disturbance))]
         self.commands: list[np.ndarray] = []
-        self.latest = np.zeros(n)  # the last command of each channel
+        self.last_u = np.zeros(n)  # commands of the last sample
         self.s, self.r, self.a = np.zeros(n), np.zeros(n), np.zeros(n)
-        self.last_reading = np.zeros((n, 2))  # that was not lost
+        self.last_reading = np.zeros((n, 2))  # positions and velocities, of the last readings that were not lost
         self.forces = np.zeros((2, n))  # sums over a control period: of the drives, of friction and contacts
         self.scale = math.prod(part.scale for part in scenario.actuator)
         self.drive_step = scenario.drive_step
         if self.drive_step:  # both states of the drives
             self.first, self.second = self.drive_step.start(self.data.qvel[self.channels["shaft"]])
         self.limits = np.array(scenario.limits)
-        inertia, formula = self.model.dof_M0[self.channels["qvel"]], self.scenario.sliding
+        inertia, formula = self.model.dof_M0[self.channels["qvel"]], self.scenario.formula_friction
         self.sliding = [] if formula is None else [PythonFriction(formula, i) for i in range(n)]
         self.bristles = [] if formula is None else [formula.bristle(i, inertia[i]) for i in range(n)]
-        self.stuck, self.speed = [math.nan] * n, [0.0] * n  # where joints stick, NaN: they slide; speeds a step before
-        self.arrived = np.zeros(n)  # the commands whose delay has passed
+        self.stuck_at, self.speed = (
+            [math.nan] * n,
+            [0.0] * n,
+        )  # positions of sticking joints, NaN for others; last speeds
+        self.delayed = np.zeros(n)  # the commands whose delay has passed
         self.log = np.full((scenario.samples + 1, n), np.nan, LOG)
         self.failure: str | None = None
         self.failed_step = 0  # physics step
@@ -114,13 +116,13 @@ class Loop:
             mujoco.mj_step(self.model, self.data)
         else:
             mujoco.mj_forward(self.model, self.data)
-        due = min(step + 1, self.total) * self.scenario.stages + (step == self.total)
-        if self.calls != due and self.failure is None:
+        expected_calls = min(step + 1, self.total) * self.scenario.stages + (step == self.total)
+        if self.calls != expected_calls and self.failure is None:
             self.failure, self.failed_step = INTERRUPTED, step
 
     def set_parameters(self, step: int) -> None:
         """Give the mechanism the true parameters that hold from a step on."""
-        models.put_values(self.model, self.compiled, self.scenario, step)
+        models.put_values(self.model, self.base, self.scenario, step)
         mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
 
     def control(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -131,18 +133,18 @@ class Loop:
         self.calls += 1
         try:
             if stage == 0:
-                self.begin(data, step)
+                self.begin_step(data, step)
             fraction = (0.0, 0.5, 0.5, LAST_STAGE)[stage]
             k, within = divmod(step, self.scenario.steps)
             t = k * self.scenario.control_period + (within + fraction) * self.scenario.physics_step
-            d = self.disturb(data, t)
+            d = self.apply_disturbances(data, t)
             if self.sliding:
-                self.rub(data, d)
+                self.apply_friction(data, d)
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.channels["qpos"]], data.qvel[self.channels["qvel"]]
-                reached = self.arrived if self.drive_step else data.ctrl[self.channels["ctrl"]] / self.scale
+                delayed = self.delayed if self.drive_step else data.ctrl[self.channels["ctrl"]] / self.scale
                 applied = np.zeros(len(x))  # the quotient may round to just beyond the limit
-                applied[self.driven] = np.clip(reached[self.driven], -self.limits, self.limits)
+                applied[self.driven] = np.clip(delayed[self.driven], -self.limits, self.limits)
                 sample = (x, v, self.commands[-1], applied, self.s, d, self.r, *self.forces / self.scenario.steps)
                 for name, values in zip(LOG.names or (), sample, strict=True):
                     self.log[name][k] = values
@@ -150,7 +152,7 @@ class Loop:
         except Failure as failure:
             self.failure, self.failed_step = " ".join(str(failure).split()), step
 
-    def begin(self, data: mujoco.MjData, step: int) -> None:
+    def begin_step(self, data: mujoco.MjData, step: int) -> None:
         """Begin a physics step: run the law if it is a sample, and apply the command whose delay has passed."""
         self.sum_forces(data)
         if not ((np.abs(data.qpos) < MAX_STATE).all() and (np.abs(data.qvel) < MAX_STATE).all()):
@@ -160,13 +162,13 @@ class Loop:
             self.commands.append(self.commands[-1] if k else np.zeros(self.scenario.plant.n))
         if within == self.late(k) and not self.missed(k):
             t = k * self.scenario.control_period + within * self.scenario.physics_step
-            self.commands[k], self.s = self.decide(*self.measure(data, k, t), t)
+            self.commands[k], self.s = self.update_law(*self.measure(data, k, t), t)
             for name, values in (("u", self.commands[k]), ("s", self.s), ("r", self.r)):
                 self.log[name][k] = values
         past = step - self.scenario.delay_steps
         if past >= 0 and past % self.scenario.steps >= self.late(past // self.scenario.steps):
-            self.arrived = self.commands[past // self.scenario.steps]
-        command, v = self.arrived, data.qvel[self.channels["shaft"]]
+            self.delayed = self.commands[past // self.scenario.steps]
+        command, v = self.delayed, data.qvel[self.channels["shaft"]]
         if self.drive_step:
             command, self.first, self.second = self.drive_step(command, self.first, self.second, v)
         control = self.scale * command
@@ -177,17 +179,17 @@ class Loop:
 
     def late(self, k: int) -> int:
         """Return by how many physics steps sample k is late."""
-        steps = self.scenario.clock.steps(self.scenario.physics_step)
+        steps = self.scenario.clock.jitter_steps(self.scenario.physics_step)
         if not steps or k in (0, self.scenario.samples):
             return 0
-        return int(words(self.scenario.noise_seed, 0, philox.JITTER, k)[0] * 2.0**-53 * (steps + 1))
+        return int(random_words(self.scenario.noise_seed, 0, philox.JITTER, k)[0] * 2.0**-53 * (steps + 1))
 
     def missed(self, k: int) -> bool:
         """Return whether sample k does not run."""
-        share = self.scenario.clock.missed
-        if not share or k in (0, self.scenario.samples):
+        probability = self.scenario.clock.missed
+        if not probability or k in (0, self.scenario.samples):
             return False
-        return words(self.scenario.noise_seed, 0, philox.MISSED, k)[0] * 2.0**-53 < share
+        return random_words(self.scenario.noise_seed, 0, philox.MISSED, k)[0] * 2.0**-53 < probability
 
     def measure(self, data: mujoco.MjData, k: int, t: float) -> tuple[np.ndarray, np.ndarray]:
         """Return measured positions and estimated velocities, (n,) each, at sample k, at time t, s."""
@@ -195,14 +197,14 @@ class Loop:
         j, sensor = k, self.scenario.sensor
         if sensor is not None and sensor.period is not None:
             j = max(0, math.floor((t - sensor.delay) / sensor.period + 1e-6))
-        errors = [-0.0 if one is None else evaluate(one, t)[0] for one in self.scenario.noise.errors]
+        errors = [-0.0 if signal is None else evaluate(signal, t)[0] for signal in self.scenario.noise.errors]
         for i in range(len(x)):
             x[i], v[i] = self.read(i, x[i] + errors[0], v[i] + errors[1], j)
             v[i], self.a[i] = self.estimator(i, Reading(self.scenario.control_period, float(x[i]), float(v[i])))
         return x, v
 
     def read(self, i: int, x: float, v: float, j: int) -> tuple[float, float]:
-        """Return reading j of channel i: position and velocity after noise, bias, rounding and loss."""
+        """Return reading j of channel i: true position x and velocity v with noise, bias, rounding and loss."""
         sigma, sensor, seed = self.scenario.noise, self.scenario.sensor, self.scenario.noise_seed
         if sigma.position or sigma.velocity:
             z = normals(seed, i, philox.MEASUREMENT, j)
@@ -210,37 +212,37 @@ class Loop:
         if sensor is None:
             return x, v
         x += sensor.bias
-        if q := sensor.quantum(self.channels["tip"][i] >= 0):
+        if q := sensor.quantum(self.channels["hinge_body"][i] >= 0):
             x = q * math.floor(x / q + 0.5)
-        if j > 0 and words(seed, i, philox.DROPOUT, j)[0] * 2.0**-53 < sensor.dropout:
+        if j > 0 and random_words(seed, i, philox.DROPOUT, j)[0] * 2.0**-53 < sensor.dropout:
             return self.last_reading[i, 0], self.last_reading[i, 1]
         self.last_reading[i] = x, v
         return x, v
 
-    def decide(self, x: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+    def update_law(self, x: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
         """Return saturated commands and sliding variables, (n,) each, for measured x and v at time t, s."""
         scenario, n = self.scenario, len(x)
-        added = 0.0 if scenario.feedforward is None else evaluate(scenario.feedforward, t)[0]
-        known = [evaluate(signal, t) for signal in references(scenario)]  # one for all, or one for each
-        motion = np.array([known[i % len(known)] for i in range(n)]).T.copy()
+        feedforward = 0.0 if scenario.feedforward is None else evaluate(scenario.feedforward, t)[0]
+        values = [evaluate(signal, t) for signal in references(scenario)]  # one for all channels, or one for each
+        motion = np.array([values[i % len(values)] for i in range(n)]).T.copy()
         self.r, u, s = np.where(self.driven, motion[0], 0.0), np.zeros(n), np.zeros(n)
         if scenario.law.joint:
-            u, s = self.law.together(self.joint_measurement(x, v, t, motion))
-            return np.array([self.bounded(i, u[i] + added, s[i]) for i in range(n)]), s
+            u, s = self.law.call_joint(self.joint_measurement(x, v, t, motion))
+            return np.array([self.bounded_command(i, u[i] + feedforward, s[i]) for i in range(n)]), s
         for i in np.flatnonzero(self.driven).tolist():
             u[i], s[i] = self.law(i, self.measurement(x, v, t, motion, i))
-            u[i] = self.bounded(i, u[i] + added, s[i])
+            u[i] = self.bounded_command(i, u[i] + feedforward, s[i])
         return u, s
 
     def measurement(self, x: np.ndarray, v: np.ndarray, t: float, motion: np.ndarray, i: int) -> Measurement:
-        """Return what the law of channel i reads; `motion` are the references and their two derivatives, (3, n)."""
+        """Return what the law of channel i reads; `motion` has the references and two derivatives, (3, n)."""
         scenario, r, dr, ddr = self.scenario, *motion[:, i].tolist()
         xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i, i)
         y = Measurement(
             t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g),
             float(ddr if math.isnan(self.a[i]) else self.a[i]), scenario.limits[i], float(scenario.model == "nominal"),
         )  # fmt: skip
-        if (j := i + len(scenario.limits)) < len(x):  # moves with it, without an actuator
+        if (j := i + len(scenario.limits)) < len(x):  # a joint without actuator, which moves with channel i
             fq, gq = self.model_at(x, v, j, i)
             y = y._replace(q=float(x[j]), dq=float(v[j]), fq=float(fq), gq=float(gq))
         if self.surface:
@@ -252,111 +254,113 @@ class Loop:
         """Return what a law of many joints reads, as `measurement` does for one."""
         scenario, (r, dr, ddr) = self.scenario, motion
         return JointMeasurement(
-            t, scenario.control_period, float(scenario.model == "nominal"), OnRequest(scenario, x, v), x.copy(),
+            t, scenario.control_period, float(scenario.model == "nominal"), NominalDynamics(scenario, x, v), x.copy(),
             v.copy(), x - r, v - dr, r, dr, ddr, np.where(np.isnan(self.a), ddr, self.a), self.limits.copy(),
             *dynamics(scenario, x, v),
         )  # fmt: skip
 
-    def bounded(self, i: int, u: float, s: float) -> float:
-        """Return the command u of channel i within its bound, which becomes the channel's latest."""
+    def bounded_command(self, i: int, u: float, s: float) -> float:
+        """Return the command u of channel i within its bound, and keep it in `last_u`."""
         limit = self.limits[i]
-        self.latest[i] = min(max(u, -limit), limit)
+        self.last_u[i] = min(max(u, -limit), limit)
         if not (math.isfinite(u) and math.isfinite(s) and min(abs(u), limit) * max(1.0, self.scale) < MAX_CONTROL):
             raise Failure(f"{self.law.name} returned u = {u:g}, s = {s:g} in channel {i}")
-        return self.latest[i]
+        return self.last_u[i]
 
     def model_at(self, x: np.ndarray, v: np.ndarray, i: int, driven: int) -> tuple[float, float]:
         """Return nominal f and g of channel i, for the u of a driven channel."""
-        f, g = nominal(self.scenario.plant, x, v, i, self.nominal, self.latest)
-        gain, drag = self.scenario.drive
+        f, g = nominal(self.scenario.plant, x, v, i, self.nominal, self.last_u)
+        gain, drag = self.scenario.nominal_drive
         return f - drag * v[driven] * g, gain * g
 
-    def disturb(self, data: mujoco.MjData, t: float) -> np.ndarray:
+    def apply_disturbances(self, data: mujoco.MjData, t: float) -> np.ndarray:
         """Apply the disturbances at time t, s, to the bodies. Return their generalised forces, (n,)."""
         xfrc, at = data.xfrc_applied.ravel(), self.channels
-        xfrc[at["xfrc"]] = xfrc[at["push"]] = 0.0
-        self.add_pushes(data, t)
+        xfrc[at["xfrc"]] = xfrc[at["horizontal"]] = 0.0
+        self.apply_pushes(data, t)
         joints = np.zeros(len(self.driven))  # forces on the joints themselves, in a user's model
         for signal, memory, stream in zip(self.scenario.disturbance, self.signal_memory, self.streams, strict=True):
             if isinstance(signal, Push):
                 continue
             if signal.random:
-                d = [
-                    evaluate(signal, t, state, self.scenario.noise_seed, i, stream)[0] for i, state in enumerate(memory)
-                ]
+                seed = self.scenario.noise_seed
+                d = [evaluate(signal, t, state, seed, i, stream)[0] for i, state in enumerate(memory)]
             elif signal.sees:
-                d = self.look(signal, data, t, memory[0])
+                d = self.feedback_force(signal, data, t, memory[0])
             else:
                 d = evaluate(signal, t)[0]  # the same in all channels
-            matched = at["sign"] * d * self.driven  # only where there is an actuator
+            matched = at["sign"] * d * self.driven  # only on joints with an actuator
             joints += matched
-            xfrc[at["push" if signal.cartesian else "xfrc"]] += d if signal.cartesian else matched
+            xfrc[at["horizontal" if signal.cartesian else "xfrc"]] += d if signal.cartesian else matched
         if self.scenario.plant.direct:
-            xfrc[at["xfrc"]], data.qfrc_applied[at["direct"]] = 0.0, joints
+            xfrc[at["xfrc"]], data.qfrc_applied[at["qfrc"]] = 0.0, joints
         d = joints if self.scenario.plant.direct else at["sign"] * xfrc[at["xfrc"]]
         if self.hinged.any():
-            arm, axis = data.xipos[at["tip"] // 3] - data.xanchor[at["anchor"] // 3], data.xaxis[at["anchor"] // 3]
-            channel, j, k = np.arange(len(d)), at["along"] + 1, (at["along"] + 2) % 3
+            arm, axis = (
+                data.xipos[at["hinge_body"] // 3] - data.xanchor[at["anchor"] // 3],
+                data.xaxis[at["anchor"] // 3],
+            )
+            channel, j, k = np.arange(len(d)), at["axis"] + 1, (at["axis"] + 2) % 3
             turn = axis[channel, j] * arm[channel, k] - axis[channel, k] * arm[channel, j]
-            d[self.hinged] += (turn * xfrc[at["push"]])[self.hinged]
+            d[self.hinged] += (turn * xfrc[at["horizontal"]])[self.hinged]
         if not np.isfinite(d).all():
             raise Failure("the disturbance became NaN or inf")
         return d
 
-    def look(self, signal: Signal, data: mujoco.MjData, t: float, memory: np.ndarray) -> float:
-        """Return the force of a disturbance that sees the loop: decided at the first stage of a sample, then held."""
+    def feedback_force(self, signal: Signal, data: mujoco.MjData, t: float, memory: np.ndarray) -> float:
+        """Return the force of a disturbance that sees the loop: a new one at each sample, constant until the next."""
         k, rest = divmod(self.calls - 1, self.scenario.stages * self.scenario.steps)
         if rest == 0:
             dr = (self.r[0] - self.log["r"][k - 1, 0]) / self.scenario.control_period if k else 0.0
-            at, v = self.channels["qpos"][0], data.qvel[self.channels["qvel"][0]]
-            evaluate(signal, t, memory, float(data.qpos[at] - self.r[0]), float(v - dr), float(self.s[0]))
+            x, v = data.qpos[self.channels["qpos"][0]], data.qvel[self.channels["qvel"][0]]
+            evaluate(signal, t, memory, float(x - self.r[0]), float(v - dr), float(self.s[0]))
         return memory[0]
 
-    def add_pushes(self, data: mujoco.MjData, t: float) -> None:
+    def apply_pushes(self, data: mujoco.MjData, t: float) -> None:
         """Apply the disturbances that push one body each, at time t, s."""
-        pushes = [one for one in self.scenario.disturbance if isinstance(one, Push)]
-        bodies = [self.model.body(one.body).id for one in pushes]
+        pushes = [signal for signal in self.scenario.disturbance if isinstance(signal, Push)]
+        bodies = [self.model.body(push.body).id for push in pushes]
         data.xfrc_applied[bodies, :3] = 0.0
-        for body, one in zip(bodies, pushes, strict=True):
-            data.xfrc_applied[body, :3] += evaluate(one, t)[0] * np.array([one.x, one.y, one.z])
+        for body, push in zip(bodies, pushes, strict=True):
+            data.xfrc_applied[body, :3] += evaluate(push, t)[0] * np.array([push.x, push.y, push.z])
 
-    def rub(self, data: mujoco.MjData, d: np.ndarray) -> None:
-        """Give the joints their friction by a formula for a physics step, under the disturbances d, (n,)."""
+    def apply_friction(self, data: mujoco.MjData, d: np.ndarray) -> None:
+        """Give the joints their friction by a formula for a physics step; d are the disturbances, (n,)."""
         at = self.channels
         for i, formula in enumerate(self.sliding):
             dof = at["qvel"][i]
             x, v = float(data.qpos[at["qpos"][i]]), float(data.qvel[dof])
-            motor = float(data.actuator_force[at["force"][i]]) if self.forced[i] else 0.0
+            motor = float(data.actuator_force[at["force"][i]]) if self.has_drive[i] else 0.0
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof])
             friction, low, high = formula(v, motor, load + float(data.qfrc_constraint[dof] + d[i]))
-            stuck, before = not math.isnan(self.stuck[i]), self.speed[i]
+            stuck, before = not math.isnan(self.stuck_at[i]), self.speed[i]
             slows = abs(v) < SLOW and abs(v) <= abs(before)
             if not stuck and (slows or v * before < 0.0):
-                stuck, self.stuck[i] = True, x
+                stuck, self.stuck_at[i] = True, x
             if stuck:
                 stiffness, damping = self.bristles[i]
-                bend = stiffness * (x - self.stuck[i])
-                if low < high and low <= bend <= high:
-                    friction = min(max(bend + damping * v, low), high)
+                spring = stiffness * (x - self.stuck_at[i])
+                if low < high and low <= spring <= high:
+                    friction = min(max(spring + damping * v, low), high)
                 else:
-                    self.stuck[i] = math.nan
-            self.speed[i], data.ctrl[at["brake"][i]] = v, -friction
+                    self.stuck_at[i] = math.nan
+            self.speed[i], data.ctrl[at["friction_ctrl"][i]] = v, -friction
 
     def sum_forces(self, data: mujoco.MjData) -> None:
         """Add the forces of the last physics step on the joints: of the drives, and of friction and contacts."""
-        self.forces[0] += np.where(self.forced, data.actuator_force[self.channels["force"]], 0.0)
+        self.forces[0] += np.where(self.has_drive, data.actuator_force[self.channels["force"]], 0.0)
         self.forces[1] += data.qfrc_constraint[self.channels["qvel"]]
-        if self.rubs.any():
-            self.forces[1, self.rubs] += data.actuator_force[self.channels["friction"][self.rubs]]
+        if self.has_friction.any():
+            self.forces[1, self.has_friction] += data.actuator_force[self.channels["friction_force"][self.has_friction]]
 
 
 def gains_of(c: Component, n: int = 1) -> tuple:
     """Return the gains of a component as the record that its function reads: vectors (n,) for a law of many joints."""
     values: list[Any] = list(c.gains.values())
     if c.joint:
-        each = c.gains.items()
         values = [
-            at(value, 0) if name in c.shared else np.array([at(value, i) for i in range(n)]) for name, value in each
+            gain_at(value, 0) if name in c.shared else np.array([gain_at(value, i) for i in range(n)])
+            for name, value in c.gains.items()
         ]
     return jit.named(tuple(c.gains))(*(values or [0.0]))
 
@@ -372,12 +376,12 @@ class PythonComponent:
     """
 
     def __init__(self, c: Component, n: int):
-        self.name, self.returns = f"{c.kind} {c.name!r}", RETURNS[c.kind]
+        self.name, self.returns = f"{c.kind} {c.name!r}", RETURN_VALUES[c.kind]
         self.memory = np.zeros((n, c.memory))
         parts = self._parts(c)
-        plain = {id(part.function): part.function for part in parts}  # a callable object may have no hash
-        plain = {key: rebuild(function, lambda inner: inner) for key, function in plain.items()}
-        self.functions, self.sizes = [plain[id(part.function)] for part in parts], [part.memory for part in parts]
+        functions = {id(part.function): part.function for part in parts}  # a callable object may have no hash
+        uncompiled = {key: rebuild(function, lambda inner: inner) for key, function in functions.items()}
+        self.functions, self.sizes = [uncompiled[id(part.function)] for part in parts], [part.memory for part in parts]
         self.bind(c)
 
     def _parts(self, c: Component) -> list[Component]:
@@ -388,9 +392,8 @@ class PythonComponent:
     def bind(self, c: Component) -> None:
         """Take the gains of a component with the same functions."""
         parts = self._parts(c)
-        made = {id(part): part for part in parts}
-        made = {key: gains_of(part, len(parts)) for key, part in made.items()}
-        self.gains = [made[id(part)] for part in parts]
+        gains = {id(part): gains_of(part, len(parts)) for part in {id(part): part for part in parts}.values()}
+        self.gains = [gains[id(part)] for part in parts]
 
     def __call__(self, i: int, y: tuple) -> list[float]:
         """Return its two numbers for channel i; NaN for an acceleration that is not estimated.
@@ -400,18 +403,18 @@ class PythonComponent:
         """
         try:
             out = self.functions[i](y, self.gains[i], self.memory[i, : self.sizes[i]])
-        except RAISES as error:
-            raise raised(self.name, error, f" in channel {i}") from error
+        except USER_EXCEPTIONS as error:
+            raise failure_of(self.name, error, f" in channel {i}") from error
         if isinstance(y, Reading) and not isinstance(out, tuple):
             out = out, math.nan
-        return numbers(self.name, out, self.returns, 2)
+        return as_floats(self.name, out, self.returns, 2)
 
-    def together(self, y: JointMeasurement) -> tuple[np.ndarray, np.ndarray]:
+    def call_joint(self, y: JointMeasurement) -> tuple[np.ndarray, np.ndarray]:
         """Return u and s of a law of many joints, (n,) each; raises as a call."""
         try:
             out = self.functions[0](y, self.gains[0], self.memory)
-        except RAISES as error:
-            raise raised(self.name, error) from error
+        except USER_EXCEPTIONS as error:
+            raise failure_of(self.name, error) from error
         n = len(self.memory)
         try:
             u, s = (np.asarray(values, float) for values in out)
@@ -427,19 +430,19 @@ class PythonFriction:
 
     def __init__(self, friction: Sliding, i: int):
         self.name, self.value = type(friction).__name__, type(friction).value
-        self.numbers = jit.named(friction.names)(*(friction.parameters(i) or [0.0]))
+        self.parameters = jit.named(friction.names)(*(friction.parameters(i) or [0.0]))
 
     def __call__(self, v: float, motor: float, load: float) -> list[float]:
-        """Return what resists, and the bounds of what holds."""
+        """Return the sliding friction, and both bounds of the static friction."""
         try:
-            out = self.value(v, motor, load, self.numbers)
-        except RAISES as error:
-            raise raised(f"friction {self.name}", error) from error
-        return numbers(f"friction {self.name}", out, "a force and two bounds", 3)
+            out = self.value(v, motor, load, self.parameters)
+        except USER_EXCEPTIONS as error:
+            raise failure_of(f"friction {self.name}", error) from error
+        return as_floats(f"friction {self.name}", out, "a force and two bounds", 3)
 
 
-class OnRequest:
-    """What `coriolis` and `jacobian` of control.joint_law call in the reference loop."""
+class NominalDynamics:
+    """The nominal mechanism, as `coriolis` and `jacobian` of control.joint_law call it in the reference loop."""
 
     def __init__(self, scenario: Scenario, x: np.ndarray, v: np.ndarray):
         self.scenario, self.x, self.v = scenario, x, v
@@ -449,7 +452,7 @@ class OnRequest:
         plant, nominal = self.scenario.plant, self.nominal
         if nominal is None:
             return np.zeros(len(self.x))
-        return nominal.coriolis(self.x, self.v, w, Values(**plant.parameters)) / self.scenario.drive.gain
+        return nominal.coriolis(self.x, self.v, w, Values(**plant.parameters)) / self.scenario.nominal_drive.gain
 
     def jacobian(self) -> np.ndarray:
         """Return the tip's Jacobian, (3, n)."""
@@ -467,15 +470,15 @@ class OnRequest:
 
 def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
     """Return the M, h and g that a law of many joints sees at measured x and v, (n,) each, per unit of u."""
-    plant, n, (gain, drag) = scenario.plant, len(x), scenario.drive
+    plant, n, (gain, drag) = scenario.plant, len(x), scenario.nominal_drive
     if scenario.resolved.model == "none":
         return Dynamics(np.eye(n), np.zeros(n), np.zeros(n))
     values = Values(**plant.parameters)
     if isinstance(plant.nominal, NominalModel):
         try:
             terms = plant.nominal.dynamics(x, v, values)
-        except RAISES as error:
-            raise raised(f"the nominal model of {plant.name}", error) from error
+        except USER_EXCEPTIONS as error:
+            raise failure_of(f"the nominal model of {plant.name}", error) from error
     else:
         moving, resting = (
             np.array([nominal(plant, x, rate, i, values, np.zeros(n)) for i in range(n)], float)
@@ -489,37 +492,37 @@ def evaluate(signal: Signal, t: float, *state: Any) -> list[float]:
     """Return a signal and its two derivatives at time t, s.
 
     Args:
-      state: memory, seed, channel and stream, which only process noise reads; or memory, e, e' and s, which only a
-        disturbance reads that sees the loop.
+      state: memory, seed, channel and stream, for process noise; or memory, e, e' and s, for a disturbance that sees
+        the loop. Other signals do not read it.
     """
     name = type(signal).__name__
     try:
         inputs = state if signal.random or signal.sees else (signal.data,) if signal.series else ()
         out = type(signal).value(t, signal, *inputs)
-    except RAISES as error:
-        raise raised(name, error) from error
-    return numbers(name, out, "a value and two derivatives", 3)
+    except USER_EXCEPTIONS as error:
+        raise failure_of(name, error) from error
+    return as_floats(name, out, "a value and two derivatives", 3)
 
 
 def nominal(plant: Plant, x: np.ndarray, v: np.ndarray, i: int, values: Values, u: np.ndarray) -> tuple[float, float]:
     """Return nominal f and g of channel i. The model of coupled channels also depends on the last commands u, (n,)."""
     try:
         return plant.nominal(x, v, i, values, *((u,) if isinstance(plant.nominal, NominalModel) else ()))
-    except RAISES as error:
-        raise raised(f"the nominal model of {plant.name}", error) from error
+    except USER_EXCEPTIONS as error:
+        raise failure_of(f"the nominal model of {plant.name}", error) from error
 
 
-def raised(name: str, error: BaseException, where: str = "") -> Failure:
+def failure_of(name: str, error: BaseException, where: str = "") -> Failure:
     """Return the Failure for an exception of a user's function."""
     try:
         text = str(error)
-    except RAISES:
+    except USER_EXCEPTIONS:
         text = "its text cannot be shown"
     return Failure(f"{name} raised {type(error).__name__} ({one_line(text)}){where}")
 
 
-def numbers(name: str, out: Any, expected: str, count: int) -> list[float]:
-    """Return what a user's function returned, as `count` floats."""
+def as_floats(name: str, out: Any, expected: str, count: int) -> list[float]:
+    """Return the result of a user's function as `count` floats; raise Failure if it is anything else."""
     try:
         values = [float(value) for value in out]
     except (TypeError, ValueError, OverflowError):
@@ -530,15 +533,15 @@ def numbers(name: str, out: Any, expected: str, count: int) -> list[float]:
 
 
 def normals(seed: int, channel: int, stream: int, k: int) -> tuple[float, float]:
-    """Return the numbers of philox.normals, from numpy's own generator."""
-    first, second = words(seed, channel, stream, k)
+    """Return the numbers of philox.normals, from numpy's generator."""
+    first, second = random_words(seed, channel, stream, k)
     radius = math.sqrt(-2.0 * math.log((first + 1) * 2.0**-53))
     angle = 2.0 * math.pi * second * 2.0**-53
     return radius * math.cos(angle), radius * math.sin(angle)
 
 
-def words(seed: int, channel: int, stream: int, k: int) -> tuple[int, int]:
-    """Return two whole numbers of 53 random bits, from numpy's own generator."""
-    before = (k - 1 + (stream << 64)) % 2**256
-    first, second = np.random.Philox(key=seed + (channel << 64), counter=before).random_raw(2)
+def random_words(seed: int, channel: int, stream: int, k: int) -> tuple[int, int]:
+    """Return two whole numbers of 53 random bits, from numpy's generator."""
+    counter = (k - 1 + (stream << 64)) % 2**256
+    first, second = np.random.Philox(key=seed + (channel << 64), counter=counter).random_raw(2)
     return int(first) >> 11, int(second) >> 11

@@ -1,4 +1,4 @@
-"""Scenarios to traces: grouped by layout, in batches that are bounded in memory.
+"""From scenarios to traces, in batches of bounded memory.
 
 A group shares the plant, its size and the kinds of its parts (but not their numbers), the integrator, the physics step
 and the number of steps. Its scenarios may differ in parameters, friction levels, laws, gains, signals, delays and
@@ -25,7 +25,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 BATCH_BYTES = 256 * 2**20  # of logs and records in one Batch
-MIN_TRIM_RUNS = 64  # runs of a batch from which on returning its memory is worth the time; chosen
+MIN_TRIM_RUNS = 64  # runs of a batch; its memory is returned to the system only if it had as many; chosen
 
 
 class PlainLoopWarning(UserWarning):
@@ -58,11 +58,11 @@ def run(
     MuJoCo's callbacks are global to the process. During a run no other callback is called, and a run fails if somebody
     sets the control callback meanwhile.
     """
-    many = list(_prepared([scenarios] if isinstance(scenarios, Scenario) else scenarios))
-    work = sum(one.scenario.work for one in many)
-    with bar(f"{len(many)} run{'s' * (len(many) != 1)}", work, shown=progress) as drawn:
-        traces = dict(stream(many, threads, drawn.advance))
-    return traces[0] if isinstance(scenarios, Scenario) else [traces[i] for i in range(len(many))]
+    prepared = list(_prepared([scenarios] if isinstance(scenarios, Scenario) else scenarios))
+    work, count = sum(item.scenario.work for item in prepared), len(prepared)
+    with bar(f"{count} run{'s' * (count != 1)}", work, shown=progress) as progress_bar:
+        traces = dict(stream(prepared, threads, progress_bar.advance))
+    return traces[0] if isinstance(scenarios, Scenario) else [traces[i] for i in range(count)]
 
 
 def stream(
@@ -73,22 +73,22 @@ def stream(
     """Yield pairs (index, Trace) as soon as their batch is done. At most one batch is in memory."""
     threads = cores(threads)
     groups: dict[Hashable, list[tuple[int, Prepared]]] = {}
-    slow: list[tuple[int, Prepared]] = []
+    uncompiled: list[tuple[int, Prepared]] = []
     for index, prepared in enumerate(_prepared(scenarios)):
         if prepared.why_not:
             warnings.warn(f"{prepared.why_not}; the run takes the reference loop", PlainLoopWarning, users_frame())
-            slow.append((index, prepared))
+            uncompiled.append((index, prepared))
         else:
             groups.setdefault(prepared.key, []).append((index, prepared))
     for group in groups.values():
         for batch in _batches(group, threads):
-            ready = [prepared for _, prepared in batch]
-            with callback.installed(), memory_for(ready):
-                traces = ScenarioBatch(ready, threads).run(report)
+            items = [prepared for _, prepared in batch]
+            with callback.installed(), memory_for(items):
+                traces = ScenarioBatch(items, threads).run(report)
             if len(batch) >= MIN_TRIM_RUNS:
                 return_freed_memory()
             yield from zip((index for index, _ in batch), traces, strict=True)
-    for index, prepared in slow:
+    for index, prepared in uncompiled:
         with memory_for([prepared]):
             trace = reference.simulate(prepared.scenario, prepared.mechanism)
         yield index, trace
@@ -103,7 +103,7 @@ def memory_for(prepared: Sequence[Prepared]) -> Iterator[None]:
     except (MemoryError, ValueError, mujoco.FatalError) as error:  # MuJoCo raises any of the three
         if not (isinstance(error, MemoryError) or "allocate memory" in str(error)):
             raise
-        count, needed = len(prepared), sum(one.bytes for one in prepared) / 2**20
+        count, needed = len(prepared), sum(item.bytes for item in prepared) / 2**20
         raise ScenarioError(
             f"no memory for {count} run{'s' * (count > 1)} at once, about {needed:.0f} MiB beside the traces kept so "
             "far: give a shorter duration, a longer control period or fewer channels, or take traces from smc.stream"

@@ -1,8 +1,8 @@
 """A scenario: everything that defines a run, as plain data, checked when it is made.
 
-A scenario keeps what it was given, and None where a default depends on other fields. `scenario.resolved` has these
-defaults, too. The true mechanism is set by `plant`, `mismatch`, `jump`, friction, contact, actuator and sensor. The law
-knows at most the plant's nominal parameters.
+A field is None if it was left out and its default depends on other fields. `scenario.resolved` has these defaults. The
+true mechanism is set by `plant`, `mismatch`, `jump`, friction, contact, actuator and sensor. The law knows at most the
+plant's nominal parameters.
 """
 
 import copy
@@ -20,7 +20,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, users_frame
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.control.component import Template, written
+from smc_mujoco.control.component import Template, gain_text
 from smc_mujoco.control.estimator import Estimator, estimator
 from smc_mujoco.control.law import Law, fits
 from smc_mujoco.control.surface import Surface
@@ -44,19 +44,19 @@ MAX_TIME = 1e9  # s, of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
-JITTER_STEPS = 4  # physics steps in the clock's jitter, at least; chosen: it takes five values or more
-SHORT_LAG = 0.02  # control periods: a shorter lag needs no shorter physics step, see `longest_step`
-DRIVE_STEPS = 4  # per control period, that are enough behind any drive, see `longest_step`
+MIN_JITTER_STEPS = 4  # physics steps in the clock's jitter; chosen: the delay of a sample has five values or more
+MIN_RESOLVED_LAG = 0.02  # control periods: a shorter lag needs no shorter physics step, see `longest_step`
+DRIVE_STEPS = 4  # physics steps per control period: enough behind any drive, see `longest_step`
 MAX_DEFAULT_STEPS = 100_000  # per control period, if no physics step is given
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 MAX_ANGLE = 3.0 * math.pi  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
 MAX_DEGREES = 720.0  # chosen; a number above this is not taken for degrees
-MAX_RATE = 100.0  # rad/s: chosen, 16 turns a second
-MAX_GAP = 0.5  # rad: chosen, 29 degrees of play
+MAX_SPEED = 100.0  # rad/s: chosen, 16 turns a second
+MAX_BACKLASH = 0.5  # rad: chosen, 29 degrees of play
 MIN_PERCENT = 10.0  # factor of a mismatch: chosen; multiples of five from here on may be percent
-MAX_CONDITION = 1e12  # of a mass matrix; chosen: its inverse has 4 digits
-MIN_MILLISECONDS = 1.0  # s, of an input delay: chosen; no plant here tolerates as much, so it may be ms
+MAX_CONDITION_NUMBER = 1e12  # of a mass matrix; chosen: its inverse has 4 digits
+MAX_INPUT_DELAY = 1.0  # s: chosen; no plant here tolerates as much, so a longer one may be in ms
 
 Out = TypeVar("Out")
 
@@ -112,11 +112,11 @@ class Scenario:
       sensor: an Encoder, or None: position and velocity as they are, with `noise`.
       condition: name of the run's condition in a grid, set by `named`; dataclasses.replace drops it.
 
-    A field is None where nothing was given and its default depends on other fields: model, physics_step, u_max, x0, v0,
+    Defaults that depend on other fields are None until they are resolved: model, physics_step, u_max, x0, v0,
     reference, velocity and integrator. `resolved` is the same scenario with these defaults. dataclasses.replace keeps
-    None, so that a default follows the fields that it depends on. Only the law is never None: one that is left out is
-    taken from the plant's channels at once. Scenarios whose resolved fields are equal are equal, and give the same
-    trace to the last bit.
+    None, so that a default follows the fields that it depends on. The law is never None: the default, that of the
+    plant's channels, is taken at once. Scenarios whose resolved fields are equal are equal, and give the same trace to
+    the last bit.
 
     Raises:
       ScenarioError: a value out of its range, or values that do not fit together, in one sentence.
@@ -159,11 +159,6 @@ class Scenario:
     sensor: Encoder | None = field(coerce.instance(Encoder, "smc.Encoder(counts=...)"), None)
     condition: str | None = dataclasses.field(default=None, init=False, repr=False)
 
-    def __new__(cls, *_: Any, **given: Any) -> "Scenario":
-        if "controller" in given:  # Python itself would suggest control_period
-            raise TypeError("Scenario has no field 'controller': give the law as law=")
-        return object.__new__(cls)
-
     if TYPE_CHECKING:  # what the converters take, which a type checker cannot see
 
         def __init__(
@@ -205,23 +200,22 @@ class Scenario:
 
     @classmethod
     def recorded(cls, **fields: Any) -> "Scenario":
-        """Make the scenario of a recorded run, without the rules and warnings that only new runs must meet.
+        """Make the scenario of a recorded run, without the rules and warnings of `check_new`.
 
         Raises:
-          ScenarioError: values that no version of the package could have run.
+          ScenarioError: values that cannot be run.
         """
-        made = object.__new__(cls)
-        for one in dataclasses.fields(cls):
-            object.__setattr__(made, one.name, fields.get(one.name, one.default))
-        made._convert()
-        check(made.resolved)
-        return made
+        scenario = object.__new__(cls)
+        vars(scenario).update({f.name: fields.get(f.name, f.default) for f in dataclasses.fields(cls)})
+        scenario._convert()
+        check(scenario.resolved)
+        return scenario
 
     def _convert(self) -> None:
         """Convert every field from what the user gave."""
-        for one in dataclasses.fields(self):
-            if convert := one.metadata.get("convert"):
-                vars(self)[one.name] = convert(one.name, getattr(self, one.name), self)  # the class is frozen
+        for f in dataclasses.fields(self):
+            if convert := f.metadata.get("convert"):
+                vars(self)[f.name] = convert(f.name, getattr(self, f.name), self)  # the class is frozen
 
     @functools.cached_property
     def noise_seed(self) -> int:
@@ -238,17 +232,17 @@ class Scenario:
 
     def _values(self) -> tuple:
         """Return all fields that decide the run."""
-        return tuple(getattr(self, one.name) for one in dataclasses.fields(self) if one.init)
+        return tuple(getattr(self, name) for name in self.fields())
 
     def __getstate__(self) -> dict[str, Any]:
-        return {one.name: getattr(self, one.name) for one in dataclasses.fields(self)}  # a copy resolves again
+        return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # a copy resolves again
 
     @functools.cached_property
     def resolved(self) -> "Resolved":
         """This scenario with the defaults that depend on other fields."""
-        made = object.__new__(Resolved)
-        vars(made).update(self.__getstate__() | _defaults(self))
-        return made
+        resolved = object.__new__(Resolved)
+        vars(resolved).update(self.__getstate__() | _defaults(self))
+        return resolved
 
     def _repr_html_(self) -> str:
         from smc_mujoco.simulation import notebook
@@ -257,52 +251,51 @@ class Scenario:
 
     @classmethod
     def fields(cls) -> tuple[str, ...]:
-        """Return the names of the fields that a call may give."""
-        return tuple(field.name for field in dataclasses.fields(cls) if field.init)
+        """Return the names of the fields that can be set."""
+        return tuple(f.name for f in dataclasses.fields(cls) if f.init)
 
     def named(self, condition: str | None) -> "Scenario":
         """Return this scenario with a name for its condition. Tables show it; the run is the same."""
-        made = copy.copy(self)
-        object.__setattr__(made, "condition", condition)
-        return made
+        scenario = copy.copy(self)
+        object.__setattr__(scenario, "condition", condition)
+        return scenario
 
     @property
     def realistic(self) -> bool:
         """Whether the mechanism is more than the plant's equation."""
-        parts = self.friction or self.actuator or self.contact.kind != "none" or self.mechanism != "equation"
-        return bool(parts or not self.plant.smooth)
+        return bool(self.actuator) or not self.plain_equation
 
     @property
-    def ideal(self) -> bool:
-        """Whether MuJoCo integrates the plant's plain equation, behind drives or none."""
-        bare = not self.friction and self.contact.kind == "none" and self.mechanism == "equation"
-        return bare and self.plant.smooth and all(part.drives for part in self.actuator)
+    def plain_equation(self) -> bool:
+        """Whether MuJoCo integrates only the plant's equation, also behind drives."""
+        without_parts = not self.friction and self.contact.kind == "none" and self.mechanism == "equation"
+        return without_parts and self.plant.smooth and all(part.drives for part in self.actuator)
 
     @property
-    def amplifier(self) -> DCMotor | None:
-        """The motor whose voltage u is; None if u is a force."""
+    def voltage_motor(self) -> DCMotor | None:
+        """The DC motor that has its voltage as u; None if u is a force."""
         return next((part for part in self.actuator if isinstance(part, DCMotor) and part.unit), None)
 
     @property
     def efforts(self) -> tuple[str, ...]:
         """Unit of u in each channel, (n,): that of the joint's force, or "V"."""
-        return self.plant.efforts if self.amplifier is None else (self.amplifier.unit,) * self.plant.n
+        return self.plant.efforts if self.voltage_motor is None else (self.voltage_motor.unit,) * self.plant.n
 
     @functools.cached_property
     def limits(self) -> tuple[float, ...]:
-        """The bound on |u| of each driven channel, in its unit: the lesser of u_max and its motor's own limit."""
+        """The bound on |u| of each driven channel, in its unit: the lesser of u_max and its motor's limit."""
         u_max = self.resolved.u_max
         bounds = u_max if isinstance(u_max, tuple) else (u_max,) * self.plant.driven
-        if self.amplifier is not None:
-            return tuple(min(bound, self.amplifier.voltage) for bound in bounds)
+        if self.voltage_motor is not None:
+            return tuple(min(bound, self.voltage_motor.voltage) for bound in bounds)
         limits = self.plant.limits or bounds
         return tuple(min(bound, limit) for bound, limit in zip(bounds, limits, strict=True))
 
     @property
     def references(self) -> tuple[Signal, ...]:
         """The reference of each driven channel."""
-        one = self.resolved.reference
-        return one.signals if isinstance(one, PerChannel) else (one,) * self.plant.driven
+        reference = self.resolved.reference
+        return reference.signals if isinstance(reference, PerChannel) else (reference,) * self.plant.driven
 
     @functools.cached_property
     def steps(self) -> int:
@@ -335,7 +328,7 @@ class Scenario:
         return -1 if self.jump is None else math.ceil(self.jump.time / self.resolved.physics_step - 1e-6)
 
     @property
-    def sliding(self) -> Sliding | None:
+    def formula_friction(self) -> Sliding | None:
         """The friction by a formula, which the callback evaluates; None without one."""
         return next((part for part in self.friction if isinstance(part, Sliding)), None)
 
@@ -346,27 +339,23 @@ class Scenario:
 
     @property
     def work(self) -> int:
-        """Physics steps times channels: the cost of a run, as progress bars and batches count it."""
+        """Physics steps times channels: a measure of the run's cost."""
         return self.samples * self.steps * self.plant.n
 
-    def stream(self, i: int) -> int:
+    def noise_stream(self, i: int) -> int:
         """The number of the random stream of disturbance i; 0 for a disturbance without randomness."""
-        if not 0 <= i < len(self.disturbance):
-            raise ScenarioError(
-                f"there is no disturbance {shown(i)}: the scenario has {len(self.disturbance)}, from 0 on"
-            )
         random = [d.random for d in self.disturbance]
         return PROCESS + sum(random[:i]) if random[i] else 0
 
     @functools.cached_property
-    def drive(self) -> Nominal:
-        """Force of the actuator per unit of u and per velocity, as the law's model knows it."""
-        return Nominal() if self.amplifier is None else self.amplifier.nominal
+    def nominal_drive(self) -> Nominal:
+        """The actuator in the nominal model: its force is gain u - drag v."""
+        return Nominal() if self.voltage_motor is None else self.voltage_motor.nominal
 
     def factors(self, step: int) -> dict[str, float]:
-        """Return the true plant's parameter factors at a physics step: the mismatch, and from its time on the jump.
+        """Return the true plant's parameter factors at a physics step: the mismatch, times the jump from its time on.
 
-        For the parameters in `plant.added` it is what is added to them.
+        For the parameters in `plant.added` they are terms, which are added.
         """
         factors = dict(self.mismatch)
         if self.jump is not None and step >= self.jump_step:
@@ -377,7 +366,7 @@ class Scenario:
 
 
 class Resolved(Scenario):
-    """A scenario whose every default is known: no field that a run needs is None."""
+    """A scenario with all defaults: these fields are not None."""
 
     model: str
     physics_step: float
@@ -400,16 +389,16 @@ class Resolved(Scenario):
 
 def _defaults(s: Scenario) -> dict[str, Any]:
     """Return the defaults of the fields that are None."""
-    in_order = s.contact.kind == "bobs"  # pendulums in a row must not start across each other
+    in_order = s.contact.kind == "bobs"  # pendulums in a row must not start beyond each other
     defaults = {
         "model": "nominal" if s.law.requires_model else "none",
-        "physics_step": s.control_period / _steps(s),
-        "u_max": suggested_u_max(s.plant) if s.amplifier is None else s.amplifier.voltage,
+        "physics_step": s.control_period / _default_steps(s),
+        "u_max": suggested_u_max(s.plant) if s.voltage_motor is None else s.voltage_motor.voltage,
         "x0": tuple(sorted(s.plant.x0)) if in_order else s.plant.x0,
         "v0": (0.0,) * s.plant.n,
         "reference": coerce.suggested_reference(s.plant),
         "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
-        "integrator": "RK4" if s.ideal else "implicitfast",
+        "integrator": "RK4" if s.plain_equation else "implicitfast",
     }
     return {name: value for name, value in defaults.items() if getattr(s, name) is None}
 
@@ -422,23 +411,23 @@ def longest_step(s: Scenario) -> float:
     (omega step)^2/12 of it. With four steps that is 5 % for the fastest cycle of a sampled law, of two samples. Half of
     a long lag, behind which cycles are slower, does as well. A force that follows at once stays where it is in a step.
     """
-    jitter = s.clock.jitter / JITTER_STEPS or MAX_STEP
-    if not s.ideal:
+    jitter = s.clock.jitter / MIN_JITTER_STEPS or MAX_STEP
+    if not s.plain_equation:
         return min(REALISTIC_STEP, jitter)
-    moving = [part for part in s.actuator if part.delay >= SHORT_LAG * s.control_period or part.limited]
+    moving = [part for part in s.actuator if part.delay >= MIN_RESOLVED_LAG * s.control_period or part.limited]
     return min(MAX_STEP, jitter, *(max(0.5 * part.delay, s.control_period / DRIVE_STEPS) for part in moving))
 
 
-def _steps(s: Scenario) -> int:
+def _default_steps(s: Scenario) -> int:
     """Return the default number of physics steps per control period.
 
-    Behind a drive it is one of which the input delay is a whole number of steps, if up to four times as many do.
+    Behind a drive the input delay should be a whole number of steps: up to four times as many steps are tried for that.
     """
-    longest = max(longest_step(s), s.control_period / MAX_DEFAULT_STEPS)  # what this is too long for is refused later
-    fewest = math.ceil(s.control_period / longest - 1e-9)
+    longest = max(longest_step(s), s.control_period / MAX_DEFAULT_STEPS)  # scenarios that need less are refused later
+    minimum = math.ceil(s.control_period / longest - 1e-9)
     delay = s.input_delay / s.control_period
-    fitting = (n for n in range(fewest, 4 * fewest + 1) if abs(math.remainder(delay * n, 1.0)) < 1e-6)
-    return next(fitting, fewest) if s.actuator else fewest
+    fitting = (n for n in range(minimum, 4 * minimum + 1) if abs(math.remainder(delay * n, 1.0)) < 1e-6)
+    return next(fitting, minimum) if s.actuator else minimum
 
 
 def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
@@ -464,9 +453,8 @@ def check(s: Resolved) -> None:
 
 
 def check_new(s: Resolved) -> None:
-    """Raise ScenarioError, or warn, for what recorded runs may have and new ones should not."""
+    """Raise ScenarioError, or warn, for what only recorded runs may have."""
     check_ranges(s.plant.name, s.plant.ranges, s.x0)
-    check_joints(s)
     check_inertia(s)
     check_names(s)
     warn_of_degrees(s)
@@ -519,11 +507,11 @@ def check_signals(s: Resolved) -> None:
             f"disturbance {shown(forces[0])} is a force on a body, and disturbances of {s.plant.name} act on its "
             "joints: give another signal"
         )
-    known = [("reference", one, "a smooth signal") for one in dict.fromkeys(s.references)]
-    known += [("feedforward", s.feedforward, "a known signal of u")] if s.feedforward else []
-    for name, signal, cure in known:
+    functions_of_time = [("reference", signal, "a smooth signal") for signal in dict.fromkeys(s.references)]
+    functions_of_time += [("feedforward", s.feedforward, "a known signal of u")] if s.feedforward else []
+    for name, signal, cure in functions_of_time:
         kinds = {"a force": signal.cartesian, "noise": signal.random, "one that sees the loop": signal.sees}
-        for kind in (kind for kind, holds in kinds.items() if holds):
+        for kind in (kind for kind, applies in kinds.items() if applies):
             raise ScenarioError(f"{name} is {type(signal).__name__}, which is {kind}: give {cure}")
 
 
@@ -547,7 +535,7 @@ def check_law(s: Resolved) -> None:
     for law in s.law.parts:
         if s.surface is not None:
             check_surface(s.surface, law)
-        period = getattr(law.function, "control_period", None)  # for which a discrete controller is
+        period = getattr(law.function, "control_period", None)  # of a discrete controller
         if period is not None and abs(s.control_period - period) > 1e-9 * period:
             raise ScenarioError(
                 f"law {law.name!r} is discretised for {period:g} s, and control_period is {s.control_period:g} s: give "
@@ -574,11 +562,16 @@ def check_channels(s: Resolved) -> None:
     for name, value in s.law.gains.items():
         if isinstance(value, tuple) and len(value) != s.plant.driven:
             raise ScenarioError(
-                f"gain {name} of {s.law.name} has {len(value)} values, {written(value)}, and {s.plant.name} has "
+                f"gain {name} of {s.law.name} has {len(value)} values, {gain_text(value)}, and {s.plant.name} has "
                 f"{s.plant.driven} driven channels: give one number, or {s.plant.driven}"
             )
     if not s.law.joint:
         return
+    if s.plant.n == 1:
+        raise ScenarioError(
+            f"law {s.law.name!r} is of many joints, and {s.plant.name} has one: give a law of one channel, such as "
+            "'computed_torque'"
+        )
     joints = getattr(s.law.function, "joints", s.plant.n)  # of C code
     if joints != s.plant.n:
         raise ScenarioError(
@@ -594,20 +587,11 @@ def check_channels(s: Resolved) -> None:
         raise ScenarioError(f"law {s.law.name!r} is of many joints and has its own surface: leave the surface out")
 
 
-def check_joints(s: Resolved) -> None:
-    """Check that a law of many joints has more than one."""
-    if s.law.joint and s.plant.n == 1:
-        raise ScenarioError(
-            f"law {s.law.name!r} is of many joints, and {s.plant.name} has one: give a law of one channel, such as "
-            "'computed_torque'"
-        )
-
-
 def check_inertia(s: Resolved) -> None:
-    """Check that the M which a law of many joints sees can be inverted at the start."""
+    """Check that the nominal M of a law of many joints can be inverted at the start."""
     if s.law.joint and s.model == "nominal" and isinstance(s.plant.nominal, NominalModel):
         M = s.plant.nominal.dynamics(np.array(s.x0), np.array(s.v0), s.plant.values({})).M
-        if not np.linalg.cond(M) < MAX_CONDITION:
+        if not np.linalg.cond(M) < MAX_CONDITION_NUMBER:
             raise ScenarioError(
                 f"the mass matrix of {s.plant.name} is singular at x0 {shown(s.x0)}, as where two joints move the same "
                 "bodies in the same way: drive one of them, or give another x0"
@@ -624,7 +608,7 @@ def check_names(s: Resolved) -> None:
 
 
 def check_mechanism(s: Resolved) -> None:
-    """Check that the integrator suits the parts, and mechanism and contact the parameters at any time."""
+    """Check that the integrator suits the parts, and that mechanism and contact suit the parameters at any time."""
     if s.integrator == "RK4" and (states := [p for p in s.friction if p.stateful]):
         raise ScenarioError(
             f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the integrator out"
@@ -642,12 +626,12 @@ def check_parameters(plant: Plant, name: str, factors: Mapping[str, float]) -> N
     """Raise ScenarioError for parameter factors that the plant's mechanism cannot have."""
     values = plant.values(factors)
     if name != "equation":
-        list(plant.mechanisms[name].fields(built(plant, name), values))
+        list(plant.mechanisms[name].fields(mechanism_model(plant, name), values))  # raises for them
 
 
 @functools.lru_cache(maxsize=16)
-def built(plant: Plant, name: str) -> mujoco.MjModel:
-    """Return the model of a plant's other mechanism."""
+def mechanism_model(plant: Plant, name: str) -> mujoco.MjModel:
+    """Return the model of a mechanism that a plant offers."""
     spec = plant.spec()
     plant.mechanisms[name].edit(spec)
     return compiled(spec)
@@ -656,17 +640,17 @@ def built(plant: Plant, name: str) -> mujoco.MjModel:
 def check_contact(contact: Contact, plant: Plant, factors: Mapping[str, float]) -> None:
     """Raise ScenarioError if a parameter differs from the value for which the obstacles are placed."""
     for name, value in plant.placed.items() if contact.kind != "none" else ():
-        is_now = getattr(plant.values(factors), name)
-        if is_now != value:
+        present = getattr(plant.values(factors), name)
+        if present != value:
             raise ScenarioError(
                 f"the obstacles of contact {contact.kind!r} of {plant.name} are placed for {name} = {value:g}, and "
-                f"{name} is {is_now:g}: leave {name} as it is"
+                f"{name} is {present:g}: leave {name} as it is"
             )
 
 
 def warn_of_degrees(s: Resolved) -> None:
-    """Warn of a start or a reference's amplitude of several turns. Ramps and time series may reach as far."""
-    amplitudes = tuple(one.parameters().get("amplitude", 0.0) for one in s.references)
+    """Warn of a start or a reference's amplitude of several turns. Ramps and time series may have as many."""
+    amplitudes = tuple(signal.parameters().get("amplitude", 0.0) for signal in s.references)
     for what, values in (("x0", s.x0), ("the reference's amplitude", amplitudes)):
         for unit, value in zip(s.plant.units, values, strict=False):
             if unit == "rad" and MAX_ANGLE < abs(value) <= MAX_DEGREES:
@@ -694,29 +678,28 @@ def _other_units(s: Resolved) -> Iterator[tuple[str, str]]:
                 f"mismatch makes {name} {factor:g} times the nominal one",
                 f"if it is {factor:g} % more, give {1 + factor / 100:g}",
             )
-    if s.input_delay >= MIN_MILLISECONDS:
+    if s.input_delay >= MAX_INPUT_DELAY:
         yield f"input_delay is {s.input_delay:g} s", f"if it is {s.input_delay:g} ms, give {s.input_delay / 1e3:g}"
     for signal in (*dict.fromkeys(s.references), *s.disturbance):
         phase = signal.parameters().get("phase", 0.0)
         if MAX_ANGLE < abs(phase) <= MAX_DEGREES:
             yield f"a phase is {phase:g} rad", f"if it is {phase:g} degrees, give math.radians({phase:g})"
-    turning = [v for unit, v in zip(s.plant.units, s.v0, strict=True) if unit == "rad"]
-    for v in turning:
-        if MAX_RATE < abs(v) <= 10 * MAX_DEGREES:
+    for unit, v in zip(s.plant.units, s.v0, strict=True):
+        if unit == "rad" and MAX_SPEED < abs(v) <= 10 * MAX_DEGREES:
             yield f"v0 is {v:g} rad/s", f"if it is {v:g} degrees per second, give math.radians({v:g})"
     for part in s.actuator:
-        if isinstance(part, Backlash) and part.gap > MAX_GAP and "rad" in s.plant.units[: s.plant.driven]:
+        if isinstance(part, Backlash) and part.gap > MAX_BACKLASH and "rad" in s.plant.units[: s.plant.driven]:
             fact = f"Backlash has a gap of {part.gap:g} rad"
             yield fact, f"if it is {part.gap:g} degrees, give math.radians({part.gap:g})"
 
 
 def warn_of_weak_motors(s: Resolved) -> None:
     """Warn of a DC motor that cannot hold a joint where it starts, though a force of u_max could."""
-    p, still = s.plant.values({}), np.zeros(s.plant.n)
+    p, at_rest = s.plant.values({}), np.zeros(s.plant.n)
     for motor in [part for part in s.actuator if isinstance(part, DCMotor)]:
         for i, limit in enumerate(s.limits):
             with np.errstate(all="ignore"):
-                f, g = s.plant.nominal(np.array(s.x0), still, i, p)
+                f, g = s.plant.nominal(np.array(s.x0), at_rest, i, p)
             need = abs(f) / abs(g) if g else 0.0
             if motor.stall < need and (need <= limit or motor.unit):
                 warnings.warn(

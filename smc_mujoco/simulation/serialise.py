@@ -10,7 +10,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.fingerprint import arithmetic
 from smc_mujoco.common.registry import subclasses
 from smc_mujoco.common.version import __version__
-from smc_mujoco.control import as_data as component
+from smc_mujoco.control import serialise as components
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.surface import catalogue as surfaces
@@ -22,26 +22,21 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation import time_series, waypoints  # noqa: F401  # whose signals a file may name
 from smc_mujoco.simulation.clock import Clock
 from smc_mujoco.simulation.perturbations import Jump, Noise
-from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel, Recorded, Signal
 
-DEPENDENT = ("model", "physics_step", "integrator", "velocity", "u_max", "x0", "v0", "reference")  # None where left out
-OPTIONAL = frozenset(  # fields that the description of an ideal run may lack
-    ("friction", "contact", "actuator", "sensor", "mechanism", "model", "surface", "feedforward", "noise_key")
-)
+RESOLVED = tuple(Resolved.__annotations__)  # fields that are None if left out, with a default that `resolved` has
 T = TypeVar("T")
 
 
 def describe(scenario: Scenario) -> dict:
-    """Return a scenario as plain data that JSON holds without loss."""
-    given, scenario = scenario, scenario.resolved
-    data = {name: _data(getattr(scenario, name)) for name in Scenario.fields() if name != "noise_key"}
-    data |= {"noise_key": scenario.noise_key} if scenario.noise_key else {}
-    return data | {
+    """Return a scenario as plain data that JSON represents without loss."""
+    resolved = scenario.resolved
+    return {name: _data(getattr(resolved, name)) for name in Scenario.fields()} | {
         "versions": dict(_versions()),
         "source": scenario.law.source.about(),
         "condition": scenario.condition,
-        "left_out": [name for name in DEPENDENT if getattr(given, name) is None],
+        "left_out": [name for name in RESOLVED if getattr(scenario, name) is None],
     }
 
 
@@ -51,20 +46,20 @@ def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
         case Plant():
             return _plant(value)
         case Component():
-            return component.describe(value)
+            return components.describe(value)
         case Recorded():
             return {"kind": value.kind, "module": value.module, "values": value.parameters()}
         case PerChannel():
-            return {"each": [_data(one) for one in value.signals]}
+            return {"each": [_data(signal) for signal in value.signals]}
         case Signal() | Part():
             values = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if f.init}
-            return dict(zip(("kind", "module"), _home(type(value)), strict=True)) | {"values": values}
+            return dict(zip(("kind", "module"), _name_and_module(type(value)), strict=True)) | {"values": values}
         case Noise() | Clock() | Jump():
-            return {name: _data(one) for name, one in vars(value).items() if one is not None}
+            return {name: _data(item) for name, item in vars(value).items() if item is not None}
         case Mapping():
             return dict(value)
         case [Signal() | Part(), *_]:
-            return [_data(one) for one in value]
+            return [_data(item) for item in value]
     return value
 
 
@@ -76,16 +71,13 @@ def _versions() -> dict[str, str]:
 
 
 def restore(data: dict) -> Scenario:
-    """Return the scenario that `describe` wrote. A law or signal that is not installed here loses its code.
-
-    Recorded scenarios skip validation rules added after they were recorded.
-    """
-    fields = {name: data[name] for name in Scenario.fields() if name in data or name not in OPTIONAL}
-    fields |= {name: restored(fields[name]) for name, restored in RESTORED.items() if fields.get(name)}
-    fields["law"] = component.law(data["law"], data.get("source"))
+    """Return the scenario that `describe` wrote. A law or signal that is not installed here has no code."""
+    fields = {name: data[name] for name in Scenario.fields()}
+    fields |= {name: restored(fields[name]) for name, restored in RESTORERS.items() if fields.get(name)}
+    fields["law"] = components.law(data["law"], data.get("source"))
     exact = Scenario.recorded(**fields)
-    given = Scenario.recorded(**fields | dict.fromkeys(data.get("left_out", ())))
-    scenario = given if given == exact else exact  # where this version's defaults differ, keep the recorded values
+    with_defaults = Scenario.recorded(**fields | dict.fromkeys(data.get("left_out", ())))
+    scenario = with_defaults if with_defaults == exact else exact  # other defaults do not change the recorded values
     return scenario.named(data.get("condition"))
 
 
@@ -107,14 +99,14 @@ def _restore_plant(data: dict) -> Plant:
 
 def _restore_signal(data: dict) -> Signal:
     if "each" in data:
-        return PerChannel(tuple(_restore_signal(one) for one in data["each"]))
+        return PerChannel(tuple(map(_restore_signal, data["each"])))
     kind, values = _kinds(Signal).get((data["kind"], data["module"])), _values(data)
     return kind(**values) if kind else Recorded(data["kind"], data["module"], values)
 
 
 def _restore_noise(data: dict) -> Noise:
-    made: dict = {name: _restore_signal(one) if isinstance(one, dict) else one for name, one in data.items()}
-    return Noise(**made)
+    values: dict = {name: _restore_signal(item) if isinstance(item, dict) else item for name, item in data.items()}
+    return Noise(**values)
 
 
 def _restore_part(data: dict) -> Part:
@@ -129,23 +121,23 @@ def _restore_parts(data: Sequence[dict]) -> tuple[Part, ...]:
 
 
 def _values(data: dict) -> dict:
-    """Return the values of a thing's fields, with tuples for the lists that JSON made of them."""
+    """Return the values of the fields of a part or signal, with tuples for JSON's lists."""
     return {name: tuple(value) if isinstance(value, list) else value for name, value in data["values"].items()}
 
 
 def _kinds(base: type[T]) -> dict[tuple[str, str], type[T]]:
     """Return every class derived from a base, also users' classes, by its name and module."""
-    return {_home(kind): kind for kind in subclasses(base)}
+    return {_name_and_module(kind): kind for kind in subclasses(base)}
 
 
-def _home(kind: type) -> tuple[str, str]:
+def _name_and_module(kind: type) -> tuple[str, str]:
     return kind.__name__, kind.__module__
 
 
-RESTORED: Mapping[str, Callable[[Any], Any]] = {  # field -> what makes its value of `_data`; other values are plain
+RESTORERS: Mapping[str, Callable[[Any], Any]] = {  # field -> inverse of `_data`; other fields are plain data
     "plant": _restore_plant,
-    "velocity": lambda data: component.restore(data, "estimator", estimators()),
-    "surface": lambda data: component.restore(data, "surface", surfaces()),
+    "velocity": lambda data: components.restore(data, "estimator", estimators()),
+    "surface": lambda data: components.restore(data, "surface", surfaces()),
     "reference": _restore_signal,
     "feedforward": _restore_signal,
     "disturbance": lambda data: tuple(map(_restore_signal, data)),

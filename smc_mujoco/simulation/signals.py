@@ -24,20 +24,20 @@ from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.simulation import philox
 
-EARLY = 1.0 - 1e-15  # factor on a switching time, because sums of decimal times miss it by an ulp or two either way
-TERMS = 32  # sinusoids of band-limited noise; chosen: its kurtosis is 3 - 3/64, 1.6 % below that of a Gaussian
+EARLY = 1.0 - 1e-15  # factor on a switching time, because sums of decimal times differ from it by an ulp or two
+SINUSOIDS = 32  # of band-limited noise; chosen: its kurtosis is 3 - 3/64, 1.6 % below that of a Gaussian
 
 
 @dataclasses.dataclass(frozen=True)
 class Signal:
-    """Base of all signals. Checks that every parameter is a finite number. All attributes are those of the class.
+    """Base of all signals, which checks that every parameter is a finite number. The attributes are class attributes.
 
     Attributes:
       memory: floats of state in each channel.
       positive, natural: names of parameters that must be > 0, and >= 0.
       random: whether `value` takes memory, seed, channel and stream.
       series: whether `value` takes data.
-      sees: whether `value` takes e, its rate and s. It is called once a control sample, and its force is then held.
+      sees: whether `value` takes e, its rate and s. It is called once a control sample; the force then stays.
       rows: of the data of a series.
       cartesian: whether it is a force on a body, N, instead of a force on the joint: a horizontal one on the body of
         each channel, or that of a `Push`.
@@ -136,7 +136,7 @@ class Ramp(Signal):
 
 @dataclasses.dataclass(frozen=True)
 class MinimumJerk(Signal):
-    """amplitude (10 a^3 - 15 a^4 + 6 a^5), a = (t - time)/duration held to 0 .. 1: a smooth move from rest to rest.
+    """amplitude (10 a^3 - 15 a^4 + 6 a^5), a = (t - time)/duration clipped to 0 .. 1: from rest to rest.
 
     No other move in that time has a smaller integral of the squared jerk. Velocity and acceleration are 0 at both ends.
     Source: T. Flash & N. Hogan, "The coordination of arm movements: an experimentally confirmed mathematical model",
@@ -266,10 +266,10 @@ class Push(Signal):
 class Relay(Signal):
     """A disturbance that sees the loop: it tends to `amplitude` where s + rate e' + error e > 0, else to -amplitude.
 
-    It sees the true error e, its rate and the law's s at a control sample, and is held until the next one. A positive
-    `rate` alone pushes along the motion, which feeds the loop as much energy as |d| <= amplitude can. With a `slope`
-    above 0 it changes by at most this from sample to sample. Before `start` it is 0. All channels get what channel 0
-    gets.
+    It sees the true error e, its rate and the law's s at a control sample, and is constant until the next one. With a
+    positive `rate` alone it pushes along the motion: no other |d| <= amplitude gives the loop more energy. With a
+    `slope` above 0 it changes by at most this from sample to sample. Before `start` it is 0. All channels get the force
+    of channel 0.
 
     Attributes:
       amplitude: N or N m.
@@ -303,8 +303,8 @@ class OrnsteinUhlenbeck(Signal):
     """Process noise with standard deviation sigma and correlation time tau, independent in every channel.
 
     d_(k+1) = a d_k + sigma sqrt(1 - a^2) n_k, a = exp(-dt/tau), on knots dt apart and linear between them: the exact
-    discretisation (Gillespie 1996, Phys. Rev. E 54:2084), stationary from the start. The knots are its own, so
-    the path is the same under every physics step and control period. `dt` defaults to 1 ms.
+    discretisation (Gillespie 1996, Phys. Rev. E 54:2084), stationary from the start. The knots do not depend on the
+    physics step and the control period, nor does the path. `dt` defaults to 1 ms.
     """
 
     sigma: float
@@ -348,7 +348,7 @@ class BandLimited(Signal):
     low: float
     high: float
 
-    memory = 2 * TERMS  # angular frequencies, phases
+    memory = 2 * SINUSOIDS  # angular frequencies, phases
     natural = ("sigma", "low")
     random = True
 
@@ -364,15 +364,15 @@ class BandLimited(Signal):
 
 @njit(error_model="numpy")
 def _band_limited(t, sigma, low, high, memory, seed, channel, stream):
-    if memory[TERMS - 1] == 0.0:
-        for i in range(TERMS):
-            part = (i + philox.uniform(seed, channel, stream, 2 * i)) / TERMS
+    if memory[SINUSOIDS - 1] == 0.0:
+        for i in range(SINUSOIDS):
+            part = (i + philox.uniform(seed, channel, stream, 2 * i)) / SINUSOIDS
             memory[i] = 2.0 * math.pi * (low + part * (high - low))
-            memory[TERMS + i] = 2.0 * math.pi * philox.uniform(seed, channel, stream, 2 * i + 1)
+            memory[SINUSOIDS + i] = 2.0 * math.pi * philox.uniform(seed, channel, stream, 2 * i + 1)
     total = 0.0
-    for i in range(TERMS):
-        total += math.cos(memory[i] * t + memory[TERMS + i])
-    return sigma * math.sqrt(2.0 / TERMS) * total
+    for i in range(SINUSOIDS):
+        total += math.cos(memory[i] * t + memory[SINUSOIDS + i])
+    return sigma * math.sqrt(2.0 / SINUSOIDS) * total
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,9 +1,9 @@
-"""The record of one simulation: all that the callback needs besides MuJoCo's own state, under names.
+"""The record of one simulation: all that the callback needs besides MuJoCo's state.
 
 `mjData.userdata` holds two numbers: `callback.magic()` and the address of the record. Compiled code reads the record by
 names (`sim.period`, `sim.calls += 1`), Python as a NumPy structured array of the same dtype. Inputs and outputs of
-users' functions are records, too: a law gets a MEASUREMENT and returns a CONTROL. Arrays, such as gains and memories,
-are in one buffer outside of the record, which holds their addresses.
+users' functions are in the record, too. Arrays, such as gains and memories, are in one buffer outside of the record,
+which has their addresses.
 """
 
 import itertools
@@ -14,27 +14,28 @@ import numpy as np
 
 from smc_mujoco.common.jit import floats, record_at
 from smc_mujoco.control.estimator import Reading
-from smc_mujoco.control.joint_law import ARRAYS, REQUESTS
+from smc_mujoco.control.joint_law import ARRAYS, HANDLE
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.drives import DriveStep
 from smc_mujoco.mechanisms.plant import SEEN
 
-# Inputs and outputs of functions. Law: MEASUREMENT, or the numbers at JOINT_MEASUREMENT -> u and s, one or n of each.
-# Surface: MEASUREMENT -> SLIDING. Estimator: READING -> ESTIMATE. Reference and disturbance: INSTANT -> MOTION. Nominal
-# model: SEEN -> MODEL.
+# Inputs and outputs of functions.
+#   law: MEASUREMENT, or the numbers at JOINT_MEASUREMENT -> u and s, one or n of each
+#   surface: MEASUREMENT -> SLIDING; estimator: READING -> ESTIMATE; nominal model: SEEN -> MODEL
+#   reference and disturbance: INSTANT -> MOTION; friction by a formula: FRICTION_INPUT -> FRICTION_OUTPUT
 MEASUREMENT, READING = floats(Measurement._fields), floats(Reading._fields)
 INSTANT = floats(("t", "seed", "channel", "stream", "e", "de", "s"))
 SLIDING, ESTIMATE = floats(("s", "v_eq")), floats(("v", "a"))
 MOTION, MODEL = floats(("value", "rate", "acceleration")), floats(("f", "g"))
+FRICTION_INPUT, FRICTION_OUTPUT = floats(("v", "motor", "load")), floats(("f", "low", "high"))  # see `Sliding.value`
 
-# A friction by a formula: speed, force of the drive and load -> what resists, and the bounds of what holds.
-RUBBING, RESISTANCE = floats(("v", "motor", "load")), floats(("f", "low", "high"))
-
-# The state of a channel between calls: the last reading that was not lost, the command after its delay, the states
-# of the drives (`DriveStep`), and sums over a control period of the drive's force and of friction and contacts; whether
-# a friction by a formula sticks, where, and the speed at the step before.
+# The state of a channel between calls:
+#   last_x, last_v: the last reading that was not lost; delayed: the command after its delay
+#   first, second: the states of the drives, see `DriveStep`
+#   force, reaction: sums over a control period, of the drive's force, and of friction and contacts
+#   stuck, stuck_at, speed: whether a friction by a formula sticks, where, and the speed at the step before
 CHANNEL_STATE = floats(
-    ("held_x", "held_v", "arrived", "first", "second", "force", "reaction", "stuck", "stuck_at", "speed")
+    ("last_x", "last_v", "delayed", "first", "second", "force", "reaction", "stuck", "stuck_at", "speed")
 )
 DRIVE_STEP = floats(DriveStep._fields)
 # Addresses of what a law of many joints measures, see control/joint_law.py: of its first number, and of its arrays.
@@ -47,10 +48,10 @@ LOG = floats(LOGGED)
 
 # A compiled function: its address, those of its parameters and of its memory, and the bytes of memory a channel has.
 FUNCTION = np.dtype([(name, "i8") for name in ("address", "parameters", "memory", "stride")], align=True)
-# A disturbance: its stream of random numbers (0: none, and then the same in every channel), whether it is a horizontal
-# force on the body instead of a force on the joint, and whether it sees the loop. A `Push` has the index of its body's
-# force in xfrc_applied, else -1, and its peak.
-SIGNAL = np.dtype(
+# A disturbance: its stream of random numbers (0: none, and then it is the same in every channel), whether it is a
+# horizontal force on the body instead of a force on the joint, and whether it sees the loop. Of a `Push` also the index
+# of its body in xfrc_applied, and its peak; body is -1 for others.
+DISTURBANCE = np.dtype(
     [
         ("function", FUNCTION), ("stream", "f8"), ("cartesian", "i8"), ("sees", "i8"), ("body", "i8"),
         ("peak", "f8", (3,)),
@@ -63,11 +64,11 @@ SIMULATION = np.dtype(
         # what has happened so far: calls of the callback, a failure and its physics step
         ("calls", "i8"), ("failure", "i8"), ("failed_step", "i8"),
         # sizes: channels, those of them that have an actuator, qpos, qvel, samples in the log, disturbances
-        ("n", "i8"), ("driven", "i8"), ("nq", "i8"), ("nv", "i8"), ("samples", "i8"), ("signal_count", "i8"),
+        ("n", "i8"), ("driven", "i8"), ("nq", "i8"), ("nv", "i8"), ("samples", "i8"), ("disturbance_count", "i8"),
         # the clock: physics steps a control period, callbacks a physics step, s of each
         ("steps", "i8"), ("stages", "i8"), ("step", "f8"), ("period", "f8"),
-        # addresses of arrays: CHANNEL (n,), CHANNEL_STATE (n,), LOG (K + 1, n), SIGNAL (signal_count,)
-        ("channels", "i8"), ("states", "i8"), ("log", "i8"), ("signals", "i8"),
+        # addresses of arrays: CHANNEL (n,), CHANNEL_STATE (n,), LOG (K + 1, n), DISTURBANCE (disturbance_count,)
+        ("channels", "i8"), ("states", "i8"), ("log", "i8"), ("disturbances", "i8"),
         # the command: delay in physics steps, a ring of (delay_slots, n) commands, bounds (n,), unit of the drive
         ("delay", "i8"), ("delay_slots", "i8"), ("delay_buffer", "i8"), ("limits", "i8"), ("scale", "f8"),
         # the controller's timer: the largest delay of a sample in physics steps, the share of samples that are missed
@@ -94,29 +95,30 @@ SIMULATION = np.dtype(
         ("width", "i8"), ("commands", "i8"),
         # a law of many joints: its measurement, all 0 for a law of one channel; the nominal M, h and g (0: from
         # `nominal`, one equation per channel), and the functions of C and of the tip's Jacobian (0: there are none)
-        ("joint", JOINT_MEASUREMENT), ("dynamics", FUNCTION), ("requests", REQUESTS),
+        ("joint", JOINT_MEASUREMENT), ("dynamics", FUNCTION), ("handle", HANDLE),
         # inputs and outputs of functions
         ("y", MEASUREMENT), ("reading", READING), ("instant", INSTANT), ("sliding", SLIDING),
-        ("estimate", ESTIMATE), ("motion", MOTION), ("model", MODEL), ("rubbing", RUBBING), ("resistance", RESISTANCE),
+        ("estimate", ESTIMATE), ("motion", MOTION), ("model", MODEL),
+        ("friction_input", FRICTION_INPUT), ("friction_output", FRICTION_OUTPUT),
         ("unused", "f8", (8,)),  # so that no two simulations write to one cache line
     ],
     align=True,
 )  # fmt: skip
 
 # How compiled code reads record i of an array at an address.
-simulation_at, state_at, log_at, signal_at, function_at = map(
-    record_at, (SIMULATION, CHANNEL_STATE, LOG, SIGNAL, FUNCTION)
+simulation_at, state_at, log_at, disturbance_at, function_at = map(
+    record_at, (SIMULATION, CHANNEL_STATE, LOG, DISTURBANCE, FUNCTION)
 )
 
 # Bytes from the start of a simulation's record to the inputs and outputs of functions.
 (
-    MEASUREMENT_AT, READING_AT, INSTANT_AT, SLIDING_AT, ESTIMATE_AT, MOTION_AT, MODEL_AT, RUBBING_AT, RESISTANCE_AT,
-    SEEN_AT, REQUESTS_AT,
+    MEASUREMENT_AT, READING_AT, INSTANT_AT, SLIDING_AT, ESTIMATE_AT, MOTION_AT, MODEL_AT, SEEN_AT, HANDLE_AT,
+    FRICTION_INPUT_AT, FRICTION_OUTPUT_AT,
 ) = (
     SIMULATION.fields[name][1]  # pyright: ignore[reportOptionalSubscript]
     for name in (
-        "y", "reading", "instant", "sliding", "estimate", "motion", "model", "rubbing", "resistance", "seen",
-        "requests",
+        "y", "reading", "instant", "sliding", "estimate", "motion", "model", "seen", "handle", "friction_input",
+        "friction_output",
     )
 )  # fmt: skip
 
@@ -127,47 +129,47 @@ simulation_at, state_at, log_at, signal_at, function_at = map(
 ) = range(13)  # fmt: skip
 
 
-class Place(int):
-    """The place of a number in a Buffer."""
+class Index(int):
+    """The index of a number in a Buffer."""
 
 
 class Buffer:
-    """Float64 numbers for one array. Each part has a place at once, and an address once the array is made.
+    """Numbers that become one float64 array. They have indices at once, and addresses when the array is made.
 
     buffer = Buffer()
-    gains = buffer.put([6.0, 3.0])                          # a Place
+    gains = buffer.put([6.0, 3.0])                          # an Index
     array = buffer.array()
-    buffer.as_tuple(FUNCTION, {"parameters": gains, ...})   # with its address, valid as long as `array` lives
+    buffer.as_tuple(FUNCTION, {"parameters": gains, ...})   # with the address, valid as long as `array` lives
     """
 
     def __init__(self) -> None:
         self.values: list[float] = []
         self.base = 0
 
-    def put(self, values: Iterable[float]) -> Place:
-        """Append numbers and return their place."""
-        place = Place(len(self.values))
+    def put(self, values: Iterable[float]) -> Index:
+        """Append numbers and return the index of the first."""
+        index = Index(len(self.values))
         self.values.extend(values)
-        return place
+        return index
 
-    def reserve(self, count: int) -> Place:
-        """Append zeros and return their place."""
+    def reserve(self, count: int) -> Index:
+        """Append zeros and return the index of the first."""
         return self.put(itertools.repeat(0.0, count))
 
     def array(self) -> np.ndarray:
         """Return the numbers, (count,) float64."""
-        made = np.array(self.values)
-        self.base = address(made)
-        return made
+        array = np.array(self.values)
+        self.base = address(array)
+        return array
 
     def as_tuple(self, dtype: np.dtype, values: Mapping[str, Any]) -> tuple:
-        """Return the values of a record's fields in their order: an address for a Place, 0 without a value."""
+        """Return the values of a record's fields in their order: an address for an Index, 0 for a missing value."""
         fields = []
         for name in dtype.names or ():
             value = values.get(name, 0)
             if dtype[name].names is not None:
                 value = self.as_tuple(dtype[name], value or {})
-            fields.append(self.base + 8 * value if isinstance(value, Place) else value)
+            fields.append(self.base + 8 * value if isinstance(value, Index) else value)
         return tuple(fields)
 
 

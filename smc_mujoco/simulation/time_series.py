@@ -13,14 +13,14 @@ from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.common.files import csv_rows
 from smc_mujoco.simulation.signals import EARLY, Signal
 
-MAX_GAP = 1.5  # median steps; chosen: a logger's jitter stays below, a missing row is above
-WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\]]*)\]")  # name of a column
-SECONDS = ("s", "sec", "second", "seconds")
+MAX_GAP_STEPS = 1.5  # longest step over the median step; chosen: a logger's jitter is below, a missing row above
+NAME_WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\]]*)\]")  # name of a column
+SECOND_SPELLINGS = ("s", "sec", "second", "seconds")
 
 
 @njit(error_model="numpy")
 def last_before(data, t, end, early):
-    """Return the index below `end` of the last point whose time, data[0, i] times `early`, is not after t; else 0."""
+    """Return the last i below `end` for which data[0, i] * early <= t; 0 if there is none."""
     low, high = 0, end
     while high - low > 1:
         middle = (low + high) // 2
@@ -103,11 +103,11 @@ class TimeSeries(Signal):
 
         _check(str(path), times, values, where)
         steps = np.diff(times)
-        usual = np.quantile(steps, 0.5, method="lower")  # the shorter one of two steps, as the other has the gap
-        for i in np.flatnonzero(steps > MAX_GAP * usual)[:1]:
+        median = np.quantile(steps, 0.5, method="lower")  # of two steps the shorter, because the other has the gap
+        for i in np.flatnonzero(steps > MAX_GAP_STEPS * median)[:1]:
             raise ScenarioError(
                 f"{path} has a gap after {where(i)}, from {times[i]:g} s to {times[i + 1]:g} s, where rows are "
-                f"{usual:g} s apart: fill it in, or cut the file there"
+                f"{median:g} s apart: fill it in, or cut the file there"
             )
         return cls(times, values)
 
@@ -123,10 +123,10 @@ class TimeSeries(Signal):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Held(TimeSeries):
-    """Steps: the value of a point from its time until the next point's, of the last one for good, and 0 before all.
+    """Steps: 0 before the first point, then the value of the last point whose time has come.
 
     Attributes:
-      times: (N,), s, increasing, N >= 2. Whole numbers of control periods make runs exact: no step falls into a stage.
+      times: (N,), s, increasing, N >= 2. Runs are exact if they are whole numbers of control periods.
       values: (N,), in the unit of what the signal is added to.
     """
 
@@ -181,7 +181,7 @@ def _columns(
             )
         return (0, 1), rows
     places: dict[str, int] = {}
-    for spellings in (names, [WITH_UNIT.sub(r"\1", name) for name in names]):
+    for spellings in (names, [NAME_WITH_UNIT.sub(r"\1", name) for name in names]):
         for i, name in enumerate(spellings):
             places.setdefault(name, i)
     if time is None:
@@ -190,10 +190,10 @@ def _columns(
         raise unknown(f"time column of {path}", time, names)
     if column is not None and (not isinstance(column, str) or column not in places):
         raise unknown(f"column of {path}", column, names)
-    at = places[time]
-    if (unit := WITH_UNIT.fullmatch(names[at])) and unit[2] not in SECONDS:
-        raise ScenarioError(f"time column {names[at]!r} of {path} is not in seconds: give times in s")
-    return (at, int(at == 0) if column is None else places[column]), rows[1:]
+    i = places[time]
+    if (unit := NAME_WITH_UNIT.fullmatch(names[i])) and unit[2] not in SECOND_SPELLINGS:
+        raise ScenarioError(f"time column {names[i]!r} of {path} is not in seconds: give times in s")
+    return (i, int(i == 0) if column is None else places[column]), rows[1:]
 
 
 def _cell(path: str | os.PathLike[str], line: int, name: str, cell: str) -> float:

@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     import xarray  # pyright: ignore[reportMissingImports]
 
 ARRAYS = ("t", *LOGGED)
-PLANT_DIVERGED = "the plant diverged", "the plant left the finite world"  # how failures begin, now and in old files
+PLANT_DIVERGED = "the plant diverged"  # how the failure of such a run begins
 MAX_FAILURE = 500  # characters; chosen
 MAX_TEXT = 2**26  # characters of a scenario in a file, 64 million; chosen
-KIND = "trace of smc_mujoco", "give the path of a .npz file that a run wrote"
+FILE = "trace of smc_mujoco", "give the path of a .npz file that a run wrote"  # for errors: what it is, and the cure
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,12 +38,12 @@ class Trace:
 
     Attributes:
       t: times, (K + 1,), s.
-      x, v: true positions and velocities, (K + 1, n), each channel in its own of `plant.units`, and per second.
-      u: commanded control after saturation, held from t_k to t_(k+1), (K + 1, n), N or N m, or V if the motor's
+      x, v: true positions and velocities, (K + 1, n), in the channels' `plant.units`, and per second.
+      u: commanded control after saturation, constant from t_k to t_(k+1), (K + 1, n), N or N m, or V if the motor's
         command is a voltage.
       applied: what the actuator gets at t_k, i.e. u after the input delay, (K + 1, n).
       s: sliding variable as the law returns it, (K + 1, n).
-      d: disturbance as a generalised force on the joint: of what acts on the joint's own body, (K + 1, n), N or N m.
+      d: disturbances on the joint's body, as a generalised force on the joint, (K + 1, n), N or N m.
       r: reference, (K + 1, n); of free joints, which have none, the plant's goal.
       force: what the actuator delivers at the joint, and with a Backlash at its rotor, (K + 1, n), N or N m.
       reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. Both are means
@@ -122,15 +122,15 @@ class Trace:
 
     def units(self) -> dict[str, str]:
         """Return the unit of each of the `columns`: "s", "rad", "N m", ...; "" for s, whose unit depends on the law."""
-        each = [unit for name in ARRAYS[1:] for unit in self._units(name)]
-        return dict(zip(self.columns(), ["s", *each], strict=True))
+        units = [unit for name in ARRAYS[1:] for unit in self._units(name)]
+        return dict(zip(self.columns(), ["s", *units], strict=True))
 
     def _units(self, name: str) -> list[str]:
         """Return the unit of an array for each channel, (n,)."""
         units = []
         for x, u in zip(self.scenario.plant.units, self.scenario.efforts, strict=True):
-            known = {"x": x, "r": x, "v": f"{x}/s", "u": u, "applied": u, "s": ""}
-            units.append(known.get(name, EFFORT[x]))
+            special = {"x": x, "r": x, "v": f"{x}/s", "u": u, "applied": u, "s": ""}
+            units.append(special.get(name, EFFORT[x]))
         return units
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
@@ -169,7 +169,10 @@ class Trace:
             import xarray  # pyright: ignore[reportMissingImports]
 
         units = {"t": ["s"]} | {name: self._units(name) for name in ARRAYS[1:]}
-        attrs = {name: {"units": each[0] if len(set(each)) == 1 else "by channel"} for name, each in units.items()}
+        attrs = {
+            name: {"units": by_channel[0] if len(set(by_channel)) == 1 else "by channel"}
+            for name, by_channel in units.items()
+        }
         about = {"scenario": to_json(serialise.describe(self.scenario))}
         return xarray.Dataset(
             {name: (("t", "channel"), getattr(self, name), attrs[name]) for name in ARRAYS[1:]},
@@ -203,9 +206,9 @@ class Trace:
 
 
 def _write_csv(trace: Trace, file: Path) -> None:
-    heads = [f"{name} [{unit}]" if unit else name for name, unit in trace.units().items()]
+    header = [f"{name} [{unit}]" if unit else name for name, unit in trace.units().items()]
     with file.open("w", encoding="utf-8", newline="") as stream:
-        csv.writer(stream, lineterminator="\n").writerow(heads)
+        csv.writer(stream, lineterminator="\n").writerow(header)
         for row in np.column_stack(list(trace.columns().values())):
             stream.write(f"{','.join(map(repr, row.tolist()))}\n")
 
@@ -214,10 +217,10 @@ def _write_mat(trace: Trace, file: Path) -> None:
     from scipy.io import savemat
 
     about = to_json(serialise.describe(trace.scenario))
-    listed = {"t": ["s"]} | {name: trace._units(name) for name in ARRAYS[1:]}
-    alike = {name: us[0] if len(set(us)) == 1 else np.array(us, object) for name, us in listed.items()}
+    by_channel = {"t": ["s"]} | {name: trace._units(name) for name in ARRAYS[1:]}
+    units = {name: us[0] if len(set(us)) == 1 else np.array(us, object) for name, us in by_channel.items()}
     arrays = {name: getattr(trace, name) for name in ARRAYS}
-    savemat(file, arrays | {"units": alike, "scenario": about}, oned_as="column")
+    savemat(file, arrays | {"units": units, "scenario": about}, oned_as="column")
 
 
 def _write_parquet(trace: Trace, file: Path) -> None:
@@ -235,14 +238,14 @@ def _write_mcap(trace: Trace, file: Path) -> None:
 
 
 _WRITERS = {".csv": _write_csv, ".mat": _write_mat, ".mcap": _write_mcap, ".parquet": _write_parquet}
-FORMATS = tuple(ending.removeprefix(".") for ending in _WRITERS)  # of Trace.export
+EXPORT_FORMATS = tuple(ending.removeprefix(".") for ending in _WRITERS)  # of Trace.export
 
 
-def formats(listed: str) -> tuple[str, ...]:
-    """Return the formats of Trace.export in a list such as "csv,mat"."""
-    names = dict.fromkeys(name.strip().lower().removeprefix(".") for name in listed.split(","))
+def formats(text: str) -> tuple[str, ...]:
+    """Return the formats of Trace.export in a text such as "csv,mat"."""
+    names = dict.fromkeys(name.strip().lower().removeprefix(".") for name in text.split(","))
     for name in names:
-        find("format to export", name, dict.fromkeys(FORMATS))
+        find("format to export", name, dict.fromkeys(EXPORT_FORMATS))
     return tuple(names)
 
 
@@ -281,25 +284,25 @@ def load(path: str | os.PathLike[str]) -> Trace:
     """
     if isinstance(path, str | os.PathLike) and not os.path.exists(path) and os.path.exists(f"{os.fspath(path)}.npz"):
         path = f"{os.fspath(path)}.npz"
-    with reading(path, *KIND) as file, zipfile.ZipFile(file) as archive:
-        about = from_json(str(_member(archive, "about")))
+    with reading(path, *FILE) as file, zipfile.ZipFile(file) as archive:
+        about = from_json(str(_checked_array(archive, "about")))
         end = {key: about.pop(key) for key in ("diverged_at", "failure")}
     try:
         scenario = serialise.restore(about)
-    except ScenarioError as error:  # names its own cure
+    except ScenarioError as error:  # with its cure
         raise ScenarioError(f"the scenario of {path} cannot be restored, {error}") from None
     except Exception as error:  # JSON that is not a scenario
         why = f"{type(error).__name__}, {error}"
         raise ScenarioError(
             f"{path} holds no scenario that can be read ({why}): give a file that a run wrote"
         ) from None
-    with reading(path, *KIND) as file, zipfile.ZipFile(file) as archive:
-        arrays = {name: _member(archive, name, scenario) for name in ARRAYS}
+    with reading(path, *FILE) as file, zipfile.ZipFile(file) as archive:
+        arrays = {name: _checked_array(archive, name, scenario) for name in ARRAYS}
     return Trace(**arrays, scenario=scenario, **end)
 
 
-def _member(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = None) -> np.ndarray:
-    """Return an array of a file, checked against the scenario, or a text if there is none. Its size comes first."""
+def _checked_array(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = None) -> np.ndarray:
+    """Return an array of a file; a text if `scenario` is None. Check type and shape before the array is read."""
     with archive.open(f"{name}.npy") as stream:
         headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
         shape, _, dtype = headers[npy.read_magic(stream)](stream)

@@ -12,17 +12,17 @@ from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.time_series import TimeSeries, last_before
 
-STEP = 0.01  # s between the knots of a path in space: chosen; the tip leaves its path by micrometres between them
-MAX_PIECES = 1_000_000  # of a path in space: minutes of computing
+KNOT_SPACING = 0.01  # s, of a path in space; chosen: between knots the tip leaves its path by micrometres
+MAX_KNOTS = 1_000_000  # of a path in space: minutes of computing
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Waypoints(TimeSeries):
-    """The move of least jerk through the points (times, values), at rest before the first and after the last.
+    """The minimum-jerk motion through the points (times, values), at rest before the first and after the last.
 
     No other function through them, at rest at both ends, has a smaller integral of the squared jerk: it is the spline
-    of fifth degree whose fourth derivative is continuous. It does not stop at the points between. With two points it
-    is `MinimumJerk`.
+    of fifth degree whose fourth derivative is continuous. It does not stop at inner points. With two points it is
+    `MinimumJerk`.
     Source: I. J. Schoenberg, "Spline functions and the problem of graduation", Proc. Natl. Acad. Sci. 52(4):947, 1964.
 
     Attributes:
@@ -56,11 +56,11 @@ class Waypoints(TimeSeries):
         a = (t - data[0, low]) / T
         v0, v1 = data[2, low] * T, data[2, high] * T
         a0, a1 = data[3, low] * T * T, data[3, high] * T * T
-        way = data[1, high] - data[1, low] - v0 - 0.5 * a0
-        speed, push = v1 - v0 - a0, a1 - a0
-        c3 = 10.0 * way - 4.0 * speed + 0.5 * push
-        c4 = -15.0 * way + 7.0 * speed - push
-        c5 = 6.0 * way - 3.0 * speed + 0.5 * push
+        # what is missing at the end, in position, velocity and acceleration, without c3, c4 and c5
+        dr_end, dv_end, da_end = data[1, high] - data[1, low] - v0 - 0.5 * a0, v1 - v0 - a0, a1 - a0
+        c3 = 10.0 * dr_end - 4.0 * dv_end + 0.5 * da_end
+        c4 = -15.0 * dr_end + 7.0 * dv_end - da_end
+        c5 = 6.0 * dr_end - 3.0 * dv_end + 0.5 * da_end
         r = data[1, low] + a * (v0 + a * (0.5 * a0 + a * (c3 + a * (c4 + a * c5))))
         dr = v0 + a * (a0 + a * (3.0 * c3 + a * (4.0 * c4 + a * 5.0 * c5)))
         ddr = a0 + a * (6.0 * c3 + a * (12.0 * c4 + a * 20.0 * c5))
@@ -75,13 +75,13 @@ def cartesian_path(
     body: str | None = None,
     orientation: Sequence[float] | None = None,
     x0: Sequence[float] | None = None,
-    step: float = STEP,
+    step: float = KNOT_SPACING,
 ) -> list[Waypoints]:
-    """Return a reference for each channel's joint, on which a tip moves through points in space with least jerk.
+    """Return a reference for each channel's joint, on which a tip moves through points in space with minimum jerk.
 
-    Inverse kinematics find the joints' positions every `step`, each from the last: least squares with MuJoCo's
-    Jacobians, damped where the arm is stretched. Among the solutions of an arm with more joints than the task needs, it
-    is the one next to the last, not the one that closes a cycle.
+    Inverse kinematics computes the joints' positions every `step`: least squares with MuJoCo's Jacobians, damped near
+    singular poses. If an arm has more joints than the task needs, each solution is the one nearest to the one before.
+    Then a closed path of the tip may not close in the joints.
 
     Args:
       plant: a plant or its name; its nominal model is used.
@@ -112,14 +112,14 @@ def cartesian_path(
         )
     path = [Waypoints(times, array[:, i].tolist()) for i in range(3)]
     step, first, last = number("step", step, above=0.0), path[0].times[0], path[0].times[-1]
-    pieces = (last - first) / step
-    if pieces > MAX_PIECES:
-        raise ScenarioError(f"step {step:g} s divides {last - first:g} s into {pieces:.3g} pieces: give a longer step")
-    knots = np.linspace(first, last, max(2, int(np.ceil(pieces - 1e-9)) + 1))
-    wanted = np.array([[Waypoints.value(t, None, one.data)[0] for one in path] for t in knots])
+    steps = (last - first) / step
+    if steps > MAX_KNOTS:
+        raise ScenarioError(f"step {step:g} s divides {last - first:g} s into {steps:.3g} steps: give a longer step")
+    knots = np.linspace(first, last, max(2, int(np.ceil(steps - 1e-9)) + 1))
+    positions = np.array([[Waypoints.value(t, None, axis.data)[0] for axis in path] for t in knots])
     start = plant.x0 if x0 is None else tuple(number("x0", x) for x in x0)
     if len(start) != plant.n:
         raise ScenarioError(f"x0 has {len(start)} values for {plant.n} channels: give {plant.n}")
     tip = Tip(plant, joint_names(plant), site, body, orientation)
-    joints = solve(tip, wanted, start)
+    joints = solve(tip, positions, start)
     return [Waypoints(knots.tolist(), joints[:, i].tolist()) for i in range(plant.n)]

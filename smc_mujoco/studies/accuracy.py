@@ -45,7 +45,7 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
-from smc_mujoco.control.source import by_words, kinds, unequal
+from smc_mujoco.control.source import by_words, kinds, untuned_laws
 from smc_mujoco.draw.style import law_colour
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
@@ -153,7 +153,7 @@ def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:
         headings=["law", f"{1e3 * first:g} ms", f"{1e3 * last:g} ms", "order of e", "order of s", "theory"],
         rows=cells,
         title=", ".join(filter(None, [title, by_words(gains)])),
-        notes=[*(f"* {row.law}: {row.why}" for row in rows if row.why), *unequal(gains)],
+        notes=[*(f"* {row.law}: {row.why}" for row in rows if row.why), *untuned_laws(gains)],
     )
 
 

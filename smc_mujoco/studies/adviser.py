@@ -220,7 +220,7 @@ def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> Sequence[Comp
       ScenarioError: an unknown law, or none that has the properties.
     """
     if laws is None:
-        left_out = {"none", *gain_sets.FORMS}  # FORMS are other implementations of laws that are there already
+        left_out = {"none", *gain_sets.ALIASES}  # aliases have the gains of laws that are there already
         chosen = [law for law in suitable(properties, plant=plant) if law.name not in left_out]
     else:
         chosen = [law for law in map(law_or_template, listed_laws(laws)) if _has(law, properties)]

@@ -28,7 +28,7 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
-from smc_mujoco.control.component import Template, written
+from smc_mujoco.control.component import Template, gain_text
 from smc_mujoco.control.law import Law, catalogue, fits
 from smc_mujoco.control.properties import suitable
 from smc_mujoco.mechanisms.named import as_plant
@@ -120,7 +120,7 @@ class Compared(Tables):
         rows = []
         for plant, candidates in self.candidates.items():
             for law, sets, _ in candidates:
-                best = ", ".join(f"{name}={written(value)}" for name, value in law.gains.items())
+                best = ", ".join(f"{name}={gain_text(value)}" for name, value in law.gains.items())
                 rows.append((plant, law.name, law.source.kind, f"{len(sets)}", best))
         heads = ["plant", "law", "gains", "sets", "best set"]
         gains = Tabular(headings=heads, rows=rows, title="Gains", notes=self.remarks, left=len(heads))
@@ -317,5 +317,5 @@ def _chosen(laws: Any, plant: Plant) -> list[Any]:
     if laws is not None:
         return listed_laws(laws)
     known = [name for name in gain_sets.LAWS if fits(catalogue()[name], plant)]
-    left_out = {"none", *gain_sets.FORMS}  # FORMS are other implementations of laws that are there already
+    left_out = {"none", *gain_sets.ALIASES}  # aliases have the gains of laws that are there already
     return known or [law for law in suitable(plant=plant) if law.name not in left_out]

@@ -90,7 +90,7 @@ def leaderboard(
             if not (there := scores.blocks):
                 continue
             floors = [paired_runs.floor(ran[k], unit) for k in there]
-            if all((scenario := ran[k]) is not None and scenario.amplifier for k in there):
+            if all((scenario := ran[k]) is not None and scenario.voltage_motor for k in there):
                 unit = unit.replace("({u})", "V").replace("{u}", "V")  # noqa: PLW2901
             comparison = compare(
                 scores.values, floors, metric == SETTLES, level, scores.outcomes, scores.sets, relevant, limits

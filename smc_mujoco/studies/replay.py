@@ -183,10 +183,10 @@ class Playback(reference.Loop):
                 values[at] = recorded[k]
         super().step(step)
 
-    def bounded(self, i: int, u: float, s: float) -> float:
+    def bounded_command(self, i: int, u: float, s: float) -> float:
         """Return the recorded command of channel i."""
-        self.latest[i] = self.recorded.u[len(self.commands) - 1, i]
-        return self.latest[i]
+        self.last_u[i] = self.recorded.u[len(self.commands) - 1, i]
+        return self.last_u[i]
 
     def verdict(self, commands: Sequence[Any]) -> tuple[bool, str]:
         """Return whether these commands, with feedforward and bounds, are the recorded ones, and what differs first."""
@@ -224,7 +224,7 @@ class _RecordedLaw:
         self.run.call_samples.append(k)
         return float(self.run.recorded.u[k, i]), float(self.run.recorded.s[k, i])
 
-    def together(self, y: Any) -> tuple[np.ndarray, np.ndarray]:
+    def call_joint(self, y: Any) -> tuple[np.ndarray, np.ndarray]:
         """Return u and s of all channels."""
         self(0, y)
         self.run.measured[-1] = -1, y
@@ -254,7 +254,7 @@ def _commands(law: Component, measured: Sequence[tuple[int, Any]]) -> list[Any]:
     with np.errstate(all="ignore"):
         for i, y in measured:
             try:
-                commands.append(function.together(y)[0] if i < 0 else function(i, y)[0])
+                commands.append(function.call_joint(y)[0] if i < 0 else function(i, y)[0])
             except reference.Failure:
                 commands.append(None)
     return commands

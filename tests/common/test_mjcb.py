@@ -75,7 +75,7 @@ COMPILES = {
 def test_within_a_policy_every_model_compiles_and_the_run_goes_on(what, own, tmp_path):
     trace = run_of("none", own)
     trace.save(tmp_path / "own.npz")
-    for kept in (scenario.built, prepared, toppling):  # as the first time in a process
+    for kept in (scenario.mechanism_model, prepared, toppling):  # as the first time in a process
         kept.cache_clear()
     asked, found = [], []
 

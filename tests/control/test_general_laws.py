@@ -4,7 +4,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.control.gain_sets import FORMS, general_laws
+from smc_mujoco.control.gain_sets import ALIASES, general_laws
 from smc_mujoco.control.law import catalogue
 
 pytestmark = pytest.mark.quick
@@ -13,9 +13,9 @@ pytestmark = pytest.mark.quick
 def test_every_general_law_is_ranked_and_no_law_beside_itself():
     found = general_laws(smc.paper.PLANTS, "default")
     assert len(found) >= 35
-    assert not set(found) & {"none", "hierarchical", "swing_up", *FORMS}
+    assert not set(found) & {"none", "hierarchical", "swing_up", *ALIASES}
     assert {"adaptive_leak", "observer_free", "pid"} <= set(found)
-    assert all(name in found for name, law in catalogue().items() if not law.plants and name not in ("none", *FORMS))
+    assert all(name in found for name, law in catalogue().items() if not law.plants and name not in ("none", *ALIASES))
 
 
 def test_a_law_without_gains_in_the_set_on_one_of_the_plants_is_left_out():

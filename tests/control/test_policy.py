@@ -134,7 +134,7 @@ def test_a_policy_may_look_ahead_in_runs_of_its_own():
 @pytest.fixture(autouse=True)
 def here(monkeypatch):
     """Files are tried in this process, where the stand-ins are."""
-    monkeypatch.setattr(policy, "tried", lambda module, order, timeout: policy.opened(policy.File(**order)))
+    monkeypatch.setattr(policy, "tried", lambda module, order, timeout: policy.load_network(policy.File(**order)))
 
 
 def test_a_library_that_a_file_crashes_is_one_sentence(tmp_path, monkeypatch):
@@ -207,7 +207,7 @@ def test_a_file_that_changed_before_its_run_is_not_taken_for_what_it_was(tmp_pat
     (tmp_path / "net.onnx").write_bytes(b"first")
     law = smc.policy(tmp_path / "net.onnx")
     (tmp_path / "net.onnx").write_bytes(b"second")
-    policy.opened.cache_clear()  # as in another process
+    policy.load_network.cache_clear()  # as in another process
     assert "'net.onnx' is gone or has changed: call smc.policy again" in str(briefly(law).failure)
 
 

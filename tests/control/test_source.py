@@ -90,7 +90,7 @@ def test_replaced_gains_are_the_users():
 def test_gains_by_channel_are_of_their_common_source():
     default, shipped = smc.law("pid"), gain_sets.law("duffing", "pid")
     both = by_channel(
-        [shipped, dataclasses.replace(shipped, gains=default.gains, source=shipped.source.of(default.gains))]
+        [shipped, dataclasses.replace(shipped, gains=default.gains, source=shipped.source.with_gains(default.gains))]
     )
     assert both.source.kind == both.of_channel(1).source.kind == "shipped"
     assert by_channel([default, shipped]).source.kind == "yours"

@@ -21,7 +21,7 @@ from scipy.linalg import expm
 
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.law import Law, Measurement
-from smc_mujoco.simulation import native, reference
+from smc_mujoco.simulation import cfunctions, reference
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,7 +139,7 @@ def chain(
       memory: the first cells of the law's memory at the start.
     """
     count, n = round(duration / h), len(x)
-    function = native.component(law)  # as the callback calls it
+    function = cfunctions.compile_component(law)  # as the callback calls it
     y = np.array(measured(dt=h if dt is None else dt, f=f, g=g, limit=limit, model=model))
     y[HAS_SURFACE] = float(n == 1)
     gains, out, cells = np.array([*law.gains.values(), 0.0]), np.zeros(2), np.zeros(law.memory + 1)

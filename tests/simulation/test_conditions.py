@@ -18,7 +18,7 @@ from smc_mujoco.analysis.tuning.result import load
 from smc_mujoco.cli.main import app
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation.conditions import NAMED, applicable, find_condition, from_file, parse
-from smc_mujoco.simulation.initial_states import SEEDS
+from smc_mujoco.simulation.initial_states import GRID_SEEDS
 from smc_mujoco.studies.run_key import condition as told
 from smc_mujoco.studies.run_key import key
 
@@ -214,10 +214,10 @@ def test_starts_are_around_the_plants_own_or_around_a_given_one():
 
 def test_no_grid_has_the_starts_and_the_noise_of_tuning():
     tuned = {s.seed for s in Objective().scenarios("duffing", smc.law("classical"), 0)}
-    assert min(tuned) >= SEEDS
+    assert min(tuned) >= GRID_SEEDS
     assert len(tuned) == 7
     with pytest.raises(smc.ScenarioError, match="seed is"):
-        smc.grid("duffing", "none", "nominal", [SEEDS])
+        smc.grid("duffing", "none", "nominal", [GRID_SEEDS])
     starts = [s.resolved.x0[0] for s in Objective().scenarios("duffing", smc.law("classical"), 0)]
     assert len(set(starts)) == 7
     assert all(abs(x / 1.5 - 1.0) <= 0.2 for x in starts)

@@ -57,7 +57,7 @@ def position(fields, name):
 
 def test_offsets_are_where_the_live_arrays_are(live):
     model, data = live
-    offsets = layout.checked(model, data)
+    offsets = layout.checked_offsets(model, data)
     assert offsets == layout.offsets()
     assert ctypes.c_int64.from_address(model._address + offsets.nuserdata).value == 17
     for name in FIELDS:
@@ -76,13 +76,13 @@ def test_an_array_at_another_s_place_is_refused(monkeypatch, live, name):
 
     doctored(monkeypatch, "mjData", swap)
     with pytest.raises(layout.LayoutError, match=rf"does not have mjData\.{name} at byte"):
-        layout.checked(*live)
+        layout.checked_offsets(*live)
 
 
 def test_a_field_less_is_refused(monkeypatch, live):
     doctored(monkeypatch, "mjData", lambda fields: fields[1:])
     with pytest.raises(layout.LayoutError, match=r"does not have mjData\.qpos at byte"):
-        layout.checked(*live)
+        layout.checked_offsets(*live)
 
 
 def test_two_arrays_that_change_places_are_refused(monkeypatch, live):
@@ -93,7 +93,7 @@ def test_two_arrays_that_change_places_are_refused(monkeypatch, live):
 
     doctored(monkeypatch, "mjData", swap)
     with pytest.raises(layout.LayoutError, match="qpos"):
-        layout.checked(*live)
+        layout.checked_offsets(*live)
 
 
 def test_arrays_in_another_order_are_refused(monkeypatch, live):
@@ -105,7 +105,7 @@ def test_arrays_in_another_order_are_refused(monkeypatch, live):
 
     doctored(monkeypatch, "mjData", turn)
     with pytest.raises(layout.LayoutError):
-        layout.checked(*live)
+        layout.checked_offsets(*live)
 
 
 @pytest.mark.parametrize("name", ["qpos", "sensordata"])
@@ -116,7 +116,7 @@ def test_an_array_that_is_gone_is_refused(monkeypatch, live, name):
 
     doctored(monkeypatch, "mjData", remove)
     with pytest.raises(layout.LayoutError):
-        layout.checked(*live)
+        layout.checked_offsets(*live)
 
 
 def test_a_shifted_model_is_refused(monkeypatch, live):
@@ -125,7 +125,7 @@ def test_a_shifted_model_is_refused(monkeypatch, live):
 
     doctored(monkeypatch, "mjModel", insert)
     with pytest.raises(layout.LayoutError, match="nuserdata"):
-        layout.checked(*live)
+        layout.checked_offsets(*live)
 
 
 def test_an_unknown_type_is_refused(monkeypatch, live):
@@ -134,7 +134,7 @@ def test_an_unknown_type_is_refused(monkeypatch, live):
 
     doctored(monkeypatch, "mjData", insert)
     with pytest.raises(layout.LayoutError, match="quaternion_t"):
-        layout.checked(*live)
+        layout.checked_offsets(*live)
 
 
 def test_nothing_is_installed_when_the_layout_is_wrong(monkeypatch):

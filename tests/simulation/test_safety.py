@@ -863,7 +863,7 @@ def test_the_generalised_force_of_a_horizontal_force_is_that_of_the_jacobian(joi
     force = channel["sign"]
     if joint == "hinge":
         force = lever.py_func(np.rec.array(channel), data.xipos.ravel(), data.xanchor.ravel(), data.xaxis.ravel())
-    direction = channel["push"] - 6
+    direction = channel["horizontal"] - 6
     assert 0 <= direction < 2
     assert force == pytest.approx(jacobian[direction, 0], rel=1e-9)
 

@@ -582,8 +582,6 @@ def test_the_field_s_usual_words_are_understood(fields, said):
 
 def test_what_belongs_elsewhere_is_sent_there(tmp_path):
     scenario = smc.Scenario(plant="duffing", law="pid", duration=0.01)
-    with pytest.raises(TypeError, match="Scenario has no field 'controller': give the law as law="):
-        smc.Scenario(plant="duffing", controller="pid")  # pyright: ignore[reportCallIssue]
     with pytest.raises(smc.ScenarioError, match=r"call smc\.margins\(\['duffing'\], \['pid'\]\)"):
         smc.margins(scenario)  # pyright: ignore[reportArgumentType]
     with pytest.raises(smc.ScenarioError, match=r"table is Trace.*: smc\.figure draws traces"):

@@ -14,10 +14,10 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.part import Part
-from smc_mujoco.simulation import native, reference, serialise
+from smc_mujoco.simulation import cfunctions, reference, serialise
 from smc_mujoco.simulation.channels import channels, lever
 from smc_mujoco.simulation.signals import (
-    TERMS,
+    SINUSOIDS,
     BandLimited,
     Constant,
     Gust,
@@ -77,9 +77,9 @@ def written(signal, times, seed=3, channel=1, stream=2):
 
 def compiled(signal, times, seed=3, channel=1, stream=2):
     """The same, by the C function that the callback calls."""
-    function = native.of_signal(signal)
+    function = cfunctions.compile_signal(signal)
     call = FUNCTION(function.address)
-    inputs, values = np.array([0.0, seed, channel, stream, *SEEN]), np.array([*native.values_of(signal), 0.0])
+    inputs, values = np.array([0.0, seed, channel, stream, *SEEN]), np.array([*cfunctions.signal_values(signal), 0.0])
     memory, outputs, found = np.zeros(max(signal.memory, 1)), np.empty(3), []
     for t in times:
         inputs[0] = t
@@ -198,7 +198,7 @@ def test_a_gust_turns_a_hinge_by_its_arm():
             at = np.rec.array(channel)
             found = lever.py_func(at, data.xipos.ravel(), data.xanchor.ravel(), data.xaxis.ravel())
             assert found == pytest.approx(torque[0], rel=1e-12)
-            assert channel["push"] == 6 + "xyz".index(force)
+            assert channel["horizontal"] == 6 + "xyz".index(force)
 
 
 @pytest.mark.parametrize(("step", "time"), [(1e-3, 0.0), (5e-4, 0.007), (2.5e-4, 1.001), (1e-4, 0.123)])
@@ -234,7 +234,9 @@ def test_band_limited_noise_has_its_variance_over_seeds_and_channels():
     d = np.array([path(NOISE, [0.37], seed=s, channel=c)[0] for s in range(1000) for c in range(4)])
     assert abs(np.mean(d)) < 3 * 0.3 / math.sqrt(4000)
     assert np.mean(d**2) == pytest.approx(0.09, rel=3 * math.sqrt(2 / 4000))
-    assert np.mean(d**4) / np.mean(d**2) ** 2 == pytest.approx(3.0 - 3.0 / (2 * TERMS), abs=3 * math.sqrt(24 / 4000))
+    assert np.mean(d**4) / np.mean(d**2) ** 2 == pytest.approx(
+        3.0 - 3.0 / (2 * SINUSOIDS), abs=3 * math.sqrt(24 / 4000)
+    )
 
 
 def test_band_limited_noise_has_no_power_outside_its_band():
@@ -250,12 +252,12 @@ def test_band_limited_noise_has_no_power_outside_its_band():
 def test_the_frequencies_of_band_limited_noise_share_the_band_out():
     memory = np.zeros(NOISE.memory)
     BandLimited.value(0.0, NOISE, memory, 3, 0, 1)
-    part = (memory[:TERMS] / (2 * math.pi) - 5.0) / 10.0 * TERMS
-    assert np.floor(part).tolist() == list(range(TERMS))
+    part = (memory[:SINUSOIDS] / (2 * math.pi) - 5.0) / 10.0 * SINUSOIDS
+    assert np.floor(part).tolist() == list(range(SINUSOIDS))
     assert np.std(part % 1.0) > 0.2
-    assert abs(np.corrcoef(part, memory[TERMS:])[0, 1]) < 0.5
-    assert abs(np.corrcoef(part % 1.0, memory[TERMS:])[0, 1]) < 0.5  # a phase does not tell its frequency
-    assert np.all((memory[TERMS:] >= 0.0) & (memory[TERMS:] < 2 * math.pi))
+    assert abs(np.corrcoef(part, memory[SINUSOIDS:])[0, 1]) < 0.5
+    assert abs(np.corrcoef(part % 1.0, memory[SINUSOIDS:])[0, 1]) < 0.5  # a phase does not tell its frequency
+    assert np.all((memory[SINUSOIDS:] >= 0.0) & (memory[SINUSOIDS:] < 2 * math.pi))
 
 
 def test_band_limited_noise_is_a_function_of_time_alone():
@@ -399,7 +401,7 @@ def test_a_user_s_series_has_parameters_beside_its_data():
 def test_data_that_compiled_code_would_misread_are_refused(monkeypatch):
     for data in (np.zeros(3), np.zeros((3, 2)), np.zeros((2, 3), int), np.zeros((3, 2)).T):
         monkeypatch.setattr(Staircase, "data", data)
-        refused(lambda: native.values_of(Staircase()), "Staircase", data.shape)
+        refused(lambda: cfunctions.signal_values(Staircase()), "Staircase", data.shape)
 
 
 # CSV files

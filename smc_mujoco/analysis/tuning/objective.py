@@ -30,7 +30,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics import catalogue as metrics
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, Condition, find_condition
-from smc_mujoco.simulation.initial_states import SEEDS, Starts
+from smc_mujoco.simulation.initial_states import GRID_SEEDS, Starts
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -104,7 +104,7 @@ class Objective:
         for one, conditioned in zip(self.conditions, fields, strict=True):
             self.starts.check_condition(one.name, conditioned)
         cases = [dataclasses.replace(first, **conditioned) for conditioned in fields]
-        placed = [self.starts.place(case, SEEDS + RUNS * seed + i) for i, case in enumerate(cases)]
+        placed = [self.starts.place(case, GRID_SEEDS + RUNS * seed + i) for i, case in enumerate(cases)]
         for one, case in zip(self.conditions, placed, strict=True):
             if not any(case.resolved.x0):
                 cure = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"

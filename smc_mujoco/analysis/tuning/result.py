@@ -279,7 +279,7 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
                     f"{one.law.name} has {its}, {first.law.name} {other}",
                 )
                 raise ScenarioError(
-                    f"laws tuned with unequal {name} cannot be compared, {pair}: tune them in the same way"
+                    f"laws tuned with untuned_laws {name} cannot be compared, {pair}: tune them in the same way"
                 )
         if one.evaluations > one.budget:
             counts = f"{one.law.name} evaluated {one.evaluations} of {one.budget}"
@@ -288,7 +288,7 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
             if not np.allclose(one.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
                 pair = f"{one.law.name}'s {gain} was searched in {one.bounds.get(gain)}, not in {ends}"
                 raise ScenarioError(
-                    f"laws tuned within unequal bounds cannot be compared, {pair}: tune them in the same way"
+                    f"laws tuned within untuned_laws bounds cannot be compared, {pair}: tune them in the same way"
                 )
         for gain, most in one._largest.items():
             if one.gains[gain] > most * (1.0 + ROUNDING):

@@ -134,7 +134,7 @@ def tune(
     plant, law = cases[0].plant, cases[0].law
     bound = goal.u_max or default_u_max(plant)
     goal = dataclasses.replace(goal, u_max=bound)
-    reach = goal.starts.reach(dataclasses.replace(cases[0], x0=None))
+    reach = goal.starts.largest(dataclasses.replace(cases[0], x0=None))
     scales = search_space.scales(plant, bound, cases[0].model == "nominal", reach)
     start = search_space.box(law, scales)
     if search_space.without_unit(law):

@@ -133,7 +133,7 @@ def usual(scenario: Scenario) -> Uncertainty:
 
 def strength(scenario: Scenario) -> float:
     """Return the largest force that every drive can hold, N or N m."""
-    return min(scenario.limits) * scenario.drive.gain
+    return min(scenario.limits) * scenario.nominal_drive.gain
 
 
 def outside(scenario: Scenario, within: Uncertainty) -> str:

@@ -236,7 +236,7 @@ def law(text: str) -> "str | Law":
 def law_with(text: str, gains: str) -> "Law":
     """Return the law in a text with the gains of the option --gains."""
     from smc_mujoco.control import from_text
-    from smc_mujoco.control.component import parsed_gains
+    from smc_mujoco.control.from_text import parsed_gains
 
     return from_text.law(text, **parsed_gains(gains, "--gains"))
 

@@ -40,8 +40,8 @@ from smc_mujoco.control.units import ACCELERATION, INERTIA, RATE, SPEED, Gain
 )
 def time_delay_sliding(y, gains, memory):
     s = y.de + gains.c * y.e
-    wanted = y.ddr - gains.c * y.de - gains.k * saturate(s / gains.width)
-    u = memory[:, 0] + gains.m * (wanted - memory[:, 2] * (y.v - memory[:, 1]) / y.dt)
+    desired = y.ddr - gains.c * y.de - gains.k * saturate(s / gains.width)
+    u = memory[:, 0] + gains.m * (desired - memory[:, 2] * (y.v - memory[:, 1]) / y.dt)
     memory[:, 0] = np.minimum(np.maximum(u, -y.limit), y.limit)
     memory[:, 1] = y.v
     memory[:, 2] = 1.0

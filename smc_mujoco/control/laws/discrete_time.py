@@ -28,8 +28,8 @@ def discrete_time(y, gains, memory):
     d = (s - memory[0]) / y.dt - memory[1] if memory[2] != 0.0 else 0.0
     v = min(max(-(s / y.dt + d), -gains.k), gains.k)
     u = command(y, v_eq + v)
-    held = v
+    applied = v
     if abs(u) > y.limit:
-        held = v + (min(max(u, -y.limit), y.limit) - u) * input_gain(y)
-    memory[0], memory[1], memory[2] = s, held, 1.0
+        applied = v + (min(max(u, -y.limit), y.limit) - u) * input_gain(y)
+    memory[0], memory[1], memory[2] = s, applied, 1.0
     return u, s

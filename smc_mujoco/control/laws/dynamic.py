@@ -31,7 +31,7 @@ def dynamic(y, gains, memory):
     rate = (s - memory[1]) / y.dt if memory[2] != 0.0 else 0.0
     memory[1], memory[2] = s, 1.0
     u, w = command(y, v_eq + memory[0]), memory[0] - y.dt * gains.k * sgn(rate + gains.q * s)
-    after = command(y, v_eq + w)
-    if abs(after) <= y.limit or abs(after) < abs(u):
+    next_u = command(y, v_eq + w)
+    if abs(next_u) <= y.limit or abs(next_u) < abs(u):
         memory[0] = w
     return u, s

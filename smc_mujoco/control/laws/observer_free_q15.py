@@ -22,15 +22,15 @@ from numba import njit
 from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import FORCE, POSITION, RATE, SPEED, Gain
 
-FULL, MOST = 32768, 32767
-TABLE = np.array([round(MOST * math.tanh(8.0 * i / 256)) for i in range(257)], np.int64)  # each fits 16 bits
+UNITS, MAX_WORD = 32768, 32767
+TABLE = np.array([round(MAX_WORD * math.tanh(8.0 * i / 256)) for i in range(257)], np.int64)  # each fits 16 bits
 
 
 @njit
 def word(a, unit):
     """Return a in units of unit / 2^15, rounded to nearest (ties away from 0) and saturated."""
-    n = math.floor(abs(a) / unit * FULL + 0.5) if abs(a) < unit else MOST
-    return int(math.copysign(min(n, MOST), a))
+    n = math.floor(abs(a) / unit * UNITS + 0.5) if abs(a) < unit else MAX_WORD
+    return int(math.copysign(min(n, MAX_WORD), a))
 
 
 @njit
@@ -43,7 +43,7 @@ def product(a, b, bits):
 @njit
 def saturated(n):
     """Return n, saturated to a word."""
-    return min(max(n, -MOST), MOST)
+    return min(max(n, -MAX_WORD), MAX_WORD)
 
 
 @law_function(
@@ -65,12 +65,12 @@ def saturated(n):
 )
 def observer_free_q15(y, gains, memory):
     e, de = word(y.e, gains.e_range), word(y.de, gains.de_range)
-    on_e, on_de = word(gains.k1 * gains.e_range / 8.0, 16.0), word(gains.de_range / 8.0, 16.0)
-    s = saturated(product(on_e, e, 11) + product(on_de, de, 11))
-    slid, v_eq = sliding(y, gains.k1)
+    k_e, k_de = word(gains.k1 * gains.e_range / 8.0, 16.0), word(gains.de_range / 8.0, 16.0)
+    s = saturated(product(k_e, e, 11) + product(k_de, de, 11))
+    surface_s, v_eq = sliding(y, gains.k1)
     if y.has_surface != 0.0:
-        s = word(slid, 8.0)
+        s = word(surface_s, 8.0)
     i, part = abs(s) >> 7, abs(s) & 127
     T = TABLE[i] + product(TABLE[i + 1] - TABLE[i], part, 7)
     u = product(word(gains.lam, gains.u_range), T if s >= 0 else -T, 15)
-    return command(y, v_eq - u * gains.u_range / FULL), s * 8.0 / FULL
+    return command(y, v_eq - u * gains.u_range / UNITS), s * 8.0 / UNITS

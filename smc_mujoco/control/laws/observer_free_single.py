@@ -15,7 +15,7 @@ from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import FORCE, RATE, Gain
 
 ONE, TEN, A45, A105 = np.float32(1.0), np.float32(10.0), np.float32(45.0), np.float32(105.0)
-QUARTER, END = np.float32(0.25), np.float32(9.0)  # tanh(9) rounds to 1
+QUARTER, MAX_S = np.float32(0.25), np.float32(9.0)  # tanh(9) rounds to 1
 
 
 @law_function(
@@ -27,10 +27,10 @@ QUARTER, END = np.float32(0.25), np.float32(9.0)  # tanh(9) rounds to 1
 )
 def observer_free_single(y, gains, memory):
     s = np.float32(y.de) + np.float32(gains.k1) * np.float32(y.e)
-    slid, v_eq = sliding(y, gains.k1)
+    surface_s, v_eq = sliding(y, gains.k1)
     if y.has_surface != 0.0:
-        s = np.float32(slid)
-    a = QUARTER * min(max(s, -END), END)
+        s = np.float32(surface_s)
+    a = QUARTER * min(max(s, -MAX_S), MAX_S)
     z = a * a
     T = a * (A105 + TEN * z) / (A105 + z * (A45 + z))
     T = (T + T) / (ONE + T * T)

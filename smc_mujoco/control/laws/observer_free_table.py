@@ -17,8 +17,8 @@ import numpy as np
 from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import FORCE, RATE, Gain
 
-MAX_STEPS, END = 256, 5.0  # steps; 1 - tanh(5) = 9.1e-5 is the error of linear interpolation at 256 steps
-TABLE = np.array([math.tanh(END * i / MAX_STEPS) for i in range(MAX_STEPS)] + [1.0])
+MAX_STEPS, MAX_S = 256, 5.0  # steps; 1 - tanh(5) = 9.1e-5 is the error of linear interpolation at 256 steps
+TABLE = np.array([math.tanh(MAX_S * i / MAX_STEPS) for i in range(MAX_STEPS)] + [1.0])
 
 
 @law_function(
@@ -32,7 +32,7 @@ TABLE = np.array([math.tanh(END * i / MAX_STEPS) for i in range(MAX_STEPS)] + [1
 def observer_free_table(y, gains, memory):
     s, v_eq = sliding(y, gains.k1)
     stride = int(MAX_STEPS / min(max(gains.size, 1.0), MAX_STEPS))
-    place = min(abs(s), END) * (MAX_STEPS / (END * stride))
+    place = min(abs(s), MAX_S) * (MAX_STEPS / (MAX_S * stride))
     i = int(place)
     low = min(i * stride, MAX_STEPS)
     high = min(low + stride, MAX_STEPS)

@@ -14,7 +14,7 @@ from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import FORCE, RATE, Gain
 
 SERIES = (1.0, -1.0 / 3.0, 2.0 / 15.0, -17.0 / 315.0, 62.0 / 2835.0)
-END = 8.0  # 1 - tanh(8) = 2.3e-7
+MAX_S = 8.0  # 1 - tanh(8) = 2.3e-7
 
 
 @law_function(
@@ -27,7 +27,7 @@ END = 8.0  # 1 - tanh(8) = 2.3e-7
 )
 def observer_free_taylor(y, gains, memory):
     s, v_eq = sliding(y, gains.k1)
-    a = min(max(s, -END), END) / 8.0
+    a = min(max(s, -MAX_S), MAX_S) / 8.0
     P = 0.0
     for i in range(min(max(int(gains.terms), 1), 5) - 1, -1, -1):
         P = P * a * a + SERIES[i]

@@ -9,14 +9,14 @@ section 5 (the algorithm with a prescribed law of variation), following S. Emely
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn
-from smc_mujoco.control.units import FORCE, PARABOLA, Gain
+from smc_mujoco.control.units import FORCE, SPEED_PER_ROOT, Gain
 
 
 @law_function(
     family="higher-order",
     finite_time="e",
     accuracy={"s": 2, "e": 2},
-    gains={"a": Gain(5.0, FORCE, positive=True), "b": Gain(2.0, PARABOLA, positive=True)},
+    gains={"a": Gain(5.0, FORCE, positive=True), "b": Gain(2.0, SPEED_PER_ROOT, positive=True)},
     memory=1,
     relative_degree=2,
     conditions={"a > b^2/2": lambda g: g.a > g.b**2 / 2.0},

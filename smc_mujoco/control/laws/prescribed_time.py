@@ -30,6 +30,6 @@ from smc_mujoco.control.units import FORCE, INERTIA, RATE, TIME, Gain
 )
 def prescribed_time(y, gains, memory):
     s, v_eq = sliding(y, gains.c)
-    left = gains.T - y.t
-    pull = s * min(gains.m / left, 1.0 / y.dt) if left > 0.5 * y.dt else 0.0
+    remaining = gains.T - y.t
+    pull = s * min(gains.m / remaining, 1.0 / y.dt) if remaining > 0.5 * y.dt else 0.0
     return command(y, v_eq - pull - gains.k * sgn(s)), s

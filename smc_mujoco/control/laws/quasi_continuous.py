@@ -12,7 +12,7 @@ condition: A. Levant, "Principles of 2-sliding mode design", Automatica 43(4):57
 import math
 
 from smc_mujoco.control.law import command, law_function, power
-from smc_mujoco.control.units import FORCE, PARABOLA, Gain
+from smc_mujoco.control.units import FORCE, SPEED_PER_ROOT, Gain
 
 
 def brakes(gains):
@@ -27,7 +27,7 @@ def brakes(gains):
     finite_time="e",
     accuracy={"s": 2, "e": 2},
     label="Quasi-continuous",
-    gains={"a": Gain(6.0, FORCE, positive=True), "b": Gain(1.0, PARABOLA, positive=True)},
+    gains={"a": Gain(6.0, FORCE, positive=True), "b": Gain(1.0, SPEED_PER_ROOT, positive=True)},
     memory=1,
     relative_degree=2,
     conditions={"a (r - b) / (r + b) > r^2/2 for some r > b": brakes},

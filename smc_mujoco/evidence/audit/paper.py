@@ -192,7 +192,7 @@ class Paper:
         """
         of_set = find("set of gains", gains, self.sets)
         if of_set is None:
-            if law in self.laws or law not in (*gain_sets.LAWS, *gain_sets.SAME):
+            if law in self.laws or law not in (*gain_sets.LAWS, *gain_sets.STUDY_ALIASES):
                 gains = "default"
             return self._bound(law, {}) if law in self.laws else gain_sets.law(self.plant(plant), law, gains)
         values = {**of_set.get("", {}).get(law, {}), **of_set.get(plant, {}).get(law, {})}

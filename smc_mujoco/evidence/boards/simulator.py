@@ -35,7 +35,7 @@ from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.evidence.boards.scoring import shoulder_first
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1, accelerations
-from smc_mujoco.simulation import native
+from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.noise_key import draw_key, has_user_code
@@ -201,7 +201,7 @@ class Machine:
             )
         law, velocity = scenario.law.of_channel(0), resolved.velocity
         try:
-            self.law, self.estimator = native.component(law), native.component(velocity)
+            self.law, self.estimator = cfunctions.compile_component(law), cfunctions.compile_component(velocity)
         except NotCompilable as error:
             raise ScenarioError(f"the robustness test runs compiled laws only, and {error}") from None
         self.gains, self.filter = np.array([*law.gains.values(), 0.0]), np.array([*velocity.gains.values(), 0.0])

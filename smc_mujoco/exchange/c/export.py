@@ -18,7 +18,7 @@ from smc_mujoco.common.jit import AtAddress
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control import from_text
-from smc_mujoco.control.component import Component, Template, Value, at, written
+from smc_mujoco.control.component import Component, GainValue, Template, gain_at, gain_text
 from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.c.translate import JOINTS, MATH, SLOTS, Untranslatable, plain, rows, translate
@@ -90,8 +90,8 @@ def number_of_joints(law: Component, joints: int | None) -> int:
     for name, values in several.items():
         if values != count:
             raise ScenarioError(
-                f"gain {name} of {law.name} has {values} values, {written(law.gains[name])}, for {count} joints: give "
-                f"one number, or {count}"
+                f"gain {name} of {law.name} has {values} values, {gain_text(law.gains[name])}, for {count} joints: "
+                f"give one number, or {count}"
             )
     return count
 
@@ -145,7 +145,7 @@ def _fixed_point(law: Component) -> str:
 def _facts(law: Component, slots: int, joints: int, single: bool) -> str:
     """Return the header, the names of the gains, and the constants that describe the law."""
     defaults = ",".join(f"{plain(name)}={_default(value)}" for name, value in law.gains.items())
-    values = [_literal(at(value, i), single) for value in law.gains.values() for i in range(max(joints, 1))]
+    values = [_literal(gain_at(value, i), single) for value in law.gains.values() for i in range(max(joints, 1))]
     lines = [
         *([f"#define {JOINTS} {joints}", f"#define {SLOTS} {slots}"] if joints else []),
         build.HEADER.read_text(encoding="utf-8"),
@@ -162,7 +162,7 @@ def _facts(law: Component, slots: int, joints: int, single: bool) -> str:
     return "\n".join(lines)
 
 
-def _default(value: Value) -> str:
+def _default(value: GainValue) -> str:
     """Return the default of a gain, or those of all joints."""
     return " ".join(map(repr, value)) if isinstance(value, tuple) else repr(value)
 
@@ -179,7 +179,7 @@ def _head(law: Component, numbers: str, slots: int, joints: int, code: str, size
     template = known_laws().get(law.name)
     ours = template is not None and template.function is law.function
     doc = template.doc if template is not None and ours else inspect.cleandoc(law.function.__doc__ or "")
-    gains = ", ".join(f"{name} = {written(value)}" for name, value in law.gains.items()) or "none"
+    gains = ", ".join(f"{name} = {gain_text(value)}" for name, value in law.gains.items()) or "none"
     many, each = (f" of {joints} joints", "joint") if joints else ("", "channel")
     facts = {
         "gains": f"{gains}; gains[] in this order" + f", {joints} numbers each" * bool(joints),

@@ -27,7 +27,8 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, shown, whole
 from smc_mujoco.common.guard import Arithmetic, computed
 from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
-from smc_mujoco.control.component import Template, as_gains, parsed_gains, template, written
+from smc_mujoco.control.component import Template, as_gains, gain_text, template_decorator
+from smc_mujoco.control.from_text import parsed_gains
 from smc_mujoco.control.joint_law import ARRAYS
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.units import Gain
@@ -211,7 +212,9 @@ def law_from_c(
     law = CLaw(library.path, symbol, library.file, _first_comment(library.path))
     law.set_up(len(about.gains), about.memory, name)
     words = {"requires_model": about.modelled, "joint": bool(about.joints)}
-    return template("law", about.gains, about.memory, positive, nonnegative, about.degree, None, plants, **words)(law)
+    return template_decorator(
+        "law", about.gains, about.memory, positive, nonnegative, about.degree, None, plants, **words
+    )(law)
 
 
 def _try(library: sandbox.Library, about: "About") -> list[str]:
@@ -237,7 +240,7 @@ def check(
     about = _about(library, gains, memory, None, None)
     yield from library.warnings
     yield from _try(library, about)
-    gains_text = ", ".join(f"{name} = {written(gain.default)}" for name, gain in about.gains.items()) or "none"
+    gains_text = ", ".join(f"{name} = {gain_text(gain.default)}" for name, gain in about.gains.items()) or "none"
     joints = f"{about.joints} joints; " * bool(about.joints)
     yield f"{source.name}: {symbol} passes; {joints}gains {gains_text}; memory {about.memory}"
 
@@ -302,11 +305,11 @@ def _about(
     for name, gain in named.items():
         if isinstance(gain.default, tuple) and len(gain.default) != joints:
             each = f", or {joints}" * bool(joints)
-            raise ScenarioError(f"gain {name} of {file} is {written(gain.default)}: give it one number{each}")
+            raise ScenarioError(f"gain {name} of {file} is {gain_text(gain.default)}: give it one number{each}")
     for name in filter(None, facts.get("smc_law_shared", "").split(",")):
         gain = errors.find(f"shared gain of {file}", name, named)
         if isinstance(gain.default, tuple):
-            raise ScenarioError(f"shared gain {name} of {file} is {written(gain.default)}: give it one number")
+            raise ScenarioError(f"shared gain {name} of {file} is {gain_text(gain.default)}: give it one number")
         named[name] = dataclasses.replace(gain, shared=True)
     return About(
         named,

@@ -90,14 +90,14 @@ def call(
       modelled: whether the law needs the nominal model.
       joints: number of joints of a law of many joints; 0 for one channel.
     """
-    from smc_mujoco.control.component import at
+    from smc_mujoco.control.component import gain_at
     from smc_mujoco.exchange.c import build
 
     calls, unseen, name, each = build.fresh(".calls"), [], library.path.name, max(1, joints)
     anchor, data = build.static_data(library.file, library.symbol)
     if not data:
         unseen.append(f"{name}: static data that it changes is not seen, as nm shows no names of it")
-    numbers = [at(gain, i) for gain in gains for i in range(each)]
+    numbers = [gain_at(gain, i) for gain in gains for i in range(each)]
     order = {"fields": fields, "gains": numbers, "memory": memory, "modelled": modelled, "joints": joints, "each": each}
     _run(library, order | {"calls": str(calls), "anchor": anchor, "data": data})
     if why := _sanitize(library, calls, len(gains), memory):

@@ -44,7 +44,7 @@ def check_c(
     Example: smc-mujoco check-c my_law.c --gains lam=6,k1=3
     """
     with held_back():
-        from smc_mujoco.control.component import parsed_gains
+        from smc_mujoco.control.from_text import parsed_gains
         from smc_mujoco.exchange.c.load import check
 
     values = parsed_gains(gains, "--gains") if gains else None

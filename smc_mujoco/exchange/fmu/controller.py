@@ -19,7 +19,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from smc_mujoco.control.component import Component, at
+from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
@@ -156,7 +156,7 @@ def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> li
     for kind, part in controller.parts.items():
         for name, value in part.gains.items():
             indices = places if kind == "law" and name not in part.shared else ("",)
-            listed += [parameter(kind, part, name, at(value, i), place) for i, place in enumerate(indices)]
+            listed += [parameter(kind, part, name, gain_at(value, i), place) for i, place in enumerate(indices)]
     listed.append(Variable("dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, controller.period))
     for kind, (slots, _) in code.items():
         for i in range(max(1, controller.joints)):
@@ -207,7 +207,7 @@ def bounded(name: str, bound: float) -> Variable:
 def parameter(kind: str, part: Component, name: str, value: float, index: str = "") -> Variable:
     """Return a gain of a component, or its element for one joint, such as "[1]", as a parameter."""
     gain = part.template.gains[name] if part.template and name in part.template.gains else None
-    unit = gain.unit_at({key: at(one, 0) for key, one in part.gains.items()}) if gain else None
+    unit = gain.unit_at({key: gain_at(one, 0) for key, one in part.gains.items()}) if gain else None
     positive = bool(gain and gain.positive)
     minimum = 0.0 if gain and (gain.positive or gain.nonnegative) else -math.inf
     limits = ", greater than 0" if positive else ", at least 0" if minimum == 0.0 else ""

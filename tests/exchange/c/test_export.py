@@ -24,7 +24,7 @@ from smc_mujoco.control.law import Measurement, catalogue, sliding
 from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.exchange.c import build, export, sandbox
 from smc_mujoco.exchange.c.load import CLaw
-from smc_mujoco.simulation import native
+from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation.reference import gains_of
 
 pytestmark = needs_compiler
@@ -63,7 +63,7 @@ def compiled(folder):
     with unmeasured(), ThreadPoolExecutor(2) as pool:
         made = dict(zip(LAWS, pool.map(make, LAWS), strict=True))
         for template in LAWS.values():
-            native.component(template())  # compiles, while the others do
+            cfunctions.compile_component(template())  # compiles, while the others do
     return made
 
 

@@ -195,7 +195,7 @@ def test_in_single_precision_each_call_is_that_of_double_within_its_rounding(fol
         M, h, g = np.eye(3) + 0.1, rng.normal(size=3), rng.normal(size=3)
         y = JointMeasurement(1e-3 * k, 1e-3, 1.0, Nothing(), *vectors, M, h, g)
         theirs.memory[:] = memory[:, : law.memory]
-        expected, found = theirs.together(y), single(y, gains_of(law, 3), memory)
+        expected, found = theirs.call_joint(y), single(y, gains_of(law, 3), memory)
         for ours, wanted in zip(found, expected, strict=True):
             scale = 1.0 / y.dt if name == "time_delay_sliding" else 1.0  # it divides a difference of velocities by dt
             np.testing.assert_allclose(ours, wanted, atol=1e-5 * scale * (1.0 + np.abs(wanted).max()), rtol=0)

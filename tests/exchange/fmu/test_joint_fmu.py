@@ -59,7 +59,7 @@ def seen(known, trace: smc.Trace, k: int) -> dict[str, float]:
     x, v = trace.x[k], trace.v[k]
     r, dr, ddr = type(REFERENCE).value(trace.t[k], REFERENCE)
     M, h, g = reference.dynamics(trace.scenario, x, v)
-    asked = reference.OnRequest(trace.scenario, x, v)
+    asked = reference.NominalDynamics(trace.scenario, x, v)
     vectors = {"x": x, "v": v, "r": [r] * 3, "dr": [dr] * 3, "ddr": [ddr] * 3, "h": h, "g": g}
     values = {f"{name}[{i}]": float(each[i - 1]) for name, each in vectors.items() for i in JOINTS}
     matrices = {"M": M, "C": np.column_stack([asked.coriolis(unit) for unit in np.eye(3)])}

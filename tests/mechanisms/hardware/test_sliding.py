@@ -365,7 +365,7 @@ def test_a_servo_needs_more_to_drive_a_load_than_it_loses_when_driven_back(model
             lambda: smc.Scenario(
                 plant="duffing", law="none", friction=[smc.LuGre(0.1, 0.2, 0.1), smc.Sigmoid(1.0, 5.0)]
             ),
-            "friction has LuGre and Sigmoid, which both hold a joint by bristles: give one",
+            "friction has LuGre and Sigmoid, which both model bristles: give one",
         ),
         (
             lambda: smc.Scenario(plant="duffing", law="none", friction=smc.Sigmoid(1.0, 5.0), integrator="RK4"),

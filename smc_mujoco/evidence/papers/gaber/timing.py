@@ -16,7 +16,7 @@ import numpy as np
 from smc_mujoco.common.jit import call
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.simulation import native
+from smc_mujoco.simulation import cfunctions
 
 CALLS, ROUNDS, QUICK_ROUNDS = 20_000, 60, 20
 AT = {name: i for i, name in enumerate(Measurement._fields)}
@@ -27,7 +27,9 @@ def nanoseconds(laws: Mapping[str, Component], quick: bool = False) -> dict[str,
     """Return the least time per call of each law, ns."""
     t = np.arange(CALLS) * 1e-3
     states = np.column_stack([0.3 * np.sin(7 * t), 2.1 * np.cos(7 * t)])
-    functions = {name: native.component(law) for name, law in laws.items()}  # kept alive while their addresses are used
+    functions = {
+        name: cfunctions.compile_component(law) for name, law in laws.items()
+    }  # kept alive while their addresses are used
     least, loop = dict.fromkeys(laws, np.inf), _loop()
     for _ in range(QUICK_ROUNDS if quick else ROUNDS):
         for name, law in laws.items():

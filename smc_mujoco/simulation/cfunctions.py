@@ -6,7 +6,7 @@ Laws, estimators, signals and nominal models all become functions of one C type:
 
 It returns 0, or 1 if the function raised an exception. Array accesses are bounds-checked, also in compiled functions
 that a law calls, so a law that writes beyond its memory fails instead of overwriting other data. Functions of the
-math module do not raise in compiled code. Outside their domain they return NaN, and inf beyond the largest float. If
+math module do not raise in compiled code: they return NaN outside their domain, and inf beyond the largest float. If
 that reaches u or s, the run ends.
 """
 
@@ -44,14 +44,14 @@ from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import SEEN
 from smc_mujoco.simulation.callback import magic
 from smc_mujoco.simulation.signals import Signal
-from smc_mujoco.simulation.state import INSTANT, RUBBING
+from smc_mujoco.simulation.state import FRICTION_INPUT, INSTANT
 
-SERIES = floats(("address", "count"))  # what follows the parameters of a series: its data
-instant_at, rubbing_at, seen_at, series_at = map(record_at, (INSTANT, RUBBING, SEEN, SERIES))
+SERIES = floats(("address", "count"))  # of a series' data; behind its parameters
+instant_at, friction_input_at, seen_at, series_at = map(record_at, (INSTANT, FRICTION_INPUT, SEEN, SERIES))
 
 
 @functools.cache
-def _component(function: Callable, kind: str, gains: tuple[str, ...], memory: int) -> Function:
+def _compile_pair(function: Callable, kind: str, gains: tuple[str, ...], memory: int) -> Function:
     """Compile (y, gains, memory) -> two numbers; an estimator may return only the velocity."""
     body, inputs, values = jit(function), loader(Reading if kind == "estimator" else Measurement), loader(named(gains))
     estimates = kind == "estimator"
@@ -67,16 +67,16 @@ def _component(function: Callable, kind: str, gains: tuple[str, ...], memory: in
             output[0], output[1] = first, second
         return not ok
 
-    return _made(native, function, kind, gains, memory)
+    return _stored(native, function, kind, gains, memory)
 
 
 @functools.cache
-def _joint(function: Callable, gains: tuple[str, ...], shared: tuple[str, ...], memory: int) -> Function:
+def _compile_joint_law(function: Callable, gains: tuple[str, ...], shared: tuple[str, ...], memory: int) -> Function:
     """Compile (y, gains, memory) -> two vectors, of a law of many joints.
 
     Its inputs are the numbers of a JointMeasurement, its parameters n numbers a gain, its outputs u and s, (n,) each.
     """
-    body, values = jit(function), _vectors(gains, shared)
+    body, values = jit(function), _joint_gains(gains, shared)
 
     @checked
     def law(y, g, m, out):
@@ -94,12 +94,12 @@ def _joint(function: Callable, gains: tuple[str, ...], shared: tuple[str, ...], 
         ok, _ = attempt(law, (seen, values(g, n), memories, output))
         return not ok
 
-    return _made(native, function, gains, shared, memory)
+    return _stored(native, function, gains, shared, memory)
 
 
 @functools.cache
-def _vectors(names: tuple[str, ...], shared: tuple[str, ...]) -> Callable:
-    """Return a compiled function (address, n) -> gains by name: a vector (n,) of each, one number of a shared one."""
+def _joint_gains(names: tuple[str, ...], shared: tuple[str, ...]) -> Callable:
+    """Return a compiled function (address, n) -> gains by name: vectors (n,), but numbers for shared gains."""
     vector = "carray(pointer(address + 8 * n * {0}), (n,))"
     read = [(vector + "[0]" * (name in shared)).format(i) for i, name in enumerate(names or ("unused",))]
     space = {"carray": carray, "pointer": pointer, "Gains": named(names)}
@@ -122,25 +122,25 @@ def with_acceleration(typingctx, result):
 
 
 @functools.cache
-def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
+def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
     """Compile a record INSTANT -> value, first and second derivative.
 
     The parameters of a series are followed by the address and the number of its data.
     """
     body, values = jit(kind.value), loader(named(names))
-    random, series, memory, behind = kind.random, kind.series, max(kind.memory, 1), 8 * len(names)
+    random, series, memory, parameter_bytes = kind.random, kind.series, max(kind.memory, 1), 8 * len(names)
     rows, sees = kind.rows, kind.sees
 
     def native(y, p, m, out):
         now = instant_at(y, 0)
         if random:
-            noise = carray(pointer(m), (memory,))
-            ok, result = attempt(body, (now.t, values(p), noise, now.seed, now.channel, now.stream))
+            state = carray(pointer(m), (memory,))
+            ok, result = attempt(body, (now.t, values(p), state, now.seed, now.channel, now.stream))
         elif sees:
-            kept = carray(pointer(m), (memory,))
-            ok, result = attempt(body, (now.t, values(p), kept, now.e, now.de, now.s))
+            state = carray(pointer(m), (memory,))
+            ok, result = attempt(body, (now.t, values(p), state, now.e, now.de, now.s))
         elif series:
-            data = series_at(p + behind, 0)
+            data = series_at(p + parameter_bytes, 0)
             table = carray(pointer(int(data.address)), (rows, int(data.count)))
             ok, result = attempt(body, (now.t, values(p), table))
         else:
@@ -151,13 +151,13 @@ def _signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
             output[0], output[1], output[2] = r, dr, ddr
         return not ok
 
-    made = _made(native, kind.value, names, random, series, memory, rows, sees)
+    compiled = _stored(native, kind.value, names, random, series, memory, rows, sees)
     fingerprint.hold(kind)
-    return made
+    return compiled
 
 
 @functools.cache
-def nominal(function: Callable, names: tuple[str, ...]) -> Function:
+def compile_nominal(function: Callable, names: tuple[str, ...]) -> Function:
     """Compile a record SEEN -> f and g of channel i."""
     body, values = jit(function), loader(named(names))
 
@@ -171,75 +171,85 @@ def nominal(function: Callable, names: tuple[str, ...]) -> Function:
             output[0], output[1] = f, g
         return not ok
 
-    return _made(native, function, names)
+    return _stored(native, function, names)
 
 
 @functools.cache
-def _friction(function: Callable, names: tuple[str, ...]) -> Function:
-    """Compile v, motor, load -> what resists, and the bounds of what holds, of a friction by a formula."""
+def _compile_friction(function: Callable, names: tuple[str, ...]) -> Function:
+    """Compile a friction by a formula: v, motor, load -> sliding friction, and both bounds of the static friction."""
     body, values = jit(function), loader(named(names))
 
     def native(y, p, m, out):
-        rubbing = rubbing_at(y, 0)
-        ok, result = attempt(body, (rubbing.v, rubbing.motor, rubbing.load, values(p)))
+        friction = friction_input_at(y, 0)
+        ok, result = attempt(body, (friction.v, friction.motor, friction.load, values(p)))
         if ok:
             f, low, high = result
             output = carray(pointer(out), (3,))
             output[0], output[1], output[2] = f, low, high
         return not ok
 
-    return _made(native, function, names)
+    return _stored(native, function, names)
 
 
-def _made(native: Callable, function: Callable, *arguments: object) -> Function:
-    """Return a C function of a user's function, kept on disk under its hash and these arguments."""
-    made = Function(native, _cached(function, *arguments))
+def _stored(native: Callable, function: Callable, *arguments: object) -> Function:
+    """Return the C function of a user's function. It is kept on disk under its hash and these arguments."""
+    compiled = Function(native, _disk_key(function, *arguments))
     fingerprint.hold(function)
-    return made
+    return compiled
 
 
-def _cached(function: Callable, *arguments: object) -> tuple[str, str] | bool:
+def _disk_key(function: Callable, *arguments: object) -> tuple[str, str] | bool:
     """Return the name and the hash under which a compiled function is kept on disk.
 
-    It is False, for none, if the function has no hash, or if a global of it has changed since it was compiled first, as
-    for other gains: the code has the present value.
+    Return False, for none, if the function has no hash, or if one of its globals has changed since it was compiled
+    first, as for other gains: the code has the present value.
     """
     function_name = getattr(function, "__qualname__", function.__name__)
     name = re.sub(r"\W+", "-", f"{function.__module__}.{function_name}")
     try:
-        known = fingerprint.of(function)
-        return known == fingerprint.now(function) and (name, f"{magic()} {known} {arguments}")
+        digest = fingerprint.of(function)
+        return digest == fingerprint.now(function) and (name, f"{magic()} {digest} {arguments}")
     except ScenarioError:
         return False
 
 
-def component(c: Component) -> Function | AtAddress:
-    """Return a law, a surface or an estimator as a C function: compiled, unless it is one already.
+def compile_component(c: Component) -> Function | AtAddress:
+    """Return a law, a surface or an estimator as a C function.
 
     Raises:
-      NotCompilable: with its name and the reason of the compiler.
+      NotCompilable: with its name and the compiler's reason.
     """
     if isinstance(c.function, AtAddress):
         return c.function
-    who = f"{c.kind} {c.name!r}"
+    name = f"{c.kind} {c.name!r}"
     if isinstance(c.function, Uncompiled):
-        raise NotCompilable(f"{who} {c.function.why}")
+        raise NotCompilable(f"{name} {c.function.why}")
     if c.joint:
-        return _named(who, _joint, c.function, tuple(c.gains), c.shared, c.memory)
-    return _named(who, _component, c.function, c.kind, tuple(c.gains), c.memory)
+        return _compile(name, _compile_joint_law, c.function, tuple(c.gains), c.shared, c.memory)
+    return _compile(name, _compile_pair, c.function, c.kind, tuple(c.gains), c.memory)
 
 
-def of_signal(s: Signal) -> Function:
-    """Return a signal, compiled; raises as `component`."""
-    return _named(type(s).__name__, _signal, type(s), tuple(s.parameters()))
+def compile_signal(s: Signal) -> Function:
+    """Return a signal as a C function; raises as `compile_component`."""
+    return _compile(type(s).__name__, _compile_signal, type(s), tuple(s.parameters()))
 
 
-def of_friction(f: Sliding) -> Function:
-    """Return the formula of a friction, compiled; raises as `component`."""
-    return _named(type(f).__name__, _friction, type(f).value, f.names)
+def compile_friction(f: Sliding) -> Function:
+    """Return the formula of a friction as a C function; raises as `compile_component`."""
+    return _compile(type(f).__name__, _compile_friction, type(f).value, f.names)
 
 
-def values_of(s: Signal) -> tuple[float, ...]:
+def _compile(name: str, compiler: Callable[..., Function], *arguments: object) -> Function:
+    """Return what a compiler makes of these arguments. Its errors begin with the name."""
+    try:
+        return compiler(*arguments)
+    except NotCompilable as error:
+        raise NotCompilable(f"{name} does not compile: {error}") from None
+    except TypeError:
+        raise NotCompilable(f"{name} does not compile: it is not hashable") from None
+
+
+def signal_values(s: Signal) -> tuple[float, ...]:
     """Return the numbers that a compiled signal reads as its parameters, valid as long as the signal exists."""
     values = tuple(s.parameters().values())
     if not s.series:
@@ -251,13 +261,3 @@ def values_of(s: Signal) -> tuple[float, ...]:
             "C-contiguous"
         )
     return (*values, float(data.ctypes.data), float(data.shape[1]))
-
-
-def _named(who: str, compiler: Callable[..., Function], *arguments: object) -> Function:
-    """Return what a compiler makes; its errors name the function."""
-    try:
-        return compiler(*arguments)
-    except NotCompilable as error:
-        raise NotCompilable(f"{who} does not compile: {error}") from None
-    except TypeError:
-        raise NotCompilable(f"{who} does not compile: it is not hashable") from None

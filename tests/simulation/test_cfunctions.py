@@ -19,7 +19,7 @@ from smc_mujoco.common import fingerprint
 from smc_mujoco.common.jit import NUMBERS
 from smc_mujoco.common.numba_internals import FunctionIdentity
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.simulation import native, reference
+from smc_mujoco.simulation import cfunctions, reference
 
 
 @pytest.fixture(autouse=True)
@@ -31,7 +31,7 @@ def cache(tmp_path, monkeypatch) -> Path:
 
 def compiled(function, kind="law", gains=("k",), memory=1):
     """Compile a component as a new process would."""
-    return native._component.__wrapped__(function, kind, gains, memory)
+    return cfunctions._compile_pair.__wrapped__(function, kind, gains, memory)
 
 
 def hits(function, **options) -> int:
@@ -121,7 +121,7 @@ import sys
 
 import numba
 import smc_mujoco as smc
-from smc_mujoco.simulation import native
+from smc_mujoco.simulation import cfunctions
 
 gains = {"k": 3.0}
 
@@ -144,7 +144,7 @@ if __name__ == "__main__":
     import pair
 
     numba.config.CACHE_DIR = sys.argv[1]
-    native.component(getattr(pair, sys.argv[2])())
+    cfunctions.compile_component(getattr(pair, sys.argv[2])())
 """
 
 
@@ -161,7 +161,7 @@ def test_code_of_two_processes_is_not_mixed_up(cache, tmp_path, monkeypatch):
     laws = pair.weak, pair.strong
     for law in laws:
         subprocess.run([sys.executable, "pair.py", cache, law.name], check=True, cwd=tmp_path)
-    loaded = [native.component(law()) for law in laws]
+    loaded = [cfunctions.compile_component(law()) for law in laws]
     assert [code._cfunc.cache_hits for code in loaded] == [1, 1]
     for trace in smc.run([pair.scenario(law) for law in laws]):
         assert_same(trace, reference.run(trace.scenario))
