@@ -591,16 +591,6 @@ def test_a_voltage_and_a_feedforward_come_back_and_have_their_unit(tmp_path):
     assert "u0 [V]" in trace.export(tmp_path / "a.csv").read_text().partition("\n")[0]
 
 
-def test_a_file_from_before_there_was_a_voltage_loads_as_the_same_scenario(tmp_path):
-    trace = smc.run(smc.Scenario(plant="duffing", law="none", actuator=smc.DCMotor(), duration=0.01))
-    with np.load(trace.save(tmp_path / "a.npz")) as file:
-        held = {name: file[name] for name in file}
-    about = json.loads(str(held.pop("about")))
-    del about["feedforward"], about["actuator"][0]["values"]["command"]
-    np.savez(tmp_path / "old.npz", about=np.array(json.dumps(about)), **held)
-    assert smc.load(tmp_path / "old.npz").scenario == trace.scenario
-
-
 def test_a_free_joint_has_the_goal_of_its_plant_as_reference():
     upright = (0.0, math.pi)
     trace = smc.run(smc.Scenario(plant="acrobot", law="none", x0=upright, duration=0.05))
