@@ -533,13 +533,6 @@ def test_a_part_that_is_not_at_hand_is_named(monkeypatch):
     refused(lambda: serialise._restore_parts(about), "Sticker", "test_signals")
 
 
-def test_a_file_from_before_there_were_parts_loads():
-    about = serialise.describe(scenario())
-    for name in ("friction", "contact", "actuator", "sensor", "mechanism"):
-        del about[name]
-    assert serialise.restore(about) == scenario()
-
-
 def test_a_realistic_scenario_survives_json():
     parts = {
         "friction": (smc.Viscous(0.1), smc.Coulomb(0.05)),
