@@ -18,8 +18,8 @@ from typing import Any
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search_space
-from smc_mujoco.analysis.tuning.result import AGREEING
-from smc_mujoco.analysis.tuning.search import BUDGET, RULE, SPARE, START
+from smc_mujoco.analysis.tuning.result import AGREEING_STARTS
+from smc_mujoco.analysis.tuning.search import BUDGET, EVALUATIONS_PER_GAIN, RULE, SPARE_EVALUATIONS
 from smc_mujoco.common.files import read_json, replacing, to_json
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS
@@ -41,8 +41,12 @@ def tune(task: Task) -> dict[str, Any]:
     """Search for the gains of a law on a plant, and return their record."""
     gains, plant, law = task
     searched = search_space.box(smc.law(law), search_space.scales(smc.plant(plant), U_MAX, with_model=False))
-    starts = AGREEING if gains == "tuned" else 1
-    budget = BUDGET if starts > 1 and law in gain_sets.LAWS else starts * START * len(searched) + SPARE
+    starts = AGREEING_STARTS if gains == "tuned" else 1
+    budget = (
+        BUDGET
+        if starts > 1 and law in gain_sets.LAWS
+        else starts * EVALUATIONS_PER_GAIN * len(searched) + SPARE_EVALUATIONS
+    )
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "no set of gains tried", smc.ScenarioWarning)
         return smc.tune(plant, law, budget, objective=gain_sets.OBJECTIVES[gains], threads=1).record()

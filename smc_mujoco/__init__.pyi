@@ -31,7 +31,7 @@ from smc_mujoco.control.surface import Surface as Surface
 from smc_mujoco.control.surface import surface as surface
 from smc_mujoco.control.surface import surface_function as surface_function
 from smc_mujoco.control.surface import surfaces as surfaces
-from smc_mujoco.draw.board import plot as plot
+from smc_mujoco.draw.dot_plot import plot as plot
 from smc_mujoco.draw.figure import figure as figure
 from smc_mujoco.draw.film.film import clip as clip
 from smc_mujoco.draw.film.film import film as film

@@ -19,9 +19,9 @@ KERNEL = ROOT / "docs" / "site" / "kernel.py"
 
 # Films have a few frames, which else take half of the time.
 QUICK = """
-from smc_mujoco.draw.film import film
-film.clock = lambda traces, fps, speed, clock=film.clock: clock(traces, fps, 15.0)
-del film
+from smc_mujoco.draw.film import pace
+pace.clock = lambda traces, fps, speed, clock=pace.clock: clock(traces, fps, 15.0)
+del pace
 """
 
 # What a notebook's text says of its numbers, as a last cell.

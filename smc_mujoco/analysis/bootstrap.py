@@ -84,12 +84,14 @@ def median_of(
     seed: int = 0,
     samples: Sequence[int] | None = None,
 ) -> Interval:
-    """As `median_interval`, for (blocks, n) in which NaN is a cell without a run. Every column has a run.
+    """Return what `median_interval` returns, for values (blocks, n) that are NaN where there is no run.
 
     Args:
+      values: every column has a run.
       samples: the sample of each column, numbered from 0, see `ranking.linked`; None if each is one.
     """
-    n, centre = values.shape[1] if samples is None else max(samples) + 1, float(middle(middle(values)))
+    n = values.shape[1] if samples is None else max(samples) + 1
+    centre = float(middle(middle(values)))
     if n < 2:
         return Interval(centre, math.nan, math.nan, n)
     drawn, at = draws(n, resamples, seed), outermost(n, level, resamples)
@@ -143,7 +145,7 @@ def share_interval(share: float, n: int, level: float = 0.95) -> Interval:
     z = NormalDist().inv_cdf((1 + confidence(level)) / 2)
     middle, half = share + z * z / (2 * n), z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
     low, high = ((middle + side * half) / (1 + z * z / n) for side in (-1, 1))
-    return Interval(share, max(min(low, share), 0.0), min(max(high, share), 1.0), n)  # rounding leaves 1 out, and 0
+    return Interval(share, max(min(low, share), 0.0), min(max(high, share), 1.0), n)  # after rounding it has the share
 
 
 @functools.lru_cache(maxsize=8)

@@ -5,9 +5,10 @@
     cycle.amplitude, cycle.frequency          # of s, in its unit, and Hz; NaN where no limit cycle is predicted
 
 A limit cycle e = a sin(omega t) solves N(a, omega) L(j omega) = 1. N is the first harmonic of what the law returns, and
-L the answer of the linearised mechanism (`harmonics`), without any integrator's error. Then the same is solved with the
-other harmonics of e, which follow from those of u. The solution is exact if the cycle is not locked to the control
-samples; `uncertainty` says how much that may change it. Cycles that are not stable by Loeb's criterion are left out.
+L the answer of the linearised mechanism (`harmonics`), without any integrator's error. Then the equation is solved
+again with the other harmonics of e, which follow from those of u. The solution is exact if the cycle is not locked to
+the control samples. `uncertainty` says how much such locking may change it. Cycles that are not stable by Loeb's
+criterion are left out.
 Sources: A. Gelb & W. E. Vander Velde, Multiple-Input Describing Functions, 1968; I. Boiko, Discontinuous Control
 Systems, 2009; U. Perez-Ventura & L. Fridman, arXiv 1705.09711, 2017.
 """
@@ -31,21 +32,22 @@ from smc_mujoco.mechanisms.hardware.drives import RateLimit
 from smc_mujoco.simulation.scenario import Scenario
 
 MIN_FREQUENCY = 0.5  # Hz: slower oscillations do not count as chattering
-FREQUENCIES, AMPLITUDES = 60, 36  # points of the grid on which cycles are sought: chosen
-COARSE = 60  # samples of a period on that grid: chosen
+GRID_FREQUENCIES, GRID_AMPLITUDES = 60, 36  # points of the grid on which cycles are sought: chosen
+COARSE_SAMPLES = 60  # samples of a period on that grid: chosen
 MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-12, 3.0  # rad or m, of the error
-SAME = 0.02  # relative difference below which two cycles are one: chosen
-WIDER = 1.0  # of the log of an amplitude, by which a bracket from the coarse grid is widened: chosen
-NYQUIST = 0.9  # share of half the sampling frequency up to which waves are sought: faster ones beat with their images
-GROWS = 3.0  # least factor by which a gain grows from an amplitude to a thousandth of it, if the law switches: chosen
-NEAR, SLOWER = 1e-4, 0.93  # relative: tolerance of the slowest and the fastest cycle, and step of the search for them
-SECANT = 1e-3  # of the logs of amplitude and omega, for derivatives: gains jump by where samples fall; chosen
-SMALL = 0.1  # relative change in Loeb's criterion: so large that the places of the samples do not matter; chosen
-# Factors of the ranges' ends, with which the ranges hold the truth in 95 % of random loops: benchmarks/chattering.py.
+SAME_CYCLE_TOLERANCE = 0.02  # relative difference below which two cycles are one: chosen
+BRACKET_MARGIN = 1.0  # of the log of an amplitude, by which a bracket from the coarse grid is widened: chosen
+MAX_NYQUIST_SHARE = 0.9  # of half the sampling frequency: faster waves beat with their images
+MIN_GAIN_GROWTH = 3.0  # of a law that switches, from an amplitude to a thousandth of it: chosen
+CYCLE_TOLERANCE = 1e-4  # relative, of the slowest and the fastest cycle
+FREQUENCY_STEP = 0.93  # factor from one frequency to the next in the search for these
+DERIVATIVE_STEP = 1e-3  # of the logs of amplitude and omega: smaller ones see jumps of the gain by the samples; chosen
+STABILITY_STEP = 0.1  # relative, in Loeb's criterion: smaller ones see these jumps too; chosen
+# Factors on the ends of ranges. With them the ranges have the truth in 95 % of random loops: benchmarks/chattering.py.
 AMPLITUDE_FACTOR, FREQUENCY_FACTOR = 1.01, 1.01
-DRIFT = 0.05  # relative drift of a law's gain from which a prediction is called a snapshot: chosen
-# Distance at which resonances without damping are passed, relative to the frequency, and points on the way: chosen.
-DAMPED, FINE = 0.01, 2000
+MAX_GAIN_DRIFT = 0.05  # relative: a law whose gain drifts more gets a remark; chosen
+RESONANCE_DAMPING = 0.01  # imaginary part of frequencies over the real one, so that resonances have a width; chosen
+PHASE_POINTS = 2000  # of the curve of phase over frequency; chosen
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -62,14 +64,12 @@ class Chattering:
       third_harmonic: third harmonic of s over the first; NaN for two samples in a period. If it is large, the law does
         not see a sine, and the prediction is rough.
       samples: control samples in a period.
-      amplitude_range, frequency_range: least and largest amplitude and frequency that are possible because the cycle
-        may be locked to the samples, see `Loop.phases`, widened by factors that were calibrated by exact integration to
-        hold the truth in 95 % of random loops. The largest amplitude includes the change of s by one count of an
-        encoder. If the balance has no solution but the law switches, the ranges are those of a locked cycle, which is
-        possible.
+      amplitude_range, frequency_range: smallest and largest amplitude and frequency of a cycle that is locked to the
+        samples, see `Loop.phases`. They are widened by factors that were calibrated by exact integration: 95 % of
+        random loops are within the ranges. The largest amplitude includes the change of s by one count of an encoder.
+        If the balance has no solution but the law switches, a locked cycle is possible, and these are its ranges.
       coupling: largest amplitude of another driven channel under this channel's command, over amplitude_x; 0 for a
-        single channel. The prediction is for a single channel. If coupling is not small, the channels oscillate
-        together.
+        single channel. If it is not small, the channels oscillate together, and the prediction for one fails.
       gain, response: N and L at the cycle, complex.
       assumptions: what was left out or is doubtful, in sentences.
     """
@@ -137,53 +137,55 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
     if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < scenario.plant.driven:
         raise ScenarioError(f"channel is {shown(channel)}: give 0 to {scenario.plant.driven - 1}")
     loop = Loop(scenario, channel)
-    waves = _stable(loop, cycles(loop))
-    said = tuple(_assumptions(loop))
+    waves = _stable_cycles(loop, cycles(loop))
+    assumptions = tuple(_assumptions(loop))
     if not waves:
-        return _locked(scenario, channel, said) if switches(loop) else Chattering(assumptions=said)
-    return _described(loop, max(waves, key=lambda wave: wave.omega), said, ranges)
+        return _locked_ranges(scenario, channel, assumptions) if switches(loop) else Chattering(assumptions=assumptions)
+    return _prediction(loop, max(waves, key=lambda wave: wave.omega), assumptions, ranges)
 
 
 def switches(loop: Loop) -> bool:
     """Return whether a law switches: whether its gain grows without bound towards small amplitudes."""
     omega = 0.1 * math.pi / loop.scenario.control_period
-    small, smaller = (abs(loop.gain(amplitude, omega, COARSE)) for amplitude in (1e3 * MIN_AMPLITUDE, MIN_AMPLITUDE))
-    return smaller > GROWS * small
+    small, smaller = (
+        abs(loop.gain(amplitude, omega, COARSE_SAMPLES)) for amplitude in (1e3 * MIN_AMPLITUDE, MIN_AMPLITUDE)
+    )
+    return smaller > MIN_GAIN_GROWTH * small
 
 
-def _locked(scenario: Scenario, channel: int, said: tuple[str, ...]) -> Chattering:
+def _locked_ranges(scenario: Scenario, channel: int, assumptions: tuple[str, ...]) -> Chattering:
     """Return the ranges of a cycle that is locked to the samples, of a law that switches.
 
     Such a law switches at most half a control period later than on average. So the cycle is not larger and not slower
     than that of the same loop with half a control period more delay.
     """
     loop = Loop(scenario, channel, 0.5 * scenario.control_period)
-    waves = _stable(loop, cycles(loop))
+    waves = _stable_cycles(loop, cycles(loop))
     if not waves:
-        return Chattering(assumptions=said)
+        return Chattering(assumptions=assumptions)
     wave = max(waves, key=lambda wave: wave.omega)
-    said += ("the balance has no solution, but the law switches: a cycle locked to the samples is possible",)
+    assumptions += ("the balance has no solution, but the law switches: a cycle locked to the samples is possible",)
     return Chattering(
-        amplitude_range=(0.0, AMPLITUDE_FACTOR * wave.s + loop.count),
+        amplitude_range=(0.0, AMPLITUDE_FACTOR * wave.s + loop.s_of_one_count),
         frequency_range=(wave.omega / FREQUENCY_FACTOR / math.tau, 0.5 / scenario.control_period),
-        assumptions=said,
+        assumptions=assumptions,
     )
 
 
 def cycles(loop: Loop) -> list[Wave]:
     """Return all solutions of N L = 1 up to half the sampling frequency."""
     fastest = math.pi / loop.scenario.control_period
-    omegas = np.geomspace(math.tau * MIN_FREQUENCY, NYQUIST * fastest, FREQUENCIES)
-    amplitudes = np.geomspace(MIN_AMPLITUDE, MAX_AMPLITUDE, AMPLITUDES)
+    omegas = np.geomspace(math.tau * MIN_FREQUENCY, MAX_NYQUIST_SHARE * fastest, GRID_FREQUENCIES)
+    amplitudes = np.geomspace(MIN_AMPLITUDE, MAX_AMPLITUDE, GRID_AMPLITUDES)
     balanced: list[tuple[float, float]] = []
     for bracket in _brackets(loop, omegas, amplitudes):
         cycle = _balanced(loop, *bracket)
-        if cycle and all(abs(cycle[0] / a - 1) + abs(cycle[1] / w - 1) > SAME for a, w in balanced):
+        if cycle and all(abs(cycle[0] / a - 1) + abs(cycle[1] / w - 1) > SAME_CYCLE_TOLERANCE for a, w in balanced):
             balanced.append(cycle)
     return [loop.wave(*one) for one in (balanced or _of_two_samples(loop, fastest, amplitudes))]
 
 
-Bracket = tuple[tuple[float, float], tuple[float, float]]  # ends of a search: two omegas, and two amplitudes
+Bracket = tuple[tuple[float, float], tuple[float, float]]  # two omegas and two amplitudes, between which a cycle may be
 
 
 def _brackets(loop: Loop, omegas: np.ndarray, amplitudes: np.ndarray) -> Iterator[Bracket]:
@@ -191,7 +193,7 @@ def _brackets(loop: Loop, omegas: np.ndarray, amplitudes: np.ndarray) -> Iterato
     branches: list[list[tuple[float, float]]] = []  # for each omega: (amplitude, phase) where |N L| = 1
     for omega in omegas:
         response = loop.response(omega)
-        products = np.array([loop.gain(a, omega, COARSE) * response for a in amplitudes])
+        products = np.array([loop.gain(a, omega, COARSE_SAMPLES) * response for a in amplitudes])
         sizes = np.log(np.abs(products) + 1e-300)
         here = []
         for k in np.flatnonzero(np.diff(np.sign(sizes))):
@@ -211,32 +213,32 @@ def _brackets(loop: Loop, omegas: np.ndarray, amplitudes: np.ndarray) -> Iterato
 def _balanced(loop: Loop, omegas: tuple[float, float], amplitudes: tuple[float, float]) -> tuple[float, float] | None:
     """Return amplitude and omega of the cycle in a bracket, or None.
 
-    The search is nested bisection, because N may jump, by where the samples fall. The bracket is widened to both sides,
-    because the coarse grid's few samples shift the phase of a law that switches.
+    The search is nested bisection, because N may jump with the places of the samples. The bracket is widened to both
+    sides, because the few samples of the coarse grid shift the phase of a law that switches.
     """
     from scipy.optimize import brentq
 
-    low, high = math.log(amplitudes[0]) - WIDER, math.log(amplitudes[1]) + WIDER
+    low, high = math.log(amplitudes[0]) - BRACKET_MARGIN, math.log(amplitudes[1]) + BRACKET_MARGIN
     first, last = np.log(omegas)
 
     def phase(w: float) -> float:
         return _on_curve(loop, math.exp(w), low, high)[1]
 
-    fastest = math.log(NYQUIST * math.pi / loop.scenario.control_period)
+    fastest = math.log(MAX_NYQUIST_SHARE * math.pi / loop.scenario.control_period)
     first, last = 2 * first - last, min(2 * last - first, fastest)
     if phase(first) * phase(last) > 0.0:
         return None  # the coarse grid's bracket has no cycle with all samples
     omega = math.exp(float(brentq(phase, first, last, xtol=1e-8)))  # type: ignore[arg-type]
-    found, _ = _on_curve(loop, omega, low, high)
-    return (found, omega) if low < math.log(found) < high else None
+    amplitude, _ = _on_curve(loop, omega, low, high)
+    return (amplitude, omega) if low < math.log(amplitude) < high else None
 
 
-def _on_curve(loop: Loop, omega: float, low: float, high: float, close: float = 1e-9) -> tuple[float, float]:
+def _on_curve(loop: Loop, omega: float, low: float, high: float, tolerance: float = 1e-9) -> tuple[float, float]:
     """Return the amplitude at which |N L| = 1 for an omega, and the phase of N L there.
 
     Args:
       low, high: range of the amplitude's log. Without a solution in it, the nearer end is returned.
-      close: tolerance of the amplitude's log.
+      tolerance: of the amplitude's log.
     """
     from scipy.optimize import brentq
 
@@ -250,15 +252,15 @@ def _on_curve(loop: Loop, omega: float, low: float, high: float, close: float = 
     elif size(high) >= 0.0:
         z = high
     else:
-        z = float(brentq(size, low, high, xtol=close))  # type: ignore[arg-type]
+        z = float(brentq(size, low, high, xtol=tolerance))  # type: ignore[arg-type]
     return math.exp(z), float(np.angle(loop.gain(math.exp(z), omega) * response))
 
 
-def _shifted(loop: Loop, wave: Wave, shift: float) -> Wave:
-    """Return the cycle for a law that acts later or earlier.
+def _shifted_cycle(loop: Loop, wave: Wave, shift: float) -> Wave:
+    """Return the cycle of a law that acts later or earlier.
 
     The search follows the curve |N L| = 1, towards slower waves for a later law. It ends at the slowest wave that
-    counts as chattering, or at a wave of two samples.
+    counts as chattering, or at a wave of two samples a period.
 
     Args:
       wave: the cycle of the law as it is.
@@ -267,15 +269,15 @@ def _shifted(loop: Loop, wave: Wave, shift: float) -> Wave:
     from scipy.optimize import brentq
 
     half = math.pi / loop.scenario.control_period
-    slowest, fastest, z = math.tau * MIN_FREQUENCY, NYQUIST * half, math.log(wave.amplitude)
+    slowest, fastest, z = math.tau * MIN_FREQUENCY, MAX_NYQUIST_SHARE * half, math.log(wave.amplitude)
 
     def excess(omega: float) -> float:
         nonlocal z
-        amplitude, phase = _on_curve(loop, omega, z - WIDER, z + WIDER, NEAR)
+        amplitude, phase = _on_curve(loop, omega, z - BRACKET_MARGIN, z + BRACKET_MARGIN, CYCLE_TOLERANCE)
         z = math.log(amplitude)
         return phase + shift * omega / wave.omega
 
-    omega, before, step = wave.omega, shift, SLOWER if shift < 0.0 else 1.0 / SLOWER
+    omega, before, step = wave.omega, shift, FREQUENCY_STEP if shift < 0.0 else 1.0 / FREQUENCY_STEP
     if omega > fastest:  # a wave of two samples, which cannot be faster
         omega, before = fastest, excess(fastest) if shift < 0.0 else 0.0
     if before * shift <= 0.0:
@@ -284,15 +286,15 @@ def _shifted(loop: Loop, wave: Wave, shift: float) -> Wave:
         after = excess(omega * step)
         if before * after <= 0.0 and abs(before - after) < math.pi:
             try:
-                omega = float(brentq(excess, omega, omega * step, rtol=NEAR))  # type: ignore[arg-type]
-            except ValueError:  # the curve has branches, and from this side another one is found
+                omega = float(brentq(excess, omega, omega * step, rtol=CYCLE_TOLERANCE))  # type: ignore[arg-type]
+            except ValueError:  # the curve has branches, and the search has changed to another one
                 omega *= step
             excess(omega)
             return loop.wave(math.exp(z), omega)
         omega, before = omega * step, after
     if step < 1.0:
         return loop.wave(math.exp(z), omega)
-    amplitudes = np.geomspace(MIN_AMPLITUDE, MAX_AMPLITUDE, AMPLITUDES)
+    amplitudes = np.geomspace(MIN_AMPLITUDE, MAX_AMPLITUDE, GRID_AMPLITUDES)
     return loop.wave(*min(_of_two_samples(loop, half, amplitudes), default=(math.exp(z), omega)))
 
 
@@ -315,32 +317,31 @@ def _of_two_samples(loop: Loop, fastest: float, amplitudes: np.ndarray) -> list[
     ]
 
 
-def _stable(loop: Loop, waves: list[Wave]) -> list[Wave]:
+def _stable_cycles(loop: Loop, waves: list[Wave]) -> list[Wave]:
     """Return the stable cycles.
 
-    A cycle is stable if a larger oscillation decays (Loeb's criterion), and if N L has not turned once around 0 between
-    a slower cycle of that kind and this one. A delay gives a row of such cycles, and all give way to the slowest.
+    A cycle is stable if a larger oscillation decays (Loeb's criterion) and the phase of L has not lost a whole turn
+    since a slower cycle of that kind. A delay gives a row of such cycles, of which only the slowest is stable.
     """
-    alone = sorted((wave for wave in waves if _decays(loop, wave)), key=lambda wave: wave.omega)
-    if len(alone) < 2:
-        return alone
-    # frequencies with a small imaginary part, so that resonances without damping have a width
-    omegas = np.geomspace(0.9 * alone[0].omega, 1.1 * alone[-1].omega, FINE)
-    phases = np.unwrap([np.angle(loop.response(w * (1.0 - DAMPED * 1j))) for w in omegas])
-    turns = np.interp([wave.omega for wave in alone], omegas, phases) / math.tau
-    return [wave for k, wave in enumerate(alone) if all(round(turns[k] - before) >= 0 for before in turns[:k])]
+    decaying = sorted((wave for wave in waves if _decays(loop, wave)), key=lambda wave: wave.omega)
+    if len(decaying) < 2:
+        return decaying
+    omegas = np.geomspace(0.9 * decaying[0].omega, 1.1 * decaying[-1].omega, PHASE_POINTS)
+    phases = np.unwrap([np.angle(loop.response(w * (1.0 - RESONANCE_DAMPING * 1j))) for w in omegas])
+    turns = np.interp([wave.omega for wave in decaying], omegas, phases) / math.tau
+    return [wave for k, wave in enumerate(decaying) if all(round(turns[k] - before) >= 0 for before in turns[:k])]
 
 
 def _decays(loop: Loop, wave: Wave) -> bool:
     """Return whether an oscillation that is a little larger than the cycle decays."""
     if wave.omega >= math.pi / loop.scenario.control_period:
-        return True  # of two samples: the gain falls with the amplitude
+        return True  # two samples a period: the gain falls with the amplitude
 
     def product(amplitude: float, omega: float) -> complex:
         return complex(np.log(loop.gain(amplitude, omega) * loop.response(omega)))
 
-    up, down = (product(wave.amplitude * (1 + d), wave.omega) for d in (SMALL, -SMALL))
-    fast, slow = (product(wave.amplitude, wave.omega * (1 + d)) for d in (SMALL, -SMALL))
+    up, down = (product(wave.amplitude * (1 + d), wave.omega) for d in (STABILITY_STEP, -STABILITY_STEP))
+    fast, slow = (product(wave.amplitude, wave.omega * (1 + d)) for d in (STABILITY_STEP, -STABILITY_STEP))
     return ((up - down) / (fast - slow)).imag < 0.0
 
 
@@ -356,30 +357,27 @@ def _with_harmonics(loop: Loop, wave: Wave) -> Wave:
         return [product.real, product.imag]
 
     start = np.log([wave.amplitude, wave.omega])
-    solved = root(excess, start, options={"xtol": NEAR, "eps": SECANT})
-    return loop.wave(*np.exp(solved.x)) if solved.success and np.abs(solved.x - start).max() < WIDER else wave
+    solved = root(excess, start, options={"xtol": CYCLE_TOLERANCE, "eps": DERIVATIVE_STEP})
+    return loop.wave(*np.exp(solved.x)) if solved.success and np.abs(solved.x - start).max() < BRACKET_MARGIN else wave
 
 
-def _described(loop: Loop, sine: Wave, said: tuple[str, ...], ranges: bool) -> Chattering:
-    """Return a limit cycle with its numbers.
-
-    Args:
-      sine: the cycle in which e is a sine.
-      said: the assumptions so far.
-    """
+def _prediction(loop: Loop, sine: Wave, assumptions: tuple[str, ...], ranges: bool) -> Chattering:
+    """Return a limit cycle with its numbers; `sine` is the cycle in which e is a sine."""
     wave = _with_harmonics(loop, sine)
     response = loop.response(wave.omega)
     if not math.isnan(wave.third):
         passed = abs(loop.response(3.0 * wave.omega) / response)
-        said += (f"the mechanism answers the third harmonic with {100.0 * passed:.2g} % of its answer to the first",)
+        words = f"the mechanism answers the third harmonic with {100.0 * passed:.2g} % of its answer to the first"
+        assumptions += (words,)
     coupling = loop.coupling(wave.omega)
     if coupling:
-        said += (f"other driven channels rest, though this command moves one of them {coupling:.2g} times as far",)
-    if wave.drift > DRIFT:
-        said += ("gains or memories of the law drift: the prediction is a snapshot",)
+        words = f"other driven channels rest, though this command moves one of them {coupling:.2g} times as far"
+        assumptions += (words,)
+    if wave.drift > MAX_GAIN_DRIFT:
+        assumptions += ("gains or memories of the law drift: the prediction is a snapshot",)
     sizes, omegas = [math.nan], [math.nan]
     if ranges:
-        waves = [sine, *(_shifted(loop, sine, phase) for phase in loop.phases(sine.amplitude, sine.omega))]
+        waves = [sine, *(_shifted_cycle(loop, sine, phase) for phase in loop.phases(sine.amplitude, sine.omega))]
         sizes = [one.s / sine.s * wave.s for one in waves]
         omegas = [one.omega / sine.omega * wave.omega for one in waves]
     fastest, nyquist = max(omegas) * FREQUENCY_FACTOR / math.tau, 0.5 / loop.scenario.control_period
@@ -391,12 +389,12 @@ def _described(loop: Loop, sine: Wave, said: tuple[str, ...], ranges: bool) -> C
         power=wave.rate**2 / 2.0,
         third_harmonic=wave.third,
         samples=math.tau / wave.omega / loop.scenario.control_period,
-        amplitude_range=(min(sizes) / AMPLITUDE_FACTOR, max(sizes) * AMPLITUDE_FACTOR + loop.count),
+        amplitude_range=(min(sizes) / AMPLITUDE_FACTOR, max(sizes) * AMPLITUDE_FACTOR + loop.s_of_one_count),
         frequency_range=(min(omegas) / FREQUENCY_FACTOR / math.tau, min(fastest, nyquist)),
         coupling=coupling,
         gain=wave.gain,
         response=response,
-        assumptions=said,
+        assumptions=assumptions,
     )
 
 
@@ -410,15 +408,15 @@ def _assumptions(loop: Loop) -> Iterator[str]:
         yield "rotor and joint are free masses while the rotor crosses its play"
     if scenario.friction:
         yield "no dry friction"
-    if loop.count:
-        unit = f"{scenario.plant.units[loop.channel]}/s"
-        yield f"no rounding by the encoder: a count moves s by {loop.count:.2g} {unit}, which hides smaller cycles"
+    if loop.s_of_one_count:
+        step = f"{loop.s_of_one_count:.2g} {scenario.plant.units[loop.channel]}/s"
+        yield f"no rounding by the encoder: a count moves s by {step}, which hides smaller cycles"
 
 
-def shared(cycles: Sequence[Chattering]) -> list[str]:
+def shared_assumptions(cycles: Sequence[Chattering]) -> list[str]:
     """Return the assumptions that all cycles have in common."""
     first, *others = cycles
-    return [said for said in first.assumptions if all(said in other.assumptions for other in others)]
+    return [one for one in first.assumptions if all(one in other.assumptions for other in others)]
 
 
 def save(

@@ -8,9 +8,9 @@ large, times 1/w as large, and forces q w^2 times as large. A gain with the unit
 
     (q w^2)^a q^b w^-c.
 
-Super-twisting has so k1 and k2 in the proportion of its theorem, k1 ~ sqrt(q), k2 ~ q. On a linear mechanism the limit
-cycle of a law that is q times as large is q times as large and has the same frequency. A law that contains a number
-with a unit, such as the width 1 of tanh(s), has no such symmetry, so that the size is searched.
+So k1 and k2 of super-twisting are in the proportion of its theorem, k1 ~ sqrt(q), k2 ~ q. On a linear mechanism the
+limit cycle of a law that is q times as large is q times as large, and has the same frequency. A law that contains a
+number with a unit, such as the width 1 of tanh(s), has no such symmetry. So the size is searched.
 """
 
 import dataclasses
@@ -21,7 +21,7 @@ from collections.abc import Callable
 import numpy as np
 
 from smc_mujoco.analysis import margins
-from smc_mujoco.analysis.chattering import Chattering, chattering, predict
+from smc_mujoco.analysis.chattering import Chattering, predict
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, users_frame
 from smc_mujoco.common.progress import bar
@@ -32,10 +32,10 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import DURATION
 from smc_mujoco.simulation.scenario import Scenario
 
-RANGE = 1e3  # of size: at most so many times the law's own, and at least the inverse
-STEP = 2.0  # from one size to the next until the wanted one lies between
+MAX_SIZE_RATIO = 1e3  # of a size to that of the original gains, and its inverse
+SIZE_STEP = 2.0  # factor from one size to the next until the wanted one lies between
 RULE = "largest gains of a predicted amplitude or frequency"
-CLOSE = 1e-3  # relative: the search ends when the size is known so well
+SIZE_TOLERANCE = 1e-3  # relative: the search ends when the size is known so well
 SPEEDS = tuple(10.0 ** (0.1 * k) for k in range(-10, 11))
 
 
@@ -68,9 +68,9 @@ def gains_for(
 ) -> Design:
     """Return the largest gains whose chattering stays below an amplitude, a frequency or both.
 
-    The amplitude decides the size of the law: the upper end of `amplitude_range` is the wanted one. A frequency decides
-    its speed, too: the one of 21 speeds, from a tenth of its own to ten times that, that allows the largest forces.
-    Forces among the gains stay at most u_max.
+    The amplitude decides the size of the law: the upper end of `amplitude_range` is the wanted one. A frequency also
+    decides its speed. Of 21 speeds, from a tenth to ten times that of the given gains, the one is taken that allows the
+    largest forces. No force among the gains exceeds u_max.
 
     Args:
       law: a law or its name. Its gains give the proportions.
@@ -101,102 +101,106 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if value is not None:
             number(name, value, above=0.0)
-    tried: list[tuple[float, float]] = []
-    with bar(f"gains of {base.law.name} on {base.plant.name}") as drawn:
+    predictions = 0
+    with bar(f"gains of {base.law.name} on {base.plant.name}") as progress_bar:
 
         def scaled(size: float, speed: float) -> Scenario:
             return dataclasses.replace(base, law=_scaled(base.law, size, speed))
 
         def cycle(size: float, speed: float) -> Chattering:
-            drawn.advance(1.0)
-            tried.append((size, speed))
+            nonlocal predictions
+            progress_bar.advance(1.0)
+            predictions += 1
             return predict(scaled(size, speed), channel)
 
-        strength = _strength(base)
-        speed = 1.0 if frequency is None else _speed(lambda w: cycle(1.0, w), amplitude, frequency, strength)
+        headroom = _force_headroom(base)
+        speed = 1.0 if frequency is None else _best_speed(lambda w: cycle(1.0, w), amplitude, frequency, headroom)
         size = 1.0
         if amplitude is not None:
-            size = _largest(lambda q: cycle(q, speed).amplitude_range[1], amplitude, strength / speed**2)
+            size = _largest_size(lambda q: cycle(q, speed).amplitude_range[1], amplitude, headroom / speed**2)
         chosen = scaled(size, speed)
-        predicted = chattering(chosen, channel)
+        predicted = predict(chosen, channel)
         if frequency is not None and predicted.frequency > frequency:
             raise ScenarioError(
                 f"{base.law.name} of amplitude {amplitude:g} oscillates at {predicted.frequency:.3g} Hz, above the "
                 f"wanted {frequency:g}: give a larger frequency, or another amplitude"
             )
-        (tolerated,) = margins.of([dataclasses.replace(chosen, duration=DURATION)], ["disturbance"])
+        (tolerated,) = margins.margins_of([dataclasses.replace(chosen, duration=DURATION)], ["disturbance"])
     if math.isnan(tolerated.value):
         warnings.warn(
             f"{base.law.name} with these gains does not hold {base.plant.name}, even without a disturbance",
             ScenarioWarning,
             users_frame(),
         )
-    law = chosen.law.sourced(source.TUNED, source.Search(rule=RULE, evaluations=len(tried), converged=True))
+    law = chosen.law.sourced(source.TUNED, source.Search(rule=RULE, evaluations=predictions, converged=True))
     return Design(law=law, chattering=predicted, disturbance=tolerated.value, size=size, speed=speed)
 
 
-def _speed(cycle: Callable[[float], Chattering], amplitude: float | None, frequency: float, strength: float) -> float:
-    """Return the speed that allows the largest forces, of SPEEDS whose predicted frequency is at most the wanted one.
+def _best_speed(
+    cycle: Callable[[float], Chattering], amplitude: float | None, frequency: float, headroom: float
+) -> float:
+    """Return, of the SPEEDS whose predicted frequency is at most the wanted one, that which allows the largest forces.
 
     The frequency is taken for size 1. It does not depend on the size on a linear mechanism, and is not monotone in the
-    speed. If a limit cycle is lost on the way up, the law has become too fast for the actuator: such speeds are out.
+    speed. A speed without a limit cycle counts only below the first speed with one: above it, the law has become too
+    fast for the actuator.
     """
-    speeds = [speed for speed in SPEEDS if speed**2 <= strength * (1.0 + CLOSE)]
+    speeds = [speed for speed in SPEEDS if speed**2 <= headroom * (1.0 + SIZE_TOLERANCE)]
     if not speeds:
         raise ScenarioError(
-            f"forces among the gains are {1.0 / strength:.3g} times what u_max allows, and the search makes them "
+            f"forces among the gains are {1.0 / headroom:.3g} times what u_max allows, and the search makes them "
             f"at most {SPEEDS[0] ** -2:g} times smaller: give smaller gains, or a larger u_max"
         )
     cycles = {speed: cycle(speed) for speed in speeds}
     first = min((speed for speed, one in cycles.items() if one), default=math.inf)
     slow = {speed: one for speed, one in cycles.items() if one.frequency <= frequency or (not one and speed < first)}
     if not slow:
-        least = min(one.frequency for one in cycles.values() if one)
+        lowest = min(one.frequency for one in cycles.values() if one)
         raise ScenarioError(
-            f"frequency is {frequency:g}, and the law oscillates at {least:.3g} Hz at least, at whatever speed: "
+            f"frequency is {frequency:g}, and the law oscillates at {lowest:.3g} Hz at least, at whatever speed: "
             "give a larger one"
         )
 
     def force(speed: float) -> float:
         allowed = math.inf if amplitude is None or not slow[speed] else amplitude / slow[speed].amplitude_range[1]
-        size = 1.0 if amplitude is None else min(allowed, RANGE)
-        return min(size * speed**2, strength)
+        size = 1.0 if amplitude is None else min(allowed, MAX_SIZE_RATIO)
+        return min(size * speed**2, headroom)
 
     return max(slow, key=lambda speed: (force(speed), speed))
 
 
 def _scaled(law: Component, size: float, speed: float) -> Component:
-    """Return the law with its size and its speed multiplied; gains that tuning holds stay."""
+    """Return the law with its size and its speed multiplied. Gains that tuning does not search stay."""
     scales = {"F": size * speed**2, "X": size, "T": 1.0 / speed}
-    gains = {name: gain * search_space.size(law, name, scales) for name, gain in law.gains.items()}
+    gains = {name: gain * search_space.unit_size(law, name, scales) for name, gain in law.gains.items()}
     return dataclasses.replace(law, gains=gains)
 
 
-def _strength(base: Scenario) -> float:
+def _force_headroom(base: Scenario) -> float:
     """Return the factor by which the forces among the gains can grow, until the first reaches the actuator's limit."""
     law, plant, u_max = base.law, base.plant, min(base.limits)
     rest, p, with_model = np.zeros(plant.n), plant.values({}), base.resolved.model == "nominal"
     accelerations = (u * abs(plant.nominal(rest, rest, i, p)[1]) for i, u in enumerate(base.limits))
     force = min(accelerations) if with_model else u_max
     limits = {name: force for name in law.gains if search_space.unit(law, name) == FORCE}
-    limits |= search_space.largest(law, {}, u_max)
+    limits |= search_space.actuator_limits(law, {}, u_max)
     sizes = [
         limits[name] / abs(gain) for name, gain in law.gains.items() if name in limits and 0.0 < abs(gain) < math.inf
     ]
     return min(sizes, default=math.inf)
 
 
-def _largest(predicted: Callable[[float], float], wanted: float, limit: float) -> float:
+def _largest_size(predicted: Callable[[float], float], wanted: float, limit: float) -> float:
     """Return the largest scale up to `limit` whose predicted amplitude is at most the wanted one.
 
-    The search begins at the law's own gains and moves in steps until the amplitude, NaN for no limit cycle, crosses the
+    The search begins at the original gains and moves in steps until the amplitude, NaN for no limit cycle, crosses the
     wanted one. If a limit cycle is lost on the way up, the law has become too large for the actuator, and that counts
     as crossing. The amplitude is in proportion to the scale for most laws, so that the first guess is often right.
     """
-    limit = min(limit, RANGE)
+    limit = min(limit, MAX_SIZE_RATIO)
     low, high, oscillates = 0.0, math.inf, False
 
-    def tried(scale: float) -> float:
+    def amplitude_at(scale: float) -> float:
         nonlocal low, high, oscillates
         amplitude = predicted(scale)
         if amplitude > wanted or (oscillates and math.isnan(amplitude)):
@@ -205,19 +209,20 @@ def _largest(predicted: Callable[[float], float], wanted: float, limit: float) -
             low, oscillates = scale, not math.isnan(amplitude)
         return amplitude
 
-    amplitude = tried(min(1.0, limit))
+    amplitude = amplitude_at(min(1.0, limit))
     guess = min(1.0, limit) * wanted / amplitude
-    for scale in (guess, guess * (1.0 + CLOSE)):
-        if low < scale < min(high, limit * (1.0 + CLOSE)):
-            tried(min(scale, limit))
+    for scale in (guess, guess * (1.0 + SIZE_TOLERANCE)):
+        if low < scale < min(high, limit * (1.0 + SIZE_TOLERANCE)):
+            amplitude_at(min(scale, limit))
     while not low:
-        if high < 1.0 / RANGE:
+        if high < 1.0 / MAX_SIZE_RATIO:
             raise ScenarioError(
-                f"amplitude is {wanted:g}, and that of gains {RANGE:g} times smaller is {amplitude:.3g}: give more"
+                f"amplitude is {wanted:g}, and that of gains {MAX_SIZE_RATIO:g} times smaller is {amplitude:.3g}: "
+                "give a larger amplitude"
             )
-        amplitude = tried(high / STEP)
+        amplitude = amplitude_at(high / SIZE_STEP)
     while low < limit and high == math.inf:
-        tried(min(low * STEP, limit))
-    while min(high, limit) > low * (1.0 + CLOSE):
-        tried(math.sqrt(low * high))
+        amplitude_at(min(low * SIZE_STEP, limit))
+    while min(high, limit) > low * (1.0 + SIZE_TOLERANCE):
+        amplitude_at(math.sqrt(low * high))
     return low

@@ -5,11 +5,11 @@
     wave = loop.wave(0.01, omega)         # what the law returns for e = 0.01 sin(omega t)
     wave.gain                             # complex, unit of u per rad or m
 
-A limit cycle is where gain times response is 1. The response is that of MuJoCo's own model, linearised about rest by
-finite differences, with drives, back-EMF, springs and joints without an actuator. The gain is that of the compiled
-law, with its estimator and its surface, at its control period: there is no approximation but that the error is a sine.
-Play between rotor and joint is a second element that is not linear; its describing function is that of two free masses,
-see `play`, and multiplies the gain.
+A limit cycle is where gain times response is 1. The response is that of MuJoCo's model, linearised about rest by finite
+differences, with drives, back-EMF, springs and joints without an actuator. The gain is that of the compiled law, with
+its estimator and its surface, at its control period, under an excitation: an error that oscillates for some periods.
+There is no approximation but that this error is a sine. Play between rotor and joint is a second nonlinear element. Its
+describing function is that of two free masses, see `play`, and multiplies the gain.
 """
 
 import copy
@@ -23,7 +23,7 @@ import mujoco
 import numpy as np
 from numba import njit
 
-from smc_mujoco.analysis.state_space import JUMPING, rates
+from smc_mujoco.analysis.state_space import NONLINEAR_FLAGS, rates
 from smc_mujoco.common.errors import ScenarioError, number, whole
 from smc_mujoco.common.interrupts import held_back
 from smc_mujoco.common.jit import NotCompilable, call
@@ -37,18 +37,18 @@ from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 
-STEP = 1e-6  # SI units, of finite differences
-CHUNK = 50_000  # samples that a law is called for at once
+DIFFERENCE_STEP = 1e-6  # SI units, of finite differences
+CHUNK_SAMPLES = 50_000  # for which a law is called at once
 MAX_SAMPLES = 10**9  # of a period, for a describing function
-SAMPLES = 3  # of a drive, about: so many times the finest period's
-PERIODS = (12, 600)  # smallest and largest number of periods for which a drive runs
-FINEST = 1000  # samples of a period; a law that runs more often is run that often here
-RESTING = 1000  # samples before, and after, the reading of an encoder moves by one count
-HARMONICS = 31  # of u that are followed through the mechanism: a triangle's peak is right to 1.3 %
-NEGLIGIBLE = 1e-9  # share of the first harmonic below which another is left out
-FOLLOWED = 2  # times that they are: a third time changes amplitudes by less than 0.2 %
-POSITIONS = 16  # of the samples in a period that are tried
-SETTLING = 0.4  # share of a drive that is left out, while memories settle
+MAX_SAMPLES_PER_PERIOD = 1000  # a law with a shorter control period is called that often
+EXCITATION_SAMPLES = 3  # of an excitation, about, over the largest number in a period
+MIN_PERIODS, MAX_PERIODS = 12, 600  # of an excitation
+SETTLING_SHARE = 0.4  # of an excitation, while memories settle: left out
+REST_SAMPLES = 1000  # before, and after, the reading of an encoder moves by one count
+MAX_HARMONICS = 31  # of u that pass through the mechanism: the peak of a triangle is right to 1.3 %
+NEGLIGIBLE_SHARE = 1e-9  # of the first harmonic, below which another one is left out
+HARMONIC_PASSES = 2  # passes of the harmonics through mechanism and law: a third changes amplitudes by less than 0.2 %
+SAMPLE_POSITIONS = 16  # of the first sample in its control period that are tried
 FIELDS = {name: i for i, name in enumerate(Measurement._fields)}
 T, DT, X, V, E, DE, F, G, A = (FIELDS[name] for name in ("t", "dt", "x", "v", "e", "de", "f", "g", "a"))
 LIMIT, MODEL, HAS_SURFACE, S, V_EQ = (FIELDS[name] for name in ("limit", "model", "has_surface", "s", "v_eq"))
@@ -65,10 +65,10 @@ class Wave:
       omega: rad/s.
       gain: first harmonic of u over that of e, complex, unit of u per rad or m, times the describing function of play.
         Here e has the harmonics that the mechanism lets through.
-      third: share of the third harmonic in s, over the first.
+      third: third harmonic of s over the first.
       s, u: half the range of the sliding variable and of u, with the harmonics that the mechanism lets through.
       rate: amplitude of the first harmonic of s, times omega.
-      drift: relative change of the gain from the first to the second half of the drive.
+      drift: relative change of the gain from the first to the second half of the excitation.
     """
 
     amplitude: float
@@ -82,10 +82,10 @@ class Wave:
 
 
 class Loop:
-    """The law and the linearised mechanism of one driven channel of a scenario; `late`: one more delay of u, s."""
+    """The law and the linearised mechanism of one driven channel of a scenario; `delay`: additional delay of u, s."""
 
-    def __init__(self, scenario: Scenario, channel: int = 0, late: float = 0.0):
-        self.scenario, self.channel, self.late, s = scenario, channel, late, scenario.resolved
+    def __init__(self, scenario: Scenario, channel: int = 0, delay: float = 0.0):
+        self.scenario, self.channel, self.delay, s = scenario, channel, delay, scenario.resolved
         plant = s.plant
         if not s.clock.regular:
             raise ScenarioError(
@@ -97,14 +97,16 @@ class Loop:
                     f"chattering is predicted about x = 0, and joint {joint!r} of {plant.name} moves from {low:g} to "
                     f"{high:g}: measure it in a run, with smc.score, or choose another plant"
                 )
-        self.partner = channel + plant.driven if channel + plant.driven < plant.n else None
+        free = channel + plant.driven  # the joint without an actuator that the channel moves, if there is one
+        self.joints = [channel, free] if free < plant.n else [channel]
         self.controller = Controller(s.velocity, s.surface, s.law.of_channel(channel))
-        self._linearise()
-        # all amplitudes of a frequency have one answer, and its samples one clock
+        self._linearise_mechanism()
+        self.nominal_models = [self._nominal_model(joint) for joint in self.joints]
+        # all amplitudes of a frequency have the same answer and the same clock
         self._answer = functools.lru_cache(maxsize=256)(self._solve)
-        self._clock = functools.lru_cache(maxsize=4)(self._timed)
+        self._clock = functools.lru_cache(maxsize=4)(self._clock_of)
 
-    def _linearise(self) -> None:
+    def _linearise_mechanism(self) -> None:
         """Linearise MuJoCo's model about rest at x = 0, without contacts, limits, dry friction and gaps."""
         s = self.scenario.resolved
         motor = next((part for part in s.actuator if isinstance(part, DCMotor)), None)
@@ -114,35 +116,33 @@ class Loop:
             contact="none", x0=None, v0=None, jump=None, integrator=s.integrator, physics_step=s.physics_step,
         )  # fmt: skip
         with installed(None):
-            compiled = models.compile_model(ideal)
-            made = models.with_values(compiled, ideal)
-            made.opt.disableflags |= JUMPING
+            model = models.with_values(models.compile_model(ideal), ideal)
+            model.opt.disableflags |= NONLINEAR_FLAGS
             gear = next((part for part in s.actuator if isinstance(part, Backlash)), None)
             if gear is not None:  # the rotor is rigid on the joint here
-                driven = dof_ids(made)[: s.plant.driven]
-                made.dof_armature[driven] += gear.rotor_inertia
-                made.dof_damping[driven] += gear.rotor_damping
-                mujoco.mj_setConst(made, mujoco.MjData(made))
-            self.step = float(made.opt.timestep)
-            data = mujoco.MjData(made)
-            key = models.initial_state(made, dataclasses.replace(ideal, x0=0.0, v0=0.0))
-            data.qpos[:], data.qvel[:] = key
-            self.a, b = transition(made, data, s.actuator)
-            self.b = b[:, drive_ids(made)[self.channel]] * math.prod(part.scale for part in s.actuator)
-            self.rows, self.nv = dof_ids(made), made.nv
-            self.gap = 0.0 if gear is None else self._gap(gear, made, data)
-        rest, p = np.zeros(s.plant.n), copy.copy(s.plant.values({}))
-        self.model = {}
-        for i in (self.channel, *(() if self.partner is None else (self.partner,))):
-            at = functools.partial(_nominal, s.plant, i, p)
-            f, g = at(rest, rest)
-            unit = np.eye(s.plant.n)[i] * STEP
-            fx, fv = ((at(*pair)[0] - f) / STEP for pair in ((unit, rest), (rest, unit)))
-            self.model[i] = f, g, fx, fv
+                driven = dof_ids(model)[: s.plant.driven]
+                model.dof_armature[driven] += gear.rotor_inertia
+                model.dof_damping[driven] += gear.rotor_damping
+                mujoco.mj_setConst(model, mujoco.MjData(model))
+            self.step = float(model.opt.timestep)
+            data = mujoco.MjData(model)
+            data.qpos[:], data.qvel[:] = models.initial_state(model, dataclasses.replace(ideal, x0=0.0, v0=0.0))
+            self.a, b = transition(model, data, s.actuator)
+            self.b = b[:, drive_ids(model)[self.channel]] * math.prod(part.scale for part in s.actuator)
+            self.rows, self.nv = dof_ids(model), model.nv
+            self.gap = 0.0 if gear is None else self._joint_gap(gear, model, data)
+
+    def _nominal_model(self, joint: int) -> tuple[float, ...]:
+        """Return nominal f and g of a joint at rest, and the derivatives of f with its x and v."""
+        plant = self.scenario.resolved.plant
+        zeros, step, p = np.zeros(plant.n), np.eye(plant.n)[joint] * DIFFERENCE_STEP, copy.copy(plant.values({}))
+        f, g = plant.nominal(zeros, zeros, joint, p)
+        fx, fv = (plant.nominal(x, v, joint, p)[0] for x, v in ((step, zeros), (zeros, step)))
+        return f, g, (fx - f) / DIFFERENCE_STEP, (fv - f) / DIFFERENCE_STEP
 
     def response(self, omega: complex) -> complex:
         """Return the amplitude of x at control samples per unit of sampled and held u, rad or m."""
-        return complex(self._answer(omega)[self.rows[self.channel]] * np.exp(-1j * omega * self.late))
+        return complex(self._answer(omega)[self.rows[self.channel]] * np.exp(-1j * omega * self.delay))
 
     def coupling(self, omega: float) -> float:
         """Return the largest amplitude of another driven channel under this one's u, over that of its own x."""
@@ -152,25 +152,27 @@ class Loop:
     def _solve(self, omega: complex) -> np.ndarray:
         """Return the amplitudes of MuJoCo's state at control samples, positions before velocities, per unit of u.
 
-        A sampled and held sine has images at omega + 2 pi m / control_period; all that a sample sees are summed.
+        A sine that is sampled and held has images at omega + 2 pi m / control_period. Those are summed that differ at
+        the physics steps.
         """
         s = self.scenario.resolved
         count = round(s.control_period / self.step)
         z = np.exp(1j * (omega * self.step + math.tau * np.arange(count) / count))
         passed = sum(z**-i for i in range(count)) / count  # by the hold
         passed = passed * z ** -round(s.input_delay / self.step)
+
         answers = np.linalg.solve(z[:, None, None] * np.eye(len(self.a)) - self.a, self.b[:, None])[:, :, 0]
-        late = s.sensor.delay if s.sensor else 0.0
-        return passed @ answers * np.exp(-1j * omega * late)
+        sensor_delay = s.sensor.delay if s.sensor else 0.0
+        return passed @ answers * np.exp(-1j * omega * sensor_delay)
 
     @functools.cached_property
-    def count(self) -> float:
+    def s_of_one_count(self) -> float:
         """The largest |s| after the reading of x has moved by one count of the encoder at rest; 0 without one."""
         s = self.scenario.resolved
         count = 0.0 if s.sensor is None else s.sensor.quantum(s.plant.units[self.channel] == "rad")
         if not count:
             return 0.0
-        x = np.where(np.arange(2 * RESTING) < RESTING, 0.0, count)
+        x = np.where(np.arange(2 * REST_SAMPLES) < REST_SAMPLES, 0.0, count)
         _, sliding = self._controlled(s.control_period, [x, np.zeros(len(x))])
         return float(np.abs(sliding).max())
 
@@ -178,58 +180,62 @@ class Loop:
         """Return u and s for x and v of the channel, and of the joint that it moves, every h seconds."""
         s = self.scenario.resolved
         fixed = {DT: h, LIMIT: self.scenario.limits[self.channel], MODEL: s.model == "nominal"}
-        return self.controller(0, fixed, motion, list(self.model.values()), self.controller.memories())
+        return self.controller(0, fixed, motion, self.nominal_models, self.controller.memories())
 
-    def gain(self, amplitude: float, omega: float, finest: int = FINEST) -> complex:
-        """Return the first harmonic of u over that of e = amplitude sin(omega t), times that of play, see `Wave`."""
-        _, u, _ = self._drive([amplitude], omega, finest)
-        return self._over(_first(u, self._clock(omega, finest, 0.0).against), amplitude, omega)
+    def gain(self, amplitude: float, omega: float, max_samples: int = MAX_SAMPLES_PER_PERIOD) -> complex:
+        """Return the first harmonic of u over that of e = amplitude sin(omega t), times that of play, see `Wave`.
+
+        Args:
+          max_samples: largest number of samples in a period.
+        """
+        _, u, _ = self._excited([amplitude], omega, max_samples)
+        return self._gain_of(_first(u, self._clock(omega, max_samples, 0.0).against), amplitude, omega)
 
     def phases(self, amplitude: float, omega: float) -> tuple[float, float]:
-        """Return how far the phase of `gain` may be off at least and at most, rad: least <= 0 <= most.
+        """Return the range, from <= 0 to >= 0, of the phase of a locked cycle's gain beyond that of `gain`, rad.
 
         `gain` is a mean over all positions of the samples in the period, but a cycle of a whole number of samples is
         locked to one. A relay then switches up to half a control period earlier or later than in the mean.
         """
-        h = max(self.scenario.control_period, math.tau / omega / FINEST)
+        h = max(self.scenario.control_period, math.tau / omega / MAX_SAMPLES_PER_PERIOD)
         locked = math.tau / h / (2 * max(round(math.pi / omega / h), 2))  # of an even number of samples, four or more
         mean = self.gain(amplitude, 1.001 * locked)
         shifts = []
-        for position in (np.arange(POSITIONS) + 0.5) / POSITIONS:
-            angles, u, _ = self._drive([amplitude], locked, FINEST, position)
-            shifts.append(float(np.angle(self._over(_harmonic(u, angles), amplitude, locked) / mean)))
+        for position in (np.arange(SAMPLE_POSITIONS) + 0.5) / SAMPLE_POSITIONS:
+            angles, u, _ = self._excited([amplitude], locked, MAX_SAMPLES_PER_PERIOD, position)
+            shifts.append(float(np.angle(self._gain_of(_harmonic(u, angles), amplitude, locked) / mean)))
         scale = omega / locked
         return scale * min(*shifts, 0.0), scale * max(*shifts, 0.0)
 
-    def _over(self, first: complex, amplitude: float, omega: float) -> complex:
-        """Return the gain that belongs to a first harmonic of u."""
-        alone = math.isclose(self.scenario.control_period * omega, math.pi, rel_tol=1e-9)
-        mirrored = 2.0 if alone else 1.0  # of two samples a period a wave is its own image
-        return first / (1j * amplitude * mirrored) * play(amplitude, self.gap)
+    def _gain_of(self, first: complex, amplitude: float, omega: float) -> complex:
+        """Return the gain for a first harmonic of u."""
+        two_samples = math.isclose(self.scenario.control_period * omega, math.pi, rel_tol=1e-9)
+        images = 2.0 if two_samples else 1.0  # with two samples a period a wave and its image are the same
+        return first / (1j * amplitude * images) * play(amplitude, self.gap)
 
-    def _gap(self, gear: Backlash, made: mujoco.MjModel, data: mujoco.MjData) -> float:
+    def _joint_gap(self, gear: Backlash, model: mujoco.MjModel, data: mujoco.MjData) -> float:
         """Return how far the joint moves while the rotor crosses its play, rad or m: see `play`."""
         dof = self.rows[self.channel]
-        mobility, force = np.zeros(made.nv), np.eye(made.nv)[dof]
-        mujoco.mj_forward(made, data)
-        mujoco.mj_solveM(made, data, mobility[None], force[None])
+        mobility, force = np.zeros(model.nv), np.eye(model.nv)[dof]
+        mujoco.mj_forward(model, data)
+        mujoco.mj_solveM(model, data, mobility[None], force[None])
         motors = [part for part in self.scenario.resolved.actuator if isinstance(part, DCMotor)]
         rotor = gear.rotor_inertia + sum(motor.gear**2 * motor.rotor_inertia for motor in motors)
         return gear.gap * rotor * float(mobility[dof])
 
     def wave(self, amplitude: float, omega: float) -> Wave:
-        """Return what the law returns for e whose first harmonic has this amplitude, with those that follow from it."""
-        angles, u, s = self._drive([amplitude], omega, FINEST)
+        """Return what the law returns for e with a first harmonic of this amplitude, and those that follow from u."""
+        angles, u, s = self._excited([amplitude], omega, MAX_SAMPLES_PER_PERIOD)
         harmonics: list[complex] = [amplitude]
-        for _ in range(FOLLOWED):
-            harmonics = self._followed(amplitude, omega, u, angles)
-            angles, u, s = self._drive(harmonics, omega, FINEST)
+        for _ in range(HARMONIC_PASSES):
+            harmonics = self._harmonics_of_e(amplitude, omega, u, angles)
+            angles, u, s = self._excited(harmonics, omega, MAX_SAMPLES_PER_PERIOD)
         first, at, half = _harmonic(u, angles), _harmonic(s, angles), len(u) // 2
         early, late = _harmonic(u[:half], angles[:half]), _harmonic(u[half:], angles[half:])
         return Wave(
             amplitude=amplitude,
             omega=omega,
-            gain=self._over(first, amplitude, omega),
+            gain=self._gain_of(first, amplitude, omega),
             third=abs(_harmonic(s, 3.0 * angles) / at) if at and len(harmonics) > 1 else math.nan,
             s=float(np.ptp(s)) / 2.0,
             u=float(np.ptp(u)) / 2.0,
@@ -237,33 +243,32 @@ class Loop:
             drift=abs(late - early) / (abs(first) or 1.0),
         )
 
-    def _followed(self, amplitude: float, omega: float, u: np.ndarray, angles: np.ndarray) -> list[complex]:
-        """Return the harmonics of e = amplitude sin(omega t) and of the mechanism's answer to those of u."""
-        highest = min(HARMONICS, math.ceil(math.pi / self.scenario.control_period / omega) - 1)
+    def _harmonics_of_e(self, amplitude: float, omega: float, u: np.ndarray, angles: np.ndarray) -> list[complex]:
+        """Return the harmonics of e: the given amplitude, then the mechanism's answer to the other harmonics of u."""
+        highest = min(MAX_HARMONICS, math.ceil(math.pi / self.scenario.control_period / omega) - 1)
         powers = itertools.accumulate(itertools.repeat(np.exp(-1j * angles), max(highest, 1)), np.multiply)
         first = _first(u, next(powers))
         rest = [self.response(n * omega) * _first(u, power) / 1j for n, power in enumerate(powers, 2)]
-        # the phase of u's first harmonic is that which the balance gives it
-        turned = 1j * amplitude / (first * self.response(omega)) if first else 0j
-        return [amplitude, *(x * (turned / abs(turned)) ** n if turned else 0j for n, x in enumerate(rest, 2))]
+        # u is shifted in time until the answer to its first harmonic has the phase of e
+        shift = 1j * amplitude / (first * self.response(omega)) if first else 0j
+        return [amplitude, *(x * (shift / abs(shift)) ** n if shift else 0j for n, x in enumerate(rest, 2))]
 
-    def _drive(
-        self, amplitudes: Sequence[complex], omega: float, finest: int, position: float = 0.0
+    def _excited(
+        self, amplitudes: Sequence[complex], omega: float, max_samples: int, position: float = 0.0
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return omega t, u and s of the samples after memories have settled, for an error of these harmonics.
 
-        The error is the sum of Re(amplitude_n exp(j n omega t)): it starts at its largest, so that integrals of odd
-        functions of it have no mean. `finest` is the largest number of samples of a period, and `position` the time of
-        the first sample, in control periods.
+        The error is the sum of Re(amplitude_n exp(j n omega t)). It starts at its largest value, so that integrals of
+        odd functions of it have no mean. `position` is the time of the first sample, in control periods.
         """
-        clock = self._clock(omega, finest, position)
+        clock = self._clock(omega, max_samples, position)
         motion = []
-        for joint in (self.channel, *(() if self.partner is None else (self.partner,))):
+        for joint in self.joints:
             x, v = np.zeros((2, len(clock.turns)))
             turns = np.ones_like(clock.turns)
             for n, amplitude in enumerate(amplitudes, 1):
                 turns *= clock.turns
-                if abs(amplitude) < NEGLIGIBLE * abs(amplitudes[0]):
+                if abs(amplitude) < NEGLIGIBLE_SHARE * abs(amplitudes[0]):
                     continue
                 answer, e = self._answer(n * omega), amplitude * turns
                 at = answer[self.rows[self.channel]]
@@ -274,13 +279,13 @@ class Loop:
         limit = self.scenario.limits[self.channel]
         return clock.angles, np.clip(u[clock.first :], -limit, limit), s[clock.first :]
 
-    def _timed(self, omega: float, finest: int, position: float) -> "Clock":
-        """Return the times of a drive's samples."""
-        turn = math.tau / omega
-        h = max(self.scenario.resolved.control_period, turn / finest)
-        periods = min(max(math.ceil(SAMPLES * finest * h / turn), PERIODS[0]), PERIODS[1])
-        count = math.ceil(periods * turn / h)
-        first = int(SETTLING * count)
+    def _clock_of(self, omega: float, max_samples: int, position: float) -> "Clock":
+        """Return the times of an excitation's samples."""
+        period = math.tau / omega
+        h = max(self.scenario.resolved.control_period, period / max_samples)
+        periods = min(max(math.ceil(EXCITATION_SAMPLES * max_samples * h / period), MIN_PERIODS), MAX_PERIODS)
+        count = math.ceil(periods * period / h)
+        first = int(SETTLING_SHARE * count)
         angles = omega * (h * np.arange(first, count) + h * position)
         turns = np.exp(1j * omega * h * (np.arange(count) + position))
         return Clock(h, turns, first, angles, np.exp(-1j * angles))
@@ -288,7 +293,7 @@ class Loop:
 
 @dataclasses.dataclass(frozen=True)
 class Clock:
-    """The times of a drive's samples.
+    """The times of an excitation's samples.
 
     Attributes:
       h: from one sample to the next, s.
@@ -305,7 +310,7 @@ class Clock:
 
 
 class Controller:
-    """Estimator, surface and law in compiled code, called by themselves."""
+    """Estimator, surface and law in compiled code, called without a simulation."""
 
     def __init__(self, *parts: Component | None):
         try:
@@ -334,7 +339,7 @@ class Controller:
           first: number of the first sample, counted from time 0.
           fixed: field of a measurement -> its value in all samples; `DT` is the time from one to the next, s.
           motion: x and v of the channel, each (K,), rad or m and per s; then those of the joint that it moves, if any.
-          models: of the channel and of that joint: f and g at rest, and the derivatives of f with x and v.
+          models: of the channel and of that joint, as `Loop._nominal_model` returns them.
           memories: of estimator, surface and law. They change.
         """
         x, v, q, dq = motion if len(motion) == 4 else (*motion, np.empty(0), np.empty(0))
@@ -389,7 +394,7 @@ def _behind(drive: Actuator, block: np.ndarray, model: mujoco.MjModel) -> np.nda
 def describing_function(
     law: Component | Template | str, amplitude: float, omega: float, samples: int = 4_000_000
 ) -> complex:
-    """Return N(a, omega) of a law: the first harmonic of u over that of e = a sin(omega t), sampled ever so fast.
+    """Return N(a, omega) of a law: the first harmonic of u over that of e = a sin(omega t), in continuous time.
 
     The law has no model and no bound on u. The second of two periods counts.
 
@@ -411,8 +416,8 @@ def describing_function(
     resolved = Scenario(plant="duffing", law=law, model="none").resolved
     controller = Controller(resolved.velocity, None, resolved.law.of_channel(0))
     memories, total = controller.memories(), 0j
-    for first in range(0, 2 * samples, CHUNK):
-        at = np.arange(first, min(first + CHUNK, 2 * samples))
+    for first in range(0, 2 * samples, CHUNK_SAMPLES):
+        at = np.arange(first, min(first + CHUNK_SAMPLES, 2 * samples))
         turns = np.exp(1j * math.tau * (at + 0.5) / samples)
         motion = [amplitude * turns.real, -amplitude * omega * turns.imag]
         u, _ = controller(first, {DT: h, LIMIT: math.inf}, motion, [FREE_MASS], memories)
@@ -424,9 +429,9 @@ def play(amplitude: float, gap: float) -> complex:
     """Return the describing function of play: the force on the joint over that on a rotor without play, complex.
 
     Rotor m1 and joint m2 are free masses, with plastic impacts, under u = sin(omega t). The rotor leaves its flank when
-    u changes its sign, and is alone until the angle c with c - sin c = play m1 omega^2 / |u|. There it gives the joint
-    at once what u has given it since: an impulse of 1 - cos c. As x has the amplitude
-    |play(...) u| / ((m1 + m2) omega^2), c depends on nothing but amplitude over gap.
+    u changes its sign. It moves alone until the angle c with c - sin c = play m1 omega^2 / |u|. There it hits the other
+    flank and gives the joint the impulse 1 - cos c, which u has given it since. As x has the amplitude
+    |play(...) u| / ((m1 + m2) omega^2), c depends on amplitude over gap alone.
 
     Args:
       amplitude: of the joint's x, rad or m.
@@ -437,26 +442,21 @@ def play(amplitude: float, gap: float) -> complex:
     from scipy.optimize import brentq
 
     def excess(c: float) -> float:
-        return (c - math.sin(c)) * amplitude - gap * abs(_late(c))
+        return (c - math.sin(c)) * amplitude - gap * abs(_play_at(c))
 
-    return _late(math.pi if excess(math.pi) < 0.0 else float(brentq(excess, 0.0, math.pi)))  # type: ignore[arg-type]
+    return _play_at(math.pi if excess(math.pi) < 0.0 else float(brentq(excess, 0.0, math.pi)))  # type: ignore[arg-type]
 
 
-def _late(c: float) -> complex:
-    """Return the describing function of play for the angle c at which the rotor meets the other flank."""
-    given = 1.0 - math.cos(c)
-    sine = 0.5 * (math.pi - c) + 0.25 * math.sin(2.0 * c) + given * math.sin(c)
-    cosine = -0.5 * math.sin(c) ** 2 + given * math.cos(c)
+def _play_at(c: float) -> complex:
+    """Return the describing function of play for the angle c at which the rotor hits the other flank."""
+    impulse = 1.0 - math.cos(c)
+    sine = 0.5 * (math.pi - c) + 0.25 * math.sin(2.0 * c) + impulse * math.sin(c)
+    cosine = -0.5 * math.sin(c) ** 2 + impulse * math.cos(c)
     return complex(sine, cosine) * 2.0 / math.pi
 
 
-def _nominal(plant, i, p, x, v):
-    """Return nominal f and g of channel i."""
-    return plant.nominal(x, v, i, p)
-
-
 def _harmonic(values: np.ndarray, angles: np.ndarray) -> complex:
-    """Return the complex amplitude of sin(angle) in samples, through a Hann window, which leaves out other waves."""
+    """Return the complex amplitude of sin(angle) in samples, through a Hann window, which rejects other waves."""
     return _first(values, np.exp(-1j * angles))
 
 
@@ -474,10 +474,9 @@ def _window(count: int) -> np.ndarray:
 
 @njit(error_model="numpy")
 def _run(addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out):
-    """Call estimator, surface and law for each sample.
+    """Call estimator, surface and law for each sample. Stop where u is not finite; y is then the measurement there.
 
-    Return the number of samples that were finite: fewer than there are if the law returned no number, in the
-    measurement y; -1 if one of the three raised.
+    Return the number of samples before that, or -1 if one of the three raised.
     """
     estimate, sliding, reading = np.empty(2), np.empty(2), np.empty(3)
     at_reading, at_y, at_out = reading.ctypes.data, y.ctypes.data, out.ctypes.data

@@ -23,7 +23,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from smc_mujoco.analysis.linearisation import DISPLACEMENTS, Linear, holding, linear, rising, sampled
+from smc_mujoco.analysis.linearisation import DISPLACEMENTS, Linear, linear, restoring_force, rising_part, sampled_mode
 from smc_mujoco.common.errors import number
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
@@ -53,7 +53,7 @@ def lam_range(plant: Plant, k1: float, control_period: float) -> tuple[float, fl
     k1, at = number("k1", k1, low=0.0), linear(plant)
     low, high = 0.0, math.inf
     for stiffness in at.modes:
-        e, gamma = sampled(at, stiffness, control_period)
+        e, gamma = sampled_mode(at, stiffness, control_period)
         row = np.array([k1, 1.0])
         t, d = np.array([np.trace(e), -row @ gamma]), np.array([np.linalg.det(e), -row @ _adjugate(e) @ gamma])
         for a, b in (d, -t - d, np.array([4.0, 0.0]) + 2.0 * t + d):
@@ -100,7 +100,7 @@ def _crossing(at: Linear, stiffness: float, lam: float, k1: float) -> float:
 
 def _sampled_crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> float:
     """Return the delay at which a sampled mode first becomes unstable, s."""
-    e, gamma = sampled(at, stiffness, h)
+    e, gamma = sampled_mode(at, stiffness, h)
     t, d, row = np.trace(e), np.linalg.det(e), lam * np.array([k1, 1.0])
     n1, n0 = row @ gamma, -row @ _adjugate(e) @ gamma  # adj(w - E) = w - adj(E)
     periods = [1.0] if n0 - 2.0 * n1 >= 4.0 + 2.0 * t + d else [math.inf]
@@ -136,26 +136,26 @@ def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
     return float(np.abs(np.linalg.solve(loop, np.full(plant.n, d))).max())
 
 
-def tolerated_force(plant: Plant, law: Law, most: float, u_max: float = math.inf) -> float | None:
-    """Return the largest constant d, or dry friction, with which the plant comes to rest within |x| <= most, rad or m.
+def tolerated_force(plant: Plant, law: Law, max_error: float, u_max: float = math.inf) -> float | None:
+    """Return the largest constant d, or dry friction, with which the plant comes to rest within |x| <= max_error.
 
-    None for a law without linear part. Dry friction up to this level cannot hold the plant further out, but it may stop
-    it closer to 0.
+    It is in N or N m, max_error in rad or m; None for a law without linear part. Dry friction up to this level cannot
+    hold the plant further out, but it may stop it closer to 0.
     """
-    force = holding(plant, law, u_max)
+    force = restoring_force(plant, law, u_max)
     if force is None:
         return None
-    most = number("most", most, above=0.0)
-    summit, highest = _summit(force, rising(force).size)
-    return max(highest if most >= summit else float(force(np.array([most]))[0]), 0.0)
+    max_error = number("max_error", max_error, above=0.0)
+    place, highest = _peak(force, rising_part(force).size)
+    return max(highest if max_error >= place else float(force(np.array([max_error]))[0]), 0.0)
 
 
-def _summit(force: Callable[[np.ndarray], np.ndarray], size: int) -> tuple[float, float]:
+def _peak(force: Callable[[np.ndarray], np.ndarray], size: int) -> tuple[float, float]:
     """Return the place and the size of the maximum of a force that rises over the first `size` of DISPLACEMENTS."""
     from scipy.optimize import minimize_scalar
 
     ends = DISPLACEMENTS[max(size - 2, 0)], DISPLACEMENTS[min(size, DISPLACEMENTS.size - 1)]
-    summit = minimize_scalar(
+    peak = minimize_scalar(
         lambda x: -float(force(np.array([x]))[0]), bounds=ends, method="bounded", options={"xatol": 1e-9 * ends[1]}
     )
-    return float(summit.x), -float(summit.fun)
+    return float(peak.x), -float(peak.fun)

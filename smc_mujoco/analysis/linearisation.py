@@ -10,20 +10,21 @@ on every channel and K is symmetric. So its eigenvectors divide the plant into n
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.frozen import Frozen, frozen
 from smc_mujoco.control.design import DIFFERENCE_STEP
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
 
-SAME = 1e-6  # relative: smaller differences count as none
+EQUALITY_TOLERANCE = 1e-6  # relative: smaller differences count as none
 MAX_DISPLACEMENT = 10.0  # rad or m, chosen: beyond the first maximum of every restoring force here
-DISPLACEMENTS = np.geomspace(1e-7, MAX_DISPLACEMENT, 4000)  # rad or m, where `holding` is sampled: steps of 0.5 %
+DISPLACEMENTS = np.geomspace(
+    1e-7, MAX_DISPLACEMENT, 4000
+)  # rad or m, where `restoring_force` is evaluated: steps of 0.5 %
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,27 +41,20 @@ class Linear:
         return np.linalg.eigvalsh(self.stiffness)
 
 
-def linear(plant: Plant, factors: Mapping[str, float] | None = None) -> Linear:
-    """Linearise the plant at x = x' = 0.
-
-    Args:
-      factors: parameter name -> factor, for the true plant with a mismatch; None: the nominal plant.
+@functools.lru_cache(maxsize=64)
+def linear(plant: Plant) -> Linear:
+    """Linearise the nominal plant at x = x' = 0.
 
     Raises:
       ScenarioError: channels without an actuator, with different units, inertias or dampings, or with a coupling other
         than springs.
     """
-    return _linear(plant, frozen(factors or {}))
-
-
-@functools.lru_cache(maxsize=64)
-def _linear(plant: Plant, factors: Frozen[float]) -> Linear:
     if plant.unmodelled:
         raise ScenarioError(f"{plant.name} has no nominal model: {plant.unmodelled}")
-    n, p = plant.n, SimpleNamespace(**vars(plant.values(factors)))
+    n, p = plant.n, SimpleNamespace(**plant.parameters)
     rest = np.zeros(n)
     g = np.array([plant.nominal(rest, rest, i, p)[1] for i in range(n)])
-    if plant.underactuated or plant.mixed or g.min() <= 0.0 or np.ptp(g) > SAME * g.max():
+    if plant.underactuated or plant.mixed or g.min() <= 0.0 or np.ptp(g) > EQUALITY_TOLERANCE * g.max():
         raise ScenarioError(f"{plant.name} has no theory here: give a plant with equal joints and an actuator on each")
 
     def slopes(at: Callable[[np.ndarray, int], float]) -> np.ndarray:
@@ -70,20 +64,20 @@ def _linear(plant: Plant, factors: Frozen[float]) -> Linear:
 
     stiffness = slopes(lambda x, i: plant.nominal(x, rest, i, p)[0])
     damping = slopes(lambda v, i: plant.nominal(rest, v, i, p)[0])
-    d, small = damping[0, 0], SAME * (1.0 + np.abs(stiffness).max())
+    d, small = damping[0, 0], EQUALITY_TOLERANCE * (1.0 + np.abs(stiffness).max())
     if np.abs(damping - d * np.eye(n)).max() > small or np.abs(stiffness - stiffness.T).max() > small:
         raise ScenarioError(f"{plant.name} has no theory here: give a plant whose joints are coupled only by springs")
     return Linear(inertia=float(1.0 / g[0]), damping=float(d), stiffness=(stiffness + stiffness.T) / 2.0)
 
 
-def local(law: Law) -> tuple[float, float] | None:
+def linear_gains(law: Law) -> tuple[float, float] | None:
     """Return lam and k1 of u = -lam (e' + k1 e), the law near s = 0; None if it is not linear there."""
     rest = law.template and law.template.rest
     return rest.linear(SimpleNamespace(**law.gains)) if rest else None
 
 
 @functools.lru_cache(maxsize=1024)
-def sampled(at: Linear, stiffness: float, h: float) -> tuple[np.ndarray, np.ndarray]:
+def sampled_mode(at: Linear, stiffness: float, h: float) -> tuple[np.ndarray, np.ndarray]:
     """Return E (2, 2) and Gamma (2,) of a mode sampled with period h: z+ = z + E z + Gamma u, z = (x, x').
 
     E is the change over a sample, not the usual Phi = 1 + E, in which rounding would hide the change over a short h.
@@ -96,29 +90,29 @@ def sampled(at: Linear, stiffness: float, h: float) -> tuple[np.ndarray, np.ndar
     return rates @ integral, integral[:, 1] / at.inertia
 
 
-def holding(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.ndarray], np.ndarray] | None:
-    """Return the force that pulls every channel back from the same x > 0, N or N m, as a function of x, (k,).
+def restoring_force(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.ndarray], np.ndarray] | None:
+    """Return the force of law and plant that pulls every channel back from the same x > 0, as a function of x, (k,).
 
-    It is that of the law and of the plant together. None for a law without linear part.
+    It is in N or N m; None for a law without linear part.
     """
     rest, gains = law.template and law.template.rest, SimpleNamespace(**law.gains)
     if not rest:
         return None
     linear(plant)  # raises for a plant without linear theory
-    p, still = SimpleNamespace(**plant.parameters), np.zeros(plant.n)
-    ratios = [plant.nominal(np.full(plant.n, 1.0), still, i, p) for i in range(plant.n)]
-    if np.ptp([f / g for f, g in ratios]) > SAME * (1.0 + abs(ratios[0][0] / ratios[0][1])):
+    p, v = SimpleNamespace(**plant.parameters), np.zeros(plant.n)
+    ratios = [plant.nominal(np.full(plant.n, 1.0), v, i, p) for i in range(plant.n)]
+    if np.ptp([f / g for f, g in ratios]) > EQUALITY_TOLERANCE * (1.0 + abs(ratios[0][0] / ratios[0][1])):
         raise ScenarioError(f"{plant.name} has no theory at rest: give a plant with equal joints")
 
     def force(x: np.ndarray) -> np.ndarray:
-        nominal = [plant.nominal(np.full(plant.n, each), still, 0, p) for each in x]
+        nominal = [plant.nominal(np.full(plant.n, each), v, 0, p) for each in x]
         return np.minimum(rest.force(gains, x), u_max) - np.array([f / g for f, g in nominal])
 
     return force
 
 
-def rising(force: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Return the force of `holding` at DISPLACEMENTS, up to its first maximum."""
+def rising_part(force: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Return the force of `restoring_force` at DISPLACEMENTS, up to its first maximum."""
     values = force(DISPLACEMENTS)
     falls = np.flatnonzero(np.diff(np.r_[0.0, values]) < 0.0)
     return values[: falls[0]] if falls.size else values

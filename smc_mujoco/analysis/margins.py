@@ -2,18 +2,18 @@
 
     for margin in margins(["duffing"], ["observer_free", "classical"], ["delay"]):
         print(margin.law, margin.value, margin.unit, margin.theory)
-    of([smc.Scenario(plant="duffing", law=my_law)], ["noise"])        # your own law
+    margins_of([smc.Scenario(plant="duffing", law=my_law)], ["noise"])        # your own law
 
 A run tolerates a level if it does not fail and its ultimate bound after 10 s is at most 5 % of its scale
-(`conventions`). (Then the envelope has shrunk, as the paper's claim on delay requires, because it starts at the scale.)
+(`conventions`). Then the envelope has shrunk, as the paper's claim on delay requires, because it starts at the scale.
 The search tries up to nine levels from small to large. Then it halves the interval below the FIRST level that is not
-tolerated, until it is within one control period of delay, an eighth of one of jitter, or 2 % of other levels. The
-tolerated levels may have gaps: there may be tolerated levels above one that is not. Noise is one realisation, seed 0,
-the same for every law. A disturbance is positive and acts on every channel.
+tolerated, until it is known to one control period of delay, an eighth of one of jitter, or 2 % of other levels. There
+may be tolerated levels above one that is not. Noise is one realisation, seed 0, the same for every law. A disturbance
+is positive and acts on every channel.
 
 Linear theory gives the delay above which rest is unstable. A smooth law then oscillates with an amplitude that grows
-from 0, so it tolerates a little more. Theory also gives the constant force, or dry friction, that holds the plant 5 %
-off. The plant may stop closer to the reference. All searches advance together, one batch of runs per round.
+from 0, so it tolerates a little more. Theory also gives the constant force, or dry friction, that holds the plant at
+5 % of its scale. The plant may stop closer to the reference. All searches advance together, a batch of runs per round.
 """
 
 import csv
@@ -28,7 +28,7 @@ import numpy as np
 
 from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis import linearisation
-from smc_mujoco.analysis.worst_case.uncertainty import JITTER_SHARES, later, rougher
+from smc_mujoco.analysis.worst_case.uncertainty import JITTER_SHARES, with_friction, with_jitter
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.files import ended, read_json, reading, replacing, write_json
 from smc_mujoco.common.progress import Report, summed
@@ -41,7 +41,7 @@ from smc_mujoco.metrics.conventions import by_group, refuse, scale
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import DURATION, Condition
 from smc_mujoco.simulation.grid import case, listed, listed_laws
-from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.initial_states import START_CURE, Starts
 from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
@@ -49,14 +49,14 @@ from smc_mujoco.simulation.signals import Constant
 from smc_mujoco.simulation.trace import Trace
 
 TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound
-RATE = 5.0  # 1/s: standard deviation of the velocity's noise over that of the position's, as in the study's sensor
+VELOCITY_NOISE_RATIO = 5.0  # 1/s, noise of the velocity over that of the position: that of the study's sensor
 MAX_FORCE = 6.0  # N or N m: the study's u_max; no actuator there holds a larger force
 MAX_MASS_RATIO, MAX_NOISE = 64.0, 2.048  # mass ratio; rad or m: chosen, far above tolerated levels
 DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s
-FINE, COARSE = 0.02, 0.1  # of the level: resolution of a full and of a quick search
-QUANTA = {FINE: 1, COARSE: 5}  # the same for levels that are multiples of a quantum, such as control periods of delay
-QUICK = 5.0  # s, of a quick search's runs
-HALVINGS = 6  # of an interval between two levels, about; for the progress bar
+FINE, COARSE = 0.02, 0.1  # resolution of a full and of a quick search, of the level
+QUANTA = {FINE: 1, COARSE: 5}  # the same in quanta, for levels that are multiples of one, such as control periods
+QUICK_DURATION = 5.0  # s, of a quick search's runs
+EXPECTED_HALVINGS = 6  # of an interval between two levels, for the progress bar
 
 Key = TypeVar("Key")
 
@@ -95,7 +95,7 @@ class Search:
     def left(self) -> int:
         """The number of runs still to come, estimated."""
         if self.high == math.inf:
-            return sum(level > self.low for level in self.levels) + HALVINGS
+            return sum(level > self.low for level in self.levels) + EXPECTED_HALVINGS
         return math.ceil(max(0.0, math.log2((self.high - self.low) / self.resolution(self.low))))
 
 
@@ -179,23 +179,23 @@ def tolerates(trace: Trace) -> bool:
     return all(bound(part) <= TOLERATED_ERROR * scale(part) for part in by_group(trace).values())
 
 
-def _doubled(largest: float) -> tuple[float, ...]:
+def _doubling_levels(largest: float) -> tuple[float, ...]:
     """Return nine levels, each twice the one before."""
     return tuple(largest * 2.0 ** (i - 8) for i in range(9))
 
 
 def _critical_delay(base: Scenario) -> float | None:
     estimated = base.resolved.velocity.name != "measured"
-    lam_k1 = None if base.actuator or estimated else linearisation.local(base.law)  # not in the theory
+    lam_k1 = None if base.actuator or estimated else linearisation.linear_gains(base.law)  # not in the theory
     return None if lam_k1 is None else theory.critical_delay(base.plant, *lam_k1, base.control_period)
 
 
-def _at_rest(base: Scenario) -> float | None:
+def _tolerated_force(base: Scenario) -> float | None:
     largest_error = TOLERATED_ERROR * (max(map(abs, base.resolved.x0)) or 1.0)
     return theory.tolerated_force(base.plant, base.law, largest_error, min(base.limits))
 
 
-def _heavier(base: Scenario, level: float) -> Scenario:
+def _with_mass(base: Scenario, level: float) -> Scenario:
     """Return the scenario with `level` times the nominal mass; the mismatch may call it "mass" or by its own name."""
     mass = base.plant.mass if base.plant.mass in base.mismatch else "mass"
     return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level})
@@ -213,35 +213,37 @@ MARGIN_KINDS: dict[str, Kind] = {
     "disturbance": Kind(
         label="constant disturbance",
         unit="{u}",
-        levels=_doubled(MAX_FORCE),
+        levels=_doubling_levels(MAX_FORCE),
         put=lambda base, level: dataclasses.replace(base, disturbance=(*base.disturbance, Constant(level))),
-        theory=_at_rest,
+        theory=_tolerated_force,
     ),
     "friction": Kind(
         label="dry friction",
         unit="{u}",
-        levels=_doubled(MAX_FORCE),
-        put=rougher,
-        theory=_at_rest,
+        levels=_doubling_levels(MAX_FORCE),
+        put=with_friction,
+        theory=_tolerated_force,
     ),
     "mass": Kind(
         label="mass",
         unit="1",
         levels=tuple(float(factor) for factor in np.geomspace(1.0, MAX_MASS_RATIO, 10)[1:]),
-        put=_heavier,
+        put=_with_mass,
         none=1.0,
     ),
     "noise": Kind(
         label="position noise",
         unit="{x}",
-        levels=_doubled(MAX_NOISE),
-        put=lambda base, level: dataclasses.replace(base, noise=Noise(position=level, velocity=RATE * level)),
+        levels=_doubling_levels(MAX_NOISE),
+        put=lambda base, level: dataclasses.replace(
+            base, noise=Noise(position=level, velocity=VELOCITY_NOISE_RATIO * level)
+        ),
     ),
     "jitter": Kind(
         label="largest delay of a sample, of the control period",
         unit="1",
         levels=tuple(i / JITTER_SHARES for i in range(1, JITTER_SHARES)),
-        put=later,
+        put=with_jitter,
         quantum=lambda base: 1.0 / JITTER_SHARES,
     ),
     "missed": Kind(
@@ -317,7 +319,7 @@ def margins(
     if isinstance(plants, Scenario):
         words = f"[{plants.plant.name!r}], [{plants.law.name!r}]"
         raise ScenarioError(f"margins are of plants and laws, not of a scenario: call smc.margins({words})")
-    duration = QUICK if quick else DURATION
+    duration = QUICK_DURATION if quick else DURATION
     bases = [
         case(plant, law, condition, duration, gains, starts=starts)
         for plant in listed("plants", plants)
@@ -325,12 +327,11 @@ def margins(
     ]
     for base in bases:
         if not any(base.resolved.x0):
-            cure = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
-            raise ScenarioError(f"{base.plant.name} starts at 0, and a margin is a share of the start: {cure}")
-    return of(bases, listed("kinds", kinds), COARSE if quick else FINE, threads, report)
+            raise ScenarioError(f"{base.plant.name} starts at 0, and a margin is a share of the start: {START_CURE}")
+    return margins_of(bases, listed("kinds", kinds), COARSE if quick else FINE, threads, report)
 
 
-def of(
+def margins_of(
     bases: Sequence[Scenario],
     kinds: Sequence[str] = KINDS,
     resolution: float = FINE,
@@ -354,9 +355,9 @@ def of(
         """Run scenarios, and return whether each is tolerated. Traces are not kept."""
         nonlocal done
         now = sum(scenario.work for scenario in scenarios)
-        later = sum(search.left * cells[i][0].work for i, search in going.items())
+        expected = sum(search.left * cells[i][0].work for i, search in going.items())
         results = [False] * len(scenarios)
-        for i, trace in stream(scenarios, threads, summed(report, done, done + max(now, later))):
+        for i, trace in stream(scenarios, threads, summed(report, done, done + max(now, expected))):
             results[i] = tolerates(trace)
         done += now
         return results

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from smc_mujoco.analysis.differences import coarse
 from smc_mujoco.analysis.ranking import first_of_kind
+from smc_mujoco.analysis.relevant_difference import without_rounding
 from smc_mujoco.common.errors import ScenarioError, shown, taken, unknown
 from smc_mujoco.control.source import Source, restore
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
@@ -23,8 +23,8 @@ from smc_mujoco.simulation.scenario import Scenario
 
 SETTLES = "settles"  # a name used like a metric's: whether the settling time is finite
 GROUPS = ("plant", "condition")
-FREE = ("law", "model", "surface", "velocity", "versions")  # entries of descriptions that may differ within a cell
-GAINS = ("law", "surface", "velocity")  # those of them that have gains
+LAW_ENTRIES = ("law", "model", "surface", "velocity", "versions")  # of a description; they may differ within a cell
+GAIN_ENTRIES = ("law", "surface", "velocity")  # those of them that have gains
 
 
 class Columns(Protocol):
@@ -48,10 +48,10 @@ def values(table: Columns, metric: str) -> np.ndarray:
     name = "settling_time" if metric == SETTLES else metric
     scores = np.array(table.column(name), float)
     scores[np.isnan(scores)] = CATALOGUE[name].absent
-    plants, lacking = np.asarray(table.column("plant"), str), np.isnan(scores) & ~failed(table)
-    without = set(plants[lacking]) - set(plants[~lacking & ~failed(table)])
+    plants, missing = np.asarray(table.column("plant"), str), np.isnan(scores) & ~failed(table)
+    without_metric = set(plants[missing]) - set(plants[~missing & ~failed(table)])
     scores[failed(table)] = np.inf
-    scores[np.isin(plants, list(without))] = np.nan
+    scores[np.isin(plants, list(without_metric))] = np.nan
     return np.isinf(scores).astype(float) if metric == SETTLES else scores
 
 
@@ -62,12 +62,12 @@ def failed(table: Columns) -> np.ndarray:
 
 
 class Scores(NamedTuple):
-    """The scores of a group's laws in the blocks in which a metric applies; nothing if there is none.
+    """The scores of a group's laws in the blocks in which a metric applies; empty if there is none.
 
     Attributes:
       blocks: the numbers of these blocks in the group.
-      values: law -> (blocks, seeds), NaN in cells that not all laws have, and in seeds in which every law did the same
-        as in an earlier seed.
+      values: law -> (blocks, seeds). NaN where not all laws ran, and where every law did the same as with an earlier
+        seed.
       outcomes, sets: law -> (blocks, seeds), as `Group.outcome` and `Group.sets`.
     """
 
@@ -151,16 +151,16 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
         raise ScenarioError("the table has no runs: run a study first")
     columns |= {"seed": seeds, "outcome": _outcomes(table)}
     columns["sets"] = _checked_sets(table, columns)
-    members: dict[tuple[str, ...], list[int]] = {}
+    rows_of: dict[tuple[str, ...], list[int]] = {}
     for row in range(seeds.size):
-        members.setdefault(tuple(str(columns[name][row]) for name in by), []).append(row)
-    for key, rows in members.items():
-        cell = {name: values[rows] for name, values in columns.items()}
-        yield _group(dict(zip(by, key, strict=True)), np.array(rows), cell)
+        rows_of.setdefault(tuple(str(columns[name][row]) for name in by), []).append(row)
+    for key, rows in rows_of.items():
+        of_group = {name: values[rows] for name, values in columns.items()}
+        yield _group(dict(zip(by, key, strict=True)), np.array(rows), of_group)
 
 
 def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return a number for each row: the same for runs with the same gains. Without the column "scenario" it is 0.
+    """Return a number for each row, the same for runs with the same gains: 0 if there is no column "scenario".
 
     Raises:
       ScenarioError: runs of one plant, condition and seed differ in more than the law.
@@ -174,16 +174,16 @@ def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarr
     known_gains: dict[str, int] = {}
     sets = []
     for cell, law, text in zip(cells, columns["law"], texts, strict=True):
-        about = json.loads(text)
-        free = {name: about.pop(name, None) for name in FREE}
-        sets.append(known_gains.setdefault(json.dumps({name: free[name] for name in GAINS}), len(known_gains)))
-        about["plant"].get("mjcf", {}).pop("path", None)  # models are identified by their contents
-        known, other = first.setdefault(cell, (law, about))
-        if about != other and (difference := _difference(other, about)):
+        conditions = json.loads(text)
+        of_law = {name: conditions.pop(name, None) for name in LAW_ENTRIES}
+        sets.append(known_gains.setdefault(json.dumps({name: of_law[name] for name in GAIN_ENTRIES}), len(known_gains)))
+        conditions["plant"].get("mjcf", {}).pop("path", None)  # models are identified by their contents
+        first_law, expected = first.setdefault(cell, (law, conditions))
+        if conditions != expected and (difference := _difference(expected, conditions)):
             what, one, two = difference
             raise ScenarioError(
-                f"runs of {cell[0]}, {cell[1]}, seed {cell[2]} are not alike: {what} is {shown(one)} under {known} and "
-                f"{shown(two)} under {law}: give runs that differ only in the law"
+                f"runs of {cell[0]}, {cell[1]}, seed {cell[2]} are not alike: {what} is {shown(one)} under {first_law} "
+                f"and {shown(two)} under {law}: give runs that differ only in the law"
             )
     return np.array(sets, np.int64)
 
@@ -209,7 +209,7 @@ def _outcomes(table: Columns) -> np.ndarray:
     for name in [*(metric.name for metric in metrics()), "diverged_at"]:
         with contextlib.suppress(ScenarioError):  # a metric that is newer than the table
             columns.append(np.array(table.column(name), float))
-    numbers = np.ascontiguousarray(coarse(np.stack(columns, axis=1)))
+    numbers = np.ascontiguousarray(without_rounding(np.stack(columns, axis=1)))
     numbers[np.isnan(numbers)] = math.nan  # a single bit pattern
     return np.unique(numbers.view(f"V{numbers.shape[1] * numbers.itemsize}"), return_inverse=True)[1].ravel()
 
@@ -254,7 +254,7 @@ def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[S
     every = zip(*(column if rows is None else column[rows] for column in columns), strict=True)
     for law, kind, search in sorted(dict.fromkeys(every), key=str):
         by_law.setdefault(law, []).append(restore({"kind": kind, "search": search and json.loads(search)}))
-    return {law: tuple(its) for law, its in by_law.items()}
+    return {law: tuple(known) for law, known in by_law.items()}
 
 
 def floor(scenario: Scenario | None, unit: str) -> float:

@@ -12,29 +12,29 @@ sample, whatever their seeds: three sets are three samples. Where all runs of a 
 the sample, and the conclusion holds for these gains. For two laws, runs that are linked by a shared set of either law
 are one sample, whose difference is the median of theirs. A run that repeats the results of both laws is not counted.
 
-The test. The difference of two laws in a sample is the logarithm of the ratio of their values. It is their difference
-where 3 % of a value is less than the sensor resolves, and for shares. A law is better than another if the signed-rank
-test (see `signed_rank`) rejects that its values are less by no more than the least relevant difference. That is the
-same as an interval of the ratio that ends beyond it. Its median must not be the higher one, and it must not fail more
-often.
+The test. The difference of two laws in a sample is the logarithm of the ratio of their values. For shares, and where
+3 % of a value is less than the sensor resolves, it is the difference of the values. A law is better than another if the
+signed-rank test (see `signed_rank`) rejects that its values are lower by the least relevant difference or less: the
+interval of the ratio lies beyond that difference. Besides, its median must not be the higher one, and it must not fail
+more often.
 
 The correction. There are two families, over all blocks of a metric in a table, however the table is grouped into
 boards. Both are corrected by S. Holm's method (Scandinavian Journal of Statistics 6(2), 1979), with two-sided p-values.
 
 - Winners. The winner of a block is better than every other law. Its p-value is the largest of those against the others,
-  and needs no correction for their number (S. Gutmann, Z. Maymin, Annals of Statistics 15(1), 1987: it is most often
-  wrong where two laws are equal and the others far behind). So the family is the blocks. The probability of any wrong
+  and needs no correction for their number (S. Gutmann, Z. Maymin, Annals of Statistics 15(1), 1987): the error is
+  largest where two laws are equal and the others far behind. So the family is the blocks. The probability of any wrong
   winner is at most 1 - level.
 - Pairs. The family is all pairs of laws in all blocks. The probability that any law is wrongly called better than
-  another is at most 1 - level, besides the statements about winners.
+  another is at most 1 - level, in addition to that of a wrong winner.
 
-A block without a test has one value of each law, which is no sample: a law is better there if its value is less by more
-than the least relevant difference. It belongs to neither family.
+A block without a test has one value of each law, which is no sample. There a law is better if its value is lower by
+more than the least relevant difference. The block belongs to neither family.
 
 A law with a run that failed, or has no value, wins nothing. In every order the laws with fewer such runs come first.
 
-A law is among the best if no other is better. A law that is not beaten only because two laws have too few samples,
-though the other's median is relevantly lower, is not among them.
+A law is among the best if no other is better. One exception: where another law's median is relevantly lower, and two
+laws have too few samples for any verdict, the law is undecided, and not among the best.
 """
 
 import dataclasses
@@ -47,8 +47,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from smc_mujoco.analysis.bootstrap import confidence, middle
-from smc_mujoco.analysis.differences import RELEVANT, ROUNDING, least_difference, share_that_matters
-from smc_mujoco.analysis.signed_rank import interval, least_p, p_values
+from smc_mujoco.analysis.relevant_difference import RELEVANT, ROUNDING, checked_share, least_difference
+from smc_mujoco.analysis.signed_rank import interval, min_p, p_values
 from smc_mujoco.common.errors import ScenarioError, shown
 
 
@@ -134,7 +134,7 @@ class Comparison:
     @functools.cached_property
     def centres(self) -> np.ndarray:
         """The medians, or means, over the seeds, (laws, blocks)."""
-        return _centres(self.cells, self.shares)
+        return _centres_of(self.cells, self.shares)
 
     @functools.cached_property
     def without_value(self) -> np.ndarray:
@@ -208,7 +208,7 @@ class Comparison:
         The median of another law is relevantly lower, and no more of its runs fail, but the two have too few samples
         for a test to tell them apart, whatever its result.
         """
-        few = np.vectorize(least_p)(self.samples) > self.limits.pair
+        few = np.vectorize(min_p)(self.samples) > self.limits.pair
         few[self.untested] = False
         return np.any(self._relevantly_lower & self._eligible & few, axis=1).T & ~self.beaten
 
@@ -268,18 +268,21 @@ def compare(
       ScenarioError: no laws, or laws with different cells.
     """
     laws, cells = _cells(scores)
-    blocks, relevant = range(cells.shape[1]), share_that_matters(relevant)
+    blocks, relevant = range(cells.shape[1]), checked_share(relevant)
     floors = np.broadcast_to(np.asarray(floors, float), len(blocks))
     untested = np.broadcast_to(np.asarray(untested, bool), len(blocks))
-    numbers = np.zeros(cells.shape, np.int64) if sets is None else _numbers(sets, laws).astype(np.int64)
-    did = None if outcomes is None else _numbers(outcomes, laws)
-    there = ~np.isnan(cells[0])
-    counts = [[np.unique(by_block[k, there[k]]).size for k in blocks] for by_block in numbers]
-    ratios = [_ratios_make_sense(cells[:, k], floors[k], relevant) for k in blocks]
-    relative = np.array(ratios) & (not shares)
-    each = [_differences(cells[:, k], relative[k], None if did is None else did[:, k], numbers[:, k]) for k in blocks]
-    differences = np.stack(each)
-    shifts = _shifts(_centres(cells, shares), floors, relative, relevant, shares)
+    gain_sets = np.zeros(cells.shape, np.int64) if sets is None else _stacked(sets, laws).astype(np.int64)
+    results = None if outcomes is None else _stacked(outcomes, laws)
+    ran = ~np.isnan(cells[0])
+    counts = [[np.unique(of_law[k, ran[k]]).size for k in blocks] for of_law in gain_sets]
+    relative = np.array([_ratios_make_sense(cells[:, k], floors[k], relevant) for k in blocks]) & (not shares)
+    differences = np.stack(
+        [
+            _differences(cells[:, k], relative[k], None if results is None else results[:, k], gain_sets[:, k])
+            for k in blocks
+        ]
+    )
+    shifts = _shifts(_centres_of(cells, shares), floors, relative, relevant, shares)
     beyond = differences - shifts[..., None]
     p = np.where(untested[:, None, None], 1.0 - np.any(beyond > 0.0, axis=3), p_values(beyond))
     p[:, *np.diag_indices(len(laws))] = 1.0
@@ -298,29 +301,29 @@ def compare(
         untested=untested,
         limits=limits or Limits(0.0, 0.0),
     )
-    return comparison if limits else dataclasses.replace(comparison, limits=corrected([comparison], level))
+    return comparison if limits else dataclasses.replace(comparison, limits=corrected_limits([comparison], level))
 
 
-def _numbers(of: Mapping[str, ArrayLike], laws: Sequence[str]) -> np.ndarray:
+def _stacked(by_law: Mapping[str, ArrayLike], laws: Sequence[str]) -> np.ndarray:
     """Return the numbers of all laws, (laws, blocks, seeds)."""
-    return np.array([np.atleast_2d(of[law]) for law in laws])
+    return np.array([np.atleast_2d(by_law[law]) for law in laws])
 
 
-def _differences(cells: np.ndarray, relative: np.ndarray, did: np.ndarray | None, sets: np.ndarray) -> np.ndarray:
+def _differences(cells: np.ndarray, relative: np.ndarray, results: np.ndarray | None, sets: np.ndarray) -> np.ndarray:
     """Return `Comparison.differences` of one block, (laws, laws, seeds).
 
     Args:
       cells, sets: (laws, seeds).
       relative: (laws, laws).
-      did: (laws, seeds), the outcomes; None if all runs differ.
+      results: (laws, seeds), a number for each run's result; None if all runs differ.
     """
-    k, there = len(cells), ~np.isnan(cells[:1])
+    k, ran = len(cells), ~np.isnan(cells[:1])
     differences = np.full((k, *cells.shape), math.nan)
     for a in range(k - 1):
         pairs = _pairwise(cells[a], cells[a + 1 :], relative[a, a + 1 :])
         for b, row in enumerate(pairs, a + 1):
-            if did is not None:
-                row[~first_of_kind(did[[a, b]][:, None], there)[0]] = math.nan
+            if results is not None:
+                row[~first_of_kind(results[[a, b]][:, None], ran)[0]] = math.nan
             row[:] = _by_sample(row, sets[a], sets[b])
         differences[a, a + 1 :], differences[a + 1 :, a] = pairs, -pairs
     return differences
@@ -339,7 +342,7 @@ def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray
     return laws, cells
 
 
-def _centres(cells: np.ndarray, shares: bool) -> np.ndarray:
+def _centres_of(cells: np.ndarray, shares: bool) -> np.ndarray:
     """Return the medians, or means of shares, over the seeds, (laws, blocks)."""
     return np.nanmean(cells, axis=2) if shares else middle(cells)
 
@@ -374,13 +377,13 @@ def _pairwise(law: np.ndarray, rivals: np.ndarray, relative: np.ndarray) -> np.n
 
 def _by_sample(differences: np.ndarray, sets: np.ndarray, rival_sets: np.ndarray) -> np.ndarray:
     """Return the median difference of each sample, then NaN: runs linked by a set of gains are one sample."""
-    there = np.flatnonzero(~np.isnan(differences))
-    labels = linked(*(of[there].tobytes() for of in (sets, rival_sets)))
+    runs = np.flatnonzero(~np.isnan(differences))
+    labels = linked(*(numbers[runs].tobytes() for numbers in (sets, rival_sets)))
     if labels is None:
         return differences
     centres = np.full(differences.shape, math.nan)
     for sample in range(max(labels) + 1):
-        ordered = np.sort(differences[there[np.array(labels) == sample]])
+        ordered = np.sort(differences[runs[np.array(labels) == sample]])
         low, high = ordered[(ordered.size - 1) // 2], ordered[ordered.size // 2]
         centres[sample] = 0.0 if low == -high else (low + high) / 2  # also of two opposite infinite values
     return centres
@@ -390,7 +393,7 @@ def _by_sample(differences: np.ndarray, sets: np.ndarray, rival_sets: np.ndarray
 def linked(*sets: bytes) -> tuple[int, ...] | None:
     """Return a number for each run, the same for runs that share a set of gains, directly or through others.
 
-    A law with one set of gains links nothing. None if every run is a sample of its own.
+    A law with one set of gains links nothing. None if no two runs are linked.
 
     Args:
       sets: for each law the number of the set of each run, as bytes of int64.
@@ -417,10 +420,10 @@ def samples_of(sets: np.ndarray) -> tuple[int, ...] | None:
     Args:
       sets: (blocks, runs), the number of the set of gains; -1 where there is no run.
     """
-    return linked(*map(_as_key, np.atleast_2d(sets)))
+    return linked(*map(_sets_as_bytes, np.atleast_2d(sets)))
 
 
-def _as_key(sets: np.ndarray) -> bytes:
+def _sets_as_bytes(sets: np.ndarray) -> bytes:
     """Return the sets of a block as `linked` takes them, where a missing run shares no set."""
     if np.unique(sets[sets >= 0]).size < 2:
         return np.zeros(sets.size, np.int64).tobytes()
@@ -434,21 +437,21 @@ def _root(parent: Sequence[int], run: int) -> int:
     return run
 
 
-def first_of_kind(outcomes: np.ndarray, there: np.ndarray) -> np.ndarray:
+def first_of_kind(outcomes: np.ndarray, exists: np.ndarray) -> np.ndarray:
     """Return which cells (blocks, seeds) exist and do not repeat the outcomes of an earlier cell of their block.
 
     Args:
       outcomes: (laws, blocks, seeds), a number for the result of each law.
-      there: (blocks, seeds), which cells exist.
+      exists: (blocks, seeds), which cells exist.
     """
-    first = np.zeros(there.shape, bool)
-    for block, own in enumerate(there):
-        seeds = np.flatnonzero(own)
+    first = np.zeros(exists.shape, bool)
+    for block, of_block in enumerate(exists):
+        seeds = np.flatnonzero(of_block)
         first[block, seeds[np.unique(outcomes[:, block, seeds], axis=1, return_index=True)[1]]] = True
     return first
 
 
-def corrected(comparisons: Sequence[Comparison], level: float = 0.95) -> Limits:
+def corrected_limits(comparisons: Sequence[Comparison], level: float = 0.95) -> Limits:
     """Return the limits of p-values for comparisons that form one family."""
     pairs, winners = [], []
     for one in comparisons:

@@ -1,17 +1,16 @@
 """Regions of attraction: from which initial states (x, v) a law brings a plant to rest at its reference.
 
-    found = basin("inverted_pendulum", "observer_free", points=(50, 50))
-    found.share                                             # of the states that converge, 0 to 1
-    of(smc.Scenario(plant="duffing", law=my_law), x, v)     # your own law
-    found.save("map.json"); load("map.json")
+    region = basin("inverted_pendulum", "observer_free", points=(50, 50))
+    region.share                                            # of the states that converge, 0 to 1
+    basin_of(smc.Scenario(plant="duffing", law=my_law), x, v)     # your own law
+    region.save("map.json"); load("map.json")
 
 All channels of a network start from the same state. x is not wrapped: a pendulum at rest a turn away has not converged.
 
 The rule. X and V are the largest |x| and |v| of the grid, and e = x - r is the error. A run is in the band while
 |e| <= 2 % of X and |v| <= 2 % of V on every channel. It is near while its squared distance (e/X)^2 + (v/V)^2 is below
 (0.2 %)^2, a tenth of the band. Every state is run for 15 % of the duration. Undecided states are run again, from the
-beginning, for 40 %, and the rest for the whole duration. (Runs are deterministic. All this costs at most 1.55 times a
-whole run.)
+beginning, for 40 %, and those still undecided for the whole duration.
 - Early, a run converges if it is in the band throughout the last third of the run, and its largest squared distance in
   the second half of this third is smaller by a tenth than in the first, or near. Near the reference the distance need
   not decrease, because a law that switches leaves a ripple. If a run starts near, the distance must decrease, because a
@@ -53,13 +52,16 @@ from smc_mujoco.simulation.signals import Constant
 from smc_mujoco.simulation.trace import Trace
 
 HORIZONS = (0.15, 0.4, 1.0)  # of the duration: chosen
-LATE = 3  # an early verdict considers the last third of a run
+EARLY_PARTS = 3  # an early verdict considers the last of so many equal parts of a run
 BATCH_BYTES = 48 * 2**20  # of traces in memory at once, about
-STILL = 1e-6  # of X, V and u_max: changes of a run that rests
-LEAVING, SHRINKING = 1.05, 0.9  # factors of the squared distance (e/X)^2 + (v/V)^2
-NEAR = (0.1 * SETTLING_BAND) ** 2  # squared distance
-TURN = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}  # X of a plant, chosen
-PACE = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
+REST_TOLERANCE = 1e-6  # of X, V and u_max: a run that changes less is at rest
+MAX_FINAL_RATIO, MAX_EARLY_RATIO = 1.05, 0.9  # of the squared distance (e/X)^2 + (v/V)^2, second half over first
+NEAR_SQUARE = (0.1 * SETTLING_BAND) ** 2  # squared distance
+POSITION_REACH = {
+    "rad": lambda plant: math.pi,
+    "m": lambda plant: 2.0 * max(map(abs, plant.x0)),
+}  # X of a plant, chosen
+VELOCITY_RATIO = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
 MIN_SAMPLES = 10  # of the shortest runs: then each half of their last fifth has one
 CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1
 
@@ -130,19 +132,21 @@ def basin(
       ScenarioError: an unknown plant, law, set or condition, a condition whose reference moves, or an empty grid.
     """
     base = case(plant, law, condition, duration, gains, changes={"integrator": "implicitfast"})
-    if own := sorted({"x0", "v0"} & find_condition(condition).on(base.plant, duration).keys()):
-        raise ScenarioError(f"condition {base.condition!r} sets {own[0]}, and a map starts everywhere: leave it out")
-    reach = TURN[base.plant.unit](base.plant)
+    if start := sorted({"x0", "v0"} & find_condition(condition).on(base.plant, duration).keys()):
+        raise ScenarioError(f"condition {base.condition!r} sets {start[0]}, and a map starts everywhere: leave it out")
+    reach = POSITION_REACH[base.plant.unit](base.plant)
     if not reach and (x is None or v is None):
         raise ScenarioError(f"{base.plant.name} starts at 0, which tells no reach: give positions x and velocities v")
     if len(counts := taken("points", points)) != 2:
         raise ScenarioError(f"points is {shown(points)}: give two numbers of points, in x and v")
     nx, nv = (whole(f"points in {axis}", n, 2, 1000) for axis, n in zip("xv", counts, strict=True))
     xs = np.linspace(-reach, reach, nx) if x is None else x
-    return of(base, xs, np.linspace(-PACE * reach, PACE * reach, nv) if v is None else v, threads, report)
+    return basin_of(
+        base, xs, np.linspace(-VELOCITY_RATIO * reach, VELOCITY_RATIO * reach, nv) if v is None else v, threads, report
+    )
 
 
-def of(
+def basin_of(
     base: Scenario,
     x: Sequence[float] | np.ndarray,
     v: Sequence[float] | np.ndarray,
@@ -175,22 +179,22 @@ def of(
     x, v = _axis("x", x), _axis("v", v)
     outcome = np.full((v.size, x.size), UNDECIDED, np.int8)
     decided_at = np.full(outcome.shape, base.duration)
-    open_, done = list(np.ndindex(*outcome.shape)), 0.0
-    for i, part in enumerate(horizons):
-        first = dataclasses.replace(base, duration=part * base.duration)
-        needed = done + len(open_) * base.work * sum(horizons[i:])
-        size, left = max(32, int(BATCH_BYTES / (72 * (first.samples + 1) * first.plant.n))), []
-        for begin in range(0, len(open_), size):
-            some = open_[begin : begin + size]
-            cases = [dataclasses.replace(first, x0=x[k], v0=v[j]) for j, k in some]
+    undecided, done = list(np.ndindex(*outcome.shape)), 0.0
+    for i, horizon in enumerate(horizons):
+        shortened = dataclasses.replace(base, duration=horizon * base.duration)
+        needed = done + len(undecided) * base.work * sum(horizons[i:])
+        size, left = max(32, int(BATCH_BYTES / (72 * (shortened.samples + 1) * shortened.plant.n))), []
+        for begin in range(0, len(undecided), size):
+            batch = undecided[begin : begin + size]
+            cases = [dataclasses.replace(shortened, x0=x[k], v0=v[j]) for j, k in batch]
             for index, trace in stream(cases, threads, summed(report, done, needed)):
-                verdict = judge(trace, x, v, final=part == HORIZONS[-1])
+                verdict = verdict_of(trace, x, v, final=horizon == HORIZONS[-1])
                 if verdict is None:
-                    left.append(some[index])
+                    left.append(batch[index])
                 else:
-                    outcome[some[index]], decided_at[some[index]] = verdict, first.duration
-            done += len(cases) * first.work
-        open_ = left
+                    outcome[batch[index]], decided_at[batch[index]] = verdict, shortened.duration
+            done += len(cases) * shortened.work
+        undecided = left
     return Basin(
         plant=base.plant.name,
         law=base.law.name,
@@ -204,27 +208,29 @@ def of(
     )
 
 
-def judge(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None:
-    """Judge a run by the module's rule, for a grid x, v: 1, 0 or -1, or None if it needs a longer run."""
+def verdict_of(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None:
+    """Return what the module's rule says of a run, for a grid x, v: 1, 0 or -1, or None if it needs a longer run."""
     if trace.failure is not None or trace.diverged_at is not None:
         return DOES_NOT
-    far = np.abs(x).max() or 1.0, np.abs(v).max() or 1.0
+    x_reach, v_reach = np.abs(x).max() or 1.0, np.abs(v).max() or 1.0
     e = error(trace)
-    distance = np.maximum(np.abs(e / far[0]), np.abs(trace.v / far[1])).max(axis=1)
-    late = last_part(trace) if final else slice(-(distance.size // LATE), None)
+    distance = np.maximum(np.abs(e / x_reach), np.abs(trace.v / v_reach)).max(axis=1)
+    late = last_part(trace) if final else slice(-(distance.size // EARLY_PARTS), None)
     inside = distance[late] <= SETTLING_BAND
-    square = ((e / far[0]) ** 2 + (trace.v / far[1]) ** 2).sum(axis=1)
+    square = ((e / x_reach) ** 2 + (trace.v / v_reach) ** 2).sum(axis=1)
     start, square = square[0], square[late]
     middle = square.size // 2
-    sooner, later = square[:middle].max(), square[middle:].max()
-    near = NEAR if final or start > NEAR else 0.0
-    stays = inside.all() and later <= max((LEAVING if final else SHRINKING) * sooner, near)
+    first_half, second_half = square[:middle].max(), square[middle:].max()
+    near = NEAR_SQUARE if final or start > NEAR_SQUARE else 0.0
+    ratio = MAX_FINAL_RATIO if final else MAX_EARLY_RATIO
+    stays = inside.all() and second_half <= max(ratio * first_half, near)
     if final or stays:
         return CONVERGES if stays else UNDECIDED if inside.any() else DOES_NOT
-    moved = np.stack([np.ptp(signal[late], axis=0).max() for signal in (trace.x, trace.v, trace.u)])
+    changes = np.stack([np.ptp(signal[late], axis=0).max() for signal in (trace.x, trace.v, trace.u)])
     u_max = float(np.max(trace.scenario.resolved.u_max))
-    limits = STILL * np.array([*far, u_max if math.isfinite(u_max) else np.abs(trace.u).max()])
-    return DOES_NOT if (moved <= limits).all() and not inside.any() else None
+    u_reach = u_max if math.isfinite(u_max) else np.abs(trace.u).max()
+    rests = (changes <= REST_TOLERANCE * np.array([x_reach, v_reach, u_reach])).all()
+    return DOES_NOT if rests and not inside.any() else None
 
 
 def load(path: str | os.PathLike[str]) -> Basin:

@@ -45,11 +45,11 @@ def p_values(differences: ArrayLike) -> np.ndarray:
     sizes = np.where(there, np.minimum(np.abs(rows), np.finfo(float).max), math.inf)
     twice = np.where(there, np.rint(2 * rankdata(sizes, axis=1)), 0).astype(int)  # whole numbers, also where ranks tie
     above = np.where(rows > 0, twice, 0).sum(axis=1)
-    kinds, kind = np.unique(np.sort(twice, axis=1), axis=0, return_inverse=True)
+    distinct, which = np.unique(np.sort(twice, axis=1), axis=0, return_inverse=True)
     p = np.empty(len(rows))
-    for i, ranks in enumerate(kinds):
-        here = kind.ravel() == i
-        p[here] = _tail(tuple(ranks[ranks > 0].tolist()), above[here])
+    for i, ranks in enumerate(distinct):
+        same = which.ravel() == i
+        p[same] = _tail(tuple(ranks[ranks > 0].tolist()), above[same])
     return p.reshape(shape)
 
 
@@ -75,8 +75,8 @@ def interval(differences: ArrayLike, error: float) -> Centre:
     return Centre(value, float(low), float(high))
 
 
-def least_p(n: int) -> float:
-    """Return the least one-sided p-value that n differences can have."""
+def min_p(n: int) -> float:
+    """Return the smallest one-sided p-value that n differences can have."""
     return 2.0**-n
 
 

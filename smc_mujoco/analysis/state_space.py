@@ -22,10 +22,10 @@ from smc_mujoco.simulation.scenario import Scenario
 if TYPE_CHECKING:
     from control import StateSpace
 
-INSTANT = 1e-9  # s: of a physics step that drives see while rates are linearised
+INSTANT_STEP = 1e-9  # s, physics step while rates are linearised
 FLAGS = mujoco.mjtDisableBit
-JUMPING = FLAGS.mjDSBL_CONTACT.value | FLAGS.mjDSBL_LIMIT.value | FLAGS.mjDSBL_FRICTIONLOSS.value  # not linear
-UNHELD = 1e-6  # rad/s^2 or m/s^2: a larger acceleration that no command cancels is no rest
+NONLINEAR_FLAGS = FLAGS.mjDSBL_CONTACT.value | FLAGS.mjDSBL_LIMIT.value | FLAGS.mjDSBL_FRICTIONLOSS.value  # not linear
+MAX_REST_ACCELERATION = 1e-6  # rad/s^2 or m/s^2: a larger acceleration that no command cancels is no rest
 
 
 def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
@@ -50,19 +50,19 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     plant = as_plant(plant)
     at = Scenario(plant=plant, law="none", x0=(plant.rest or 0.0) if x is None else x, v0=0.0)
     with installed(None):
-        made = models.with_values(models.compile_model(at), at)
-        made.opt.disableflags |= JUMPING
-        data = mujoco.MjData(made)
-        data.qpos[:], data.qvel[:] = models.initial_state(made, at)
-        driven, dofs = drive_ids(made), dof_ids(made)
-        _hold(made, data, driven, plant.name)
-        block = rates(made, data)
-    order = [*dofs, *(i for i in range(made.nv) if i not in dofs)]
-    order += [made.nv + i for i in order]
+        model = models.with_values(models.compile_model(at), at)
+        model.opt.disableflags |= NONLINEAR_FLAGS
+        data = mujoco.MjData(model)
+        data.qpos[:], data.qvel[:] = models.initial_state(model, at)
+        driven, dofs = drive_ids(model), dof_ids(model)
+        _hold(model, data, driven, plant.name)
+        block = rates(model, data)
+    order = [*dofs, *(i for i in range(model.nv) if i not in dofs)]
+    order += [model.nv + i for i in order]
     n = len(order)
     a, b = block[:n, :n][np.ix_(order, order)], block[:n, n:][np.ix_(order, driven)]
     names = joint_names(plant)
-    labels = [made.joint(int(made.dof_jntid[i])).name for i in order[: made.nv]]
+    labels = [model.joint(int(model.dof_jntid[i])).name for i in order[: model.nv]]
     states = [f"{kind}[{name}]" for kind in ("x", "v") for name in labels]
     inputs, outputs = [f"u[{name}]" for name in names[: plant.driven]], [f"x[{name}]" for name in names]
     return StateSpace(a, b, np.eye(plant.n, n), 0.0, states=states, inputs=inputs, outputs=outputs, name=plant.name)
@@ -78,7 +78,7 @@ def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: np.ndarray, name: 
     mujoco.mj_forward(model, data)
     data.ctrl[driven] -= np.linalg.lstsq(b, data.qacc, rcond=None)[0]
     mujoco.mj_forward(model, data)
-    if np.abs(data.qacc).max() > UNHELD:
+    if np.abs(data.qacc).max() > MAX_REST_ACCELERATION:
         x = ", ".join(f"{one:g}" for one in data.qpos)
         raise ScenarioError(f"no command holds {name} at rest at x = {x}: give another x")
 
@@ -90,21 +90,21 @@ def rates(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
       Rows: those rates; columns: positions, velocities, activations, commands. Rows of the commands are 0.
     """
     nv, n, step = model.nv, 2 * model.nv + model.na, float(model.opt.timestep)
-    rest = data.qpos.copy(), data.qvel.copy(), data.act.copy(), data.ctrl.copy()
-    model.opt.timestep = INSTANT  # or drives give the force of the step's end
+    point = data.qpos.copy(), data.qvel.copy(), data.act.copy(), data.ctrl.copy()
+    model.opt.timestep = INSTANT_STEP  # the force of a drive is that at the end of a step
 
-    def moving(moved: np.ndarray) -> np.ndarray:
-        data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = rest
-        mujoco.mj_integratePos(model, data.qpos, moved[:nv], 1.0)
-        data.qvel[:] += moved[nv : 2 * nv]
-        data.act[:] += moved[2 * nv : n]
-        data.ctrl[:] += moved[n:]
+    def rates_at(offset: np.ndarray) -> np.ndarray:
+        data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = point
+        mujoco.mj_integratePos(model, data.qpos, offset[:nv], 1.0)
+        data.qvel[:] += offset[nv : 2 * nv]
+        data.act[:] += offset[2 * nv : n]
+        data.ctrl[:] += offset[n:]
         mujoco.mj_forward(model, data)
         return np.concatenate((data.qvel, data.qacc, data.act_dot))
 
     block = np.zeros((n + model.nu, n + model.nu))
-    for i, moved in enumerate(DIFFERENCE_STEP * np.eye(n + model.nu)):
-        block[:n, i] = (moving(moved) - moving(-moved)) / (2.0 * DIFFERENCE_STEP)
+    for i, offset in enumerate(DIFFERENCE_STEP * np.eye(n + model.nu)):
+        block[:n, i] = (rates_at(offset) - rates_at(-offset)) / (2.0 * DIFFERENCE_STEP)
     model.opt.timestep = step
-    data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = rest
+    data.qpos[:], data.qvel[:], data.act[:], data.ctrl[:] = point
     return block

@@ -13,11 +13,12 @@ from rich.text import Text
 
 from smc_mujoco.cli.tables import plain, titled, with_package
 from smc_mujoco.common.errors import unknown
+from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.docstring import entry
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.joint_law import catalogue as joint_laws
-from smc_mujoco.control.law import Measurement
+from smc_mujoco.control.law import Law, Measurement
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.control.properties import PROPERTIES, reads, searched, suitable
 from smc_mujoco.control.surface import catalogue as surfaces
@@ -27,8 +28,8 @@ INITIALS = re.compile(r"\b[A-Z]\.(?:[- ]?[A-Z]\.)*\s*")  # of authors
 CATALOGUES = {"Laws": laws, "Laws of many joints": joint_laws, "Surfaces": surfaces, "Velocity estimators": estimators}
 # Relative degree -> what a law acts on.
 DEGREES = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}
-ARRIVES = {"s": "s", "e": "e", "": "–"}  # what is 0 after a finite time -> cell of a table
-CALLS = {  # kind of component -> how a user makes one
+ARRIVAL_CELLS = {"s": "s", "e": "e", "": "–"}  # what is 0 after a finite time -> cell of a table
+CALL_TEMPLATES = {  # kind of component -> how a user makes one
     "law": "smc.law({})",
     "surface": "smc.Scenario(surface=smc.surface({}), ...)",
     "estimator": "smc.Scenario(velocity=smc.estimator({}), ...)",
@@ -44,7 +45,7 @@ def catalogue() -> dict[str, list[tuple[Template, str]]]:
     return by_name
 
 
-def brief(source: str) -> str:
+def short_source(source: str) -> str:
     """Return a source in short: its one or two authors, or the first "et al.", and its year."""
     first = INITIALS.sub("", source).partition(";")[0]
     authors, *others = re.split(r", | \(", first.partition('"')[0])
@@ -56,20 +57,24 @@ def brief(source: str) -> str:
     return " ".join([authors.removeprefix("after ").strip(), *years[-1:]])
 
 
-def print_pages(name: str | None, console: Console) -> None:
-    """Print a page about one law, surface or estimator; without a name a line about each.
+def print_pages(name: str, console: Console) -> None:
+    """Print a page about one law, surface or estimator of this name, or about each law of a file.
 
     Raises:
-      ScenarioError: nothing has that name, or what has it cannot be loaded from its package.
+      ScenarioError: nothing has that name, or what has it cannot be loaded from its package, or from its file.
     """
-    if name is not None:
-        known = [templates() for templates in CATALOGUES.values()]
-        found = [(templates[name], templates.package(name)) for templates in known if name in templates]
-        if not found:
-            raise unknown("law, surface or velocity estimator", name, catalogue())
-        for template, package in found:
-            print_page(template, console, package)
-        return
+    known = [templates() for templates in CATALOGUES.values()]
+    pages = [(templates[name], templates.package(name)) for templates in known if name in templates]
+    if not pages and "." in name:
+        pages = [(law.template, "") for law in from_text.laws(name) if isinstance(law, Law) and law.template]
+    if not pages:
+        raise unknown("law, surface or velocity estimator", name, catalogue())
+    for template, package in pages:
+        print_page(template, console, package, name)
+
+
+def print_lists(console: Console) -> None:
+    """Print a line about each law, surface and estimator."""
     for heading, templates in CATALOGUES.items():
         known, degree = templates(), [Column("deg", justify="right", style="dim")] * (heading == "Laws")
         columns = (
@@ -83,7 +88,7 @@ def print_pages(name: str | None, console: Console) -> None:
             parts = entry(template)
             degrees = [str(template.relative_degree)] * len(degree)
             formula = with_package(parts.formula, known.package(template.name))
-            table.add_row(template.name, *degrees, Text(formula), Text(brief(parts.source)))
+            table.add_row(template.name, *degrees, Text(formula), Text(short_source(parts.source)))
         console.print(table, "")
     one, some = ("smc-mujoco laws NAME", "cyan"), ("smc-mujoco laws --needs continuous,two-gains", "cyan")
     console.print(Text.assemble("One law in full: ", one, ". Only some laws: ", some))
@@ -100,37 +105,38 @@ def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str 
     Raises:
       ScenarioError: an unknown property, family or plant.
     """
-    suiting = suitable(needs, family, plant)
+    suitable_laws = suitable(needs, family, plant)
     filters = [PROPERTIES[need].words for need in needs] + [f"are of the family {family}"] * (family is not None)
-    kind = plant if plant is None or isinstance(plant, str) else plant.name
-    title = f"{len(suiting)} of {len(laws())} laws" + f" that {' and '.join(filters)}" * bool(filters)
-    title += f" for {kind}" * (kind is not None)
+    machine = plant if plant is None or isinstance(plant, str) else plant.name
+    title = f"{len(suitable_laws)} of {len(laws())} laws" + f" that {' and '.join(filters)}" * bool(filters)
+    title += f" for {machine}" * (machine is not None)
     if "no-velocity" in needs:
         text = 'Every law runs without a velocity sensor if the scenario estimates the velocity: velocity="levant".'
         console.print(text, highlight=False)
-    if not suiting:
+    if not suitable_laws:
         console.print(f"{title}: leave out a need, --family or --plant", highlight=False)
         return
     columns = Column("name", no_wrap=True, style="cyan"), "family", "u", "arrives", "gains to choose"
     table = titled(title, *columns, show_edge=False, padding=(0, 2, 0, 0), pad_edge=False)
-    for law in suiting:
+    for law in suitable_laws:
         u = "continuous" * law.continuous
-        table.add_row(law.name, law.family, u, ARRIVES[law.finite_time], ", ".join(searched(law)) or "none")
+        table.add_row(law.name, law.family, u, ARRIVAL_CELLS[law.finite_time], ", ".join(searched(law)) or "none")
     console.print(table, "")
     key = "u: continuous, where the law says so. arrives: what theory says is 0 after a finite time, s or the error e."
     console.print(key, style="dim", highlight=False)
 
 
-def print_page(template: Template, console: Console, package: str = "") -> None:
+def print_page(template: Template, console: Console, package: str, text: str) -> None:
     """Print everything about one law, surface or estimator.
 
     Args:
       package: that it is from; "" for this one.
+      text: its name, or its file.
     """
     parts, is_law = entry(template), template.kind == "law"
     console.print(Text.assemble((template.name, "bold cyan"), f"  {parts.title}", (f"  {template.kind}", "dim")))
     console.print(Padding(Text(parts.formula, style="bold"), (0, 0, 1, 2)))
-    call = ", ".join([f'"{template.name}"', *(f"{k}={v:g}" for k, v in list(template.defaults.items())[:2])])
+    call = ", ".join([f'"{text}"', *(f"{k}={v:g}" for k, v in list(template.defaults.items())[:2])])
     rows = {
         "gains": "\n".join(_gains(template)),
         "conditions": "\n".join(template.conditions) or "none on the gains alone",
@@ -143,12 +149,12 @@ def print_page(template: Template, console: Console, package: str = "") -> None:
         "known": parts.known,
         "source": parts.source,
         "package": package,
-        "use": CALLS[template.kind].format(call),
+        "use": CALL_TEMPLATES[template.kind].format(call),
     }
     table = plain(Column(style="dim", no_wrap=True), "", padding=(0, 2, 1, 0))
-    for label, text in rows.items():
-        if text:
-            table.add_row(label, Text(text))
+    for label, words in rows.items():
+        if words:
+            table.add_row(label, Text(words))
     console.print(table)
 
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.step_halving import StepChange
 
 MAX_TIP_COLUMNS = 5  # with more, the name of the joint that does most work does not fit into 80 characters
-TIP = {  # columns of a table of an arm's tip and worst joint: heading -> score, unit, factor on its SI value
+TIP_COLUMNS = {  # of a table of an arm's tip: heading -> score, unit, factor on its SI value
     "largest\nerror": ("max_error", "mm", 1e3),
     "error at\nthe end": ("last_error", "mm", 1e3),
     "mean\nforce": ("mean_force", "N", 1.0),
@@ -42,7 +42,7 @@ TIP = {  # columns of a table of an arm's tip and worst joint: heading -> score,
 }
 
 # Columns of a table of scores: heading -> metric.
-SHOWN = {
+SCORE_COLUMNS = {
     "settles": "settling_time",
     "overshoot": "overshoot",
     "ultimate\nbound": "ultimate_bound",
@@ -52,7 +52,7 @@ SHOWN = {
     "spread\nsettles": "spread_settling_time",
 }
 FAILED = Text("failed", style="red")
-MAX_OVERSHOOT = 1000  # %, the largest that is printed as a number; chosen
+MAX_PRINTED_OVERSHOOT = 1000  # %, the largest that is printed as a number; chosen
 MAX_NAMED_JOINTS = 4  # in the heading of a group
 SPARKS = "▁▂▃▄▅▆▇█"
 
@@ -82,12 +82,12 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
     tables = []
     for group, heading in headings(scenario).items():
         units = {m.name: m.unit_for(group.unit, group.effort) for m in metrics() if m.fits(group)}
-        shown = {head: name for head, name in SHOWN.items() if name in units}
+        shown = {head: name for head, name in SCORE_COLUMNS.items() if name in units}
         heads = [Text(f"{head}\n").append(units[name], "dim") for head, name in shown.items()]
         table = _by_label(", ".join(filter(None, (title, heading))), heads, traces.values())
         for label, trace in traces.items():
             numbers = values[label][group.name] if label in values else {}
-            cells = [_shown(name, numbers[name]) for name in shown.values()] if numbers else [FAILED]
+            cells = [_score_text(name, numbers[name]) for name in shown.values()] if numbers else [FAILED]
             table.add_row(_label(label, trace), *cells)
         tables.append(table)
     gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
@@ -100,7 +100,7 @@ def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:
     if not next(iter(traces.values())).scenario.plant.tip:
         return []
     values = {label: tip_scores(trace) for label, trace in traces.items() if trace.diverged_at is None}
-    shown = {head: one for head, one in TIP.items() if any(one[0] in each for each in values.values())}
+    shown = {head: one for head, one in TIP_COLUMNS.items() if any(one[0] in each for each in values.values())}
     heads = [Text(f"{head}\n").append(unit, "dim") for head, (_, unit, _) in shown.items()]
     room = len(shown) < MAX_TIP_COLUMNS
     table = _by_label(f"{title}, tip", [*heads, *([Text("most work\n").append("J", "dim")] * room)], traces.values())
@@ -167,18 +167,22 @@ def _cell(metric: Metric, trace: Trace | None) -> Text | str:
     """Return a metric of a run as text; "" if there is no run, or if the metric does not apply to its plant."""
     if trace is None or metric.refusal(trace.scenario.plant):
         return ""
-    return FAILED if trace.diverged_at is not None else _shown(metric.name, metric.of(trace))
+    return FAILED if trace.diverged_at is not None else _score_text(metric.name, metric.of(trace))
 
 
-def _shown(metric: str, value: float) -> str:
-    """Return a score as text. A run that goes far away has no overshoot to speak of."""
-    return f"> {MAX_OVERSHOOT}" if metric == "overshoot" and MAX_OVERSHOOT < value < math.inf else number(value)
+def _score_text(metric: str, value: float) -> str:
+    """Return a score as text. Overshoot of a run that goes far away has no digits that matter."""
+    return (
+        f"> {MAX_PRINTED_OVERSHOOT}"
+        if metric == "overshoot" and MAX_PRINTED_OVERSHOOT < value < math.inf
+        else number(value)
+    )
 
 
 def _by_label(title: str, heads: Iterable[Text], traces: Iterable[Trace], width: int = 16) -> Table:
-    """Return an empty table with a column for labels of traces, at most `width` wide, and columns for numbers."""
+    """Return an empty table with a column for labels of traces, up to `width` wide, and columns for numbers."""
     laws = [trace.scenario.law.name for trace in traces]
-    head = "run" if len(set(laws)) == 1 < len(laws) else "law"  # labels of one law say what differs
+    head = "run" if len(set(laws)) == 1 < len(laws) else "law"  # labels of runs of one law say what differs
     label = Column(head, no_wrap=True, vertical="bottom", max_width=width, overflow="ellipsis")
     numbers = (Column(head, justify="right", vertical="bottom") for head in heads)
     return titled(title, label, *numbers, padding=0, show_edge=False, pad_edge=False)
@@ -239,12 +243,12 @@ def with_package(line: str, package: str) -> str:
 # margins and chattering
 
 
-def margins(kind: str, found: Sequence[Margin]) -> Table:
+def margins(kind: str, results: Sequence[Margin]) -> Table:
     """Return the margins of one kind: a line for each plant and law."""
     numbers = [Column(head, justify="right", no_wrap=True) for head in ("margin", "to within", "theory")]
     table = titled(f"largest {kind} tolerated", "plant", "law", *numbers, "unit")
     last = None
-    for margin in found:
+    for margin in results:
         value = f"{'>= ' * margin.open}{number(margin.value)}"
         theory = "" if margin.theory is None else "any" if margin.theory == math.inf else number(margin.theory)
         plant = "" if margin.plant == last else margin.plant

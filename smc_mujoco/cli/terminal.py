@@ -49,10 +49,11 @@ class Terminal(Console):
     """The console of a command, which also measures its time. It prints brackets as they are, not as markup.
 
     Args:
-      prints: name of a result file to print on stdout instead of keeping it; all else then goes to stderr. "" for none.
+      prints: name of a result file that goes to stdout instead of to a folder; all else then goes to stderr. "" for
+        none.
 
     Attributes:
-      printed: where the command is to write that file, or None. `wrote` prints and deletes it.
+      printed: a temporary path for that file, or None. The command writes it there; `wrote` prints and deletes it.
     """
 
     def __init__(self, prints: str = ""):

@@ -24,7 +24,7 @@ from smc_mujoco.metrics.limit_cycle import channel_cycle
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-HEIGHT = 5.6  # inches on a full page
+PAGE_HEIGHT = 5.6  # inches on a full page
 
 
 def lag(scenario: Scenario) -> float:
@@ -70,11 +70,11 @@ def amplitudes(
     paths = [] if path is None else pages.files(path, format)
     width, height = pages.measure(size, fig)
     with style.page(width):
-        page = pages.blank(width, height or style.points(HEIGHT), fig)
+        page = pages.blank(width, height or style.points(PAGE_HEIGHT), fig)
         ax = page.subplots()
         colours = style.law_colours([of[0].scenario.law for of in runs.values()])
         handles, predicted, hollow = [], {}, False
-        gains, shared = pages.gained([[trace.scenario.law.source for trace in of] for of in runs.values()])
+        gains, shared = pages.gain_sources([[trace.scenario.law.source for trace in of] for of in runs.values()])
         for (label, of), colour, source in zip(runs.items(), colours, gains, strict=True):
             of.sort(key=lambda trace: lag(trace.scenario))
             lags = [1e3 * lag(trace.scenario) for trace in of]

@@ -13,11 +13,11 @@ import numpy as np
 
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 
-WINDOW = 0.01, 40  # of a mean: share of the run, and fewest samples; chosen, see `window`
-STILL = 2e-3  # of the largest value: smaller steps between samples do not count as moves
-REVERSALS = 6  # this many in a row are chattering, if each follows within a quarter of a window
-TREND = 0.5  # share of variance along a straight line, above which y moves rather than chatters; chosen
-POINTS = 250  # parts of a line, of which the least and the largest value are kept
+MEAN_WINDOW = 0.01, 40  # of a mean: share of the run, and smallest number of samples; chosen, see `window`
+MIN_MOVE = 2e-3  # of the largest value: smaller steps between samples do not count as moves
+MIN_REVERSALS = 6  # in a row are chattering, if each follows within a quarter of a window
+TREND_SHARE = 0.5  # of the variance along a straight line, above which y moves rather than chatters; chosen
+LINE_PARTS = 250  # of a line; the smallest and the largest value of each are kept
 
 
 class Envelope(NamedTuple):
@@ -76,32 +76,33 @@ def window(trace: Trace) -> int:
     If a control switches irregularly between +-1, its mean over w samples varies by about 2 / w, which makes the line
     jagged. The window is so wide that this is less than the width of the line.
     """
-    share, shortest = WINDOW
+    share, shortest = MEAN_WINDOW
     return 4 * round(max(share * trace.scenario.samples, shortest) / 4)
 
 
-def stretches(y: np.ndarray, width: int) -> list[slice]:
+def chattering_parts(y: np.ndarray, width: int) -> list[slice]:
     """Return where y (K+1,) chatters.
 
-    A move is a step between samples of more than STILL of the largest |y|. A reversal is a pair of successive moves
-    with opposite signs. Reversals are close, within n samples, if neither the time between a reversal's moves nor the
-    time to the next reversal is longer. y chatters where at least REVERSALS of them in a row are close within a quarter
-    of `width`. The stretch includes the reversals before and after that are close within `width`, from the first move
-    to the last, and extends to the end of y if that is as close. It extends to the start only if that is within the
-    quarter: what is held there longer does not chatter yet. Else the rule is symmetric in time.
+    A move is a step between samples of more than MIN_MOVE of the largest |y|. A reversal is a pair of successive moves
+    with opposite signs. Reversals are n-close if neither the time between a reversal's moves nor the time to the next
+    reversal is longer than n samples. y chatters where MIN_REVERSALS or more in a row are (width / 4)-close.
+
+    A part goes from the first move to the last of the reversals around that are width-close. It extends to the end of y
+    if that is as close. It extends to the start only if that is within a quarter of `width`, because a y that rests
+    there longer does not chatter yet.
     """
     step = np.diff(y)
-    moves = np.flatnonzero(np.abs(step) > STILL * np.abs(y).max())
-    turns = np.flatnonzero(np.diff(np.sign(step[moves])))
-    first, last = moves[turns], moves[turns + 1]
+    moving = np.flatnonzero(np.abs(step) > MIN_MOVE * np.abs(y).max())
+    turns = np.flatnonzero(np.diff(np.sign(step[moving])))
+    first, last = moving[turns], moving[turns + 1]
 
     def sequences(near: int) -> list[np.ndarray]:
-        """Return the indices of reversals that follow each other within `near` samples."""
+        """Return the indices of the reversals in each row of `near`-close ones."""
         brief = np.flatnonzero(last - first <= near)
         parts = np.split(brief, np.flatnonzero(first[brief[1:]] - last[brief[:-1]] > near) + 1)
         return [part for part in parts if len(part)]
 
-    seeds = np.array([first[part[0]] + 1 for part in sequences(width // 4) if len(part) >= REVERSALS])
+    seeds = np.array([first[part[0]] + 1 for part in sequences(width // 4) if len(part) >= MIN_REVERSALS])
     result = []
     for part in sequences(width):
         a, b = first[part[0]] + 1, last[part[-1]] + 1
@@ -114,34 +115,34 @@ def smooth(y: np.ndarray, width: int) -> np.ndarray:
     """Return y (K+1,), replaced where it chatters by its mean over `width` samples with triangular weights.
 
     The weights result from averaging twice over half the width, which suppresses a periodic signal far better than one
-    average. Within half a width of the ends of a stretch the value is that of the nearest whole triangle; where y moves
-    there, as a noisy one does before it settles, it is that of the longest triangle about the sample. In a stretch
-    shorter than the width the triangle is as long as the stretch.
+    average. Within half a width of the ends of a part the value is that of the nearest whole triangle; where y moves
+    there, as a noisy one does before it settles, it is that of the longest triangle about the sample. In a part shorter
+    than the width the triangle is as long as the part.
     """
     line = y.astype(float)
-    for part in stretches(y, width):
+    for part in chattering_parts(y, width):
         half = min(width // 2, (part.stop - part.start + 1) // 2)
-        means = np.pad(triangles(line[part], half), half - 1, "edge")
+        means = np.pad(triangular_mean(line[part], half), half - 1, "edge")
         for values, mean in ((line[part], means), (line[part][::-1], means[::-1])):  # from each end
-            if moves(values[: 2 * half - 1]):
-                mean[: half - 1] = [triangles(values[: 2 * k - 1], k)[0] for k in range(1, half)]
+            if is_moving(values[: 2 * half - 1]):
+                mean[: half - 1] = [triangular_mean(values[: 2 * k - 1], k)[0] for k in range(1, half)]
         line[part] = means
     return line
 
 
-def moves(y: np.ndarray) -> bool:
+def is_moving(y: np.ndarray) -> bool:
     """Return whether y (K,) follows a straight line more than it varies about it."""
     from scipy.signal import detrend
 
-    return bool(detrend(y).var() < (1.0 - TREND) * y.var())
+    return bool(detrend(y).var() < (1.0 - TREND_SHARE) * y.var())
 
 
-def triangles(y: np.ndarray, half: int) -> np.ndarray:
+def triangular_mean(y: np.ndarray, half: int) -> np.ndarray:
     """Return the means of y (K,) with the weights 1, 2, ... half, ... 2, 1, (K - 2 half + 2,)."""
-    return running(running(y, half), half)
+    return running_mean(running_mean(y, half), half)
 
 
-def running(y: np.ndarray, width: int) -> np.ndarray:
+def running_mean(y: np.ndarray, width: int) -> np.ndarray:
     """Return the mean of y (K,) over each `width` samples in a row, (K - width + 1,)."""
     total = np.concatenate([[0.0], np.cumsum(y)])
     return (total[width:] - total[:-width]) / width
@@ -149,7 +150,7 @@ def running(y: np.ndarray, width: int) -> np.ndarray:
 
 def line(t: np.ndarray, y: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
     """Return times and values of a curve for y (K+1,): smoothed where it chatters, in few points that keep extremes."""
-    y, size = smooth(y, width), -(-len(t) // POINTS)
+    y, size = smooth(y, width), -(-len(t) // LINE_PARTS)
     starts = np.arange(0, len(t), size)
     padded = np.pad(y, (0, len(starts) * size - len(y)), "edge").reshape(-1, size)
     keep = np.unique([0, *starts + padded.argmin(axis=1), *starts + padded.argmax(axis=1), len(t) - 1])

@@ -18,22 +18,23 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.draw.panels import Panel
-from smc_mujoco.draw.states import HOLD
+from smc_mujoco.draw.states import MIN_STATE_TIME
 from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.metrics import catalogue
 from smc_mujoco.metrics.channel_groups import Group, group_trace
 from smc_mujoco.simulation.trace import Trace
 
-OVER_TIME = {  # panel -> quantity
+TIME_PANELS = {  # panel -> quantity
     "x": "x", "error": "e", "spread": "spread", "v": "v", "u": "u", "delivered": "force", "reaction": "reaction",
     "d": "d", "s": "s",
 }  # fmt: skip
-BESIDE = ("phase", "settling", "end")
-NAMES = {name: name for name in (*OVER_TIME, "channels", *BESIDE)}  # of panels
-ROW = 1.5  # inches on a full page, height of a panel over time
-HEIGHTS = {"phase": 1.5, "settling": 1.0, "end": 1.0}  # relative heights of the panels in BESIDE
+SIDE_PANELS = ("phase", "settling", "end")
+PANEL_NAMES = {name: name for name in (*TIME_PANELS, "channels", *SIDE_PANELS)}  # of panels
+ROW_HEIGHT = 1.5  # inches on a full page, height of a panel over time
+SIDE_HEIGHTS = {"phase": 1.5, "settling": 1.0, "end": 1.0}  # relative heights of SIDE_PANELS
 Row = tuple[Axes, Panel, Sequence[str]]  # axes, the panel with the traces that they show, and the traces' colours
-LOW, LINES, FILLED = 0.32, 0.45, 0.6  # relative height of a row, with one line, with several; the part below its name
+LINE_ROW, LINES_ROW = 0.32, 0.45  # relative height of a row with one line, and with several
+ROW_FILLED = 0.6  # part of a row below its name
 
 
 def figure(
@@ -79,16 +80,17 @@ def figure(
     traces = style.same_plant(traces)
     names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
     traces = [finite(trace) for trace in traces]
-    chosen = (
-        _default(traces, width) if panels is None else [find("panel", name, NAMES) for name in taken("panels", panels)]
-    )
+    if panels is None:
+        chosen = _default(traces, width)
+    else:
+        chosen = [find("panel", name, PANEL_NAMES) for name in taken("panels", panels)]
     with style.page(width):
-        page = _composed(traces, names, colours, chosen, (width, height), title, fig)
+        page = _composed_page(traces, names, colours, chosen, (width, height), title, fig)
         pages.write(page, paths)
     return page
 
 
-def _composed(
+def _composed_page(
     traces: Sequence[Trace],
     names: Sequence[str],
     colours: Sequence[str],
@@ -104,18 +106,18 @@ def _composed(
     each = style.split(early) if "channels" in chosen else ()
     small = [row for group in each for row in drawing.small(early, group)]
     small.sort(key=lambda row: row[0].channel or 0)
-    beside = [name for name in chosen if name in BESIDE]
+    beside = [name for name in chosen if name in SIDE_PANELS]
     groups = [Panel("x", *each) for each in style.split(traces).items()]
-    places = _parted(groups)
+    places = _by_joint(groups)
     rests = [drawing.rests(trace) for trace in traces] if "phase" in beside else []
     key, gains = _key(traces, names, colours, [*overview, *(panel for row in small for panel in row)], any(rests))
     column = [name for name in beside for _ in (places if name == "phase" else "x")]
-    space, narrow = pages.head(width, key), width < pages.NARROW
+    space, narrow = pages.head_height(width, key), width < pages.NARROW
     last = Panel("u", *next(iter(style.split(traces).items())))
-    heights = [_height(panel) for panel in overview], [_height(last) if n == "end" else HEIGHTS[n] for n in column]
+    heights = [_height(panel) for panel in overview], [_height(last) if n == "end" else SIDE_HEIGHTS[n] for n in column]
     parts = [0.62 * len(small), *map(sum, heights)]
     rows = sum(parts) if narrow else max(parts[0], parts[1], 4.0 if beside else 1.0)
-    tall = height or max(0.5625 * width * (not narrow), space + style.points(ROW) * rows + 0.5)
+    tall = height or max(0.5625 * width * (not narrow), space + style.points(ROW_HEIGHT) * rows + 0.5)
     page = pages.blank(width, tall, fig)
     pitch = 72 * (page.bbox.height / page.dpi - space - 0.4) / (rows if narrow else max(parts[1], 1))
     first, cells, others = _cells(page, narrow, parts, heights)
@@ -149,11 +151,9 @@ def _cells(
 
 def _height(panel: Panel) -> float:
     """Return the relative height of a panel over time."""
-    return (
-        max(1.0, (LOW if len(panel.group.channels) == 1 else LINES) * len(panel.traces))
-        if drawing.crowded(panel)
-        else 1.0
-    )
+    if not drawing.crowded(panel):
+        return 1.0
+    return max(1.0, (LINE_ROW if len(panel.group.channels) == 1 else LINES_ROW) * len(panel.traces))
 
 
 def _column(cell: SubplotSpec, heights: Sequence[float]) -> list[SubplotSpec]:
@@ -171,25 +171,25 @@ def _default(traces: Sequence[Trace], width: float) -> list[str]:
     if several:
         return [*names, "settling"]
     names += ["s"] * any(np.nan_to_num(trace.s).any() for trace in traces)
-    return [*names, "settling"] if width < pages.NARROW else [*names, *BESIDE]
+    return [*names, "settling"] if width < pages.NARROW else [*names, *SIDE_PANELS]
 
 
 def _overview(traces: Sequence[Trace], chosen: Sequence[str]) -> list[Panel]:
     """Return the chosen panels over time, from top to bottom: the plant's default ones first."""
     by_default = drawing.overview(traces)
-    found = [panel for panel in by_default if any(OVER_TIME.get(name) == panel.quantity for name in chosen)]
-    there = {panel.quantity for panel in by_default}
+    panels = [panel for panel in by_default if any(TIME_PANELS.get(name) == panel.quantity for name in chosen)]
+    shown = {panel.quantity for panel in by_default} | {"spread", "force", "reaction"}  # only if the plant has them
     for name in chosen:
-        if name in OVER_TIME and OVER_TIME[name] not in there and name not in ("spread", "delivered", "reaction"):
+        if (quantity := TIME_PANELS.get(name)) and quantity not in shown:
             parts = style.split(traces).items()
-            found += [Panel(OVER_TIME[name], *each) for each in parts if each[0].driven or name in ("v", "error")]
-    return _parted(found)
+            panels += [Panel(quantity, *each) for each in parts if each[0].driven or name in ("v", "error")]
+    return _by_joint(panels)
 
 
-def _parted(found: Sequence[Panel]) -> list[Panel]:
+def _by_joint(panels: Sequence[Panel]) -> list[Panel]:
     """Return the panels, divided into one for each joint of a robot: these have nothing in common."""
-    direct = any(panel.traces[0].scenario.plant.direct for panel in found)
-    return [one for panel in found for one in (drawing.by_channel(panel) if direct else [panel])]
+    direct = any(panel.traces[0].scenario.plant.direct for panel in panels)
+    return [one for panel in panels for one in (drawing.by_channel(panel) if direct else [panel])]
 
 
 def _time(span: tuple[float, float]) -> str:
@@ -215,15 +215,15 @@ def _draw_over_time(
         frame, rows = _rows(page, cells[i], panel, names, colours, axes[0] if axes else None)
         frame.set_ylabel(words[i])
         frames.append(frame)
-        for ax, part, own in rows:
+        for ax, part, row_colours in rows:
             axes.append(ax)
             ax.set_xlim(0.0, span[0])
-            drawing.over_time(ax, part, own, among=panel.traces)
+            drawing.over_time(ax, part, row_colours, among=panel.traces)
             drawing.mark(ax, changes, named=ax is axes[0])
             ax.tick_params(labelbottom=False)
         for ax in (frame, *(ax for ax, *_ in rows)):
             drawing.scale_ticks(ax.yaxis, panel)
-        _level(frame, rows)
+        _equal_ranges(frame, rows)
     axes[-1].tick_params(labelbottom=True)
     axes[-1].set_xlabel(_time(span))
     page.align_ylabels(frames)
@@ -240,7 +240,7 @@ def _rows(page, cell: SubplotSpec, panel: Panel, names, colours, share: Axes | N
     frame = page.add_subplot(cell, frameon=False, xticks=[])
     pitch, size, rows = 1.0 / len(panel.traces), style.points(8.5), []
     for i, (trace, name, colour) in enumerate(zip(panel.traces, names, colours, strict=True)):
-        ax = frame.inset_axes((0.0, 1.0 - (i + 1) * pitch, 1.0, FILLED * pitch), sharex=share)
+        ax = frame.inset_axes((0.0, 1.0 - (i + 1) * pitch, 1.0, ROW_FILLED * pitch), sharex=share)
         words = style.cropped(name, 72 * cell.get_position(page).width * page.bbox.width / page.dpi, size)
         ax.set_title(words, fontsize=size, fontweight="normal", color=colour, pad=1.0, parse_math=False)
         rows.append((ax, panel._replace(traces=[trace]), [colour]))
@@ -248,8 +248,8 @@ def _rows(page, cell: SubplotSpec, panel: Panel, names, colours, share: Axes | N
     return frame, rows
 
 
-def _level(frame: Axes, rows: Sequence[Row]) -> None:
-    """Give all rows of a panel the range of the runs that last, and ticks near its ends. Keep a single row as it is."""
+def _equal_ranges(frame: Axes, rows: Sequence[Row]) -> None:
+    """Give several rows of a panel the range of the runs that last, and ticks near its ends."""
     if len(rows) == 1:
         return
     lasting = [ax for ax, part, _ in rows if part.traces[0].diverged_at is None]
@@ -304,9 +304,9 @@ def _draw_end(page, cell: SubplotSpec, panel: Panel, names, colours) -> None:
     """Draw the close-up of the last samples of u."""
     frame, rows = _rows(page, cell, panel, names, colours)
     period = drawing.last_period(panel.traces)
-    for ax, part, own in rows:
-        drawing.last_samples(ax, part.traces, own, period)
-    _level(frame, rows)
+    for ax, part, row_colours in rows:
+        drawing.last_samples(ax, part.traces, row_colours, period)
+    _equal_ranges(frame, rows)
     plant = panel.traces[0].scenario.plant
     letter = f"{joint_names(plant)[0]} u" if plant.driven > 1 or plant.direct else "control u"
     frame.set_ylabel(f"{letter} ({style.units(panel.group)['u']})")
@@ -357,7 +357,7 @@ def signals(
             if room > points(250):
                 drawing.note(ax, _variation(trace, group))
         drawing.scale_ticks(axes[0, 0].yaxis, control)  # which all share
-        gains, shared = pages.gained([[of_law[law].source] for law in laws])
+        gains, shared = pages.gain_sources([[of_law[law].source] for law in laws])
         for law, source, ax in zip(laws, gains, axes[:, 0], strict=True):
             ax.set_ylabel(control.label.replace("control ", ""))
             words = style.cropped(f"{style.law_name(of_law[law])}{source}", 0.55 * room, points(11), bold=True)
@@ -369,7 +369,7 @@ def signals(
         if room > points(250):
             shared = "; ".join(filter(None, ["at the right: total variation per second over the last 20 %", shared]))
         title = title or f"{style.plant_name(traces[0].scenario.plant)}: control"
-        pages.set_head(page, width, title, _meaning([control]), shared)
+        pages.set_head(page, width, title, _line_key([control]), shared)
         pages.write(page, paths)
     return page
 
@@ -394,18 +394,18 @@ def _name_condition(ax: Axes, condition: str, trace: Trace, room: float) -> None
 def _key(
     traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], shown: Sequence[Panel], rests: bool
 ) -> tuple[list[Handle], str]:
-    """Return the entries of a legend, for the traces, the reference and lines and bands; and where gains are from."""
+    """Return a legend's entries for the traces, the reference, and lines and bands; and where all gains come from."""
     handles, gains = pages.run_handles(traces, names, colours)
     if rests:
         diamond = {"marker": "D", "ms": style.points(5), "lw": 0, "color": style.MUTED, "mec": style.PAPER}
-        handles.append(Line2D([], [], **diamond, label=f"held by friction for {HOLD:g} s or longer"))
+        handles.append(Line2D([], [], **diamond, label=f"held by friction for {MIN_STATE_TIME:g} s or longer"))
     if any(panel.quantity == "x" and np.isfinite(trace.r).any() for panel in shown for trace in panel.traces):
         look = {"color": style.INK, "lw": style.points(0.8), "ls": (0, (4, 4))}
         handles += [Line2D([], [], **look, label="reference"), Patch(color=style.BAND, label="reference ± 2 %")]
-    return [*handles, *(_meaning(shown) if shown else [])], gains
+    return [*handles, *(_line_key(shown) if shown else [])], gains
 
 
-def _meaning(shown: Sequence[Panel]) -> list[Handle]:
+def _line_key(shown: Sequence[Panel]) -> list[Handle]:
     """Return the entries of a legend that explain bands and lines."""
     looks = {
         "play": Patch(color=style.REACTION, alpha=drawing.PLAY),

@@ -21,12 +21,12 @@ from smc_mujoco.metrics import tip
 from smc_mujoco.metrics.channel_groups import group_trace
 from smc_mujoco.simulation.trace import Trace
 
-WIDE, SLIM = (4, 3), (2, 3)  # panels in a row of a page, and of a narrow one: the number that leaves fewer cells empty
-ROW = 2.0  # inches on a full page
-TICKS = 62.0  # points on a full page, room for the numbers at the left of a panel
-TITLE, WORDS = 10.0, 8.5  # points on a full page, letters of a panel's title, and of words on a run that leaves it
-AIR = 0.2  # of a panel's height, above its curves: room for these words
-HALO = 0.8  # opacity of the paper behind these words
+WIDE_COLUMNS, NARROW_COLUMNS = (4, 3), (2, 3)  # in a row: of these two numbers the one that leaves fewer cells empty
+ROW_HEIGHT = 2.0  # inches on a full page
+TICK_ROOM = 62.0  # points on a full page, for the numbers at the left of a panel
+TITLE_SIZE, NOTE_SIZE = 10.0, 8.5  # points on a full page: of a panel's title, and of a note on a run that leaves it
+NOTE_ROOM = 0.2  # of a panel's height, above its curves
+NOTE_OPACITY = 0.8  # of the paper behind a note
 
 
 def joints(
@@ -52,15 +52,15 @@ def joints(
     """
     traces = [finite(trace) for trace in style.same_plant(traces)]
     names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
-    drawn, marks = contents(traces), style.marks(traces, names)
+    drawn, marks = panels_of(traces), style.marks(traces, names)
     paths = [] if path is None else pages.files(path, format)
     width, height = pages.measure(size, fig)
-    columns = min(SLIM if width < pages.NARROW else WIDE, key=lambda n: -len(drawn) % n)
+    columns = min(NARROW_COLUMNS if width < pages.NARROW else WIDE_COLUMNS, key=lambda n: -len(drawn) % n)
     rows = -(-len(drawn) // columns)
     with style.page(width):
-        room = 72 * width / columns - style.points(TICKS)
-        letters = min(style.points(TITLE), *(room / style.width(panel.label, 1.0, bold=True) for panel in drawn))
-        page = pages.blank(width, height or style.points(ROW * rows + 0.9), fig)
+        room = 72 * width / columns - style.points(TICK_ROOM)
+        letters = min(style.points(TITLE_SIZE), *(room / style.width(panel.label, 1.0, bold=True) for panel in drawn))
+        page = pages.blank(width, height or style.points(ROW_HEIGHT * rows + 0.9), fig)
         grid = page.subplots(rows, columns, sharex=True, squeeze=False)
         for ax, panel in zip(grid.flat, drawn, strict=False):
             draw(ax, panel, names, colours, letters)
@@ -79,17 +79,17 @@ def joints(
     return page
 
 
-def contents(traces: Sequence[Trace]) -> list[Panel]:
+def panels_of(traces: Sequence[Trace]) -> list[Panel]:
     """Return the panels: the error of each joint, and what the tip does."""
-    groups, found = list(style.split(traces)), []
+    groups, of_joints = list(style.split(traces)), []
     for group in groups:
         for i in group.channels:
             one = dataclasses.replace(group, channels=(i,))
-            found.append(Panel("joint", one, [group_trace(trace, one) for trace in traces], i))
-    found.sort(key=lambda panel: panel.channel)
+            of_joints.append(Panel("joint", one, [group_trace(trace, one) for trace in traces], i))
+    of_joints.sort(key=lambda panel: panel.channel)
     names = ["tip"] * bool(traces[0].scenario.plant.tip)
     names += ["contact"] * all(tip.knows_contacts(trace.scenario) for trace in traces)
-    return found + [Panel(name, groups[0], traces) for name in names]
+    return of_joints + [Panel(name, groups[0], traces) for name in names]
 
 
 def draw(ax: Axes, panel: Panel, names: Sequence[str], colours: Sequence[str], letters: float) -> None:
@@ -105,13 +105,13 @@ def draw(ax: Axes, panel: Panel, names: Sequence[str], colours: Sequence[str], l
             mark_losses(ax, trace.t, panels.QUANTITIES["contact"](trace)[:, 0], colour, k)
     if (away := panels.far_off(panel.traces, panel.quantity)) is not None:
         low, high = ax.get_ylim()
-        ax.set_ylim(low, high + AIR * (high - low))
-        name, most = panels.outside(panel, names)
+        ax.set_ylim(low, high + NOTE_ROOM * (high - low))
+        name, largest = panels.outside(panel, names)
         room = 72 * ax.get_position().width * ax.figure.bbox.width / ax.figure.dpi
-        size = style.points(WORDS)
-        words = style.cropped(name, 0.95 * room - style.width(most, size), size) + most
+        size = style.points(NOTE_SIZE)
+        words = style.cropped(name, 0.95 * room - style.width(largest, size), size) + largest
         look = {"fontsize": size, "color": colours[away], "ha": "right", "va": "top", "parse_math": False}
-        look["bbox"] = {"facecolor": style.PAPER, "alpha": HALO, "lw": 0, "pad": 0.5}
+        look["bbox"] = {"facecolor": style.PAPER, "alpha": NOTE_OPACITY, "lw": 0, "pad": 0.5}
         ax.annotate(words, (1.0, 1.0), (-2, -1), "axes fraction", "offset points", **look)
 
 

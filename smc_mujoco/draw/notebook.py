@@ -13,16 +13,16 @@ from smc_mujoco.common import html, progress
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import reading, scratch
 from smc_mujoco.draw import page
-from smc_mujoco.draw.film import encoder, film
+from smc_mujoco.draw.film import encoder, film, pace
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
     from mediapy import VideoMetadata
 
-SIZE = 800, 450  # px, of a film in a cell
-KINDS = {".mp4": "video/mp4", ".webm": "video/webm", ".webp": "image/webp", ".gif": "image/gif"}
-KINDS |= {".png": "image/png", ".svg": "image/svg+xml"}
+CELL_SIZE = 800, 450  # px, of a film in a cell
+MEDIA_TYPES = {".mp4": "video/mp4", ".webm": "video/webm", ".webp": "image/webp", ".gif": "image/gif"}
+MEDIA_TYPES |= {".png": "image/png", ".svg": "image/svg+xml"}
 
 
 @dataclasses.dataclass(repr=False, eq=False)
@@ -46,7 +46,7 @@ class Frames:
 
     def __post_init__(self) -> None:
         checked(self.camera)
-        self._clock = film.clock(self.traces, self.fps, self.speed)
+        self._clock = pace.clock(self.traces, self.fps, self.speed)
         self.times = self._clock.times
 
     def __len__(self) -> int:
@@ -73,7 +73,7 @@ def frames(
     traces: Trace | Sequence[Trace],
     labels: Sequence[str] | None = None,
     title: str | None = None,
-    size: tuple[int, int] = SIZE,
+    size: tuple[int, int] = CELL_SIZE,
     fps: float = film.FPS,
     speed: float | None = None,
     camera: Camera | None = None,
@@ -90,7 +90,7 @@ def show(
     what: Trace | Sequence[Trace] | Frames | Figure | SubFigure | str | os.PathLike,
     labels: Sequence[str] | None = None,
     title: str | None = None,
-    size: tuple[int, int] = SIZE,
+    size: tuple[int, int] = CELL_SIZE,
     fps: float = film.FPS,
     speed: float | None = None,
     camera: Camera | None = None,
@@ -113,14 +113,14 @@ def show(
     display(HTML(embedded(what, labels, title, size, fps, speed, camera)))
 
 
-def embedded(what: object, labels=None, title=None, size=SIZE, fps=film.FPS, speed=None, camera=None) -> html.Html:
+def embedded(what: object, labels=None, title=None, size=CELL_SIZE, fps=film.FPS, speed=None, camera=None) -> html.Html:
     """Return HTML with the film or picture in it, see `show`."""
     if isinstance(what, Figure | SubFigure):
         return html.embedded(page.png(what), "image/png", page.css_width(what))
     if isinstance(what, str | os.PathLike):
-        kind = KINDS.get(Path(what).suffix.lower())
+        kind = MEDIA_TYPES.get(Path(what).suffix.lower())
         if kind is None:
-            raise ScenarioError(f"cannot show {Path(what).name!r}: end the name in {', '.join(KINDS)}")
+            raise ScenarioError(f"cannot show {Path(what).name!r}: end the name in {', '.join(MEDIA_TYPES)}")
         with reading(what, "film or picture", "give the path of one, such as film.mp4") as path:
             return html.embedded(path.read_bytes(), kind)
     if not isinstance(what, Frames):
@@ -130,13 +130,12 @@ def embedded(what: object, labels=None, title=None, size=SIZE, fps=film.FPS, spe
     with scratch() as folder, progress.bar("film", len(what)) as bar:
         path = folder / "film.mp4"
         what.write(path, bar.advance)
-        return html.embedded(path.read_bytes(), KINDS[".mp4"], what.size[0])
+        return html.embedded(path.read_bytes(), MEDIA_TYPES[".mp4"], what.size[0])
 
 
 def _traces(what: object) -> list[Trace]:
     """Return what is a trace, or a list of them, as a list."""
     traces = list(what) if isinstance(what, list | tuple) else [what]
-    found = [one for one in traces if isinstance(one, Trace)]
-    if len(found) < len(traces):
+    if not all(isinstance(one, Trace) for one in traces):
         raise ScenarioError(f"cannot show {shown(what)}: give traces, smc.frames, a figure, or the path of a film")
-    return found
+    return traces  # pyright: ignore[reportReturnType]

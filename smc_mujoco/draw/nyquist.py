@@ -27,10 +27,10 @@ from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-ROW = 3.4  # inches on a full page, height of a row
-SPAN = 40.0  # of the frequencies of L about the crossing, and of the amplitudes of N: a factor
-EDGE = 2.5  # of the complex plane
-PERIODS = 6  # of s
+ROW_HEIGHT = 3.4  # inches on a full page, height of a row
+SPAN_FACTOR = 40.0  # of the frequencies of L about the crossing, and of the amplitudes of N: a factor
+PLANE_EDGE = 2.5  # of the complex plane
+SHOWN_PERIODS = 6  # of s
 
 
 def nyquist(
@@ -66,12 +66,12 @@ def nyquist(
     width, height = pages.measure(size, fig)
     with style.page(width):
         colours = style.law_colours([scenario.law for scenario in scenarios])
-        gains, shared = pages.gained([[scenario.law.source] for scenario in scenarios])
+        gains, shared = pages.gain_sources([[scenario.law.source] for scenario in scenarios])
         handles: list[Handle] = [
             Line2D([], [], color=colour, lw=style.points(3), label=_legend(scenario, cycle) + source)
             for scenario, cycle, colour, source in zip(scenarios, cycles, colours, gains, strict=True)
         ]
-        whole = pages.head(width, handles) + style.points(ROW) * len(scenarios)
+        whole = pages.head_height(width, handles) + style.points(ROW_HEIGHT) * len(scenarios)
         page = pages.blank(width, height or whole, fig)
         axes = page.subplots(len(scenarios), 2, squeeze=False, width_ratios=[1.0, 2.0])
         for row, scenario, cycle, trace, colour in zip(axes, scenarios, cycles, runs, colours, strict=True):
@@ -98,8 +98,8 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
     ax.set(
         xlabel="real part",
         ylabel="imaginary part",
-        xlim=(-EDGE, 0.2 * EDGE),
-        ylim=(-0.6 * EDGE, 0.6 * EDGE),
+        xlim=(-PLANE_EDGE, 0.2 * PLANE_EDGE),
+        ylim=(-0.6 * PLANE_EDGE, 0.6 * PLANE_EDGE),
         aspect="equal",
     )
     ax.axhline(0.0, color=style.RULE, lw=style.points(0.8))
@@ -109,10 +109,13 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
         return
     loop, omega, unit = Loop(scenario, channel), math.tau * cycle.frequency, -cycle.response
     fastest = math.pi / scenario.control_period
-    omegas = np.geomspace(omega / SPAN, min(omega * SPAN, fastest), 400)
+    omegas = np.geomspace(omega / SPAN_FACTOR, min(omega * SPAN_FACTOR, fastest), 400)
     response = np.array([loop.response(w) for w in omegas]) / unit
     inverse = np.array(
-        [1.0 / (loop.gain(cycle.amplitude_x * q, omega) or math.nan) for q in np.geomspace(1 / SPAN, SPAN, 60)]
+        [
+            1.0 / (loop.gain(cycle.amplitude_x * q, omega) or math.nan)
+            for q in np.geomspace(1 / SPAN_FACTOR, SPAN_FACTOR, 60)
+        ]
     )
     inverse /= unit
     ax.plot(response.real, response.imag, color=style.INK, lw=style.points(1.6), label="L, over frequency")
@@ -124,12 +127,12 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
 
 def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour: str) -> None:
     """Draw s in the last periods of a run, and the predicted amplitude as a band."""
-    start = trace.t[-1] - PERIODS / cycle.frequency if cycle else trace.t[0]
+    start = trace.t[-1] - SHOWN_PERIODS / cycle.frequency if cycle else trace.t[0]
     part = trace.t >= start
     t, s = trace.t[part] - trace.t[part][0], trace.s[part, channel]
     ax.plot(1e3 * t if cycle else t, s, color=colour, lw=style.points(1.4), drawstyle="steps-post")
     unit = f"{trace.scenario.plant.units[channel]}/s"
-    ax.set(xlabel=f"last {PERIODS} periods predicted (ms)" if cycle else "time (s)", ylabel=f"s ({unit})")
+    ax.set(xlabel=f"last {SHOWN_PERIODS} periods predicted (ms)" if cycle else "time (s)", ylabel=f"s ({unit})")
     ax.ticklabel_format(axis="y", scilimits=(-3, 3))
     if cycle:
         mean = float(s.mean())

@@ -20,8 +20,8 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
 from smc_mujoco.draw.pareto import MARKS
 
-ROW = 5.2  # inches on a full page, height of the panels of a plant in a condition
-NAMES = {"e": "largest |e|", "s": "largest |s|"}
+ROW_HEIGHT = 5.2  # inches on a full page, height of the panels of a plant in a condition
+AXIS_NAMES = {"e": "largest |e|", "s": "largest |s|"}
 
 
 def orders(
@@ -54,14 +54,14 @@ def orders(
     with style.page(width):
         narrow = width < pages.NARROW
         down = len(groups) * (len(QUANTITIES) if narrow else 1)
-        page = pages.blank(width, height or style.points(ROW * down), fig)
+        page = pages.blank(width, height or style.points(ROW_HEIGHT * down), fig)
         axes = page.subplots(down, 1 if narrow else len(QUANTITIES), squeeze=False).ravel()
         panels = itertools.product(groups.items(), QUANTITIES)
         for ax, ((name, group), quantity) in zip(axes, panels, strict=True):
             for row in group:
                 _draw(ax, row.periods, getattr(row, quantity), *looks[row.law])
             unit = group[0].unit if quantity == "e" else "unit of s"
-            ax.set(xscale="log", yscale="log", ylabel=f"{NAMES[quantity]} ({unit})", xlabel="control period (ms)")
+            ax.set(xscale="log", yscale="log", ylabel=f"{AXIS_NAMES[quantity]} ({unit})", xlabel="control period (ms)")
             ax.set_xticks([1e3 * h for h in group[0].periods])
             ax.minorticks_off()
             ax.xaxis.set_major_formatter("{x:g}")

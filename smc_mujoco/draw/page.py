@@ -29,14 +29,14 @@ from smc_mujoco.simulation.trace import Trace
 
 DPI = 150
 FORMATS = ("svg", "png", "pdf")
-WIDTHS = {"ieee-column": 3.5, "ieee-page": 7.16}  # inches
-SIDES = (2.0, 100.0)  # inches, shortest and longest
+NAMED_WIDTHS = {"ieee-column": 3.5, "ieee-page": 7.16}  # inches
+SIDE_RANGE = (2.0, 100.0)  # inches, shortest and longest
 NARROW = 6.0  # inches: narrower pages have one column of panels
-LETTERS, TITLE = 11.0, 17.0  # points on a full page
-SAMPLE, GAPS = 1.6, 2.3  # of a legend's entry, in heights of its letters: its sample, and the space around its words
-PAD = 5.0  # points on a full page, above the title
-SHARE, WHOLE = 0.55, 0.95  # widest entry of a legend, of the page: in several columns, and in a single one
-MAX_TICKS = 9  # ticks of an axis, as of matplotlib's own
+TEXT_SIZE, TITLE_SIZE = 11.0, 17.0  # points on a full page
+ENTRY_SAMPLE, ENTRY_SPACE = 1.6, 2.3  # of a legend's entry, in heights of its letters: its sample, and all its spaces
+TITLE_PAD = 5.0  # points on a full page, above the title
+MAX_SHARE, MAX_SINGLE_SHARE = 0.55, 0.95  # width of a legend's entry, of the page's: in several columns, and in one
+MAX_TICKS = 9  # ticks of an axis, as of matplotlib's
 TICK_GAP = 0.6  # between labels of ticks, in heights of their letters
 Handle = Line2D | Patch
 Size = str | tuple[float, float] | None
@@ -69,24 +69,26 @@ def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, f
         box = fig.bbox.transformed(fig.dpi_scale_trans.inverted())
         return box.width, box.height
     if size is None:
-        return style.FULL_PAGE, None
+        return style.FULL_WIDTH, None
     if isinstance(size, str):
-        if size not in WIDTHS:
-            raise unknown("size", size, WIDTHS)
-        return WIDTHS[size], None
+        if size not in NAMED_WIDTHS:
+            raise unknown("size", size, NAMED_WIDTHS)
+        return NAMED_WIDTHS[size], None
     try:
         width, height = (float(side) for side in size)
     except (TypeError, ValueError):
         width = height = 0.0
-    if not all(SIDES[0] <= side <= SIDES[1] for side in (width, height)):
-        raise ScenarioError(f"size is {shown(size)}: give (width, height) in inches, each {SIDES[0]:g} to {SIDES[1]:g}")
+    if not all(SIDE_RANGE[0] <= side <= SIDE_RANGE[1] for side in (width, height)):
+        raise ScenarioError(
+            f"size is {shown(size)}: give (width, height) in inches, each {SIDE_RANGE[0]:g} to {SIDE_RANGE[1]:g}"
+        )
     return width, height
 
 
 def blank(width: float, height: float, fig: Figure | SubFigure | None = None) -> Figure | SubFigure:
     """Return a page to draw on: `fig`, or a new one of this size in inches. Its layout keeps texts apart."""
     layout = ConstrainedLayoutEngine(
-        w_pad=style.points(7.2) / 72, h_pad=style.points(PAD) / 72, wspace=0.02, hspace=0.02
+        w_pad=style.points(7.2) / 72, h_pad=style.points(TITLE_PAD) / 72, wspace=0.02, hspace=0.02
     )
     if fig is None:
         return Page(figsize=(width, height), layout=layout)
@@ -95,31 +97,34 @@ def blank(width: float, height: float, fig: Figure | SubFigure | None = None) ->
     return fig
 
 
-def columns(labels: Sequence[str], width: float) -> int:
+def legend_columns(labels: Sequence[str], width: float) -> int:
     """Return the number of columns of a legend on a page of `width` inches: as many as fit."""
-    room, size = 72 * width - 16, style.points(LETTERS)
-    widths = [_widest(words, size) + (SAMPLE + GAPS) * size for words in labels]
+    room, size = 72 * width - 16, style.points(TEXT_SIZE)
+    widths = [_widest(words, size) + (ENTRY_SAMPLE + ENTRY_SPACE) * size for words in labels]
     fitting = (n for n in range(len(widths), 1, -1) if sum(map(max, np.array_split(widths, n))) < room)
     return next(fitting, 1)
 
 
-def head(width: float, handles: Sequence[Handle]) -> float:
+def head_height(width: float, handles: Sequence[Handle]) -> float:
     """Return the height of the title and the legend, in inches."""
     labels = _wrapped(handles, width)
     lines = [words.count("\n") + 1 for words in labels]
-    rows = max((sum(part) for part in np.array_split(lines, columns(labels, width))), default=0)
-    return style.points(1.9 * TITLE + 1.45 * LETTERS * rows) / 72
+    rows = max((sum(part) for part in np.array_split(lines, legend_columns(labels, width))), default=0)
+    return style.points(1.9 * TITLE_SIZE + 1.45 * TEXT_SIZE * rows) / 72
 
 
 def _wrapped(handles: Sequence[Handle], width: float) -> list[str]:
     """Return the labels of a legend, each on up to two lines. In a single column they may be as wide as the page."""
-    size, labels = style.points(LETTERS), [str(handle.get_label()) for handle in handles]
+    size, labels = style.points(TEXT_SIZE), [str(handle.get_label()) for handle in handles]
 
     def wrapped(share: float) -> list[str]:
-        return [style.wrapped(label, share * 72 * width - (SAMPLE + GAPS) * size, size, lines=2) for label in labels]
+        return [
+            style.wrapped(label, share * 72 * width - (ENTRY_SAMPLE + ENTRY_SPACE) * size, size, lines=2)
+            for label in labels
+        ]
 
-    narrow = wrapped(SHARE)
-    return narrow if columns(narrow, width) > 1 else wrapped(WHOLE)
+    narrow = wrapped(MAX_SHARE)
+    return narrow if legend_columns(narrow, width) > 1 else wrapped(MAX_SINGLE_SHARE)
 
 
 def _widest(words: str, size: float) -> float:
@@ -129,13 +134,13 @@ def _widest(words: str, size: float) -> float:
 
 def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequence[Handle], note: str = "") -> None:
     """Draw the title with the legend below it, in as few rows as fit, and a note at the right of the title."""
-    size, big, words = style.points(LETTERS), style.points(TITLE), _wrapped(handles, width)
+    size, big, words = style.points(TEXT_SIZE), style.points(TITLE_SIZE), _wrapped(handles, width)
     room = 72 * width - 16
     if note:
-        note = style.cropped(note, SHARE * room, size)
+        note = style.cropped(note, MAX_SHARE * room, size)
         room -= style.width(note, size) + big
         place = {
-            "xytext": (-8, -style.points(PAD) - big),
+            "xytext": (-8, -style.points(TITLE_PAD) - big),
             "textcoords": "offset points",
             "ha": "right",
             "va": "baseline",
@@ -151,10 +156,10 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
         title_fontproperties={"size": big, "weight": "bold"},
         alignment="left",
         loc="outside upper left",
-        ncols=max(columns(words, width), 1),
+        ncols=max(legend_columns(words, width), 1),
         fontsize=size,
         borderpad=0.2,
-        handlelength=SAMPLE,
+        handlelength=ENTRY_SAMPLE,
         columnspacing=1.5,
     )
     legend.get_title().set_parse_math(False)
@@ -164,21 +169,24 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
 
 
 def run_handles(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) -> tuple[list[Handle], str]:
-    """Return the entries of a legend for runs, a line and a label for each that says when it failed; and `gained`."""
+    """Return a legend's entries for runs, which say when a run failed, and the note of `gain_sources`."""
     handles: list[Handle] = []
-    gains, shared = gained([[trace.scenario.law.source] for trace in traces])
+    gains, shared = gain_sources([[trace.scenario.law.source] for trace in traces])
     for trace, name, colour, source in zip(traces, names, colours, gains, strict=True):
         how = style.ending(trace)
-        words = style.cropped(name, 0.3 * 72 * style.FULL_PAGE, LETTERS) + source + (f" ({how})" if how else "")
+        words = style.cropped(name, 0.3 * 72 * style.FULL_WIDTH, TEXT_SIZE) + source + (f" ({how})" if how else "")
         handles.append(Line2D([], [], color=colour, lw=style.points(3), label=words))
     return handles, shared
 
 
-def gained(sources: Sequence[Iterable[Source]]) -> tuple[list[str], str]:
-    """Return where gains come from: what follows each label, such as ", gains: default", or one note for all alike."""
-    words = [f"gains: {found}" if (found := kinds(each)) not in ("", NONE) else "" for each in sources]
-    if len(said := {one for one in words if one}) == 1:
-        return [""] * len(words), said.pop()
+def gain_sources(sources: Sequence[Iterable[Source]]) -> tuple[list[str], str]:
+    """Return where gains come from: a text behind each label, such as ", gains: default", and a note.
+
+    If all gains come from the same source, the note says so, and the texts are "".
+    """
+    words = [f"gains: {source}" if (source := kinds(each)) not in ("", NONE) else "" for each in sources]
+    if len(different := {one for one in words if one}) == 1:
+        return [""] * len(words), different.pop()
     return [f", {one}" if one else "" for one in words], ""
 
 
@@ -229,7 +237,7 @@ def lay_out(whole: Figure, format: str) -> None:
 
 
 class Spaced(AutoLocator):
-    """Round places whose labels do not touch. Matplotlib's own takes labels for three heights of a letter wide."""
+    """Ticks at round numbers whose labels do not touch. Matplotlib assumes labels that are three letters wide."""
 
     def __init__(self):
         super().__init__()
@@ -240,8 +248,8 @@ class Spaced(AutoLocator):
         assert self.axis is not None
         low, high = sorted(self.axis.get_view_interval())
         box, formatter, ticks = self.axis.axes.bbox, self.axis.get_major_formatter(), []
-        for most in range(MAX_TICKS, 0, -1):
-            self.set_params(nbins=most)
+        for count in range(MAX_TICKS, 0, -1):
+            self.set_params(nbins=count)
             ticks = [tick for tick in self.tick_values(low, high).tolist() if low <= tick <= high]
             widest = max((style.width(text, self.size) for text in formatter.format_ticks(ticks)), default=0.0)
             pitch = 72 * box.width / self.axis.figure.dpi * (ticks[1] - ticks[0]) / (high - low) if ticks[1:] else 0.0

@@ -20,7 +20,7 @@ from matplotlib.ticker import NullFormatter, ScalarFormatter
 from smc_mujoco.control.law import Law
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import columns, end, line, smooth, window
-from smc_mujoco.draw.states import HOLD, at_rest, backlash_gap, has_dry_friction
+from smc_mujoco.draw.states import MIN_STATE_TIME, at_rest, backlash_gap, has_dry_friction
 from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.metrics import tip
 from smc_mujoco.metrics.channel_groups import Group, group_trace
@@ -418,12 +418,12 @@ def note(ax: Axes, words: str) -> None:
 
 
 def rests(trace: Trace) -> list[int]:
-    """Return the last samples of the latest times when dry friction holds all channels, for HOLD s or longer."""
+    """Return the last samples of the latest times when dry friction holds all channels for MIN_STATE_TIME or longer."""
     if not trace.scenario.realistic or not has_dry_friction(trace.scenario):
         return []
     still = at_rest(trace).all(axis=1)
     edges = np.flatnonzero(np.diff(still.astype(int), prepend=0, append=0)).reshape(-1, 2)
-    long = [int(last) for first, last in edges - (0, 1) if trace.t[last] - trace.t[first] >= HOLD]
+    long = [int(last) for first, last in edges - (0, 1) if trace.t[last] - trace.t[first] >= MIN_STATE_TIME]
     return long[-MAX_RESTS:]
 
 

@@ -20,7 +20,7 @@ from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
 
-HEIGHT = 6.4  # inches on a full page
+PAGE_HEIGHT = 6.4  # inches on a full page
 MIN_VARIATION = 1e-6  # 1/s: smaller ones are drawn here, because the axis is logarithmic
 MARKS = "osD^vPX"  # one for each law, for readers who see no colours
 CHOSEN = {"mfc": "none", "lw": 0}
@@ -47,7 +47,7 @@ def pareto(
     paths, best = [] if path is None else pages.files(path, format), compare(tunings)
     width, height = pages.measure(size, fig)
     with style.page(width):
-        page = pages.blank(width, height or style.points(HEIGHT), fig)
+        page = pages.blank(width, height or style.points(PAGE_HEIGHT), fig)
         ax = page.subplots()
         looks = zip(best, itertools.cycle(MARKS), style.law_colours([one.law for one in best]), strict=False)
         handles = [_front(ax, *look) for look in looks]

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 # From early to late, then undecided, then not. All differ in lightness, so also with colour blindness and in grey. Blue
 # and orange are those of Okabe and Ito.
-BLUES, OPEN, NOT = ("#00466B", "#0072B2", "#7CC0E8"), "#F4F4F4", "#F2B84B"
-COLOURS = (*BLUES, OPEN, NOT)
-PANEL = (5.4, 5.3)  # inches on a full page, width and height of a map
+BLUES, UNDECIDED_COLOUR, LEAVING_COLOUR = ("#00466B", "#0072B2", "#7CC0E8"), "#F4F4F4", "#F2B84B"
+COLOURS = (*BLUES, UNDECIDED_COLOUR, LEAVING_COLOUR)
+MAP_SIZE = (5.4, 5.3)  # inches on a full page, width and height of a map
 
 
 def draw(
@@ -33,27 +33,27 @@ def draw(
     paths = [] if path is None else pages.files(path)
     if not maps:
         raise ScenarioError("no map to draw: give at least one")
-    width, height = (PANEL[0] * len(maps), None) if size is None and fig is None else pages.measure(size, fig)
-    with style.page(style.FULL_PAGE if size is None and fig is None else width):
+    width, height = (MAP_SIZE[0] * len(maps), None) if size is None and fig is None else pages.measure(size, fig)
+    with style.page(style.FULL_WIDTH if size is None and fig is None else width):
         across = max(1, min(len(maps), int(width / style.points(3.2)))) if size is not None else len(maps)
         down = -(-len(maps) // across)
-        page = pages.blank(width, height or (PANEL[1] if size is None else down * width / across * 1.08), fig)
+        page = pages.blank(width, height or (MAP_SIZE[1] if size is None else down * width / across * 1.08), fig)
         axes = page.subplots(down, across, squeeze=False).ravel()
         for ax, region in zip(axes, maps, strict=False):
-            fill(ax, region)
+            draw_map(ax, region)
         for ax in axes[len(maps) :]:
             ax.remove()
         pages.write(page, paths)
     return page
 
 
-def fill(ax, region: Basin) -> None:
+def draw_map(ax, region: Basin) -> None:
     """Fill a matplotlib axes with a map and its legend."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    after = horizons([region])
-    classes = classed(region, after)
+    after = convergence_times([region])
+    classes = colour_indices(region, after)
     ax.pcolormesh(region.x, region.v, classes, cmap=ListedColormap(COLOURS), vmin=-0.5, vmax=4.5, rasterized=True)
     ax.plot(0.0, 0.0, "+", color=style.PAPER, markersize=style.points(11), markeredgewidth=style.points(1.6))
     ax.grid(visible=False)
@@ -69,12 +69,12 @@ def fill(ax, region: Basin) -> None:
     ax.legend(handles=marks, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=style.points(9.5))
 
 
-def horizons(maps: Sequence[Basin]) -> list[float]:
+def convergence_times(maps: Sequence[Basin]) -> list[float]:
     """Return the run lengths, s, after which states were seen to converge, over all maps."""
     return sorted({float(at) for one in maps for at in np.unique(one.decided_at[one.outcome == CONVERGES])})
 
 
-def classed(region: Basin, after: Sequence[float]) -> np.ndarray:
+def colour_indices(region: Basin, after: Sequence[float]) -> np.ndarray:
     """Return the index into COLOURS for each state, (nv, nx): converging by horizon, then undecided, then not."""
     shade = np.minimum(np.searchsorted(after, region.decided_at), len(BLUES) - 1)
     return np.where(region.outcome == CONVERGES, shade, np.where(region.outcome == DOES_NOT, 4, 3))

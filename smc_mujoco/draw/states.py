@@ -1,9 +1,9 @@
 """States of a machine over time: whether it sticks or slides, touches something, and where it lies in its backlash.
 
-States are shown for HOLD seconds at least: a blow of 5 ms for HOLD, and rest only if it lasts that long. Rest is
-defined by `metrics.conventions.at_rest`. Contact is found by MuJoCo's collision detection, with the scenario's model
-posed at each sample. The flank of a backlash is the sign of the joint's reaction. With friction or contacts, whose
-forces are in the reaction too, it is the sign of the actuator's force, which does not show when the rotor is in play.
+No state is shown for less than MIN_STATE_TIME: a blow of 5 ms is shown for that time, and rest only if it lasts so
+long. `metrics.conventions.at_rest` defines rest. Contact is what MuJoCo's collision detection says of the scenario's
+model, posed at each sample. The flank of a backlash is the sign of the joint's reaction. Friction and contacts are in
+the reaction too: with them it is the sign of the actuator's force, which does not tell when the rotor is in play.
 """
 
 import itertools
@@ -23,7 +23,7 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-HOLD = 0.15  # s, chosen: nine frames at 60 fps, and long enough to read a word
+MIN_STATE_TIME = 0.15  # s, chosen: nine frames at 60 fps, and long enough to read a word
 CALM, STUCK, STRUCK = range(3)  # moods
 SIDES = {-1: "left flank", 0: "in play", 1: "right flank", 2: "rattles"}
 
@@ -51,11 +51,11 @@ def shapes(scenario: Scenario) -> list[Shape]:
     ]
 
 
-def timeline(trace: Trace, times: np.ndarray, hold: float = HOLD) -> list[State | None]:
+def timeline(trace: Trace, times: np.ndarray, hold: float = MIN_STATE_TIME) -> list[State | None]:
     """Return the state at each time, s; None for a machine without states, and after its run failed."""
     dry, gap = has_dry_friction(trace.scenario), backlash_gap(trace.scenario)
-    contact = np.any(np.stack([held(on, trace.t, hold) for on in in_contact(trace).T]), axis=0)
-    sliding = np.array([held(on_at_start(~on, trace.t, hold), trace.t, hold) for on in at_rest(trace).T])
+    contact = np.any(np.stack([extended(on, trace.t, hold) for on in in_contact(trace).T]), axis=0)
+    sliding = np.array([extended(also_at_start(~on, trace.t, hold), trace.t, hold) for on in at_rest(trace).T])
     sides = np.array([backlash_side(flank, trace.t, hold) for flank in flanks(trace).T]) if gap else None
     states: list[State | None] = []
     for time in times.tolist():
@@ -157,7 +157,7 @@ def flanks(trace: Trace) -> np.ndarray:
     return np.sign(np.nan_to_num(trace.reaction if alone else trace.force))
 
 
-def held(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
+def extended(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
     """Return the signal (K + 1,), extended by `hold` s each time it is on, without gaps shorter than that."""
     last = np.maximum.accumulate(np.where(on, t, -np.inf))
     on = t - last < hold - 1e-9
@@ -167,8 +167,8 @@ def held(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
     return on
 
 
-def on_at_start(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
-    """Return the signal, on from the start if it is on within `hold` s: a machine released at rest does not stick."""
+def also_at_start(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
+    """Return the signal, on from the start if it is on within `hold` s: a machine that starts at rest slides."""
     early = t < t[0] + hold
     return on | (early & on[early].any())
 
@@ -180,8 +180,8 @@ def backlash_side(flank: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
     rattles = np.zeros(len(t), bool)
     rattles[crossed[1:][np.diff(t[crossed]) < hold]] = True
     latest = np.maximum.accumulate(np.where(flank != 0, np.arange(len(t)), 0))
-    sides = np.where(held(flank != 0, t, hold), flank[latest], 0.0)
-    return np.where(held(rattles, t, hold), 2, sides).astype(int)
+    sides = np.where(extended(flank != 0, t, hold), flank[latest], 0.0)
+    return np.where(extended(rattles, t, hold), 2, sides).astype(int)
 
 
 def stick_words(sticks: np.ndarray) -> str:

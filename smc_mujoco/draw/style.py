@@ -36,9 +36,9 @@ DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
 # Friction and contact. Chosen from a grid as one of the farthest in CIELAB from the laws' colours, the disturbance's
 # and paper, with any colour blindness (G. M. Machado et al., IEEE TVCG 15(6), 2009).
 REACTION = "#9018F0"
-WHITE = 0.35  # share of white in a law's colour on a dark page: chosen
-CHROMA = 0.12  # above it, colours are compared by hue and lightness only, see `distance`; chosen
-ALIKE = 0.03  # colours closer than this are mistaken for each other, see `distance`; chosen
+WHITE_SHARE = 0.35  # share of white in a law's colour on a dark page: chosen
+MAX_CHROMA = 0.12  # above it, colours are compared by hue and lightness only, see `distance`; chosen
+MIN_DISTANCE = 0.03  # colours closer than this are mistaken for each other, see `distance`; chosen
 OKLAB_CONES = np.array([
     [0.4122214708, 0.5363325363, 0.0514459929],
     [0.2119034982, 0.6806995451, 0.1073969566],
@@ -50,7 +50,7 @@ OKLAB = np.array([
     [0.0259040371, 0.7827717662, -0.8086757660],
 ])  # fmt: skip
 
-FULL_PAGE, JOURNAL = 12.8, 10.0  # inches: 1280 px of SVG, 1920 of PNG; narrower pages have smaller letters
+FULL_WIDTH, JOURNAL_WIDTH = 12.8, 10.0  # inches: 1280 px of SVG, 1920 of PNG; narrower pages have smaller letters
 RC = {
     "font.family": "DejaVu Sans",
     "font.size": 10.5,
@@ -85,7 +85,7 @@ RC = {
 }
 
 
-def page(width: float = FULL_PAGE):
+def page(width: float = FULL_WIDTH):
     """Return a context in which matplotlib draws in this style, on a page of this width in inches.
 
     A full page has the letters and lines of RC. On journal pages and columns they are smaller, with letters of 8
@@ -93,7 +93,7 @@ def page(width: float = FULL_PAGE):
     """
     from matplotlib import rc_context
 
-    scale = 1.0 if width >= JOURNAL else 8.0 / RC["font.size"]
+    scale = 1.0 if width >= JOURNAL_WIDTH else 8.0 / RC["font.size"]
     keys = ("size", "linewidth", "markersize")
     return rc_context({key: value * scale if key.endswith(keys) else value for key, value in RC.items()})  # pyright: ignore[reportArgumentType]
 
@@ -122,7 +122,7 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
     """
     colours: list[str] = []
     for wanted in map(law_colour, laws):
-        clear = all(distance(wanted, other) > ALIKE for other in colours)
+        clear = all(distance(wanted, other) > MIN_DISTANCE for other in colours)
         used = [*colours, PAPER, DISTURBANCE, REACTION, FAILED]
         free = () if clear else [colour for colour in _grid(len(colours)) if colour not in used]
         colours.append(wanted if clear else _farthest(free, used)[0])
@@ -174,7 +174,7 @@ def _place(colour: str) -> tuple[float, float, float]:
     c = np.array(rgb(colour)) / 255
     cones = OKLAB_CONES @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
     lightness, a, b = (OKLAB @ np.cbrt(cones)).tolist()
-    damp = min(1.0, CHROMA / math.hypot(a, b)) if a or b else 1.0
+    damp = min(1.0, MAX_CHROMA / math.hypot(a, b)) if a or b else 1.0
     return lightness / 3.0, damp * a, damp * b
 
 
@@ -423,7 +423,7 @@ def rgb(colour: str) -> tuple[int, int, int]:
 
 def lighter(colour: str) -> str:
     """Return a law's colour for a dark page: mixed with white."""
-    return "#" + "".join(f"{round((1.0 - WHITE) * part + WHITE * 255):02X}" for part in rgb(colour))
+    return "#" + "".join(f"{round((1.0 - WHITE_SHARE) * part + WHITE_SHARE * 255):02X}" for part in rgb(colour))
 
 
 def letters_on(colour: str) -> str:

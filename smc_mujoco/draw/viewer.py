@@ -25,10 +25,10 @@ from smc_mujoco.simulation.reference import Loop
 from smc_mujoco.simulation.scenario import Scenario
 
 GAIN = "gain:"  # prefix of the sliders' names
-SPACE = 32  # code of the key in GLFW
-FRAME = 1.0 / 60.0  # s, of most screens
-MAX_FRAME = 0.1  # s, longest time that a frame simulates and takes, so that slow runs still respond to the mouse
-SETTLED = 30  # frames without a change after which gains are printed: half a second
+SPACE_KEY = 32  # code of the key in GLFW
+FRAME_TIME = 1.0 / 60.0  # s, of most screens
+MAX_FRAME_TIME = 0.1  # s, longest time that a frame simulates and takes, so that slow runs still respond to the mouse
+SETTLED_FRAMES = 30  # frames without a change after which gains are printed: half a second
 
 
 def watch(scenario: Scenario) -> None:
@@ -55,7 +55,7 @@ def play(live: "Live", window: Any) -> None:
         with contextlib.suppress(mujoco.UnexpectedError):  # raised if the window is closed during a frame
             live.frame(window, now - before)
         before = now
-        time.sleep(max(0.0, now + FRAME - time.perf_counter()))
+        time.sleep(max(0.0, now + FRAME_TIME - time.perf_counter()))
 
 
 def aim(model: mujoco.MjModel, data: mujoco.MjData, cam: mujoco.MjvCamera) -> None:
@@ -109,7 +109,7 @@ class Live:
 
     def key(self, code: int) -> None:
         """Pause or resume on the space bar: the viewer's key callback."""
-        if code == SPACE:
+        if code == SPACE_KEY:
             self.paused = not self.paused
 
     def frame(self, viewer: Any, seconds: float) -> None:
@@ -135,17 +135,17 @@ class Live:
             law = dataclasses.replace(self.law, gains=gains)
             self.loop.scenario, self.unchanged = dataclasses.replace(self.loop.scenario, law=law), 0
             self.loop.law.bind(law)
-        elif self.unchanged >= SETTLED and self.printed != self.law:
+        elif self.unchanged >= SETTLED_FRAMES and self.printed != self.law:
             self.printed = self.law
             self.say(as_code(self.law))
 
     def advance(self, seconds: float) -> None:
-        """Simulate the time that is due, at most MAX_FRAME. Restart a finished run, pause a failed one."""
+        """Simulate the time that is due, at most MAX_FRAME_TIME. Restart a finished run, pause a failed one."""
         if self.loop.failure or self.step > self.loop.total:
             self.begin(self.loop.scenario)
         loop, h = self.loop, self.loop.scenario.resolved.physics_step
-        self.due += min(seconds, MAX_FRAME)
-        until, self.late = time.perf_counter() + MAX_FRAME, seconds > MAX_FRAME
+        self.due += min(seconds, MAX_FRAME_TIME)
+        until, self.late = time.perf_counter() + MAX_FRAME_TIME, seconds > MAX_FRAME_TIME
         with installed(loop.control), np.errstate(all="ignore"):
             while self.due >= h and self.step <= loop.total and not loop.failure:
                 loop.step(self.step)

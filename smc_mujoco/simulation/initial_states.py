@@ -23,6 +23,7 @@ from smc_mujoco.simulation.scenario import Scenario
 
 SPREAD = 0.2  # of x0, to either side; chosen
 GRID_SEEDS = 2**52  # number of a grid's seeds; tuning takes larger ones
+START_CURE = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"  # where a plant starts at 0
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from smc_mujoco.analysis.ranking import Comparison
-from smc_mujoco.analysis.signed_rank import least_p
+from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.control.component import Component
@@ -210,7 +210,7 @@ class Advice(Tables):
     @property
     def _too_few(self) -> bool:
         """Whether no comparison can tell two laws apart, with the samples that there are."""
-        smallest_p = 2 * least_p(int(self.comparison.samples.max()))
+        smallest_p = 2 * min_p(int(self.comparison.samples.max()))
         return not self.comparison.untested.any() and smallest_p > (1 - self.comparison.level) / len(self.blocks)
 
     # the answer

@@ -37,10 +37,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
-from smc_mujoco.analysis.differences import RELEVANT, share_that_matters
 from smc_mujoco.analysis.paired_runs import SETTLES, Scores
 from smc_mujoco.analysis.ranking import Comparison, Rank, block_ranks, compare, ranked, ranks
-from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, usual
+from smc_mujoco.analysis.relevant_difference import RELEVANT, checked_share
+from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, default_class
 from smc_mujoco.common.errors import ScenarioError, number, unknown, whole
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
@@ -132,7 +132,7 @@ def which(
     tried = [case(machine, "none", one, length, starts=starts) for one in tested]
     for scenario in tried:  # refuses what cannot be compared before gains are searched
         check_moving([scenario])
-    folder, relevant, properties = Path(out), share_that_matters(relevant), [n for n in properties if n != NO_VELOCITY]
+    folder, relevant, properties = Path(out), checked_share(relevant), [n for n in properties if n != NO_VELOCITY]
     options: dict[str, Any] = {"threads": threads, "progress": progress}
     chosen = _suited(machine, properties, laws)
     with_gains = fair_gains(machine, chosen, folder / "gains", extent.budget, starts, **options)
@@ -258,7 +258,7 @@ def _worst(
       options: threads and progress, as in `run`.
     """
     first = cases[0][0]
-    within = within or usual(first)
+    within = within or default_class(first)
     budget = budget or max(SCREENING_BUDGET, default_budget(first, within) // (len(cases[0]) * parts))
     worst: dict[str, list[WorstCase]] = {}
     for law in cases:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.ranking import Effect, Limits, Rank
-from smc_mujoco.analysis.signed_rank import least_p
+from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
@@ -269,7 +269,7 @@ class Board(Tables):
     def too_few(self) -> str:
         """The size of the sample in words, if no block has enough samples for a winner; else ""."""
         largest = max(self.blocks, key=lambda block: block.samples)
-        smallest_p, error = 2 * least_p(largest.samples), 1 - self.level
+        smallest_p, error = 2 * min_p(largest.samples), 1 - self.level
         if smallest_p <= error / self.family:
             return ""
         compared = f", too few for {self.family} comparisons" if smallest_p <= error else ", too few"

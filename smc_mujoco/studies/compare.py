@@ -16,8 +16,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from smc_mujoco.analysis.differences import RELEVANT, share_that_matters
 from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.analysis.relevant_difference import RELEVANT, checked_share
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, taken, whole
@@ -189,9 +189,9 @@ class Compared(Tables):
           path, options: path, title, size, format and fig of `smc.figure`.
           metrics: names of metrics. Default: settling time, ultimate bound and variation of u.
         """
-        from smc_mujoco.draw import board
+        from smc_mujoco.draw import dot_plot
 
-        return board.plot(self.table, path, metrics or board.METRICS, **options)
+        return dot_plot.plot(self.table, path, metrics or dot_plot.METRICS, **options)
 
 
 def compare(
@@ -257,7 +257,7 @@ def compare(
       ScenarioError: an unknown name, or arguments that `grid`, `study` or `leaderboard` refuse.
     """
     extent = QUICK if quick else FULL
-    count, relevant = whole("seeds", seeds, 1, MAX_ITEMS), share_that_matters(relevant)
+    count, relevant = whole("seeds", seeds, 1, MAX_ITEMS), checked_share(relevant)
     length = extent.duration if duration is None else checked("duration", duration, above=0.0)
     tries = search.BUDGET // (3 if quick else 1) if budget is None else whole("budget", budget, 1, MAX_ITEMS)
     where = executors.as_executor("local" if executor is None else executor)

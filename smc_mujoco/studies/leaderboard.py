@@ -21,9 +21,9 @@ import numpy as np
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import RESAMPLES, Interval, median_of, share_interval
-from smc_mujoco.analysis.differences import RELEVANT
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns, Group
-from smc_mujoco.analysis.ranking import Comparison, Limits, compare, corrected, ranks, samples_of
+from smc_mujoco.analysis.ranking import Comparison, Limits, compare, corrected_limits, ranks, samples_of
+from smc_mujoco.analysis.relevant_difference import RELEVANT
 from smc_mujoco.analysis.step_halving import depends_on_step
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.control.source import DEFAULT, Source
@@ -147,7 +147,7 @@ def _family(
                     Limits(0.0, 0.0),
                 )
             )
-    return corrected(comparisons, level), sum(len(one.laws) > 1 for one in comparisons) or 1
+    return corrected_limits(comparisons, level), sum(len(one.laws) > 1 for one in comparisons) or 1
 
 
 def _unit(metric: str, unit: str, scenario: "Scenario | None") -> str:

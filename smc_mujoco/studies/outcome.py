@@ -4,7 +4,7 @@
         return f"{runs.who('settles', 'settle')}; first: {runs.least('settling_time')}"
 
 gives "all 4 settle; first: adaptive and super_twisting tied (0.840 to 0.853 s)". Values that differ by less than the
-least relevant difference of `analysis.differences` are tied, as on leaderboards. These are single runs: a study says
+least relevant difference are tied, as on leaderboards. These are single runs: a study says
 whether another start or noise would change the order.
 """
 
@@ -13,8 +13,8 @@ import functools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from smc_mujoco.analysis.differences import exceeds
 from smc_mujoco.analysis.paired_runs import floor
+from smc_mujoco.analysis.relevant_difference import exceeds
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.text import joined, number
 from smc_mujoco.metrics.catalogue import CATALOGUE, scores, settling_time

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from smc_mujoco.analysis.worst_case.search import Search, Tried
-from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, outside, usual
+from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, default_class, outside
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.progress import bar
@@ -43,7 +43,6 @@ MIN_RUNS, MAX_RUNS = 24, 1024  # of the default budget
 MAX_BUDGET = 1_000_000
 PANELS = "error", "d", "u", "phase"  # of a figure
 HEADINGS = "law", "worst found", "median", "place by median", "found by"
-MAX_LETTERS = 48  # of a class in a picture's title, which would be cropped; chosen
 FIRST_MEMBERS = 2  # the worst random members, from which the search begins
 
 
@@ -94,10 +93,8 @@ class WorstCase(Tables):
 
     @property
     def heading(self) -> str:
-        """The plant and the class; the number of its bounds if the class is too long for a picture's title."""
-        words = self.class_words
-        words = words if len(words) <= MAX_LETTERS else f"{words.count(', ') + 1} bounds"
-        return f"{self.nominal.plant.name}: the worst found within {words}"
+        """The plant and the class. A picture crops it where it is too long."""
+        return f"{self.nominal.plant.name}: the worst found within {self.class_words}"
 
     @property
     def class_words(self) -> str:
@@ -227,7 +224,7 @@ def worst_case(
     """
     scenarios = _listed(scenario)
     scenario = scenarios[0]
-    within = usual(scenario) if within is None else within
+    within = default_class(scenario) if within is None else within
     if not isinstance(within, Uncertainty):
         raise ScenarioError(f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)")
     entry = find("metric", metric, CATALOGUE)
@@ -277,7 +274,7 @@ def cached_worst_case(
     progress: bool = False,
 ) -> WorstCase:
     """Return the `worst_case` of a scenario, from the file of an earlier call if there is one."""
-    within = usual(scenario) if within is None else within
+    within = default_class(scenario) if within is None else within
 
     def load(file: Path) -> WorstCase:
         data = read_json(file)

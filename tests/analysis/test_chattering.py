@@ -148,7 +148,7 @@ def test_a_law_is_told_of_its_joint_of_the_one_that_this_moves_and_of_their_mode
     omega, loop = 20.0, Loop(smc.Scenario(plant=smc.plant("furuta", b=1e-3, bq=1e-3), law=weighted(**{name: 1.0})))
     answer = loop._answer(omega) / loop._answer(omega)[loop.rows[0]]
     (x, q), (v, dq) = answer[loop.rows], answer[loop.nv + loop.rows]
-    (*_, fx, fv), (*_, fqx, fqv) = loop.model.values()
+    (*_, fx, fv), (*_, fqx, fqv) = loop.nominal_models
     expected = {"x": x, "v": v, "f": fx * x + fv * v, "q": q, "dq": dq, "fq": fqx * q + fqv * dq}
     assert loop.gain(1e-6, omega) == pytest.approx(expected[name], rel=1e-3)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.gains_for import _strength
+from smc_mujoco.analysis.gains_for import _force_headroom
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 
 COARSELY = pytest.mark.usefixtures("coarse_grid")
@@ -38,7 +38,7 @@ def test_forces_among_the_gains_stay_at_the_limit_of_every_channel():
     law, limits, rest = smc.law("classical", k=2.0), (6.0, 0.5), np.zeros(2)
     base = smc.Scenario(plant="double_pendulum", law=law, model="nominal", u_max=limits)
     least = min(u * base.plant.nominal(rest, rest, i, base.plant.values({}))[1] for i, u in enumerate(limits))
-    assert _strength(base) == pytest.approx(least / 2.0)
+    assert _force_headroom(base) == pytest.approx(least / 2.0)
 
 
 @COARSELY

@@ -12,7 +12,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.margins import COARSE, FINE, KINDS, Margin
 from smc_mujoco.cli import tables
-from smc_mujoco.cli.commands.analysis import QUICK
+from smc_mujoco.cli.commands.analysis import QUICK_MARGINS
 from smc_mujoco.cli.commands.analysis import margins as command
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.evidence.papers.gaber import scenarios
@@ -29,7 +29,7 @@ ROUGH = Margin(
 def found():
     """Every margin of two laws on one plant, coarsely."""
     bases = [BASE, scenarios.scenario("duffing", "classical", duration=4.0)]
-    return margins.of(bases, resolution=COARSE, threads=2)
+    return margins.margins_of(bases, resolution=COARSE, threads=2)
 
 
 def kind_of(put, levels=(1.0, 2.0, 4.0), none=0.0):
@@ -91,7 +91,7 @@ def test_it_comes_in_the_order_asked_for_with_units_and_to_the_resolution_asked_
 
 
 def test_it_does_not_depend_on_company_or_threads(found):
-    assert margins.of([BASE], ["disturbance", "delay"], COARSE, threads=1) == [found[1], found[0]]
+    assert margins.margins_of([BASE], ["disturbance", "delay"], COARSE, threads=1) == [found[1], found[0]]
 
 
 # the search
@@ -100,38 +100,38 @@ def test_it_does_not_depend_on_company_or_threads(found):
 def test_it_stops_at_the_first_level_that_is_not_tolerated(monkeypatch):
     island = kind_of(lambda base, level: pushed(not 1.3 < level < 2.5))
     monkeypatch.setitem(margins.MARGIN_KINDS, "island", island)
-    (margin,) = margins.of([pushed(True)], ["island"])
+    (margin,) = margins.margins_of([pushed(True)], ["island"])
     assert margin.value == pytest.approx(1.3, rel=FINE)
     assert margin.searched == 4.0
 
 
 def test_an_island_between_two_levels_goes_unseen(monkeypatch):
     monkeypatch.setitem(margins.MARGIN_KINDS, "island", kind_of(lambda base, level: pushed(not 1.3 < level < 1.9)))
-    (margin,) = margins.of([pushed(True)], ["island"])
+    (margin,) = margins.margins_of([pushed(True)], ["island"])
     assert margin.open
 
 
 def test_a_run_that_never_fails_has_the_searched_level_as_its_margin(monkeypatch):
     monkeypatch.setitem(margins.MARGIN_KINDS, "nothing", kind_of(lambda base, level: pushed(True)))
-    (margin,) = margins.of([pushed(True)], ["nothing"])
+    (margin,) = margins.margins_of([pushed(True)], ["nothing"])
     assert (margin.value, margin.searched, margin.resolution, margin.open) == (4.0, 4.0, 0.0, True)
 
 
 def test_a_law_that_fails_anyway_has_no_margin():
-    (margin,) = margins.of([dataclasses.replace(BASE, law=smc.law("none"))], ["mass"])
+    (margin,) = margins.margins_of([dataclasses.replace(BASE, law=smc.law("none"))], ["mass"])
     assert math.isnan(margin.value)
     assert not margin.open
 
 
 def test_a_margin_below_the_smallest_level_is_found_too(monkeypatch):
     monkeypatch.setitem(margins.MARGIN_KINDS, "tiny", kind_of(lambda base, level: pushed(level < 0.3)))
-    (margin,) = margins.of([pushed(True)], ["tiny"])
+    (margin,) = margins.margins_of([pushed(True)], ["tiny"])
     assert margin.value == pytest.approx(0.3, abs=FINE)
 
 
 def test_delays_are_whole_control_periods():
     slow = dataclasses.replace(BASE, control_period=0.03, physics_step=None)
-    (margin,) = margins.of([slow], ["delay"])
+    (margin,) = margins.margins_of([slow], ["delay"])
     periods = margin.value / 0.03
     assert periods == pytest.approx(round(periods))
     assert margin.resolution == pytest.approx(0.03)
@@ -139,7 +139,7 @@ def test_delays_are_whole_control_periods():
 
 def test_it_tells_how_far_it_is():
     told = []
-    margins.of([BASE], ["delay"], COARSE, report=lambda done, whole: told.append((done, whole)))
+    margins.margins_of([BASE], ["delay"], COARSE, report=lambda done, whole: told.append((done, whole)))
     assert all(0.0 < done <= whole for done, whole in told)
     assert [done for done, _ in told] == sorted(done for done, _ in told)
     assert told[-1][0] == told[-1][1]
@@ -236,7 +236,7 @@ def test_margins_are_measured_where_theory_has_nothing_to_say(poles):
         smc.Scenario(plant=dataclasses.replace(poles(), mixed=("rad", "m")), law=law, x0=0.2, **runs),
         smc.Scenario(plant="cart_pole", law=law, x0=0.0, **runs),
     ]
-    found = margins.of(bases, ["disturbance"], COARSE)
+    found = margins.margins_of(bases, ["disturbance"], COARSE)
     assert [margin.theory for margin in found] == [None] * 3
     assert found[0].value > 0.1
     assert found[1].value > 0.1
@@ -248,7 +248,7 @@ def test_the_mass_ratio_is_of_the_nominal_mass_under_whichever_name():
         known = dataclasses.replace(BASE, mismatch={name: 1.5, "alpha": 2.0})
         assert heavier(known, 2.0).mismatch == {name: 2.0, "alpha": 2.0}
     assert heavier(BASE, 2.0).mismatch == {"mass": 2.0}
-    (margin,) = margins.of([dataclasses.replace(BASE, mismatch={"M": 1.1}, duration=1.0)], ["mass"], COARSE)
+    (margin,) = margins.margins_of([dataclasses.replace(BASE, mismatch={"M": 1.1}, duration=1.0)], ["mass"], COARSE)
     assert margin.kind == "mass"
 
 
@@ -332,6 +332,6 @@ def test_the_table_says_what_was_not_found_to_fail_and_what_was_never_tolerated(
 
 
 def test_what_is_quick_is_part_of_the_study():
-    assert set(QUICK["plants"]) <= set(scenarios.PLANTS)
-    assert set(QUICK["kinds"]) <= set(KINDS)
+    assert set(QUICK_MARGINS["plants"]) <= set(scenarios.PLANTS)
+    assert set(QUICK_MARGINS["kinds"]) <= set(KINDS)
     assert set(scenarios.LAWS) <= set(gains.LAWS)

@@ -13,9 +13,9 @@ import smc_mujoco as smc
 from smc_mujoco import grid
 from smc_mujoco.analysis import paired_runs as cells
 from smc_mujoco.analysis.bootstrap import Interval, median_interval, median_of, share_interval
-from smc_mujoco.analysis.differences import RELEVANT, coarse, exceeds, least_difference
 from smc_mujoco.analysis.ranking import Effect, Rank, _holm, compare, samples_of
 from smc_mujoco.analysis.ranking import ranks as places
+from smc_mujoco.analysis.relevant_difference import RELEVANT, exceeds, least_difference, without_rounding
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.tabular import plain
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
@@ -797,8 +797,10 @@ def test_seeds_that_change_rounding_alone_are_one_sample():
     values = 1.0 + 1e-12 * np.arange(20.0)
     (board,) = leaderboard(stand({"a": values[None], "b": 2 * values[None]}), ["itae"])
     assert board.result == "no winner: 20 seeds, 1 distinct run"
-    assert len({*coarse(np.array([0.1, 0.1 + 1e-15, 0.1 - 1e-15]))}) == 1
-    assert (coarse(np.array([INF, 0.0, 3.0, 1.7e308])) > coarse(np.array([1.0, -1e-3, 2.9999, 1.0]))).all()
+    assert len({*without_rounding(np.array([0.1, 0.1 + 1e-15, 0.1 - 1e-15]))}) == 1
+    assert (
+        without_rounding(np.array([INF, 0.0, 3.0, 1.7e308])) > without_rounding(np.array([1.0, -1e-3, 2.9999, 1.0]))
+    ).all()
 
 
 def test_a_block_without_randomness_is_in_every_resample():
@@ -818,9 +820,9 @@ def test_the_table_says_that_intervals_of_very_few_runs_cover_less(seeds, told):
 
 def test_positions_are_told_apart_as_far_as_the_sensor_of_the_condition_resolves_them():
     fine = paper.scenario("duffing", "none")  # x0 1.5 m
-    coarse = paper.scenario("duffing", "none", changes={"sensor": smc.Encoder(counts=50)})
+    without_rounding = paper.scenario("duffing", "none", changes={"sensor": smc.Encoder(counts=50)})
     noisy = paper.scenario("duffing", "none", changes={"noise": smc.Noise(position=0.02)})
-    assert [cells.floor(one, "{x}") for one in (fine, coarse, noisy)] == [0.0, 0.5 / 50, 0.02]
+    assert [cells.floor(one, "{x}") for one in (fine, without_rounding, noisy)] == [0.0, 0.5 / 50, 0.02]
     assert cells.floor(noisy, "%") == pytest.approx(100 * 0.02 / 1.5)
     assert [cells.floor(noisy, unit) for unit in ("s", "{u}/s", "{x} s^2")] == [0.0] * 3
     table = stand({"a": blocks(1e-6), "b": blocks(2e-6)}, metric="ultimate_bound")

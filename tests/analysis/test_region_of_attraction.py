@@ -27,7 +27,7 @@ def base(plant: str, law: smc.Law, duration: float = 6.0) -> smc.Scenario:
 @pytest.fixture(scope="module")
 def weak():
     """The inverted pendulum under a law that cannot lift it from everywhere."""
-    return maps.of(base("inverted_pendulum", WEAK), np.linspace(-1.5, 1.5, 16), np.linspace(-4.5, 4.5, 16))
+    return maps.basin_of(base("inverted_pendulum", WEAK), np.linspace(-1.5, 1.5, 16), np.linspace(-4.5, 4.5, 16))
 
 
 @smc.law_function(gains={"far": 1.0})
@@ -50,8 +50,8 @@ def fails_far_out(y, gains, memory):
 )
 def test_states_that_leave_early_get_the_verdict_of_a_run_to_the_end(plant, law):
     x, v = np.linspace(-2.2, 2.2, 5), np.linspace(-5.0, 5.0, 4)
-    early = maps.of(base(plant, law), x, v)
-    late = maps.of(base(plant, law), x, v, early=False)
+    early = maps.basin_of(base(plant, law), x, v)
+    late = maps.basin_of(base(plant, law), x, v, early=False)
     assert (early.outcome == late.outcome).all()
     assert (late.decided_at == 6.0).all()
 
@@ -63,13 +63,13 @@ def test_most_of_what_converges_leaves_early(weak):
 def test_a_law_below_the_smallest_lambda_converges_from_nowhere_else():
     law = smc.law("observer_free", lam=0.2, k1=3.0)
     assert law.gains["lam"] < linear_theory.smallest_lam(smc.plant("duffing"), 3.0)
-    found = maps.of(base("duffing", law, 20.0), [-1.5, -0.5, 0.5, 1.5], [-1.0, 1.0])
+    found = maps.basin_of(base("duffing", law, 20.0), [-1.5, -0.5, 0.5, 1.5], [-1.0, 1.0])
     assert (found.outcome == DOES_NOT).all()
 
 
 def test_a_run_that_creeps_away_from_an_unstable_rest_has_not_converged():
     law = smc.law("observer_free", lam=0.23, k1=9.7)  # 0.253 would do
-    found = maps.of(base("inverted_pendulum", law, 4.0), [-math.pi, 0.01], [-9.0, 0.0])
+    found = maps.basin_of(base("inverted_pendulum", law, 4.0), [-math.pi, 0.01], [-9.0, 0.0])
     assert found.outcome[1, 1] != CONVERGES
 
 
@@ -78,58 +78,58 @@ def test_a_run_that_leaves_slowly_does_not_converge_early():
     plant = smc.plant("duffing")
     assert lam < linear_theory.smallest_lam(plant, k1)
     slow = base("duffing", smc.law("observer_free", lam=lam, k1=k1), 10.0)
-    found = maps.of(slow, [-3.0, -0.05, -0.02, 0.02, 0.05, 3.0], [-9.0, 0.0, 9.0])
+    found = maps.basin_of(slow, [-3.0, -0.05, -0.02, 0.02, 0.05, 3.0], [-9.0, 0.0, 9.0])
     assert (found.outcome[1] != CONVERGES).all()
 
 
 @pytest.mark.parametrize("plant", ["duffing", "van_der_pol"])
 def test_a_run_that_leaves_slowly_from_near_the_reference_does_not_converge_early(plant):
-    found = maps.of(base(plant, smc.law("none"), 10.0), [0.0005, 0.001, 2.0], [0.0, 6.0])
+    found = maps.basin_of(base(plant, smc.law("none"), 10.0), [0.0005, 0.001, 2.0], [0.0, 6.0])
     assert (found.outcome != CONVERGES).all()
 
 
 def test_a_run_that_fails_does_not_converge():
-    found = maps.of(base("duffing", fails_far_out(far=1.0), 4.0), [0.5, 1.5], [0.0, 0.1])
+    found = maps.basin_of(base("duffing", fails_far_out(far=1.0), 4.0), [0.5, 1.5], [0.0, 0.1])
     assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]] * 2
 
 
 def test_sticking_under_a_growing_command_is_not_decided_early():
     stuck = base("duffing", smc.law("pid"), 10.0)
     stuck = dataclasses.replace(stuck, friction=smc.Coulomb(3.0), u_max=math.inf)
-    early, whole = (maps.of(stuck, [0.1, 0.5], [0.0], early=one).outcome.tolist() for one in (True, False))
+    early, whole = (maps.basin_of(stuck, [0.1, 0.5], [0.0], early=one).outcome.tolist() for one in (True, False))
     assert early == whole
     assert DOES_NOT not in whole[0]
 
 
 def test_distance_is_measured_from_the_reference():
     held = dataclasses.replace(base("duffing", smc.law("lqr"), 12.0), model="nominal", reference=smc.Constant(0.3))
-    found = maps.of(held, [0.0, 0.6], [0.0, 0.1])
+    found = maps.basin_of(held, [0.0, 0.6], [0.0, 0.1])
     assert found.outcome.tolist() == [[CONVERGES] * 2] * 2
     assert found.decided_at.max() < 5.0
     with pytest.raises(smc.ScenarioError, match=r"Sine\(.*\) moves: give a constant reference$"):
-        maps.of(dataclasses.replace(held, reference=smc.Sine(0.3, 1.0)), [0.0, 0.6], [0.0, 0.1])
+        maps.basin_of(dataclasses.replace(held, reference=smc.Sine(0.3, 1.0)), [0.0, 0.6], [0.0, 0.1])
 
 
 def test_rest_a_turn_away_does_not_converge():
-    found = maps.of(base("inverted_pendulum", smc.law("lqr"), 3.0), [0.0, 2 * math.pi], [0.0])
+    found = maps.basin_of(base("inverted_pendulum", smc.law("lqr"), 3.0), [0.0, 2 * math.pi], [0.0])
     assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]]
 
 
 def test_a_run_that_swings_through_the_band_at_the_end_is_undecided():
     swinging = base("van_der_pol", smc.law("none"), 10.0)
-    found = maps.of(swinging, [2.0], [0.0])
+    found = maps.basin_of(swinging, [2.0], [0.0])
     assert found.outcome.tolist() == [[DOES_NOT]]  # the limit cycle's speed is never in the band
     trace = smc.run(dataclasses.replace(swinging, x0=2.0))
-    assert maps.judge(trace, np.array([50.0]), np.array([100.0]), final=True) == UNDECIDED
+    assert maps.verdict_of(trace, np.array([50.0]), np.array([100.0]), final=True) == UNDECIDED
 
 
 def test_a_state_has_the_same_verdict_in_any_company(weak):
-    alone = maps.of(base("inverted_pendulum", WEAK), weak.x[[0, 7, -1]], weak.v[[0, 9, -1]], threads=1)
+    alone = maps.basin_of(base("inverted_pendulum", WEAK), weak.x[[0, 7, -1]], weak.v[[0, 9, -1]], threads=1)
     assert (alone.outcome == weak.outcome[np.ix_([0, 9, -1], [0, 7, -1])]).all()
 
 
 def test_the_channels_of_a_network_start_alike():
-    found = maps.of(
+    found = maps.basin_of(
         base("inverted_pendulum_network", smc.law("observer_free", lam=3.96, k1=9.36), 3.0), [-0.5, 0.5], [0]
     )
     assert (found.outcome == CONVERGES).all()
@@ -139,8 +139,8 @@ def test_the_channels_of_a_network_start_alike():
 def test_what_a_switching_law_holds_has_converged_whatever_the_beat_of_its_ripple(law):
     """Van der Pol, from everywhere on the study's map: an independent integration is at rest in the end."""
     x, v = np.linspace(-4.0, 4.0, 5), np.linspace(-12.0, 12.0, 5)
-    assert (maps.of(base("van_der_pol", law, 8.0), x, v).outcome == CONVERGES).all()
-    assert (maps.of(base("van_der_pol", law, 8.0), x, v, early=False).outcome == CONVERGES).all()
+    assert (maps.basin_of(base("van_der_pol", law, 8.0), x, v).outcome == CONVERGES).all()
+    assert (maps.basin_of(base("van_der_pol", law, 8.0), x, v, early=False).outcome == CONVERGES).all()
 
     state, h = np.array(np.meshgrid(x, v)), 1e-3
     gain = np.full((5, 5), law.gains.get("k", 0.0))
@@ -166,13 +166,13 @@ def test_what_a_switching_law_holds_has_converged_whatever_the_beat_of_its_rippl
 
 def test_metres_and_radians_do_not_start_alike():
     with pytest.raises(smc.ScenarioError, match="cart_pole has channels in m and rad"):
-        maps.of(smc.Scenario(plant="cart_pole", law="none"), [0.1], [0.0])
+        maps.basin_of(smc.Scenario(plant="cart_pole", law="none"), [0.1], [0.0])
 
 
 def test_beyond_the_angle_that_the_torque_can_hold_a_pendulum_at_rest_falls():
     p = PENDULUM.parameters
     limit = math.asin(WEAK.gains["lam"] / (p["m"] * p["grav"] * p["l"]))
-    found = maps.of(base("inverted_pendulum", WEAK), [0.9 * limit, 1.02 * limit, 2.0 * limit], [0.0, 9.0])
+    found = maps.basin_of(base("inverted_pendulum", WEAK), [0.9 * limit, 1.02 * limit, 2.0 * limit], [0.0, 9.0])
     assert found.outcome[0].tolist() == [CONVERGES, DOES_NOT, DOES_NOT]
 
 
@@ -217,7 +217,7 @@ def test_what_is_no_map_is_refused(text, tmp_path):
 def test_a_picture_is_drawn_and_its_shares_are_a_whole(weak, tmp_path):
     region.draw([weak, weak], tmp_path / "map.png")
     assert (tmp_path / "map.png").stat().st_size > 10_000
-    assert np.array_equal(region.classed(weak, region.horizons([weak])) == 4, weak.outcome == DOES_NOT)
+    assert np.array_equal(region.colour_indices(weak, region.convergence_times([weak])) == 4, weak.outcome == DOES_NOT)
     legend = region.draw([weak]).axes[0].get_legend()
     entries = legend.get_texts() if legend else []
     assert sum(float(one.get_text().split(": ")[1].rstrip(" %")) for one in entries) == pytest.approx(100, abs=1)
@@ -236,14 +236,14 @@ def test_too_short_a_duration_is_one_sentence_and_a_longer_one_is_mapped(early):
     least = 0.067 if early else 0.01
     short = base("duffing", smc.law("classical"), duration=0.8 * least)
     with pytest.raises(smc.ScenarioError, match=r"duration \S* s is too short to tell .*: give at least \S* s$"):
-        maps.of(short, [0.1], [0.1], early=early)
-    assert maps.of(dataclasses.replace(short, duration=least), [0.1], [0.1], early=early).outcome.shape == (1, 1)
+        maps.basin_of(short, [0.1], [0.1], early=early)
+    assert maps.basin_of(dataclasses.replace(short, duration=least), [0.1], [0.1], early=early).outcome.shape == (1, 1)
 
 
 @pytest.mark.parametrize("x", [[], [math.nan], [[1.0]], ["a"], [[1.0], 2.0]])
 def test_positions_that_are_none_are_refused(x):
     with pytest.raises(smc.ScenarioError, match="give one or more finite numbers"):
-        maps.of(base("duffing", WEAK), x, [0.0])
+        maps.basin_of(base("duffing", WEAK), x, [0.0])
 
 
 def test_the_study_maps_by_name_and_tells_how_far_it_is():

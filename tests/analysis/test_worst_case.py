@@ -9,8 +9,8 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.worst_case.search import Search
-from smc_mujoco.analysis.worst_case.strategies import frequency, recorded
-from smc_mujoco.analysis.worst_case.uncertainty import Members, usual
+from smc_mujoco.analysis.worst_case.strategies import loop_frequency, recorded_force
+from smc_mujoco.analysis.worst_case.uncertainty import Members, default_class
 from smc_mujoco.control import gain_sets
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import reference, serialise
@@ -85,7 +85,7 @@ def test_the_loop_s_frequency_is_read_of_a_run_under_a_relay_of_the_rate_or_with
 def test_the_frequency_of_a_sine_is_its_own(hertz):
     t = np.linspace(0.0, 8.0, 8001)
     x, clock = np.sin(2.0 * np.pi * hertz * t + 0.1)[:, None], SimpleNamespace(control_period=1e-3)
-    found = frequency(SimpleNamespace(t=t, x=x, r=0.0 * x, scenario=clock))
+    found = loop_frequency(SimpleNamespace(t=t, x=x, r=0.0 * x, scenario=clock))
     assert found == pytest.approx(hertz, abs=0.5 / 6.0)  # half a period of the last 6 s
 
 
@@ -93,7 +93,7 @@ def test_a_relay_replays_from_its_record_to_the_last_bit():
     relay = Relay(2.0, s=0.3, rate=1.0, error=-0.2)
     base = scenario(plant=smc.plant("pendulum_network", n=2), law="super_twisting")
     run = smc.run(dataclasses.replace(base, disturbance=relay))
-    force = 2.0 * recorded(run, relay, np.zeros(0))
+    force = 2.0 * recorded_force(run, relay, np.zeros(0))
     np.testing.assert_array_equal(run.d, np.column_stack([force, force]))
     replay = smc.run(dataclasses.replace(base, disturbance=smc.Held(run.t, force)))
     for name in ("x", "v", "u", "s", "d"):
@@ -103,7 +103,7 @@ def test_a_relay_replays_from_its_record_to_the_last_bit():
 def test_a_relay_that_starts_late_goes_on_from_another_force():
     relay = Relay(2.0, rate=1.0, start=0.5)
     run = smc.run(scenario(duration=1.0, disturbance=(smc.Held([0.0, 0.5, 1.0], [1.0, 0.0, 0.0]), relay)))
-    np.testing.assert_array_equal(run.d[:, 0], 2.0 * recorded(run, relay, np.full(1001, 0.5)))
+    np.testing.assert_array_equal(run.d[:, 0], 2.0 * recorded_force(run, relay, np.full(1001, 0.5)))
     assert set(run.d[:500, 0]) == {1.0}
     assert set(run.d[500:, 0]) == {-2.0}
 
@@ -140,13 +140,13 @@ def test_the_adversary_chooses_the_set_of_parameters_and_the_scale_of_friction()
 
 
 def test_the_class_where_none_is_given_is_what_the_machine_leaves_open():
-    assert usual(scenario()) == smc.Uncertainty(disturbance=1.0)
+    assert default_class(scenario()) == smc.Uncertainty(disturbance=1.0)
     arm = smc.plant("panda")
-    own = usual(smc.Scenario(plant=arm, law="none", friction=arm.friction))
+    own = default_class(smc.Scenario(plant=arm, law="none", friction=arm.friction))
     assert own == smc.Uncertainty(parameters=arm.uncertain, friction_scale=(0.5, 1.5))
     assert (own.disturbance, own.parameters["payload"]) == (0.0, (0.0, 2.0))
     rig = smc.rig("qube_servo").scenario("none")  # a voltage: its force is that of the motor at rest
-    assert usual(rig).disturbance == pytest.approx(10.0 * 0.0470184 / 10.069624549988971 / 6)
+    assert default_class(rig).disturbance == pytest.approx(10.0 * 0.0470184 / 10.069624549988971 / 6)
 
 
 def test_constants_and_relays_reach_what_another_adversary_found():

@@ -186,7 +186,7 @@ def test_help_teaches(call):
     code, out, _ = call("laws", "--help")
     text = flat(out)
     assert code == 0
-    for words in ("laws [OPTIONS] [NAME]", "relative degree", "Example: smc-mujoco laws super_twisting"):
+    for words in ("laws [OPTIONS] [NAME|FILE]", "relative degree", "Example: smc-mujoco laws super_twisting"):
         assert words in text
     assert "laws" in call("--help")[1]
 
@@ -208,7 +208,7 @@ def test_help_teaches(call):
     ],
 )
 def test_a_source_in_short_is_its_first_authors_and_their_year(source, short):
-    assert law_pages.brief(source) == short
+    assert law_pages.short_source(source) == short
 
 
 def test_a_law_of_one_s_own_is_read_as_the_library_s_are():
@@ -230,6 +230,14 @@ def test_a_law_of_one_s_own_is_read_as_the_library_s_are():
         'A. Author, "Title", J. Things 1(2):3, 1999.',
     )
     assert law_pages.entry(law_function(lambda y, gains, memory: (0.0, 0.0))).formula == "<lambda>"
+
+
+def test_a_law_of_a_file_has_a_page_that_says_how_to_make_it(call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_law.py").write_text(LAW)
+    code, page, _ = call("laws", "my_law.py")
+    assert code == 0
+    assert 'smc.law("my_law.py", k=4, c=2.5)' in page
 
 
 # adding a law touches one file

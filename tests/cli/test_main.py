@@ -240,11 +240,13 @@ def test_no_number_and_no_heading_of_a_score_table_is_cut_at_80_columns(plant, f
     (row,) = [line for line in table if line.startswith(LABEL[:8])]
     (saved,) = [path for path in (folder / "out" / "wide").glob("*.npz") if "label" in path.name]
     values = score(smc.load(saved))
-    expected = [tables.number(values[name]) for name in tables.SHOWN.values() if name in values]
+    expected = [tables.number(values[name]) for name in tables.SCORE_COLUMNS.values() if name in values]
     assert row.split()[-len(expected) :] == expected
     headings = " ".join(line for line in table if not line.startswith((LABEL[:8], "sour")))
     assert "…" not in headings
-    assert all(word in headings for head, name in tables.SHOWN.items() if name in values for word in head.split())
+    assert all(
+        word in headings for head, name in tables.SCORE_COLUMNS.items() if name in values for word in head.split()
+    )
 
 
 def test_a_failing_law_is_named_and_others_keep_their_scores(call, undrawn, folder):

@@ -42,15 +42,18 @@ def test_every_law_of_a_set_has_gains_and_these_are_all_that_tuning_moves(gain_s
 @pytest.mark.parametrize(("gain_set", "plant"), SETS)
 def test_every_search_is_of_the_one_rule_and_tells_whether_its_starts_agree(gain_set, plant):
     for name, known in shipped(gain_set, plant).items():
-        start, starts = search.START * len(known.sets[0]), result.AGREEING if gain_set == "tuned" else 1
-        budget = search.BUDGET if starts > 1 and name in gains.LAWS else starts * start + search.SPARE
+        start, starts = (
+            search.EVALUATIONS_PER_GAIN * len(known.sets[0]),
+            result.AGREEING_STARTS if gain_set == "tuned" else 1,
+        )
+        budget = search.BUDGET if starts > 1 and name in gains.LAWS else starts * start + search.SPARE_EVALUATIONS
         assert known.rule == search.RULE, name
         assert known.converged is search.converged(known.ends), name
         assert known.objective <= min(known.ends), name
-        ended = known.converged and len(known.sets) == search.SETS
-        assert ended or known.evaluations > budget - search.SPARE - start, name  # no start is left
+        ended = known.converged and len(known.sets) == search.MAX_SETS
+        assert ended or known.evaluations > budget - search.SPARE_EVALUATIONS - start, name  # no start is left
         assert known.evaluations <= budget, name
-        assert len(known.sets) in result.COUNTS, name
+        assert len(known.sets) in result.SET_COUNTS, name
         assert len({tuple(one.values()) for one in known.sets}) == len(known.sets), name
         assert known.best in known.front, name
 
@@ -66,7 +69,7 @@ def test_every_general_law_is_a_rival():
 @pytest.mark.parametrize(("gain_set", "plant"), SETS)
 def test_no_force_among_the_gains_and_no_gain_over_another_is_more_than_the_actuator_gives(gain_set, plant):
     """The force k / b of the observers' laws is bounded as every force is."""
-    most, divided = scenarios.U_MAX * (1.0 + search_space.ROUNDING), 0
+    most, divided = scenarios.U_MAX * (1.0 + search_space.ROUNDING_TOLERANCE), 0
     for name, known in shipped(gain_set, plant).items():
         law = gains.law(plant, name, gain_set)
         template = catalogue()[name]
@@ -112,7 +115,7 @@ def test_shipped_gains_cost_what_their_record_says(gain_set, law):
 @pytest.mark.slow
 def test_the_first_start_of_a_shipped_search_comes_out_again():
     known = gains.tuned("duffing", "observer_free")
-    (end,) = search.tune("duffing", "observer_free", 2 * search.START, known.seed).ends
+    (end,) = search.tune("duffing", "observer_free", 2 * search.EVALUATIONS_PER_GAIN, known.seed).ends
     assert end == pytest.approx(known.ends[0], rel=1e-3)  # another processor rounds otherwise
 
 

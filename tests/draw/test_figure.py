@@ -312,7 +312,7 @@ def test_what_does_not_chatter_is_drawn_as_it_is():
     slow = 6 * np.sign(np.sin(2 * np.pi * 10 * t))  # ten times a second
     assert (decimate.smooth(slow, 100) == slow).all()
     x, y = decimate.line(t, slow, 100)
-    assert len(x) <= 2 * decimate.POINTS + 2
+    assert len(x) <= 2 * decimate.LINE_PARTS + 2
     assert (x[0], x[-1]) == (t[0], t[-1])
     assert np.abs(np.diff(np.sign(y))).sum() == np.abs(np.diff(np.sign(slow))).sum()
 
@@ -333,7 +333,7 @@ def test_within_chattering_the_line_is_a_whole_mean_whatever_is_held_shorter_tha
     rng = np.random.default_rng(seed)
     within = switching([*rng.integers(1, 10, 6), *rng.integers(1, 41, 60), *rng.integers(1, 10, 6)])  # 40: the window
     u = np.concatenate([np.full(300, 6.0), within, np.full(300, -within[-1])])
-    (part,) = decimate.stretches(u, 40)
+    (part,) = decimate.chattering_parts(u, 40)
     assert (part.start, part.stop) == (300, 300 + len(within))
     mean, line = triangle(within, 20), decimate.smooth(u, 40)
     np.testing.assert_allclose(line[319:-319], mean, atol=1e-12)

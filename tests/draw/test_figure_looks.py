@@ -103,7 +103,7 @@ def test_words_are_apart_and_on_the_page(kind, size, one, arm):
         "arm": arm,
     }[kind]
     page = figure(traces, size=size)
-    assert page.get_figwidth() == (12.8 if size is None else pages.WIDTHS[size])
+    assert page.get_figwidth() == (12.8 if size is None else pages.NAMED_WIDTHS[size])
     check(page)
 
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning.objective import FAILED, Objective
+from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
 from smc_mujoco.analysis.tuning.result import Tuned
 from smc_mujoco.analysis.tuning.search import tune
 from smc_mujoco.draw import page as pages
@@ -77,7 +77,7 @@ def test_no_tried_gains_lie_below_the_staircase_and_the_chosen_ones_are_on_it(pa
 
 def test_a_law_whose_every_run_failed_is_named_and_one_whose_command_rests_is_drawn(pair, page, tmp_path):
     first = pair[0]
-    failed = [one._replace(tracking=1.5 * FAILED, objective=1.5 * FAILED) for one in first.history]
+    failed = [one._replace(tracking=1.5 * FAILURE_COST, objective=1.5 * FAILURE_COST) for one in first.history]
     resting = [one._replace(variation=0.0) for one in pair[1].history]
     both = [dataclasses.replace(first, history=tuple(failed)), dataclasses.replace(pair[1], history=tuple(resting))]
     svg, _ = pareto(both, tmp_path / "fronts")

@@ -15,7 +15,7 @@ from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl, html
-from smc_mujoco.draw.film import film
+from smc_mujoco.draw.film import film, pace
 
 SIZE = (320, 180)
 FILM = {"size": SIZE, "fps": 20.0, "speed": 1.0}
@@ -78,7 +78,7 @@ def test_frames_are_those_of_the_film_again_and_again(trace):
     assert len(frames) == 5
     assert np.allclose(frames.times, [0.0, 0.05, 0.1, 0.15, 0.2])
     first, second = list(frames), list(frames)
-    wanted = list(film.frames(trace, film.clock(trace, 20.0, 1.0), None, "twice", SIZE))
+    wanted = list(film.frames(trace, pace.clock(trace, 20.0, 1.0), None, "twice", SIZE))
     assert np.array_equal(first, second)
     assert np.array_equal(first, wanted)
     assert first[0].shape == (180, 320, 3)

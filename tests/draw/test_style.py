@@ -76,7 +76,7 @@ def test_laws_that_would_be_mistaken_for_each_other_differ_in_one_picture():
     same = [law for law in mine if style.law_colour(law) == style.law_colour(mine[0])][:2]
     given = style.law_colours([*same, "observer_free", "observer_free"])
     assert [given[0], given[2]] == [style.law_colour(same[0]), "#0072B2"]
-    assert min(style.distance(*pair) for pair in itertools.combinations(given, 2)) > style.ALIKE
+    assert min(style.distance(*pair) for pair in itertools.combinations(given, 2)) > style.MIN_DISTANCE
 
 
 def test_law_colours_never_repeat_in_one_picture():

@@ -109,7 +109,7 @@ def test_untouched_it_is_the_run_that_run_makes(scenario, run, shown):
 
 
 def test_the_viewer_shows_the_present_state_of_the_run(shown, monkeypatch):
-    monkeypatch.setattr(live, "MAX_FRAME", 60.0)  # a slow machine shortens no frame
+    monkeypatch.setattr(live, "MAX_FRAME_TIME", 60.0)  # a slow machine shortens no frame
     view, viewer = shown(HARD)
     for _ in range(12):
         view.frame(viewer, FRAME)
@@ -141,7 +141,7 @@ def test_in_pause_nothing_moves_and_nothing_is_lost(shown):
     view, viewer = shown()
     for _ in range(5):
         view.frame(viewer, FRAME)
-    view.key(live.SPACE)
+    view.key(live.SPACE_KEY)
     before = view.step, view.loop.data.qpos.copy(), view.loop.log.copy(), view.data.time
     for _ in range(5):
         view.frame(viewer, FRAME)
@@ -150,7 +150,7 @@ def test_in_pause_nothing_moves_and_nothing_is_lost(shown):
         assert np.asarray(one).tobytes() == np.asarray(other).tobytes()
     assert "paused" in viewer.texts[-1]
     assert "paused" not in viewer.texts[0]
-    view.key(live.SPACE)
+    view.key(live.SPACE_KEY)
     same(finish(view, viewer), smc.run(DUFFING))
 
 
@@ -205,7 +205,7 @@ def test_a_slider_moved_before_the_start_gives_the_run_with_that_gain(shown):
 
 
 def test_a_slider_moved_in_mid_run_changes_the_gain_from_there_on(shown, monkeypatch):
-    monkeypatch.setattr(live, "MAX_FRAME", 60.0)  # a slow machine shortens no frame
+    monkeypatch.setattr(live, "MAX_FRAME_TIME", 60.0)  # a slow machine shortens no frame
     view, viewer = shown(moves=lambda view, frame: slide(view, "k1", 9.0) if frame == 9 else None)
     trace, untouched = finish(view, viewer), smc.run(DUFFING)
     at = round(10 * FRAME / DUFFING.control_period)
@@ -224,7 +224,7 @@ def test_gains_stay_within_their_sliders(shown):
 def test_changed_gains_are_printed_once_when_the_slider_rests(shown, said):
     drag = {10: 7.0, 11: 8.0, 12: 9.0}
     view, viewer = shown(moves=lambda view, frame: slide(view, "lam", drag.get(frame, view.law.gains["lam"])))
-    view.key(live.SPACE)
+    view.key(live.SPACE_KEY)
     for _ in range(100):
         view.frame(viewer, FRAME)
     assert said == ["smc.law('observer_free', lam=9, k1=3)"]
@@ -281,7 +281,7 @@ def test_a_law_that_fails_is_told_and_paused_and_space_restarts_the_run(shown, s
     assert "'breaks' raised ZeroDivisionError" in sentence
     assert "t = 0.051 s" in sentence
     assert view.paused
-    view.key(live.SPACE)
+    view.key(live.SPACE_KEY)
     view.frame(viewer, FRAME)
     assert view.loop.failure is None
     assert view.data.time == pytest.approx(FRAME, abs=1e-3)
@@ -290,7 +290,7 @@ def test_a_law_that_fails_is_told_and_paused_and_space_restarts_the_run(shown, s
 def test_a_slow_machine_is_told_of_and_never_simulates_much_in_a_frame(shown):
     view, viewer = shown()
     view.frame(viewer, 10.0)
-    assert view.step <= round(live.MAX_FRAME / DUFFING.resolved.physics_step) + 1
+    assert view.step <= round(live.MAX_FRAME_TIME / DUFFING.resolved.physics_step) + 1
     assert "slower than real time" in viewer.texts[-1]
 
 

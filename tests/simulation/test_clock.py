@@ -139,7 +139,7 @@ def test_a_clock_comes_back_from_a_file_and_from_text(tmp_path):
 def test_jitter_takes_margin_from_a_law_that_lives_near_its_delay():
     """A margin of jitter is a multiple of an eighth of the period, and a longer delay leaves less of it."""
     fields = {"control_period": 0.05, "duration": 5.0}
-    quick, slow = margins.of(
+    quick, slow = margins.margins_of(
         [smc.Scenario(plant="duffing", law="classical", input_delay=d, **fields) for d in (0.0, 0.1)], ["jitter"]
     )
     assert quick.value * 8 == round(quick.value * 8)

@@ -14,7 +14,7 @@ is judged on runs that it was tuned on.
 With a bound on predicted chattering, gains beyond it cost as much as if all runs had failed, and more the further they
 are beyond it.
 
-A failed run has no ITAE. It costs FAILED (2 - t / duration), with t the time of the failure. This is finite, more than
+A failed run has no ITAE. It costs FAILURE_COST (2 - t / duration), with t the time of the failure. This is more than
 any other run costs, and decreases with t.
 """
 
@@ -30,15 +30,15 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics import catalogue as metrics
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, Condition, find_condition
-from smc_mujoco.simulation.initial_states import GRID_SEEDS, Starts
+from smc_mujoco.simulation.initial_states import GRID_SEEDS, START_CURE, Starts
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 DURATION = 5.0  # s, chosen: half the study's, at least 8 T of its plants; settled runs add little later
 CONDITIONS = tuple(NAMED[n] for n in ("nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"))
-AROUND = Starts()
-RUNS = 1000  # seeds of runs for each seed of tuning; each condition uses one
-FAILED = 1e9  # s^2, also the bound on ITAE / |x0|, which is less anyway for |x0| > 0.05, because |x| > 1e6 is a failure
+DEFAULT_STARTS = Starts()
+SEEDS_PER_TUNING = 1000  # each condition uses one of them
+FAILURE_COST = 1e9  # s^2; larger ITAE / |x0| count as this, which needs |x0| < 0.05, because |x| > 1e6 is a failure
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -62,7 +62,7 @@ class Objective:
     """
 
     conditions: tuple[Condition, ...] = CONDITIONS
-    starts: Starts = AROUND
+    starts: Starts = DEFAULT_STARTS
     weight: float = 1e-3
     duration: float = DURATION
     control_period: float = CONTROL_PERIOD
@@ -71,7 +71,7 @@ class Objective:
 
     def __post_init__(self):
         conditions = self.conditions if isinstance(self.conditions, tuple | list) else (self.conditions,)
-        if not 0 < len(conditions) <= RUNS:
+        if not 0 < len(conditions) <= SEEDS_PER_TUNING:
             raise ScenarioError(f"conditions is {shown(self.conditions)}: give names, such as ('nominal', 'noise')")
         object.__setattr__(self, "conditions", tuple(map(find_condition, conditions)))
         if not isinstance(self.starts, Starts):
@@ -101,42 +101,44 @@ class Objective:
         common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
         first = Scenario(plant=plant, law=law, **common)
         fields = [one.on(first.plant, self.duration) for one in self.conditions]
-        for one, conditioned in zip(self.conditions, fields, strict=True):
-            self.starts.check_condition(one.name, conditioned)
-        cases = [dataclasses.replace(first, **conditioned) for conditioned in fields]
-        placed = [self.starts.place(case, GRID_SEEDS + RUNS * seed + i) for i, case in enumerate(cases)]
-        for one, case in zip(self.conditions, placed, strict=True):
+        cases = []
+        for i, (condition, changes) in enumerate(zip(self.conditions, fields, strict=True)):
+            self.starts.check_condition(condition.name, changes)
+            case = self.starts.place(dataclasses.replace(first, **changes), GRID_SEEDS + SEEDS_PER_TUNING * seed + i)
             if not any(case.resolved.x0):
-                cure = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
-                raise ScenarioError(
-                    f"{case.plant.name} starts at 0 under {one.name!r}, where a law has nothing to do: {cure}"
-                )
-        return placed
+                where = f"starts at 0 under {condition.name!r}, where a law has nothing to do"
+                raise ScenarioError(f"{case.plant.name} {where}: {START_CURE}")
+            cases.append(case)
+        return cases
 
     def terms(self, traces: list[Trace]) -> tuple[float, float]:
-        """Return tracking and variation of a candidate's runs, each summed; J = tracking + weight variation."""
-        parts = [self.parts(trace) for trace in traces]
-        return sum(tracking for tracking, _ in parts), sum(variation for _, variation in parts)
+        """Return tracking and variation, each summed over a candidate's runs; J = tracking + weight variation."""
+        tracking, variation = zip(*map(self.terms_of_run, traces), strict=True)
+        return sum(tracking), sum(variation)
 
-    def parts(self, trace: Trace) -> tuple[float, float]:
+    def terms_of_run(self, trace: Trace) -> tuple[float, float]:
         """Return ITAE / sum |x0| in s^2 and TV / (u_max duration) in 1/s; for a failed run its cost, and 0."""
         if trace.diverged_at is not None:
-            return FAILED * (2.0 - min(trace.diverged_at / self.duration, 1.0)), 0.0
+            return FAILURE_COST * (2.0 - min(trace.diverged_at / self.duration, 1.0)), 0.0
         start = float(np.abs(trace.x[0]).sum())
-        tracking = min(metrics.itae(trace) / start, FAILED)
+        tracking = min(metrics.itae(trace) / start, FAILURE_COST)
         bound = float(np.max(trace.scenario.resolved.u_max)) if self.u_max is None else self.u_max
         return tracking, metrics.tv(trace) / (bound * self.duration)
 
     def excess(self, case: Scenario) -> float:
-        """Return what predicted chattering above the bound costs, s^2, in proportion to it; 0 below it.
+        """Return what predicted chattering costs, s^2: 0 up to the bound, above it in proportion to the amplitude.
 
-        Where no limit cycle is predicted and one is possible, the most that it may be counts.
+        Where a limit cycle is possible though none is predicted, its largest possible amplitude counts.
         """
         if self.chattering is None:
             return 0.0
         cycle = predict(case, ranges=False)
         amplitude = cycle.amplitude if cycle else cycle.amplitude_range[1]
-        return 2.0 * FAILED * len(self.conditions) * amplitude / self.chattering if amplitude > self.chattering else 0.0
+        return (
+            2.0 * FAILURE_COST * len(self.conditions) * amplitude / self.chattering
+            if amplitude > self.chattering
+            else 0.0
+        )
 
 
 def restore(data: Mapping[str, Any]) -> Objective:

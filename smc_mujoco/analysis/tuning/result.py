@@ -3,15 +3,23 @@
 import dataclasses
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.analysis.tuning.objective import FAILED, Objective, restore
-from smc_mujoco.analysis.tuning.search_space import DECADES, ROUNDING, Box, at_bound, box, largest, without_unit
+from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, restore
+from smc_mujoco.analysis.tuning.search_space import (
+    HALF_WIDTH,
+    ROUNDING_TOLERANCE,
+    Box,
+    actuator_limits,
+    at_bound,
+    box,
+    without_unit,
+)
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import ended, read_json, reading, write_json
 from smc_mujoco.common.tabular import Tables, Tabular
@@ -21,17 +29,17 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 
-ALIKE = ("rule", "plant", "definition", "budget", "seed", "versions")  # what two tunings must share to be compared
+COMPARED_FIELDS = ("rule", "plant", "definition", "budget", "seed", "versions")  # equal in tunings that are compared
 HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of a tuning's table
-WRITTEN = (
+SAVED_FIELDS = (
     "objective", "before", "rule", "budget", "seed", "screened", "ends", "scales", "bounds", "searched", "versions",
 )  # fmt: skip
-AGREEING, AGREEMENT = 3, 0.01  # a search has converged when so many of its starts end so close to the best J
-NEAR_OPTIMAL = 0.03  # of the best J; as much as a metric must differ to be relevant
-SETS = 24  # near-optimal sets of gains that a search hands on: the runs of a law in a study
-# Numbers of sets that laws may have. Each divides those before it, so that runs of two laws, which use their sets in
-# turn, make as many independent samples as the law with fewer sets has.
-COUNTS = (SETS, 12, 6, 3, 1)
+AGREEING_STARTS, AGREEMENT_TOLERANCE = 3, 0.01  # a search has converged when so many starts end so close to the best J
+NEAR_OPTIMAL_TOLERANCE = 0.03  # of the best J; as much as a metric must differ to be relevant
+MAX_SETS = 24  # near-optimal sets of gains of a tuning: as many as runs of a law in a study
+# Numbers of sets that laws may have. Each divides those before it. Runs use their sets in turn, so that the runs of two
+# laws are as many independent samples as the law with fewer sets has.
+SET_COUNTS = (MAX_SETS, 12, 6, 3, 1)
 
 
 class Evaluation(NamedTuple):
@@ -45,7 +53,7 @@ class Evaluation(NamedTuple):
     @property
     def failed(self) -> bool:
         """Whether one of its runs failed."""
-        return self.tracking >= FAILED
+        return self.tracking >= FAILURE_COST
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, repr=False)
@@ -94,22 +102,24 @@ class Tuned(Tables):
         """One table, a line for each gain: its value, the bounds of its search, and whether it is at one of them."""
         rows = []
         for name, (low, high) in self.searched.items():
-            notes = [f"at its {self.at_bound[name]} bound"] if name in self.at_bound else []
-            notes += ["beyond the box of the starts"] if name in self.beyond_box else []
-            rows.append((name, f"{self.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", ", ".join(notes)))
-        said = (
+            remarks = [f"at its {self.at_bound[name]} bound"] if name in self.at_bound else []
+            remarks += ["beyond the box of the starts"] if name in self.beyond_box else []
+            rows.append((name, f"{self.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", ", ".join(remarks)))
+        notes = (
             str(self.definition),
             f"{self.verdict}; {len(self.near_optimal)} near-optimal set{'s' * (len(self.near_optimal) > 1)}",
             f"objective {self.objective:.4g} s², with the law's own gains {self.before:.4g} s²; "
             f"{self.evaluations} set{'s' * (self.evaluations > 1)} of gains, seed {self.seed}",
         )
-        return [Tabular(headings=HEADINGS, rows=rows, title=f"{self.law.name} on {self.plant.name}", notes=said)]
+        return [Tabular(headings=HEADINGS, rows=rows, title=f"{self.law.name} on {self.plant.name}", notes=notes)]
 
     def sourced(self) -> "Tuned":
         """Return the tuning with a law that names this search as the source of its gains."""
-        about = bool(without_unit(self.law))
         search = source.Search(
-            rule=self.rule, evaluations=self.evaluations, converged=self.converged, about_defaults=about
+            rule=self.rule,
+            evaluations=self.evaluations,
+            converged=self.converged,
+            about_defaults=bool(without_unit(self.law)),
         )
         return dataclasses.replace(self, law=self.law.sourced(source.TUNED, search))
 
@@ -122,15 +132,17 @@ class Tuned(Tables):
     def at_bound(self) -> dict[str, str]:
         """Gain -> "lower" or "upper", if it is within 2 % of a bound of the search, or at the actuator's limit."""
         return at_bound(self.gains, self.searched) | {
-            name: "upper" for name, most in self._largest.items() if self.gains[name] >= most * (1.0 - ROUNDING)
+            name: "upper"
+            for name, limit in self._actuator_limits.items()
+            if self.gains[name] >= limit * (1.0 - ROUNDING_TOLERANCE)
         }
 
     @property
-    def _largest(self) -> dict[str, float]:
+    def _actuator_limits(self) -> dict[str, float]:
         """The actuator's limit on gains that the law divides by another one."""
         u_max = self.definition.u_max
-        bounds = largest(self.law, self.law.gains, math.inf if u_max is None else u_max)
-        return {name: most for name, most in bounds.items() if name in self.bounds}
+        limits = actuator_limits(self.law, self.law.gains, math.inf if u_max is None else u_max)
+        return {name: limit for name, limit in limits.items() if name in self.bounds}
 
     @property
     def beyond_box(self) -> list[str]:
@@ -151,10 +163,10 @@ class Tuned(Tables):
     def verdict(self) -> str:
         """Whether the search has converged, in words."""
         if self.converged is None:
-            return f"{len(self.ends)} of the {AGREEING} starts that convergence needs"
+            return f"{len(self.ends)} of the {AGREEING_STARTS} starts that convergence needs"
         best = min(self.ends)
-        agreeing = sum(end <= best * (1.0 + AGREEMENT) for end in self.ends)
-        ended = f"{agreeing} of {len(self.ends)} starts end within {100 * AGREEMENT:g} % of the best"
+        agreeing = sum(end <= best * (1.0 + AGREEMENT_TOLERANCE) for end in self.ends)
+        ended = f"{agreeing} of {len(self.ends)} starts end within {100 * AGREEMENT_TOLERANCE:g} % of the best"
         return f"{'converged' if self.converged else 'not converged'}: {ended}"
 
     @property
@@ -172,7 +184,7 @@ class Tuned(Tables):
         near = self.near_optimal
         logs = np.log10([one.gains for one in near])
         taken, distances = [0], np.linalg.norm(logs - logs[0], axis=1)
-        while len(taken) < next(count for count in COUNTS if count <= len(near)):
+        while len(taken) < next(count for count in SET_COUNTS if count <= len(near)):
             taken.append(int(np.argmax(distances)))
             distances = np.minimum(distances, np.linalg.norm(logs - logs[taken[-1]], axis=1))
         order = np.random.default_rng(self.seed).permutation(taken[1:])
@@ -209,7 +221,7 @@ class Tuned(Tables):
         """Write a .json file that `load` reads back."""
         path = ended(path, ".json")
         scenario = self.definition.scenarios(self.plant, self.law, self.seed)[0]
-        data = {name: getattr(self, name) for name in WRITTEN} | {
+        data = {name: getattr(self, name) for name in SAVED_FIELDS} | {
             "definition": self.definition.describe(),
             "at_bound": self.at_bound,
             "scenario": serialise.describe(scenario),
@@ -228,7 +240,7 @@ def load(path: str | os.PathLike[str]) -> Tuned:
     with reading(path, "tuning", "give a .json file that Tuned.save wrote") as file:
         data = read_json(file)
         scenario = serialise.restore(data["scenario"])
-        fields: dict[str, Any] = {name: data[name] for name in WRITTEN}
+        fields: dict[str, Any] = {name: data[name] for name in SAVED_FIELDS}
         fields["ends"] = tuple(fields["ends"])
         fields |= {name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")}
         return Tuned(
@@ -247,9 +259,9 @@ def _short(value: float) -> float:
 
 def converged(ends: Sequence[float]) -> bool | None:
     """Return whether three starts ended within 1 % of the best J, given the best J of each; None if there are fewer."""
-    if len(ends) < AGREEING:
+    if len(ends) < AGREEING_STARTS:
         return None
-    return sorted(ends)[AGREEING - 1] <= min(ends) * (1.0 + AGREEMENT)
+    return sorted(ends)[AGREEING_STARTS - 1] <= min(ends) * (1.0 + AGREEMENT_TOLERANCE)
 
 
 def near_optimal(history: Sequence[Evaluation]) -> list[Evaluation]:
@@ -257,7 +269,7 @@ def near_optimal(history: Sequence[Evaluation]) -> list[Evaluation]:
     ranked = sorted(history, key=lambda e: e.objective)
     if ranked[0].failed:
         return ranked[:1]
-    return [one for one in ranked if one.objective <= ranked[0].objective * (1.0 + NEAR_OPTIMAL)]
+    return [one for one in ranked if one.objective <= ranked[0].objective * (1.0 + NEAR_OPTIMAL_TOLERANCE)]
 
 
 def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
@@ -272,38 +284,34 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
         raise ScenarioError(f"cannot compare {shown(tuned)}: give a list of tunings")
     first = tuned[0]
     for one in tuned:
-        for field in ALIKE:
-            if (its := getattr(one, field)) != (other := getattr(first, field)):
-                name, pair = (
-                    field.replace("definition", "objective"),
-                    f"{one.law.name} has {its}, {first.law.name} {other}",
-                )
-                raise ScenarioError(
-                    f"laws tuned with untuned_laws {name} cannot be compared, {pair}: tune them in the same way"
-                )
-        if one.evaluations > one.budget:
-            counts = f"{one.law.name} evaluated {one.evaluations} of {one.budget}"
-            raise ScenarioError(f"laws that spent more than their budget cannot be compared, {counts}: tune it again")
-        for gain, ends in _bounds(one).items():
-            if not np.allclose(one.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
-                pair = f"{one.law.name}'s {gain} was searched in {one.bounds.get(gain)}, not in {ends}"
-                raise ScenarioError(
-                    f"laws tuned within untuned_laws bounds cannot be compared, {pair}: tune them in the same way"
-                )
-        for gain, most in one._largest.items():
-            if one.gains[gain] > most * (1.0 + ROUNDING):
-                pair = f"{one.law.name}'s {gain} is {one.gains[gain]:g}, and its actuator gives {most:g}"
-                raise ScenarioError(
-                    f"laws tuned beyond their actuator cannot be compared, {pair}: tune them in the same way"
-                )
+        if difference := next(_differences(one, first), ""):
+            raise ScenarioError(f"laws tuned {difference}: tune them in the same way")
     return sorted(tuned, key=lambda one: one.objective)
+
+
+def _differences(tuned: Tuned, first: Tuned) -> Iterator[str]:
+    """Yield in what a tuning was not made as the first one, or as the rule says, in words."""
+    law, cannot = tuned.law.name, "cannot be compared"
+    for field in COMPARED_FIELDS:
+        if (value := getattr(tuned, field)) != (other := getattr(first, field)):
+            name = field.replace("definition", "objective")
+            yield f"with unequal {name} {cannot}, {law} has {value}, {first.law.name} {other}"
+    if tuned.evaluations > tuned.budget:
+        yield f"with more than their budget {cannot}, {law} evaluated {tuned.evaluations} of {tuned.budget}"
+    for gain, ends in _bounds(tuned).items():
+        if not np.allclose(tuned.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
+            where = f"{law}'s {gain} was searched in {tuned.bounds.get(gain)}, not in {ends}"
+            yield f"within unequal bounds {cannot}, {where}"
+    for gain, limit in tuned._actuator_limits.items():
+        if (value := tuned.gains[gain]) > limit * (1.0 + ROUNDING_TOLERANCE):
+            yield f"beyond their actuator {cannot}, {law}'s {gain} is {value:g}, and its actuator gives {limit:g}"
 
 
 def _bounds(tuned: Tuned) -> Box:
     """Return the bounds by the rule. For a law that cannot be loaded here, only their width is checked."""
     if tuned.law.template:
         return box(tuned.law, tuned.scales)
-    one_sided = 10.0**DECADES  # of a force, which is searched up to u_max
+    one_sided = 10.0**HALF_WIDTH  # of a force, which is searched up to u_max
     return {
         gain: (low, low * (one_sided if high / low < 2.0 * one_sided else one_sided**2))
         for gain, (low, high) in tuned.bounds.items()

@@ -16,16 +16,16 @@ evaluations for each gain:
 The first two are cheap: they use Euler's method at 1 ms if the plant's own method is RK4, which costs a third. Only the
 accurate evaluations of the descents count as results.
 
-The search has converged when three starts end within 1 % of the best J. Starts end when it has converged and knows 24
-near-optimal sets of gains, or when the budget has no room for another. Near-optimal is every set within 3 % of the best
-J. A careful user could have ended with any of them, so runs of a law use them in turn, see `gain_sets`. If fewer are
-known after the starts, the rest of the budget draws gains at random about those that are: a law with few sets would be
-a small sample, which no rival can beat.
+The search has converged when three starts end within 1 % of the best J. It makes new starts until it has converged and
+knows 24 near-optimal sets of gains, or until the budget has no room for another start. A set is near-optimal within 3 %
+of the best J. A careful user could have ended with any of them, so runs of a law use them in turn, see `gain_sets`. If
+fewer are known after the starts, the rest of the budget draws gains at random about the known ones. A law with few sets
+would be a small sample, which no rival can beat.
 
 Gains are rounded to four digits, so the printed gains are those that were run. A set that was evaluated before costs no
 budget. `search_space` gives the box from which starts are drawn; a descent may leave it by a decade. `Tuned.at_bound`
-names gains that are at the limit of that. No start depends on the budget, so a search with a larger budget repeats the
-starts of a shorter one. `objective` defines what is minimised.
+names gains at the limit of that. No start depends on the budget, so a search with a larger budget repeats the starts of
+a shorter one. `objective` defines what is minimised.
 """
 
 import dataclasses
@@ -37,10 +37,10 @@ import numpy as np
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.objective import OBJECTIVES, Objective
 from smc_mujoco.analysis.tuning.result import (
-    AGREEING,
-    AGREEMENT,
-    NEAR_OPTIMAL,
-    SETS,
+    AGREEING_STARTS,
+    AGREEMENT_TOLERANCE,
+    MAX_SETS,
+    NEAR_OPTIMAL_TOLERANCE,
     Evaluation,
     Tuned,
     compare,
@@ -65,24 +65,26 @@ from smc_mujoco.simulation.trace import Trace
 
 __all__ = ["Tuned", "compare", "load", "tune"]
 
-START = 64  # evaluations of a start for each gain
-SCREENED, EVOLVED = 1 / 8, 1 / 2  # of them; the rest descend
-SPREAD = 0.3  # decades: first standard deviation of the evolution; chosen
-RADII = (0.2, 0.1)  # decades: first radius of the trust region in each of a start's descents; chosen
+EVALUATIONS_PER_GAIN = 64  # of a start
+SCREENED_SHARE, EVOLVED_SHARE = 1 / 8, 1 / 2  # of the evaluations; the rest descend
+FIRST_DEVIATION = 0.3  # decades: first standard deviation of the evolution; chosen
+FIRST_RADII = (0.2, 0.1)  # decades: first radius of the trust region in each of a start's descents; chosen
 LAST_RADIUS = 0.005  # decades
-SPARE = 96  # evaluations that starts after the first leave for further near-optimal sets; chosen
-BUDGET = 768 + SPARE  # evaluations: three starts of a law of four gains, six of one of two
-WIDER, NARROWER = 1.5, 1.5**-0.5  # factors on the step of draws, after a near-optimal set and another: a third are
-DIGITS = 4  # of a gain
-MAX_CANDIDATES = 1_000_000  # candidates
+SPARE_EVALUATIONS = 96  # starts after the first leave so many for further near-optimal sets; chosen
+BUDGET = 768 + SPARE_EVALUATIONS  # evaluations: three starts of a law of four gains, six of one of two
+# Factors on the random step after a near-optimal set and after another: they balance at a third of near-optimal ones.
+STEP_GROWTH, STEP_SHRINKAGE = 1.5, 1.5**-0.5
+GAIN_DIGITS = 4
+MAX_BUDGET = 1_000_000  # evaluations
 RULE = (
-    f"CMA-ES and COBYQA from several starts, in the logarithm of the gains: each start has {START} evaluations a gain."
-    " An eighth screens a Latin hypercube, within 1.5 decades about the gains' scale by dimension, forces up to u_max,"
-    " and a half evolves from the best of them by CMA-ES, both under Euler's method at 1 ms. The rest descends from the"
-    " best of these by COBYQA under RK4. Both may leave the box by a decade. Starts end when"
-    f" {AGREEING} starts end within {100 * AGREEMENT:g} % of the best and {SETS} sets of gains within"
-    f" {100 * NEAR_OPTIMAL:g} % of it are known, or when {SPARE} evaluations are left. These are random steps from"
-    " the sets that are known, until they are as many"
+    "CMA-ES and COBYQA from several starts, in the logarithm of the gains: each start has"
+    f" {EVALUATIONS_PER_GAIN} evaluations a gain. An eighth screens a Latin hypercube, within 1.5 decades about the"
+    " gains' scale by dimension, forces up to u_max, and a half evolves from the best of them by CMA-ES, both under"
+    " Euler's method at 1 ms. The rest descends from the best of these by COBYQA under RK4. Both may leave the box by"
+    " a decade. Starts end when"
+    f" {AGREEING_STARTS} starts end within {100 * AGREEMENT_TOLERANCE:g} % of the best and {MAX_SETS} sets of gains"
+    f" within {100 * NEAR_OPTIMAL_TOLERANCE:g} % of it are known, or when {SPARE_EVALUATIONS} evaluations are left."
+    " These are random steps from the sets that are known, until they are as many"
 )
 Report = Callable[[int], None]
 
@@ -107,7 +109,7 @@ def tune(
 
     Args:
       plant, law: names, or your own plant and law. The search does not start from the law's gains; `Tuned.before` is
-        their objective. Gains that are held keep their value.
+        their objective. Gains declared with `held=True` keep their value.
       budget: largest number of sets of gains to evaluate, each in one run per condition.
       seed: seed of the search, and of initial states and noise, which are the same for all candidates; below 10^9.
       objective: an Objective, "balanced", or "tracking", without a cost of the variation of u.
@@ -122,13 +124,13 @@ def tune(
         range, or a law whose own code fails in every run with its own gains.
 
     Warns:
-      ScenarioWarning: a gain of unknown unit, which is searched about its default; the law's own gains are better than
-        any that were tried, or all chatter more than is wanted.
+      ScenarioWarning: a gain of unknown unit, which is searched about its default; the law's original gains are better
+        than any that were tried; or all chatter more than is wanted.
     """
-    given = {"conditions": conditions, "starts": starts, "chattering": chattering}
+    changes = {"conditions": conditions, "starts": starts, "chattering": chattering}
     goal = objective if isinstance(objective, Objective) else find("objective", objective, OBJECTIVES)
-    goal = dataclasses.replace(goal, **{name: value for name, value in given.items() if value is not None})
-    budget = whole("budget", budget, 1, MAX_CANDIDATES)
+    goal = dataclasses.replace(goal, **{name: value for name, value in changes.items() if value is not None})
+    budget = whole("budget", budget, 1, MAX_BUDGET)
     whole("seed", seed, 0, 10**9)
     cases = goal.scenarios(plant, coerce.law(law), seed)
     plant, law = cases[0].plant, cases[0].law
@@ -136,20 +138,20 @@ def tune(
     goal = dataclasses.replace(goal, u_max=bound)
     reach = goal.starts.largest(dataclasses.replace(cases[0], x0=None))
     scales = search_space.scales(plant, bound, cases[0].model == "nominal", reach)
-    start = search_space.box(law, scales)
+    box = search_space.box(law, scales)
     if search_space.without_unit(law):
-        _warn(_about_defaults(law))
+        _warn(_without_unit_warning(law))
     traces = run(cases, threads)
     _refuse_broken(law, traces)
     tracking, variation = goal.terms(traces)
     before = tracking + goal.weight * variation + goal.excess(cases[0])
-    with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as drawn:
-        ledger = _Ledger(goal, cases, tuple(start), bound, budget, threads, drawn.advance)
-        searched = search_space.widened(law, start)
-        ends = _search(ledger, start, searched, seed)
+    with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as progress_bar:
+        ledger = _Ledger(goal, cases, tuple(box), bound, budget, threads, progress_bar.advance)
+        searched = search_space.widened(law, box)
+        ends = _search(ledger, box, searched, seed)
     best = min(ledger.evaluations, key=lambda e: e.objective)
-    made = Tuned(
-        law=_with(law, tuple(start), best.gains),
+    tuned = Tuned(
+        law=_with_gains(law, tuple(box), best.gains),
         objective=best.objective,
         history=tuple(ledger.evaluations),
         screened=ledger.screened,
@@ -161,25 +163,25 @@ def tune(
         budget=budget,
         seed=seed,
         scales=scales,
-        bounds=start,
+        bounds=box,
         searched=searched,
         versions=versions(),
     )
-    _warn_of_result(made, chatters=bool(ledger.excess(best.gains)))
-    return made.sourced()
+    _warn_of_result(tuned, chatters=bool(ledger.excess(best.gains)))
+    return tuned.sourced()
 
 
-def _warn_of_result(made: Tuned, chatters: bool) -> None:
+def _warn_of_result(tuned: Tuned, chatters: bool) -> None:
     """Warn if a search ends with gains that are worse than the law's own, or chatter more than is wanted."""
-    tried = f"tried for {made.law.name} on {made.plant.name}"
-    if made.objective > made.before:
+    tried = f"tried for {tuned.law.name} on {tuned.plant.name}"
+    if tuned.objective > tuned.before:
         _warn(
-            f"no set of gains {tried} is better than the law's own, with an objective of {made.objective:.3g} s² "
-            f"instead of {made.before:.3g} s²: give a larger budget"
+            f"no set of gains {tried} is better than the law's own, with an objective of {tuned.objective:.3g} s² "
+            f"instead of {tuned.before:.3g} s²: give a larger budget"
         )
     if chatters:
         _warn(
-            f"all gains {tried} are predicted to chatter with more than {made.definition.chattering:g}: give a larger "
+            f"all gains {tried} are predicted to chatter with more than {tuned.definition.chattering:g}: give a larger "
             "budget, or a larger chattering"
         )
 
@@ -199,13 +201,13 @@ def _warn(words: str) -> None:
     warnings.warn(words, ScenarioWarning, users_frame())
 
 
-def _about_defaults(law: Component) -> str:
+def _without_unit_warning(law: Component) -> str:
     """Return the warning of a law with gains of unknown unit, which are searched about their defaults."""
-    about = list(search_space.without_unit(law))
-    have, whose = ("have", "their defaults") if len(about) > 1 else ("has", "its default")
+    names = list(search_space.without_unit(law))
+    have, whose = ("have", "their defaults") if len(names) > 1 else ("has", "its default")
     return (
-        f"{law.name}'s {joined(about)} {have} no unit, and so a search about {whose} in place of the rule of all laws: "
-        f'write the unit, as in gains={{"{about[0]}": Gain({law.gains[about[0]]:g}, RATE)}}, see '
+        f"{law.name}'s {joined(names)} {have} no unit, and so a search about {whose} in place of the rule of all laws: "
+        f'write the unit, as in gains={{"{names[0]}": Gain({law.gains[names[0]]:g}, RATE)}}, see '
         "smc_mujoco.control.units"
     )
 
@@ -234,7 +236,7 @@ class _Ledger:
     def screen(self, logs: np.ndarray) -> np.ndarray:
         """Return J of candidates (candidates, gains), given as log10 gains, from cheap runs."""
         candidates = [self.gains(row) for row in logs.tolist()]
-        costs = [one.objective for one in self.evaluate(candidates, [_cheap(case) for case in self.cases])]
+        costs = [one.objective for one in self.evaluate(candidates, [_under_euler(case) for case in self.cases])]
         self.screened += len(candidates)
         self.report(len(candidates))
         return np.array(costs)
@@ -251,14 +253,14 @@ class _Ledger:
     def gains(self, logs: Sequence[float]) -> tuple[float, ...]:
         """Return the gains of a candidate, none above the actuator's limit, see `search_space`."""
         gains = {name: _rounded(10.0**z) for name, z in zip(self.names, logs, strict=True)}
-        for name, most in search_space.largest(self.cases[0].law, gains, self.u_max).items():
-            gains[name] = min(gains[name], _rounded(most))
+        for name, limit in search_space.actuator_limits(self.cases[0].law, gains, self.u_max).items():
+            gains[name] = min(gains[name], _rounded(limit))
         return tuple(gains.values())
 
     def evaluate(self, candidates: Sequence[tuple[float, ...]], cases: Sequence[Scenario]) -> list[Evaluation]:
         """Run candidates in all cases, as one batch."""
         size = len(cases)
-        laws = [_with(cases[0].law, self.names, gains) for gains in candidates]
+        laws = [_with_gains(cases[0].law, self.names, gains) for gains in candidates]
         traces = run([dataclasses.replace(case, law=law) for law in laws for case in cases], self.threads)
         terms = [self.goal.terms(traces[i : i + size]) for i in range(0, len(traces), size)]
         return [
@@ -267,63 +269,65 @@ class _Ledger:
         ]
 
     def excess(self, gains: tuple[float, ...]) -> float:
-        """Return what a candidate's predicted chattering costs; it is predicted once."""
+        """Return what a candidate's predicted chattering costs, s^2. Each candidate is predicted once."""
         if gains not in self.excesses:
             case = self.cases[0]
-            self.excesses[gains] = self.goal.excess(dataclasses.replace(case, law=_with(case.law, self.names, gains)))
+            self.excesses[gains] = self.goal.excess(
+                dataclasses.replace(case, law=_with_gains(case.law, self.names, gains))
+            )
         return self.excesses[gains]
 
 
 def _rounded(gain: float) -> float:
-    """Return a gain as it is printed."""
-    return float(f"{gain:.{DIGITS}g}")
+    return float(f"{gain:.{GAIN_DIGITS}g}")
 
 
-def _cheap(case: Scenario) -> Scenario:
+def _under_euler(case: Scenario) -> Scenario:
     """Return the case under Euler's method, if its own is RK4."""
     return dataclasses.replace(case, integrator="Euler") if case.resolved.integrator == "RK4" else case
 
 
-def _with(law: Component, names: Sequence[str], values: Sequence[float]) -> Component:
+def _with_gains(law: Component, names: Sequence[str], values: Sequence[float]) -> Component:
     """Return the law with other gains, without a warning for violated conditions of its theorem."""
     return dataclasses.replace(law, gains=dict(law.gains) | dict(zip(names, values, strict=True)))
 
 
-def _search(ledger: _Ledger, start: Box, searched: Box, seed: int) -> tuple[float, ...]:
+def _search(ledger: _Ledger, box: Box, searched: Box, seed: int) -> tuple[float, ...]:
     """Make starts until they have converged or the budget is spent, and return the best J of each, s^2.
 
     Args:
-      start: the box from which starts are drawn.
-      searched: the wider one in which they go on.
+      box: from which starts are drawn.
+      searched: the wider box in which they go on.
     """
     ends: list[float] = []
-    whole_start = START * len(start)
-    while not ends or ledger.left >= whole_start + SPARE:
-        random, size, first = np.random.default_rng([seed, len(ends)]), min(whole_start, ledger.left), ledger.screened
-        logs, cost = _drawn(ledger, start, random, int(SCREENED * size))
-        logs = _evolved(ledger, searched, random, logs, cost, int(EVOLVED * size))
-        ends.append(_descend(ledger, searched, logs, size - (ledger.screened - first)))
-        if converged(ends) and len(near_optimal(ledger.evaluations)) >= SETS:
+    whole_start = EVALUATIONS_PER_GAIN * len(box)
+    while not ends or ledger.left >= whole_start + SPARE_EVALUATIONS:
+        random, size = np.random.default_rng([seed, len(ends)]), min(whole_start, ledger.left)
+        screened = ledger.screened
+        logs, cost = _screened(ledger, box, random, int(SCREENED_SHARE * size))
+        logs = _evolved(ledger, searched, random, logs, cost, int(EVOLVED_SHARE * size))
+        ends.append(_descend(ledger, searched, logs, size - (ledger.screened - screened)))
+        if converged(ends) and len(near_optimal(ledger.evaluations)) >= MAX_SETS:
             break
     _spread(ledger, searched, np.random.default_rng([seed, len(ends)]))
     return tuple(ends)
 
 
 def _spread(ledger: _Ledger, box: Box, random: np.random.Generator) -> None:
-    """Draw gains about the near-optimal ones, until enough of these are known or the budget is spent."""
+    """Draw gains about the near-optimal ones, until enough near-optimal ones are known or the budget is spent."""
     low, high = np.log10(list(box.values())).T
-    step = RADII[-1]  # decades, standard deviation
+    step = FIRST_RADII[-1]  # decades, standard deviation
     for _ in range(ledger.left):
         near = near_optimal(ledger.evaluations)
-        if len(near) >= SETS or near[0].failed:
+        if len(near) >= MAX_SETS or near[0].failed:
             return
         logs = np.log10(near[random.integers(len(near))].gains) + step * random.standard_normal(len(low))
         cost = ledger.cost(np.clip(logs, low, high))
-        found = cost <= near[0].objective * (1.0 + NEAR_OPTIMAL)
-        step = max(step * (WIDER if found else NARROWER), LAST_RADIUS)
+        is_near = cost <= near[0].objective * (1.0 + NEAR_OPTIMAL_TOLERANCE)
+        step = max(step * (STEP_GROWTH if is_near else STEP_SHRINKAGE), LAST_RADIUS)
 
 
-def _drawn(ledger: _Ledger, box: Box, random: np.random.Generator, size: int) -> tuple[np.ndarray, float]:
+def _screened(ledger: _Ledger, box: Box, random: np.random.Generator, size: int) -> tuple[np.ndarray, float]:
     """Return the log10 gains of the best of a Latin hypercube in the box, and their J; the middle if size is 0."""
     from scipy.stats.qmc import LatinHypercube
 
@@ -344,7 +348,7 @@ def _evolved(
     if len(logs) < 2:  # CMA-ES adapts a covariance
         return logs
     bounds, seed = np.log10(list(box.values())), int(random.integers(2**31))
-    evolution = CMA(mean=logs, sigma=SPREAD, bounds=bounds, seed=seed)
+    evolution = CMA(mean=logs, sigma=FIRST_DEVIATION, bounds=bounds, seed=seed)
     for _ in range(size // evolution.population_size):
         candidates = np.array([evolution.ask() for _ in range(evolution.population_size)])
         costs = ledger.screen(candidates)
@@ -365,7 +369,7 @@ def _descend(ledger: _Ledger, box: Box, logs: np.ndarray, size: int) -> float:
         costs.append(ledger.cost(np.clip(z, low, high)))
         return np.log(costs[-1])
 
-    radii = RADII if size > 4 * len(logs) + 4 else RADII[:1]  # a first model needs 2 n + 1 evaluations
+    radii = FIRST_RADII if size > 4 * len(logs) + 4 else FIRST_RADII[:1]  # a first model needs 2 n + 1 evaluations
     for radius in radii if size > 1 else ():
         logs = minimize(
             cost,

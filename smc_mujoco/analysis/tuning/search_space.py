@@ -8,20 +8,19 @@ The plant has four scales, from which each gain's scale follows:
     T = sqrt(M X / u_max)   time in which the actuator moves the plant by X (by X / 2, from rest)
 
 A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5. A gain that is a force
-by itself, such as lambda of -lambda tanh(s), is searched up to F, because the actuator cannot give more. A gain that
-the law divides by another one, such as k of the force k / b where b is the law's own estimate of g, is bounded in the
-same
-way: k is at most u_max b, for the b of each candidate. The law declares this with `Gain(2.0, ACCELERATION, over="b")`.
-A law that has the model divides by the plant's g instead: its k is declared as a force and searched up to F = u_max /
-M. Gains k and b are tuned without the model. With the model, if g is less than b, the force k / g may be larger.
+by itself, such as lambda of -lambda tanh(s), is searched up to F, because the actuator cannot give more. A law may
+divide a gain by another one, such as k by b in the force k / b, where b is an estimate of g. Then k is at most u_max b,
+for the b of each candidate. The law declares this with `Gain(2.0, ACCELERATION, over="b")`. With the model a law
+divides by the plant's g instead, and its k is declared as a force. Gains k and b are tuned without the model: with it,
+the force k / g may be larger than u_max where g is less than b.
 
-A law declares the unit of each gain with the gain, and which gains are held at the law's own value. A gain whose unit
-is not known is searched over as many decades about its default:
+A law declares the unit of each gain, and which gains the search leaves as they are. A gain of unknown unit is searched
+over as many decades about its default:
 
     @smc.law_function(gains={"lam": Gain(6.0, FORCE), "k1": Gain(2.5, RATE), "order": Gain(2.0, held=True)})
 
-Initial values, exponents, table sizes, a plant's parameters, filters and number formats of a processor are held. If an
-exponent is a gain, the unit of the factor before the power depends on it, and is given as a function of the gains.
+The search leaves initial values, exponents, table sizes, a plant's parameters, filters and number formats of a
+processor as they are. If an exponent is a gain, the unit of the factor before the power is a function of the gains.
 
 With these units a law behaves the same in every system of units (tests/analysis/tuning/test_search_space.py). Some laws
 contain a number with a unit, such as the width 1 of tanh(s): their gains have the units that leave this number
@@ -38,24 +37,25 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.component import Component, gain_text
 from smc_mujoco.control.units import FORCE, Gain, Unit
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.initial_states import START_CURE
 
-DECADES = 1.5  # on either side of a scale: chosen, a factor of 1000 in all
-NEAR = 0.02  # of the range in log space: a gain so close to a bound counts as at the bound
-WIDENING = 1.0  # decades
-ROUNDING = 1e-3  # of a gain: twice the largest error of four digits
+HALF_WIDTH = 1.5  # decades on either side of a scale: chosen, a factor of 1000 in all
+BOUND_MARGIN = 0.02  # of the range in log space: a gain so close to a bound counts as at the bound
+WIDENING = 1.0  # decades by which the search may leave the box
+ROUNDING_TOLERANCE = 1e-3  # of a gain: twice the largest error of four digits
 
 Box = Mapping[str, tuple[float, float]]  # gain -> lowest, highest
 
 
 def _gain(law: Component, name: str) -> Gain:
     """Return a law's gain with its unit, which may depend on the law's exponents."""
-    known = law.template.gains if law.template else {}
-    gain = known.get(name, Gain(law.gains[name]))
+    declared = law.template.gains if law.template else {}
+    gain = declared.get(name, Gain(law.gains[name]))
     return dataclasses.replace(gain, unit=gain.unit_at(law.gains))
 
 
 def unit(law: Component, name: str) -> Unit | None:
-    """Return the unit of a law's gain; None for a gain that is held.
+    """Return the unit of a law's gain; None for a gain that is not searched and has none.
 
     Raises:
       ScenarioError: the unit is not known.
@@ -71,15 +71,15 @@ def unit(law: Component, name: str) -> Unit | None:
 
 
 def without_unit(law: Component) -> dict[str, float]:
-    """Return gain -> default of a law's gains of unknown unit that are not held."""
+    """Return gain -> default of the searched gains whose unit is not known."""
     gains = {name: _gain(law, name) for name in law.gains}
     return {name: gain.default for name, gain in gains.items() if gain.unit is None and not gain.held}
 
 
-def size(law: Component, name: str, scales: Mapping[str, float]) -> float:
-    """Return the size of a gain's unit for these sizes of F, X and T; 1 for a gain that is held."""
-    its = unit(law, name)
-    return 1.0 if its is None or _gain(law, name).held else its.of(scales)
+def unit_size(law: Component, name: str, scales: Mapping[str, float]) -> float:
+    """Return the size of a gain's unit for these sizes of F, X and T; 1 for a gain that is not searched."""
+    gain_unit = unit(law, name)
+    return 1.0 if gain_unit is None or _gain(law, name).held else gain_unit.of(scales)
 
 
 def scales(plant: Plant, u_max: float, with_model: bool, reach: float | None = None) -> dict[str, float]:
@@ -94,19 +94,18 @@ def scales(plant: Plant, u_max: float, with_model: bool, reach: float | None = N
     """
     if plant.unscaled:
         raise ScenarioError(f"cannot tune on {plant.name}: {plant.unscaled}")
-    at_rest = np.zeros(plant.n)
-    g = min(abs(plant.nominal(at_rest, at_rest, i, plant.values({}))[1]) for i in range(plant.n))
+    zeros = np.zeros(plant.n)
+    g = min(abs(plant.nominal(zeros, zeros, i, plant.values({}))[1]) for i in range(plant.n))
     X = max(abs(x) for x in plant.x0) if reach is None else reach
     if not X > 0.0:
-        cure = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
-        raise ScenarioError(f"{plant.name} starts at 0, where a law has nothing to do: {cure}")
+        raise ScenarioError(f"{plant.name} starts at 0, where a law has nothing to do: {START_CURE}")
     if not (math.isfinite(g) and g > 0.0):
         raise ScenarioError(f"{plant.name} has g(0) = {g:g}: tuning needs a joint that u moves; choose another plant")
     return {"X": X, "F": u_max * g if with_model else u_max, "M": 1.0 / g, "T": math.sqrt(X / (g * u_max))}
 
 
 def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Return gain -> lowest and highest value of the search, for all gains of a law that are not held.
+    """Return gain -> lowest and highest start of the search, for all gains of a law that are searched.
 
     Raises:
       ScenarioError: a gain of unknown unit whose default is not positive, or no gain to tune.
@@ -114,15 +113,15 @@ def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[fl
     bounds = {}
     if not law.uniform:
         raise ScenarioError(f"tuning needs gains that all channels share, not {law}: give one number for each gain")
-    about = without_unit(law)
+    defaults = without_unit(law)
     for name in law.gains:
-        if name in about:
-            if not about[name] > 0.0:
+        if name in defaults:
+            if not defaults[name] > 0.0:
                 unit(law, name)  # raises: there is neither a unit nor a size
-            bounds[name] = (about[name] * 10**-DECADES, about[name] * 10**DECADES)
-        elif (its := unit(law, name)) is not None and not _gain(law, name).held:
-            scale = its.of(plant_scales)
-            bounds[name] = (scale * 10**-DECADES, scale if its == FORCE else scale * 10**DECADES)
+            bounds[name] = (defaults[name] * 10**-HALF_WIDTH, defaults[name] * 10**HALF_WIDTH)
+        elif (gain_unit := unit(law, name)) is not None and not _gain(law, name).held:
+            scale = gain_unit.of(plant_scales)
+            bounds[name] = (scale * 10**-HALF_WIDTH, scale if gain_unit == FORCE else scale * 10**HALF_WIDTH)
     if not bounds:
         raise ScenarioError(f"law {law.name!r} has no gain to tune: choose another")
     return bounds
@@ -131,20 +130,21 @@ def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[fl
 def at_bound(gains: Mapping[str, float], bounds: Box) -> dict[str, str]:
     """Return gain -> "lower" or "upper" for gains within 2 % of a bound in log space."""
     places = {name: math.log(gains[name] / low) / math.log(high / low) for name, (low, high) in bounds.items()}
-    near = {name: place for name, place in places.items() if min(place, 1.0 - place) <= NEAR}
+    near = {name: place for name, place in places.items() if min(place, 1.0 - place) <= BOUND_MARGIN}
     return {name: "lower" if place < 0.5 else "upper" for name, place in near.items()}
 
 
-def largest(law: Component, gains: Mapping[str, float], u_max: float) -> dict[str, float]:
+def actuator_limits(law: Component, gains: Mapping[str, float], u_max: float) -> dict[str, float]:
     """Return the upper bound of each gain that the law divides by another one: u_max b for the force k / b."""
-    known = law.template.gains if law.template else {}
+    declared = law.template.gains if law.template else {}
     values = {**law.gains, **gains}
-    return {name: u_max * values[gain.over] for name, gain in known.items() if gain.over is not None}
+    return {name: u_max * values[gain.over] for name, gain in declared.items() if gain.over is not None}
 
 
 def widened(law: Component, bounds: Box) -> dict[str, tuple[float, float]]:
     """Return bounds a decade wider on either side, except above the actuator's limit."""
-    by = 10**WIDENING
+    factor = 10**WIDENING
     return {
-        name: (low / by, high * (1 if _gain(law, name).unit == FORCE else by)) for name, (low, high) in bounds.items()
+        name: (low / factor, high * (1 if _gain(law, name).unit == FORCE else factor))
+        for name, (low, high) in bounds.items()
     }

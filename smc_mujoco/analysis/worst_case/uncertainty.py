@@ -26,16 +26,16 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Relay, Signal
 from smc_mujoco.simulation.time_series import Held, TimeSeries
 
-KNOT = 0.5  # s between the knots of a random disturbance, straight lines in between; chosen
-LEAST_KNOTS = 8  # of a random disturbance in a run; chosen
-LONGEST = 0.4  # of a run: the longest change of a force; chosen
-SHIFTED = 0.5  # of all changes of a force shift a switch, if there is one; the others turn a piece round; chosen
-MOVED = 0.5  # of the constants move in a change of constants; chosen
-DRIFT = 0.3  # standard deviation by which a constant moves, of its range; chosen
-JITTER_SHARES = 8  # of the control period, in which jitter is counted; chosen
+KNOT_SPACING = 0.5  # s between the knots of a random disturbance, straight lines in between; chosen
+MIN_KNOTS = 8  # of a random disturbance in a run; chosen
+MAX_PIECE_SHARE = 0.4  # of a run: the longest piece of a force that a change reverses; chosen
+SHIFT_PROBABILITY = 0.5  # that a change of a force shifts a switch, if there is one, and reverses no piece; chosen
+MOVE_PROBABILITY = 0.5  # of each constant, in a change of constants; chosen
+CONSTANT_DEVIATION = 0.3  # standard deviation by which a constant moves, of its range; chosen
+JITTER_SHARES = 8  # jitter is a multiple of this part of the control period; chosen
 ROUNDING = 1e-12  # of the largest force: a smaller change of slope is none
-USUAL_SHARE = 1 / 6  # of the force that the drives can give: the disturbance where no class is given; chosen
-USUAL_SCALE = (0.5, 1.5)  # of the friction that a scenario has, where no class is given; chosen
+DEFAULT_FORCE_SHARE = 1 / 6  # of the force of the weakest drive: the disturbance of the default class; chosen
+DEFAULT_FRICTION_SCALE = (0.5, 1.5)  # of the default class; chosen
 
 Range = tuple[float, float]
 
@@ -107,9 +107,9 @@ class Uncertainty:
         x, u = plant.units[0], EFFORT[plant.units[0]]
         parts = [f"|d| <= {self.disturbance:g} {u}"] if self.disturbance else []
         parts += [f"|d'| <= {self.slope:g} {u}/s"] if self.disturbance and self.slope is not None else []
-        held = f" held for {self.hold:g} s"
-        parts += [f"position errors <= {self.position_noise:g} {x}{held}"] if self.position_noise else []
-        parts += [f"velocity errors <= {self.velocity_noise:g} {x}/s{held}"] if self.velocity_noise else []
+        hold = f" held for {self.hold:g} s"
+        parts += [f"position errors <= {self.position_noise:g} {x}{hold}"] if self.position_noise else []
+        parts += [f"velocity errors <= {self.velocity_noise:g} {x}/s{hold}"] if self.velocity_noise else []
         ranges = {"delay (s)": self.delay, f"friction ({u})": self.friction, "friction x": self.friction_scale}
         ranges |= {"mass x": self.mass, **self.parameters}
         parts += [f"{name} {low:g} to {high:g}" for name, (low, high) in ranges.items() if low < high]
@@ -118,16 +118,17 @@ class Uncertainty:
         return ", ".join(parts)
 
 
-def usual(scenario: Scenario) -> Uncertainty:
-    """Return the class where none is given: what the plant declares, else a disturbance; and friction, if it has some.
+def default_class(scenario: Scenario) -> Uncertainty:
+    """Return the class of a scenario for which none is given.
 
-    The disturbance is up to a sixth of the force of the weakest drive.
+    It is what the plant declares, or else a disturbance up to a sixth of the force of the weakest drive. Friction, if
+    there is some, varies by half of it.
     """
     declared = scenario.plant.uncertain
     return Uncertainty(
-        disturbance=0.0 if declared else USUAL_SHARE * strength(scenario),
+        disturbance=0.0 if declared else DEFAULT_FORCE_SHARE * strength(scenario),
         parameters=declared,
-        friction_scale=USUAL_SCALE if scenario.friction or _dry(scenario.plant) else (1.0, 1.0),
+        friction_scale=DEFAULT_FRICTION_SCALE if scenario.friction or _dry(scenario.plant) else (1.0, 1.0),
     )
 
 
@@ -206,11 +207,11 @@ class Members:
         self.samples = scenario.samples
         self.forced = within.disturbance > 0.0
         self.slope = 0.0 if within.slope is None else within.slope * self.h
-        sets: dict[str, Put] = {"set": lambda _, share: scenarios[min(int(share * count), count - 1)]}
+        sets: dict[str, SetConstant] = {"set": lambda _, share: scenarios[min(int(share * count), count - 1)]}
         self.constants = (sets if count > 1 else {}) | dict(_constants(scenario, within))
         self.ends = [[0.0, 1.0] for _ in self.constants]
-        self.held = max(1, round(within.hold / self.h))  # samples for which an error of measurement is held
-        self.times = -(-self.samples // self.held) if within.position_noise or within.velocity_noise else 0
+        self.hold = max(1, round(within.hold / self.h))  # samples that an error of measurement lasts
+        self.times = -(-self.samples // self.hold) if within.position_noise or within.velocity_noise else 0
         if self.times and any(scenario.noise.errors):
             cure = "the adversary chooses them: leave them out"
             raise ScenarioError(f"the scenario has errors of measurement, {scenario.noise.errors}, and {cure}")
@@ -219,35 +220,39 @@ class Members:
             self.ends[0], middle[0] = [(i + 0.5) / count for i in range(count)], 0.0
         self.bare = Member(middle, np.zeros(0), np.zeros((2, self.times)))
         for share in (0.0, 1.0):
-            self.placed(np.full(len(self.constants), share))
+            self.with_constants(np.full(len(self.constants), share))  # raises if the plant lacks one
 
-    def placed(self, shares: np.ndarray) -> Scenario:
+    def with_constants(self, shares: np.ndarray) -> Scenario:
         """Return the scenario with constants of the class."""
-        made = self.scenario
-        for put, share in zip(self.constants.values(), shares.tolist(), strict=True):
-            made = put(made, share)
-        return made
+        scenario = self.scenario
+        for set_constant, share in zip(self.constants.values(), shares.tolist(), strict=True):
+            scenario = set_constant(scenario, share)
+        return scenario
 
     def scenario_of(self, member: Member, relay: Relay | None = None) -> Scenario:
-        """Return the scenario of a member, an ordinary one; or of a relay in place of its force, from a start on."""
-        made, force = self.placed(member.shares), self.within.disturbance * member.force
+        """Return the scenario of a member. From its start on, a relay takes the place of the member's force."""
+        scenario, force = self.with_constants(member.shares), self.within.disturbance * member.force
         if relay:
             force = np.where(np.arange(len(force)) * self.h < relay.start, force, 0.0)
         signals = ([self.signal(force)] if force.any() else []) + ([relay] if relay else [])
-        made = dataclasses.replace(made, disturbance=(*made.disturbance, *signals))
+        scenario = dataclasses.replace(scenario, disturbance=(*scenario.disturbance, *signals))
         if self.times:
-            made = dataclasses.replace(made, noise=dataclasses.replace(made.noise, **self.errors(member.noise)))
-        return made
+            noise = dataclasses.replace(scenario.noise, **self.errors(member.noise))
+            scenario = dataclasses.replace(scenario, noise=noise)
+        return scenario
 
     def errors(self, noise: np.ndarray) -> dict[str, Signal]:
         """Return the signals of a member's errors of measurement."""
         bounds = {"position_error": self.within.position_noise, "velocity_error": self.within.velocity_noise}
-        t = (np.arange(self.times + 1) * self.held * self.h).tolist()
+        t = (np.arange(self.times + 1) * self.hold * self.h).tolist()
         rows = zip(bounds.items(), noise, strict=True)
         return {name: Held(t, [*(bound * row).tolist(), 0.0]) for (name, bound), row in rows if bound}
 
     def signal(self, values: np.ndarray) -> Signal:
-        """Return values at the control samples as a signal: steps if they mostly rest and may jump, else lines."""
+        """Return values at the control samples as a signal: steps if fewer than half of them change and may jump.
+
+        Else it has straight lines between the samples.
+        """
         change = np.diff(values)
         steps = not self.slope and 2 * np.count_nonzero(change) < len(change)
         bends = change != 0.0 if steps else np.abs(np.diff(change, append=math.inf)) > ROUNDING * np.abs(values).max()
@@ -255,17 +260,17 @@ class Members:
         return (Held if steps else TimeSeries)((at * self.h).tolist(), values[at].tolist())
 
     def limited(self, force: np.ndarray) -> np.ndarray:
-        """Return a force of the class that is near to one: within -1 .. 1, and not too steep."""
+        """Return a force limited to -1 .. 1, and in its slope."""
         force, change = np.clip(force, -1.0, 1.0), self.slope / self.within.disturbance
         if not change or np.abs(np.diff(force)).max(initial=0.0) <= change:
             return force
-        made = [before := float(force[0])]
-        made += [before := min(max(value, before - change), before + change) for value in force[1:].tolist()]
-        return np.array(made)
+        limited = [before := float(force[0])]
+        limited += [before := min(max(value, before - change), before + change) for value in force[1:].tolist()]
+        return np.array(limited)
 
     def random(self, rng: np.random.Generator) -> Member:
         """Return a member drawn at random: uniform constants, knots and errors."""
-        knot = min(KNOT, self.samples * self.h / LEAST_KNOTS)
+        knot = min(KNOT_SPACING, self.samples * self.h / MIN_KNOTS)
         knots = np.arange(math.ceil(self.samples * self.h / knot) + 1) * knot
         values = np.interp(np.arange(self.samples + 1) * self.h, knots, rng.uniform(-1.0, 1.0, len(knots)))
         return Member(
@@ -280,10 +285,12 @@ class Members:
         weights = np.array([3.0 * self.forced, 2.0 * (self.times > 0), len(self.constants) > 0], float)
         what = rng.choice(3, p=weights / weights.sum())
         if what == 0:
-            return dataclasses.replace(member, force=self.limited(turned(member.force, rng)))
+            return dataclasses.replace(member, force=self.limited(mutated_signal(member.force, rng)))
         if what == 1:
-            return dataclasses.replace(member, noise=np.array([turned(row, rng) for row in member.noise]))
-        moves = rng.normal(0.0, DRIFT, len(self.constants)) * (rng.random(len(self.constants)) < MOVED)
+            return dataclasses.replace(member, noise=np.array([mutated_signal(row, rng) for row in member.noise]))
+        moves = rng.normal(0.0, CONSTANT_DEVIATION, len(self.constants)) * (
+            rng.random(len(self.constants)) < MOVE_PROBABILITY
+        )
         return dataclasses.replace(member, shares=np.clip(member.shares + moves, 0.0, 1.0))
 
     def size(self, knots: int) -> int:
@@ -291,9 +298,12 @@ class Members:
         return len(self.constants) + knots * (self.forced + 2 * (self.times > 0))
 
     def moved(self, member: Member, z: np.ndarray, knots: int) -> Member:
-        """Return the member that is moved by numbers, (size,): constants, and straight lines added between knots."""
+        """Return a member moved by numbers z, (size,): those of its constants, then those of the knots of its signals.
+
+        Straight lines between the knots are added to the force, or to both errors of measurement.
+        """
         m, rows = len(self.constants), np.reshape(z[len(self.constants) : self.size(knots)], (-1, knots))
-        shares, at = np.clip(member.shares + DRIFT * z[:m], 0.0, 1.0), np.linspace(0.0, 1.0, knots)
+        shares, at = np.clip(member.shares + CONSTANT_DEVIATION * z[:m], 0.0, 1.0), np.linspace(0.0, 1.0, knots)
 
         def added(row: np.ndarray, more: np.ndarray) -> np.ndarray:
             return np.clip(row + 2.0 * np.interp(np.linspace(0.0, 1.0, len(row)), at, more), -1.0, 1.0)
@@ -303,72 +313,72 @@ class Members:
         return Member(shares, force, np.array(noise), member.kind)
 
 
-def turned(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return values, (K,), of which a random piece is turned round, or a switch comes earlier or later."""
-    made, last = values.copy(), len(values) - 1
-    length = round(math.exp(rng.uniform(0.0, math.log(max(2.0, LONGEST * last)))))
+def mutated_signal(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return values, (K,), of which a random piece is reversed in sign, or a switch comes earlier or later."""
+    mutated, last = values.copy(), len(values) - 1
+    length = round(math.exp(rng.uniform(0.0, math.log(max(2.0, MAX_PIECE_SHARE * last)))))
     switches = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1])) + 1
-    if len(switches) and rng.random() < SHIFTED:
+    if len(switches) and rng.random() < SHIFT_PROBABILITY:
         at = int(rng.choice(switches))
         piece = slice(max(0, at - length), at) if rng.random() < 0.5 else slice(at, at + length)
     else:
         at = int(rng.integers(1 - length, max(last, 2 - length)))
         piece = slice(max(0, at), at + length)
-    made[piece] *= -1.0
-    return made
+    mutated[piece] *= -1.0
+    return mutated
 
 
-Put = Callable[[Scenario, float], Scenario]
+SetConstant = Callable[[Scenario, float], Scenario]
 
 
-def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[tuple[str, Put]]:
-    """Yield the name of each constant that may differ, and the function that puts a share of its range."""
+def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[tuple[str, SetConstant]]:
+    """Yield the name of each constant that may differ, and the function that sets it to a share of its range."""
     if within.delay != (0.0, 0.0):
-        yield "delay", _of_range(within.delay, _delayed)
+        yield "delay", _of_range(within.delay, _with_delay)
     if within.jitter:
-        yield "jitter", _of_range((0.0, within.jitter / scenario.control_period), later)
+        yield "jitter", _of_range((0.0, within.jitter / scenario.control_period), with_jitter)
     for name, bounds in {"mass": within.mass, **within.parameters}.items():
         if bounds != (1.0, 1.0):
-            yield name, _of_range(bounds, functools.partial(_changed, name=name))
+            yield name, _of_range(bounds, functools.partial(_with_factor, name=name))
     if within.friction != (0.0, 0.0):
-        yield "friction", _of_range(within.friction, rougher)
+        yield "friction", _of_range(within.friction, with_friction)
     if within.friction_scale != (1.0, 1.0):
         if not (scenario.friction or _dry(scenario.plant)):
             cure = "give it some, such as friction=smc.Coulomb(0.1), or a class with friction=(0.0, 0.1)"
             raise ScenarioError(f"friction_scale of {scenario.plant.name}, which has no friction here: {cure}")
-        yield "friction x", _of_range(within.friction_scale, _scaled)
+        yield "friction x", _of_range(within.friction_scale, _with_friction_scale)
     for i in range(scenario.plant.n if within.x0 else 0):
-        yield f"x0[{i}]", _of_range((-within.x0, within.x0), functools.partial(_started, i=i))
+        yield f"x0[{i}]", _of_range((-within.x0, within.x0), functools.partial(_with_start, i=i))
 
 
-def _of_range(bounds: Range, put: Put) -> Put:
-    """Return a function that puts the value at a share of a range."""
+def _of_range(bounds: Range, put: SetConstant) -> SetConstant:
+    """Return a function that sets the value at a share of a range."""
     low, high = bounds
     return lambda scenario, share: put(scenario, low + share * (high - low))
 
 
-def _delayed(scenario: Scenario, delay: float) -> Scenario:
+def _with_delay(scenario: Scenario, delay: float) -> Scenario:
     """Return the scenario with a longer input delay, to the nearest physics step."""
     step = scenario.resolved.physics_step
     return dataclasses.replace(scenario, input_delay=(scenario.delay_steps + round(delay / step)) * step)
 
 
-def _changed(scenario: Scenario, value: float, name: str) -> Scenario:
-    """Return the scenario with a factor on a parameter of the plant, or with more of what is added to it."""
-    plant, own = scenario.plant, dict(scenario.mismatch)
-    name = plant.mass if name == "mass" and plant.mass in own else name
-    own[name] = own.get(name, 0.0) + value if name in plant.added else own.get(name, 1.0) * value
-    return dataclasses.replace(scenario, mismatch=own)
+def _with_factor(scenario: Scenario, value: float, name: str) -> Scenario:
+    """Return the scenario with a factor on a parameter of the plant, or a term for a parameter of `plant.added`."""
+    plant, mismatch = scenario.plant, dict(scenario.mismatch)
+    name = plant.mass if name == "mass" and plant.mass in mismatch else name
+    mismatch[name] = mismatch.get(name, 0.0) + value if name in plant.added else mismatch.get(name, 1.0) * value
+    return dataclasses.replace(scenario, mismatch=mismatch)
 
 
-def _started(scenario: Scenario, share: float, i: int) -> Scenario:
-    """Return the scenario with another start of one channel."""
+def _with_start(scenario: Scenario, share: float, i: int) -> Scenario:
+    """Return the scenario with the start of one channel moved by a share of it."""
     x0 = list(scenario.resolved.x0)
     x0[i] *= 1.0 + share
     return dataclasses.replace(scenario, x0=x0)
 
 
-def rougher(scenario: Scenario, level: float) -> Scenario:
+def with_friction(scenario: Scenario, level: float) -> Scenario:
     """Return the scenario with `level` added to its dry friction, N or N m."""
     others = tuple(part for part in scenario.friction if not isinstance(part, Coulomb))
     before = sum(part.level for part in scenario.friction if isinstance(part, Coulomb))
@@ -380,15 +390,15 @@ def _dry(plant: Plant) -> list[str]:
     return [name for name in plant.dry if plant.parameters[name]]
 
 
-def _scaled(scenario: Scenario, factor: float) -> Scenario:
+def _with_friction_scale(scenario: Scenario, factor: float) -> Scenario:
     """Return the scenario with a factor on its friction, and on the dry friction of its plant."""
-    made = dataclasses.replace(scenario, friction=tuple(part.scaled(factor) for part in scenario.friction))
+    scenario = dataclasses.replace(scenario, friction=tuple(part.scaled(factor) for part in scenario.friction))
     for name in _dry(scenario.plant):
-        made = _changed(made, factor, name)
-    return made
+        scenario = _with_factor(scenario, factor, name)
+    return scenario
 
 
-def later(scenario: Scenario, level: float) -> Scenario:
+def with_jitter(scenario: Scenario, level: float) -> Scenario:
     """Return the scenario whose samples are late by up to `level` control periods, counted in eighths of one."""
     steps = JITTER_SHARES * math.ceil(scenario.steps / JITTER_SHARES)
     jitter = round(level * JITTER_SHARES) / JITTER_SHARES * scenario.control_period

@@ -1,4 +1,4 @@
-"""smc-mujoco tune, margins, basin, chatter: one question about laws on a plant, answered by many runs."""
+"""smc-mujoco tune, margins, worst, accuracy, basin, chatter: one question about laws on a plant, by many runs."""
 
 import dataclasses
 from pathlib import Path
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from smc_mujoco.control.law import Law
     from smc_mujoco.simulation.scenario import Scenario
 
-QUICK = {  # of `margins --quick`
+QUICK_MARGINS = {  # defaults of `margins --quick`
     "plants": ["inverted_pendulum", "duffing"],
     "laws": ["observer_free", "classical", "adaptive", "super_twisting"],
     "kinds": ["delay", "disturbance"],
@@ -33,9 +33,12 @@ def tune(
         int | None, typer.Option(min=1, help="Sets of gains to try at most; default: several starts of the search.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search and of the noise.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="Also write gains, history and provenance to a .json file.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Also write gains, history and provenance to a file.")
+    ] = None,
     front: Annotated[
-        Path | None, typer.Option(help="Also draw error against variation, as FRONT.svg and .png.")
+        Path | None,
+        typer.Option(metavar="PICTURE", help=f"Also draw error against variation, {options.PICTURE}."),
     ] = None,
     chattering: Annotated[
         float | None, typer.Option(help="Largest predicted amplitude of s, in its unit, in the first condition.")
@@ -102,7 +105,7 @@ def margins(
     ] = False,
     condition: options.Condition = "nominal",
     x0: options.X0 = None,
-    out: Annotated[Path | None, typer.Option(help="Also write the table to a .csv file.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="Also write the table to a file.")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
@@ -126,20 +129,20 @@ def margins(
         from smc_mujoco.simulation.conditions import PLANTS
 
     json, terminal = options.json_file(json, out and ended(out, ".csv"))
-    machines = [options.plant(text) for text in options.names(plants, QUICK["plants"] if quick else PLANTS)]
-    chosen = options.laws(law, QUICK["laws"] if quick else gain_sets.LAWS)
-    kind = options.names(kinds, QUICK["kinds"] if quick else KINDS)
-    with bar("margins") as drawn:
+    machines = [options.plant(text) for text in options.names(plants, QUICK_MARGINS["plants"] if quick else PLANTS)]
+    chosen = options.laws(law, QUICK_MARGINS["laws"] if quick else gain_sets.LAWS)
+    kind = options.names(kinds, QUICK_MARGINS["kinds"] if quick else KINDS)
+    with bar("margins") as progress:
         start = options.starts(x0, None)
-        found = search(machines, chosen, kind, gains, quick, threads, drawn.reached, condition, start)
+        results = search(machines, chosen, kind, gains, quick, threads, progress.reached, condition, start)
     for name in kind:
-        terminal.print(tables.margins(name, [margin for margin in found if margin.kind == name]))
-    count = f"{len(found)} margin{'s' * (len(found) != 1)}"
+        terminal.print(tables.margins(name, [margin for margin in results if margin.kind == name]))
+    count = f"{len(results)} margin{'s' * (len(results) != 1)}"
     terminal.note(f"{count}, {options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim", wrap=True)
     if out:
-        terminal.wrote(save_csv(found, out))
+        terminal.wrote(save_csv(results, out))
     if json:
-        terminal.wrote(save(found, json))
+        terminal.wrote(save(results, json))
 
 
 @errors_as_sentences()
@@ -168,28 +171,33 @@ def worst(
         typer.Option(metavar="NAME=LOW:HIGH", help="Another parameter, as alpha=0.8:1.2. May be repeated."),
     ] = None,
     spread: Annotated[float, typer.Option(help="How far x0 may be off, as a share of it.")] = 0.0,
-    metric: Annotated[str, typer.Option(help="The metric that is to be large; any of `smc.score`.")] = "rms_error",
+    metric: Annotated[str, typer.Option(help="The metric to make large, any of `smc.score`.")] = "rms_error",
     gains: options.Gains = "tuned",
     condition: options.Condition = "nominal",
-    duration: Annotated[float, typer.Option(help="Duration of the runs, s; errors count from a quarter on.")] = 8.0,
+    duration: Annotated[
+        float, typer.Option(help="Duration of the runs, s; the error of the first quarter does not count.")
+    ] = 8.0,
     budget: Annotated[int | None, typer.Option(min=1, help="Runs of a search; default: about 10 s a law.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search.")] = 0,
     out: Annotated[
-        Path | None, typer.Option(help="Also draw the worst runs, as OUT.svg and OUT.png, or OUT.pdf.")
+        Path | None, typer.Option(metavar="PICTURE", help=f"Also draw the worst runs, {options.PICTURE}.")
     ] = None,
     json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
     """Find the worst that can happen to laws within bounds that you give: an adversary instead of random seeds.
 
-    You say what is uncertain, and nothing else: a bound on the disturbance, ranges of mass, delay and friction. If you
-    say nothing, it is what the plant declares, such as an arm's payload, or else a disturbance up to a sixth of what
-    the weakest drive gives. Of a rig, such as qube_servo, the adversary also chooses one of its sets of parameters. The
-    search is the same for every law: constant forces, forces that switch with the sign of s, of e or of its rate, waves
-    at the frequency of the loop, all corners of the ranges, and an evolution from the worst of these. The column worst
-    found has the error of the worst run, the column median that of as many random members of the class. Laws are
-    ordered by the worst. A line below the table says where a class goes beyond the theorem of a law. What is found is
-    a lower bound: there may be worse. The law of your file has its default gains: tune it first (`smc-mujoco tune`).
+    You say only what is uncertain: a bound on the disturbance, ranges of mass, delay and friction. By default, it is
+    what the plant declares, such as an arm's payload, or else a disturbance up to a sixth of what the weakest drive
+    gives. Of a rig, such as qube_servo, the adversary also chooses one of its sets of parameters.
+
+    The search is the same for every law: constant forces, forces that switch with the sign of s, of e or of its rate,
+    waves at the frequency of the loop, all corners of the ranges, and an evolution from the worst of these. There may
+    be worse than what it finds.
+
+    The column "worst found" has the error of the worst run, the column "median" that of as many random runs within the
+    bounds. Laws are ordered by the worst. A line below the table says where the bounds go beyond the theorem of a law.
+    The law of your file has its default gains: tune it first (`smc-mujoco tune`).
 
     Example: smc-mujoco worst duffing --law classical,super_twisting,observer_free --disturbance 2 --mass 0.7:1.3
 
@@ -202,7 +210,7 @@ def worst(
         from smc_mujoco.studies.worst_case import WorstCases, worst_case
 
     json, terminal = options.json_file(json, *(files(out) if out else ()))
-    apart = [text.partition("=") for text in parameter or ()]
+    pairs = [text.partition("=") for text in parameter or ()]
     ranges = {"delay": delay, "mass": mass, "friction": friction, "friction_scale": friction_scale}
     bounds = {
         "disturbance": disturbance,
@@ -211,23 +219,23 @@ def worst(
         "velocity_noise": velocity_noise,
         "jitter": jitter,
         "x0": spread,
-        "parameters": {name: options.low_and_high(f"--parameter {name}", text) for name, _, text in apart},
+        "parameters": {name: options.low_and_high(f"--parameter {name}", text) for name, _, text in pairs},
         **{name: options.low_and_high(f"--{name}", text) for name, text in ranges.items() if text},
     }
-    given: dict[str, Any] = {name: bound for name, bound in bounds.items() if bound}
-    within = Uncertainty(hold=hold, **given) if given else None
-    chosen, cases = _attacked(plant, law, condition, duration, gains)
-    found = WorstCases(worst_case(one, metric, within, budget, seed, threads, progress=True) for one in cases)
-    terminal.print(found)
-    terminal.note(f"{sum(one.tried for one in found)} runs, {options.gains_used(chosen, gains)}", "dim", wrap=True)
+    set_bounds: dict[str, Any] = {name: bound for name, bound in bounds.items() if bound}
+    within = Uncertainty(hold=hold, **set_bounds) if set_bounds else None
+    chosen, cases = _attacked_cases(plant, law, condition, duration, gains)
+    results = WorstCases(worst_case(one, metric, within, budget, seed, threads, progress=True) for one in cases)
+    terminal.print(results)
+    terminal.note(f"{sum(one.tried for one in results)} runs, {options.gains_used(chosen, gains)}", "dim", wrap=True)
     if json:
-        terminal.wrote(write_json(json, [one.about() for one in found]))
+        terminal.wrote(write_json(json, [one.about() for one in results]))
     if out:
-        found.figure(out)
+        results.figure(out)
         terminal.wrote(*files(out))
 
 
-def _attacked(
+def _attacked_cases(
     plant: str, law: list[str] | None, condition: str, duration: float, gains: str
 ) -> "tuple[list[str | Law], list[list[Scenario]]]":
     """Return the laws to attack, and the scenarios of each: one on a plant, one for each set of parameters of a rig."""
@@ -237,10 +245,10 @@ def _attacked(
 
     rigs = annexes.module("smc_mujoco.evidence.rigs.rig", "a rig") if annexes.installed("evidence") else None
     if rigs and plant in rigs.rigs():
-        twin, ensemble = rigs.rig(plant), annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig")
+        rig, ensemble = rigs.rig(plant), annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig")
         gain_set = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
-        named = options.laws(law, of_rig=twin.laws) or twin.laws
-        cases = [ensemble.runs(twin, [one], 1, gain_set, duration) for one in named]
+        chosen = options.laws(law, of_rig=rig.laws) or rig.laws
+        cases = [ensemble.runs(rig, [one], 1, gain_set, duration) for one in chosen]
         return [runs[0].law for runs in cases], cases
     chosen = options.laws(law, gain_sets.LAWS)
     return chosen, [[case(options.plant(plant), one, condition, duration, gains)] for one in chosen]
@@ -265,7 +273,7 @@ def accuracy(
     x0: options.X0 = None,
     spread: options.Spread = None,
     out: Annotated[
-        Path | None, typer.Option(help="Also draw error over period, as OUT.svg and OUT.png, or OUT.pdf.")
+        Path | None, typer.Option(metavar="PICTURE", help=f"Also draw error over period, {options.PICTURE}.")
     ] = None,
     json: options.Json = None,
     threads: options.Threads = None,
@@ -300,16 +308,15 @@ def accuracy(
         h = [float(text) for text in options.names(periods)]
     except ValueError:
         raise ScenarioError(f"--periods {periods!r} cannot be read: give numbers in s, as 0.004,0.002,0.001") from None
-    with bar("accuracy") as drawn:
-        found = measure(
-            chosen, machines, h, condition, seeds, gains, duration, options.starts(x0, spread), threads, drawn.reached
-        )
-    terminal.print(found)
-    terminal.note(f"{sum(row.runs for row in found)} runs, {terminal.seconds:.0f} s", "dim")
+    start = options.starts(x0, spread)
+    with bar("accuracy") as progress:
+        table = measure(chosen, machines, h, condition, seeds, gains, duration, start, threads, progress.reached)
+    terminal.print(table)
+    terminal.note(f"{sum(row.runs for row in table)} runs, {terminal.seconds:.0f} s", "dim")
     if json:
-        terminal.wrote(found.save(json))
+        terminal.wrote(table.save(json))
     if pictures:
-        found.plot(out)
+        table.plot(out)
         terminal.wrote(*pictures)
 
 
@@ -317,22 +324,21 @@ def accuracy(
 def basin(
     plant: options.PlantName,
     law: Annotated[
-        str, typer.Option(autocompletion=options.LAWS, help=f"A law. {options.OWN_GAINS}")
+        str, typer.Option(autocompletion=options.LAWS, help=f"A law. {options.GAINS_HELP}")
     ] = "observer_free",
     points: Annotated[int, typer.Option(min=2, help="Number of positions, and of velocities.")] = 50,
     gains: options.Gains = "tuned",
     duration: Annotated[float, typer.Option(help="Duration of the longest runs, s.")] = 10.0,
-    out: Annotated[Path | None, typer.Option(help="Also draw the map, as OUT.svg and OUT.png, or OUT.pdf.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="PICTURE", help=f"Also draw the map, {options.PICTURE}.")] = None,
     json: options.Json = None,
     condition: options.Condition = "nominal",
     threads: options.Threads = None,
 ) -> None:
     """Map a region of attraction: run a grid of initial positions and velocities, and show which come to rest at 0.
 
-    Positions reach from half a turn on one side to half a turn on the other; on a rail, twice as far as the plant's own
-    start. Velocities reach three times the number of the largest position, per second. All channels of a network have
-    the same start. A run ends as soon as its outcome is decided, by the rule in
-    smc_mujoco.analysis.region_of_attraction.
+    Positions reach half a turn to either side; on a rail, twice as far as the plant's start. The largest velocity is
+    three times the largest position, per second. All channels of a network have the same start. A run ends as soon as
+    its outcome is decided, by the rule in smc_mujoco.analysis.region_of_attraction.
 
     Example: smc-mujoco basin inverted_pendulum --law classical --out classical.png
     """
@@ -346,28 +352,28 @@ def basin(
     pictures = files(out) if out else []
     json, terminal = options.json_file(json, *pictures)
     chosen = options.law(law)
-    with bar(f"{law} on {plant}") as drawn:
-        found = search(
+    with bar(f"{law} on {plant}") as progress:
+        region = search(
             options.plant(plant),
             chosen,
             (points, points),
             gains=gains,
             duration=duration,
             threads=threads,
-            report=drawn.reached,
+            report=progress.reached,
             condition=condition,
         )
-    terminal.note(f"{found.law} on {found.plant}: {100 * found.share:.3g} % of the states converge")
-    yes, no, undecided = (int((found.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED))
+    terminal.note(f"{region.law} on {region.plant}: {100 * region.share:.3g} % of the states converge")
+    yes, no, undecided = (int((region.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED))
     terminal.note(
         f"{yes} converge, {no} do not, {undecided} undecided after {duration:g} s; "
         f"{options.gains_used([chosen], gains)}, {terminal.seconds:.0f} s",
         "dim",
     )
     if json:
-        terminal.wrote(found.save(json))
+        terminal.wrote(region.save(json))
     if pictures:
-        draw([found], out)
+        draw([region], out)
         terminal.wrote(*pictures)
 
 
@@ -392,7 +398,7 @@ def chatter(
     ] = None,
     duration: Annotated[float, typer.Option(min=0.1, help="Duration of the runs that measure it, s.")] = 8.0,
     out: Annotated[
-        Path | None, typer.Option(help="Also draw Nyquist plots and runs, as OUT.svg and OUT.png, or OUT.pdf.")
+        Path | None, typer.Option(metavar="PICTURE", help=f"Also draw Nyquist plots and runs, {options.PICTURE}.")
     ] = None,
     json: options.Json = None,
     threads: options.Threads = None,
@@ -403,18 +409,20 @@ def chatter(
     law's describing function N and the response L of the linearised mechanism: N L = 1. The column "±" is how far
     the predicted amplitude or frequency may be off. There are two reasons: s has harmonics, and the cycle may be locked
     to the control samples, which shifts the instant at which the law switches. A star marks a run whose amplitude or
-    frequency changes by more than 10 % with half the physics step. The column "third" is the share of the third
-    harmonic. If the plant has several driven channels, the column "coupling" is how far this channel's command
-    moves another channel, relative to its own motion. The prediction is for a single channel, so it fails if that is
-    not small, because the channels then oscillate together.
+    frequency changes by more than 10 % with half the physics step. The column "third" is the third harmonic over the
+    first.
 
-    With --amplitude or --frequency, the gains of each law are scaled in proportion until the prediction is what you ask
-    for. Then the constant disturbance that they tolerate is measured.
+    If the plant has several driven channels, the column "coupling" is how far this channel's command moves another
+    channel, over how far it moves this one. The prediction is for a single channel. It fails if the coupling is not
+    small, because the channels then oscillate together.
+
+    With --amplitude or --frequency, the gains of each law are scaled in proportion until the prediction meets the
+    bound. Then the constant disturbance that they tolerate is measured.
 
     Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --out chatter
     """
     with held_back():
-        from smc_mujoco.analysis.chattering import chattering, save, shared
+        from smc_mujoco.analysis.chattering import chattering, save, shared_assumptions
         from smc_mujoco.analysis.gains_for import design
         from smc_mujoco.analysis.step_halving import step_halving
         from smc_mujoco.cli import tables
@@ -439,18 +447,18 @@ def chatter(
                 terminal.note(f"{one.law.name} is left out: {error}", "yellow", wrap=True)
         if not designs:
             raise ScenarioError("no law has such gains: give a larger --amplitude or --frequency")
-        cases = [dataclasses.replace(one, law=chosen.law) for one, chosen in designs]
-    with bar("chattering") as drawn:
+        cases = [dataclasses.replace(one, law=designed.law) for one, designed in designs]
+    with bar("chattering") as progress:
         cycles = []
         for done, scenario in enumerate(cases):
-            drawn.reached(done, len(cases) + 1)
+            progress.reached(done, len(cases) + 1)
             cycles.append(chattering(scenario, channel))
         traces = run(cases, threads=threads)
         measured, changes = [channel_cycle(trace, channel) for trace in traces], step_halving(traces, channel, threads)
     terminal.print(tables.chattering(cases, channel, cycles, measured, changes))
     if designs:
-        terminal.print(tables.designs([chosen for _, chosen in designs], cases[0].efforts[channel]))
-    terminal.note("assumed: " + "; ".join(shared(cycles)), wrap=True)
+        terminal.print(tables.designs([designed for _, designed in designs], cases[0].efforts[channel]))
+    terminal.note("assumed: " + "; ".join(shared_assumptions(cycles)), wrap=True)
     terminal.note(f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim", wrap=True)
     if json:
         terminal.wrote(save(cases, cycles, measured, changes, json))

@@ -48,7 +48,9 @@ def laws(
     name: Annotated[
         str | None,
         typer.Argument(
-            metavar="NAME", autocompletion=options.LAWS, help="A law, surface or velocity estimator; by default all."
+            metavar="NAME|FILE",
+            autocompletion=options.LAWS,
+            help="A law, surface or velocity estimator, or a file with a law; by default all.",
         ),
     ] = None,
     needs: Annotated[
@@ -78,6 +80,8 @@ def laws(
 
     Example: smc-mujoco laws super_twisting
 
+    Example: smc-mujoco laws my_law.py
+
     Example: smc-mujoco laws --needs continuous,two-gains
     """
     with held_back():
@@ -90,5 +94,7 @@ def laws(
     if filtered:
         chosen = None if plant is None else options.plant(plant)
         law_pages.print_suitable(options.names(needs), family, chosen, Terminal())
+    elif name is None:
+        law_pages.print_lists(Terminal())
     else:
         law_pages.print_pages(name, Terminal())

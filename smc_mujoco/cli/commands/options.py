@@ -21,21 +21,22 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation import conditions as named
     from smc_mujoco.simulation.initial_states import Starts
 
-SEPARATOR = re.compile(r",(?![^(]*\))")  # a comma outside brackets
-FIELD = re.compile(r"\w+\s*=")  # of a scenario, in a condition
-OWN_GAINS = "With your own gains: pid(kp=50, ki=1). Of a file: my_law.py, or gains.json of `smc-mujoco tune --out`."
+COMMA = re.compile(r",(?![^(]*\))")  # a comma outside brackets
+FIELD_START = re.compile(r"\w+\s*=")  # of a scenario, in a condition
+PICTURE = "as PICTURE.svg and PICTURE.png, or PICTURE.pdf"  # what the help says of a figure's file
+GAINS_HELP = "With your own gains: pid(kp=50, ki=1). Of a file: my_law.py, or gains.json of `smc-mujoco tune --out`."
 
 
 def _completing(module: str, name: str) -> Callable[[str], list[str]]:
-    """Return a function that completes the last name of a text such as "a,b" or "a+b" for a shell.
+    """Return a shell's function that completes the last name of a text such as "a,b" or "a+b".
 
     Args:
-      module, name: of the names to choose from, or of the function that returns them.
+      module, name: where the names to choose from are, or the function that returns them.
     """
 
     def complete(incomplete: str) -> list[str]:
-        found = getattr(importlib.import_module(f"smc_mujoco.{module}"), name)
-        known: Any = found() if callable(found) else found
+        names = getattr(importlib.import_module(f"smc_mujoco.{module}"), name)
+        known: Any = names() if callable(names) else names
         last = re.split("[,+]", incomplete)[-1]
         return [incomplete + one[len(last) :] for one in known if one.startswith(last)]
 
@@ -49,7 +50,7 @@ Columns = Annotated[
     str | None,
     typer.Option(
         metavar="NAME=COLUMN,...",
-        help="Columns of the files that have other names than the rig's, as theta=arm_angle,plant_input=voltage.",
+        help="Columns whose names in the files differ from the rig's, as theta=arm_angle,plant_input=voltage.",
     ),
 ]
 Conditions = Annotated[
@@ -97,7 +98,7 @@ Laws = Annotated[
         "--law",
         metavar="LAW|FILE",
         autocompletion=LAWS,
-        help=f"Laws of `smc-mujoco laws`, as a,b. {OWN_GAINS} May be repeated.",
+        help=f"Laws of `smc-mujoco laws`, as a,b. {GAINS_HELP} May be repeated.",
         show_default=False,
     ),
 ]
@@ -156,17 +157,18 @@ def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> lis
         return list(default)
     parts = []
     for text in [texts] if isinstance(texts, str) else texts:
-        parts += (own := [name.strip() for name in SEPARATOR.split(text) if name.strip()])
-        if not own:
+        of_text = [name.strip() for name in COMMA.split(text) if name.strip()]
+        if not of_text:
             raise ScenarioError(f"{text!r} holds no name: give names, as a,b")
+        parts += of_text
     return parts
 
 
 def json_file(json: Path | None, *others: Path | None) -> "tuple[Path | None, Terminal]":
-    """Return where a command is to write the result for --json, and its console, which prints the result for "-".
+    """Return the file for --json, and the console of the command, which prints that file for "-".
 
     Args:
-      others: what it writes besides. That all can be written is found out before minutes are spent.
+      others: files that the command writes besides. All are checked now, before minutes are spent.
     """
     from smc_mujoco.cli.terminal import Terminal
     from smc_mujoco.common.files import ended, writable
@@ -197,9 +199,9 @@ def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
     return values
 
 
-def key(given: int | None) -> int | str:
+def noise_key_of(number: int | None) -> int | str:
     """Return the noise key of a study from the option --noise-key."""
-    return "drawn" if given is None else given
+    return "drawn" if number is None else number
 
 
 def columns(text: str | None) -> dict[str, str]:
@@ -229,8 +231,8 @@ def law(text: str) -> "str | Law":
     """
     from smc_mujoco.control import from_text
 
-    given_laws = from_text.laws(text)
-    return given_laws[0] if len(given_laws) == 1 else from_text.law(text)
+    laws_of_text = from_text.laws(text)
+    return laws_of_text[0] if len(laws_of_text) == 1 else from_text.law(text)
 
 
 def law_with(text: str, gains: str) -> "Law":
@@ -280,7 +282,7 @@ def _conditions_apart(texts: Sequence[str]) -> list[str]:
     for text in texts:
         first = len(chosen)
         for part in names(text):
-            if len(chosen) > first and ":" in chosen[-1] and ":" not in part and FIELD.match(part):
+            if len(chosen) > first and ":" in chosen[-1] and ":" not in part and FIELD_START.match(part):
                 chosen[-1] += f", {part}"
             else:
                 chosen.append(part)

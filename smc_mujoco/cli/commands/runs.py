@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 @errors_as_sentences()
 def run(
     name: options.SceneName,
-    out: Annotated[Path, typer.Option(help="Folder for results; each scene has its own in it.")] = Path("videos"),
+    out: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="For results; each scene has a folder of its name in it.")
+    ] = Path("videos"),
     film: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
     speed: Annotated[
         float | None,
@@ -79,7 +81,7 @@ def run(
 @errors_as_sentences()
 def show(
     trace: Annotated[Path, typer.Argument(metavar="TRACE", help="A .npz file from `smc-mujoco run` or Trace.save.")],
-    figure: Annotated[Path | None, typer.Option(help="Also draw it, as FIGURE.svg and FIGURE.png.")] = None,
+    figure: Annotated[Path | None, typer.Option(metavar="PICTURE", help=f"Also draw it, {options.PICTURE}.")] = None,
     export: Annotated[
         str | None,
         typer.Option(

@@ -37,7 +37,9 @@ def which(
     x0: options.X0 = None,
     spread: options.Spread = None,
     relevant: options.Relevant = None,
-    out: Annotated[Path, typer.Option(help="Folder for gains and runs; a later call reuses them.")] = Path("which"),
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="For gains and runs; a later call reuses them.")] = Path(
+        "which"
+    ),
     defaults: options.Defaults = False,
     noise_key: options.NoiseKey = None,
     disturbance: Annotated[
@@ -47,15 +49,15 @@ def which(
 ) -> None:
     """Advise a law for a plant: which to use, with which gains, why, the second choice, and how sure that is.
 
-    All laws that suit are compared, with gains that were tuned for the plant by one rule: those of the package, or else
-    found now, which takes some seconds for each law. A first round with few starts selects the finalists. They run from
-    new starts and noises, and over all gains that their tuning may end with. The rules are those of `compare`: a law is
-    better only if its values are lower by more than the least relevant difference, in a paired test that is
-    corrected for all comparisons. If no law is better than another, the answer says so. If you stop the command, it
-    continues when you start it again.
+    All laws that suit the plant are compared. Their gains are those that the package has for it, or else they are tuned
+    now by the same rule, which takes some seconds for each law. A first round with few starts selects the finalists.
+    They run from new starts, with new noise, and with all sets of gains that their tuning may end with. The rules are
+    those of `compare`: a law is better only if its values are lower by more than the least relevant difference, in a
+    paired test that is corrected for all comparisons. If no law is better than another, the answer says so. If you stop
+    the command, it continues when you start it again.
 
-    The need robust is not of these runs: an adversary attacks each finalist within a bound on the disturbance, and the
-    worst that it finds is compared, see `smc-mujoco worst`. The answer tells the median of random disturbances beside.
+    For the need robust, an adversary attacks each finalist within a bound on the disturbance, and the worst runs are
+    compared, see `smc-mujoco worst`. The answer also gives the median of random disturbances.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --needs calm,fast
 
@@ -64,7 +66,7 @@ def which(
     Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition "worn: sensor=Encoder(counts=4096)" --needs accurate
     """
     with held_back():
-        from smc_mujoco.analysis.differences import RELEVANT
+        from smc_mujoco.analysis.relevant_difference import RELEVANT
         from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
         from smc_mujoco.studies.adviser import which as advise
 
@@ -83,7 +85,7 @@ def which(
         progress=True,
         defaults=defaults,
         relevant=RELEVANT if relevant is None else relevant,
-        noise_key=options.key(noise_key),
+        noise_key=options.noise_key_of(noise_key),
         within=None if disturbance is None else Uncertainty(disturbance=disturbance),
     )
     terminal.print(advice)
@@ -108,13 +110,13 @@ def compare(
     spread: options.Spread = None,
     relevant: options.Relevant = None,
     defaults: options.Defaults = False,
-    out: Annotated[Path, typer.Option(help="Folder for gains and runs; the same command continues there.")] = Path(
-        "compared"
-    ),
+    out: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="For gains and runs; the same command continues there.")
+    ] = Path("compared"),
     figure: Annotated[
-        Path | None, typer.Option(help="Also draw the medians, as FIGURE.svg and FIGURE.png, or FIGURE.pdf.")
+        Path | None, typer.Option(metavar="PICTURE", help=f"Also draw the medians, {options.PICTURE}.")
     ] = None,
-    latex: Annotated[Path | None, typer.Option(help="Also write the tables as LaTeX, to a .tex file.")] = None,
+    latex: Annotated[Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")] = None,
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
     traces: Annotated[
         str, typer.Option(help="Traces to save: none, all, or worst (the worst run per plant and condition).")
@@ -147,7 +149,7 @@ def compare(
     Example: smc-mujoco compare arm.xml:shoulder --x0 0.5 --law pid,classical --figure arm --latex arm.tex
     """
     with held_back():
-        from smc_mujoco.analysis.differences import RELEVANT
+        from smc_mujoco.analysis.relevant_difference import RELEVANT
         from smc_mujoco.common.files import writable
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.compare import compare as run
@@ -163,11 +165,11 @@ def compare(
                 "--worst, --figure and --latex"
             )
         begin = options.starts(x0, spread)
-        key = options.key(noise_key)
-        _compare_on(rig, law, seeds, duration, begin, out, fresh, executor, threads, defaults, relevant, key)
+        key = options.noise_key_of(noise_key)
+        _compare_on_rig(rig, law, seeds, duration, begin, out, fresh, executor, threads, defaults, relevant, key)
         return
     machines = [options.plant(text) for text in options.names(plants)]
-    found = run(
+    comparison = run(
         options.compared_laws(law, machines, gains),
         machines or None,
         options.conditions(condition) or None,
@@ -184,20 +186,20 @@ def compare(
         relevant=relevant,
         traces=traces,
         fresh=fresh,
-        noise_key=options.key(noise_key),
+        noise_key=options.noise_key_of(noise_key),
         threads=threads,
     )
-    terminal.print(found)
+    terminal.print(comparison)
     if latex:
-        found.to_latex(latex)
+        comparison.to_latex(latex)
         terminal.wrote(latex)
     if pictures:
-        found.plot(figure)
+        comparison.plot(figure)
         terminal.wrote(*pictures)
-    _finish(found.table, out, terminal)
+    _finish(comparison.table, out, terminal)
 
 
-def _compare_on(
+def _compare_on_rig(
     rig: str,
     law: list[str] | None,
     seeds: int,

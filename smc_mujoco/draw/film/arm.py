@@ -15,18 +15,18 @@ from smc_mujoco.draw.film import arrows
 from smc_mujoco.metrics import tip
 from smc_mujoco.simulation.trace import Trace
 
-WIDTH, WANTED_WIDTH = 3.0, 1.6  # px, of the path and of the wanted one
-WANTED = 0.5  # opacity of the wanted path
-BAR, GAP, HEIGHT = 13, 5, 42  # px of a bar, between bars, and of the bar of both limits together
-LETTERS, NUMBER = 10, 13  # px
-SPACE = 5  # px, from a label to its bars
-ROOM = SPACE + HEIGHT + 1.6 * LETTERS  # px, of bars with their numbers
-LOST = 0.015  # m that a tip is off its path where a ghost shows the reference; chosen: nearer ones hide the ghost
-LONGEST = 0.6  # m, of the arrow of the largest force
-STRUCK = 0.4  # m, of the arrow of a blow
-SHAFT = 4.0  # px, width of an arrow's shaft
-REACH = 0.09  # m, of a blow's arrow from the middle of its body
-SHOWN = 0.12  # s for which a blow is shown after its end
+PATH_WIDTH, WANTED_PATH_WIDTH = 3.0, 1.6  # px
+WANTED_OPACITY = 0.5  # of the wanted path
+BAR_WIDTH, BAR_GAP, BAR_HEIGHT = 13, 5, 42  # px, of a bar, between bars, and from one limit to the other
+BAR_LETTERS, NUMBER_SIZE = 10, 13  # px
+LABEL_GAP = 5  # px, from a label to its bars
+BARS_HEIGHT = LABEL_GAP + BAR_HEIGHT + 1.6 * BAR_LETTERS  # px, of bars with their numbers
+MAX_TIP_ERROR = 0.015  # m: a ghost shows the reference of a tip farther off its path; nearer ones hide it; chosen
+FORCE_ARROW = 0.6  # m, length of the arrow of the largest force
+BLOW_ARROW = 0.4  # m, length of the arrow of a blow
+SHAFT_WIDTH = 4.0  # px
+BLOW_DISTANCE = 0.09  # m, from the middle of a body to the arrow of its blow
+BLOW_TIME = 0.12  # s for which a blow is shown after its end
 Project = Callable[[np.ndarray], np.ndarray]  # points (m, 3) -> (m, 2) px
 
 
@@ -50,7 +50,7 @@ def key(traces: Sequence[Trace]) -> list[str]:
         words.append("violet arrow: force on what the tip touches")
     if style.pushes(traces):
         words.append("violet arrow: the blow")
-    if any(tip.tip_error(trace).max() > LOST for trace in traces):
+    if any(tip.tip_error(trace).max() > MAX_TIP_ERROR for trace in traces):
         words.append("translucent machine: where the reference wants it")
     return words
 
@@ -135,8 +135,10 @@ class Overlay:
         for trace, colour, place in zip(traces, colours, places, strict=True):
             path, wanted = (points + place for points in tip.tip_paths(trace))
             above = path[:, 2] >= 0.0, wanted[:, 2] >= 0.0  # the floor hides what is below it
-            self.trails.append(Trail(project(path), trace.t, above[0], colour, WIDTH * scale, size))
-            self.wanted.append(Trail(project(wanted), trace.t, above[1], style.INK, WANTED_WIDTH * scale, size, WANTED))
+            self.trails.append(Trail(project(path), trace.t, above[0], colour, PATH_WIDTH * scale, size))
+            self.wanted.append(
+                Trail(project(wanted), trace.t, above[1], style.INK, WANTED_PATH_WIDTH * scale, size, WANTED_OPACITY)
+            )
         self.edges = edges
         self.shares = [self.share(trace) for trace in traces] if all(map(has_bars, traces)) else None
         self.errors = [windows(trace.t, tip.tip_error(trace)[:, None], edges).mean[:, 0] for trace in traces]
@@ -145,7 +147,7 @@ class Overlay:
             for trace in traces
         ]
         sizes = [np.linalg.norm(one, axis=1).max() for one in self.forces if one is not None]
-        self.newton = LONGEST / max(sizes, default=1.0) if max(sizes, default=0.0) else 0.0  # m
+        self.newton = FORCE_ARROW / max(sizes, default=1.0) if max(sizes, default=0.0) else 0.0  # m
         self.blows = [(k, push) for k, trace in enumerate(traces) for push in style.pushes([trace])]
 
     def share(self, trace: Trace) -> np.ndarray:
@@ -168,11 +170,11 @@ class Overlay:
                 ends = self.project(np.array([at, at - self.newton * force[frame]]))
                 self.arrow(image, ends[0], ends[1], style.REACTION, f"{size:.0f} N", after=True)
         for k, blow in self.blows:
-            if self.edges[frame] <= blow.time + blow.width + SHOWN and time >= blow.time:
+            if self.edges[frame] <= blow.time + blow.width + BLOW_TIME and time >= blow.time:
                 peak = np.array([blow.x, blow.y, blow.z])
                 way = peak / np.linalg.norm(peak)
-                end = bodies(k, blow.body) - REACH * way
-                ends = self.project(np.array([end - STRUCK * way, end]))
+                end = bodies(k, blow.body) - BLOW_DISTANCE * way
+                ends = self.project(np.array([end - BLOW_ARROW * way, end]))
                 self.arrow(image, ends[0], ends[1], style.REACTION, f"{np.linalg.norm(peak):.0f} N", after=False)
         for k in range(len(self.traces)):
             self.gauges(draw, k, frame)
@@ -185,8 +187,8 @@ class Overlay:
         s = self.scale
         if np.linalg.norm(end - start) > 1.0:
             line, rgb = np.linspace(start, end, 40), np.array(style.rgb(colour)) / 255
-            arrows.paint(image, arrows.outline(line, SHAFT * s), (*rgb, 1.0))
-        draw, font = ImageDraw.Draw(image), style.font(NUMBER * s, bold=True)
+            arrows.paint(image, arrows.outline(line, SHAFT_WIDTH * s), (*rgb, 1.0))
+        draw, font = ImageDraw.Draw(image), style.font(NUMBER_SIZE * s, bold=True)
         place = end if after else start
         gap = 6 * s * np.sign((end - start)[0] or 1.0) * (1 if after else -1)
         anchor = "lm" if gap > 0 else "rm"
@@ -195,31 +197,31 @@ class Overlay:
 
     def gauges(self, draw: ImageDraw.ImageDraw, k: int, frame: int) -> None:
         """Draw the bars of a machine, and how far its tip is off its path."""
-        s, (left, top, right, bottom), font = self.scale, self.room[k].tolist(), style.font(LETTERS * self.scale)
-        off, letters = 1e3 * self.errors[k][frame], style.font(NUMBER * s, bold=True)  # mm
+        s, (left, top, right, bottom), font = self.scale, self.room[k].tolist(), style.font(BAR_LETTERS * self.scale)
+        off, letters = 1e3 * self.errors[k][frame], style.font(NUMBER_SIZE * s, bold=True)  # mm
         words = f"tip {off:.{1 if off < 9.95 else 0}f} mm"
         if self.shares is None:
             draw.text(((left + right) / 2, (top + bottom) / 2), words, style.INK, letters, anchor="mm")
             return
-        zero, half = top + (SPACE + HEIGHT / 2) * s, HEIGHT * s / 2
+        zero, half = top + (LABEL_GAP + BAR_HEIGHT / 2) * s, BAR_HEIGHT * s / 2
         share = self.shares[k][frame]
         for i, value in enumerate(share):
-            x = left + (GAP + i * (BAR + GAP)) * s
-            draw.rectangle((x, zero - half, x + BAR * s, zero + half), style.PAPER, style.RULE)
+            x = left + (BAR_GAP + i * (BAR_WIDTH + BAR_GAP)) * s
+            draw.rectangle((x, zero - half, x + BAR_WIDTH * s, zero + half), style.PAPER, style.RULE)
             low, high = sorted((zero, zero - value * half))
             full = abs(value) > 0.999
-            draw.rectangle((x + 1, low, x + BAR * s - 1, high), style.FAILED if full else self.colours[k])
-            draw.text((x + BAR * s / 2, zero + half + 2 * s), str(i + 1), style.MUTED, font, anchor="ma")
+            draw.rectangle((x + 1, low, x + BAR_WIDTH * s - 1, high), style.FAILED if full else self.colours[k])
+            draw.text((x + BAR_WIDTH * s / 2, zero + half + 2 * s), str(i + 1), style.MUTED, font, anchor="ma")
         wide = bars_width(len(share)) * s
         draw.line((left, zero, left + wide, zero), style.INK, max(1, round(s)))
         if right - left > wide + 1:
-            draw.text((left + wide + 6 * s, zero), "tip", style.MUTED, style.font(NUMBER * s), anchor="lb")
+            draw.text((left + wide + 6 * s, zero), "tip", style.MUTED, style.font(NUMBER_SIZE * s), anchor="lb")
             draw.text((left + wide + 6 * s, zero + 2 * s), words.removeprefix("tip "), style.INK, letters, anchor="lt")
 
 
 def bars_width(joints: int) -> float:
     """Return the width of the bars of a machine, px of a full-size film."""
-    return joints * (BAR + GAP) + GAP
+    return joints * (BAR_WIDTH + BAR_GAP) + BAR_GAP
 
 
 def room(traces: Sequence[Trace], slot: float) -> tuple[float, float]:
@@ -227,8 +229,8 @@ def room(traces: Sequence[Trace], slot: float) -> tuple[float, float]:
 
     The tip's distance stands beside the bars where the slot has room for it.
     """
-    number = style.width("000 mm", NUMBER, bold=True) + 8
+    number = style.width("000 mm", NUMBER_SIZE, bold=True) + 8
     if not all(map(has_bars, traces)):
-        return number + style.width("tip ", NUMBER, bold=True), 1.6 * NUMBER
+        return number + style.width("tip ", NUMBER_SIZE, bold=True), 1.6 * NUMBER_SIZE
     bars = bars_width(traces[0].scenario.plant.n)
-    return bars + number * (bars + number < slot), ROOM
+    return bars + number * (bars + number < slot), BARS_HEIGHT

@@ -22,23 +22,24 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-HINGE, SLIDE = 0.425, 0.08  # length of the longest arrow: of the pendulum's, of the rail's
-OF_RADIUS, OF_LENGTH = 0.16, 0.024  # thickness at a hinge: the sum of these shares of the bob's radius and the length
-LONG = 0.5  # m: longer pendulums have arrows as thick as one of this length
-OFF_ARC, OFF_RAIL = 1.6, 2.2  # thicknesses between a body and its nearest arrow
-THICKNESS, SHORT = 0.035, 0.008  # m, at a slide, and at most that part of its rail
-OWN_LENGTH, OWN_THICKNESS = 0.25, 0.012  # at an own model's slides, of its extent
-OWN_RADIUS, SWEEP = 0.15, 1.3  # at its hinges: radius of a bent arrow, of the extent, and angle of the longest, rad
-BENT, BESIDE = 0.12, 0.3  # width of a bent arrow, and distance of the next, in radii
-RAISED = 0.5  # how much the direction of a bent arrow's middle is raised from that to the camera
-HEAD, LONG_HEAD = 2.25, 2.2  # of a flat arrow: half the head's width, in shafts, and its length, in halves
-FINER = 3  # pixels with which a flat arrow is drawn for each of the picture
-NETWORK = 1.6  # times as long for the pendulums of a network: they swing past each other, and are seen from the side
+HINGE_LENGTH, SLIDE_LENGTH = 0.425, 0.08  # longest arrow, as a share of the pendulum's length, and of the rail's
+RADIUS_SHARE, LENGTH_SHARE = 0.16, 0.024  # of the bob's radius and of the pendulum's length: their sum is the thickness
+LONG_PENDULUM = 0.5  # m: longer pendulums have arrows as thick as one of this length
+ARC_DISTANCE, RAIL_DISTANCE = 1.6, 2.2  # thicknesses between a body and its nearest arrow
+SLIDE_THICKNESS, MAX_RAIL_SHARE = 0.035, 0.008  # m, and largest share of the rail, of an arrow's thickness
+USER_LENGTH, USER_THICKNESS = 0.25, 0.012  # at slides of a user's model, of its extent
+USER_RADIUS = 0.15  # of a bent arrow at a hinge of a user's model, of its extent
+MAX_SWEEP = 1.3  # rad, of the longest bent arrow
+BENT_WIDTH, BENT_DISTANCE = 0.12, 0.3  # of a bent arrow, and to the next one, in radii
+BENT_RAISE = 0.5  # by which the middle of a bent arrow is higher than the direction to the camera
+HEAD_WIDTH, HEAD_LENGTH = 2.25, 2.2  # of a flat arrow: half the head's width in shafts, its length in such halves
+SUPERSAMPLING = 3  # pixels of a flat arrow for each of the picture, in both directions
+NETWORK_FACTOR = 1.6  # arrows of a network are longer: they are seen from the side
 MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
-SLENDER = 0.2  # thickest shaft of a short arrow, of its length
+MAX_THICKNESS = 0.2  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
-DRAWN = 0.5  # MuJoCo draws an arrow, but not a capsule, in this part of the length between its points: measured, 3.17.0
-PALE = 0.45  # opacity of a command's arrow beside that of the drive's force
+DRAWN_SHARE = 0.5  # part of an arrow's length that MuJoCo draws; of a capsule it draws all: measured, 3.17.0
+COMMAND_OPACITY = 0.45  # opacity of a command's arrow beside that of the drive's force
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
 
@@ -60,7 +61,7 @@ class Mount(NamedTuple):
       joint: of the film's scene.
       beyond: whether the arrows of a hinge are on the other side of it than the body: the pendulums of a network swing
         past each other.
-      unit: length of the longest arrow at a slide, m; its factor at a hinge, over HINGE of the pendulum's.
+      unit: length of the longest arrow at a slide, m; its factor at a hinge, over HINGE_LENGTH of the pendulum's.
       thick: thickness at a slide, m.
       front: direction to the camera, (3,), of arrows before a slide that carries something; None for those above it.
       radius: of bent arrows, m; 0 for straight ones.
@@ -78,16 +79,16 @@ def mounts(
     scenario: Scenario, joints: Sequence[int], slides: Sequence[bool], rail: float, front: np.ndarray
 ) -> list[Mount]:
     """Return the Mount of each joint of a machine on a `rail` of that length in m; `front` points to the camera."""
-    plant, own = scenario.plant, not scenario.plant.on_stage
-    extent = float(models.compile_model(scenario).stat.extent) if own else 0.0
-    length, thick = (
-        (OWN_LENGTH * extent, OWN_THICKNESS * extent) if own else (SLIDE * rail, min(THICKNESS, SHORT * rail))
-    )
-    beyond = plant.network and not own
-    turning = NETWORK if plant.n > 1 and not own else 1.0
-    if plant.n == 1 and not own and "l" in plant.parameters and (usual := catalogue().get(plant.name)):
+    plant, is_users = scenario.plant, not scenario.plant.on_stage
+    extent = float(models.compile_model(scenario).stat.extent) if is_users else 0.0
+    length, thick = SLIDE_LENGTH * rail, min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail)
+    if is_users:
+        length, thick = USER_LENGTH * extent, USER_THICKNESS * extent
+    beyond = plant.network and not is_users
+    turning = NETWORK_FACTOR if plant.n > 1 and not is_users else 1.0
+    if plant.n == 1 and not is_users and "l" in plant.parameters and (usual := catalogue().get(plant.name)):
         turning = max(1.0, usual.parameters["l"] / plant.parameters["l"])  # no smaller on a short rod
-    before, radius = front if own or plant.free else None, OWN_RADIUS * extent
+    before, radius = front if is_users or plant.free else None, USER_RADIUS * extent
     return [
         Mount(j, length if slide else turning, thick, before, beyond, 0.0 if slide else radius)
         for j, slide in zip(joints, slides, strict=True)
@@ -111,13 +112,14 @@ def loads(trace: Trace, edges: np.ndarray) -> Loads:
 class Scale(NamedTuple):
     """Values of the longest arrows, in the units of u and of a force: the largest of the runs that lasted.
 
-    Blows are far larger than what drives the machine, so the reaction's longest arrow is at most the control's.
+    Short peaks do not count, such as that of an estimator at the start. Blows are far larger than what drives the
+    machine, so the reaction's longest arrow is not longer than the control's.
     """
 
     control: float
     disturbance: float
     reaction: float = 0.0
-    blows: bool = False  # whether a reaction is larger than its longest arrow
+    exceeded: tuple[str, ...] = ()  # those of these whose values are larger than their longest arrow
     drive: bool = False  # whether the control passes a drive, such as a motor, whose force is then shown
 
 
@@ -125,17 +127,29 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
     """Return the scale of the arrows for each group of driven channels."""
     by_group = {}
     for group, parts in style.split(traces).items():
-        control, disturbance, reaction = (max(map(abs, panels.span(parts, y))) for y in ("applied", "d", "reaction"))
+        if not group.driven:
+            continue
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
-        longest = min(reaction, control) if control and same else reaction
-        if group.driven:
-            drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
-            control = max(control, *map(abs, panels.span(parts, "force"))) if drive else control
-            by_group[group] = Scale(control, disturbance, longest, reaction > 1.01 * longest, drive)
+        drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
+        peaks = [max(map(abs, panels.span(parts, name))) for name in ("applied", "force", "d", "reaction")]
+        applied, force, disturbance = (lasting_size(parts, name) for name in ("applied", "force", "d"))
+        control = max(applied, force) if drive else applied
+        reaction = min(peaks[3], applied) if applied and same else peaks[3]
+        pairs = {"control": (max(peaks[: 1 + drive]), control), "disturbance": (peaks[2], disturbance)}
+        pairs["reaction"] = peaks[3], reaction
+        exceeded = tuple(name for name, (peak, longest) in pairs.items() if peak > 1.01 * longest)
+        by_group[group] = Scale(control, disturbance, reaction, exceeded, drive)
     return by_group
 
 
-def by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale]:
+def lasting_size(traces: Sequence[Trace], name: str) -> float:
+    """Return the largest magnitude of a quantity in runs that last. Brief values of twice as much do not count."""
+    peak = max(map(abs, panels.span(traces, name)))
+    usual = max((np.quantile(np.abs(y), panels.LASTING) for y in panels.lasting(traces, name).values()), default=0.0)
+    return float(usual) if peak > 2.0 * usual > 0.0 else peak
+
+
+def scales_by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale]:
     """Return the scale of the arrows of each of a trace's driven channels."""
     driven = [group for group in groups(trace.scenario) if group.driven]
     of_channel = {i: scale for group, scale in zip(driven, scales.values(), strict=True) for i in group.channels}
@@ -155,7 +169,7 @@ def arrows(loads: Loads, frame: int, channel: int, scale: Scale, colour: str) ->
             drawn.append(Arrow(low, high, (*law, 0.4), head=False))
     if scale.control and scale.drive:
         command = float(loads.control.mean[frame, channel]) / scale.control
-        drawn.append(Arrow(0.0, command, (*law, PALE), layer=layer, size=0.65))
+        drawn.append(Arrow(0.0, command, (*law, COMMAND_OPACITY), layer=layer, size=0.65))
         layer += 1
     if scale.disturbance:
         mean = float(loads.disturbance.mean[frame, channel]) / scale.disturbance
@@ -169,7 +183,7 @@ def arrows(loads: Loads, frame: int, channel: int, scale: Scale, colour: str) ->
 
 def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow) -> None:
     """Add an arrow to a scene that already has the machines."""
-    body = handle(model, model.jnt_bodyid[mount.joint])
+    body = arrow_geom(model, model.jnt_bodyid[mount.joint])
     if body < 0 or scene.ngeom >= scene.maxgeom:
         return
     place, radius = data.geom_xpos[body], model.geom_rbound[body]
@@ -179,11 +193,11 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, mou
         if length < MIN_LEVER:
             return
         reach, width, out = (
-            mount.unit * HINGE * length,
-            OF_RADIUS * radius + OF_LENGTH * mount.unit * min(length, LONG),
+            mount.unit * HINGE_LENGTH * length,
+            RADIUS_SHARE * radius + LENGTH_SHARE * mount.unit * min(length, LONG_PENDULUM),
             arm / length,
         )
-        along, start = np.cross(data.xaxis[mount.joint], out), radius + OFF_ARC * width
+        along, start = np.cross(data.xaxis[mount.joint], out), radius + ARC_DISTANCE * width
         if mount.beyond:
             out = np.array([0.0, 0.0, -1.0 if out[2] > 0.0 else 1.0])
             place, along = data.xanchor[mount.joint], np.cross(out, data.xaxis[mount.joint])
@@ -193,14 +207,14 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, mou
             across = np.cross(mount.front, along)
             if np.linalg.norm(across) >= 0.1:  # else it slides to the camera
                 out = across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
-            place = place + (half(model, data, body, mount.front) + width) * mount.front
-        start = half(model, data, body, out) + OFF_RAIL * width
+            place = place + (half_extent(model, data, body, mount.front) + width) * mount.front
+        start = half_extent(model, data, body, out) + RAIL_DISTANCE * width
     foot = place + (start + 2.6 * width * arrow.layer) * out
     low, high = (arrow.size * reach * np.clip(end, -1.0, 1.0) for end in (arrow.low, arrow.high))
-    width = min(arrow.size * width, 0.006 + SLENDER * abs(high - low))
+    width = min(arrow.size * width, 0.006 + MAX_THICKNESS * abs(high - low))
 
     kind = mujoco.mjtGeom.mjGEOM_ARROW if arrow.head else mujoco.mjtGeom.mjGEOM_CAPSULE
-    geom, zero, end = scene.geoms[scene.ngeom], np.zeros(3), low + (high - low) / (DRAWN if arrow.head else 1.0)
+    geom, zero, end = scene.geoms[scene.ngeom], np.zeros(3), low + (high - low) / (DRAWN_SHARE if arrow.head else 1.0)
     mujoco.mjv_initGeom(geom, kind, zero, zero, np.zeros(9), np.array(arrow.rgba, np.float32))
     mujoco.mjv_connector(geom, kind, width if arrow.head else 0.5 * width, foot + low * along, foot + end * along)
     geom.specular, geom.objtype = 0.0, mujoco.mjtObj.mjOBJ_UNKNOWN  # mjv_initGeom leaves that of an earlier shape
@@ -212,7 +226,7 @@ def bend(
 ) -> None:
     """Draw an arrow that bends around a hinge's axis over a picture; `project` is from (m, 3) m to (m, 2) px."""
     axis, middle = data.xaxis[mount.joint], data.xanchor[mount.joint]
-    right = np.cross(axis, mount.front + np.array([0.0, 0.0, RAISED]))
+    right = np.cross(axis, mount.front + np.array([0.0, 0.0, BENT_RAISE]))
     if not np.linalg.norm(right):
         return
     right /= np.linalg.norm(right)
@@ -222,22 +236,22 @@ def bend(
         angle = np.linspace(low, high, 40)[:, None]
         return project(middle + mount.radius * (np.cos(angle) * near + np.sin(angle) * right))
 
-    low, high = (SWEEP * arrow.size * np.clip(end, -1.0, 1.0) for end in (arrow.low, arrow.high))
+    low, high = (MAX_SWEEP * arrow.size * np.clip(end, -1.0, 1.0) for end in (arrow.low, arrow.high))
     centre = project(middle[None])
     radius = np.linalg.norm(around(0.0, 2.0 * np.pi) - centre, axis=1).max()
-    line = centre + (1.0 + BESIDE * arrow.layer) * (around(low, high) - centre)
-    paint(image, outline(line, arrow.size * BENT * radius, arrow.head), arrow.rgba)
+    line = centre + (1.0 + BENT_DISTANCE * arrow.layer) * (around(low, high) - centre)
+    paint(image, outline(line, arrow.size * BENT_WIDTH * radius, arrow.head), arrow.rgba)
 
 
 def outline(line: np.ndarray, width: float, head: bool = True) -> np.ndarray:
     """Return the outline, (points, 2) px, of an arrow along a line (m, 2) px whose shaft is `width` px wide."""
     way = np.append(0.0, np.linalg.norm(np.diff(line, axis=0), axis=1).cumsum())
-    width = min(width, SLENDER * way[-1])
-    long = min(LONG_HEAD * HEAD * width, 0.7 * way[-1]) * head
+    width = min(width, MAX_THICKNESS * way[-1])
+    long = min(HEAD_LENGTH * HEAD_WIDTH * width, 0.7 * way[-1]) * head
     shaft = np.column_stack([np.interp(np.linspace(0.0, way[-1] - long, len(line)), way, part) for part in line.T])
     along = np.gradient(shaft, axis=0)
     across = 0.5 * width * along[:, ::-1] * (-1, 1) / np.linalg.norm(along, axis=1)[:, None]
-    wing = long / LONG_HEAD / (0.5 * width) * across[-1]
+    wing = long / HEAD_LENGTH / (0.5 * width) * across[-1]
     return np.concatenate([shaft + across, [shaft[-1] + wing, line[-1], shaft[-1] - wing], (shaft - across)[::-1]])
 
 
@@ -245,19 +259,19 @@ def paint(image: Image.Image, rim: np.ndarray, rgba: Sequence[float]) -> None:
     """Fill an outline, (points, 2) px, with smooth edges."""
     corner, far = np.floor(rim.min(axis=0)).astype(int), np.ceil(rim.max(axis=0)).astype(int) + 1
     size = tuple((far - corner).tolist())
-    mask = Image.new("L", tuple(FINER * side for side in size))
-    ImageDraw.Draw(mask).polygon([tuple(FINER * point) for point in rim - corner], round(255 * rgba[3]))
+    mask = Image.new("L", tuple(SUPERSAMPLING * side for side in size))
+    ImageDraw.Draw(mask).polygon([tuple(SUPERSAMPLING * point) for point in rim - corner], round(255 * rgba[3]))
     colour = tuple(round(255 * part) for part in rgba[:3])
     image.paste(colour, tuple(corner.tolist()), mask.resize(size, Image.Resampling.BOX))
 
 
-def half(model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray) -> float:
+def half_extent(model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray) -> float:
     """Return how far a geom's box reaches from its middle in a direction, m."""
     turned = direction @ data.geom_xmat[geom].reshape(3, 3)
     return float(model.geom_aabb[geom, :3] @ turned + model.geom_aabb[geom, 3:] @ np.abs(turned))
 
 
-def handle(model: mujoco.MjModel, body: int) -> int:
+def arrow_geom(model: mujoco.MjModel, body: int) -> int:
     """Return the geom of a body that carries its arrows: the first in the accent's material, else the first, or -1."""
     geoms = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
     named = (g for g in geoms if model.geom_matid[g] >= 0)

@@ -13,14 +13,14 @@ import numpy as np
 
 from smc_mujoco.common import gl
 from smc_mujoco.draw.film import camera, scene, shadows
-from smc_mujoco.draw.film.arrows import DRAWN
+from smc_mujoco.draw.film.arrows import DRAWN_SHARE
 
-MOVED = 0.2  # px: a shape that has moved less since it was drawn is not drawn again; chosen
-MARGIN = 3  # px around what has changed, for smoothed edges
-FIXED, SHAPE = 8000, 4000  # px that take as long as a rectangle by itself, as each shape in it; fitted to two films
-SMALL, FEW = 6.0, 2  # px: radius up to which round shapes are drawn with few stacks, as cylinders are; and their number
+MIN_MOTION = 0.2  # px: a shape that has moved less since it was drawn is not drawn again; chosen
+EDGE_MARGIN = 3  # px around what has changed, for smoothed edges
+RECTANGLE_COST, SHAPE_COST = 8000, 4000  # px drawn in the time of a rectangle, and of a shape in it; fitted to films
+SMALL_RADIUS, FEW_STACKS = 6.0, 2  # px, up to which round shapes have as few stacks as cylinders, and their number
 CHORD_GAP, MIN_CHORDS = 0.35, 6  # px between an arc and its chords, and the smallest number of chords; chosen
-RING = 24  # chords of a ring around an arm's link: with fewer, a link would show through it
+RING_CHORDS = 24  # chords of a ring around an arm's link: with fewer, a link would show through it
 GEOM, SKIN, TENDON = mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_SKIN, mujoco.mjtObj.mjOBJ_TENDON
 ROUND = [mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_ELLIPSOID]
 CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
@@ -40,17 +40,19 @@ class Canvas:
         self.model, self.data, self.size = model, data, size
         self.turn, self.place = data.cam("film").xmat.reshape(3, 3).copy(), data.cam("film").xpos.copy()
         self.sun = sun(model, data)
-        self.steady = not any(model.light_castshadow & model.light_active)  # where lamps' shadows fall is not foretold
+        self.steady = not any(model.light_castshadow & model.light_active)  # a lamp's shadow may be anywhere
         middle = (model.stat.center - self.place) @ -self.turn[:, 2]
-        self.casts = shadows.casting(model, middle * camera.pixel(size), shadows.FLAT if arms else 0.0)
+        self.casts = shadows.casting(model, middle * camera.pixel(size), shadows.MIN_ARM_SIZE if arms else 0.0)
         ball, widest = roundness(model) / (middle * camera.pixel(size))
         quality = model.vis.quality
-        quality.numstacks = FEW if ball < SMALL else facets(ball, np.pi, quality.numstacks)  # of cylinders, too
+        quality.numstacks = (
+            FEW_STACKS if ball < SMALL_RADIUS else facets(ball, np.pi, quality.numstacks)
+        )  # of cylinders, too
         if arms:  # joints hide the round ends of links
             ball = model.geom_size[model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE, 0].max(initial=0.0)
             ball /= middle * camera.pixel(size)
             quality.numstacks = min(max(facets(ball, np.pi, quality.numstacks), MIN_CHORDS), quality.numstacks)
-        quality.numslices = max(facets(widest, 2 * np.pi, quality.numslices), RING * arms)
+        quality.numslices = max(facets(widest, 2 * np.pi, quality.numslices), RING_CHORDS * arms)
         self.renderer = gl.renderer(model, size[1], size[0])
         self.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
         bounded = [model.geom_type != scene.PLANE, np.ones(model.nskin, bool), self.casts & (self.sun is not None)]
@@ -86,7 +88,9 @@ class Canvas:
         if self.sun is not None:
             casting = shadows.draw(shown, self.sun, self.casts, self.model.stat.extent)
         boxes = self.boxes(geoms, casting, around(shapes), around(loose))
-        areas = joined(areas, lambda area: pixels(area) + FIXED + SHAPE * int((~outside(boxes, area)).sum()))
+        areas = joined(
+            areas, lambda area: pixels(area) + RECTANGLE_COST + SHAPE_COST * int((~outside(boxes, area)).sum())
+        )
         geoms = list(shown.geoms[: shown.ngeom])
         picture = self.picture.copy() if self.picture.size else np.empty((self.size[1], self.size[0], 3), np.uint8)
         views = [eye.frustum_top for eye in shown.camera]
@@ -111,28 +115,27 @@ class Canvas:
           casting: index in `geoms` of what casts each shadow.
           shapes, others: rectangles of what `seen_shapes` and `seen_others` return, (n, 4) px.
         """
-        model, loose, found, cast = self.model, iter(range(len(others))), [], {}
+        model, remaining, boxes, shadow_boxes = self.model, iter(others), [], {}
         for i, geom in enumerate(geoms):
             if geom.objtype == GEOM and model.geom_type[geom.objid] == scene.PLANE:
-                found.append(np.array([-np.inf, -np.inf, np.inf, np.inf]))
+                boxes.append(np.array([-np.inf, -np.inf, np.inf, np.inf]))
             elif geom.objtype in (GEOM, SKIN):
-                found.append(shapes[geom.objid + model.ngeom * (geom.objtype == SKIN)])
+                boxes.append(shapes[geom.objid + model.ngeom * (geom.objtype == SKIN)])
             else:
-                found.append(others[next(loose)])
+                boxes.append(next(remaining))
             if geom.objtype == GEOM:
-                cast[i] = shapes[model.ngeom + model.nskin + geom.objid]
-        tendons = [i for i, geom in enumerate(geoms) if geom.objtype == TENDON]
-        cast |= {i: others[next(loose)] for i in tendons}
-        return np.array([*found, *(cast[i] for i in casting)]).reshape(-1, 4)
+                shadow_boxes[i] = shapes[model.ngeom + model.nskin + geom.objid]
+        shadow_boxes |= {i: next(remaining) for i, geom in enumerate(geoms) if geom.objtype == TENDON}
+        return np.array([*boxes, *(shadow_boxes[i] for i in casting)]).reshape(-1, 4)
 
     def seen_shapes(self) -> np.ndarray:
         """Return where each geom, each skin and the shadow of each geom is in the picture: (shapes, 8, 2) px."""
-        seen, found = self.renderer.scene, [scene.boxes(self.model, self.data)]
-        vertices = np.asarray(seen.skinvert, float).reshape(-1, 3)
-        for start, count in zip(seen.skinvertadr[: seen.nskin], seen.skinvertnum[: seen.nskin], strict=True):
-            part = vertices[start : start + count]
-            found.append(corners(part.min(axis=0), part.max(axis=0))[None])
-        return self.seen(np.concatenate([*found, self.cast(found[0])]))
+        shown, boxes = self.renderer.scene, [scene.boxes(self.model, self.data)]
+        vertices = np.asarray(shown.skinvert, float).reshape(-1, 3)
+        for start, count in zip(shown.skinvertadr[: shown.nskin], shown.skinvertnum[: shown.nskin], strict=True):
+            skin = vertices[start : start + count]
+            boxes.append(corners(skin.min(axis=0), skin.max(axis=0))[None])
+        return self.seen(np.concatenate([*boxes, self.cast(boxes[0])]))
 
     def seen_others(self, others: Sequence) -> np.ndarray:
         """Return the same of geoms of the scene that are not the model's, such as arrows and tendons."""
@@ -152,23 +155,23 @@ class Canvas:
 
     def changed(self, shapes: np.ndarray, others: np.ndarray) -> list[Area]:
         """Return the rectangles that must be drawn again: none if nothing has moved since it was last drawn."""
-        moved = self.bounded & (np.abs(shapes - self.shapes).max(axis=(1, 2)) > MOVED)
+        moved = self.bounded & (np.abs(shapes - self.shapes).max(axis=(1, 2)) > MIN_MOTION)
         parts = [around(np.concatenate([shapes[moved], self.shapes[moved]], axis=1))]
         self.shapes[moved] = shapes[moved]
         gap = np.full((len(others), len(self.others)), np.inf)
         if gap.size:
             gap = np.abs(others[:, None] - self.others[None]).max(axis=(2, 3))
-        new, gone = gap.min(axis=1, initial=np.inf) > MOVED, gap.min(axis=0, initial=np.inf) > MOVED
+        new, gone = gap.min(axis=1, initial=np.inf) > MIN_MOTION, gap.min(axis=0, initial=np.inf) > MIN_MOTION
         parts += [around(others[new]), around(self.others[gone])]
         self.others = np.concatenate([self.others[~gone], others[new]]) if gap.size else others
         boxes = np.concatenate(parts)
-        boxes = np.concatenate([np.floor(boxes[:, :2]) - MARGIN, np.ceil(boxes[:, 2:]) + MARGIN], axis=1)
+        boxes = np.concatenate([np.floor(boxes[:, :2]) - EDGE_MARGIN, np.ceil(boxes[:, 2:]) + EDGE_MARGIN], axis=1)
         boxes = boxes.clip(0, [*self.size, *self.size]).astype(int)
         inside = [(a, b, c, d) for a, b, c, d in boxes.tolist() if a < c and b < d]
-        return joined(inside, lambda area: pixels(area) + FIXED)
+        return joined(inside, lambda area: pixels(area) + RECTANGLE_COST)
 
     def render(self, area: Area, views: Sequence[float]) -> np.ndarray:
-        """Return a part of the picture; the whole view of each of the scene's cameras is from -`view` to `view`."""
+        """Return a part of the picture; `views` are the tops of the whole views of the scene's cameras."""
         left, top, right, bottom = area
         (width, height), renderer = self.size, self.renderer
         for eye, high in zip(renderer.scene.camera, views, strict=True):
@@ -240,7 +243,7 @@ def reach(geom: mujoco.MjvGeom) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest and highest corner of a box in a geom's frame, (3,) m, that has all of the geom in it."""
     width, _, long = geom.size
     if geom.type == mujoco.mjtGeom.mjGEOM_ARROW:  # its head is 1.75 times as wide
-        return np.array([-2.0 * width, -2.0 * width, 0.0]), np.array([2.0 * width, 2.0 * width, DRAWN * long])
+        return np.array([-2.0 * width, -2.0 * width, 0.0]), np.array([2.0 * width, 2.0 * width, DRAWN_SHARE * long])
     if geom.type == mujoco.mjtGeom.mjGEOM_CAPSULE:
         half = np.array([width, width, long + width])
     else:

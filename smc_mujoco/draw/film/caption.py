@@ -18,11 +18,11 @@ from smc_mujoco.metrics.channel_groups import Group
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-LABEL, TITLE, KEY, BADGE = 15, 24, 13, 13  # px, height of letters in a film of full size
+LABEL_SIZE, TITLE_SIZE, KEY_SIZE, BADGE_SIZE = 15, 24, 13, 13  # px, height of letters in a film of full size
 EDGE = 24  # px, from the picture's edge to text
-MAX_LABEL = 0.3  # width of a label beside its machine, of the picture's width
-STRIP, COUNTS = 110, 6  # of an encoder's strip: px, and counts in it
-NEWS = 1.5  # s for which a change of the plant is highlighted
+MAX_LABEL_SHARE = 0.3  # of the picture's width, for a label beside its machine
+STRIP_WIDTH, STRIP_COUNTS = 110, 6  # of an encoder's strip, px and counts
+NEWS_TIME = 1.5  # s for which a change of the plant is highlighted
 
 
 class Caption:
@@ -54,31 +54,35 @@ class Caption:
         self.traces, self.names, self.colours, self.size, self.scale = traces, names, colours, size, scale
         self.jumps = style.jumps(traces, names)
         inside = size[0] - 2 * EDGE * scale
-        clock = style.width("00.000 s", TITLE * scale, bold=True) + EDGE * scale
-        clock += style.width("8× slower", KEY * scale, bold=True) + 2 * KEY * scale
+        clock = style.width("00.000 s", TITLE_SIZE * scale, bold=True) + EDGE * scale
+        clock += style.width("8× slower", KEY_SIZE * scale, bold=True) + 2 * KEY_SIZE * scale
         self.title = style.cropped(
-            title or style.plant_name(traces[0].scenario.plant), inside - clock, TITLE * scale, bold=True
+            title or style.plant_name(traces[0].scenario.plant), inside - clock, TITLE_SIZE * scale, bold=True
         )
-        notes = [style.width(f"{words} since {time:g} s", KEY * scale, bold=True) for time, words in self.jumps.items()]
+        notes = [
+            style.width(f"{words} since {time:g} s", KEY_SIZE * scale, bold=True) for time, words in self.jumps.items()
+        ]
         self.note_room = min(max(notes, default=0.0) + EDGE * scale, 0.4 * inside)
         gains = in_words({name: [t.scenario.law.source] for name, t in zip(names, traces, strict=True)}, short=True)
         parts = [*(key(traces, scales) if parts is None else parts), *filter(None, [gains])]
-        self.key = wrapped(parts, inside - self.note_room, KEY * scale)
+        self.key = wrapped(parts, inside - self.note_room, KEY_SIZE * scale)
         self.beside = not row  # machines behind each other have their labels at the left
         words = [{state.words for state in each if state} for each in states] or [set()] * len(traces)
-        letters, margin = BADGE * scale, 1.2 * BADGE * scale  # px, of a badge, which shows a machine's state
+        letters, margin = BADGE_SIZE * scale, 1.2 * BADGE_SIZE * scale  # px, of a badge, which shows a machine's state
         badges = [max((style.width(text, letters, bold=True) + margin for text in each), default=0.0) for each in words]
         self.gauges = [gauges(trace.scenario) and not each for trace, each in zip(traces, words, strict=True)]
-        badges = [max(wide, STRIP * scale * on) for wide, on in zip(badges, self.gauges, strict=True)]
-        self.badge = np.array([badges, [1.6 * BADGE * scale * any(badges)] * len(traces)]).T  # width and height, px
-        top = (106 + 1.4 * KEY * (len(self.key) - 1)) * scale
+        badges = [max(wide, STRIP_WIDTH * scale * on) for wide, on in zip(badges, self.gauges, strict=True)]
+        self.badge = np.array(
+            [badges, [1.6 * BADGE_SIZE * scale * any(badges)] * len(traces)]
+        ).T  # width and height, px
+        top = (106 + 1.4 * KEY_SIZE * (len(self.key) - 1)) * scale
         if below is not None:
             self.badge[:] = np.array(below) * scale
             top -= 26 * scale
         side, below_row = 40 * scale, 52 * scale
-        self.max_label = (size[0] - side) / len(traces) - 0.8 * LABEL * scale  # width of a label
+        self.max_label = (size[0] - side) / len(traces) - 0.8 * LABEL_SIZE * scale  # width of a label
         if self.beside:
-            self.max_label = MAX_LABEL * size[0]
+            self.max_label = MAX_LABEL_SHARE * size[0]
             widths = [self.width(text) for text in self.texts()] + self.badge[:, 0]
             side, below_row = max(widths) + 30 * scale, 20 * scale
         else:
@@ -91,7 +95,7 @@ class Caption:
     @property
     def apart(self) -> float:
         """The width, px, that a machine in a row needs for its label and what is below it."""
-        return max(*(self.width(text) for text in self.texts()), *self.badge[:, 0]) + 0.8 * LABEL * self.scale
+        return max(*(self.width(text) for text in self.texts()), *self.badge[:, 0]) + 0.8 * LABEL_SIZE * self.scale
 
     def texts(self, failed: Sequence[bool] | None = None) -> list[str]:
         """Return the labels, with the time of failure of machines that have failed; default: of all that will fail."""
@@ -99,19 +103,21 @@ class Caption:
         words = []
         for name, trace, gone in zip(self.names, self.traces, failed, strict=True):
             end = f": {style.ending(trace)}" if gone and trace.diverged_at is not None else ""
-            words.append(style.cropped(name, self.max_label - self.width(end), LABEL * self.scale, bold=True) + end)
+            words.append(
+                style.cropped(name, self.max_label - self.width(end), LABEL_SIZE * self.scale, bold=True) + end
+            )
         return words
 
     def width(self, text: str) -> float:
         """Return the width of a label, px."""
-        return style.width(text, LABEL * self.scale, bold=True) + 1.4 * LABEL * self.scale
+        return style.width(text, LABEL_SIZE * self.scale, bold=True) + 1.4 * LABEL_SIZE * self.scale
 
     def place(self, boxes: np.ndarray) -> None:
         """Place the labels under machines in a row, else at the left of each; `boxes` are their places, (n, 4) px.
 
         A badge is below its label, or at its right.
         """
-        widths, height = np.array([self.width(text) for text in self.texts()]), 1.75 * LABEL * self.scale
+        widths, height = np.array([self.width(text) for text in self.texts()]), 1.75 * LABEL_SIZE * self.scale
         gap, middle, (wide, high) = 0.4 * height, (boxes[:, :2] + boxes[:, 2:]) / 2, self.badge.T
         if not self.beside:
             x = spread(middle[:, 0], np.maximum(widths, wide) + gap, self.size[0])
@@ -135,27 +141,27 @@ class Caption:
         """Return the picture with the text on it: machines that have failed, their states, and the playback speed."""
         past = max((start for start in self.jumps if start <= time), default=None)
         image = Image.fromarray(picture)
-        sheet = self.sheet(failed, states, past, past is not None and time < past + NEWS)
+        sheet = self.sheet(failed, states, past, past is not None and time < past + NEWS_TIME)
         image.paste(sheet, mask=sheet)
         for k in np.flatnonzero(self.gauges):
             if not failed[k]:
                 self._strip(ImageDraw.Draw(image), int(k), time)
-        self._clock(ImageDraw.Draw(image), f"{time:.{3 if speed < 0.2 else 2}f} s", pace.words(speed))
+        self._clock(ImageDraw.Draw(image), f"{time:.{3 if speed < 0.2 else 2}f} s", pace.speed_words(speed))
         return np.asarray(image)
 
     def _clock(self, draw: ImageDraw.ImageDraw, time: str, speed: str) -> None:
         """Draw the time, and at its left the playback speed."""
-        s, font = self.scale, style.font(TITLE * self.scale, bold=True)
+        s, font = self.scale, style.font(TITLE_SIZE * self.scale, bold=True)
         right = self.size[0] - EDGE * s
         draw.text((right, 16 * s), time, style.INK, font, anchor="ra")
         if not speed:
             return
-        right -= style.width("00.000 s", TITLE * s, bold=True) + KEY * s
-        left, middle = right - style.width(speed, KEY * s, bold=True) - KEY * s, 28 * s
-        box = left, middle - 0.85 * KEY * s, right, middle + 0.85 * KEY * s
+        right -= style.width("00.000 s", TITLE_SIZE * s, bold=True) + KEY_SIZE * s
+        left, middle = right - style.width(speed, KEY_SIZE * s, bold=True) - KEY_SIZE * s, 28 * s
+        box = left, middle - 0.85 * KEY_SIZE * s, right, middle + 0.85 * KEY_SIZE * s
         fill, rim = (style.INK, style.INK) if speed.endswith("slower") else (style.PAPER, style.MUTED)
-        draw.rounded_rectangle(box, radius=0.85 * KEY * s, fill=fill, outline=rim, width=max(1, round(s)))
-        at, letters = ((left + right) / 2, middle), style.font(KEY * s, bold=True)
+        draw.rounded_rectangle(box, radius=0.85 * KEY_SIZE * s, fill=fill, outline=rim, width=max(1, round(s)))
+        at, letters = ((left + right) / 2, middle), style.font(KEY_SIZE * s, bold=True)
         draw.text(at, speed, style.letters_on(fill), letters, anchor="mm")
 
     def _sheet(
@@ -164,16 +170,16 @@ class Caption:
         """Draw everything but the clock; `change` is the time of the plant's last change, highlighted if it is news."""
         sheet = Image.new("RGBA", self.size, (255, 255, 255, 0))
         draw, s = ImageDraw.Draw(sheet), self.scale
-        draw.text((EDGE * s, 16 * s), self.title, style.INK, style.font(TITLE * s, bold=True))
+        draw.text((EDGE * s, 16 * s), self.title, style.INK, style.font(TITLE_SIZE * s, bold=True))
         for i, text in enumerate(self.key):
-            draw.text((EDGE * s, (48 + 1.4 * KEY * i) * s), text, style.DISTURBANCE, style.font(KEY * s))
+            draw.text((EDGE * s, (48 + 1.4 * KEY_SIZE * i) * s), text, style.DISTURBANCE, style.font(KEY_SIZE * s))
         if change is not None:
             self._note(draw, f"{self.jumps[change]} since {change:g} s", news)
         for text, colour, box, gone in zip(self.texts(failed), self.colours, self.pills, failed, strict=True):
             fill = style.FAILED if gone else colour
             draw.rounded_rectangle(tuple(box), radius=(box[3] - box[1]) / 2, fill=fill)
             middle = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
-            draw.text(middle, text, style.letters_on(fill), style.font(LABEL * s, bold=True), anchor="mm")
+            draw.text(middle, text, style.letters_on(fill), style.font(LABEL_SIZE * s, bold=True), anchor="mm")
         for state, box in zip(states, self.badges, strict=False):
             if state:
                 self._badge(draw, state, box)
@@ -183,7 +189,7 @@ class Caption:
         """Draw a machine's state: pale while it moves, dark while friction holds it, bright in contact."""
         looks = {CALM: (style.PAPER, style.MUTED), STUCK: (style.INK,) * 2, STRUCK: (style.REACTION,) * 2}
         fill, rim = looks[state.mood]
-        size, middle = BADGE * self.scale, ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
+        size, middle = BADGE_SIZE * self.scale, ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
         draw.rounded_rectangle(
             tuple(box), radius=5 * self.scale, fill=fill, outline=rim, width=max(1, round(self.scale))
         )
@@ -196,9 +202,9 @@ class Caption:
         assert sensor is not None
         count = sensor.quantum(trace.scenario.plant.unit == "rad")
         now, then = np.interp([time, time - sensor.delay], trace.t, trace.x[:, 0]) / count
-        middle, step = (left + right) / 2, (right - left) / COUNTS
+        middle, step = (left + right) / 2, (right - left) / STRIP_COUNTS
         draw.rounded_rectangle((left, top, right, bottom), 5 * s, style.PAPER, style.MUTED, max(1, round(s)))
-        for tick in range(math.ceil(now - COUNTS / 2), math.floor(now + COUNTS / 2) + 1):
+        for tick in range(math.ceil(now - STRIP_COUNTS / 2), math.floor(now + STRIP_COUNTS / 2) + 1):
             x = middle + (tick - now) * step
             if left + 3 * s < x < right - 3 * s:
                 draw.line((x, top + 0.62 * (bottom - top), x, bottom - 2 * s), style.INK, max(1, round(1.5 * s)))
@@ -210,13 +216,13 @@ class Caption:
     def _note(self, draw: ImageDraw.ImageDraw, text: str, news: bool) -> None:
         """Draw what has changed, under the clock; in a dark box while it is news."""
         s = self.scale
-        text = style.cropped(text, self.note_room, KEY * s, bold=True)
+        text = style.cropped(text, self.note_room, KEY_SIZE * s, bold=True)
         right, y = self.size[0] - EDGE * s, 56 * s
         if news:
-            box = right - style.width(text, KEY * s, bold=True) - 8 * s, y - 11 * s, right + 8 * s, y + 11 * s
+            box = right - style.width(text, KEY_SIZE * s, bold=True) - 8 * s, y - 11 * s, right + 8 * s, y + 11 * s
             draw.rounded_rectangle(box, radius=5 * s, fill=style.INK)
         colour = style.PAPER if news else style.INK
-        draw.text((right, y), text, colour, style.font(KEY * s, bold=True), anchor="rm")
+        draw.text((right, y), text, colour, style.font(KEY_SIZE * s, bold=True), anchor="rm")
 
 
 def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
@@ -225,10 +231,9 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
     def longest(quantity: str) -> str:
         """Return the values of the longest arrows, one a group, such as "6 N"; "" if there are none."""
         sizes = [(getattr(scale, quantity), group, scale) for group, scale in scales.items()]
-        more = {True: " or more", False: ""}
+        unit = "u" if quantity == "control" else "force"
         return ", ".join(
-            f"{style.short(size)} {style.units(group)['u' if quantity == 'control' else 'force']}"
-            f"{more[quantity == 'reaction' and scale.blows]}"
+            f"{style.short(size)} {style.units(group)[unit]}{' or more' * (quantity in scale.exceeded)}"
             for size, group, scale in sizes
             if size
         )
@@ -247,9 +252,9 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
     words += [scenery] if (scenery := traces[0].scenario.plant.scenery) else []
     if any(gauges(trace.scenario) for trace in traces):
         words.append("strip: counts of the encoder, the line is the position, the dot what is read")
-    most = max(trace.scenario.plant.n for trace in traces)
-    if most > MAX_CHANNELS and not traces[0].scenario.plant.direct:
-        words.append(f"machines: the first {MAX_CHANNELS} of {most} pendulums")
+    count = max(trace.scenario.plant.n for trace in traces)
+    if count > MAX_CHANNELS and not traces[0].scenario.plant.direct:
+        words.append(f"machines: the first {MAX_CHANNELS} of {count} pendulums")
     return words
 
 

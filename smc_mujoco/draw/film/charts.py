@@ -17,9 +17,9 @@ from smc_mujoco.draw.panels import Panel
 from smc_mujoco.simulation.trace import Trace
 
 DPI = 100
-FAINT = 0.16  # opacity of what is still to come
+FUTURE_OPACITY = 0.16  # of curves that are still to come
 LEFT, RIGHT = 0.062, 0.985  # of the width: where the charts begin and end
-GAP = 0.155 / 2.155 * (RIGHT - LEFT)  # of the width, between two charts: 0.155 of one if there are two
+CHART_GAP = 0.155 / 2.155 * (RIGHT - LEFT)  # of the width, between two charts: 0.155 of one if there are two
 CURSOR = np.array(style.rgb(style.MUTED))
 
 
@@ -46,8 +46,8 @@ class Charts:
             figure = Figure(figsize=(size[0] / DPI / scale, size[1] / DPI / scale), dpi=DPI * scale)
             canvas = FigureCanvasAgg(figure)
             axes = figure.subplots(1, len(strip))
-            wide = (RIGHT - LEFT + GAP) / len(strip) - GAP
-            figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=0.2, top=0.855, wspace=GAP / wide)
+            wide = (RIGHT - LEFT + CHART_GAP) / len(strip) - CHART_GAP
+            figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=0.2, top=0.855, wspace=CHART_GAP / wide)
             artists = []
             for ax, panel in zip(axes, strip, strict=True):
                 set_titles(ax, panel, names, DPI * scale / 72)
@@ -59,7 +59,7 @@ class Charts:
                 panels.scale_ticks(ax.yaxis, panel)
             self.full = picture(canvas)
             for artist in artists:
-                artist.set_alpha(FAINT * (artist.get_alpha() or 1.0))
+                artist.set_alpha(FUTURE_OPACITY * (artist.get_alpha() or 1.0))
             self.faint = picture(canvas)
         height = self.full.shape[0]
         boxes = [ax.get_window_extent() for ax in axes]

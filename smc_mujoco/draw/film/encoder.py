@@ -15,7 +15,7 @@ from smc_mujoco.common.errors import ScenarioError
 
 CRF = 21  # of x264, chosen: clean on a slide at about 1 MB for 10 s
 ARGUMENTS = "-preset veryfast -movflags +faststart"  # half the time of x264's default preset, and no larger files
-AHEAD = 8  # pictures that may wait for the encoder; chosen, 22 MB at 1280 x 720
+MAX_WAITING = 8  # pictures before the encoder; chosen, 22 MB at 1280 x 720
 Write = Callable[[np.ndarray], None]
 
 
@@ -52,10 +52,10 @@ def mediapy() -> ModuleType:
 def in_thread(write: Write) -> Iterator[Write]:
     """Yield a function that has `write` called with the same pictures, in order, in another thread.
 
-    It waits while AHEAD pictures are not written yet. What `write` raises is raised by its next call, or at the end.
-    After an error, here or there, pictures that still wait are dropped.
+    It waits while MAX_WAITING pictures are not written yet. What `write` raises is raised by its next call, or at the
+    end. After an error, here or there, pictures that still wait are dropped.
     """
-    waiting: queue.Queue[np.ndarray | None] = queue.Queue(AHEAD)
+    waiting: queue.Queue[np.ndarray | None] = queue.Queue(MAX_WAITING)
     errors: list[Exception] = []
     ended = threading.Event()
 

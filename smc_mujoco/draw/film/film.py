@@ -34,8 +34,8 @@ FPS = 30.0
 MAX_MACHINES = 8  # more are too small to tell apart
 MIN_SIZE, MAX_SIZE = (320, 180), (1920, 1080)  # px
 FULL_WIDTH = 1280  # px, for which sizes of letters are stated
-CHARTS = 0.36  # height of the charts, of the film's
-PAUSE = 1200  # ms for which a clip's last picture stays before it repeats
+CHARTS_SHARE = 0.36  # of the film's height
+LAST_FRAME_TIME = 1200  # ms, for which a clip's last picture stays before it repeats
 Report = Callable[[int], None]
 
 
@@ -70,7 +70,7 @@ def film(
       ScenarioError: nothing to show, a size that is odd or too small or large, or no OpenGL to render with.
     """
     path = ended(path, ".mp4")
-    shown = clock(traces, fps, speed)
+    shown = pace.clock(traces, fps, speed)
     pictures = frames(traces, shown, labels, title, size, camera)
     with replacing(path) as part, contextlib.closing(pictures), reporting(report, len(shown.times)) as done:
         first = next(pictures)
@@ -85,9 +85,9 @@ def film(
 
 @contextlib.contextmanager
 def reporting(report: Report | None, frames: int) -> Iterator[Report]:
-    """Yield the function that is told of frames, or that of a progress bar if there is none."""
-    with bar("film", frames, shown=report is None) as drawn:
-        yield report or drawn.advance
+    """Yield `report`, or the same function of a progress bar if there is none."""
+    with bar("film", frames, shown=report is None) as progress:
+        yield report or progress.advance
 
 
 def missing() -> str | None:
@@ -112,7 +112,7 @@ def clip(
     if len(ends := taken("span", span)) != 2:
         raise ScenarioError(f"span is {errors.shown(span)}: give two times, in s")
     start, stop = (number("span", end) for end in ends)
-    shown = clock(traces, fps, speed).part(start, stop)
+    shown = pace.clock(traces, fps, speed).part(start, stop)
     count = len(shown.times)
     if not 0 < count <= 600:
         raise ScenarioError(f"a clip of {start:g} .. {stop:g} s has {count} frames: give a span with 1 to 600")
@@ -121,7 +121,7 @@ def clip(
         for picture in frames(traces, shown, labels, title, size, camera):
             pictures.append(Image.fromarray(picture))
             done(1)
-    ends = [round(1000 / fps)] * (count - 1) + [PAUSE]
+    ends = [round(1000 / fps)] * (count - 1) + [LAST_FRAME_TIME]
     with replacing(path) as part:
         pictures[0].save(part, save_all=True, append_images=pictures[1:], duration=ends, loop=0, quality=60, method=4)
     return path
@@ -145,12 +145,7 @@ def still(
     return path
 
 
-def clock(traces: Trace | Sequence[Trace], fps: float, speed: float | None = None) -> Clock:
-    """Return the times of a film's frames and the speed of playback at each, see pace.clock."""
-    return pace.clock(style.same_plant(traces), fps, speed)
-
-
-def _pixels(size: Iterable[int]) -> tuple[int, int]:
+def _checked_size(size: Iterable[int]) -> tuple[int, int]:
     """Return width and height of a film; refuse odd ones, and those out of range."""
     sides = taken("size", size)
     fit = [
@@ -175,18 +170,18 @@ def frames(
     names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
     if len(traces) > MAX_MACHINES:
         raise ScenarioError(f"{len(traces)} machines in one film: show at most {MAX_MACHINES}")
-    size = _pixels(size)
+    size = _checked_size(size)
     if why := gl.missing():
         raise ScenarioError(why)
     scale = (size[0] / FULL_WIDTH) ** 0.6  # letters shrink less than pictures
-    low = 2 * round(CHARTS * size[1] / 2)
+    low = 2 * round(CHARTS_SHARE * size[1] / 2)
     above = size[0], size[1] - low
     times = shown.times
     edges = np.append(times[0] - (times[1] - times[0] if len(times) > 1 else 1 / FPS), times)
-    hold = max(states.HOLD, float(np.diff(edges).max()))
+    hold = max(states.MIN_STATE_TIME, float(np.diff(edges).max()))
     traces = [finite(trace) for trace in traces]
     scales = arrows.scales(traces)
-    by_channel = [arrows.by_channel(trace, scales) for trace in traces]
+    by_channel = [arrows.scales_by_channel(trace, scales) for trace in traces]
     loads = [arrows.loads(trace, edges) for trace in traces]
     arms = arm.is_arm(traces)
     timelines = [[None] * len(times) if arms else states.timeline(trace, times, hold) for trace in traces]
@@ -211,7 +206,7 @@ def frames(
             for k, colour in enumerate(colours):
                 stage.set_shape(k, time)
                 stage.pose(k, places[k][frame], ahead[k][frame], time)
-                lost = over is None or over.errors[k][frame] > arm.LOST
+                lost = over is None or over.errors[k][frame] > arm.MAX_TIP_ERROR
                 stage.aim(k, wanted[k][frame] if lost and not failed[k] else None)
                 stage.set_colour(k, style.FAILED if failed[k] else colour)
                 for i, longest in enumerate([] if failed[k] or arms else by_channel[k][: stage.shown[k]]):
@@ -238,7 +233,7 @@ def framed(
     Arguments are those of `Stage`. It warns of a chosen view that shows nothing, and if no view shows anything.
     """
     name = traces[0].scenario.plant.name
-    for view in (chosen, *scene.OTHERS):
+    for view in (chosen, *scene.OTHER_VIEWS):
         stage = Stage(traces, colours, size, room, view, motions, apart)
         if stage.shows():
             if view != chosen is not None:

@@ -1,9 +1,9 @@
 """Playback speed of a film, from its traces: slow motion where things move fast, and faster where they rest.
 
 The measure is how far something moves in the time of a frame, as a share of its range over the whole run. Every machine
-should cross its range in 1/TRAVEL frames or more, so the speed is 1, 1/2, 1/4 or 1/8. Around impacts, and around pushes
-on an arm, it is 1/8. Where nothing has moved for a while, it is FAST. If a film would be too long, slow motion is
-reduced step by step, and around pushes last. The same traces give the same film.
+should take 1/MAX_TRAVEL frames or more to cross its range, so the speed is 1, 1/2, 1/4 or 1/8. Around impacts, and
+around pushes on an arm, it is 1/8. Where nothing has moved for a while, it is REST_SPEED. If a film would be too long,
+slow motion is reduced step by step, around pushes last. The same traces give the same film.
 """
 
 from collections.abc import Sequence
@@ -16,15 +16,15 @@ from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.simulation.trace import Trace
 
-TRAVEL = 0.02  # of its range that a thing moves a frame at most, if the speeds suffice; chosen
-SLOWEST = 3  # powers of two
-STILL = 5e-4  # of its range that a thing at rest moves a frame at most; chosen: less than a pixel in 3 frames
-FAST = 4.0  # times real time, where everything rests
-AROUND = 0.1  # s before and after fast motion that are shown as slowly
-IMPACT = 0.04  # s around the start of a contact, and around the middle of a push
-REST = 0.3  # s after motion, and before it, that are not shown faster
+MAX_TRAVEL = 0.02  # of its range, that a thing moves in a frame if the speeds suffice; chosen
+MAX_HALVINGS = 3  # of the speed
+REST_TRAVEL = 5e-4  # of its range: a thing that moves less in a frame is at rest; chosen: a pixel in 3 frames
+REST_SPEED = 4.0  # times real time
+MOTION_MARGIN = 0.1  # s before and after fast motion that are shown as slowly
+IMPACT_TIME = 0.04  # s around the start of a contact, and around the middle of a push
+REST_MARGIN = 0.3  # s after motion, and before it, that are not shown faster
 MAX_LENGTH = 1.85, 8.0  # duration of a film: in durations of the run, or in s if that is more; chosen
-SPEEDS = 0.01, 100.0
+SPEED_RANGE = 0.01, 100.0
 
 
 class Clock(NamedTuple):
@@ -44,18 +44,18 @@ class Clock(NamedTuple):
         return Clock(self.times[inside], self.speeds[inside])
 
 
-def clock(traces: Sequence[Trace], fps: float, speed: float | None = None) -> Clock:
+def clock(traces: Trace | Sequence[Trace], fps: float, speed: float | None = None) -> Clock:
     """Return the times of a film's frames from t = 0 to the end of the longest trace.
 
     Args:
       speed: of playback, 1 for real time; None for the rule above.
     """
-    fps = number("fps", fps)
+    traces, fps = style.same_plant(traces), number("fps", fps)
     if not 1.0 <= fps <= 120.0:
         raise ScenarioError(f"fps is {fps:g}: give 1 to 120")
     whole = end(traces)
     if speed is not None:
-        speed = number("speed", speed, low=SPEEDS[0], high=SPEEDS[1])
+        speed = number("speed", speed, low=SPEED_RANGE[0], high=SPEED_RANGE[1])
         times = np.arange(int(whole * fps / speed + 1e-6) + 1) * (speed / fps)
         return Clock(times, np.full(len(times), speed))
     grid, wanted = speeds(traces, fps)
@@ -74,27 +74,29 @@ def speeds(traces: Sequence[Trace], fps: float) -> tuple[np.ndarray, np.ndarray]
     whole = end(traces)
     grid = np.arange(max(1, round(whole * fps))) / fps
     runs = [finite(trace) for trace in traces]
-    travel = motion(runs, np.append(grid, whole))
-    powers = np.ceil(np.log2(np.maximum(travel / TRAVEL, 1.0)) - 1e-9)
-    powers = np.asarray(maximum_filter1d(powers, 2 * round(AROUND * fps) + 1, mode="nearest"))
+    travel = travel_of(runs, np.append(grid, whole))
+    powers = np.ceil(np.log2(np.maximum(travel / MAX_TRAVEL, 1.0)) - 1e-9)
+    powers = np.asarray(maximum_filter1d(powers, 2 * round(MOTION_MARGIN * fps) + 1, mode="nearest"))
     for start in impacts(runs):
-        powers[np.abs(grid + 0.5 / fps - start) <= IMPACT] = SLOWEST
+        powers[np.abs(grid + 0.5 / fps - start) <= IMPACT_TIME] = MAX_HALVINGS
     pushed = np.zeros(len(grid), bool)
     for push in style.pushes(runs):
-        pushed |= np.abs(grid + 0.5 / fps - push.time - 0.5 * push.width) <= IMPACT
-    moved = (travel > STILL) | pushed
-    moving = np.asarray(maximum_filter1d(moved, 2 * round(REST * fps) + 1, mode="nearest"), bool)
+        pushed |= np.abs(grid + 0.5 / fps - push.time - 0.5 * push.width) <= IMPACT_TIME
+    moved = (travel > REST_TRAVEL) | pushed
+    moving = np.asarray(maximum_filter1d(moved, 2 * round(REST_MARGIN * fps) + 1, mode="nearest"), bool)
     longest, playback = max(MAX_LENGTH[0] * whole, MAX_LENGTH[1]), np.ones(len(grid))
-    steps = [(slowest, SLOWEST) for slowest in range(SLOWEST, 0, -1)] + [(0, k) for k in range(SLOWEST, -1, -1)]
+    steps = [(slowest, MAX_HALVINGS) for slowest in range(MAX_HALVINGS, 0, -1)] + [
+        (0, k) for k in range(MAX_HALVINGS, -1, -1)
+    ]
     for slowest, around_pushes in steps:
-        playback = np.where(moving | (powers > 0.0), 0.5 ** np.minimum(powers, slowest), FAST)
+        playback = np.where(moving | (powers > 0.0), 0.5 ** np.minimum(powers, slowest), REST_SPEED)
         playback[pushed] = 0.5**around_pushes
         if (1.0 / playback).sum() / fps <= longest:
             break
     return grid, playback
 
 
-def motion(runs: Sequence[Trace], edges: np.ndarray) -> np.ndarray:
+def travel_of(runs: Sequence[Trace], edges: np.ndarray) -> np.ndarray:
     """Return how far the machines move between times, (edges - 1,): the largest share of a channel's range."""
     lasting = [trace for trace in runs if trace.diverged_at is None] or runs
     low, high = (f([f(trace.x, axis=0) for trace in lasting], axis=0) for f in (np.min, np.max))
@@ -111,12 +113,12 @@ def impacts(runs: Sequence[Trace]) -> list[float]:
     """Return when contacts begin after a while without contact, s."""
     starts = []
     for trace in runs:
-        touch = states.held(np.asarray(states.in_contact(trace).any(axis=1)), trace.t, states.HOLD)
+        touch = states.extended(np.asarray(states.in_contact(trace).any(axis=1)), trace.t, states.MIN_STATE_TIME)
         starts += trace.t[np.flatnonzero(np.diff(touch.astype(int), prepend=1) > 0)].tolist()
     return starts
 
 
-def words(speed: float) -> str:
+def speed_words(speed: float) -> str:
     """Return a playback speed in words, as "4× slower"; "" for real time."""
     if abs(speed - 1.0) < 1e-9:
         return ""

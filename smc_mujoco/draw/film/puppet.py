@@ -18,10 +18,8 @@ from smc_mujoco.simulation.trace import Trace
 
 SLIDE = mujoco.mjtJoint.mjJNT_SLIDE
 POSES = 24  # poses of a trace that must be in the picture
-MAX_FIXED = (
-    4.0  # size of a fixed thing of an own model, in sizes of what moves: larger ones may leave the picture; chosen
-)
-CLOSE = 0.6  # height of the part of a stand that must be in the picture, in sizes of what moves; chosen
+MAX_FIXED_SIZE = 4.0  # of what moves: larger fixed things of a user's model may leave the picture; chosen
+STAND_SHARE = 0.6  # height of a stand that must be in the picture, in sizes of what moves; chosen
 
 
 class Motion(NamedTuple):
@@ -115,10 +113,10 @@ class Puppet:
         low, high = points.min(axis=0), points.max(axis=0)
         size = (high - low).max()
         if not self.scenario.plant.on_stage:
-            close = np.ptp(near, axis=1).max(axis=1) < MAX_FIXED * size
-            close &= ((near < high + MAX_FIXED * size) & (near > low - MAX_FIXED * size)).all(axis=(1, 2))
+            close = np.ptp(near, axis=1).max(axis=1) < MAX_FIXED_SIZE * size
+            close &= ((near < high + MAX_FIXED_SIZE * size) & (near > low - MAX_FIXED_SIZE * size)).all(axis=(1, 2))
             near, still = near[close], still[close]
-        near[still, :, 2] = near[still, :, 2].clip(low[2] - CLOSE * size, high[2] + CLOSE * size)
+        near[still, :, 2] = near[still, :, 2].clip(low[2] - STAND_SHARE * size, high[2] + STAND_SHARE * size)
         return np.concatenate([points, near.reshape(-1, 3)])
 
     def shape(self, time: float) -> int:
@@ -135,9 +133,8 @@ def motion(trace: Trace, times: np.ndarray) -> Motion | None:
 def poses(trace: Trace, times: np.ndarray) -> np.ndarray | None:
     """Return qpos at times in s, (times, nq), each at the physics step before; after a failure the last one.
 
-    A trace has the channels only, so the run is simulated again.
-
-    None: the law or a signal does not compile, and the run would take long.
+    A trace has the channels only, so the run is simulated again; None if that would take long, because the law or a
+    signal does not compile.
     """
     prepared = prepare(trace.scenario)
     if prepared.why_not:
@@ -163,7 +160,7 @@ def poses(trace: Trace, times: np.ndarray) -> np.ndarray | None:
     return np.array([qpos_at[end] for end in wanted])
 
 
-def places(puppets: Sequence[Puppet], reaches: Sequence[np.ndarray], turn: np.ndarray) -> np.ndarray:
+def standing_places(puppets: Sequence[Puppet], reaches: Sequence[np.ndarray], turn: np.ndarray) -> np.ndarray:
     """Return where the machines stand, (machines, 3) m: side by side, on the floor."""
     scenarios = [puppet.scenario for puppet in puppets]
     step = scene.lane(scenarios, reaches, turn)

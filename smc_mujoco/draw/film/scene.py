@@ -1,6 +1,6 @@
 """The model of a film: one machine a trace, side by side, without their surroundings, and a camera that suits them.
 
-Machines are the scenarios' own mechanisms with all that they touch. The camera looks in the direction of the plant's
+Machines are the scenarios' mechanisms with all that they touch. The camera looks in the direction of the plant's
 own camera `look`, or of the chosen one. A user's model keeps its cameras; its lights, sky and floor are the film's.
 """
 
@@ -21,24 +21,24 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 
 MAX_CHANNELS = 6  # of a network: more would be hidden by the next machine
-GAP = 0.15  # between machines in a row, of their width or height; chosen
-ARMS_GAP = 0.04  # the same between arms, which have no arrows beside them
-AISLE = 0.05  # m between machines, chosen
-HIDDEN = 5  # a group of geoms that MuJoCo does not draw by default
+ROW_GAP = 0.15  # between machines in a row, of their width or height; chosen
+ARM_GAP = 0.04  # the same between arms, which have no arrows beside them
+MIN_DISTANCE = 0.05  # m between machines, chosen
+HIDDEN_GROUP = 5  # a group of geoms that MuJoCo does not draw by default
 TENDON_GROUPS = 3  # groups of tendons that MuJoCo draws by default
 QUALITY = {"offsamples": 4, "shadowsize": 2048, "numslices": 36, "numstacks": 10, "numquads": 1}  # looks and speed
 LOOK = "look"
 SUN = "sun"  # the light whose shadows lie on the floor, see shadows.py
-CELLS = 7  # of the floor's grid, in the width of what is seen; chosen
+FLOOR_CELLS = 7  # of the floor's grid, in the width of what is seen; chosen
 HAZE = (0.66, 0.725, 0.80)  # red, green, blue, chosen
-FADED = 0.9  # part of the haze at the top of the picture, chosen
-HORIZON = 3.0  # distances of the farthest machine, where the haze is as thick if the floor reaches further
-NO_HAZE = 1.05  # a floor less far than this, of the distance of the farthest point, gets no haze; chosen
-LOW = -12.0  # degrees, elevation of a view of an own model: a little above it, so that the floor is seen; chosen
-FRONT, ABOVE = (90.0, LOW), (90.0, -70.0)  # azimuth and elevation, degrees: of slides, and of vertical hinges
-CORNER = (125.0, -18.0)  # of hinges about several axes, which no view along one of them shows; chosen
-PARALLEL = 0.95  # cosine of two axes; chosen
-OTHERS = (CORNER, FRONT, ABOVE, (0.0, LOW), (-55.0, -30.0))  # views to try where one shows nothing
+HAZE_AT_TOP = 0.9  # share of the full haze at the top of the picture, chosen
+HAZE_HORIZON = 3.0  # times the distance of the farthest machine: largest distance at which the haze is so thick
+MIN_HAZE_DISTANCE = 1.05  # times the distance of the farthest point: a nearer floor gets no haze; chosen
+LOW_ELEVATION = -12.0  # degrees: a view from a little above a user's model, so that the floor is seen; chosen
+FRONT, ABOVE = (90.0, LOW_ELEVATION), (90.0, -70.0)  # azimuth, elevation: for slides, for vertical hinges; degrees
+CORNER = (125.0, -18.0)  # for hinges about several axes; chosen
+PARALLEL_COSINE = 0.95  # of two axes that count as parallel; chosen
+OTHER_VIEWS = (CORNER, FRONT, ABOVE, (0.0, LOW_ELEVATION), (-55.0, -30.0))  # views to try where one shows nothing
 EMISSION = 0.13  # of the floor, so that it is nearly as white as the page below
 FIXED, DIRECTIONAL = mujoco.mjtCamLight.mjCAMLIGHT_FIXED.value, mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
 PLANE, CAPSULE = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_CAPSULE
@@ -56,7 +56,7 @@ def compose(scenarios: Sequence[Scenario], places: np.ndarray, size: tuple[int, 
     for k, (scenario, place) in enumerate(zip(scenarios, places, strict=True)):
         machine = models.spec(scenario)
         if not scenario.plant.on_stage:
-            machine = own_machine(machine, spec)
+            machine = users_machine(machine, spec)
             spec.attach(machine, frame=spec.worldbody.add_frame(pos=place), prefix=f"m{k}/")
             continue
         strip(machine, *machine.lights, machine.geom("floor"), machine.material("floor"), *machine.textures)
@@ -79,7 +79,7 @@ def strip(machine: mujoco.MjSpec, *surroundings) -> None:
         machine.delete(item)
 
 
-def own_machine(machine: mujoco.MjSpec, film: mujoco.MjSpec) -> mujoco.MjSpec:
+def users_machine(machine: mujoco.MjSpec, film: mujoco.MjSpec) -> mujoco.MjSpec:
     """Return a user's mechanism without its surroundings, with the film's settings."""
     machine.option = film.option  # MuJoCo warns of settings that differ
     for name in (name for name in dir(machine) if name.startswith("nuser_")):
@@ -108,15 +108,15 @@ def set_floor(
     )
     cell = min(
         (step * 10.0**power for power in range(-4, 5) for step in (1.0, 2.0, 5.0)),
-        key=lambda m: abs(np.log(CELLS * m / model.stat.extent)),
+        key=lambda m: abs(np.log(FLOOR_CELLS * m / model.stat.extent)),
     )
     model.mat_texrepeat[model.material("floor").id] = 1.0 / cell
     start = float(((points - place) @ -turn[:, 2]).max())
-    stop = min(camera.floor_distance(turn, place, size), HORIZON * start)
-    if stop < NO_HAZE * start:  # a view from above: the floor is no farther than the machine
-        stop = HORIZON * start
+    stop = min(camera.floor_distance(turn, place, size), HAZE_HORIZON * start)
+    if stop < MIN_HAZE_DISTANCE * start:  # a view from above: the floor is no farther than the machine
+        stop = HAZE_HORIZON * start
     model.vis.map.fogstart = start / model.stat.extent
-    model.vis.map.fogend = (start + (stop - start) / FADED) / model.stat.extent
+    model.vis.map.fogend = (start + (stop - start) / HAZE_AT_TOP) / model.stat.extent
     model.vis.rgba.fog[:] = (*HAZE, 1.0)
 
 
@@ -133,21 +133,21 @@ def hide_cut(
     corners = boxes(model, data)[fixed]
     down = camera.project(corners.reshape(-1, 3), turn, place, size)[:, 1].reshape(len(fixed), 8)
     cut = (down.min(axis=1) > room.bottom) & (down.max(axis=1) > size[1])
-    model.geom_group[fixed[cut]] = HIDDEN
+    model.geom_group[fixed[cut]] = HIDDEN_GROUP
 
 
 def turn(scenario: Scenario, chosen: Camera | None = None) -> np.ndarray:
     """Return the frame of the camera, (3, 3), as camera.py has it: the chosen one, else the plant's own."""
     if isinstance(chosen, str):
-        return named(scenario, chosen)
+        return camera_of(scenario, chosen)
     if chosen is not None:
         return camera.turn(*chosen[:2])
     if not scenario.plant.on_stage:
         return camera.turn(*view(models.compile_model(scenario)))
-    return named(scenario, LOOK)
+    return camera_of(scenario, LOOK)
 
 
-def named(scenario: Scenario, name: str) -> np.ndarray:
+def camera_of(scenario: Scenario, name: str) -> np.ndarray:
     """Return the frame of a camera of the scenario's model, (3, 3), at the start of its run."""
     model = models.compile_model(scenario)
     names = {model.camera(i).name: i for i in range(model.ncam) if model.camera(i).name}
@@ -159,7 +159,7 @@ def named(scenario: Scenario, name: str) -> np.ndarray:
 
 
 def view(model: mujoco.MjModel) -> tuple[float, float]:
-    """Return azimuth and elevation, degrees, of an own model's first fixed camera, or of one that sees its joints turn.
+    """Return azimuth and elevation, degrees, of a user's first fixed camera, or of one that sees its joints turn.
 
     The view looks down a little at least: along the floor or from below it there is nothing to see.
     """
@@ -167,17 +167,17 @@ def view(model: mujoco.MjModel) -> tuple[float, float]:
         if model.cam_bodyid[i] == 0 and model.cam_mode[i] == FIXED:
             right, _, back = model.cam_mat0[i].reshape(3, 3).T
             azimuth, elevation = np.degrees([np.arctan2(right[0], -right[1]), np.arcsin(np.clip(-back[2], -1.0, 1.0))])
-            return float(azimuth), min(float(elevation), LOW)
+            return float(azimuth), min(float(elevation), LOW_ELEVATION)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     axes = data.xaxis[[i for i in joint_ids(model) if model.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE]]
     if not len(axes):
         return FRONT
-    if (np.abs(axes @ axes[0]) < PARALLEL).any():
+    if (np.abs(axes @ axes[0]) < PARALLEL_COSINE).any():
         return CORNER
-    if abs(axes[0, 2]) > PARALLEL:
+    if abs(axes[0, 2]) > PARALLEL_COSINE:
         return ABOVE
-    return float(np.degrees(np.arctan2(abs(axes[0, 1]), axes[0, 0] * np.sign(axes[0, 1] or 1.0)))), LOW
+    return float(np.degrees(np.arctan2(abs(axes[0, 1]), axes[0, 0] * np.sign(axes[0, 1] or 1.0)))), LOW_ELEVATION
 
 
 def in_a_row(scenario: Scenario, turn: np.ndarray) -> bool:
@@ -205,7 +205,7 @@ def lane(scenarios: Sequence[Scenario], reaches: Sequence[np.ndarray], turn: np.
         sides = [points @ right for points in reaches]
         wide = max((one.max() - other.min() for one, other in itertools.pairwise(sides)), default=0.0)
         tall = max(float(np.ptp(points[:, 2])) for points in reaches)
-        gap = ARMS_GAP if scenarios[0].plant.tip else GAP
+        gap = ARM_GAP if scenarios[0].plant.tip else ROW_GAP
         return (wide + gap * max(wide, tall)) * right
     if not any(scenario.realistic for scenario in scenarios):
         return step
@@ -217,7 +217,7 @@ def lane(scenarios: Sequence[Scenario], reaches: Sequence[np.ndarray], turn: np.
             by = (k - j) * stretch * step[:2]
             apart = np.maximum(low[k][:, None] + by - high[j], low[j] - high[k][:, None] - by)
             gaps.append(apart.max(axis=2).min())
-        if min(gaps, default=AISLE) >= AISLE:
+        if min(gaps, default=MIN_DISTANCE) >= MIN_DISTANCE:
             return stretch * step
     return step
 
@@ -259,7 +259,7 @@ def first_channels(scenario: Scenario) -> Scenario:
 
 
 def rail(scenario: Scenario, model: mujoco.MjModel) -> float:
-    """Return the length of the rail, m: of what does not move, along x; inf for pendulums and own models."""
+    """Return the length of the rail, m: of what does not move, along x; inf for pendulums and users' models."""
     if scenario.plant.unit == "rad" or not scenario.plant.on_stage:
         return np.inf
     return float(2 * np.abs(fixed_boxes(model)[..., 0]).max())

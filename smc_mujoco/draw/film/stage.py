@@ -14,20 +14,20 @@ from PIL import Image
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film import arm, arrows, camera, scene
 from smc_mujoco.draw.film.canvas import Canvas
-from smc_mujoco.draw.film.puppet import Motion, Puppet, places
+from smc_mujoco.draw.film.puppet import Motion, Puppet, standing_places
 from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.trace import Trace
 
-FILLED = 0.7  # part of the width that the places of machines in a row take at least; chosen
-SAME = 1e-9  # of a camera's distance, that rounding may change
-OWN = 0.75  # share of the law's colour in that of an own model's links, where several laws are shown; chosen
-UNPAINTED = np.array([0.5, 0.5, 0.5, 1.0], np.float32)  # MuJoCo's own colour of geoms
-BLANK = 8  # of 255: colours that differ by less are one; chosen
-SEEN = 2e-4  # least part of a picture that shows something, such as 120 px of 1280 x 460; chosen
+ROW_SHARE = 0.7  # of the width, which the places of machines in a row take at least; chosen
+DISTANCE_ROUNDING = 1e-9  # of a camera's distance
+LAW_SHARE = 0.75  # of the law's colour in that of a user's model, where several laws are shown; chosen
+DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)  # MuJoCo's colour of geoms
+COLOUR_TOLERANCE = 8  # of 255: colours that differ by less are one; chosen
+MIN_PICTURE_SHARE = 2e-4  # of a picture that shows something, such as 120 px of 1280 x 460; chosen
 GROUPS = 3  # groups of geoms that MuJoCo draws by default
-GHOST = np.array([0.12, 0.14, 0.16, 0.22], np.float32)  # ink, translucent
-INSIDE = 0.97  # size of a ghost: it is hidden by the machine that has reached its reference
+GHOST_RGBA = np.array([0.12, 0.14, 0.16, 0.22], np.float32)  # ink, translucent
+GHOST_SIZE = 0.97  # of its machine's: a machine that has reached its reference hides it
 OTHER = mujoco.mjtObj.mjOBJ_UNKNOWN
 
 
@@ -53,7 +53,7 @@ class Stage:
     ):
         self.puppets = [Puppet(trace.scenario) for trace in traces]
         scenarios = [puppet.scenario for puppet in self.puppets]
-        self.shown, self.own = [puppet.shown for puppet in self.puppets], not scenarios[0].plant.on_stage
+        self.shown, self.is_users = [puppet.shown for puppet in self.puppets], not scenarios[0].plant.on_stage
         turn = scene.turn(scenarios[0], chosen)
         self.motions = motions or [None] * len(traces)
         runs = zip(self.puppets, traces, self.motions, strict=True)
@@ -100,16 +100,16 @@ class Stage:
         self.canvas.close()
 
     def shows(self) -> bool:
-        """Return whether a picture has more than one colour, and of an own model some of what its channels move."""
+        """Return whether a picture has more than one colour, and of a user's model some of what its channels move."""
         links, casts = np.concatenate(self.links), self.canvas.casts
         groups = self.model.geom_group[links].copy()
         self.canvas.casts = np.zeros_like(casts)  # a shadow shows nothing
         picture, self.changed = self.canvas.draw(whole=True).astype(int), True
-        self.model.geom_group[links] = scene.HIDDEN
+        self.model.geom_group[links] = scene.HIDDEN_GROUP
         bare = self.canvas.draw(whole=True)
         self.canvas.casts, self.model.geom_group[links] = casts, groups
-        seen = (np.abs(picture - bare).max(axis=2) > BLANK).mean() > SEEN
-        return bool(np.ptp(picture.reshape(-1, 3), axis=0).max() > BLANK and (seen or not self.own))
+        seen = (np.abs(picture - bare).max(axis=2) > COLOUR_TOLERANCE).mean() > MIN_PICTURE_SHARE
+        return bool(np.ptp(picture.reshape(-1, 3), axis=0).max() > COLOUR_TOLERANCE and (seen or not self.is_users))
 
     def set_shape(self, k: int, time: float) -> None:
         """Give machine k its shape at a time, s: a scenario's rod may be longer than the plant's, and may change."""
@@ -119,23 +119,23 @@ class Stage:
         self.shape[k], single = now, self.puppets[k].shapes[now].model
         for geom in range(single.ngeom):
             name = single.geom(geom).name
-            if name and name != "floor" and not self.own:
+            if name and name != "floor" and not self.is_users:
                 copy = self.model.geom(f"m{k}/{name}")
                 copy.pos, copy.size = single.geom_pos[geom], single.geom_size[geom]
         self.changed = True
 
     def set_colour(self, k: int, colour: str) -> None:
-        """Colour the accent of machine k; of a user's own model all links, of a single one those without a colour."""
+        """Colour the accent of machine k. A user's model has none: colour its links, of a single one the unpainted."""
         if self.colours[k] == colour:
             return
         rgb, links = np.array(style.rgb(colour)) / 255, self.links[k]
-        if self.own:
+        if self.is_users:
             if len(self.colours) == 1 and colour != style.FAILED:
-                links = links[(self.paint[links] == UNPAINTED).all(axis=1)]
+                links = links[(self.paint[links] == DEFAULT_RGBA).all(axis=1)]
             if len(links):
                 self.model.geom_matid[links] = -1
                 self.model.geom_rgba[links] = self.paint[links]
-                self.model.geom_rgba[links, :3] = OWN * rgb + (1.0 - OWN) * self.paint[links, :3]
+                self.model.geom_rgba[links, :3] = LAW_SHARE * rgb + (1.0 - LAW_SHARE) * self.paint[links, :3]
         else:
             self.model.mat(f"m{k}/accent").rgba[:3] = rgb
         self.colours[k], self.changed = colour, True
@@ -197,8 +197,8 @@ class Stage:
         """Add translucent copies of geoms, posed as the reference wants them."""
         model, goal = self.model, self.goal
         for i in links[: shown.maxgeom - shown.ngeom].tolist():
-            shape, size = shown.geoms[shown.ngeom], INSIDE * model.geom_size[i]
-            mujoco.mjv_initGeom(shape, model.geom_type[i], size, goal.geom_xpos[i], goal.geom_xmat[i], GHOST)
+            shape, size = shown.geoms[shown.ngeom], GHOST_SIZE * model.geom_size[i]
+            mujoco.mjv_initGeom(shape, model.geom_type[i], size, goal.geom_xpos[i], goal.geom_xmat[i], GHOST_RGBA)
             shape.dataid, shape.objtype, shape.transparent = 2 * model.geom_dataid[i], OTHER, 1
             shape.specular = 0.0
             shown.ngeom += 1
@@ -216,9 +216,9 @@ def placed(
 ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
     """Return the places of the machines, (machines, 3) m, their points there, and the place of the camera, (3,) m.
 
-    Machines in a row are at least `apart` px apart, and fill FILLED of the room if that makes them no smaller.
+    Machines in a row are at least `apart` px apart, and fill ROW_SHARE of the room if that makes them no smaller.
     """
-    where = places(puppets, reaches, turn)
+    where = standing_places(puppets, reaches, turn)
     if arm.is_arm(traces):  # the floor hides what is below it
         floors = [(-np.inf, -np.inf, -there[2]) for there in where]
         reaches = [np.maximum(points, floor) for points, floor in zip(reaches, floors, strict=True)]
@@ -229,11 +229,11 @@ def placed(
 
     fit = fitted(where)
     step = np.diff(camera.project(where, turn, fit[2], size)[:, 0]).mean() if len(where) > 1 else 0.0
-    pitch = FILLED * (room.right - room.left) / len(where)
+    pitch = ROW_SHARE * (room.right - room.left) / len(where)
     if 0.0 < step < apart:  # else labels would not be below their machines
         fit = fitted(where * (apart / step, apart / step, 1.0))
     elif 0.0 < step < pitch and scene.in_a_row(puppets[0].scenario, turn):
         wide = fitted(where * (pitch / step, pitch / step, 1.0))
-        if (wide[2] - fit[2]) @ turn[:, 2] < SAME * np.abs(fit[2]).max():
+        if (wide[2] - fit[2]) @ turn[:, 2] < DISTANCE_ROUNDING * np.abs(fit[2]).max():
             return wide
     return fit

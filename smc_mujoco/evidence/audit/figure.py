@@ -52,7 +52,7 @@ def figure(
     kinds = [kind for kind in COLOURS if any(claim.verdict == kind for claim in claims)]
     with style.page(width):
         handles = [Line2D([], [], color=COLOURS[kind], marker="o", ls="", label=kind) for kind in kinds]
-        whole = pages.head(width, handles) + style.points(ROW * (len(claims) + 2.5)) / 72
+        whole = pages.head_height(width, handles) + style.points(ROW * (len(claims) + 2.5)) / 72
         page = pages.blank(width, height or whole, fig)
         ax = page.subplots()
         for row, claim in enumerate(claims):

@@ -46,7 +46,7 @@ def report(
         a further law that is unknown or has no tuned gains.
       MissingPackageError: jinja2 or plotly is not installed.
     """
-    from smc_mujoco.analysis.differences import share_that_matters
+    from smc_mujoco.analysis.relevant_difference import checked_share
     from smc_mujoco.common import extras
     from smc_mujoco.common.errors import taken, whole
     from smc_mujoco.common.files import replacing
@@ -59,7 +59,7 @@ def report(
     if seeds is not None:
         plan = dataclasses.replace(plan, seeds=whole("seeds", seeds, 1, 10_000))
     if relevant is not None:
-        plan = dataclasses.replace(plan, relevant=share_that_matters(relevant))
+        plan = dataclasses.replace(plan, relevant=checked_share(relevant))
     if laws:
         plan = dataclasses.replace(plan, laws=tuple(dict.fromkeys((*plan.laws, *taken("laws", laws)))))
     folder = Path(out)

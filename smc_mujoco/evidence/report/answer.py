@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from smc_mujoco.analysis.differences import ROUNDING
 from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.analysis.relevant_difference import ROUNDING
 from smc_mujoco.common.text import joined
 from smc_mujoco.evidence.audit.verdict import totals
 from smc_mujoco.evidence.report import words

@@ -15,6 +15,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import replacing, scratch
 from smc_mujoco.draw import decimate
 from smc_mujoco.draw.film import film as video
+from smc_mujoco.draw.film import pace
 from smc_mujoco.draw.film.encoder import sigint_blocked
 from smc_mujoco.evidence.report.plan import Report
 from smc_mujoco.simulation.trace import Trace
@@ -71,7 +72,7 @@ def curve(trace: Trace) -> Curve:
     t, x, u = whole.t, whole.x[:, i], whole.u[:, i]
     width = decimate.window(trace)
     tu, line = decimate.line(t, u, width)
-    band = decimate.columns(t, u[:, None], BANDS) if decimate.stretches(u, width) else None
+    band = decimate.columns(t, u[:, None], BANDS) if decimate.chattering_parts(u, width) else None
     tb, low, high = (band.t, band.low[:, 0], band.high[:, 0]) if band else (np.empty(0),) * 3
     tx, x = decimate.line(t, x, 0)
     return Curve(law=trace.scenario.law.name, t=tx, x=x, tu=tu, u=line, tb=tb[: len(low)], low=low, high=high)
@@ -92,7 +93,7 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whol
 
     if why := gl.missing():
         raise ScenarioError(why)
-    shown, poster = video.clock(traces, FPS), io.BytesIO()
+    shown, poster = pace.clock(traces, FPS), io.BytesIO()
     count = len(shown.times)
     with scratch() as folder:
         path = folder / "film.webm"

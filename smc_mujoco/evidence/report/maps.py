@@ -20,8 +20,8 @@ FALLS, RISES = "#DCEAF4", "#C05A21"  # of V; light and dark apart from hue
 
 def meanings(found: "Sequence[Basin]") -> dict[str, str]:
     """Return colour -> its meaning, for the colours that occur in any of the maps."""
-    after = region.horizons(found)
-    there = {int(k) for basin in found for k in np.unique(region.classed(basin, after))}
+    after = region.convergence_times(found)
+    there = {int(k) for basin in found for k in np.unique(region.colour_indices(basin, after))}
     texts = region.meanings(after, "at rest, known after {:g} s", "does not come to rest here")
     return {region.COLOURS[k]: text for k, text in texts.items() if k in there}
 
@@ -32,7 +32,7 @@ def basins(found: "Sequence[Basin]", after: Sequence[float]) -> Figure:
     data: list[dict] = []
     layout: dict[str, Any] = {"annotations": []}
     for panel, basin in zip(grid, found, strict=True):
-        data.append(_plane(panel, basin.x, basin.v, region.classed(basin, after), region.COLOURS))
+        data.append(_plane(panel, basin.x, basin.v, region.colour_indices(basin, after), region.COLOURS))
         law = panel.title(words.law(basin.law), font={"color": words.colour(basin.law)})
         share = {"x": panel.x[1], "xanchor": "right", "font": {"size": 11, "color": style.MUTED}}
         layout["annotations"] += [law, panel.heading(f"{100 * basin.share:.0f} %", **share)]

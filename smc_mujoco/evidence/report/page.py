@@ -62,7 +62,7 @@ def environment() -> "Environment":
         lstrip_blocks=True,
     )
     made.filters |= {"json": htmlsafe_json_dumps, "margin_kind": words.kind, "law_name": words.law}
-    made.globals |= {"words": words, "checks": checks, "white": style.WHITE}
+    made.globals |= {"words": words, "checks": checks, "white": style.WHITE_SHARE}
     return made
 
 

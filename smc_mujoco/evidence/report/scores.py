@@ -12,9 +12,9 @@ import numpy as np
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of
-from smc_mujoco.analysis.differences import RELEVANT
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.ranking import samples_of
+from smc_mujoco.analysis.relevant_difference import RELEVANT
 from smc_mujoco.evidence.report import words
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies.board import Board

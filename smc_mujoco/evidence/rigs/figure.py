@@ -40,8 +40,8 @@ def residual_figure(
         handles = [
             Line2D([], [], color=colour, label=twin) for twin, colour in ({"measured": style.INK} | colours).items()
         ]
-        height = pages.head(style.FULL_PAGE, handles) + ROW * len(measured)
-        page = pages.blank(style.FULL_PAGE, height)
+        height = pages.head_height(style.FULL_WIDTH, handles) + ROW * len(measured)
+        page = pages.blank(style.FULL_WIDTH, height)
         axes = page.subplots(len(measured), 2, squeeze=False, sharex=True, width_ratios=(3, 2))
         for k, ((left, right), (name, values)) in enumerate(zip(axes, measured.items(), strict=True)):
             left.plot(t, values, color=style.INK, lw=1.6)
@@ -57,6 +57,6 @@ def residual_figure(
             right.set_title(f"residual, rms: {', '.join(left_over)}")
         for ax in axes[-1]:
             ax.set_xlabel("time (s)")
-        pages.set_head(page, style.FULL_PAGE, title, handles)
+        pages.set_head(page, style.FULL_WIDTH, title, handles)
         pages.write(page, paths)
     return paths

@@ -88,9 +88,9 @@ def test_bars_are_shares_of_each_joints_limit(trace):
     np.testing.assert_allclose(bars.shares[0][0], expected, atol=0.05)
     bars.shares[0][0] = (0.5, -1.0, 0.0)
     image = bars.over(paper() // 2, 0, lambda k, name: np.array([9.0, 0.0, 9.0]))
-    zero = 150.0 + arm.SPACE + arm.HEIGHT / 2
-    middles = [round(100.0 + arm.GAP + i * (arm.BAR + arm.GAP) + arm.BAR / 2) for i in range(3)]
-    quarter = round(arm.HEIGHT / 8)
+    zero = 150.0 + arm.LABEL_GAP + arm.BAR_HEIGHT / 2
+    middles = [round(100.0 + arm.BAR_GAP + i * (arm.BAR_WIDTH + arm.BAR_GAP) + arm.BAR_WIDTH / 2) for i in range(3)]
+    quarter = round(arm.BAR_HEIGHT / 8)
     up, down = round(zero) - quarter, round(zero) + quarter
     assert image[up, middles[0]].tolist() == list(style.rgb(COLOUR))
     assert image[down, middles[0]].tolist() == list(style.rgb(style.PAPER))
@@ -104,7 +104,7 @@ def test_a_blow_is_an_arrow_that_ends_before_its_body(trace):
     before, during = (shown.over(paper(), frame, lambda k, name: body) for frame in (0, 1))
     hue = np.array(style.rgb(style.REACTION))
     y, x = np.nonzero((during == hue).all(axis=2) & ~(before == hue).all(axis=2))
-    assert 250 - 100 * arm.REACH - 3 <= x.max() <= 250 - 100 * arm.REACH + 1
+    assert 250 - 100 * arm.BLOW_DISTANCE - 3 <= x.max() <= 250 - 100 * arm.BLOW_DISTANCE + 1
     assert abs(np.median(y) - 100) <= 1
     edges = np.array([0.0, 0.02, 0.03, 0.14, 0.16, 0.18])  # s, of frames; it is seen until 0.12 s after its end
     frames = [overlay(hit, edges).over(paper(), frame, lambda k, name: body) for frame in range(5)]
@@ -128,8 +128,8 @@ def test_a_blow_on_an_arm_is_shown_in_slow_motion(trace, monkeypatch):
     found = pace.clock([hit], 30.0)
     slow = np.abs(found.times - 0.31) < 0.02
     assert slow.sum() > 5
-    assert found.speeds[slow].tolist() == [0.5**pace.SLOWEST] * slow.sum()
-    assert pace.clock([still], 30.0).speeds.min() == pace.FAST
+    assert found.speeds[slow].tolist() == [0.5**pace.MAX_HALVINGS] * slow.sum()
+    assert pace.clock([still], 30.0).speeds.min() == pace.REST_SPEED
     monkeypatch.setattr(pace, "MAX_LENGTH", (1.0, 0.0))
     assert len(pace.clock([hit], 30.0).times) <= 0.5 * 30 + 2
 

@@ -81,7 +81,7 @@ def test_an_own_model_s_camera_is_found_by_its_name(trace):
     assert -side[:, 2] == pytest.approx([-1.0, 0.0, 0.0])
     azimuth, down = -scene.turn(trace.scenario)[:2, 2], -scene.turn(trace.scenario)[2, 2]
     assert azimuth / np.linalg.norm(azimuth) == pytest.approx([0.0, 1.0])  # the first that stands still, which
-    assert down == pytest.approx(np.sin(np.radians(scene.LOW)))  # looks along the floor
+    assert down == pytest.approx(np.sin(np.radians(scene.LOW_ELEVATION)))  # looks along the floor
     with pytest.raises(smc.ScenarioError, match="sid"):
         scene.turn(trace.scenario, "sid")
 

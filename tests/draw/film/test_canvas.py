@@ -80,7 +80,7 @@ def test_two_machines_that_move_far_apart_are_drawn_in_two_rectangles(monkeypatc
 def test_cylinders_have_few_stacks_unless_the_model_has_large_round_shapes():
     for plant, few in (("van_der_pol", True), ("inverted_pendulum", False)):
         with stage(plant) as shown:
-            assert (shown.model.vis.quality.numstacks == canvas.FEW) is few
+            assert (shown.model.vis.quality.numstacks == canvas.FEW_STACKS) is few
 
 
 def test_arcs_have_as_many_chords_as_can_be_told_apart():

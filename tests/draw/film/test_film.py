@@ -16,7 +16,7 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.draw import states, style
-from smc_mujoco.draw.film import camera, encoder, film, puppet, scene
+from smc_mujoco.draw.film import camera, encoder, film, pace, puppet, scene
 from smc_mujoco.draw.film.arrows import Arrow, Scale, arrows, loads, scales
 from smc_mujoco.draw.film.caption import Caption, key
 from smc_mujoco.draw.film.pace import Clock
@@ -67,7 +67,7 @@ def pictures(traces, times, charts=False, **options) -> list[np.ndarray]:
 
 def seconds(trace: smc.Trace, fps: float = 30.0) -> np.ndarray:
     """Times of a film's frames in real time."""
-    return film.clock([trace], fps, 1.0).times
+    return pace.clock([trace], fps, 1.0).times
 
 
 def machines(picture: np.ndarray) -> np.ndarray:
@@ -385,7 +385,7 @@ def stood(scenarios) -> np.ndarray:
     """Where machines stand."""
     found = [puppet.Puppet(scenario) for scenario in scenarios]
     reaches = [each.reach(smc.run(scenario)) for each, scenario in zip(found[:1], scenarios, strict=False)]
-    return puppet.places(found, reaches * len(found), scene.turn(scenarios[0]))
+    return puppet.standing_places(found, reaches * len(found), scene.turn(scenarios[0]))
 
 
 @pytest.mark.parametrize(("plant", "field", "name"), VARIANTS[::6], ids=str)
@@ -412,7 +412,7 @@ def test_a_joint_is_told_to_stick_from_when_it_rests_and_to_slide_before(stuck):
     (first, slides), (second, _) = moods(stuck)
     assert (first, second) == ("slides", "sticks")
     moving = np.flatnonzero(np.abs(stuck.v) > 1e-3 * np.abs(stuck.v).max())[-1]
-    assert slides / 30 == pytest.approx(stuck.t[moving] + states.HOLD, abs=0.04)  # it has rested for HOLD
+    assert slides / 30 == pytest.approx(stuck.t[moving] + states.MIN_STATE_TIME, abs=0.04)  # it has rested for HOLD
 
 
 def test_a_cart_rests_beside_the_speed_of_carts_and_not_of_its_pole():
@@ -434,7 +434,7 @@ def test_a_blow_of_milliseconds_is_told_as_long_as_it_takes_to_read(hit):
     assert 0.0 < np.ptp(touching) < 0.05
     (before, _), (blow, frames), (after, _) = moods(hit)
     assert (before, blow, after) == (None, "contact", None)
-    assert frames / 30 >= states.HOLD
+    assert frames / 30 >= states.MIN_STATE_TIME
     words = [now.words if now else None for now in states.timeline(hit, seconds(hit))]
     assert words.index("contact") == np.ceil(touching[0] * 30)  # at once, and not before
 
@@ -457,24 +457,24 @@ def test_flanks_are_told_by_where_they_push():
         assert now is not None
         assert now.words == "rattles" or now.words in {names[f] for f in flank[near].tolist()}
     rattling = np.where(np.arange(1001) // 20 % 2, 1.0, -1.0)
-    assert (states.backlash_side(rattling, slack.t, states.HOLD)[200:] == 2).all()
-    assert (states.backlash_side(np.ones(1001), slack.t, states.HOLD) == 1).all()
+    assert (states.backlash_side(rattling, slack.t, states.MIN_STATE_TIME)[200:] == 2).all()
+    assert (states.backlash_side(np.ones(1001), slack.t, states.MIN_STATE_TIME) == 1).all()
 
 
 def test_what_is_held_lasts_and_has_no_short_gaps():
     t = np.arange(100) * 0.01
     on = np.zeros(100, bool)
     on[[10, 40, 70]] = True
-    assert np.flatnonzero(np.diff(states.held(on, t, 0.16).astype(int))).tolist() == [9, 85]
-    assert np.flatnonzero(np.diff(states.held(on, t, 0.1).astype(int))).tolist() == [9, 19, 39, 49, 69, 79]
-    assert not states.held(on & False, t, 0.15).any()
+    assert np.flatnonzero(np.diff(states.extended(on, t, 0.16).astype(int))).tolist() == [9, 85]
+    assert np.flatnonzero(np.diff(states.extended(on, t, 0.1).astype(int))).tolist() == [9, 19, 39, 49, 69, 79]
+    assert not states.extended(on & False, t, 0.15).any()
 
 
 def test_words_never_flicker():
     rng, times = np.random.default_rng(0), np.arange(300) / 30
     names = [states.State("a", states.CALM), states.State("b", states.STUCK), states.State("hit", states.STRUCK)]
     found = [names[i] for i in rng.choice(3, 300, p=(0.48, 0.48, 0.04))]
-    shown = states.debounced(found, times, states.HOLD)
+    shown = states.debounced(found, times, states.MIN_STATE_TIME)
     runs = [(now, len(list(run))) for now, run in itertools.groupby(shown)]
     assert all(frames >= 5 or now == names[2] for now, frames in runs[1:-1])
     assert all(after == now for after, now in zip(shown, found, strict=True) if now == names[2])

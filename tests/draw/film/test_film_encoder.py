@@ -9,7 +9,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.draw.film import encoder
-from smc_mujoco.draw.film.encoder import AHEAD, in_thread
+from smc_mujoco.draw.film.encoder import MAX_WAITING, in_thread
 
 pytestmark = pytest.mark.quick
 
@@ -33,7 +33,7 @@ def test_pictures_are_written_in_order_and_all_by_the_end():
 def test_no_more_pictures_wait_than_agreed():
     gate, written = threading.Event(), []
     with in_thread(lambda picture: (gate.wait(), written.append(picture))) as write:
-        for _ in range(AHEAD + 1):  # one more is with the writer
+        for _ in range(MAX_WAITING + 1):  # one more is with the writer
             write(PICTURE)
         late = threading.Thread(target=write, args=(PICTURE,))
         late.start()
@@ -42,7 +42,7 @@ def test_no_more_pictures_wait_than_agreed():
         gate.set()
         late.join(timeout=10.0)
         assert not late.is_alive()
-    assert len(written) == AHEAD + 2
+    assert len(written) == MAX_WAITING + 2
 
 
 def test_an_error_of_the_encoder_ends_the_film_in_one_sentence_and_soon(tmp_path, monkeypatch):
@@ -73,7 +73,7 @@ def test_after_an_error_no_more_pictures_are_made():
 
     with pytest.raises(OSError, match="Broken pipe"):
         make()
-    assert len(made) < AHEAD + 5
+    assert len(made) < MAX_WAITING + 5
 
 
 def test_an_error_with_the_last_picture_is_not_lost(tmp_path, monkeypatch):
@@ -94,10 +94,10 @@ def test_an_error_where_pictures_are_made_is_that_error_and_the_rest_is_dropped(
 
     def interrupted():
         with in_thread(slow) as write:
-            for _ in range(AHEAD):
+            for _ in range(MAX_WAITING):
                 write(PICTURE)
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
-    assert len(written) < AHEAD
+    assert len(written) < MAX_WAITING

@@ -52,7 +52,7 @@ def test_a_jump_of_position_is_slow_and_a_rest_fast(base):
 def test_a_thing_takes_fifty_frames_or_more_to_cross_its_range(base, seconds, speed):
     trace = moving(base, lambda t: np.clip(t / seconds, 0.0, 1.0))
     assert at(trace, (0.1,)) == [speed]
-    assert speed / (seconds * FPS) <= pace.TRAVEL < 2 * speed / (seconds * FPS) or speed == 1.0
+    assert speed / (seconds * FPS) <= pace.MAX_TRAVEL < 2 * speed / (seconds * FPS) or speed == 1.0
 
 
 def test_the_fastest_machine_and_its_own_channel_s_range_count(base):
@@ -110,7 +110,7 @@ def test_a_diverged_run_does_not_make_the_others_rest(base):
     ("speed", "words"), [(1.0, ""), (0.125, "8× slower"), (4.0, "4× faster"), (0.3, "3.33× slower")]
 )
 def test_speeds_in_words(speed, words):
-    assert pace.words(speed) == words
+    assert pace.speed_words(speed) == words
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, 1e3, float("nan"), "fast"])
@@ -126,7 +126,7 @@ def test_most_frames_of_a_settling_run_show_motion():
     shares = []
     for speed in (1.0, None):
         found = pace.clock(traces, FPS, speed)
-        shares.append((pace.motion(traces, found.times) > pace.STILL * found.speeds[:-1]).mean())
+        shares.append((pace.travel_of(traces, found.times) > pace.REST_TRAVEL * found.speeds[:-1]).mean())
     assert shares[0] < 0.3
     assert shares[1] > 0.6
 

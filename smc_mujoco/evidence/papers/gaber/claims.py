@@ -2,7 +2,7 @@
 
 Settling time, overshoot and ripple are those of `metrics`. Overshoot is what goes beyond the origin, in percent of
 |x0|, whether the paper calls it overshoot or undershoot; if less is better, it is inf of a run that does not settle.
-"Larger" and "slower" mean by more than the least relevant difference, see `differences`. The paper says neither which
+"Larger" and "slower" mean by more than the least relevant difference. The paper says neither which
 way up the network's pendulums are nor how strongly they are coupled: a claim on it is supported if it holds on both
 networks of the study.
 """
@@ -14,8 +14,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from smc_mujoco.analysis import linear_theory
-from smc_mujoco.analysis.differences import RELEVANT
 from smc_mujoco.analysis.margins import DELAYS, TOLERATED_ERROR, Search, find_boundaries
+from smc_mujoco.analysis.relevant_difference import RELEVANT
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.control.law import Measurement, catalogue, command, law_function, sliding

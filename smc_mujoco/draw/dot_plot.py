@@ -23,8 +23,8 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.trace import Trace
 
 METRICS = ("settling_time", "ultimate_bound", "tv_rate")
-ROUNDING = 1e-9  # a size below it is printed as "<1e-9"
-LINE = 0.18  # inches on a full page, height of a law's line
+MIN_SIZE = 1e-9  # a size below it is printed as "<1e-9"
+LINE_HEIGHT = 0.18  # inches on a full page, height of a law's line
 
 
 def plot(
@@ -64,14 +64,14 @@ def plot(
     marks = dict(zip(laws, itertools.cycle(MARKS), strict=False))
     with style.page(width):
         key, shared = _key(table, colours, marks)
-        tall = [0.5 + LINE * (len(laws) + 1) * len(_there(table, plant, conditions)) for plant in plants]
-        space = pages.head(width, key) + style.points(0.6)
+        tall = [0.5 + LINE_HEIGHT * (len(laws) + 1) * len(_conditions_of(table, plant, conditions)) for plant in plants]
+        space = pages.head_height(width, key) + style.points(0.6)
         page = pages.blank(width, height or space + style.points(sum(tall)), fig)
         axes = page.subplots(len(plants), len(names), squeeze=False, height_ratios=tall)
         room = 72 * width / len(names) - style.points(50)  # what the axis' numbers and the space beside it leave
         for i, plant in enumerate(plants):
             labels = [_label(name, plant) for name in names]
-            if any(style.width(label, style.points(pages.LETTERS)) > room for label in labels):
+            if any(style.width(label, style.points(pages.TEXT_SIZE)) > room for label in labels):
                 labels = [label.replace(" (", "\n(").replace(" that", "\nthat") for label in labels]
             for k, name in enumerate(names):
                 _panel(axes[i, k], table, plant, name, conditions, laws, colours, marks)
@@ -79,7 +79,9 @@ def plot(
                 axes[i, k].tick_params(labelleft=k == 0)
             shipped = plants_catalogue().get(plant)
             above = (
-                None if width >= pages.NARROW else 1.0 + style.points(1.7 * pages.LETTERS / 72) / style.points(tall[i])
+                None
+                if width >= pages.NARROW
+                else 1.0 + style.points(1.7 * pages.TEXT_SIZE / 72) / style.points(tall[i])
             )
             axes[i, 0].set_title(
                 style.plant_name(shipped) if shipped else plant, y=above, parse_math=False
@@ -92,14 +94,14 @@ def plot(
 def _key(table: Columns, colours: Mapping[str, str], marks: Mapping[str, str]) -> tuple[list[Handle], str]:
     """Return the entries of the legend, law by law, and where all gains come from if that is the same."""
     known, key = sources(table), []
-    gains, shared = pages.gained([known.get(law, ()) for law in colours])
+    gains, shared = pages.gain_sources([known.get(law, ()) for law in colours])
     for law, source in zip(colours, gains, strict=True):
         look = {"marker": marks[law], "ms": style.points(6), "mec": "none", "lw": style.points(1.5)}
         key.append(Line2D([], [], color=colours[law], label=style.law_name(law) + source, **look))
     return [*key, Line2D([], [], color=style.MUTED, lw=style.points(1.5), label="95 % interval of the median")], shared
 
 
-def _there(table: Columns, plant: str, conditions: Sequence[str]) -> list[str]:
+def _conditions_of(table: Columns, plant: str, conditions: Sequence[str]) -> list[str]:
     """Return the conditions in which a plant ran, in order."""
     ran = set(table.column("condition")[table.column("plant") == plant].tolist())
     return [condition for condition in conditions if condition in ran]
@@ -109,7 +111,7 @@ def _panel(ax: Axes, table: Columns, plant: str, metric: str, conditions, laws, 
     """Draw a metric of one plant: a block of lines per condition, with a dot per law."""
     column, found = values(table, metric), {}
     of_plant, of_law, of_condition = (table.column(name) for name in ("plant", "law", "condition"))
-    there = _there(table, plant, conditions)
+    there = _conditions_of(table, plant, conditions)
     for j, condition in enumerate(there):
         for k, law in enumerate(laws):
             here = column[(of_plant == plant) & (of_law == law) & (of_condition == condition)]
@@ -118,7 +120,7 @@ def _panel(ax: Axes, table: Columns, plant: str, metric: str, conditions, laws, 
                 found[law, j * (len(laws) + 1) + k] = share_interval(float((here == 0.0).mean()), len(here))
             elif len(here):
                 one = median_interval(here)
-                middle, low, high = (max(v, ROUNDING) if v > 0.0 else v for v in one[:3])
+                middle, low, high = (max(v, MIN_SIZE) if v > 0.0 else v for v in one[:3])
                 found[law, j * (len(laws) + 1) + k] = Interval(middle, low, high, one.n)
     sizes = [v for one in found.values() for v in one[:3] if np.isfinite(v)]
     if metric != SETTLES and sizes and min(sizes) > 0.0 and max(sizes) > 20.0 * min(sizes):

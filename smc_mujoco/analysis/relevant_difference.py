@@ -33,12 +33,12 @@ def exceeds(a: ArrayLike, b: ArrayLike, resolution: ArrayLike = 0.0, relevant: f
     return np.asarray(a) - least_difference(a, resolution, relevant) > np.asarray(b)
 
 
-def share_that_matters(relevant: float) -> float:
+def checked_share(relevant: float) -> float:
     """Return the share of a value that is relevant. Raise ScenarioError if it is out of range."""
     return number("relevant", relevant, low=0.0, high=0.5)
 
 
-def coarse(values: np.ndarray) -> np.ndarray:
+def without_rounding(values: np.ndarray) -> np.ndarray:
     """Round values so that rounding errors vanish: 0 below 1e-9, else 20 binary digits."""
     share, exponent = np.frexp(np.where(np.abs(values) < ROUNDING, 0.0, values))
     with np.errstate(over="ignore"):
