@@ -68,7 +68,7 @@ class TimeSeries(Signal):
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self.times)} points, {self.times[0]:g} to {self.times[-1]:g} s)"
 
-    def __reduce__(self):  # so that a copy has its own data, also read-only
+    def __reduce__(self):  # a copy has separate data, also read-only
         return type(self), (self.times, self.values)
 
     def parameters(self) -> dict[str, float]:
@@ -83,7 +83,7 @@ class TimeSeries(Signal):
 
         Args:
           path: the file. Its first row may name the columns; otherwise they are time and value. A name may have a unit,
-            "d [N m]", as Trace.export writes it, and is found with and without the unit.
+            "d [N m]", as Trace.export writes it, which `column` and `time` may leave out.
           column: name of the column of values. Default: the first besides time.
           time: name of the column of times, s. Default: "t" or "time", else the first.
 
@@ -174,9 +174,9 @@ def _columns(
         if len(row) != len(names):
             raise ScenarioError(f"{path}, line {line}: {len(row)} cells for {len(names)} columns: give one for each")
     if all(not name or _is_number(name) for name in names):
-        if wanted := column or time:
+        if named := column or time:
             raise ScenarioError(
-                f"{path} has no header to find {shown(wanted)} in: write the columns' "
+                f"{path} has no header to find {shown(named)} in: write the columns' "
                 "names in its first line, or leave out column and time"
             )
         return (0, 1), rows
