@@ -145,8 +145,8 @@ def test_the_class_where_none_is_given_is_what_the_machine_leaves_open():
     own = default_class(smc.Scenario(plant=arm, law="none", friction=arm.friction))
     assert own == smc.Uncertainty(parameters=arm.uncertain, friction_scale=(0.5, 1.5))
     assert (own.disturbance, own.parameters["payload"]) == (0.0, (0.0, 2.0))
-    rig = smc.rig("qube_servo").scenario("none")  # a voltage: its force is that of the motor at rest
-    assert default_class(rig).disturbance == pytest.approx(10.0 * 0.0470184 / 10.069624549988971 / 6)
+    rig = smc.rig("qube_servo")  # its u is a voltage: the force is that of the motor at rest under 10 V
+    assert default_class(rig.scenario("none")).disturbance == pytest.approx(10.0 * rig.values["torque_per_volt"] / 6)
 
 
 def test_constants_and_relays_reach_what_another_adversary_found():
