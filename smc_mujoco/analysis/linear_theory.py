@@ -11,8 +11,8 @@ At rest the plant is M x'' = -K x - D x' + u + d (`linear`) and u = -lam tanh(x'
     M x'' + (D + lam) x' + (K + lam k1) x = d,                                                          (1)
 
 in n modes that differ only in their stiffness K_j. Each result below is that of the worst mode. A law with a boundary
-layer has the same form near s = 0, with lam = k/phi and k1 = c (`linearisation.local`). Laws that switch have no linear
-part, and no theory here.
+layer has the same form near s = 0, with lam = k/phi and k1 = c (`linearisation.linear_gains`). Laws that switch have no
+linear part, and no theory here.
 Source: Routh-Hurwitz for (1), the paper's stability claim is "any lambda > 0"; the crossings of a delay after
 K. L. Cooke & Z. Grossman, J. Math. Anal. Appl. 86:592, 1982; sampling after Astrom & Wittenmark, Computer-Controlled
 Systems, 1997, chapter 2; the rest derived here.

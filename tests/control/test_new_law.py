@@ -63,7 +63,7 @@ for name in ("brand_new", "plain_one"):
         "short": words.short(name),
         "colour": style.law_colours([trace.scenario.law])[0],
         "colours": style.law_colours([*smc.laws()]),
-        "linear": linearisation.local(smc.law(name)),
+        "linear": linearisation.linear_gains(smc.law(name)),
     }
 print(json.dumps(found))
 """

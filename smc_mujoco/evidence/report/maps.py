@@ -27,7 +27,7 @@ def meanings(found: "Sequence[Basin]") -> dict[str, str]:
 
 
 def basins(found: "Sequence[Basin]", after: Sequence[float]) -> Figure:
-    """Draw the maps of one plant: a panel per law, x across, x' up; `after` comes from `horizons` of all maps."""
+    """Draw the maps of one plant: a panel a law, x across, x' up; `after` is from `convergence_times` of all maps."""
     grid, unit = panels(1, len(found), (0.02, 0)), found[0].unit
     data: list[dict] = []
     layout: dict[str, Any] = {"annotations": []}

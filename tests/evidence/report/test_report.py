@@ -292,7 +292,7 @@ def test_a_page_of_thirteen_laws_has_a_line_for_each(findings):
 
 
 def test_a_map_is_drawn_as_it_was_found(findings):
-    figure = panels_of(maps.basins(findings.basins, maps.region.horizons(findings.basins)))
+    figure = panels_of(maps.basins(findings.basins, maps.region.convergence_times(findings.basins)))
     z = figure["data"][0]["z"]
     drawn = np.frombuffer(base64.b64decode(z["bdata"]), np.int8).reshape(tuple(map(int, z["shape"].split(","))))
     home = findings.basins[0].outcome == 1
