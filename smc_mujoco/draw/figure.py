@@ -116,6 +116,8 @@ def _composed_page(
     last = Panel("u", *next(iter(style.split(traces).items())))
     heights = [_height(panel) for panel in overview], [_height(last) if n == "end" else SIDE_HEIGHTS[n] for n in column]
     parts = [0.62 * len(small), *map(sum, heights)]
+    if not any(parts):
+        raise ScenarioError(f"panels is {list(chosen)}: give a panel that the plant has, or leave panels out")
     rows = sum(parts) if narrow else max(parts[0], parts[1], 4.0 if beside else 1.0)
     tall = height or max(0.5625 * width * (not narrow), space + style.points(ROW_HEIGHT) * rows + 0.5)
     page = pages.blank(width, tall, fig)

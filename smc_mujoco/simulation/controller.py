@@ -22,6 +22,7 @@ can fail return a failure code of state.py, unless they say otherwise.
 import math
 from collections import namedtuple
 
+import numpy as np
 from numba import njit
 
 from smc_mujoco.common.jit import call, pointer
@@ -142,7 +143,7 @@ def _read_sensor(sim, state, i, x, v, j, hinge):
         x += sim.bias
     if sim.counts != 0.0:
         quantum = (2.0 * math.pi if hinge else 1.0) / sim.counts
-        x = quantum * math.floor(x / quantum + 0.5)
+        x = quantum * np.floor(x / quantum + 0.5)
     if sim.dropout != 0.0:
         if j > 0 and philox.uniform(sim.seed, i, philox.DROPOUT, j) < sim.dropout:
             return state.last_x, state.last_v

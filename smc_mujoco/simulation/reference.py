@@ -213,7 +213,7 @@ class Loop:
             return x, v
         x += sensor.bias
         if q := sensor.quantum(self.channels["hinge_body"][i] >= 0):
-            x = q * math.floor(x / q + 0.5)
+            x = q * float(np.floor(x / q + 0.5))
         if j > 0 and random_words(seed, i, philox.DROPOUT, j)[0] * 2.0**-53 < sensor.dropout:
             return self.last_reading[i, 0], self.last_reading[i, 1]
         self.last_reading[i] = x, v

@@ -337,6 +337,8 @@ def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path)
         ({"size": (5.0, 0.1)}, "each 2 to 100"),
         ({"size": (5.0, 4.0), "fig": Figure()}, "give one of the two"),
         ({"panels": ["x", "phases"]}, "unknown panel 'phases': did you mean 'phase'"),
+        ({"panels": []}, "panels is \\[\\]: give a panel that the plant has"),
+        ({"panels": ["reaction"]}, "give a panel that the plant has"),
         ({"format": "pdf"}, "give path too"),
         ({"format": "gif", "path": "a"}, "unknown format 'gif'"),
         ({"format": "pdf", "path": "a.svg"}, "end the name in .pdf"),

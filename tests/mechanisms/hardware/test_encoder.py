@@ -81,6 +81,12 @@ def test_without_counts_a_reading_is_the_position_itself():
     np.testing.assert_array_equal(x, trace.x)
 
 
+def test_a_reading_of_more_counts_than_integers_have_bits_is_the_position():
+    trace, x, _ = read(smc.Encoder(counts=2**32, bias=1e12))
+    assert x == pytest.approx(1e12)
+    same(trace, reference.run(trace.scenario))
+
+
 def test_a_bias_is_added_before_the_rounding():
     trace, x, _ = read(smc.Encoder(counts=10, bias=0.04))
     np.testing.assert_array_equal(x, 0.1 * np.floor((trace.x + 0.04) / 0.1 + 0.5))
