@@ -340,6 +340,7 @@ def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path)
         ({"panels": []}, "panels is \\[\\]: give a panel that the plant has"),
         ({"panels": ["reaction"]}, "give a panel that the plant has"),
         ({"format": "pdf"}, "give path too"),
+        ({"format": 10**5000}, "give path too"),
         ({"format": "gif", "path": "a"}, "unknown format 'gif'"),
         ({"format": "pdf", "path": "a.svg"}, "end the name in .pdf"),
     ],
