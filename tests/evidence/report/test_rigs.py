@@ -108,13 +108,13 @@ def test_a_twin_that_leaves_the_machines_range_falls():
 
 @pytest.mark.skipif(not DATA.exists(), reason="the public records are not at hand")
 @pytest.mark.parametrize("kept", smc.rig("qube_servo").reached, ids=lambda kept: kept.quantities)
-def test_what_the_page_says_of_unused_records_is_what_they_give(kept):
+def test_what_the_page_says_of_public_records_is_what_they_give(kept):
     twin = smc.rig("qube_servo")
-    unused = [dict(np.load(DATA / f"qube-{name}.npz")) for name in re.findall(r"\d+", kept.records)]
+    records = [dict(np.load(DATA / f"qube-{name}.npz")) for name in re.findall(r"\d+", kept.records)]
     if kept.quantities == "do nothing":
-        fits = [twin.idle(record) for record in unused]
+        fits = [twin.idle(record) for record in records]
     else:
-        fits = (twin if kept.quantities == "identified" else twin.set(kept.quantities)).fits(unused)
+        fits = (twin if kept.quantities == "identified" else twin.set(kept.quantities)).fits(records)
     for name, value in kept.values.items():
         assert np.median([fit[name] for fit in fits]) == pytest.approx(value, rel=5e-3, abs=0.06)
 

@@ -27,7 +27,7 @@ SURE = 0.95  # probability of the angles within a sixteenth of a pitch, below wh
 PERIOD, STEP = 2e-3, 5e-4  # s; the fit is the same to 0.3 % at half the step
 FOUND = "identified here from eight records by least squares in closed loop, after a wide search with two of them"
 RIPPLE = "identified here from eight records in open loop, by the likelihood of a Kalman filter"
-USED = "06, 18, 30 and 42, of the eight: medians"
+USED = "06, 18, 30 and 42, four of the eight that identified the twin: medians"
 PUBLISHED = "Quanser, QUBE-Servo 2, as in BlueRiverTech/quanser-openai-driver (MIT)"
 DRIVER = {
     "pendulum_length": 0.129, "arm_length": 0.085, "arm_inertia": 4e-6 + 0.095 * 0.085**2 / 12, "arm_damping": 5e-5,
