@@ -131,22 +131,29 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
             continue
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
-        peaks = [max(map(abs, panels.span(parts, name))) for name in ("applied", "force", "d", "reaction")]
-        applied, force, disturbance = (lasting_size(parts, name) for name in ("applied", "force", "d"))
-        control = max(applied, force) if drive else applied
-        reaction = min(peaks[3], applied) if applied and same else peaks[3]
-        pairs = {"control": (max(peaks[: 1 + drive]), control), "disturbance": (peaks[2], disturbance)}
-        pairs["reaction"] = peaks[3], reaction
-        exceeded = tuple(name for name, (peak, longest) in pairs.items() if peak > 1.01 * longest)
-        by_group[group] = Scale(control, disturbance, reaction, exceeded, drive)
+        control, force, push, reaction = (_sizes(parts, name) for name in ("applied", "force", "d", "reaction"))
+        longest = min(reaction.peak, control.lasting) if control.lasting and same else reaction.peak
+        if drive:
+            control = Sizes(*map(max, control, force))
+        sizes = {"control": control, "disturbance": push, "reaction": Sizes(reaction.peak, longest)}
+        exceeded = tuple(name for name, size in sizes.items() if size.peak > 1.01 * size.lasting)
+        by_group[group] = Scale(control.lasting, push.lasting, longest, exceeded, drive)
     return by_group
 
 
-def lasting_size(traces: Sequence[Trace], name: str) -> float:
-    """Return the largest magnitude of a quantity in runs that last. Brief values of twice as much do not count."""
+class Sizes(NamedTuple):
+    """The largest magnitude of a quantity, at its peak and without values of twice as much that are brief."""
+
+    peak: float
+    lasting: float
+
+
+def _sizes(traces: Sequence[Trace], name: str) -> Sizes:
+    """Return the sizes of a quantity in runs that last; brief is at most a share 1 - LASTING of a channel's time."""
     peak = max(map(abs, panels.span(traces, name)))
-    usual = max((np.quantile(np.abs(y), panels.LASTING) for y in panels.lasting(traces, name).values()), default=0.0)
-    return float(usual) if peak > 2.0 * usual > 0.0 else peak
+    runs = panels.lasting(traces, name).values()
+    usual = max((float(np.quantile(np.abs(y), panels.LASTING, axis=0).max()) for y in runs), default=0.0)
+    return Sizes(peak, usual if peak > 2.0 * usual > 0.0 else peak)
 
 
 def scales_by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale]:

@@ -412,7 +412,7 @@ def test_a_joint_is_told_to_stick_from_when_it_rests_and_to_slide_before(stuck):
     (first, slides), (second, _) = moods(stuck)
     assert (first, second) == ("slides", "sticks")
     moving = np.flatnonzero(np.abs(stuck.v) > 1e-3 * np.abs(stuck.v).max())[-1]
-    assert slides / 30 == pytest.approx(stuck.t[moving] + states.MIN_STATE_TIME, abs=0.04)  # it has rested for HOLD
+    assert slides / 30 == pytest.approx(stuck.t[moving] + states.MIN_STATE_TIME, abs=0.04)  # it has rested so long
 
 
 def test_a_cart_rests_beside_the_speed_of_carts_and_not_of_its_pole():
@@ -550,6 +550,27 @@ def test_a_blow_is_cut_at_the_control_s_scale_and_the_key_says_so(hit):
     assert f"violet arrow: contact, longest {scale.control:.2g} N or more" in key([hit], found)
 
 
+@pytest.mark.parametrize(
+    ("peak", "samples", "longest", "words"),
+    [
+        (9.0, 20, 2.0, "2 N·m or more"),
+        (9.0, 25, 9.0, "9 N·m"),
+        (3.9, 20, 3.9, "3.9 N·m"),
+        (4.1, 20, 2.0, "2 N·m or more"),
+    ],
+)
+def test_a_brief_peak_of_a_channel_does_not_set_the_longest_arrow(peak, samples, longest, words):
+    """One of three pendulums is driven with 2 N m; brief is up to 2 % of its 1001 samples."""
+    (trace,) = smc.run([smc.Scenario(plant=smc.plant("pendulum_network", n=3), law="none", duration=1.0)])
+    force = np.zeros((1001, 3))
+    force[:, 1] = np.where(np.arange(1001) < samples, -peak, 2.0)
+    found = scales([dataclasses.replace(trace, applied=force, d=force)])
+    scale = found[driven([trace])]
+    assert (scale.control, scale.disturbance) == (longest, longest)
+    said = key([trace], found)
+    assert {f"coloured arrow: mean control, longest {words}", f"dark arrow: disturbance, longest {words}"} <= {*said}
+
+
 @renders
 def test_the_state_stands_in_a_badge_beside_the_label_in_the_picture():
     plant = "inverted_pendulum"
@@ -580,6 +601,8 @@ def test_behind_a_drive_the_force_is_shown_and_the_command_pale():
     assert (solid.rgba[3], pale.rgba[3]) == (1.0, 0.45)
     assert (solid.layer, pale.layer) == (0, 1)
     assert "pale arrow: command" in key([slow], found)
+    strong = scales([dataclasses.replace(slow, force=3.0 * slow.applied)])[driven([slow])]
+    assert strong.control == pytest.approx(3.0 * np.abs(slow.applied).max())
     assert not any("pale" in words for words in key(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1]))))
 
 
