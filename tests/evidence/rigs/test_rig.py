@@ -57,6 +57,12 @@ def test_a_rig_makes_scenarios_of_its_machine(name):
         assert rig.scenario(duration=0.1).law == rig.controller
 
 
+@pytest.mark.parametrize("samples", [500, 1020])
+def test_a_record_too_short_to_read_the_brushes_is_repeated_with_an_even_torque(record, samples):
+    brief = {name: column[:samples] for name, column in record.items()}
+    assert QUBE.replay(brief, start=0.5).actuator[0].ripple == 0.0
+
+
 @pytest.mark.parametrize(
     ("name", "stall", "brake"),  # N m or N per volt; V per rad/s or m/s
     [("qube_servo_2", 5e-3, 0.042), ("qube_servo_3", 5.63e-3, 0.0422), ("srv02", 0.128, 0.538), ("ip02", 1.72, 4.48)],
