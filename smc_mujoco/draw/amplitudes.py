@@ -67,7 +67,7 @@ def amplitudes(
             runs.setdefault(label, []).append(trace)
     if not runs:
         raise ScenarioError("no trace to draw: give at least one")
-    paths = [] if path is None else pages.files(path, format)
+    paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     with style.page(width):
         page = pages.blank(width, height or style.points(PAGE_HEIGHT), fig)

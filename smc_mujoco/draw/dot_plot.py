@@ -51,7 +51,7 @@ def plot(
     """
     if isinstance(table, Trace):
         raise ScenarioError(f"table is {shown(table)}: smc.figure draws traces, and this draws the table of a study")
-    paths = [] if path is None else pages.files(path, format)
+    paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     names = taken("metrics", metrics)
     for name in names:

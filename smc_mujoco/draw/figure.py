@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from smc_mujoco.common.errors import ScenarioError, find, shown, taken
+from smc_mujoco.common.errors import ScenarioError, find, taken
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style
@@ -73,9 +73,7 @@ def figure(
       ScenarioError: no traces, traces of several plants, an unknown panel, size or format, or a path that cannot be
         written.
     """
-    paths = [] if path is None else pages.files(path, format)
-    if path is None and format is not None:
-        raise ScenarioError(f"format is {shown(format)} without a file: give path too")
+    paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     traces = style.same_plant(traces)
     names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
@@ -334,7 +332,7 @@ def signals(
     Raises:
       ScenarioError: as in `figure`; also two traces of one law under one condition, or u in several units.
     """
-    paths = [] if path is None else pages.files(path, format)
+    paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     traces = style.same_plant(traces)
     columns = style.labels(traces, labels)

@@ -53,7 +53,7 @@ def joints(
     traces = [finite(trace) for trace in style.same_plant(traces)]
     names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
     drawn, marks = panels_of(traces), style.marks(traces, names)
-    paths = [] if path is None else pages.files(path, format)
+    paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     columns = min(NARROW_COLUMNS if width < pages.NARROW else WIDE_COLUMNS, key=lambda n: -len(drawn) % n)
     rows = -(-len(drawn) // columns)

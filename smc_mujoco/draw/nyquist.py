@@ -59,7 +59,7 @@ def nyquist(
     """
     if not scenarios:
         raise ScenarioError("no scenario to draw: give at least one")
-    paths = [] if path is None else pages.files(path, format)
+    paths = pages.files(path, format)
     if cycles is None:
         cycles = [predict(scenario, channel, ranges=False) for scenario in scenarios]
     runs = [run(scenario) for scenario in scenarios] if traces is None else traces

@@ -47,7 +47,7 @@ def orders(
         groups.setdefault(f"{row.plant.replace('_', ' ')}, {row.condition.replace('_', ' ')}", []).append(row)
     if not groups:
         raise ScenarioError("no accuracy to draw: give at least one row")
-    paths = [] if path is None else pages.files(path, format)
+    paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     laws = list(dict.fromkeys(row.law for row in rows))
     looks = dict(zip(laws, zip(style.law_colours(laws), itertools.cycle(MARKS), strict=False), strict=True))

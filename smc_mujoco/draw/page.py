@@ -190,11 +190,15 @@ def gain_sources(sources: Sequence[Iterable[Source]]) -> tuple[list[str], str]:
     return [f", {one}" if one else "" for one in words], ""
 
 
-def files(path: str | os.PathLike[str], format: str | None = None) -> list[Path]:
+def files(path: str | os.PathLike[str] | None, format: str | None = None) -> list[Path]:
     """Return the files of a figure: a PDF for .pdf, else an SVG and a PNG; only one of them if `format` is given.
 
-    ".5" in "lam_0.5" and ".b c" in "a.b c" do not count as endings.
+    ".5" in "lam_0.5" and ".b c" in "a.b c" do not count as endings. Without a path there are no files.
     """
+    if path is None:
+        if format is not None:
+            raise ScenarioError(f"format is {shown(format)} without a file: give path too")
+        return []
     base = Path(path)
     if not base.name or "\0" in base.name:
         raise ScenarioError(f"cannot draw to {str(path)!r}: give the name of a file, such as network.svg")

@@ -44,7 +44,7 @@ def pareto(
     Raises:
       ScenarioError: no tunings, tunings that cannot be compared, or as `figure`.
     """
-    paths, best = [] if path is None else pages.files(path, format), compare(tunings)
+    paths, best = pages.files(path, format), compare(tunings)
     width, height = pages.measure(size, fig)
     with style.page(width):
         page = pages.blank(width, height or style.points(PAGE_HEIGHT), fig)

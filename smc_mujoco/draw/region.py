@@ -30,7 +30,7 @@ def draw(
     fig: "Figure | SubFigure | None" = None,
 ) -> "Figure | SubFigure":
     """Draw maps side by side; `path`, `size` and `fig` are as in `figure`."""
-    paths = [] if path is None else pages.files(path)
+    paths = pages.files(path)
     if not maps:
         raise ScenarioError("no map to draw: give at least one")
     width, height = (MAP_SIZE[0] * len(maps), None) if size is None and fig is None else pages.measure(size, fig)

@@ -36,10 +36,7 @@ def tune(
     out: Annotated[
         Path | None, typer.Option(metavar="FILE.json", help="Also write gains, history and provenance to a file.")
     ] = None,
-    front: Annotated[
-        Path | None,
-        typer.Option(metavar="PICTURE", help=f"Also draw error against variation, {options.PICTURE}."),
-    ] = None,
+    front: Annotated[Path | None, options.picture("error against variation")] = None,
     chattering: Annotated[
         float | None, typer.Option(help="Largest predicted amplitude of s, in its unit, in the first condition.")
     ] = None,
@@ -179,9 +176,7 @@ def worst(
     ] = 8.0,
     budget: Annotated[int | None, typer.Option(min=1, help="Runs of a search; default: about 10 s a law.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search.")] = 0,
-    out: Annotated[
-        Path | None, typer.Option(metavar="PICTURE", help=f"Also draw the worst runs, {options.PICTURE}.")
-    ] = None,
+    out: Annotated[Path | None, options.picture("the worst runs")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
@@ -209,7 +204,7 @@ def worst(
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.worst_case import WorstCases, worst_case
 
-    json, terminal = options.json_file(json, *(files(out) if out else ()))
+    json, terminal = options.json_file(json, *files(out))
     pairs = [text.partition("=") for text in parameter or ()]
     ranges = {"delay": delay, "mass": mass, "friction": friction, "friction_scale": friction_scale}
     bounds = {
@@ -272,9 +267,7 @@ def accuracy(
     duration: Annotated[float, typer.Option(help="Duration of the runs, s.")] = 10.0,
     x0: options.X0 = None,
     spread: options.Spread = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="PICTURE", help=f"Also draw error over period, {options.PICTURE}.")
-    ] = None,
+    out: Annotated[Path | None, options.picture("error over period")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
@@ -300,7 +293,7 @@ def accuracy(
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.accuracy import accuracy as measure
 
-    pictures = files(out) if out else []
+    pictures = files(out)
     json, terminal = options.json_file(json, *pictures)
     machines = [options.plant(text) for text in options.names(plants)]
     chosen = known(machines[0]) if law == ["all"] else options.laws(law, gain_sets.LAWS)
@@ -329,7 +322,7 @@ def basin(
     points: Annotated[int, typer.Option(min=2, help="Number of positions, and of velocities.")] = 50,
     gains: options.Gains = "tuned",
     duration: Annotated[float, typer.Option(help="Duration of the longest runs, s.")] = 10.0,
-    out: Annotated[Path | None, typer.Option(metavar="PICTURE", help=f"Also draw the map, {options.PICTURE}.")] = None,
+    out: Annotated[Path | None, options.picture("the map")] = None,
     json: options.Json = None,
     condition: options.Condition = "nominal",
     threads: options.Threads = None,
@@ -349,7 +342,7 @@ def basin(
         from smc_mujoco.draw.page import files
         from smc_mujoco.draw.region import draw
 
-    pictures = files(out) if out else []
+    pictures = files(out)
     json, terminal = options.json_file(json, *pictures)
     chosen = options.law(law)
     with bar(f"{law} on {plant}") as progress:
@@ -397,9 +390,7 @@ def chatter(
         typer.Option(min=1e-3, help="Take the largest gains whose predicted frequency, Hz, stays below this."),
     ] = None,
     duration: Annotated[float, typer.Option(min=0.1, help="Duration of the runs that measure it, s.")] = 8.0,
-    out: Annotated[
-        Path | None, typer.Option(metavar="PICTURE", help=f"Also draw Nyquist plots and runs, {options.PICTURE}.")
-    ] = None,
+    out: Annotated[Path | None, options.picture("Nyquist plots and runs")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
@@ -433,7 +424,7 @@ def chatter(
         from smc_mujoco.simulation.grid import case
         from smc_mujoco.simulation.run import run
 
-    pictures = files(out) if out else []
+    pictures = files(out)
     json, terminal = options.json_file(json, *pictures)
     chosen = options.laws(law, gain_sets.LAWS)
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}

@@ -23,8 +23,14 @@ if TYPE_CHECKING:
 
 COMMA = re.compile(r",(?![^(]*\))")  # a comma outside brackets
 FIELD_START = re.compile(r"\w+\s*=")  # of a scenario, in a condition
-PICTURE = "as PICTURE.svg and PICTURE.png, or PICTURE.pdf"  # what the help says of a figure's file
 GAINS_HELP = "With your own gains: pid(kp=50, ki=1). Of a file: my_law.py, or gains.json of `smc-mujoco tune --out`."
+
+
+def picture(contents: str) -> Any:
+    """Return an option for the file of a figure that shows `contents`."""
+    return typer.Option(
+        metavar="PICTURE", help=f"Also draw {contents}, as PICTURE.svg and PICTURE.png, or PICTURE.pdf."
+    )
 
 
 def _completing(module: str, name: str) -> Callable[[str], list[str]]:

@@ -81,7 +81,7 @@ def run(
 @errors_as_sentences()
 def show(
     trace: Annotated[Path, typer.Argument(metavar="TRACE", help="A .npz file from `smc-mujoco run` or Trace.save.")],
-    figure: Annotated[Path | None, typer.Option(metavar="PICTURE", help=f"Also draw it, {options.PICTURE}.")] = None,
+    figure: Annotated[Path | None, options.picture("it")] = None,
     export: Annotated[
         str | None,
         typer.Option(

@@ -113,9 +113,7 @@ def compare(
     out: Annotated[
         Path, typer.Option(metavar="FOLDER", help="For gains and runs; the same command continues there.")
     ] = Path("compared"),
-    figure: Annotated[
-        Path | None, typer.Option(metavar="PICTURE", help=f"Also draw the medians, {options.PICTURE}.")
-    ] = None,
+    figure: Annotated[Path | None, options.picture("the medians")] = None,
     latex: Annotated[Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")] = None,
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
     traces: Annotated[
@@ -154,7 +152,7 @@ def compare(
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.compare import compare as run
 
-    terminal, pictures = Terminal(), files(figure) if figure else []
+    terminal, pictures = Terminal(), files(figure)
     relevant = RELEVANT if relevant is None else relevant
     for file in (*pictures, *([latex] if latex else [])):
         writable(file)

@@ -47,7 +47,7 @@ def figure(
     """
     if not claims:
         raise ScenarioError("no claims to draw: give at least one")
-    paths = [] if path is None else pages.files(path, format)
+    paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     kinds = [kind for kind in COLOURS if any(claim.verdict == kind for claim in claims)]
     with style.page(width):

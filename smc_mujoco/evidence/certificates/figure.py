@@ -29,7 +29,7 @@ def draw(certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike
     part = next((one for one in data["parts"] if one["theorem"] == "level sets"), None)
     if part is None and not certificate.stable:
         raise ScenarioError(f"the certificate of {certificate.law} on {certificate.plant} has no region to draw")
-    paths = [] if path is None else pages.files(path)
+    paths = pages.files(path)
     with style.page(SIZE[0]):
         bounded = part is not None and not certificate.rests
         page = pages.blank(SIZE[0] if bounded else 0.62 * SIZE[0], SIZE[1], None)

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.interrupts import held_back
 
@@ -15,7 +16,7 @@ def board(
     robustness: Annotated[
         bool, typer.Option(help="Whether to run the robustness test too: 722 machines a row, some 20 s in all.")
     ] = True,
-    figure: Annotated[Path | None, typer.Option(help="Also draw the run, as FIGURE.svg and FIGURE.png.")] = None,
+    figure: Annotated[Path | None, options.picture("the run")] = None,
     film: Annotated[Path | None, typer.Option(help="Also film the run, to a .mp4 file.")] = None,
 ) -> None:
     """Show RealAIGym's board of a robot, with this package's rows among the published ones.

@@ -38,10 +38,7 @@ def certify(
     condition: options.Condition = "nominal",
     gains: options.Gains = "tuned",
     out: Annotated[Path | None, typer.Option(metavar="FILE.json", help="Also write the certificate to a file.")] = None,
-    figure: Annotated[
-        Path | None,
-        typer.Option(help="Also draw the state plane, with a run, as FIGURE.svg and FIGURE.png, or FIGURE.pdf."),
-    ] = None,
+    figure: Annotated[Path | None, options.picture("the state plane, with a run")] = None,
     worst: Annotated[
         bool, typer.Option("--worst", help="Also search for the worst d within its bound, some 10 s, and draw its run.")
     ] = False,
@@ -74,7 +71,7 @@ def certify(
         from smc_mujoco.simulation.run import run
         from smc_mujoco.studies.worst_case import worst_case
 
-    pictures = files(figure) if figure else []
+    pictures = files(figure)
     json, terminal = options.json_file(json, out and ended(out, ".json"), *pictures)
     scenario = found = None
     if check:

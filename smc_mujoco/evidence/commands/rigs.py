@@ -28,9 +28,7 @@ def identify(
     ] = None,
     starts: Annotated[int, typer.Option(min=1, help="How many sets of values the search may start from.")] = 4,
     seed: Annotated[int, typer.Option(min=0, help="Seed of these starts.")] = 0,
-    figure: Annotated[
-        Path | None, typer.Option(help="Also draw the first record and its residuals, as FIGURE.svg and .png.")
-    ] = None,
+    figure: Annotated[Path | None, options.picture("the first record and its residuals")] = None,
     json: options.Json = None,
 ) -> None:
     """Fit a machine's parameters (mass, friction, motor) to measured data.
@@ -108,9 +106,7 @@ def replay(
     duration: Annotated[
         float | None, typer.Option(help="Duration of the film, s; default to the end of the record.")
     ] = None,
-    figure: Annotated[
-        Path | None, typer.Option(help="Also draw the columns and their residuals, as FIGURE.svg and .png.")
-    ] = None,
+    figure: Annotated[Path | None, options.picture("the columns and their residuals")] = None,
     film: Annotated[Path | None, typer.Option(help="Also film machine and twins side by side, to a .mp4 file.")] = None,
 ) -> None:
     """Repeat a record of a real machine by its twin, and show both side by side.

@@ -3,7 +3,7 @@
 The paper (J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition") states d(t) = 0.2 sin(5t), five
 pendulums and Gaussian noise on x and v; it states no gain and no other parameter. Those here were chosen for this
 study: every law is bounded by the same |u| <= 6, and its gains are those of a set in `gains`. Its conditions are named
-in `named_conditions`. The plants' parameters are in their files.
+in `simulation.conditions`. The plants' parameters are in their files.
 
     scenario("duffing", "classical", "noise", seed=3)      # one Scenario
     comparison("duffing", "noise")                         # the four laws: name -> Scenario
