@@ -61,7 +61,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture
 def coarse_grid(monkeypatch):
-    """Seek limit cycles on a thirteenth of the grid's points, and gains at a quarter of the speeds.
+    """Seek limit cycles on a sixth of the grid's points, and gains at a quarter of the speeds.
 
     What is found there is refined as ever; a law with several cycles may lose one.
     """

@@ -22,9 +22,7 @@ from smc_mujoco.mechanisms.plant import Plant
 
 EQUALITY_TOLERANCE = 1e-6  # relative: smaller differences count as none
 MAX_DISPLACEMENT = 10.0  # rad or m, chosen: beyond the first maximum of every restoring force here
-DISPLACEMENTS = np.geomspace(
-    1e-7, MAX_DISPLACEMENT, 4000
-)  # rad or m, where `restoring_force` is evaluated: steps of 0.5 %
+DISPLACEMENTS = np.geomspace(1e-7, MAX_DISPLACEMENT, 4000)  # rad or m, of `restoring_force`: steps of 0.5 %
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)

@@ -57,10 +57,7 @@ BATCH_BYTES = 48 * 2**20  # of traces in memory at once, about
 REST_TOLERANCE = 1e-6  # of X, V and u_max: a run that changes less is at rest
 MAX_FINAL_RATIO, MAX_EARLY_RATIO = 1.05, 0.9  # of the squared distance (e/X)^2 + (v/V)^2, second half over first
 NEAR_SQUARE = (0.1 * SETTLING_BAND) ** 2  # squared distance
-POSITION_REACH = {
-    "rad": lambda plant: math.pi,
-    "m": lambda plant: 2.0 * max(map(abs, plant.x0)),
-}  # X of a plant, chosen
+POSITION_REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}  # X, chosen
 VELOCITY_RATIO = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
 MIN_SAMPLES = 10  # of the shortest runs: then each half of their last fifth has one
 CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1

@@ -284,7 +284,7 @@ class Template:
     def unmet(self, gains: Mapping[str, GainValue]) -> list[str]:
         """Return the conditions of the theorem that these gains violate, in words."""
         channels = list(_per_channel(gains))
-        return [words for words, test in self.conditions.items() if not all(_holds(test, gains) for gains in channels)]
+        return [words for words, test in self.conditions.items() if not all(_holds(test, g) for g in channels)]
 
     def __call__(self, **gains: float | Sequence[float]) -> Component:
         """Return `bind(gains, warn=True)`."""

@@ -88,12 +88,8 @@ class LinearLaw:
     def py_func(self) -> Any:
         """The compiled text, as a plain function of Python."""
         file, space = f"<controller {self.name} {hash(self):x}>", {"__name__": "law_from_control"}
-        linecache.cache[file] = (
-            len(self.text),
-            None,
-            self.text.splitlines(keepends=True),
-            file,
-        )  # for the translation to C
+        lines = self.text.splitlines(keepends=True)
+        linecache.cache[file] = len(self.text), None, lines, file  # for the translation to C
         exec(compile(self.text, file, "exec"), space)
         return space["controller"]
 
@@ -234,7 +230,7 @@ def _realisation(num: Any, den: Any, dt: Any) -> System:
             try:
                 forms.append(tf2ss(np.atleast_1d(above), np.atleast_1d(below)))
             except ValueError:
-                order = " over ".join(str(len(np.trim_zeros(array, "f")) - 1) for array in (above, below))
+                order = " over ".join(str(len(np.trim_zeros(polynomial, "f")) - 1) for polynomial in (above, below))
                 cure = "filter its derivative, as s / (tau s + 1)"
                 raise ScenarioError(f"K is improper, of order {order}: {cure}") from None
     a, b = (block_diag(*(form[k] for form in forms)) for k in (0, 1))

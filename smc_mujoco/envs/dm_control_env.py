@@ -49,7 +49,7 @@ class PlantPhysics(Physics):
     step_context: contextlib.AbstractContextManager[None] = contextlib.nullcontext()
 
     def step(self, nstep: int = 1) -> None:
-        """Take physics steps. Those of an action with two drives in series are taken one by one."""
+        """Take physics steps. Those of an action are taken one by one if `DriveStep` simulates a drive."""
         step_counts, self.step_counts = self.step_counts, ()
         context, self.step_context = self.step_context, contextlib.nullcontext()
         with context:

@@ -21,7 +21,8 @@ def register_when_imported() -> None:
     if getattr(sys.modules.get(LIBRARY), "envs", None) is not None:  # set once gymnasium has registered its own ids
         register()
     else:
-        others = [finder for finder in sys.meta_path if type(finder).__module__ != __name__]  # none of ours
+        # finders of other packages; an earlier import of this module may have left its own
+        others = [finder for finder in sys.meta_path if type(finder).__module__ != __name__]
         sys.meta_path[:] = [Importer(), *others]
 
 

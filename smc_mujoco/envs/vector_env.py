@@ -174,14 +174,18 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
                 ids = np.setdiff1d(np.arange(self.num_envs) if ids is None else ids, error.ids).astype(np.int32)
         return failed | self.friction.failed if self.friction else failed
 
-    def observe(self, lost: np.ndarray | None = None) -> np.ndarray:
-        """Return the observations of all copies, (num_envs, size). `lost` marks those that diverged, if known."""
+    def observe(self, diverged: np.ndarray | None = None) -> np.ndarray:
+        """Return the observations of all copies, (num_envs, observation_size).
+
+        Args:
+          diverged: the copies that diverged, (num_envs,) of bool, if known.
+        """
         x, v = self.state()
-        if lost is None:
-            lost = np.asarray(self.setting.diverged(x, v))
+        if diverged is None:
+            diverged = np.asarray(self.setting.diverged(x, v))
         observations = self.setting.observe(x, v, self.samples)
-        if lost.any():
-            observations[lost] = bounded(observations[lost])
+        if diverged.any():
+            observations[diverged] = bounded(observations[diverged])
         return observations
 
     @property

@@ -126,7 +126,7 @@ def _window(count: int) -> np.ndarray:
 
 
 def _refined(rates: np.ndarray, peak: int) -> float:
-    """Return a peak's number of periods, not a whole one: its phase turns from the first half to the second."""
+    """Return the number of periods of a peak with its fraction, by which the phase turns between the halves."""
     half = len(rates) // 2
     turns = np.exp(-2j * math.pi * peak / len(rates) * np.arange(2 * half))
     window = _window(half)

@@ -5,8 +5,8 @@ taken to stay where it starts.
 
 MuJoCo computes the forces of contact at the logged state, command and disturbances of each sample. So they are not
 means over a control period. They are unknown if an actuator has a state that a trace lacks, such as a motor's current,
-or the rotor behind a backlash. LuGre friction and friction by a formula are left out. That does not matter on an arm: a
-sliding contact's spring carries 99 % of a change of load, see `mechanisms.hardware.contact`.
+or the rotor behind a backlash. LuGre friction, friction by a formula and a motor's ripple are left out. That does not
+matter on an arm: a sliding contact's spring carries 99 % of a change of load, see `mechanisms.hardware.contact`.
 """
 
 from __future__ import annotations
@@ -65,9 +65,9 @@ def tip_path(plant: Plant, x: np.ndarray, factors: Mapping[str, float] | None = 
     model = plant.load(factors)
     data, site = mujoco.MjData(model), model.site(plant.tip).id
     data.qpos[:] = initial_pose(model)
-    positions, tip = model.jnt_qposadr[joint_ids(model)], np.empty((len(x), 3))
+    addresses, tip = model.jnt_qposadr[joint_ids(model)], np.empty((len(x), 3))
     for k, joints in enumerate(x):
-        data.qpos[positions] = joints
+        data.qpos[addresses] = joints
         mujoco.mj_kinematics(model, data)
         tip[k] = data.site_xpos[site]
     return tip

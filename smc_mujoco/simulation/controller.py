@@ -214,13 +214,8 @@ def update_law(address, sim, k, t):
         if _call(law, first, y, sim.commands) != 0:
             return record.LAW_RAISED
         for j in range(width):
-            i = first + j
-            command, s, limit, sample = (
-                commands[j] + feedforward,
-                commands[width + j],
-                limits[i],
-                log_at(sim.log, k * n + i),
-            )
+            i, limit = first + j, limits[first + j]
+            command, s, sample = commands[j] + feedforward, commands[width + j], log_at(sim.log, k * n + i)
             u = min(max(command, -limit), limit)
             if not (math.isfinite(command) and math.isfinite(s) and abs(u) * max(1.0, sim.scale) < MAX_CONTROL):
                 sim.seen.i = i
@@ -479,9 +474,8 @@ def _apply_disturbances(address, sim, data, t, k):
             _add_force(data, channel, motion.value, signal.cartesian != 0)
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
-        if not (
-            math.isfinite(data.xfrc_applied[channel.xfrc]) and math.isfinite(data.xfrc_applied[channel.horizontal])
-        ):
+        on_joint, horizontal = data.xfrc_applied[channel.xfrc], data.xfrc_applied[channel.horizontal]
+        if not (math.isfinite(on_joint) and math.isfinite(horizontal)):
             return record.DISTURBANCE_NOT_FINITE
         if channel.qfrc >= 0 and not math.isfinite(data.qfrc_applied[channel.qfrc]):
             return record.DISTURBANCE_NOT_FINITE

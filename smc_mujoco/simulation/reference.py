@@ -99,10 +99,7 @@ class Loop:
         inertia, formula = self.model.dof_M0[self.channels["qvel"]], self.scenario.formula_friction
         self.sliding = [] if formula is None else [PythonFriction(formula, i) for i in range(n)]
         self.bristles = [] if formula is None else [formula.bristle(i, inertia[i]) for i in range(n)]
-        self.stuck_at, self.speed = (
-            [math.nan] * n,
-            [0.0] * n,
-        )  # positions of sticking joints, NaN for others; last speeds
+        self.stuck_at, self.speed = [math.nan] * n, [0.0] * n  # positions of joints that stick, or NaN; last speeds
         self.delayed = np.zeros(n)  # the commands whose delay has passed
         self.log = np.full((scenario.samples + 1, n), np.nan, LOG)
         self.failure: str | None = None
@@ -296,10 +293,8 @@ class Loop:
             xfrc[at["xfrc"]], data.qfrc_applied[at["qfrc"]] = 0.0, joints
         d = joints if self.scenario.plant.direct else at["sign"] * xfrc[at["xfrc"]]
         if self.hinged.any():
-            arm, axis = (
-                data.xipos[at["hinge_body"] // 3] - data.xanchor[at["anchor"] // 3],
-                data.xaxis[at["anchor"] // 3],
-            )
+            anchor, axis = data.xanchor[at["anchor"] // 3], data.xaxis[at["anchor"] // 3]
+            arm = data.xipos[at["hinge_body"] // 3] - anchor
             channel, j, k = np.arange(len(d)), at["axis"] + 1, (at["axis"] + 2) % 3
             turn = axis[channel, j] * arm[channel, k] - axis[channel, k] * arm[channel, j]
             d[self.hinged] += (turn * xfrc[at["horizontal"]])[self.hinged]

@@ -264,8 +264,7 @@ def _worst(
     for law in cases:
         for i, scenario in enumerate(law):
             file = Path(f"{path}-{i}-{scenario.plant.name}-{scenario.law.name}.json")
-            case = cached_worst_case(file, scenario, within, budget, **options)
-            worst.setdefault(scenario.law.name, []).append(case)
+            worst.setdefault(scenario.law.name, []).append(cached_worst_case(file, scenario, within, budget, **options))
     return worst
 
 

@@ -191,7 +191,7 @@ def back_within(trace: Trace, distance: float, after: float) -> float:
 
 
 def unstable(scenarios: Sequence[Scenario], traces: Sequence[Trace]) -> bool:
-    """Return whether the tip's rms error changes with half the physics step, by MAX_STEP_CHANGE in the median of runs.
+    """Return whether half the physics step changes the tip's rms error by over MAX_STEP_CHANGE, in the median run.
 
     The numbers of such runs depend on their step, and say nothing of the arm.
     """

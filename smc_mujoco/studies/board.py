@@ -70,7 +70,7 @@ class Lead(NamedTuple):
 
     @property
     def words(self) -> str:
-        """How the law compares with its rival, such as "12 % less than pid (8 to 16 %), ahead in 24 of 24 seeds"."""
+        """How the law compares with its rival, such as "12 % less than pid (8 to 16 %), ahead in 24 of 24 runs"."""
         samples = "sets of gains" if self.effect.sets else "runs"
         size = size_in_words(self.effect, self.unit, self.rival)
         return f"{size}, ahead in {self.effect.ahead} of {self.effect.samples} {samples}"

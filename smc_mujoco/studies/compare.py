@@ -267,8 +267,8 @@ def compare(
     if not isinstance(out, str | os.PathLike):
         raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
     machines = [as_plant(plant) for plant in (extent.plants if plants is None else listed("plants", plants))]
-    usual = applicable(extent.conditions, machines, length) if conditions is None else listed("conditions", conditions)
-    tested = [find_condition(one) for one in usual]
+    given = applicable(extent.conditions, machines, length) if conditions is None else listed("conditions", conditions)
+    tested = [find_condition(one) for one in given]
     compared = _checked(machines, tested, laws, length, starts)
     folder = Path(out)
     options = {"tune": tune and gains == "tuned", "gains": gains, "shipped_budget": budget is None}

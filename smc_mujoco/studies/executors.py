@@ -50,7 +50,7 @@ TIMEOUT = 10.0  # s, for a scheduler, and for its first worker; chosen
 if TYPE_CHECKING:
     from distributed import Client
 
-    Workers = str | Executor | Client  # where a study is computed, see `checked`
+    Workers = str | Executor | Client  # where a study is computed, see `as_executor`
 
 ResultColumns = dict[str, Any]
 Batch = Sequence[Prepared]
@@ -94,7 +94,7 @@ def compute_here(
 
     Args:
       finish: called with each batch and its traces, one batch at a time.
-      report: called with the number of steps just run_batch.
+      report: called with the number of steps just simulated.
     """
     with futures.ThreadPoolExecutor(1) as pool:
         last: Future[None] | None = None

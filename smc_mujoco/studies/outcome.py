@@ -4,8 +4,8 @@
         return f"{runs.who('settles', 'settle')}; first: {runs.least('settling_time')}"
 
 gives "all 4 settle; first: adaptive and super_twisting tied (0.840 to 0.853 s)". Values that differ by less than the
-least relevant difference are tied, as on leaderboards. These are single runs: a study says
-whether another start or noise would change the order.
+least relevant difference are tied, as on leaderboards. These are single runs: a study says whether another start or
+noise would change the order.
 """
 
 import dataclasses
@@ -32,8 +32,8 @@ def settles(trace: Trace) -> bool:
 class Outcome:
     """The runs of a scene, and their outcome in words: the argument of `Scene.answer`.
 
-    A measure is the name of a metric, or a function Trace -> float. A run that failed has no value, and no statement
-    `holds` is true of it.
+    A measure is the name of a metric, or a function Trace -> float. For `least`, smaller values are better. A run that
+    failed has no value, and every `holds` counts as False for it.
 
     Attributes:
       traces: condition -> label -> Trace.
@@ -265,7 +265,7 @@ def _of_group(trace: Trace, name: str, group: str) -> float:
 
 
 def _floor(measure: Measure, run: Trace, group: str) -> float:
-    """Return the smallest relevant difference that a sensor resolves, as on leaderboards; 0 for a function."""
+    """Return the largest difference that the run's sensor does not resolve, as on leaderboards; 0 for a function."""
     return floor(run.scenario, CATALOGUE[measure].unit) if isinstance(measure, str) and not group else 0.0
 
 

@@ -72,7 +72,7 @@ def quantity(value: float, unit: str = "") -> str:
 
 
 def without_frames(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function with its ScenarioErrors raised anew, so that pytest shows no frames of this package."""
+    """Return the function. At its ScenarioErrors pytest shows the test's line, and not the lines of this package."""
 
     @functools.wraps(function)
     def call(*args: P.args, **named: P.kwargs) -> R:

@@ -820,9 +820,9 @@ def test_the_table_says_that_intervals_of_very_few_runs_cover_less(seeds, told):
 
 def test_positions_are_told_apart_as_far_as_the_sensor_of_the_condition_resolves_them():
     fine = paper.scenario("duffing", "none")  # x0 1.5 m
-    without_rounding = paper.scenario("duffing", "none", changes={"sensor": smc.Encoder(counts=50)})
+    coarse = paper.scenario("duffing", "none", changes={"sensor": smc.Encoder(counts=50)})
     noisy = paper.scenario("duffing", "none", changes={"noise": smc.Noise(position=0.02)})
-    assert [cells.floor(one, "{x}") for one in (fine, without_rounding, noisy)] == [0.0, 0.5 / 50, 0.02]
+    assert [cells.floor(one, "{x}") for one in (fine, coarse, noisy)] == [0.0, 0.5 / 50, 0.02]
     assert cells.floor(noisy, "%") == pytest.approx(100 * 0.02 / 1.5)
     assert [cells.floor(noisy, unit) for unit in ("s", "{u}/s", "{x} s^2")] == [0.0] * 3
     table = stand({"a": blocks(1e-6), "b": blocks(2e-6)}, metric="ultimate_bound")

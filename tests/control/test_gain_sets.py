@@ -42,10 +42,8 @@ def test_every_law_of_a_set_has_gains_and_these_are_all_that_tuning_moves(gain_s
 @pytest.mark.parametrize(("gain_set", "plant"), SETS)
 def test_every_search_is_of_the_one_rule_and_tells_whether_its_starts_agree(gain_set, plant):
     for name, known in shipped(gain_set, plant).items():
-        start, starts = (
-            search.EVALUATIONS_PER_GAIN * len(known.sets[0]),
-            result.AGREEING_STARTS if gain_set == "tuned" else 1,
-        )
+        start = search.EVALUATIONS_PER_GAIN * len(known.sets[0])
+        starts = result.AGREEING_STARTS if gain_set == "tuned" else 1
         budget = search.BUDGET if starts > 1 and name in gains.LAWS else starts * start + search.SPARE_EVALUATIONS
         assert known.rule == search.RULE, name
         assert known.converged is search.converged(known.ends), name

@@ -85,7 +85,7 @@ const int smc_mujoco_joints = SMC_JOINTS;
 /* The measurement of a law of many joints, from the numbers of joint_law.py in double precision. */
 typedef long long smc_mujoco_function(const double *, const double *, double *, double *);
 
-typedef struct { /* REQUESTS of joint_law.py: addresses of two functions and of their parameters, force per unit of u */
+typedef struct { /* HANDLE of joint_law.py: addresses of two functions and of their parameters, force per unit of u */
     double smc_coriolis, smc_jacobian, smc_parameters, smc_unit;
 } smc_mujoco_requests;
 

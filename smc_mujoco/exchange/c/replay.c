@@ -9,7 +9,7 @@
 #include <string.h>
 
 typedef long long smc_entry(const double *, const double *, double *, double *);
-/* What joint_law.py stores before the arrays (HEAD), and what `dynamics` is the address of (REQUESTS). */
+/* What joint_law.py stores before the arrays (HEAD), and what `dynamics` is the address of (HANDLE). */
 typedef struct { double t, dt, model, dynamics, joints; } head;
 typedef struct { double coriolis, jacobian, parameters, unit; } requests;
 
