@@ -114,6 +114,11 @@ class Condition:
             texts = [f"{name}={shown(value)}" for name, value in self.fields.items()]
         return f"{self.name}: {', '.join(texts)}"
 
+    def brief(self, plant: Plant, duration: float) -> str:
+        """Return the fields on a plant as text, without values that are defaults; arguments and errors as in `on`."""
+        fields = self.on(plant, duration)
+        return ", ".join(f"{name}={_as_text(value, defaults=False)}" for name, value in fields.items())
+
 
 def condition(name: str, **fields: Any) -> Condition:
     """Return your own condition, for `grid`, `tune`, `margins` and `basin`.
@@ -256,15 +261,17 @@ def _kinds() -> dict[str, Any]:
     return {kind.__name__: kind for kind in kinds}
 
 
-def _as_text(value: Any) -> str:
-    """Return a value as `parse` reads it."""
+def _as_text(value: Any, defaults: bool = True) -> str:
+    """Return a value as `parse` reads it, with or without fields that have their default."""
     if isinstance(value, Component):
         return f"{value.name}({', '.join(f'{gain}={number!r}' for gain, number in value.gains.items())})"
     if isinstance(value, Part | Signal | Noise | Jump | Clock):
-        texts = [f"{f.name}={_as_text(getattr(value, f.name))}" for f in dataclasses.fields(value) if f.init]
+        fields = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if f.init}
+        default = {f.name: f.default for f in dataclasses.fields(value) if not defaults}
+        texts = [f"{name}={_as_text(own, defaults)}" for name, own in fields.items() if own != default.get(name, ...)]
         return f"{type(value).__name__}({', '.join(texts)})"
     if isinstance(value, tuple):
-        return f"({', '.join(map(_as_text, value))},)"
+        return f"({', '.join(_as_text(one, defaults) for one in value)},)"
     return repr(value)
 
 

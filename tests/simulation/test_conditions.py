@@ -65,6 +65,14 @@ def test_text_says_a_condition_whole():
         assert parse(str(condition)) == condition
 
 
+@pytest.mark.parametrize("name", [name for name in NAMED if name != "nominal"])
+def test_the_brief_text_of_a_condition_has_all_its_fields_and_no_default(name):
+    plant = smc.plant("inverted_pendulum")
+    text = NAMED[name].brief(plant, 4.0)
+    assert parse(f"copy: {text}").fields == NAMED[name].on(plant, 4.0)
+    assert smc.condition("all defaults", actuator=smc.DCMotor()).brief(plant, 4.0) == "actuator=DCMotor()"
+
+
 def test_a_class_of_the_users_with_a_name_of_ours_changes_no_text():
     @dataclasses.dataclass(frozen=True)
     class Sine(smc.Signal):  # pyright: ignore[reportUnusedClass]

@@ -23,7 +23,7 @@ def list_() -> None:
         from smc_mujoco.cli import law_pages, tables
         from smc_mujoco.common.catalogue import Catalogue
         from smc_mujoco.mechanisms.plant import catalogue as plants
-        from smc_mujoco.simulation.conditions import NAMED
+        from smc_mujoco.simulation.conditions import DURATION, NAMED
         from smc_mujoco.studies import scene
 
     def first_line(doc: str | None) -> str:
@@ -37,7 +37,10 @@ def list_() -> None:
     for title, templates in law_pages.CATALOGUES.items():
         lists[title] = listed(templates(), lambda template: template.doc)
     lists["Scenes, for smc-mujoco run"] = listed(scene.scenes(), scene.question)
-    lists["Conditions"] = [("", ", ".join(NAMED))]
+    machine = plants()["inverted_pendulum"]  # it has stops, and numbers for jumps
+    lists["Conditions, on inverted_pendulum for 10 s"] = [
+        (name, condition.brief(machine, DURATION) or "the scenario's defaults") for name, condition in NAMED.items()
+    ]
     terminal = Terminal()
     for title, rows in lists.items():
         terminal.print(tables.catalogue(title, rows), "")
