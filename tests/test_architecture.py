@@ -162,6 +162,20 @@ def test_importing_the_package_imports_nothing_heavy(name):
     assert loaded & HEAVY == set()
 
 
+def test_somebody_who_runs_and_compares_loads_no_annex_and_few_lines(tmp_path):
+    code = """
+import sys
+import smc_mujoco as smc
+trace = smc.run(smc.Scenario(plant="duffing", law="pid", duration=0.01))
+smc.score(trace), smc.figure(trace), smc.film
+smc.compare("pid", "duffing", "nominal", seeds=1, duration=0.1, out="compared", progress=False)
+print(*{module.__file__ for name, module in sys.modules.items() if name.startswith("smc_mujoco")})
+"""
+    loaded = [Path(file) for file in python(code, folder=tmp_path).splitlines()[-1].split()]
+    assert [label(file) for file in loaded if file.relative_to(PACKAGE).parts[0] in ANNEXES] == []
+    assert sum(len(file.read_text().splitlines()) for file in loaded) <= 30_000
+
+
 def test_importing_the_command_line_starts_no_simulator():
     loaded = set(python("import smc_mujoco.cli.main, sys; print(*sys.modules)").split())
     assert loaded & (HEAVY - {"rich", "typer", "numpy"}) == set()

@@ -21,6 +21,7 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.cli import main
 from smc_mujoco.cli import scene as show
 from smc_mujoco.common import gl
+from smc_mujoco.common.files import slug
 from smc_mujoco.evidence.rigs import ensemble
 from smc_mujoco.studies import fair_gains, scene
 
@@ -156,12 +157,12 @@ def check_command(line: str, known: dict) -> None:
 def results(folder: Path) -> set[str]:
     """The traces that a run of a scene writes to its folder."""
     runs = scene.read(scene.find(folder.name)).runs()
-    return {(folder / f"{scene.slug(condition)}-{scene.slug(label)}.npz").as_posix() for condition, label, _ in runs}
+    return {(folder / f"{slug(condition)}-{slug(label)}.npz").as_posix() for condition, label, _ in runs}
 
 
 def test_names_of_files_hold_letters_numbers_and_little_else():
     names = {"k = 2": "k-2", "k=2": "k-2", "k = -2": "k--2", "a = 0.67": "a-0.67", "0.02 N, N m": "0.02_n_n_m"}
-    assert {name: scene.slug(name) for name in names} == names
+    assert {name: slug(name) for name in names} == names
     run = smc.Scenario(plant="duffing", law="none")
     with pytest.raises(smc.ScenarioError, match="same file name: k = 2, k=2"):
         smc.Scene(title="Twins", conditions={"nominal": {"k = 2": run, "k=2": run}})
@@ -169,7 +170,7 @@ def test_names_of_files_hold_letters_numbers_and_little_else():
 
 def test_traces_are_named_as_these_tests_say(tmp_path):
     trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
-    assert show.save({"A b": {"c": trace}}, tmp_path) == [tmp_path / f"{scene.slug('A b')}-{scene.slug('c')}.npz"]
+    assert show.save({"A b": {"c": trace}}, tmp_path) == [tmp_path / f"{slug('A b')}-{slug('c')}.npz"]
 
 
 def test_make_targets_exist():

@@ -9,11 +9,12 @@ from smc_mujoco.cli import tables
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, printable
+from smc_mujoco.common.files import slug
 from smc_mujoco.draw.film.camera import Camera
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.scene import Scene, slug
+from smc_mujoco.studies.scene import Scene
 
 Traces = Mapping[str, Mapping[str, Trace]]  # condition -> label -> Trace
 Timer = Callable[[str], AbstractContextManager[None]]

@@ -1,7 +1,8 @@
-"""Files: the package's folders, atomic writing, reading of files that may be damaged, JSON with NaN and infinity."""
+"""Files: the package's folders, names, atomic writing, reading what may be damaged, JSON with NaN and infinity."""
 
 import contextlib
 import csv
+import hashlib
 import json
 import math
 import os
@@ -15,6 +16,7 @@ from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, shown
 
+MAX_NAME = 60  # bytes of a name in a file's name, which most file systems limit to 255
 MAX_SIZE = 2 * 10**9  # bytes of a file that is read: chosen
 MAX_UNPACKED, MAX_RATIO, MAX_MEMBERS = 500_000_000, 20, 10_000  # of an archive: bytes, per byte packed, files; chosen
 WORDS = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}  # numbers that JSON lacks
@@ -31,6 +33,19 @@ def shipped(folder: str) -> Path:
         if place.is_dir():
             return place
     raise ScenarioError(f"no folder {folder!r} in {here} or beside it: reinstall smc-mujoco")
+
+
+def slug(name: str, max_bytes: int = MAX_NAME) -> str:
+    """Return a name as part of a file name: letters, digits, and _ . + - between them.
+
+    It has no separator of folders and begins with no dot. Beyond `max_bytes` it is cut and ends in a hash.
+    """
+    words = re.sub(r"\s*=\s*", "-", name.lower())
+    part = re.sub(r"[^\w.+-]+", "_", words).lstrip("._").rstrip("_") or "run"
+    if len(part.encode()) > max_bytes:
+        start = part.encode()[: max_bytes - 9].decode(errors="ignore")
+        part = f"{start}-{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:8]}"
+    return part
 
 
 def ended(path: str | os.PathLike[str], ending: str) -> Path:

@@ -19,12 +19,10 @@ from typing import TYPE_CHECKING, Any
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.relevant_difference import RELEVANT, checked_share
 from smc_mujoco.analysis.tuning import search
-from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, taken, whole
 from smc_mujoco.common.errors import number as checked
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
-from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
@@ -47,11 +45,13 @@ from smc_mujoco.studies.leaderboard import METRICS, leaderboard
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, study
 from smc_mujoco.studies.table import Table
-from smc_mujoco.studies.worst_case import DURATION, WorstCase, WorstCases, cached_worst_case
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure, SubFigure
+
+    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+    from smc_mujoco.studies.worst_case import WorstCase
 
 MAX_BLOCKS = 12  # plants times conditions with a table each; beyond, each plant has one table over all conditions
 
@@ -76,7 +76,7 @@ class Compared(Tables):
     defaults: bool
     relevant: float
     out: Path
-    worst: Mapping[str, Mapping[str, WorstCase]] = frozen({})
+    worst: "Mapping[str, Mapping[str, WorstCase]]"
 
     @property
     def gains(self) -> dict[str, dict[str, Law]]:
@@ -128,6 +128,10 @@ class Compared(Tables):
 
     @property
     def _worst_tables(self) -> list[Tabular]:
+        if not self.worst:
+            return []
+        from smc_mujoco.studies.worst_case import WorstCases
+
         return [table for cases in self.worst.values() for table in WorstCases(cases.values()).tables]
 
     def to_latex(self, path: str | os.PathLike[str] | None = None) -> str:
@@ -200,7 +204,7 @@ def compare(
     conditions: str | Condition | Sequence[str | Condition] | None = None,
     seeds: int = 16,
     tune: bool = True,
-    worst: bool | Uncertainty = False,
+    worst: "bool | Uncertainty" = False,
     executor: "executors.Workers | None" = None,
     *,
     out: str | os.PathLike[str] = "compared",
@@ -246,12 +250,10 @@ def compare(
       quick: shorter runs and searches; by default three plants and three conditions.
       defaults: whether a winner may be named over laws whose gains are their defaults.
       relevant: the least relevant difference, as a share of the larger value.
-      traces: traces to save in the folder: "none", "all" or "worst".
       fresh: whether to remove the runs that are in the folder first.
       noise_key: as in `study`: drawn after the laws are fixed, so that none can know its noise. One run of each of
         your laws on each plant in each condition is replayed, too.
-      threads: simulations at once; None for one per available core.
-      progress: whether to show progress.
+      traces, threads, progress: as in `study`.
 
     Raises:
       ScenarioError: an unknown name, or arguments that `grid`, `study` or `leaderboard` refuse.
@@ -261,11 +263,7 @@ def compare(
     length = extent.duration if duration is None else checked("duration", duration, above=0.0)
     tries = search.BUDGET // (3 if quick else 1) if budget is None else whole("budget", budget, 1, MAX_ITEMS)
     where = executors.as_executor("local" if executor is None else executor)
-    for name in taken("metrics", metrics):
-        find("metric", name, dict.fromkeys((SETTLES, *CATALOGUE)))
-    find("set of gains", gains, dict.fromkeys((*gain_sets.SETS, "default")))
-    if not isinstance(out, str | os.PathLike):
-        raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
+    _check_names(metrics, gains, out)
     machines = [as_plant(plant) for plant in (extent.plants if plants is None else listed("plants", plants))]
     given = applicable(extent.conditions, machines, length) if conditions is None else listed("conditions", conditions)
     tested = [find_condition(one) for one in given]
@@ -280,13 +278,10 @@ def compare(
     }
     runs = all_combinations(machines, lambda plant: candidates[plant.name], tested, range(count), length, starts)
     table = study(runs, folder, not fresh, where, threads, progress, traces, noise_key, replay=True)
-
-    def attacked(plant: Plant, law: Law) -> WorstCase:
-        scenario = case(plant, law, "nominal", DURATION if duration is None else length, starts=starts)
-        within, path = None if worst is True else worst, folder / "worst" / f"{plant.name}-{law.name}.json"
-        return cached_worst_case(path, scenario, within or None, None, threads, progress)
-
-    attacked_plants = machines if worst else ()
+    attacked: dict[str, dict[str, WorstCase]] = {}
+    if worst:
+        within, lasting = None if worst is True else worst, None if duration is None else length
+        attacked = _worst_cases(machines, candidates, within, lasting, starts, folder / "worst", threads, progress)
     return Compared(
         table=table,
         candidates=candidates,
@@ -294,11 +289,38 @@ def compare(
         defaults=defaults,
         relevant=relevant,
         out=folder,
-        worst={
-            plant.name: {one.law.name: attacked(plant, one.law) for one in candidates[plant.name]}
-            for plant in attacked_plants
-        },
+        worst=attacked,
     )
+
+
+def _check_names(metrics: Sequence[str], gains: str, out: object) -> None:
+    """Raise ScenarioError for an unknown metric or set of gains, or for what is no path of a folder."""
+    for name in taken("metrics", metrics):
+        find("metric", name, dict.fromkeys((SETTLES, *CATALOGUE)))
+    find("set of gains", gains, dict.fromkeys((*gain_sets.SETS, "default")))
+    if not isinstance(out, str | os.PathLike):
+        raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
+
+
+def _worst_cases(
+    plants: Sequence[Plant],
+    candidates: Mapping[str, Sequence[Candidate]],
+    within: "Uncertainty | None",
+    duration: float | None,
+    starts: Starts | None,
+    folder: Path,
+    threads: int | None,
+    progress: bool,
+) -> "dict[str, dict[str, WorstCase]]":
+    """Return `Compared.worst`: the worst case of each law with its best gains on each plant."""
+    from smc_mujoco.studies.worst_case import DURATION, cached_worst_case
+
+    def attacked(plant: Plant, law: Law) -> "WorstCase":
+        scenario = case(plant, law, "nominal", DURATION if duration is None else duration, starts=starts)
+        path = folder / f"{plant.name}-{law.name}.json"
+        return cached_worst_case(path, scenario, within, None, threads, progress)
+
+    return {plant.name: {one.law.name: attacked(plant, one.law) for one in candidates[plant.name]} for plant in plants}
 
 
 def _checked(

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.common.files import slug
 from smc_mujoco.common.progress import counter
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.studies.executors import batches
-from smc_mujoco.studies.scene import slug
 from smc_mujoco.studies.table import Table
 
 CHOICES = ("none", "worst", "all")

@@ -9,7 +9,6 @@ defines `scene`:
 import ast
 import dataclasses
 import functools
-import hashlib
 import os
 import re
 import sys
@@ -21,15 +20,13 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.catalogue import Catalogue, added, source
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.errors import find as lookup
-from smc_mujoco.common.files import shipped
+from smc_mujoco.common.files import shipped, slug
 from smc_mujoco.common.scripts import execute
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.outcome import Outcome, summary
-
-MAX_NAME = 60  # bytes of a name in a file's name, which most file systems limit to 255
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -167,16 +164,3 @@ def read(path: Path) -> Scene:
 def question(path: Path) -> str:
     """Return the first line of a scene file's docstring."""
     return (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n")[0]
-
-
-def slug(name: str, max_bytes: int = MAX_NAME) -> str:
-    """Return a name as part of a file name: letters, digits, and _ . + - between them.
-
-    It has no separator of folders and begins with no dot. Beyond `max_bytes` it is cut and ends in a hash.
-    """
-    words = re.sub(r"\s*=\s*", "-", name.lower())
-    part = re.sub(r"[^\w.+-]+", "_", words).lstrip("._").rstrip("_") or "run"
-    if len(part.encode()) > max_bytes:
-        start = part.encode()[: max_bytes - 9].decode(errors="ignore")
-        part = f"{start}-{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:8]}"
-    return part

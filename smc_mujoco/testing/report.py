@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from smc_mujoco.common.files import slug
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.scene import slug
 from smc_mujoco.testing.response import StepResponse
 
 MAX_ID = 150  # characters of a test's id in a file's name: most file systems allow 255 bytes

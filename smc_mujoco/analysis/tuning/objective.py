@@ -24,7 +24,6 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
@@ -132,6 +131,8 @@ class Objective:
         """
         if self.chattering is None:
             return 0.0
+        from smc_mujoco.analysis.chattering import predict
+
         cycle = predict(case, ranges=False)
         amplitude = cycle.amplitude if cycle else cycle.amplitude_range[1]
         return (

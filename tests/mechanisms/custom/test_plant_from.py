@@ -15,6 +15,7 @@ from helpers.episodes import dm_control_suite, driven_by_dm, run_of
 import smc_mujoco as smc
 from smc_mujoco.analysis import linearisation
 from smc_mujoco.common import process
+from smc_mujoco.common.files import slug
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import design
 from smc_mujoco.envs import episode, tasks
@@ -26,7 +27,6 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import reference as plain
 from smc_mujoco.simulation import scenario as scenario_module
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies.scene import slug
 
 TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)
 ARRAYS = ("x", "v", "u", "applied", "s", "d", "force", "reaction")
