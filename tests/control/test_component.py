@@ -1,11 +1,19 @@
 """What decorators take and refuse: gains with units, old words, options of other kinds."""
 
+import contextlib
 import dataclasses
+import itertools
+import math
+import re
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import wild
 
 import smc_mujoco as smc
+from smc_mujoco.control import estimator, surface
+from smc_mujoco.control.law import known_laws
 from smc_mujoco.control.units import RATE, Gain
 
 pytestmark = pytest.mark.quick
@@ -71,3 +79,46 @@ def test_what_python_cannot_print_is_refused(value):
         smc.surface_function(value)
     with pytest.raises(smc.ScenarioError, match=r"name of a law is <.*>: give a text"):
         dataclasses.replace(smc.law("classical"), name=value)
+
+
+# conditions
+
+TEMPLATES = [*known_laws().values(), *surface.catalogue().values(), *estimator.catalogue().values()]
+VALUES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0, 64.0, 128.0, 256.0, 257.0)  # many of them lie on bounds
+RATIOS = 1.0 + np.geomspace(1e-3, 1e3, 500)
+AS_PYTHON = (
+    (r", (for|or|else) .*", ""),  # what follows from the condition, or from its opposite
+    (r"(\w+) is ((\d, )*\d) or (\d)", r"\1 in (\2, \4)"),
+    (r"^(\w+), (\w+) > 0$", r"\1 > 0 and \2 > 0"),
+    (r"whole (\w+) and (\w+),", r"\1 % 1 == \2 % 1 == 0"),
+    (r"\|(\w+)\|", r"abs(\1)"),
+    (r" = ", " == "),
+    (r"\^", "**"),
+    (r"(\w|\)) (?=[\w(])(?<!or )(?<!and )(?<!in )(?!or |and |in )", r"\1 * "),
+)
+
+
+def meaning(words):
+    """The function of the gains that a condition's words describe."""
+    words, _, some = words.partition(" for some ")
+    for pattern, python in AS_PYTHON:
+        words = re.sub(pattern, python, words)
+    code = compile(words, words, "eval")
+    if some:  # r > b
+        return lambda g: any(eval(code, {"r": g["b"] * ratio}, g) for ratio in RATIOS)
+    return lambda g: eval(code, {"abs": abs, "sqrt": math.sqrt}, g)
+
+
+def test_a_condition_holds_exactly_where_its_words_say():
+    both = 0  # conditions whose words are a formula, which is true and false of some values
+    for template in TEMPLATES:
+        for words, holds in template.conditions.items():
+            names = [name for name in template.gains if re.search(rf"\b{name}\b", words)]
+            allowed = [[v for v in VALUES if v or not template.gains[name].positive] for name in names]
+            every = [dict(zip(names, values, strict=True)) for values in itertools.product(*allowed)]
+            with contextlib.suppress(SyntaxError, NameError):  # of a sentence
+                means = meaning(words)
+                said = [bool(means(gains)) for gains in every]
+                assert said == [holds(SimpleNamespace(**gains)) for gains in every], (template.name, words)
+                both += {False, True} == set(said)
+    assert both >= 30

@@ -18,7 +18,7 @@ from smc_mujoco.control.units import Gain
 
 MAX_READINGS = 128  # readings in memory
 FITS = {
-    f"whole numbers, a window of 2 to {MAX_READINGS} and a degree of 1 to window - 1, else the nearest": lambda g: (
+    f"whole window and degree, and 1 <= degree < window <= {MAX_READINGS}, else the nearest": lambda g: (
         g.window == int(g.window) and g.degree == int(g.degree) and 1 <= g.degree < g.window <= MAX_READINGS
     )
 }

@@ -35,7 +35,7 @@ class Backlash(Actuator):
 
     Attributes:
       gap: rad (m), the whole play; 0 or more.
-      rotor_inertia: kg m^2 (kg) at the joint, greater than 0; that of a DCMotor is added. The default is chosen: 1 % of
+      rotor_inertia: kg m^2 (kg) at the joint, 1e-9 or more; that of a DCMotor is added. The default is chosen: 1 % of
         the pendulums' 0.125.
       rotor_damping: N m s/rad (N s/m), 0 or more.
     """

@@ -58,7 +58,7 @@ class Contact(Part):
 
     Attributes:
       kind: its name, or "none".
-      friction: coefficient of Coulomb friction where bodies slide, 0 or more. None: the plant's own.
+      friction: coefficient of Coulomb friction where bodies slide, 0 .. 10. None: the plant's own.
       restitution: ratio of the speeds after and before a blow, 0 .. 0.98; values below 0.01 count as 0.01. None: the
         plant's own.
     """

@@ -124,8 +124,8 @@ class DCMotor(Drive):
       rotor_inertia: kg m^2 at the motor, 0 or more.
       cogging: N m at the motor, the amplitude; 0 or more.
       poles: periods of cogging per turn of the motor, 0 or more; the default is chosen.
-      voltage: V, the supply; math.inf for no limit.
-      current: A, the amplifier's limit; math.inf for none.
+      voltage: V, the supply, greater than 0; math.inf for no limit.
+      current: A, the amplifier's limit, greater than 0; math.inf for none.
       ripple: share of the torque that a brush adds, 0 or more; 0 for an even torque. It needs inductance 0.
       bars: of the commutator, greater than 0; the default is chosen.
       bridge, bridge_2: rad at the motor, over which each brush bridges two bars, greater than 0; chosen.

@@ -33,9 +33,9 @@ class Encoder(Part):
       counts: per revolution of a hinge, or per metre of a slide; math.inf for no quantisation.
       bias: zero error, added to every reading, rad or m.
       dropout: probability that a reading is lost, 0 .. 1; the first never is.
-      period: s between readings, a whole number of physics steps; None: one at every control sample.
-      delay: s until a reading arrives, a whole number of physics steps. Until the first arrives, the controller reads
-        x0.
+      period: s between readings, greater than 0, a whole number of physics steps. None: one at every control sample.
+      delay: s until a reading arrives, 0 or more, a whole number of physics steps. Until the first arrives, the
+        controller reads x0.
 
     With the velocity estimator "measured" there is also a tachometer, with the same period, delay and losses.
     """

@@ -83,13 +83,14 @@ class LuGre(Friction):
       coulomb: N m (N): friction when sliding fast; greater than 0.
       static: N m (N): friction at which the joint breaks away; coulomb or more.
       stribeck: rad/s (m/s): the speed at which friction falls from static to coulomb; greater than 0.
-      stiffness: N m/rad (N/m). The default is chosen: a hundredth of the paper's 1e5, whose bristles would oscillate at
-        up to 900 rad/s on these plants. At up to 89 rad/s they are stable and resolved even at h = 1 ms. They bend by
-        0.1 mrad under 0.1 N m.
-      damping: N m s/rad (N s/m), more than stiffness h, because MuJoCo bends bristles a step late and they would
-        oscillate. None: 0.2 sqrt(stiffness inertia), with each joint's inertia at the plant's default parameters: 2.2
-        for the pendulum. This is a fifth of the paper's rule, chosen because implicitfast counts damping h as inertia,
-        0.4 % of the pendulum's at h = 0.25 ms. With half of it, bristles oscillate too long.
+      stiffness: N m/rad (N/m), greater than 0. The default is chosen: a hundredth of the paper's 1e5, whose bristles
+        would oscillate at up to 900 rad/s on these plants. At up to 89 rad/s they are stable and resolved even at h = 1
+        ms. They bend by 0.1 mrad under 0.1 N m.
+      damping: N m s/rad (N s/m), 0 or more. It should be more than stiffness h, because MuJoCo bends bristles a step
+        late and they would oscillate. None: 0.2 sqrt(stiffness inertia), with each joint's inertia at the plant's
+        default parameters: 2.2 for the pendulum. This is a fifth of the paper's rule, chosen because implicitfast
+        counts damping h as inertia, 0.4 % of the pendulum's at h = 0.25 ms. With half of it, bristles oscillate too
+        long.
     """
 
     bristles = True

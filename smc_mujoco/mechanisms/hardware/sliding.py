@@ -49,8 +49,8 @@ class Sliding(Friction):
     A class states its numbers as fields. Each is one number for all channels, or a sequence with one for each channel.
 
     Attributes:
-      stiffness: of a stuck joint, N m/rad (N/m). None: for the natural frequency BRISTLE, with each joint's inertia at
-        the start of the run, in MuJoCo's reference position qpos0.
+      stiffness: of a stuck joint, N m/rad (N/m), greater than 0. None: for the natural frequency BRISTLE, with each
+        joint's inertia at the start of the run, in MuJoCo's reference position qpos0.
     """
 
     bristles = True

@@ -1,0 +1,116 @@
+"""Every law, surface and estimator says of itself and computes what is recorded.
+
+Theorems hold for every gain, so they do not see a default, a unit or an order that has changed, which would change
+published numbers. Here all of it is seen at once. What is added to a catalogue is tested once it is recorded.
+"""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from helpers.words import recorded
+
+from smc_mujoco.common.rebuild import rebuild
+from smc_mujoco.control import estimator, joint_law, surface
+from smc_mujoco.control import law as laws
+from smc_mujoco.control.component import gain_text
+from smc_mujoco.control.estimator import Reading
+from smc_mujoco.control.joint_law import JointMeasurement
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.simulation import reference
+
+pytestmark = pytest.mark.quick
+
+KINDS = {"law": laws, "joint law": joint_law, "surface": surface, "estimator": estimator}
+TEMPLATES = {f"{kind} {name}": law for kind, room in KINDS.items() for name, law in room.catalogue().items()}
+COUNT, DT, JOINTS = 60, 0.05, 3
+
+
+def moved(template):
+    """Gains beside their defaults: 7 % more, 0.3 for 0 and 2 for infinity."""
+    changed = {0.0: 0.3, math.inf: 2.0}
+    return template.bind({gain: changed.get(value, 1.07 * value) for gain, value in template.defaults.items()})
+
+
+def seen(shape=()):
+    """Errors and speeds of both signs and all sizes from 1 to 0.001, exact zeros among them, and other readings."""
+    random = np.random.default_rng(7)
+    sizes = 10.0 ** np.linspace(0.0, -3.0, COUNT).reshape(-1, *(1 for _ in shape))
+    e, de, others = (random.normal(size=(COUNT, *shape)) for _ in range(3))
+    e, de = e * sizes, de * sizes
+    e[20] = de[30] = e[40] = de[40] = 0.0
+    return zip(e, de, others, strict=True)
+
+
+def measurements(model, has_surface):
+    for k, (e, de, other) in enumerate(seen()):
+        yield Measurement(
+            t=0.5 + DT * k, dt=DT, x=e + 0.3, v=de - 0.2, e=e, de=de, r=0.3, dr=-0.2, ddr=0.7, f=other, g=1.7,
+            a=2.0 * other, limit=3.0, model=model, has_surface=has_surface, s=e - 0.5 * de, v_eq=0.4 * other,
+            q=e + 0.1 * de, dq=de - 0.1 * e, fq=-other, gq=0.6,
+        )  # fmt: skip
+
+
+def joint_measurements(model):
+    turned = np.array([[0.0, 0.3, -0.2], [-0.3, 0.0, 0.5], [0.2, -0.5, 0.0]])
+    dynamics = SimpleNamespace(coriolis=lambda w: turned @ w, jacobian=lambda: np.eye(JOINTS) + turned)
+    M, ones = np.array([[2.0, 0.3, 0.1], [0.3, 1.5, 0.2], [0.1, 0.2, 1.1]]), np.ones(JOINTS)
+    for k, (e, de, other) in enumerate(seen((JOINTS,))):
+        yield JointMeasurement(
+            t=DT * k, dt=DT, model=model, dynamics=dynamics, x=e + 0.3, v=de - 0.2, e=e, de=de, r=0.3 * ones,
+            dr=-0.2 * ones, ddr=0.7 * other, a=other, limit=3.0 * ones, M=M, h=0.5 * other - de, g=0.5 * other,
+        )  # fmt: skip
+
+
+def readings():
+    return (Reading(dt=DT, x=math.sin(0.2 * k) + 0.1 * e, v=de) for k, (e, de, _) in enumerate(seen()))
+
+
+def ways(template):
+    """Name of a way through a component's inputs -> the inputs."""
+    if template.kind == "estimator":
+        return {"computes": readings()}
+    if template.joint:
+        return {"alone": joint_measurements(0.0), "with the model": joint_measurements(1.0)}
+    both = {"alone": measurements(0.0, 0.0), "with the model": measurements(1.0, 0.0)}
+    return both | {"on a surface": measurements(1.0, 1.0)} if template.kind == "law" else both
+
+
+def computed(component, inputs):
+    """Weighted sums of each result over all samples, and of the memory at the end."""
+    function, joint = rebuild(component.function, lambda plain: plain), component.joint
+    memory = np.zeros((JOINTS, component.memory) if joint else component.memory)
+    gains = reference.gains_of(component, JOINTS)
+    results = np.array([function(y, gains, memory) for y in inputs]).reshape(COUNT, -1)
+    weights, last = np.random.default_rng(8).uniform(0.5, 1.5, results.shape), memory.ravel()
+    sums = [*(weights * results).sum(axis=0), last @ np.linspace(0.5, 1.5, last.size)]
+    return ", ".join(f"{value:.7g}" for value in sums)
+
+
+def text(template):
+    """What a template says, and what it computes."""
+    component = moved(template)
+    g = SimpleNamespace(**component.gains)
+    said = [template.label, template.short, template.colour, template.family]
+    said += [flag for flag in ("continuous", "joint", "requires_model") if getattr(template, flag)]
+    said += [f"{template.finite_time} = 0 after a finite time"] if template.finite_time else []
+    said += [f"order of {what} {template.order(what, component.gains):.7g}" for what in template.accuracy]
+    said += [f"admits {what} below {bound(g):.7g}" for what, bound in template.admits.items()]
+    lines = [", ".join(filter(None, said)), *(f"asks for {words}" for words in template.conditions)]
+    lines.append(f"degree {template.relative_degree}, memory {template.memory}, for {template.plants or 'all'}")
+    for name, gain in template.gains.items():
+        unit = gain.unit_at(component.gains)
+        marks = [flag for flag in ("positive", "nonnegative", "held", "shared") if getattr(gain, flag)]
+        marks += [f"over {gain.over}"] if gain.over else []
+        size = "no unit" if unit is None else "F^{:.4g} X^{:.4g} T^{:.4g}".format(*unit)
+        lines.append(", ".join([f"{name} = {gain_text(gain.default)}", size, *marks]))
+    if template.rest:
+        numbers = [*template.rest.linear(g), *template.rest.force(g, np.array([-0.2, 0.05, 3.0]))]
+        lines.append(f"at rest {', '.join(f'{number:.7g}' for number in numbers)}")
+    return "\n".join([*lines, *(f"{way}: {computed(component, inputs)}" for way, inputs in ways(template).items())])
+
+
+@pytest.mark.parametrize("name", recorded(__file__, TEMPLATES))
+def test_a_component_says_and_computes_what_is_recorded(name, snapshot):
+    assert text(TEMPLATES[name]) == snapshot

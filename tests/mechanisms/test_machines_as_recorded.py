@@ -1,0 +1,80 @@
+"""Every plant says of itself what is recorded, and its machine looks so, with each contact and other mechanism.
+
+Tests of the equation do not see what is only drawn, nor names, scales of jumps, limits and places in a film. What is
+added to the catalogue is tested once it is recorded.
+"""
+
+import dataclasses
+import zlib
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from helpers.words import recorded
+
+from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.mechanisms.plant import catalogue, plant, write
+
+PLANTS = {name: one if one.n == one.sizes[0] else plant(name, n=3) for name, one in catalogue().items()}
+CASES = [f"{name} {how}" for name, one in PLANTS.items() for how in ("alone", *one.contacts, *one.mechanisms)]
+ARRAYS = {  # what is drawn, and what blows and springs are made of
+    "body": ("pos", "quat", "mass", "inertia"),
+    "geom": ("pos", "quat", "size", "rgba", "matid", "group", "type", "contype"),
+    "pair": ("friction", "solref", "solimp", "dim"),
+    "tendon": ("stiffness", "damping", "lengthspring"),
+    "jnt": ("stiffness", "range"),
+    "dof": ("damping", "armature", "frictionloss"),
+    "skin": ("vert", "matid"),
+    "site": ("pos", "group"),
+    "key": ("qpos",),
+    "cam": ("pos", "quat"),
+    "actuator": ("biasprm", "ctrlrange"),
+}
+
+
+def moved(value):
+    return 1.07 * value if value else 0.3
+
+
+def said(one):
+    """All fields of a plant, except functions and what has tests of its own."""
+    fields = {field.name: getattr(one, field.name) for field in dataclasses.fields(one)}
+    fields |= {name: sorted(fields[name]) for name in ("contacts", "mechanisms")}
+    plain = {name: value for name, value in fields.items() if not callable(value) and name not in ("friction", "n")}
+    return [f"{name} {value}" for name, value in plain.items() if value not in ((), {}, "", False)]
+
+
+def machine(one, how):
+    """The compiled model with each parameter moved, drawn with a contact or another mechanism."""
+    spec, fields, values = one.spec(), one.fields, SimpleNamespace(**{k: moved(v) for k, v in one.parameters.items()})
+    if how in one.contacts:
+        one.contacts[how](spec)
+    if how in one.mechanisms:
+        one.mechanisms[how].edit(spec)
+        fields = one.mechanisms[how].fields
+    model = compiled(spec)
+    write(model, fields(model, values))
+    return model
+
+
+def sizes(model):
+    """A weighted sum of each array, one line for each kind of object: to see that one has changed, not which."""
+    yield f"names {len(model.names)}, {zlib.crc32(model.names):x}"
+    for kind, arrays in ARRAYS.items():
+        if getattr(model, f"{kind}_{arrays[0]}").size:
+            sums = (weighed(getattr(model, f"{kind}_{array}")) for array in arrays)
+            yield f"{kind} {', '.join(sums)}"
+    yield f"gravity {model.opt.gravity}, seen from {model.stat.center} to {model.stat.extent:.7g}"
+
+
+def weighed(array):
+    values = np.asarray(array, float).ravel()
+    return f"{values @ np.random.default_rng(values.size).uniform(0.5, 1.5, values.size) + 0.0:.7g}"
+
+
+@pytest.mark.parametrize("case", recorded(__file__, CASES))
+def test_a_machine_says_and_shows_what_is_recorded(case, snapshot):
+    name, how = case.split()
+    one = PLANTS[name]
+    lines = [*(said(one) if how == "alone" else ()), *sizes(machine(one, how))]
+    assert "\n".join(lines) == snapshot
