@@ -118,11 +118,13 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
     """Return one colour per law for one picture, all different.
 
     Each law has its colour. Only where two would be mistaken for each other, as where a law runs twice or two of the
-    user's laws have the same place in the palette, the later one gets the colour farthest from all in the picture.
+    user's laws have the same place in the palette, the later one gets the colour farthest from all in the picture. A
+    law that is not of the library, whose colour says nothing, keeps twice the distance.
     """
     colours: list[str] = []
-    for wanted in map(law_colour, laws):
-        clear = all(distance(wanted, other) > MIN_DISTANCE for other in colours)
+    for law in laws:
+        wanted, library = law_colour(law), _template(law)[1] in known_laws().own
+        clear = all(distance(wanted, other) > MIN_DISTANCE * (2 - library) for other in colours)
         used = [*colours, PAPER, DISTURBANCE, REACTION, FAILED]
         free = () if clear else [colour for colour in _grid(len(colours)) if colour not in used]
         colours.append(wanted if clear else _farthest(free, used)[0])

@@ -77,6 +77,8 @@ def test_laws_that_would_be_mistaken_for_each_other_differ_in_one_picture():
     given = style.law_colours([*same, "observer_free", "observer_free"])
     assert [given[0], given[2]] == [style.law_colour(same[0]), "#0072B2"]
     assert min(style.distance(*pair) for pair in itertools.combinations(given, 2)) > style.MIN_DISTANCE
+    several = style.law_colours(mine[:8])  # twice as far, as their places in the palette say nothing
+    assert min(style.distance(*pair) for pair in itertools.combinations(several, 2)) > 2 * style.MIN_DISTANCE
 
 
 def test_law_colours_never_repeat_in_one_picture():

@@ -31,6 +31,11 @@ def _named(law: str) -> str:
     return words.escape(words.law(law))
 
 
+def _quantity(value: float, unit: str) -> str:
+    """Return a number with its unit, in words; "never" has none."""
+    return f"{words.number(value)} {unit * math.isfinite(value)}".strip()
+
+
 def forest(scores: Sequence[Score], metrics: Sequence[str], plants: Sequence[str], laws: Sequence[str]) -> Figure:
     """Draw medians with intervals in one condition: a row per metric, a column per plant, a line per law."""
     grid = panels(len(metrics), len(plants), (0.028, 0.08))
@@ -58,11 +63,12 @@ def _whisker(score: Score, ends: tuple[bool, float, float]) -> dict[str, Any]:
     logarithmic, low, high = ends
     off = (high / low) ** 0.035 if logarithmic else 1.0  # off the ends, clear of the labels
     inner = (low * off, high / off) if logarithmic else (low, high * 0.97)
-    at, left, right = (min(max(v, inner[0]), inner[1]) for v in (score.median, score.low, score.high))
+    low, high = (score.median if math.isnan(v) else v for v in (score.low, score.high))  # of a single run
+    at, left, right = (min(max(v, inner[0]), inner[1]) for v in (score.median, low, high))
     symbol = "triangle-right" if score.median > inner[1] else "triangle-left" if score.median < inner[0] else "circle"
     symbol += "" if score.best else "-open"
     colour, name = words.colour(score.law), _named(score.law)
-    text = f"<b>{name}</b><br>{words.number(score.median)} {words.unit(score.metric, score.plant)}"
+    text = f"<b>{name}</b><br>{_quantity(score.median, words.unit(score.metric, score.plant))}"
     spread = words.interval(score.median, score.low, score.high)
     bar = {"type": "data", "symmetric": False, "array": [right - at], "arrayminus": [at - left]}
     return {
@@ -154,16 +160,17 @@ def _margin(margin: "Margin", most: float) -> list[dict[str, Any]]:
         cross = {"size": 8, "symbol": "x-thin", "line": {"width": 2, "color": colour}}
         hover = f"<b>{name}</b><br>not within bounds without any, either<extra></extra>"
         return [common | {"x": [0.0], "marker": cross, "hovertemplate": hover}]
+    unit = words.either([margin.unit])
     beyond, at = margin.value >= margin.searched, min(margin.value, most)
     marker = {"size": 10, "color": colour, "symbol": "triangle-right" if beyond else "circle"}
-    hover = f"<b>{name}</b><br>{'at least ' if beyond else ''}{words.number(margin.value)} {margin.unit}"
+    hover = f"<b>{name}</b><br>{'at least ' if beyond else ''}{_quantity(margin.value, unit)}"
     hover += f" (to {words.number(margin.resolution)})<extra></extra>"
     stem = {"array": [0], "arrayminus": [at], "symmetric": False, "type": "data"}
     stem |= {"color": colour, "thickness": 1.5, "width": 0}
     traces = [common | {"x": [at], "marker": marker, "error_x": stem, "hovertemplate": hover}]
     if margin.theory is not None and math.isfinite(margin.theory):
         bar = {"size": 15, "symbol": "line-ns", "line": {"width": 2.5, "color": style.INK}}
-        hover = f"linear theory<br>{words.number(margin.theory)} {margin.unit}<extra></extra>"
+        hover = f"linear theory<br>{_quantity(margin.theory, unit)}<extra></extra>"
         traces.append(common | {"x": [margin.theory], "marker": bar, "hovertemplate": hover})
     return traces
 

@@ -2,16 +2,14 @@
 
 import re
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.report import charts, page, rigs, stages
+from smc_mujoco.evidence.report import charts, rigs, stages
 from smc_mujoco.evidence.report.plan import Bars, Work
 from smc_mujoco.evidence.rigs import records
-from smc_mujoco.evidence.rigs.rig import Fall
 from tests.evidence.report.test_report import TINY
 
 DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
@@ -80,32 +78,6 @@ def test_every_law_of_the_machine_runs_on_every_set(work):
     assert machine.unit("itae") == "rad s^2"
 
 
-def board(*winners):
-    blocks = [SimpleNamespace(winner=winner) for winner in winners]
-    sole = winners[0] if len(set(winners)) == 1 else None
-    return SimpleNamespace(metric="itae", blocks=blocks, winner=sole)
-
-
-@pytest.mark.parametrize(
-    ("winners", "sentence"),
-    [
-        (("relay", "relay"), "ITAE: relay wins on all 2 sets of quantities: the ranking survives."),
-        ((None, None), "ITAE: no law wins on any of the 2 sets of quantities."),
-        (("relay", None, "relay", "state_feedback"),
-         "ITAE: no law wins on all sets of quantities; relay on 2 and Rig's state feedback on 1 of 4."),
-    ],
-)  # fmt: skip
-def test_a_sentence_says_whether_a_ranking_survives(winners, sentence):
-    assert rigs.Machine(rig=smc.rig("qube_servo"), boards=()).sentence(board(*winners)) == sentence
-
-
-def test_a_twin_that_leaves_the_machines_range_falls():
-    assert rigs.fit({"theta": 94.06, "u": -0.01}) == "theta 94.1, u 0.0 %"
-    assert rigs.fit({"theta": Fall(8.44), "u": Fall(8.44)}) == "falls at 8.4 s"
-    assert rigs.fit({"theta": -np.inf, "u": -np.inf}) == "falls"
-    assert rigs.fit({"elbow": 0.0731}, "N m") == "elbow 0.073 N·m"
-
-
 @pytest.mark.skipif(not DATA.exists(), reason="the public records are not at hand")
 @pytest.mark.parametrize("kept", smc.rig("qube_servo").reached, ids=lambda kept: kept.quantities)
 def test_what_the_page_says_of_public_records_is_what_they_give(kept):
@@ -117,7 +89,3 @@ def test_what_the_page_says_of_public_records_is_what_they_give(kept):
         fits = (twin if kept.quantities == "identified" else twin.set(kept.quantities)).fits(records)
     for name, value in kept.values.items():
         assert np.median([fit[name] for fit in fits]) == pytest.approx(value, rel=5e-3, abs=0.06)
-
-
-def test_the_section_is_in_the_page():
-    assert page.SECTIONS["rigs"] == "On the rig"

@@ -1,0 +1,371 @@
+"""The page of a study that nobody ran: its findings are typed in, so that all that it says and draws can be recorded.
+
+The record changes with every word, number and mark of the page. Read the difference before you record it anew.
+"""
+
+import html
+import json
+import math
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.margins import Margin
+from smc_mujoco.analysis.region_of_attraction import Basin
+from smc_mujoco.analysis.scaling import Accuracy, Scaling
+from smc_mujoco.evidence.audit.verdict import Claim
+from smc_mujoco.evidence.report import page, rigs, words
+from smc_mujoco.evidence.report.about import About, Gains
+from smc_mujoco.evidence.report.films import Curve, Scene
+from smc_mujoco.evidence.report.oscillation import Oscillation
+from smc_mujoco.evidence.report.plan import Plan
+from smc_mujoco.evidence.report.scores import Place, Score
+from smc_mujoco.evidence.report.stages import Field, Findings, Front
+from smc_mujoco.evidence.rigs.rig import Fall
+from smc_mujoco.studies.accuracy import AccuracyTable
+from smc_mujoco.studies.worst_case import WorstCase
+
+NEVER, NONE = math.inf, math.nan
+PLANTS = "duffing", "van_der_pol", "no_plant", "pendulum_network"
+LAWS = "observer_free", "classical", "super_twisting"
+CONDITIONS = "nominal", "noise"
+SIZES = {"settling_time": 2.0, "overshoot": 30.0, "itae": 0.4, "ultimate_bound": 1e-3, "steady_error": 7e-4}
+SIZES |= {"max_u": 5.0, "tv_rate": 900.0}
+
+
+def scores():
+    """Other laws lead under other conditions; one never settles, one is level, one has runs that fail."""
+    for i, plant in enumerate(PLANTS[:2]):
+        for j, condition in enumerate(CONDITIONS):
+            for k, (metric, size) in enumerate(SIZES.items()):
+                best = LAWS[(i * j + k) % 3]
+                for m, law in enumerate(LAWS):
+                    median = size * (1.0 + 0.3 * i + 0.7 * j + 1.9 * (m + 1) * (law != best) * 2.5**k)
+                    median = NEVER if (metric, law, i) == ("settling_time", "super_twisting", 1) else median
+                    width = (0.1 * median if m else 0.0) if i == 0 else NONE
+                    wins, level = law == best and (i, j) != (1, 1), (i, j, m) == (1, 1, 1)
+                    yield Score(
+                        plant=plant,
+                        condition=condition,
+                        law=law,
+                        metric=metric,
+                        median=median,
+                        low=median - width,
+                        high=median + width,
+                        best=law == best or level,
+                        beaten=law != best and not level,
+                        wins=wins,
+                        lead="3.2 times less (2.9 to 3.5)" * wins,
+                        seeds=6,
+                        failed=(i + m) % 3 // 2,
+                        runs=6 - j,
+                        sample=f"{6 - j} starts",
+                    )
+
+
+def places():
+    for i, plant in enumerate((*PLANTS[:2], "")):
+        for k, metric in enumerate(words.RANKED):
+            for m, law in enumerate(LAWS):
+                median = (m + 1) * (i + 1) * 0.31 * 10.0 ** (k - 3) if plant else NONE
+                wins, losses = ((2, 0), (0, 1), (1, 2))[(i * k + m) % 3]
+                yield Place(
+                    plant=plant,
+                    metric=metric,
+                    law=law,
+                    mean=1.25 + m * 0.5,
+                    failed=m // 2,
+                    best=not losses,
+                    median=(0.6, 1.0, 0.95)[m] if metric == "settles" else median,
+                    wins=wins,
+                    losses=losses,
+                    of=2 if plant else 8,
+                    why="" if wins else "6 seeds, too few",
+                )
+
+
+def claims():
+    checks = {
+        "duffing: settling time, s": {"value": 2.5, "relation": "<", "limit": 4.0, "holds": True},
+        "largest step, over lambda": {"value": 1.25, "relation": "<=", "limit": 1.0, "holds": False},
+    }
+    fields = {"measured": "runs with eps > 0", "holds_if": "steps of eps s^2 <= lambda"}
+    yield Claim(
+        id="3",
+        text="observer_free settles",
+        where="p. 4",
+        **fields,
+        verdict="partly supported",
+        numbers={"tuned": checks},
+        beside={"tuned": {"TV rate of classical": 12.5}},
+        verdicts={"tuned": "partly supported"},
+        flips=False,
+        note="A note.",
+        how="by eq. 3",
+        read="abstract",
+    )
+    some = {what: {**its, "limit": 9.0, "holds": True} for what, its in checks.items()}
+    yield Claim(
+        id="18",
+        text="it is calm",
+        where="sec. 2",
+        **fields,
+        verdict="supported",
+        numbers={"study": some, "tuned": checks},
+        beside={"study": {}, "tuned": {}},
+        verdicts={"study": "supported", "tuned": "refuted"},
+        flips=True,
+        over="some",
+    )
+
+
+def scaling(errors, order, theory, interval=0.25, why=""):
+    return Scaling(
+        errors=(errors,), used=(), order=order, low=order - interval, high=order + interval, theory=theory, why=why
+    )
+
+
+def accuracies():
+    periods = (4e-3, 2e-3, 1e-3)
+    for condition in ("constant", "coulomb"):
+        for m, law in enumerate(LAWS):
+            errors = tuple(3e-3 * (h / 4e-3) ** m for h in periods) if m else (NEVER, 2e-4, 0.0)
+            yield Accuracy(
+                plant="duffing",
+                condition=condition,
+                law=law,
+                gains="shipped",
+                unit="m",
+                periods=periods,
+                e=scaling(errors, NONE if not m else m + 0.1, m - 1 if m else None),
+                s=scaling(errors, m + 0.5 * (condition == "coulomb"), m if m else None, why="levels off" * m),
+                runs=6,
+                failed=2 * (not m),
+                floor=1e-9,
+            )
+
+
+def margins():
+    for kind, size in (("delay", 0.012), ("mass", 3.0)):
+        for i, plant in enumerate(PLANTS[:2]):
+            for m, law in enumerate(LAWS):
+                value = (NONE, size * (i + 1), 8.0 * size)[(i + m) % 3]
+                theory = (None, 0.8 * size, NEVER)[m]
+                yield Margin(
+                    plant=plant,
+                    law=law,
+                    kind=kind,
+                    value=value,
+                    unit="s" if kind == "delay" else "1",
+                    resolution=0.01 * size,
+                    searched=8.0 * size,
+                    theory=theory,
+                )
+
+
+def worst_cases():
+    for m, law in enumerate(LAWS):
+        scenario = smc.Scenario(plant="duffing", law=law)
+        yield WorstCase(
+            value=(0.2, 0.05, NEVER)[m],
+            median=(0.02, 0.03, 0.01)[m],
+            unit="m",
+            scenario=scenario,
+            found_by="steps",
+            tried=40,
+            strategies={"steps": 0.2},
+            nominal=scenario,
+            within=smc.Uncertainty(disturbance=2.0),
+            metric="rms_error",
+            outside="",
+            seed=0,
+        )
+
+
+def fields():
+    for plant in PLANTS:
+        x, v = np.linspace(-2.0, 2.0, 5), np.linspace(-3.0, 3.0, 9)
+        s = v[:, None] + 1.5 * x
+        yield Field(plant=plant, x=x, v=v, vdot=s * (0.5 - x**2), s=s)
+
+
+def basins():
+    for m, law in enumerate(LAWS[:2]):
+        outcome = np.array([[1, 0, -1], [1, 1, m], [1, -1, 0], [-1, 1, 1]], np.int8)
+        after = np.where(outcome == 1, [[2.5], [2.5], [5.0], [10.0]], 20.0)
+        yield Basin(
+            plant="duffing",
+            law=law,
+            x=np.linspace(-1, 1, 3),
+            v=np.linspace(-2, 2, 4),
+            outcome=outcome,
+            decided_at=after,
+            unit="m",
+            duration=20.0,
+        )
+
+
+def fronts():
+    for i, plant in enumerate(PLANTS[:2]):
+        for m, law in enumerate(LAWS):
+            tracking = tuple(0.01 * (1 + i + m) * 7.0**k for k in range(4))
+            variation = tuple(90.0 / (1 + m) / 9.0**k for k in range(4))
+            chosen = tracking[1], variation[1]
+            yield Front(plant=plant, law=law, tracking=tracking, variation=variation, chosen=chosen)
+
+
+def oscillations():
+    for i, plant in enumerate(PLANTS[:2]):
+        for m, law in enumerate(LAWS):
+            predicted, seen = ((NONE, NONE), (0.02, 0.025), (0.04, NONE))[m]
+            yield Oscillation(
+                plant=plant,
+                law=law,
+                amplitude=predicted,
+                frequency=11.0 + m,
+                measured_amplitude=seen,
+                measured_frequency=10.0 + i,
+                third_harmonic=(NONE, 0.04, 0.3)[m],
+                uncertainty=(NONE, 0.08, 2.0)[m],
+                marked=(i, m) == (1, 1),
+            )
+
+
+def machines():
+    """The QUBE-Servo, on which one law wins in one metric, several in another and none in a third."""
+    twin = smc.rig("qube_servo")
+    winners = {"itae": ["relay"] * 4, "tv_rate": ["relay", None, "regulator", "relay"], "ultimate_bound": [None] * 4}
+    boards = []
+    for k, (metric, won) in enumerate(winners.items()):
+        medians = [{law.name: 0.03 * 10.0**k * (m + 1 + 0.1 * j) for m, law in enumerate(twin.laws)} for j in range(4)]
+        blocks = [
+            SimpleNamespace(winner=one, medians=its, sample="6 starts") for one, its in zip(won, medians, strict=True)
+        ]
+        boards.append(SimpleNamespace(metric=metric, blocks=blocks, winner=won[0] if len(set(won)) == 1 else None))
+    yield rigs.Machine(rig=twin, boards=tuple(boards))
+
+
+def repeated():
+    t = np.linspace(0.0, 1.0, 5)
+    columns = {"theta": np.sin(t), "u": t**2}
+    fits = {"the twin’s": {"theta": 94.06, "u": 88.0}, "quanser": {"theta": Fall(8.44), "u": Fall(8.44)}}
+    yield rigs.Repeated(
+        rig=smc.rig("qube_servo"),
+        name="a.npz",
+        fits=fits,
+        t=t,
+        measured=columns,
+        twin={name: 1.01 * values for name, values in columns.items()},
+    )
+    yield rigs.Repeated(rig=smc.rig("emps"), name="b <csv>", why="it is too short")
+
+
+def scenes():
+    t, empty = np.linspace(0.0, 2.0, 5), np.empty(0)
+    for plant, unit, film in (("duffing", "m", b"film"), ("pendulum_network", "rad", None)):
+        curves = []
+        for m, law in enumerate(LAWS[:2]):
+            u = (3.0 - m) * np.cos(3.0 * t)
+            band = (t[::2], u[::2] - 0.5, u[::2] + 0.5) if m else (empty,) * 3
+            curves.append(Curve(law=law, t=t, x=np.exp(-t), tu=t, u=u, tb=band[0], low=band[1], high=band[2]))
+        yield Scene(
+            plant=plant,
+            condition="nominal",
+            unit=unit,
+            u_max=6.0,
+            curves=tuple(curves),
+            film=film,
+            poster=film and b"poster",
+            seconds=2.0,
+        )
+
+
+def about():
+    plan = Plan(
+        quick=True,
+        plants=PLANTS[:2],
+        laws=LAWS,
+        conditions=CONDITIONS,
+        seeds=6,
+        duration=3.0,
+        kinds=("delay", "mass"),
+        points=(3, 4),
+        basins=("duffing",),
+        relevant=0.05,
+    )
+    made = About(
+        plan=plan,
+        runs=144,
+        failed=4,
+        seeds=6,
+        sources="gains of all laws: shipped",
+        versions={"smc_mujoco": "1.2", "mujoco": "3.4"},
+        spent={"grid": 12.4, "claims": 3.6},
+        no_film="nothing renders here: install a renderer",
+    )
+    vars(made)["gains"] = [
+        Gains("study", "duffing", "classical", "k 3, c 2", "by hand"),
+        Gains("tuned", "duffing", "classical", "k 4", "shipped"),
+    ]
+    return made
+
+
+@pytest.fixture(scope="module")
+def findings():
+    found = tuple(margins())
+    return Findings(
+        scores=tuple(scores()),
+        places=tuple(places()),
+        claims=tuple(claims()),
+        fields=tuple(fields()),
+        fronts=tuple(fronts()),
+        worst=tuple(worst_cases()),
+        margins=found,
+        by_set={"tuned": found[:6], "study": found[:4]},
+        oscillations=tuple(oscillations()),
+        accuracies=AccuracyTable(accuracies()),
+        basins=tuple(basins()),
+        machines=tuple(machines()),
+        repeated=tuple(repeated()),
+        scenes=tuple(scenes()),
+        about=about(),
+    )
+
+
+PLOT = re.compile(r'<script type="application/json" data-plot="(.*?)">(.*?)</script>', re.S)
+
+
+def drawn(plot):
+    """Return a chart's data and layout, a line for each trace, axis and part."""
+    figure = json.loads(plot[2], parse_float=lambda text: float(f"{float(text):.9g}"), parse_constant=pytest.fail)
+    if plot[1] != "plot-accuracy":  # the first; all have the same
+        figure["layout"].pop("template")
+    traces = [f"  {json.dumps(trace, ensure_ascii=False)}" for trace in figure["data"]]
+    parts = [f"  {name}: {json.dumps(part, ensure_ascii=False)}" for name, part in figure["layout"].items()]
+    return html.escape("\n".join([f"chart {plot[1]}", *traces, *parts, ""]), quote=False)
+
+
+def said(text):
+    """Return what a page says, a line for each row, with the target of each link, and its charts."""
+    text = re.sub(r"<style>.*?</style>", "", text, flags=re.S)
+    text = re.sub(r"<script>.*?</script>", "", PLOT.sub(drawn, text), flags=re.S)
+    text = re.sub(r'<a [^>]*?href="(.*?)".*?>(.*?)</a>', r"\2 [\1]", text, flags=re.S)
+    text = re.sub(r'<(img|video) [^>]*?(?:alt|aria-label)="(.*?)".*?src="(.*?)".*?>', r"\1: \2 (\3)", text, flags=re.S)
+    text = re.sub(r"<select.*?</select>", "", text, flags=re.S)
+    text = re.sub(r"--law: (#\w+)[^>]*?>", r">\1 ", text)
+    text = re.sub(r"</t[dh]>", " | ", text)
+    return re.sub(r"\n\s+", "\n", html.unescape(re.sub(r"<[^>]*?>", "", text)))
+
+
+def test_a_page_says_and_draws_its_findings(findings, snapshot, monkeypatch):
+    import plotly.graph_objects as go
+
+    monkeypatch.setattr("plotly.offline.get_plotlyjs", lambda: "")
+    whole = page.page(findings)
+    for plot in PLOT.finditer(whole):
+        go.Figure(json.loads(plot[2]))  # which refuses what plotly does not know
+    text = said(whole.partition('<h3 id="definitions">')[0])
+    assert re.sub(r"the package’s \d+ laws", "the package’s laws", text) == snapshot  # a new one needs no new record
