@@ -212,11 +212,6 @@ def test_run_hands_the_speed_and_the_camera_to_the_film(call, undrawn, scene, fo
     assert "give the name of a camera of the model, or (azimuth, elevation)" in err
 
 
-def test_results_go_to_videos_and_the_scene_s_name_by_default(call, undrawn, scene, folder):
-    assert call("run", scene, "--no-film")[0] == 0
-    assert {path.name for path in (folder / "videos" / "mine").iterdir()} == TRACES
-
-
 @pytest.mark.parametrize("plant", ["duffing", "pendulum_network"])
 @pytest.mark.parametrize("fails", [False, True], ids=["all well", "one fails"])
 def test_no_number_and_no_heading_of_a_score_table_is_cut_at_80_columns(plant, fails, call, undrawn, folder):

@@ -1,0 +1,219 @@
+"""What every command says of itself, and that each of its options reaches the function that does the work."""
+
+import dataclasses
+import importlib
+import inspect
+import itertools
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import NoneType
+from typing import Any
+
+import pytest
+from typer.models import OptionInfo
+
+from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+from smc_mujoco.cli import main
+from smc_mujoco.control.component import Component
+from smc_mujoco.draw import display
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.conditions import Condition
+from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.studies.scene import Scene
+
+TYPED = ("duffin", "hierarchica", "encode", "vdp_nois", "noise+duffin")  # begun names: what completes them is told
+CALLS = {  # command line -> the functions that it calls, of which the last does the work
+    "laws": ["cli.law_pages.print_lists"],
+    "laws pid": ["cli.law_pages.print_pages"],
+    "laws --needs continuous,two-gains": ["cli.law_pages.print_suitable"],
+    "laws --family terminal": ["cli.law_pages.print_suitable"],
+    "laws --plant duffing": ["cli.law_pages.print_suitable"],
+    "run duffing": ["cli.scene.perform"],
+    "run duffing --out there --no-film --speed 2 --camera 1,2,3 --seed 7 --threads 2 --export csv,mat": [
+        "cli.scene.perform"
+    ],
+    "view duffing": ["draw.viewer.watch"],
+    "view vdp_noise --condition noise --label super_twisting": ["draw.viewer.watch"],
+    "compare": ["studies.compare.compare"],
+    "compare duffing,van_der_pol --law pid,classical --condition noise --seeds 3 --no-tune --worst --quick "
+    "--gains default --duration 2 --x0 0.4 --spread 0.1 --relevant 0.05 --defaults --out there --figure f "
+    "--latex t.tex --executor dask://a:1 --traces all --fresh --noise-key 5 --threads 2": ["studies.compare.compare"],
+    "compare --law all": ["studies.compare.compare"],
+    "compare --law all --gains default duffing": ["studies.compare.compare"],
+    "compare --rig simple_pendulum_ak80 --seeds 1": ["studies.study.study", "studies.leaderboard.leaderboard"],
+    "compare --rig simple_pendulum_ak80 --law pid --seeds 1 --duration 2 --x0 0.4 --spread 0.1 --out there --fresh "
+    "--executor dask://a:1 --threads 2 --defaults --relevant 0.05 --noise-key 0": [
+        "studies.study.study",
+        "studies.leaderboard.leaderboard",
+    ],
+    "which duffing": ["studies.adviser.which"],
+    "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 --x0 0.4 --spread 0.1 "
+    "--relevant 0.05 --out there --defaults --noise-key 5 --disturbance 2 --threads 2": ["studies.adviser.which"],
+    "tune duffing pid": ["analysis.tuning.search.tune"],
+    "tune duffing pid --objective tracking --budget 7 --seed 3 --out there.json --front f --chattering 0.02 "
+    "--condition noise --x0 0.4 --spread 0.1 --threads 2": ["analysis.tuning.search.tune"],
+    "margins": ["analysis.margins.margins"],
+    "margins --quick": ["analysis.margins.margins"],
+    "margins duffing --law pid --kinds delay,mass --gains default --quick --condition noise --x0 0.4 --out m.csv "
+    "--json m.json --threads 2": ["analysis.margins.margins"],
+    "worst duffing": ["studies.worst_case.worst_case"],
+    "worst duffing --law pid --disturbance 2 --slope 3 --position-noise 0.01 --velocity-noise 0.02 --hold 0.1 "
+    "--delay 0:0.01 --jitter 0.002 --mass 0.7:1.3 --friction 0:0.1 --friction-scale 0.5:2 --parameter alpha=0.8:1.2 "
+    "--spread 0.1 --metric peak --gains default --condition noise --duration 2 --budget 9 --seed 3 --out w "
+    "--json w.json --threads 2": ["studies.worst_case.worst_case"],
+    "worst simple_pendulum_ak80 --gains default": ["studies.worst_case.worst_case"],
+    "accuracy duffing": ["studies.accuracy.accuracy"],
+    "accuracy duffing van_der_pol --law pid --condition sine --periods 0.002,0.001 --seeds 2 --gains default "
+    "--duration 2 --x0 0.4 --spread 0.1 --out a --json a.json --threads 2": ["studies.accuracy.accuracy"],
+    "basin duffing": ["analysis.region_of_attraction.basin"],
+    "basin duffing --law pid --points 3 --gains default --duration 2 --out b --json b.json --condition noise "
+    "--threads 2": ["analysis.region_of_attraction.basin"],
+    "chatter duffing": ["simulation.grid.case"],
+    "chatter duffing --law pid --actuator lag:0.01 --condition noise --gains default --duration 2": [
+        "simulation.grid.case"
+    ],
+    "chatter duffing --law pid --amplitude 0.1 --frequency 5 --channel 1 --out c --json c.json --threads 2": [
+        "analysis.gains_for.design"
+    ],
+    "live": ["exchange.live.build.live"],
+    "live duffing furuta --law pid --law classical --out there": ["exchange.live.build.live"],
+    "export-c pid": ["exchange.c.export.law_to_c"],
+    "export-c pid --gains kp=50 --type float --joints 2": ["exchange.c.export.law_to_c"],
+    "check-c law.c": ["exchange.c.load.check"],
+    "check-c law.c --gains a=1 --memory 3 --symbol f --flag=-Ia --flag=-Ib --timeout 4": ["exchange.c.load.check"],
+    "export-fmu pid": ["exchange.fmu.export.export_fmu"],
+    "export-fmu pid --gains kp=50 --surface linear(c=4) --velocity levant --period 0.002 --u-max 6 --model nominal "
+    "--joint slide --joints 2 --no-binary --out p.fmu": ["exchange.fmu.export.export_fmu"],
+    "check-fmu law.fmu": ["exchange.fmu.load.check"],
+    "check-fmu law.fmu --variables x=theta,u=torque --constants enable=1 --period 0.002 --timeout 4": [
+        "exchange.fmu.load.check"
+    ],
+    "report": ["evidence.report.report"],
+    "report --quick --out there --seeds 3 --records r --law pid --relevant 0.05 --threads 2": [
+        "evidence.report.report"
+    ],
+    "report --paper gaber --quick --out there --threads 2": ["evidence.report.paper.report"],
+}
+
+
+COMMANDS = {name: (group, command) for group, commands in main.GROUPS.items() for name, command in commands.items()}
+
+
+class Reached(BaseException):
+    """The function that does the work was called; it passes the command's sentences for errors."""
+
+
+def told(value: Any) -> str:
+    """Return an argument in words: of what the package makes, its name and what differs from the default."""
+    return next((words(value) for kind, words in WORDS.items() if isinstance(value, kind)), f"a {type(value).__name__}")
+
+
+def told_scenario(scenario: Scenario) -> str:
+    """Return plant, law and what differs from the default."""
+    plain = Scenario(plant=scenario.plant, law=scenario.law)
+    given = {one.name: getattr(scenario, one.name) for one in dataclasses.fields(scenario)}
+    changed = [f"{name}={told(one)}" for name, one in given.items() if one != getattr(plain, name)]
+    return f"Scenario({', '.join([told(scenario.plant), told(scenario.law), *changed])})"
+
+
+WORDS: dict[Any, Callable[[Any], str]] = {
+    Scenario: told_scenario,
+    Scene: lambda scene: f"Scene({scene.title}, camera={scene.camera}, seeds={ {s.seed for _, _, s in scene.runs()} })",
+    Plant: lambda plant: f"plant {plant.name}",
+    Component: lambda one: f"{one.kind} {one.name}, gains of kind {one.source.kind}",
+    Path: lambda path: f"Path({path.as_posix()})",
+    Mapping: lambda values: "{" + ", ".join(f"{key}: {told(one)}" for key, one in values.items()) + "}",
+    (list, tuple): lambda values: f"[{', '.join([*map(told, values[:3]), *['...'] * (len(values) > 3)])}]",
+    (bool, int, float, str, NoneType, Condition, Starts, Uncertainty): repr,
+}
+
+
+def _same(a: object, b: object) -> bool:
+    return type(a) is type(b) and a == b
+
+
+def called(function: Callable, arguments: tuple, named: dict[str, Any]) -> str:
+    """Return a call in words, an argument on each line, in the order and with the defaults of the function."""
+    signature = inspect.signature(function)
+    bound = signature.bind(*arguments, **named).arguments
+    lines = [f"{function.__name__}("]
+    for name, parameter in signature.parameters.items():
+        as_default = name not in bound or _same(bound[name], parameter.default)
+        lines.append(f"  {name}: {told(bound.get(name, parameter.default))}{' (the default)' * as_default}")
+    return "\n".join([*lines, ")"])
+
+
+def stub(path: str, last: bool, calls: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Replace a function by one that notes how it is called."""
+    module, _, name = f"smc_mujoco.{path}".rpartition(".")
+    home = importlib.import_module(module)
+    function = getattr(home, name)
+
+    def noted(*arguments: Any, **named: Any) -> None:
+        calls.append(called(function, arguments, named))
+        if last:
+            raise Reached
+
+    monkeypatch.setattr(home, name, noted)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(display, "missing", lambda: None)
+    monkeypatch.setenv("MUJOCO_GL", "disabled")
+    monkeypatch.setattr("warnings.showwarning", None)
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize("line", CALLS, ids=lambda line: line[:50])
+def test_every_option_reaches_the_function_that_does_the_work(line, monkeypatch, snapshot):
+    calls: list[str] = []
+    for path, following in itertools.zip_longest(CALLS[line], CALLS[line][1:]):
+        stub(path, following is None, calls, monkeypatch)
+    with pytest.raises(Reached):
+        main.main(line.split())
+    assert "\n".join(calls) == snapshot
+
+
+def parameters(command: Callable) -> dict[str, tuple[inspect.Parameter, Any]]:
+    """Return how each option and argument is written -> its parameter, and what typer is told of it."""
+    found = {}
+    for one in inspect.signature(command).parameters.values():
+        (info,) = one.annotation.__metadata__
+        given = [word for word in (info.default, *(info.param_decls or ())) if isinstance(word, str)]
+        name = one.name.replace("_", "-")
+        names = [f"--{name}", *[f"--no-{name}"] * isinstance(one.default, bool)]
+        found["/".join(given or (names if isinstance(info, OptionInfo) else [one.name]))] = one, info
+    return found
+
+
+def about(name: str, parameter: inspect.Parameter, info: Any) -> str:
+    """Return all that a user can know of an option or an argument, and what completes some begun names."""
+    completed = [one for word in TYPED for one in (info.autocompletion(word) if info.autocompletion else ())]
+    facts = {
+        "default": None if parameter.default is inspect.Parameter.empty else told(parameter.default),
+        "metavar": info.metavar,
+        "from": info.min,
+        "to": info.max,
+        "completes": ", ".join(completed) or None,
+        "help": info.help,
+    }
+    shown = [f"{fact} {value}" for fact, value in facts.items() if value is not None]
+    return f"  {name}: {'; '.join(shown)}{'' if info.show_default else '; the default is not shown'}"
+
+
+def test_the_calls_above_have_every_option_of_their_commands():
+    beside = {"--timing", "--serve", "--port", "--paper"}  # for what is done after the work, or instead of it
+    for name, (_, command) in COMMANDS.items():
+        words = {word.partition("=")[0] for line in CALLS if line.split()[0] == name for word in line.split()}
+        options = [{*names.split("/")} for names in parameters(command) if names.startswith("-")] if words else []
+        assert [one for one in options if not one & (words | beside)] == [], name
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_what_a_command_says_of_itself_is_as_recorded(name, snapshot):
+    group, command = COMMANDS[name]
+    lines = [about(names, *facts) for names, facts in parameters(command).items()]
+    assert "\n".join([f"{name} ({group})", inspect.cleandoc(command.__doc__ or ""), *lines]) == snapshot
