@@ -4,6 +4,7 @@ import dataclasses
 import importlib
 import inspect
 import itertools
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import NoneType
@@ -12,6 +13,7 @@ from typing import Any
 import pytest
 from typer.models import OptionInfo
 
+import smc_mujoco as smc
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.cli import main
 from smc_mujoco.control.component import Component
@@ -21,6 +23,7 @@ from smc_mujoco.simulation.conditions import Condition
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.scene import Scene
+from tests.helpers.words import words
 
 TYPED = ("duffin", "hierarchica", "encode", "vdp_nois", "noise+duffin")  # begun names: what completes them is told
 CALLS = {  # command line -> the functions that it calls, of which the last does the work
@@ -99,6 +102,20 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
 
 COMMANDS = {name: (group, command) for group, commands in main.GROUPS.items() for name, command in commands.items()}
 
+PRINTED = [  # command lines that are run to their ends
+    "show one.npz --export csv,mat",
+    "margins duffing --law classical,pid --kinds delay --quick --out m.csv --json m.json",
+    "worst duffing --law classical --budget 3 --duration 0.2 --gains default --out w.pdf --json w.json",
+    "accuracy duffing --law classical --periods 0.004,0.002 --seeds 1 --duration 0.5 --out a.pdf --json a.json",
+    "basin duffing --law classical --points 2 --duration 0.1 --out b.pdf --json b.json",
+    "chatter duffing --law classical --actuator lag:0.01 --gains default --duration 0.2 --out c.pdf --json c.json",
+    "tune duffing classical --budget 2 --condition nominal --out t.json --front f.pdf",
+    "compare duffing --law classical,pid --gains default --condition nominal --seeds 1 --duration 0.1 --out c "
+    "--figure f.pdf --latex f.tex",
+    "compare --rig simple_pendulum_ak80 --law classical --seeds 1 --duration 0.1 --noise-key 0 --out r",
+    "export-fmu classical --no-binary",
+]
+
 
 class Reached(BaseException):
     """The function that does the work was called; it passes the command's sentences for errors."""
@@ -164,6 +181,7 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.setattr(display, "missing", lambda: None)
     monkeypatch.setenv("MUJOCO_GL", "disabled")
     monkeypatch.setattr("warnings.showwarning", None)
+    return tmp_path
 
 
 @pytest.mark.usefixtures("folder")
@@ -217,3 +235,41 @@ def test_what_a_command_says_of_itself_is_as_recorded(name, snapshot):
     group, command = COMMANDS[name]
     lines = [about(names, *facts) for names, facts in parameters(command).items()]
     assert "\n".join([f"{name} ({group})", inspect.cleandoc(command.__doc__ or ""), *lines]) == snapshot
+
+
+# what is printed and written
+
+
+@pytest.fixture
+def trace(folder):
+    smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.05)).save(folder / "one.npz")
+
+
+@pytest.mark.usefixtures("trace", "coarse_grid")
+@pytest.mark.parametrize("line", PRINTED, ids=lambda line: line.partition(" --")[0])
+def test_what_a_command_prints_and_writes_is_as_recorded(line, folder, monkeypatch, capsys, snapshot):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit) as end:
+        main.main(line.split())
+    assert not end.value.code
+    files = sorted(
+        path.relative_to(folder) for path in folder.rglob("*") if path.is_file() and path.parent.name != "parts"
+    )
+    written = [f"{file.as_posix()}: {content(file)}" for file in files]
+    assert "\n".join([words(capsys.readouterr().out), "", *written]) == snapshot
+
+
+def content(file: Path) -> str:
+    """Return the words of a table that was written: the heads of CSV, all LaTeX, or the names in JSON."""
+    if file.suffix == ".json":
+        return names_in(json.loads(file.read_text(encoding="utf-8")))
+    text = file.read_text(encoding="utf-8") if file.suffix in (".csv", ".tex") else ""
+    return words(text if file.suffix == ".tex" else text.partition("\n")[0])
+
+
+def names_in(data: Any, depth: int = 2) -> str:
+    """Return the names in some JSON and, to some depth, those below them; of a list, those of its first item."""
+    data = data[0] if isinstance(data, list) and data else data
+    if not depth or not isinstance(data, dict):
+        return ""
+    return ", ".join(f"{name} ({below})" if (below := names_in(one, depth - 1)) else name for name, one in data.items())

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.cli import main, tables
+from smc_mujoco.cli import main, tables, terminal
 from smc_mujoco.cli import scene as show
 from smc_mujoco.cli.commands import options
 from smc_mujoco.common import gl
@@ -610,6 +610,30 @@ def test_a_wrong_command_line_ends_with_code_2_and_shows_the_usage(words, call):
     assert "Traceback" not in err
 
 
+STOPPED = "smc-mujoco: stopped. Run the same command again to go on.\n"
+OUTCOMES = {  # what a command raises -> its exit code and what it says
+    "bad input": (ScenarioError("k is 0: give more"), 2, "smc-mujoco: k is 0: give more\n"),
+    "Ctrl-C": (KeyboardInterrupt(), 130, STOPPED),
+    "a closed pipe": (BrokenPipeError(), 1, ""),
+    "a full disk": (
+        OSError(28, "No space", "a.csv"),
+        2,
+        "smc-mujoco: a.csv: No space; choose another folder or make room\n",
+    ),
+    "no file": (OSError("torn"), 2, "smc-mujoco: a file: torn; choose another folder or make room\n"),
+    "no memory": (MemoryError(), 2, "smc-mujoco: out of memory: give fewer or shorter runs\n"),
+}
+
+
+@pytest.mark.parametrize("case", OUTCOMES)
+def test_a_command_ends_with_the_code_and_the_sentence_of_what_it_raises(case, capsys, monkeypatch):
+    monkeypatch.setattr(os, "dup2", lambda opened, _: os.close(opened))  # the test's stdout stays
+    error, *expected = OUTCOMES[case]
+    with pytest.raises(SystemExit) as end, terminal.errors_as_sentences():
+        raise error
+    assert [end.value.code, capsys.readouterr().err] == expected
+
+
 # the process around it
 
 
@@ -737,9 +761,6 @@ if __name__ == "__main__":
     show.simulate = announced
     smc.play(__file__)
 """
-
-
-STOPPED = "smc-mujoco: stopped. Run the same command again to go on.\n"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for a process")
