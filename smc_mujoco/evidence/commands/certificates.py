@@ -100,7 +100,7 @@ def certify(
     if out:
         terminal.wrote(made.save(out))
     if json:
-        write_json(json, made.data)
+        terminal.wrote(write_json(json, made.data))
     if figure:
         shown = found.scenario if found else scenario
         made.figure(figure, run([shown]) if shown and shown.plant.n == 1 else ())

@@ -14,12 +14,10 @@ from typer.testing import CliRunner
 
 import smc_mujoco as smc
 from smc_mujoco.cli.main import app
-from smc_mujoco.evidence.commands import tables
 from smc_mujoco.evidence.rigs import identify as identification
 from smc_mujoco.evidence.rigs import records, uncertainty
 from smc_mujoco.evidence.rigs.figure import residual_figure
 from smc_mujoco.evidence.rigs.replays import Point, Replays
-from smc_mujoco.evidence.rigs.rig import Fall
 
 AXIS = smc.rig("emps")
 PENDULUM = smc.rig("simple_pendulum_ak80")
@@ -297,15 +295,6 @@ def test_a_poor_fit_is_said(found):
     assert found.notes == []
     poor = dataclasses.replace(found, fits=({"x": 99.0, "u": 61.3},))
     assert poor.notes[0].startswith("the worst fit is 61 %: the model lacks something, a column is wrong")
-
-
-def test_median_and_worst_fit_of_many_records_are_shown_with_falls(found):
-    fits = ({"x": 99.0}, {"x": 90.0}, {"x": Fall(8.44)}, {"x": 95.0})
-    table = tables.identified(dataclasses.replace(found, fits=fits, fits_before=fits[:3] + fits[:1]), list("abcd"))[1]
-    assert [list(column.cells)[-2:] for column in table.columns] == [
-        ["median", "worst"],
-        ["90.0 (90.0)", "falls at 8.4 s (falls at 8.4 s)"],
-    ]
 
 
 def test_drawn_sets_have_the_errors_and_correlations_found(found):

@@ -1,0 +1,218 @@
+"""What the annex's commands print, write and hand on, with the work itself replaced by typed results."""
+
+import contextlib
+import json
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.cli import main
+from smc_mujoco.common.progress import Bar
+from smc_mujoco.evidence import boards
+from smc_mujoco.evidence.audit.verdict import Claim, Claims
+from smc_mujoco.evidence.certificates.certificate import Certificate
+from smc_mujoco.evidence.rigs.identified import Identified
+from smc_mujoco.evidence.rigs.rig import Fall
+
+ROWS = (boards.Row("mine", 1.234, 8.08, 1.8, 0.0104, 88.52, 0.6549), boards.Row("SAC", 2.5, 10.0, 3.0, 0.1, 99.0, 0.5))
+TESTS = tuple(boards.RobustnessRow(name, 90.04, 80.0, 70.0, 60.0, 50.0, 40.06, 0.6505) for name in ("mine", "SAC"))
+CHECKS = {
+    "duffing: settling time, s": {"value": 2.5, "relation": "<", "limit": 4.0, "holds": True},
+    "largest step": {"value": 1.25, "relation": "<=", "limit": 1.0, "holds": False},
+}
+CLAIMS = Claims(
+    [
+        Claim(
+            id="3", text="it settles", where="p. 4", measured="runs", holds_if="steps <= 1", verdict="refuted",
+            numbers={"study": CHECKS, "tuned": CHECKS}, beside={"study": {}, "tuned": {"TV rate": 12.5}},
+            verdicts={"study": "supported", "tuned": "refuted"}, flips=True, note="A note.", how="by eq. 3",
+            read="abstract", over="some", instead="It rests.", shown_by="smc-mujoco certify",
+        ),
+        Claim(
+            id="4", text="it is calm", where="p. 5", measured="runs", holds_if="calm", verdict="not testable",
+            numbers={"study": {}, "tuned": {}}, beside={"study": {}, "tuned": {}},
+            verdicts={"study": "not testable", "tuned": "not testable"}, flips=False, note="Nothing says how.",
+        ),
+    ]
+)  # fmt: skip
+LEVELS = {
+    "x": [0.0, 1.0, 2.0], "s": [-2.0, 0.0, 2.0], "W": [[0.5, 0.0, 0.5], [0.75, 0.25, 0.5], [1.0, 1.0, 1.0]],
+    "start": [0.5, 0.0], "inner": 0.1, "outer": 0.6, "bound": 0.45,
+}  # fmt: skip
+MARGINS = {
+    "saturated PD": {"damping": -0.25, "restoring": 0.125, "local": 3.0},
+    "level sets": {"actuator": 1.5, "start": 0.2},
+}
+PARTS = [
+    {"theorem": theorem, "holds": min(its.values()) >= 0.0} | (LEVELS if theorem == "level sets" else {})
+    | {"conditions": [{"name": name, "margin": margin} for name, margin in its.items()]}
+    for theorem, its in MARGINS.items()
+]  # fmt: skip
+
+
+def certificate(**changes):
+    """A certificate of Duffing's equation whose numbers nobody proved."""
+    gains = {"lam": 6.0, "k1": 3.0}
+    plant = {"name": "duffing", "n": 1, "parameters": dict(smc.plant("duffing").parameters), "mechanism": "equation"}
+    plain = {"format": "x", "plant": plant, "law": {"name": "observer_free", "gains": gains}, "u_max": 6.0, "unit": "m"}
+    bounds = {
+        "disturbance": 2.0,
+        "slope": None,
+        "leaves_out": {"delay": "4 ms", "noise": ""},
+        "parts": PARTS,
+        "seal": "y",
+    }
+    return Certificate(data=plain | bounds | changes)
+
+
+def identified(count):
+    """Quantities of the axis: one at the end of its range, one that may be 0, one just not; records that fit badly."""
+    rig = smc.rig("emps").with_values({"mass": 120.5, "viscous": 0.0, "coulomb": 2.0, "offset": 6.0}, "identified")
+    correlations = np.eye(4)
+    correlations[0, 2] = correlations[2, 0] = -0.999
+    t = np.arange(3.0)
+    columns = {"x": t, "u": t**2}
+    fits = ({"x": 99.04, "u": 81.0}, {"x": 90.0, "u": 60.0}, {"x": Fall(8.44), "u": Fall(8.44)})
+    return Identified(
+        rig=rig,
+        before=smc.rig("emps"),
+        values={name: rig.values[name] for name in rig.free},
+        errors={"mass": 0.0213, "viscous": 1.0, "coulomb": 2.0, "offset": 7.0},
+        correlations=correlations,
+        fits=fits[:count],
+        fits_before=({"x": 99.0, "u": 81.5}, *fits[1:count]),
+        predictions=((columns, columns, t),) * count,
+        evaluations=41,
+    )
+
+
+def shown(value):
+    """An argument in words."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {shown(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, list | tuple | Claims):
+        return f"[{', '.join(map(shown, value))}]"
+    if isinstance(value, smc.Scenario):
+        return f"<{value.law.name} on {value.plant.name}, {value.condition}, gains {value.law.source.kind}>"
+    plain = isinstance(value, str | int | float | None | Path | smc.Uncertainty)
+    return str(value) if plain else f"<{getattr(value, 'name', type(value).__name__)}>"
+
+
+class Notes(list):
+    """What the stubs were called with."""
+
+    def stub(self, monkeypatch, name, gives=None):
+        def noted(*given, **options):
+            words = [*map(shown, given), *(f"{key}={shown(one)}" for key, one in options.items())]
+            self.append(f"{name.rpartition('.')[2]}({', '.join(words)})")
+            return gives(*given, **options) if callable(gives) else gives
+
+        monkeypatch.setattr(f"smc_mujoco.{name}", noted)
+
+    @contextlib.contextmanager
+    def bar(self, what, whole=None, shown=True, counted=False):
+        self.append(f"bar of {what}, whole {whole}{', counted' * counted}")
+        drawn = Bar()
+        drawn.reached = lambda done, whole: self.append(f"  reached {done} of {whole}")
+        drawn.advance = lambda work: self.append(f"  advance {work}")
+        yield drawn
+
+
+def half_done(scenario, report):
+    report(1, 2)
+    return f"robustness of {scenario}"
+
+
+def audited(about, ids, sets, quick, threads, table, report):
+    report(1)
+    save = lambda path: path  # noqa: E731
+    return SimpleNamespace(claims=Claims(one for one in CLAIMS if one.id in (ids or "34")), save=save, badge=save)
+
+
+def repeated(name):
+    """A twin whose replays are texts."""
+    twin = SimpleNamespace(name=name, label=f"the rig {name}", units={"x": "m"}, start=2.0, set=repeated)
+    twin.columns = SimpleNamespace(time="t")
+    twin.fit, twin.idle = (lambda _: {"x": 99.04, "u": 1.25}), (lambda _: {"x": -0.04, "u": 0.0})
+    twin.fits = lambda _: [{"x": Fall(8.44), "u": -20.0}]
+    twin.predictions = lambda _: [(f"{name} predicted", "measured", "times")]
+    twin.replay = lambda record, start, duration, rounded: f"{name} from {start} for {duration}, rounded {rounded}"
+    twin.measured = lambda record, start, duration: f"measured from {start} for {duration}"
+    return twin
+
+
+FOUND = SimpleNamespace(tried=40, value=0.3125, scenario=smc.Scenario(plant="duffing", law="pid"))
+STUBS = {  # of each command: the functions replaced, and what they give
+    "board": {
+        "evidence.boards.experiments": {boards.NAME: "first", "SAC": "second"},
+        "simulation.run.run": lambda runs: [f"trace of {one}" for one in runs],
+        "evidence.boards.board": ROWS,
+        "evidence.boards.robustness": half_done,
+        "evidence.boards.robustness_board": TESTS,
+        "evidence.boards.verdict": "first of two",
+        "evidence.boards.comparison": "better than nothing",
+        "draw.figure.figure": None,
+        "cli.scene.filmed": [Path("film.mp4")],
+    },
+    "certify": {
+        "evidence.certificates.maker.certify": lambda scenario, within: certificate(),
+        "evidence.certificates.certificate.Certificate.figure": None,
+        "studies.worst_case.worst_case": FOUND,
+        "simulation.run.run": ["a trace"],
+    },
+    "claims": {"evidence.audit.audit.audit": audited, "evidence.audit.mutants.survivors": lambda *_: {"3": "kept"}},
+    "identify": {
+        "evidence.rigs.identify.identify": lambda of, many, *_, **__: identified(len(many)),
+        "evidence.rigs.records.load": lambda file, names: f"columns of {file}",
+    },
+    "replay": {
+        "evidence.rigs.rig.rig": repeated,
+        "evidence.rigs.records.load": lambda file, names: {"t": np.array([3.0, 4.0])},
+        "evidence.rigs.figure.residual_figure": [Path("run.svg")],
+        "simulation.run.run": lambda runs: runs,
+        "cli.scene.filmed": [Path("film.mp4")],
+    },
+}
+LINES = (
+    "board acrobot --figure a --film b.mp4",
+    "board pendubot --no-robustness",
+    "certify duffing --disturbance 2 --worst --out d.json --json e.json --figure f",
+    "certify duffing --law pid --condition noise --gains default --slope 3",
+    "certify",
+    "certify duffing --check d.json",
+    "certify duffing --worst",
+    "certify duffing --json -",
+    "claims 3 --gains study,tuned --quick --threads 2",
+    "claims --mutants --out all.json --evidence e.json --badge b.svg",
+    "claims 4 --json --quick",
+    "claims --json --mutants",
+    "identify emps a.csv b.csv c.csv --columns x=position --quantities mass,offset --set mass=5 --starts 2 --seed 3",
+    "identify duffing a.csv --json found.json --figure fit",
+    "identify emps a.csv --set mass=much",
+    "replay emps run.csv --columns x=position",
+    "replay emps run.csv --quantities driver,quanser --start 1.5 --duration 6 --figure run --film film.mp4",
+    "replay emps run.csv --film film.mp4",
+)
+
+
+@pytest.mark.parametrize("line", LINES, ids=str)
+def test_a_command_prints_and_hands_on_what_is_recorded(line, snapshot, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setattr("warnings.showwarning", None)
+    notes, (command, *_) = Notes(), line.split()
+    monkeypatch.setattr("smc_mujoco.common.progress.bar", notes.bar)
+    for name, gives in STUBS.get(command, {}).items():
+        notes.stub(monkeypatch, name, gives)
+    with pytest.raises(SystemExit) as ended:
+        main.main(line.split())
+    said = capsys.readouterr()
+    files = sorted(path.name for path in tmp_path.iterdir())
+    out = json.dumps(json.loads(said.out)) if said.out.startswith("{") else said.out
+    text = "\n".join([*notes, out, said.err, f"files {files}", f"exit code {ended.value.code or 0}"])
+    text = re.sub(r"(?<![.\d])\d+ s\b", "# s", text.replace(str(tmp_path), ".").replace(smc.__version__, "VERSION"))
+    assert re.sub(" +$", "", text, flags=re.M) == snapshot
