@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+import types
 import warnings
 from pathlib import Path
 
@@ -626,12 +627,15 @@ OUTCOMES = {  # what a command raises -> its exit code and what it says
 
 
 @pytest.mark.parametrize("case", OUTCOMES)
-def test_a_command_ends_with_the_code_and_the_sentence_of_what_it_raises(case, capsys, monkeypatch):
-    monkeypatch.setattr(os, "dup2", lambda opened, _: os.close(opened))  # the test's stdout stays
+def test_a_command_ends_with_the_code_and_the_sentence_of_what_it_raises(case, capfd, monkeypatch):
+    kept = types.SimpleNamespace(
+        devnull=os.devnull, O_WRONLY=os.O_WRONLY, open=os.open, dup2=lambda new, _: os.close(new)
+    )
+    monkeypatch.setattr(terminal, "os", kept)  # the test's stdout stays
     error, *expected = OUTCOMES[case]
     with pytest.raises(SystemExit) as end, terminal.errors_as_sentences():
         raise error
-    assert [end.value.code, capsys.readouterr().err] == expected
+    assert [end.value.code, capfd.readouterr().err] == expected
 
 
 # the process around it
