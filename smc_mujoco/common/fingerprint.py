@@ -38,7 +38,7 @@ PRESENTATION = (
     "exchange/commands",
     "cli",
 )  # folders that show results and do not change them
-VERSIONED = {*sys.stdlib_module_names, "numpy", "numba", "scipy", "mujoco"}  # packages identified by their version
+VERSIONED = {*sys.stdlib_module_names, "numpy", "numba", "llvmlite", "scipy", "mujoco"}  # identified by their version
 VALUES = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.ndarray)
 VALUES += (tuple, list, set, frozenset, Mapping)
 

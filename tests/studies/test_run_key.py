@@ -13,6 +13,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 from helpers import runs
+from llvmlite import ir
 
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
@@ -144,6 +145,14 @@ def test_a_key_does_not_depend_on_the_process():
         check=True,
     )
     assert done.stdout.strip() == key(grid(["duffing"], ["adaptive"], ["noise"], [3], "study")[0])
+
+
+def test_types_that_a_compiler_has_made_by_then_change_no_key():
+    """A law of many joints reaches llvmlite, which keeps each type that it has made."""
+    joint = smc.Scenario(plant="inverted_pendulum_network", law="passivity_based")
+    before = key(joint), fingerprint.now(joint.law.function)
+    ir.IntType(57)
+    assert (key(joint), fingerprint.now(joint.law.function)) == before
 
 
 def test_a_global_changes_a_run_until_its_law_is_compiled():
