@@ -38,7 +38,7 @@ def duffing(law: str, **fields) -> smc.Trace:
 def test_a_figure_of_a_machine_with_friction_a_gear_a_jump_and_a_failure(snapshot):
     parts = {"friction": Coulomb(0.4), "actuator": smc.Backlash(0.04), "reference": SINE}
     jumping = duffing("classical", jump=smc.Jump(0.5, {"mass": 2.0}), **parts)
-    lost = failed(duffing("pid", **parts), 700, f"{PLANT_DIVERGED}, at t = 0.7 s")
+    lost = failed(duffing("adaptive", **parts), 700, f"{PLANT_DIVERGED}, at t = 0.7 s")
     rests = dataclasses.replace(jumping, v=np.where(jumping.t < 0.8, 1.0, 0.0)[:, None] * jumping.v)
     traces = [switching(rests, 1.0), switching(duffing("super_twisting", **parts), 0.7), lost]
     assert sketch(figure(traces)) == snapshot
@@ -51,7 +51,7 @@ def test_a_figure_of_a_network_under_two_laws(snapshot):
 
 
 def test_a_column_of_every_panel_of_a_cart_with_a_pole(snapshot):
-    law = smc.law("hierarchical")
+    law = smc.law("classical")
     trace = made(smc.Scenario(plant="cart_pole", law=law, duration=0.4, contact="none", friction=Coulomb(0.01)))
     small = dataclasses.replace(trace, x=0.01 * trace.x, u=0.02 * trace.u)
     assert sketch(figure(small, size="ieee-column", panels=ALL, labels=["small"])) == snapshot
@@ -118,7 +118,7 @@ def accuracy(law: str, plant: str = "duffing", order: float = 1.9, theory: float
 
 @pytest.mark.parametrize("size", [None, "ieee-column"])
 def test_orders_of_laws_with_and_without_a_theory(size, snapshot):
-    rows = [accuracy("super_twisting"), accuracy("classical", theory=None), accuracy("pid", order=math.nan)]
+    rows = [accuracy("super_twisting"), accuracy("classical", theory=None), accuracy("adaptive", order=math.nan)]
     page = orders(rows if size else [rows[0], accuracy("super_twisting", "van_der_pol")], size=size)
     assert sketch(page) == snapshot
 
@@ -129,5 +129,5 @@ def test_maps_of_states_that_converge_early_or_late_or_not(size, snapshot):
     decided = np.array([[2.0, 4.0, 8.0], [8.0, 16.0, 1.0]])
     names = {"plant": "van_der_pol", "unit": "m", "duration": 16.0, "outcome": outcome, "decided_at": decided}
     grid = {"x": np.array([-1.0, 0.0, 2.0]), "v": np.array([-3.0, 3.0])}
-    maps = [Basin(law="classical", source="tuned", **names, **grid), Basin(law="pid", **names, **grid)]
+    maps = [Basin(law="classical", source="tuned", **names, **grid), Basin(law="adaptive", **names, **grid)]
     assert sketch(region.draw(maps, size=size)) == snapshot

@@ -49,7 +49,7 @@ def test_letters_and_badges_of_machines_in_a_row_and_behind_each_other(row, pen,
     jump = smc.Jump(0.2, {"mass": 2.0})
     parts = {"jump": jump, "friction": smc.Coulomb(0.2), "contact": "stops", "actuator": smc.Lag(0.02)}
     first = machine("duffing", **parts)
-    traces = [first, failed(machine("duffing", "pid", **parts), 600, "the law raised ValueError: no")]
+    traces = [first, failed(machine("duffing", "adaptive", **parts), 600, "the law raised ValueError: no")]
     told = [[State("sticks", STUCK)], [State("slides", CALM), State("contact", STRUCK)]]
     caption = Caption(traces, ["one", "other"], COLOURS, None, SIZE, 0.7, arrows.scales(traces), told, row)
     caption.place(np.array([[90.0, 80, 190, 180], [140, 120, 340, 230]]))
@@ -101,7 +101,7 @@ def test_charts_below_a_film_and_their_dots(monkeypatch, snapshot):
     figures = []
     monkeypatch.setattr(charts, "Figure", lambda **given: figures.append(Figure(**given)) or figures[0])
     parts = {"friction": smc.Coulomb(0.2), "jump": smc.Jump(0.4, {"mass": 2.0})}
-    lost = failed(machine("duffing", "pid", **parts), 600, "the law raised ValueError: no")
+    lost = failed(machine("duffing", "adaptive", **parts), 600, "the law raised ValueError: no")
     lost = finite(dataclasses.replace(lost, x=0.5 * lost.x, u=0.3 * lost.u))
     traces = [machine("duffing", **parts), lost]
     shown = charts.Charts(traces, ["one", "other"], COLOURS, (640, 130), 0.7)
