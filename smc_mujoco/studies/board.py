@@ -311,7 +311,8 @@ def size_in_words(effect: Effect, unit: str = "", rival: str = "") -> str:
         value, *ends = saved if less else [0.0 - saved[k] for k in (0, 2, 1)]
         shown, unit = (_percent, " %") if effect.relative else (number, f" {unit}" * (unit not in ("", "1")))
         words, span = f"{shown(value)}{unit} {'less' if less else 'more'}", f"{' to '.join(map(shown, ends))}{unit}"
-    return f"{words}{f' than {rival}' * bool(rival)} ({'too few for an interval' if endless else span})"
+    named = f" {'as' if words.endswith(' as much') else 'than'} {rival}" * bool(rival)
+    return f"{words}{named} ({'too few for an interval' if endless else span})"
 
 
 def _percent(share: float) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from helpers.words import words
 from rich.console import Console
 
 import smc_mujoco as smc
@@ -555,3 +556,46 @@ def test_the_command_says_in_one_sentence_what_is_wrong(capsys):
         main.main(["which", "duffing", "--needs", "quick"])
     assert end.value.code == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_advice_says_as_recorded(advice, snapshot):
+    """With made-up scores of the same runs, and other finalists; what comes from the runs has no numbers."""
+    traded = with_cells(advice, observer_free=[1, 1, 9.9, 9.9], slow=[2, 2, 3, 8], classical=[4, 4, 9, 9])
+    even = np.ones(24)
+    tied = with_cells(
+        advice, {"slow": (1.0, 1.0), "observer_free": (1.0, 2.0)}, observer_free=[1.0, 1, 9, 9], slow=[1.01, 1, 9, 9]
+    )
+    three = with_cells(advice, observer_free=[even] * 4, slow=[1.02 * even] * 4, classical=[even] * 4)
+    first, *others = traded.choices
+    unfit = {"fit": False, "reliable": False}
+    made = {
+        "one for each need": traded,
+        "left out, and properties": dataclasses.replace(traded, others=tuple("abcdefg"), wanted=("settle", "rest")),
+        "one left out": dataclasses.replace(traded, others=("idle",), effort="N"),
+        "better in one condition": with_cells(advice, observer_free=[1, 1, 9, 9], slow=[2, 2, 9, 3], classical=[3] * 4),
+        "tied": tied,
+        "two level": with_cells(advice, observer_free=[even] * 4, slow=[1.02 * even] * 4),
+        "three level": dataclasses.replace(
+            three, choices=tuple(dataclasses.replace(one, reliable=True, settles=0.96) for one in three.choices)
+        ),
+        "few": with_cells(advice, observer_free=[even[:3]] * 4, slow=[1.02 * even[:3]] * 4),
+        "not fit": dataclasses.replace(
+            traded, choices=(dataclasses.replace(first, fit=False, reliable=False), *others)
+        ),
+        "nothing settles": dataclasses.replace(
+            traded, choices=(dataclasses.replace(first, settles=0.0, **unfit), *others)
+        ),
+        "not reliable": dataclasses.replace(traded, choices=(dataclasses.replace(first, reliable=False), *others)),
+        "second not fit": dataclasses.replace(
+            traded, choices=(first, *(dataclasses.replace(one, fit=False, remark="a remark") for one in others))
+        ),
+        "one default": dataclasses.replace(traded, untuned=("slow", "classical")),
+        "two defaults": dataclasses.replace(traded, untuned=("observer_free", "classical")),
+    }
+    said = []
+    for name, one in made.items():
+        (table,) = one.tables
+        said += ["", name, *table.notes, repr(one)]
+        if name in ("one for each need", "left out, and properties", "two level", "few", "second not fit"):
+            said += [str(table.title), str([str(cell) for cell in table.headings]), *map(str, table.rows[:2])]
+    assert words("\n".join(said)) == snapshot

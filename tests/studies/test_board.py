@@ -1,5 +1,6 @@
 """Boards in notebooks and papers: the numbers of the text board, escaped, and bold only what is not beaten."""
 
+import dataclasses
 import math
 import re
 from xml.etree import ElementTree
@@ -10,12 +11,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from smc_mujoco.analysis.bootstrap import Interval
+from smc_mujoco.analysis.ranking import Effect
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.html import text
 from smc_mujoco.common.tabular import TEX, plain
+from smc_mujoco.control.source import TUNED, Search, Source
 from smc_mujoco.evidence.report import words
 from smc_mujoco.studies import board
-from smc_mujoco.studies.board import Boards, spread
+from smc_mujoco.studies.board import Boards, Lead, spread
 from smc_mujoco.studies.leaderboard import leaderboard
 
 pytestmark = pytest.mark.quick
@@ -179,3 +182,78 @@ def test_latex_has_no_letter_that_an_engine_may_not_know():
     assert TEX["Ω"] == r"$\Omega$"
     assert TEX["₂"] == "$_2$"
     assert TEX["²"] == "$^2$"
+
+
+# every word
+
+
+@pytest.mark.parametrize(
+    ("options", "stand"),
+    [
+        ({"metrics": (*METRICS, "settling_time")}, {}),
+        ({"metrics": ["itae", "settling_time"], "level": 0.9, "relevant": 0.5}, {"seeds": 3}),
+        ({"metrics": ["itae", "settles"], "by": ("condition",)}, {"conditions": ("nominal", "noise")}),
+        ({"metrics": ["itae"], "by": ()}, {"conditions": tuple("abcde"), "seeds": 6}),
+    ],
+)
+def test_boards_say_as_recorded(options, stand, snapshot):
+    made = leaderboard(Stand(**stand), **options)
+    assert "\n".join([plain(made, 100), *(one.verdict for one in made)]) == snapshot
+
+
+def test_why_there_is_no_winner_as_recorded(snapshot):
+    (made,) = leaderboard(Stand(conditions=("nominal", "noise")), metrics=["itae"])
+    first, second = made.blocks
+    laws, none, about = (
+        dict.fromkeys(LAWS, 2),
+        dict.fromkeys(LAWS, 0),
+        Search(rule="CMA-ES", evaluations=90, about_defaults=True),
+    )
+    about = Source(kind=TUNED, search=about)
+    changes = {
+        "one condition": {"blocks": (first,)},
+        "wins here and there": {"blocks": (first, dataclasses.replace(second, ahead="second", best=("second",)))},
+        "barred": {"blocks": (dataclasses.replace(first, untuned=("second", "third", EVIL)), second)},
+        "all fail": {"blocks": (dataclasses.replace(first, ahead=None, best=(), lacking=laws),)},
+        "never": {"blocks": (dataclasses.replace(first, ahead=None, best=(), lacking=laws),), "unit": "s"},
+        "one law": {"entries": made.entries[:1], "blocks": (dataclasses.replace(first, ahead=None),)},
+        "undecided": {
+            "blocks": (dataclasses.replace(first, ahead=None, best=(), undecided=("second",), lacking=none),),
+            "entries": tuple(dataclasses.replace(one, rank=one.rank._replace(best=False)) for one in made.entries),
+        },
+        "few sets": {"blocks": (dataclasses.replace(first, ahead=None, samples=3, sets=3),)},
+        "linked sets": {"blocks": (dataclasses.replace(first, ahead=None, samples=2, sets=3),)},
+        "few runs of two": {"blocks": (dataclasses.replace(first, ahead=None, samples=1, runs=7),)},
+        "repeated runs": {"blocks": (dataclasses.replace(first, ahead=None, samples=4, runs=4),)},
+        "few for many": {"blocks": (dataclasses.replace(first, ahead=None, samples=6, runs=20),), "family": 40},
+        "without an interval": {"blocks": (dataclasses.replace(first, lead=None),)},
+        "searched about defaults": {
+            "blocks": (dataclasses.replace(first, sets=3), second),
+            "entries": tuple(
+                dataclasses.replace(one, sources=(about,), failed=k) for k, one in enumerate(made.entries)
+            ),
+        },
+        "sensor": {"unit": "{x}", "resolution": 0.02, "by_step": True},
+    }
+    said = []
+    for name, change in changes.items():
+        one = dataclasses.replace(made, **change)
+        failures = filter(None, [one.failures(entry) for entry in one.entries])
+        said += [f"{name}: {one.result}; {one.too_few}; {', '.join(failures)}", *{each.sample for each in one.blocks}]
+        said += [board.key([one])] if name in ("repeated runs", "few for many", "sensor") else []
+    assert "\n".join(said) == snapshot
+
+
+def test_effects_in_words(snapshot):
+    ratios = [
+        (0.85, 0.8, 0.9), (1.15, 1.1, 1.2), (0.95, 0.93, 1.02), (0.3, 0.2, 0.4), (0.3, 0.2, 0.5), (0.25, 0.0, 0.4),
+        (0.0, 0.0, 0.3), (20.0, 12.0, 30.0), (20.0, 10.0, 30.0), (math.inf, 15.0, math.inf), (1.0, 1.0, 1.0),
+        (0.9, 0.0, math.inf), (1.0, 0.98, 1.01), (0.9005, 0.9, 0.901), (math.inf, 2.0, math.inf),
+    ]  # fmt: skip
+    differences = [(0.2, 0.1, 0.3), (-0.2, -0.3, -0.1), (0.0, 0.0, 0.0), (5e-10, -9e-10, 9e-10), (5e-10, -1e-9, 0.0)]
+    differences += [(0.1, -math.inf, math.inf)]
+    said = []
+    for values, relative in [*((each, True) for each in ratios), *((each, False) for each in differences)]:
+        effect = Effect(*values, relative, 5, 8, True)
+        said += [board.size_in_words(effect, "1"), Lead("a", "b", effect._replace(sets=bool(len(said) % 4)), "m").words]
+    assert "\n".join(said) == snapshot

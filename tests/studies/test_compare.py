@@ -6,6 +6,7 @@ import re
 import warnings
 
 import pytest
+from helpers import words
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search
@@ -57,9 +58,16 @@ def test_every_law_has_given_shipped_or_tuned_gains_and_its_table_says_which(fou
     assert kinds(found) == {"my_law": "tuned here", "classical": "shipped", "pid": "yours"}
     assert found.gains["duffing"]["my_law"].gains != found.gains["inverted_pendulum"]["my_law"].gains
     text = repr(found)
-    for words in (r"my_law +tuned here +\d", r"classical +shipped +24", r"pid +yours +1 +kp=20"):
-        assert re.search(words, text)
+    for said in (r"my_law +tuned here +\d", r"classical +shipped +24", r"pid +yours +1 +kp=20"):
+        assert re.search(said, text)
     assert max(map(len, text.splitlines())) <= 80
+
+
+def test_a_comparison_says_as_recorded(found, snapshot):
+    *boards, gains = found.tables
+    names = list(found.to_pandas().columns)
+    said = [gains.title, *gains.headings, *map(str, gains.rows), *boards[-1].headings, boards[-1].notes[-1], *names]
+    assert words.words("\n".join(map(str, said))) == snapshot
 
 
 def test_runs_use_every_set_of_gains_in_turn(found):
@@ -142,13 +150,13 @@ def test_a_plant_on_which_laws_cannot_be_tuned_says_so(tmp_path):
 
 def test_what_cannot_run_is_refused_before_any_gains_are_searched(tmp_path, monkeypatch):
     monkeypatch.setattr(fair_gains, "_tuned", None)
-    for arguments, words in (
+    for arguments, said in (
         (([my_law], "duffing", "noisy"), "did you mean 'noise'"),
         (([my_law], "duffing", "nominal", 0), "seeds is 0"),
         (([my_law, my_law(lam=2.0)], "duffing"), "two laws have the name 'my_law'"),
         (([my_law], "duffing", "nominal", 1, True, False, "ray"), "executor is 'ray'"),
     ):
-        with pytest.raises(smc.ScenarioError, match=words):
+        with pytest.raises(smc.ScenarioError, match=said):
             smc.compare(*arguments, out=tmp_path, progress=False)
 
 
