@@ -1,0 +1,230 @@
+"""What the checks of a user's values take, at and around their bounds, and what they say of all else."""
+
+import math
+import sys
+import types
+
+import numpy as np
+import pytest
+
+from smc_mujoco.common import annexes, errors, extras, guard, libmujoco
+from smc_mujoco.common.errors import ScenarioError, find, name, number, one_line, shown, taken, unknown, whole
+from smc_mujoco.common.frozen import frozen
+
+pytestmark = pytest.mark.quick
+
+LAWS = ("super_twisting", "lqr", "terminal")
+
+
+class Silent:
+    """An object of a user's whose words fail."""
+
+    def __repr__(self):
+        raise KeyError
+
+    __iter__ = __str__ = __repr__
+
+
+class Odd(Exception):
+    """An exception of a user's whose message fails."""
+
+    def __str__(self):
+        raise KeyError
+
+
+TAKEN = [  # call, what it returns
+    (lambda: number("k", 2), 2.0),
+    (lambda: number("k", np.array(3.5)), 3.5),
+    (lambda: number("k", 1e-9, above=0.0), 1e-9),
+    (lambda: number("k", -2.0, low=-2.0, high=3.0), -2.0),
+    (lambda: number("k", 3.0, low=-2.0, high=3.0), 3.0),
+    (lambda: number("k", math.inf, infinite=True), math.inf),
+    (lambda: number("k", 10**400, infinite=True), math.inf),
+    (lambda: whole("n", 2.0, 2, 5), 2),
+    (lambda: whole("n", np.int64(5), 2, 5), 5),
+    (lambda: name("label", "a" * 100), "a" * 100),
+    (lambda: find("law", "lqr", {"lqr": 3}), 3),
+    (lambda: taken("runs", iter("ab")), ["a", "b"]),
+    (lambda: shown("x" * 58), "'" + "x" * 58 + "'"),
+    (lambda: shown("x" * 59), "'" + "x" * 56 + "..."),
+    (lambda: shown([0] * 70), "[" + "0, " * 18 + "0,..."),
+    (lambda: shown({"a": "b\n"}), r"{'a': 'b\n'}"),
+    (lambda: shown(Silent()), "<Silent>"),
+    (lambda: errors.printable("a\n\x1b[1m\u2028ä"), r"a\n\x1b[1m\u2028ä"),
+    (lambda: one_line("a \n b\x07", 5), "a b?"),
+    (lambda: one_line("abcdef", 6), "abcdef"),
+    (lambda: one_line("abcdefg", 6), "abc..."),
+    (lambda: errors.words(KeyError("k")), "KeyError: 'k'"),
+    (lambda: errors.words(Odd()), "Odd, whose message cannot be read"),
+    (lambda: str(ScenarioError("a" * 1500)), "a" * 1500),
+    (lambda: str(ScenarioError("a" * 1001 + "b" * 500)), "a" * 997 + "..." + "b" * 500),
+    (lambda: dict(frozen({"a": 1})), {"a": 1}),
+    (lambda: hash(frozen({"a": 1, "b": 2})) == hash(frozen({"b": 2, "a": 1})), True),
+    (lambda: extras.missing("film", "A film", "sys", "json"), None),
+    (lambda: extras.missing("film", "It", "a_", "sys", "b_"), "It needs a_ and b_: pip install 'smc-mujoco[film]'"),
+]  # fmt: skip
+REFUSED = [  # call, what the sentence says
+    (lambda: number("k", True), "k is True: give a number"),
+    (lambda: number("k", np.timedelta64(1)), "k is np.timedelta64(1): give a number"),
+    (lambda: number("k", "1"), "k is '1': give a number"),
+    (lambda: number("k", np.ones(1)), "k is array([1.]): give a number"),
+    (lambda: number("k", math.nan, infinite=True), "k is nan: give a finite number"),
+    (lambda: number("k", -math.inf), "k is -inf: give a finite number"),
+    (lambda: number("k", 0.0, above=0.0), "k is 0: give a number greater than 0"),
+    (lambda: number("k", -2.1, low=-2.0), "k is -2.1: give at least -2"),
+    (lambda: number("k", 3.1, high=3.0), "k is 3.1: give at most 3"),
+    (lambda: whole("n", 2.5, 2, 5), "n is 2.5: give a whole number from 2 to 5"),
+    (lambda: whole("n", 6, 2, 5), "n is 6: give a whole number from 2 to 5"),
+    (lambda: whole("n", 1, 2, 5), "n is 1: give a whole number from 2 to 5"),
+    (lambda: whole("n", None, 2, 5), "n is None: give a whole number from 2 to 5"),
+    (lambda: name("label", " "), "label is ' ': give a name of printable characters"),
+    (lambda: name("label", "a\n"), r"label is 'a\n': give a name of printable characters"),
+    (lambda: name("label", 3), "label is 3: give a name of printable characters"),
+    (lambda: name("label", "a" * 101), f"label is '{'a' * 56}..., 101 characters: give at most 100"),
+    (lambda: taken("runs", range(10**6 + 1)), "runs has more than 1,000,000 items: give fewer"),
+    (lambda: taken("runs", 3), "runs is 3: give a list"),
+    (lambda: taken("runs", Silent()), "runs is <Silent>: give a list"),
+    (lambda: find("law", "lqrr", dict.fromkeys(LAWS)), "unknown law 'lqrr': did you mean 'lqr'?"),
+    (lambda: find("law", 3, dict.fromkeys(LAWS)), "unknown law 3: choose from lqr, super_twisting, terminal"),
+    (lambda: frozen([("a", 1)]), "[('a', 1)] is no mapping: give a dict"),
+]
+NAMES = {  # what is typed -> what is said of it
+    "STA": "did you mean 'super_twisting'?",
+    "STSMC": "did you mean 'super_twisting'?",
+    "TSM": "did you mean 'terminal'?",
+    "STX": "choose from lqr, super_twisting, terminal",
+    "sta": "choose from lqr, super_twisting, terminal",
+    "Terminal": "did you mean 'terminal'?",
+    "twist": "did you mean 'super_twisting'?",
+    "": "choose from lqr, super_twisting, terminal",
+}
+
+
+@pytest.mark.parametrize("call", range(len(TAKEN)))
+def test_what_is_taken_comes_back(call):
+    made, expected = TAKEN[call]
+    assert made() == expected
+    assert type(made()) is type(expected)
+
+
+@pytest.mark.parametrize("call", range(len(REFUSED)))
+def test_what_is_refused_is_one_sentence(call):
+    made, sentence = REFUSED[call]
+    with pytest.raises(ScenarioError) as refused:
+        made()
+    assert str(refused.value) == sentence
+
+
+@pytest.mark.parametrize("typed", NAMES)
+def test_an_unknown_name_is_answered_with_the_nearest_or_with_all(typed):
+    assert str(unknown("law", typed, LAWS)) == f"unknown law {typed!r}: {NAMES[typed]}"
+
+
+def test_claims_are_listed_by_their_numbers_and_nothing_as_nothing():
+    assert str(unknown("claim", "x", ["10", "9", "all"])) == "unknown claim 'x': choose from all, 9, 10"
+    assert str(unknown("claim", "x", [])) == "unknown claim 'x': there are none"
+    assert len(str(unknown("claim", "x", map(str, range(9999))))) == len("unknown claim 'x': choose from ") + 950
+
+
+def test_two_laws_may_have_one_abbreviation():
+    said = str(unknown("law", "TA", ["terminal", "terminal_adaptive", "twisting_adaptive"]))
+    assert said == "unknown law 'TA': did you mean 'terminal_adaptive' or 'twisting_adaptive'?"
+
+
+def test_a_frozen_mapping_does_not_change():
+    values = frozen({"a": 1})
+    changes = (lambda: values.update(b=2), values.clear, values.popitem, lambda: values.pop("a"))
+    for change in (*changes, lambda: values.setdefault("b", 2), lambda: values.__setitem__("a", 2)):
+        with pytest.raises(TypeError, match=r"^a checked mapping does not change: make a new one$"):
+            change()
+    assert values == {"a": 1}
+
+
+def test_a_warning_points_to_the_line_of_the_user():
+    """The nearest caller outside the package: the frame of this test, from however deep."""
+    space = {"__name__": "smc_mujoco.deep", "users_frame": errors.users_frame}
+    exec("def level(n):\n    return users_frame() if n == 0 else level(n - 1)", space)
+    assert [space["level"](n) for n in range(3)] == [2, 3, 4]
+
+
+# what is missing
+
+
+def test_a_missing_package_is_named_with_its_cure(monkeypatch):
+    for wait, cure in (
+        (extras.extra("film", "A film"), "pip install 'smc-mujoco[film]'"),
+        (extras.package("onnx", "A film"), "pip install onnx"),
+    ):
+        with pytest.raises(extras.MissingPackageError) as missing, wait:
+            import nope_  # noqa: F401  # pyright: ignore[reportMissingImports]
+        what = "an optional package" if "smc-mujoco" in cure else "onnx"
+        assert str(missing.value) == f"A film needs {what} (No module named 'nope_'): {cure}"
+        assert isinstance(missing.value, ImportError | ScenarioError)
+    with pytest.raises(extras.MissingPackageError, match="no attribute 'nope'"), extras.extra("film", "A film"):
+        math.nope  # noqa: B018  # pyright: ignore[reportAttributeAccessIssue]
+    monkeypatch.setattr(sys, "version_info", (3, 13, 0))
+    assert extras.cure("dm") == "take Python 3.12, the last for which pip can install it"
+    assert extras.cure("film") == "pip install 'smc-mujoco[film]'"
+    monkeypatch.setattr(sys, "version_info", (3, 12, 9))
+    assert extras.cure("dm") == "pip install 'smc-mujoco[dm]'"
+
+
+def test_a_missing_annex_is_named_and_no_other_module(monkeypatch):
+    monkeypatch.setattr(annexes, "installed", lambda annex: annex != "evidence")
+    with pytest.raises(extras.MissingPackageError) as missing:
+        annexes.module("smc_mujoco.evidence.rigs.rig", "a rig")
+    assert str(missing.value) == "a rig needs smc_mujoco.evidence, which is missing here: install all of smc-mujoco"
+    assert annexes.module("smc_mujoco.exchange", "C").__name__ == "smc_mujoco.exchange"
+    assert annexes.module("smc_mujoco.common.text", "a number").__name__ == "smc_mujoco.common.text"
+
+
+def test_mujoco_without_its_library_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(libmujoco.mujoco, "__file__", str(tmp_path / "__init__.py"))
+    with pytest.raises(ScenarioError, match=r"^no MuJoCo library in .*: reinstall mujoco$"):
+        libmujoco.path()
+    (tmp_path / "plugin").mkdir()
+    for file in ("libmujoco.so.3", "plugin/b.so", "plugin/a.dll", "plugin/c.txt", "plugin/d.dylib"):
+        (tmp_path / file).write_text("")
+    assert libmujoco.path() == tmp_path / "libmujoco.so.3"
+    assert [path.name for path in libmujoco.plugins()] == ["a.dll", "b.so", "d.dylib"]
+
+
+# what foreign code does in its trial
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        (None, "did not end within 2.5 s: fix what it waits for, or give timeout="),
+        (0, "ended the process with exit code 0: let it return"),
+        (3, "ended the process with exit code 3: let it return"),
+        (-6, "died of SIGABRT (Aborted): fix where it aborts"),
+        (-8, "died of SIGFPE (Floating point exception): fix where it divides, or traps floating-point exceptions"),
+        (-11, "died of SIGSEGV (Segmentation fault): fix where it reads, writes or divides"),
+    ],
+)
+@pytest.mark.skipif(sys.platform != "linux", reason="the system's names of signals")
+def test_how_a_trial_ended_is_told_in_words(code, words):
+    failed = guard.Failed("the trial", "", code, 2.5)
+    assert (str(failed), failed.stage, failed.fault, failed.code) == (f"the trial {words}", "the trial", "", code)
+    assert str(guard.Failed("the trial", "is NaN", code, 2.5)) == "is NaN"
+
+
+def test_a_trial_reports_what_its_module_returns_or_raises(tmp_path, monkeypatch):
+    """The process of a trial, in this one: its order, its limits and the lines of its report."""
+    limits = []
+    monkeypatch.setattr(guard, "limit", lambda: limits.append("set"))
+    monkeypatch.setattr(sys, "path", sys.path[:])
+    trials = {
+        "passes": (lambda order, say: say("loading") or {"k": order}, ["loading", '{"k": 3}', "unloading"]),
+        "is wrong": (lambda order, say: (_ for _ in ()).throw(guard.Fault("it is\nNaN")), ["Fault it is NaN"]),
+        "fails": (lambda order, say: {}[order], ["Fault KeyError: 3"]),
+        "is large": (lambda order, say: bytes(2**62), ["Fault takes more than 4 GiB of memory: make it smaller"]),
+    }  # fmt: skip
+    for attempt, lines in trials.values():
+        monkeypatch.setitem(sys.modules, "trial", types.SimpleNamespace(attempt=attempt))
+        (tmp_path / "order").write_text('{"module": "trial", "order": 3, "path": ["a"]}')
+        guard.run(tmp_path)
+        assert (tmp_path / "report").read_text().splitlines() == lines
+    assert limits == ["set"] * len(trials)
+    assert sys.path == ["a"]

@@ -1,0 +1,90 @@
+"""Numbers and lists in words, and a table for every reader: terminal, plain text, notebook, LaTeX."""
+
+import math
+
+import pytest
+
+from smc_mujoco.common import tabular
+from smc_mujoco.common.tabular import Cell, Tables, Tabular
+from smc_mujoco.common.text import joined, number
+
+pytestmark = pytest.mark.quick
+
+NUMBERS = {  # value -> with three digits, with one
+    math.nan: ("none", "none"),
+    -math.inf: ("never", "never"),
+    0.0: ("0", "0"),
+    -9.9e-10: ("<1e-9", "<1e-9"),
+    1e-9: ("1.0e-9", "1.0e-9"),
+    9.994e-4: ("1.0e-3", "1.0e-3"),
+    1e-3: ("0.00100", "0.001"),
+    -0.012345: ("-0.0123", "-0.01"),
+    1.0: ("1.00", "1"),
+    98.76: ("98.8", "99"),
+    -12345.6: ("-12346", "-12346"),
+    1e5: ("1.0e5", "1.0e5"),
+    2.56e12: ("2.6e12", "2.6e12"),
+}
+LONG = "a_name_that_is_longer than_twenty"
+TABLE = Tabular(
+    title="Laws & gains",
+    headings=["law", "gains", "ITAE (m s^2)", "bound (m)", "time until it rests (s)"],
+    rows=[
+        ["pid", "kp=3_0", Cell("1.2e-4", "1.1–1.3", strong=True), "3 %", Cell("never", alarm="2 of 9 fail")],
+        [Cell(LONG, colour="red"), "", Cell("2.5", "2.25–12.75"), Cell("−4 ± 1", "a\nb"), "λ₂ < x²"],
+    ],
+    notes=["A note.", "Another."],
+    left=2,
+)
+
+
+@pytest.mark.parametrize("value", NUMBERS)
+def test_a_number_has_as_many_digits_as_are_asked_for(value):
+    assert (number(value), number(value, 1)) == NUMBERS[value]
+
+
+def test_a_list_reads_as_a_sentence():
+    assert [joined(""), joined("a"), joined("ab"), joined("abc")] == ["", "a", "a and b", "a, b and c"]
+
+
+@pytest.mark.parametrize("width", [80, 44])
+@pytest.mark.parametrize("stacked", [False, True])
+def test_a_table_fits_into_a_width(width, stacked, snapshot):
+    table = Tabular(**{**vars(TABLE), "stacked": stacked})
+    text = tabular.plain(table, width)
+    assert max(map(len, text.splitlines())) <= width
+    assert text == snapshot
+
+
+def test_a_table_for_notebooks_and_for_latex_has_all_its_words(snapshot):
+    assert TABLE._repr_html_().replace("><", ">\n<") == snapshot(name="html")
+    assert TABLE.to_latex() == snapshot(name="latex")
+    long = Tabular(headings=["a"], rows=[["b"]] * 41)
+    assert long._repr_html_().count("<tr>") == 1 + 40 + 1
+    assert "and 1 more" in long._repr_html_()
+
+
+def test_tables_are_shown_one_after_the_other_and_empty_ones_not_in_latex():
+    class Two(Tables):
+        @property
+        def tables(self):
+            return Tabular(headings=["a"], rows=[["b"]]), Tabular(headings=["c"], rows=[])
+
+    both = Two()
+    assert str(both) == repr(both) == "a\n─\nb\n\nc\n─"
+    assert tabular.plain(both) == "a\n─\nb\n\nc\n─\n"
+    assert both._repr_html_().count("<br>") == 1
+    assert both.to_latex().count("tabular}{l}") == 1
+
+
+def test_every_character_that_latex_reads_is_written_out():
+    assert tabular.tex("a^-12 ⁰₉ \\~^&%$#_{}<|>Ωε–·×±−′″") == (
+        r"a$^{-12}$ $^0$$_9$ \textbackslash{}\textasciitilde{}\textasciicircum{}\&\%\$\#\_\{\}$<$$|$$>$$\Omega$"
+        r"$\varepsilon$--$\cdot$$\times$$\pm$$-$$'$$''$"
+    )
+
+
+def test_names_are_broken_at_spaces_and_after_underscores():
+    assert tabular.folded("a_bb cc_d", 9) == "a_bb cc_d"
+    assert tabular.folded("a_bb cc_d", 5) == "a_bb\ncc_d"
+    assert tabular.folded("aaaa_bbbb", 6) == "aaaa_\nbbbb"
