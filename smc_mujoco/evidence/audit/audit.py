@@ -230,7 +230,7 @@ def _evidence(entry: Entry, found: Any, met: Collection[str]) -> Iterator[Check 
     values = {measure: dict(_cases(measure, one)) for measure, one in found.items()}
     for threshold in entry.thresholds:
         if not values.get(threshold.measure):
-            cure = f"its measures are {', '.join(map(str, values)) or 'none'}"
+            cure = f"its measures are {', '.join(str(one) for one, cases in values.items() if cases) or 'none'}"
             raise ScenarioError(f"it returns no {threshold.measure!r}, of which holds_if is: {cure}")
         yield from threshold.evidence(values[threshold.measure])
     asked = {threshold.measure for threshold in entry.thresholds}

@@ -395,7 +395,7 @@ def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
     for number, one in enumerate(claims, 1):
         called = f"claim {one.get('id', f'number {number}') if isinstance(one, dict) else number}"
         try:
-            entry = _entry(_typed(called, one, dict, "a table"), functions, paper)
+            entry = _entry(_typed("it", one, dict, "a table"), functions, paper)
         except ScenarioError as error:
             raise ScenarioError(f"{called}: {error}") from None
         if entry.id in entries:

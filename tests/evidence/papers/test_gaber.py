@@ -1,6 +1,9 @@
 """The claims about simulations give the verdict that their evidence asks for: stubbed runs, and a few real ones."""
 
+import json
 import math
+import re
+import zlib
 from collections.abc import Callable
 
 import numpy as np
@@ -21,6 +24,7 @@ from smc_mujoco.evidence.papers.gaber.scenarios import LAWS
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import ARRAYS, Trace
+from smc_mujoco.studies.run_key import description
 
 GABER = paper("gaber")
 NUMBERS = (27, 28, 29, *range(31, 41), 45, 46, 48, *range(49, 53), 55, 56, 57, 59, 61)
@@ -69,6 +73,39 @@ def test_what_a_law_may_ask_for_beyond_the_actuator_is_no_bound():
     runs = Stub(lambda s: {"tv_rate": 1.1e-3 * s.limits[0], "max_step": 0.021 * s.limits[0]})
     runs.mutated = lambda law: with_gains(law, lam=60.0)
     assert [judged(runs, id) for id in ("11", "49")] == [REFUTED, REFUTED]
+
+
+def lots(scenario: Scenario, *names: str) -> dict[str, float]:
+    """Return name -> a number in 0.5 .. 1.5 that depends on every field of a scenario, to six digits."""
+    fields = description(scenario) | {"versions": None, "condition": None}
+    text = re.sub(r"-?\d+\.\d*(e-?\d+)?", lambda one: f"{float(one[0]):.6g}", json.dumps(fields, sort_keys=True))
+    drawn = zlib.crc32(text.encode())
+    return {name: 0.5 + zlib.crc32(name.encode(), drawn) / 2**32 for name in names}
+
+
+def drawn_by_lot(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+    """Return x that decays as fast, and u that turns as fast, as the lot says."""
+    x0, (fast, large, often) = max(map(abs, scenario.resolved.x0)), lots(scenario, "x", "u", "turns").values()
+    return x0 * np.exp(-fast * T), 6.0 * large * np.sin(40.0 * often * T)
+
+
+def test_the_evidence_of_runs_drawn_by_lot_is_the_recorded_one(snapshot, monkeypatch):
+    """Which runs a claim looks at, what it makes of them, its limits and words; the numbers come from no simulation."""
+    monkeypatch.setattr(measured, "nanoseconds", lambda laws, quick: {law: 1.0 + len(law) for law in laws})
+
+    def told(s: Scenario) -> dict[str, float]:
+        found = lots(s, *(m.name for m in metrics()))
+        small = 0.7 * TOLERATED_ERROR * max(map(abs, s.resolved.x0)) * (1.0 + 10.0 * s.input_delay)
+        return found | {"ultimate_bound": small * found["ultimate_bound"]}
+
+    said = []
+    for id, quick in [(id, id == "18") for id in GABER.claims] + [(id, True) for id in ("20", "24", "61")]:
+        runs = Stub(told, drawn_by_lot, quick=quick).of(GABER.claims[id])
+        said.append(f"{id}{', quick' * quick}")
+        for one in measure(GABER.claims[id], runs):
+            asked = f" {one.relation} {one.limit:.4g} {one.sentence}".rstrip() if isinstance(one, Check) else ""
+            said.append(f"  {one.what} = {one.value:.4g}{asked}")
+    assert "\n".join(said) == snapshot
 
 
 def by_law(**told: tuple[float, ...]) -> Told:

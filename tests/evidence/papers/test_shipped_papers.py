@@ -36,7 +36,7 @@ def test_at_least_five_papers_ship_with_4_to_12_claims_each():
 def test_the_page_of_verdicts_has_every_paper_with_what_was_read_and_its_totals():
     page, golden = (ROOT / "docs" / "papers.md").read_text(), json.loads(GOLDEN.read_text())
     for name in PAPERS:
-        kinds = [next(iter(claim.items())) for claim in golden[name].values()]
+        kinds = [(claim["whose"], claim["verdict"]) for claim in golden[name].values()]
         own = [verdict for whose, verdict in kinds if whose == "paper"]
         counts = [own.count(verdict) for verdict in ("supported", "partly supported", "refuted")]
         counts += [sum(whose == kind for whose, _ in kinds) for kind in ("derived", "ours")]
