@@ -109,15 +109,15 @@ def audit(
     """
     from smc_mujoco.evidence.audit.runs import Runs, of_table
 
-    found = as_paper(paper)
+    audited = as_paper(paper)
     # a table has runs of the laws as they are, not of their mutants
     rows: dict[str, Result] = {} if table is None or substitute else of_table(table)
     shared: dict[str, Result] = {}
-    entries = wanted(found, only)
+    entries = wanted(audited, only)
     evidence: dict[str, dict[str, Evidence]] = {entry.id: {} for entry in entries}
     used: dict[str, dict[str, dict[str, Used]]] = {entry.id: {} for entry in entries}
-    for name in sets(found, gains, quick):
-        runs = Runs(found, name, quick, substitute, threads, rows, shared)
+    for name in sets(audited, gains, quick):
+        runs = Runs(audited, name, quick, substitute, threads, rows, shared)
         for entry in sorted(entries, key=lambda entry: entry.late):
             own = runs.of(entry)
             evidence[entry.id][name] = measure(entry, own)
@@ -127,7 +127,7 @@ def audit(
         instead = {entry.id: f"; here, quickly, {entry.quick}" if entry.quick else "" for entry in entries}
         entries = [dataclasses.replace(entry, measured=entry.measured + instead[entry.id]) for entry in entries]
     verdicts = Claims(judged(entry, evidence[entry.id]) for entry in entries)
-    return Audit(found, verdicts, quick, used, table is None and not substitute)
+    return Audit(audited, verdicts, quick, used, table is None and not substitute)
 
 
 def claims(
@@ -180,8 +180,8 @@ def evaluations(
     paper: str | Path | Paper = DEFAULT,
 ) -> int:
     """Return how often `claims` reports, for a progress bar."""
-    found = as_paper(paper)
-    return len(wanted(found, only)) * len(sets(found, gains, quick))
+    audited = as_paper(paper)
+    return len(wanted(audited, only)) * len(sets(audited, gains, quick))
 
 
 def document(claims: Sequence[Claim]) -> str:
@@ -204,30 +204,30 @@ def measure(entry: Entry, runs: Runs) -> Evidence:
 def _measured(entry: Entry, runs: Runs) -> list[Check | Beside]:
     """Return what a claim's function measures with these runs, as checks and numbers beside them."""
     try:
-        found = entry.evidence(runs)
+        returned = entry.evidence(runs)
     except (Exception, SystemExit) as error:  # whatever a user's function raises
         raise failed(runs.paper, entry, error) from error
     try:
-        return list(_evidence(entry, found, runs.asked))
+        return list(_evidence(entry, returned, runs.asked))
     except ScenarioError as error:
         raise failed(runs.paper, entry, error) from None
 
 
-def _evidence(entry: Entry, found: Any, met: Collection[str]) -> Iterator[Check | Beside]:
+def _evidence(entry: Entry, returned: Any, met: Collection[str]) -> Iterator[Check | Beside]:
     """Yield the checks of what a claim's function returned; `met` are measures whose thresholds it has asked for."""
-    if not isinstance(found, Mapping):
-        checks = isinstance(found, Sequence) and all(isinstance(one, Check | Beside) for one in found)
+    if not isinstance(returned, Mapping):
+        checks = isinstance(returned, Sequence) and all(isinstance(one, Check | Beside) for one in returned)
         if not checks:
-            raise ScenarioError(f"it returns {shown(found)}: {CURE}")
+            raise ScenarioError(f"it returns {shown(returned)}: {CURE}")
         for threshold in entry.thresholds:
             if threshold.measure not in met:
                 cure = "return numbers, or checks from runs.check"
                 raise ScenarioError(f"it returns checks, and none for {threshold.measure!r} of holds_if: {cure}")
-        yield from found
+        yield from returned
         return
     if not entry.thresholds:
         raise ScenarioError('it returns numbers, and holds_if is a text: write a table, as { "exponent" = ">= 1.9" }')
-    values = {measure: dict(_cases(measure, one)) for measure, one in found.items()}
+    values = {measure: dict(_cases(measure, one)) for measure, one in returned.items()}
     for threshold in entry.thresholds:
         if not values.get(threshold.measure):
             cure = f"its measures are {', '.join(str(one) for one, cases in values.items() if cases) or 'none'}"
@@ -239,9 +239,9 @@ def _evidence(entry: Entry, found: Any, met: Collection[str]) -> Iterator[Check 
             yield Beside(f"{case}: {measure}" if case else measure, value)
 
 
-def _cases(measure: object, found: Any) -> Iterator[tuple[str, float]]:
+def _cases(measure: object, values: Any) -> Iterator[tuple[str, float]]:
     """Yield case -> number of a measure; the case is "" for a measure with one number."""
-    for case, value in found.items() if isinstance(found, Mapping) else (("", found),):
+    for case, value in values.items() if isinstance(values, Mapping) else (("", values),):
         try:
             yield str(case), float(value)
         except (TypeError, ValueError):

@@ -87,8 +87,8 @@ def check(path: str | Path) -> dict[str, Any]:
 
 def files(paper: Paper) -> dict[str, str]:
     """Return file -> hash, of the files of a paper that count; the ends of lines do not."""
-    found = sorted(path for path in paper.folder.rglob("*") if path.suffix in ENDINGS and path.is_file())
-    texts = {path.relative_to(paper.folder).as_posix(): path.read_bytes().replace(b"\r\n", b"\n") for path in found}
+    paths = sorted(path for path in paper.folder.rglob("*") if path.suffix in ENDINGS and path.is_file())
+    texts = {path.relative_to(paper.folder).as_posix(): path.read_bytes().replace(b"\r\n", b"\n") for path in paths}
     return {name: hashlib.sha256(text).hexdigest() for name, text in texts.items()}
 
 

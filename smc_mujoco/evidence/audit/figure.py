@@ -100,6 +100,6 @@ def place(check: Check) -> float:
         return edge
     if over == 0.0 or math.isinf(over):
         return edge
-    found = math.log10(over / under)
-    found = min(found, 0.0) if check.holds else max(found, 0.0)
-    return min(max(found, -DECADES), DECADES)
+    decades = math.log10(over / under)
+    decades = min(decades, 0.0) if check.holds else max(decades, 0.0)
+    return min(max(decades, -DECADES), DECADES)

@@ -46,17 +46,17 @@ def survivors(
       report: called with the number of evaluations done since its last call; the sum is `evaluations`. An evaluation is
         one claim, set of gains and mutant. Those of a claim that is lost already count as done.
     """
-    found = as_paper(paper)
-    asked = {entry.id: entry for entry in wanted(found, only) if not entry.immune}
+    audited = as_paper(paper)
+    asked = {entry.id: entry for entry in wanted(audited, only) if not entry.immune}
     left = dict(asked)
-    names = sets(found, gains, quick)
+    names = sets(audited, gains, quick)
 
     def measured(entries: Iterable[Entry], law: str, mutant: str) -> Iterator[tuple[str, str, Evidence | None]]:
         """Yield claim, set of gains, and evidence; None as evidence if the claim's function cannot measure a mutant."""
         shared: dict[str, Result] = {}
         replaced = {law: MUTANTS[mutant]} if mutant else None
         for name in names:
-            runs = Runs(found, name, quick, replaced, threads, None, shared)
+            runs = Runs(audited, name, quick, replaced, threads, None, shared)
             for entry in sorted(entries, key=lambda entry: entry.late):
                 try:
                     yield entry.id, name, measure(entry, runs.of(entry))
@@ -85,9 +85,9 @@ def evaluations(
     quick: bool = True,
 ) -> int:
     """Return the number of evaluations that `survivors` reports, for a progress bar."""
-    found = as_paper(paper)
-    asked = [entry for entry in wanted(found, only) if not entry.immune]
-    return len(asked) * len(sets(found, gains, quick)) * (1 + len(MUTANTS))
+    audited = as_paper(paper)
+    asked = [entry for entry in wanted(audited, only) if not entry.immune]
+    return len(asked) * len(sets(audited, gains, quick)) * (1 + len(MUTANTS))
 
 
 def first_law(entry: Entry) -> str:

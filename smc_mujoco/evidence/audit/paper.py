@@ -240,10 +240,10 @@ def catalogue() -> Catalogue[Home]:
 
 def _of_package(point: EntryPoint) -> Home:
     """Return where the paper is that an entry point of another package names."""
-    found = source(point)
-    if not found.submodule_search_locations:
-        raise ScenarioError(f"{found.origin} is no folder: give {KINDS[point.group][1]}")
-    return Home(Path(next(iter(found.submodule_search_locations))), point.module)
+    spec = source(point)
+    if not spec.submodule_search_locations:
+        raise ScenarioError(f"{spec.origin} is no folder: give {KINDS[point.group][1]}")
+    return Home(Path(next(iter(spec.submodule_search_locations))), point.module)
 
 
 def paper(which: str | Path) -> Paper:
@@ -270,15 +270,15 @@ def _known(home: Home) -> Paper:
 
 def papers() -> dict[str, Paper]:
     """Return every paper that ships, or comes with another package, by its name, in alphabetical order."""
-    found: dict[str, Paper] = {}
+    known: dict[str, Paper] = {}
     for key, home in catalogue().items():
         try:
-            found[key] = _known(home)
+            known[key] = _known(home)
         except ScenarioError as error:
             if not (package := catalogue().package(key)):
                 raise
             warn(f"package {package!r}: its paper {key!r}: {error}")
-    return found
+    return known
 
 
 def new(folder: Path) -> list[Path]:
@@ -506,11 +506,11 @@ def _sets(data: Mapping[str, Any]) -> dict[str, Any]:
         if key in SETS:
             raise ScenarioError(f"gains.{key} is a set of the suite: give yours another name, such as gains.paper")
     listed = _names("sets", data.get("sets", list(own) or ["default"]))
-    found: dict[str, Any] = {}
+    sets: dict[str, Any] = {}
     for key in listed or ["default"]:
         if key not in own:
             find("set of gains in sets", key, dict.fromkeys((*own, *SETS)))
-            found[key] = None
+            sets[key] = None
             continue
         of_set: dict[str, dict[str, Any]] = {}
         for law_or_plant, values in _typed(f"gains.{key}", own[key], dict, "a table").items():
@@ -521,8 +521,8 @@ def _sets(data: Mapping[str, Any]) -> dict[str, Any]:
                 of_set.setdefault("", {})[law_or_plant] = one
         for law in {law for laws in of_set.values() for law in laws}:
             name(f"a law in gains.{key}", law)
-        found[key] = of_set
-    return found
+        sets[key] = of_set
+    return sets
 
 
 def _plant(key: str, data: object, folder: Path) -> Plant:

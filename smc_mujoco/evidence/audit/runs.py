@@ -178,9 +178,9 @@ class Runs:
         other parameters or another size; the gains stay those of its name.
         """
         paper, entry = self.paper, self._entry
-        found = paper.plant(plant)
-        conditioned = paper.condition(condition).on(found, duration_of(paper, entry, changes))
-        fields: dict[str, Any] = {"plant": found, **paper.fields, **conditioned, **(entry.fields if entry else {})}
+        machine = paper.plant(plant)
+        conditioned = paper.condition(condition).on(machine, duration_of(paper, entry, changes))
+        fields: dict[str, Any] = {"plant": machine, **paper.fields, **conditioned, **(entry.fields if entry else {})}
         if "law" not in changes:
             fields["law"] = self.law(plant, law_name)
         scenario = Scenario(**fields | changes)

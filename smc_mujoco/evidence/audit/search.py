@@ -51,7 +51,7 @@ def decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence]) -> E
     if entry.over == "all" or len(entry.plants) == 1:
         return _decisive(entry, runs, measure, "")
     each = [(one, dataclasses.replace(entry, plants=(one,))) for one in entry.plants]
-    return [found for plant, alone in each for found in _decisive(alone, runs.on(plant), measure, f"{plant}: ")]
+    return [check for plant, alone in each for check in _decisive(alone, runs.on(plant), measure, f"{plant}: ")]
 
 
 def _decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], prefix: str) -> Evidence:

@@ -133,15 +133,15 @@ class Threshold(NamedTuple):
     def read(cls, measure: str, text: object, sentence: str = "") -> "Threshold":
         """Return the threshold in a text."""
         words = text if isinstance(text, str) else ""
-        if found := LIMIT.fullmatch(words):
-            return cls(measure, words, found[1], float(found[2]), sentence=sentence)
-        if found := WITHIN.fullmatch(words):
-            middle, width = map(float, found.groups())
+        if match := LIMIT.fullmatch(words):
+            return cls(measure, words, match[1], float(match[2]), sentence=sentence)
+        if match := WITHIN.fullmatch(words):
+            middle, width = map(float, match.groups())
             return cls(measure, words, "<=", width, middle, middle, sentence)
-        found = BETWEEN.fullmatch(words)
-        if not found or float(found[1]) >= float(found[2]):
+        match = BETWEEN.fullmatch(words)
+        if not match or float(match[1]) >= float(match[2]):
             raise ScenarioError(f"the threshold of {measure!r} is {shown(text)}: {FORMS}")
-        return cls(measure, words, "<=", 0.0, float(found[1]), float(found[2]), sentence)
+        return cls(measure, words, "<=", 0.0, float(match[1]), float(match[2]), sentence)
 
     def __str__(self) -> str:
         """Return the measure and what is asked of it."""

@@ -120,8 +120,8 @@ def score(of: Trace | Mapping[str, Any] | Criteria | Row, version: str = "v2") -
       ScenarioError: an unknown version, a criterion that is missing, or another plant.
     """
     wanted = find("version of the boards", version, VERSIONS)
-    found = criteria(of) if isinstance(of, Trace) else of
-    values = dict(found) if isinstance(found, Mapping) else found._asdict()
+    measured = criteria(of) if isinstance(of, Trace) else of
+    values = dict(measured) if isinstance(measured, Mapping) else measured._asdict()
     for name in wanted:
         if values.get(name) is None:
             raise ScenarioError(f"criterion {name} of board {version} is missing in {shown(values)}: give a number")

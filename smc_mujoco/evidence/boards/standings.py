@@ -117,7 +117,7 @@ def _new_name(name: str, published: tuple[Row, ...] | tuple[RobustnessRow, ...])
     return name
 
 
-def verdict(robot: str, trace: Trace, found: Robustness | None, name: str = NAME) -> str:
+def verdict(robot: str, trace: Trace, robustness: Robustness | None, name: str = NAME) -> str:
     """Return a sentence that says where a row stands on the boards, and in which tests another is better."""
     rows = board(trace, name)
     place = next(i for i, row in enumerate(rows, 1) if row.name == name)
@@ -129,18 +129,18 @@ def verdict(robot: str, trace: Trace, found: Robustness | None, name: str = NAME
         if getattr(rows[place - 1], field) > min(getattr(row, field) for row in others)
     ]
     text += f"; others have less {joined(worse)}" if worse else "; no other is better in any criterion"
-    if found is None:
+    if robustness is None:
         return text
-    rows = robustness_board(robot, found, name)
+    rows = robustness_board(robot, robustness, name)
     place = next(i for i, row in enumerate(rows, 1) if row.name == name)
     text += f". In robustness it is number {place} of {len(rows)}, with {rows[place - 1].score:.3f}"
     worse = [
-        f"{words} ({best.name}: {getattr(best, field):g} against {found.percent[field]:.3g} %)"
+        f"{words} ({best.name}: {getattr(best, field):g} against {robustness.percent[field]:.3g} %)"
         for field, words in TESTS.items()
         if getattr(best := max(ROBUSTNESS[robot], key=lambda row: getattr(row, field)), field)
-        > round(found.percent[field], 1)
+        > round(robustness.percent[field], 1)
     ]
-    weak = [parameter for parameter, count in found.parameters.items() if count <= 10]
+    weak = [parameter for parameter, count in robustness.parameters.items() if count <= 10]
     text += f"; others survive more of {joined(worse)}" if worse else "; no other survives more of any test"
     return text + (f"; fewer than half of the values of {joined(weak)} are survived" if weak else "")
 

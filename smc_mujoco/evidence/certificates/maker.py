@@ -180,8 +180,8 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
     bounded = document["disturbance"] > 0.0 or not parts[0]["holds"]
     if single and bounded and law.name != "terminal" and f.room >= 0:
         proven = functools.partial(checker.falls, e, f, checker.arb(document["disturbance"]))
-        if found := search.levels(loop, reach, _start(scenario, loop), proven, attracts, box):
-            parts.append(_levels(float(f.room), found, scenario, _start(scenario, loop)))
+        if levels := search.levels(loop, reach, _start(scenario, loop), proven, attracts, box):
+            parts.append(_levels(float(f.room), levels, scenario, _start(scenario, loop)))
     return parts
 
 
@@ -257,21 +257,21 @@ def _start(scenario: Scenario, loop: Loop) -> tuple[float, float]:
     return x, v + loop.c * x
 
 
-def _levels(room: float, found: search.Levels, scenario: Scenario, start: tuple[float, float]) -> dict:
+def _levels(room: float, levels: search.Levels, scenario: Scenario, start: tuple[float, float]) -> dict:
     """Return the levels of W as data."""
-    conditions = [_condition("actuator", room), _condition("start", found.outer - _cell(found, *start))]
-    data = {"x": found.x.tolist(), "s": found.s.tolist(), "W": found.W.tolist()}
-    data |= {"start": [scenario.resolved.x0[0], scenario.resolved.v0[0]]} | ({"P": list(found.P)} if found.P else {})
-    return _part("level sets", conditions, **data, inner=found.inner, outer=found.outer, bound=found.bound)
+    conditions = [_condition("actuator", room), _condition("start", levels.outer - _cell(levels, *start))]
+    data = {"x": levels.x.tolist(), "s": levels.s.tolist(), "W": levels.W.tolist()}
+    data |= {"start": [scenario.resolved.x0[0], scenario.resolved.v0[0]]} | ({"P": list(levels.P)} if levels.P else {})
+    return _part("level sets", conditions, **data, inner=levels.inner, outer=levels.outer, bound=levels.bound)
 
 
-def _cell(found: search.Levels, x: float, s: float) -> float:
+def _cell(levels: search.Levels, x: float, s: float) -> float:
     """Return the largest corner of the cell of a state, 1 outside of the grid."""
     x, s = (x, s) if x >= 0.0 else (-x, -s)
-    if x >= found.x[-1] or abs(s) >= found.s[-1]:
+    if x >= levels.x[-1] or abs(s) >= levels.s[-1]:
         return 1.0
-    i, j = (int(np.searchsorted(edges, at, side="right")) - 1 for edges, at in ((found.x, x), (found.s, s)))
-    return float(found.W[i : i + 2, j : j + 2].max())
+    i, j = (int(np.searchsorted(edges, at, side="right")) - 1 for edges, at in ((levels.x, x), (levels.s, s)))
+    return float(levels.W[i : i + 2, j : j + 2].max())
 
 
 def _super_twisting(document: dict, loop: Loop, law: SimpleNamespace, judge: Judge) -> dict:
@@ -324,5 +324,5 @@ def _form(k1: float, k2: float, L: float, M: float) -> np.ndarray | None:
         return max(*rates, -np.linalg.eigvalsh(P).min())
 
     starts = [np.array([math.log(2.0 * k2 * M + 0.5 * (k1 * M) ** 2), -k1 * M / 2.0 * share]) for share in (0.3, 1.0)]
-    found = min((minimize(worst, z, method="Nelder-Mead") for z in starts), key=lambda one: one.fun)
-    return shape(found.x) if found.fun < 0.0 and np.linalg.det(shape(found.x)) > 0.0 else None
+    best = min((minimize(worst, z, method="Nelder-Mead") for z in starts), key=lambda one: one.fun)
+    return shape(best.x) if best.fun < 0.0 and np.linalg.det(shape(best.x)) > 0.0 else None

@@ -43,8 +43,8 @@ def rest(loop: Loop, reach: float) -> float:
     i = int(np.argmax(left > 0.0))
     low = 0.0 if i == 0 else x[i - 1]
     at = lambda z: float(loop.sigma(np.array(loop.c * z)) - loop.phi(np.array(z)) - loop.d0)  # noqa: E731
-    found: Any = low if at(low) >= 0.0 else brentq(at, low, x[i])
-    return float(found)
+    root: Any = low if at(low) >= 0.0 else brentq(at, low, x[i])
+    return float(root)
 
 
 def form(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | None:
@@ -195,16 +195,16 @@ class _Grid:
 
     def surely(self, window: tuple[float, float], proven: Proven) -> tuple[float, float] | None:
         """Return a range of levels between which W surely falls in each cell, or None."""
-        found: tuple[float, float] | None = window
-        while found is not None:
-            inside = (self.high >= found[0]) & (self.low <= found[1]) & ~self.sure & ~self.bad
+        interval: tuple[float, float] | None = window
+        while interval is not None:
+            inside = (self.high >= interval[0]) & (self.low <= interval[1]) & ~self.sure & ~self.bad
             for i, j in zip(*np.nonzero(inside), strict=True):
                 box = (self.x[i], self.x[i + 1], self.s[j], self.s[j + 1])
                 ok = proven(tuple(map(float, box)), tuple(map(float, self.corners[:, i, j])))
                 self.sure[i, j], self.bad[i, j] = ok, not ok
             if not (self.bad & inside).any():
-                return found
-            found = self.window()
+                return interval
+            interval = self.window()
         return None
 
 

@@ -73,7 +73,7 @@ def certify(
 
     pictures = files(figure)
     json, terminal = options.json_file(json, out and ended(out, ".json"), *pictures)
-    scenario = found = None
+    scenario = worst_run = None
     if check:
         if plant:
             raise ScenarioError("--check proves what is in a file: leave out the plant")
@@ -86,22 +86,23 @@ def certify(
         made = make(scenario, within)
         if worst and within is None:
             raise ScenarioError("--worst needs a bound to search within: give --disturbance")
-        found = worst_case(scenario, METRIC, within, progress=True) if worst else None
+        worst_run = worst_case(scenario, METRIC, within, progress=True) if worst else None
     else:
         raise ScenarioError("give a plant, such as duffing, or --check FILE.json")
     terminal.print(tables.certificate(made))
     for sentence in made.sentences:
         terminal.note(f"{sentence[0].upper()}{sentence[1:]}.", "bold", wrap=True)
-    if found:
+    if worst_run:
         unit = made.data["unit"]
         terminal.note(
-            f"Worst found in {found.tried} runs of this machine: it ends in |x| = {found.value:.3g} {unit}.", "bold"
+            f"Worst found in {worst_run.tried} runs of this machine: it ends in |x| = {worst_run.value:.3g} {unit}.",
+            "bold",
         )
     if out:
         terminal.wrote(made.save(out))
     if json:
         terminal.wrote(write_json(json, made.data))
     if figure:
-        shown = found.scenario if found else scenario
+        shown = worst_run.scenario if worst_run else scenario
         made.figure(figure, run([shown]) if shown and shown.plant.n == 1 else ())
         terminal.wrote(*pictures)

@@ -87,9 +87,9 @@ def claims(
             writable(ended(file, ending) if ending else file)
     with bar("claims", evaluations(ids or None, sets, quick, about), counted=True) as drawn:
         done = audit(about, ids or None, sets, quick, threads, table=known, report=drawn.advance)
-    found = done.claims
+    verdicts = done.claims
     written = [one for one in (evidence and done.save(evidence), badge and done.badge(badge)) if one]
-    text = document(found)
+    text = document(verdicts)
     if out:
         with replacing(out) as file:
             file.write_text(text + "\n", encoding="utf-8")
@@ -97,7 +97,7 @@ def claims(
     if json:
         print(text)
         return
-    tables.print_claims(found, terminal, full=bool(ids))
+    tables.print_claims(verdicts, terminal, full=bool(ids))
     kept: dict[str, str] = {}
     if mutants:
         with bar("mutants", testing.evaluations(about, ids or None, sets, quick), counted=True) as drawn:
@@ -108,7 +108,7 @@ def claims(
                 or ["Every claim is lost by a mutant of its law, or says why it cannot be."]
             )
         )
-        asked = [about.claims[claim.id] for claim in found]
+        asked = [about.claims[claim.id] for claim in verdicts]
         for entry in [entry for entry in asked if entry.immune]:
             terminal.note(f"claim {entry.id} cannot be lost: {entry.immune}", wrap=True)
     notes = [f"{terminal.seconds:.0f} s", "quick: coarser grids than the claims say" * quick]

@@ -55,7 +55,7 @@ def identify(
         if file:
             writable(file)
     named = options.columns(columns)
-    found = find(
+    identified = find(
         as_plant(options.plant(rig)) if rig not in rigs() and (rig in plants() or ".xml" in rig) else rig,
         [load(file, named) for file in files],
         options.names(quantities) or None,
@@ -64,15 +64,15 @@ def identify(
         seed=seed,
         progress=True,
     )
-    for table in tables.identified(found, [str(file) for file in files]):
+    for table in tables.identified(identified, [str(file) for file in files]):
         terminal.print(table)
-    for note in found.notes:
+    for note in identified.notes:
         terminal.note(note, wrap=True)
-    terminal.note(f"{found.evaluations} sets of values, seed {seed}, {terminal.seconds:.0f} s")
+    terminal.note(f"{identified.evaluations} sets of values, seed {seed}, {terminal.seconds:.0f} s")
     if json:
-        terminal.wrote(found.save(ended(json, ".json")))
+        terminal.wrote(identified.save(ended(json, ".json")))
     if figure:
-        terminal.wrote(*found.figure(figure))
+        terminal.wrote(*identified.figure(figure))
 
 
 def _numbers(text: str | None) -> dict[str, float]:
@@ -83,13 +83,13 @@ def _numbers(text: str | None) -> dict[str, float]:
     """
     from smc_mujoco.common.errors import ScenarioError
 
-    found = {}
+    numbers = {}
     for name, value in options.pairs(text, "--set", "M=5,b=8").items():
         try:
-            found[name] = float(value)
+            numbers[name] = float(value)
         except ValueError:
             raise ScenarioError(f"--set {name}={value} is no number: write it as M=5,b=8") from None
-    return found
+    return numbers
 
 
 @errors_as_sentences()

@@ -130,10 +130,10 @@ def _print_claim(claim: Claim, console: Console) -> None:
         console.print(Padding(table, (0, 0, 1, 2)))
 
 
-def fits(title: str, found: Mapping[str, Mapping[str, float]]) -> Table:
+def fits(title: str, by_name: Mapping[str, Mapping[str, float]]) -> Table:
     """Return the fit of each twin of a record, %, or when it falls."""
-    table = titled(f"{title}: fit, %", "", *(Column(head, justify="right") for head in next(iter(found.values()))))
-    for name, fit in found.items():
+    table = titled(f"{title}: fit, %", "", *(Column(head, justify="right") for head in next(iter(by_name.values()))))
+    for name, fit in by_name.items():
         table.add_row(name, *(f"{value:z.1f}" for value in fit.values()))
     return table
 
@@ -144,26 +144,26 @@ def _to_error(value: float, error: float) -> str:
     return f"{value:#.{min(max(digits, 4), 12)}g}"
 
 
-def identified(found: Identified, names: Sequence[str]) -> list[Table]:
+def identified(result: Identified, names: Sequence[str]) -> list[Table]:
     """Return a table of the quantities found, with standard errors and values before, and one of each record's fit.
 
     Of three records or more, median and worst fit are added; a fall is the worst.
     """
     values = titled(
-        found.rig.label, "quantity", *(Column(head, justify="right") for head in ("value", "±", "before")), ""
+        result.rig.label, "quantity", *(Column(head, justify="right") for head in ("value", "±", "before")), ""
     )
-    for name, value in found.values.items():
-        quantity = found.rig.quantities[name]
-        before = number(found.before.values[name])
-        error = found.errors[name]
+    for name, value in result.values.items():
+        quantity = result.rig.quantities[name]
+        before = number(result.before.values[name])
+        error = result.errors[name]
         values.add_row(name, _to_error(value, error), f"{error:.2g}", before, Text(quantity.unit, "dim"))
-    heads = [Column(head, justify="right") for head in found.fits[0]]
+    heads = [Column(head, justify="right") for head in result.fits[0]]
     fits = titled("fit, % (before)", "record", *heads)
-    for name, fit, before in zip(names, found.fits, found.fits_before, strict=True):
+    for name, fit, before in zip(names, result.fits, result.fits_before, strict=True):
         fits.add_row(name, *(f"{value:.1f} ({before[key]:.1f})" for key, value in fit.items()))
     for word, chosen in (("median", median_low), ("worst", min)) if len(names) > 2 else ():
         after, before = (
-            {key: chosen([fit[key] for fit in each]) for key in each[0]} for each in (found.fits, found.fits_before)
+            {key: chosen([fit[key] for fit in each]) for key in each[0]} for each in (result.fits, result.fits_before)
         )
         fits.add_row(word, *(f"{after[key]:.1f} ({before[key]:.1f})" for key in after))
     return [values, fits]

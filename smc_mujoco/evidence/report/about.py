@@ -63,12 +63,12 @@ class About:
     @functools.cached_property
     def conditions(self) -> dict[str, str]:
         """Condition -> the Scenario fields that it sets, in words."""
-        found = {}
+        texts = {}
         for name in self.plan.conditions:
             each = {words.plant(p): _fields(scenarios.fields(name, p, self.plan.duration)) for p in self.plan.plants}
             same = len(set(each.values())) == 1
-            found[name] = next(iter(each.values())) if same else "; ".join(f"{p}: {text}" for p, text in each.items())
-        return found
+            texts[name] = next(iter(each.values())) if same else "; ".join(f"{p}: {text}" for p, text in each.items())
+        return texts
 
     @functools.cached_property
     def gains(self) -> list[Gains]:
@@ -113,11 +113,11 @@ def _short(value: Any) -> str:
 
 def laws_of(plan: Plan, gains: str) -> dict[str, dict[str, Component]]:
     """Return plant -> law's name -> law, for the laws that a set has gains for on that plant."""
-    found: dict[str, dict[str, Component]] = {}
+    laws: dict[str, dict[str, Component]] = {}
     for plant, law in itertools.product(plan.plants, plan.laws):
         with contextlib.suppress(ScenarioError):
-            found.setdefault(plant, {})[law] = sets.law(plant, law, gains)
-    return found
+            laws.setdefault(plant, {})[law] = sets.law(plant, law, gains)
+    return laws
 
 
 def _source(plant: str, law: str, name: str) -> str:

@@ -84,65 +84,65 @@ class Loss(NamedTuple):
 
 def cells(scores: Sequence[Score]) -> Cells:
     """Return the scores of each comparison."""
-    found: Cells = {}
+    by_cell: Cells = {}
     for score in scores:
-        found.setdefault((score.plant, score.condition, score.metric), []).append(score)
-    return found
+        by_cell.setdefault((score.plant, score.condition, score.metric), []).append(score)
+    return by_cell
 
 
-def leaders(found: Cells, plant: str, condition: str, metric: str) -> list[str]:
+def leaders(by_cell: Cells, plant: str, condition: str, metric: str) -> list[str]:
     """Return the laws that are best, or level with the best; none where no law has a finite median."""
-    best = [s for s in found.get((plant, condition, metric), ()) if s.best]
+    best = [s for s in by_cell.get((plant, condition, metric), ()) if s.best]
     return [s.law for s in best] if any(math.isfinite(s.median) for s in best) else []
 
 
-def winner(found: Cells, plant: str, condition: str, metric: str) -> str | None:
+def winner(by_cell: Cells, plant: str, condition: str, metric: str) -> str | None:
     """Return the law that wins, as on a board, if there is one."""
-    return next((score.law for score in found.get((plant, condition, metric), ()) if score.wins), None)
+    return next((score.law for score in by_cell.get((plant, condition, metric), ()) if score.wins), None)
 
 
-def settles(found: Cells, plant: str, condition: str, law: str) -> bool:
+def settles(by_cell: Cells, plant: str, condition: str, law: str) -> bool:
     """Return whether a law settles in the median of a cell; True where that was not measured."""
-    return all(s.median < math.inf for s in found.get((plant, condition, "settling_time"), ()) if s.law == law)
+    return all(s.median < math.inf for s in by_cell.get((plant, condition, "settling_time"), ()) if s.law == law)
 
 
-def lead(found: Cells, plant: str, condition: str, metric: str) -> str:
+def lead(by_cell: Cells, plant: str, condition: str, metric: str) -> str:
     """Return how the winner compares with its closest rival, in words; "" if there is no winner."""
-    said = next((score.lead for score in found[plant, condition, metric] if score.wins), "")
+    said = next((score.lead for score in by_cell[plant, condition, metric] if score.wins), "")
     return words.pretty(said)
 
 
 def standings(findings: "Findings", metric: str) -> list[Standing]:
     """Return how often each law leads, and how often another law is better, most wins first."""
-    found = {key: scores for key, scores in cells(findings.scores).items() if key[2] == metric}
-    best = Counter(law for key in found for law in leaders(found, *key))
-    alone = Counter(winner(found, *key) for key in found)
-    lost = Counter(s.law for scores in found.values() for s in scores if s.beaten)
-    rows = [Standing(law, best[law], alone[law], lost[law], len(found)) for law in findings.laws]
+    by_cell = {key: scores for key, scores in cells(findings.scores).items() if key[2] == metric}
+    best = Counter(law for key in by_cell for law in leaders(by_cell, *key))
+    alone = Counter(winner(by_cell, *key) for key in by_cell)
+    lost = Counter(s.law for scores in by_cell.values() for s in scores if s.beaten)
+    rows = [Standing(law, best[law], alone[law], lost[law], len(by_cell)) for law in findings.laws]
     return sorted(rows, key=lambda row: (-row.alone, row.lost, -row.best))
 
 
 def everywhere(findings: "Findings", metric: str) -> dict[str, list[str]]:
     """Return law -> the conditions in which it wins on every plant, of those with two plants or more."""
-    found = cells(findings.scores)
+    by_cell = cells(findings.scores)
     conditions: dict[str, list[str]] = {}
     for condition in findings.conditions:
-        winners = [winner(found, *key) for key in found if key[1:] == (condition, metric)]
+        winners = [winner(by_cell, *key) for key in by_cell if key[1:] == (condition, metric)]
         if len(winners) > 1 and winners[0] and len(set(winners)) == 1:
             conditions.setdefault(winners[0], []).append(words.condition(condition))
     return conditions
 
 
-def undecided(found: Cells, metrics: Sequence[str]) -> tuple[int, int]:
+def undecided(by_cell: Cells, metrics: Sequence[str]) -> tuple[int, int]:
     """Return how many comparisons have no winner, and how many comparisons there are."""
-    winners = [winner(found, *key) for key in found if key[2] in metrics]
+    winners = [winner(by_cell, *key) for key in by_cell if key[2] in metrics]
     return winners.count(None), len(winners)
 
 
-def losses(found: Cells, metrics: Sequence[str], law: str = words.PAPER) -> list[Loss]:
+def losses(by_cell: Cells, metrics: Sequence[str], law: str = words.PAPER) -> list[Loss]:
     """Return the cells in which another law is better than this one, worst first."""
     lost: list[Loss] = []
-    for (plant, condition, metric), scores in found.items():
+    for (plant, condition, metric), scores in by_cell.items():
         own = next((s for s in scores if s.law == law), None)
         if metric not in metrics or own is None or not own.beaten:
             continue
@@ -158,7 +158,7 @@ def losses(found: Cells, metrics: Sequence[str], law: str = words.PAPER) -> list
                 law=best.law,
                 times=own.median / max(best.median, least),
                 rounded=best.median < least,
-                settles=settles(found, plant, condition, best.law),
+                settles=settles(by_cell, plant, condition, best.law),
             )
             lost.append(loss)
     return sorted(lost, key=lambda loss: -loss.times)
@@ -202,8 +202,8 @@ def attacked(findings: "Findings") -> dict[str, WorstCases]:
 
 def robust(attacked: Mapping[str, WorstCases]) -> str:
     """Return which law has the smallest error in the worst case on each plant, and where it is not first by median."""
-    first = [found[0] for found in attacked.values()]
-    least = [min(found, key=lambda one: one.median) for found in attacked.values()]
+    first = [rows[0] for rows in attacked.values()]
+    least = [min(rows, key=lambda one: one.median) for rows in attacked.values()]
     others = [one for one in least if one not in first]
     text = f"smallest rms error found (in brackets its median): {'; '.join(map(_both, first))}."
     return text + f" First by the median alone: {'; '.join(map(_both, others))}." * bool(others)
@@ -257,9 +257,11 @@ def leads(findings: "Findings", metric: str) -> str:
         f"{words.law(law)} wins on every plant under {joined(names)}"
         for law, names in everywhere(findings, metric).items()
     ]
-    found = cells(findings.scores)
+    by_cell = cells(findings.scores)
     unsettled = Counter(
-        law for key in found if key[2] == metric and (law := winner(found, *key)) and not settles(found, *key[:2], law)
+        law
+        for key in by_cell
+        if key[2] == metric and (law := winner(by_cell, *key)) and not settles(by_cell, *key[:2], law)
     )
     wins = [
         f"{words.law(row.law)} wins in {row.alone}"

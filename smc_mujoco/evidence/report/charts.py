@@ -83,15 +83,15 @@ def _whisker(score: Score, ends: tuple[bool, float, float]) -> dict[str, Any]:
     }
 
 
-def fronts(found: "Sequence[Front]") -> Figure:
+def fronts(drawn: "Sequence[Front]") -> Figure:
     """Draw tracking against variation: a panel per plant, a staircase per law; a dot at the study's gains."""
-    plants = list(dict.fromkeys(front.plant for front in found))
-    laws = list(dict.fromkeys(front.law for front in found))
+    plants = list(dict.fromkeys(front.plant for front in drawn))
+    laws = list(dict.fromkeys(front.law for front in drawn))
     grid = panels(1, len(plants), (0.035, 0))
     data: list[dict] = []
     layout: dict[str, Any] = {"annotations": plant_titles(grid, plants)}
     for panel, plant in zip(grid, plants, strict=True):
-        own = [front for front in found if front.plant == plant]
+        own = [front for front in drawn if front.plant == plant]
         data += [trace | panel.trace for front in own for trace in _front(front)]
         across = _span([v for f in own for v in (*f.variation, f.chosen[1])], 1e-3)
         up = _span([v for f in own for v in (*f.tracking, f.chosen[0])], None)
@@ -134,18 +134,18 @@ def _front(front: "Front") -> list[dict[str, Any]]:
     ]
 
 
-def margins(found: "Sequence[Margin]", kind: str) -> Figure:
+def margins(drawn: "Sequence[Margin]", kind: str) -> Figure:
     """Draw the largest level of one kind that each law tolerates: a panel per plant; a bar marks linear theory.
 
     A triangle means that the search ended there without a failure.
     """
-    plants = list(dict.fromkeys(margin.plant for margin in found))
-    laws = list(dict.fromkeys(margin.law for margin in found))
+    plants = list(dict.fromkeys(margin.plant for margin in drawn))
+    laws = list(dict.fromkeys(margin.law for margin in drawn))
     grid = panels(1, len(plants), (0.025, 0))
     data: list[dict] = []
     layout: dict[str, Any] = {"annotations": plant_titles(grid, plants)}
     for panel, plant in zip(grid, plants, strict=True):
-        here = [margin for margin in found if (margin.plant, margin.kind) == (plant, kind)]
+        here = [margin for margin in drawn if (margin.plant, margin.kind) == (plant, kind)]
         _, _, most = scale([v for m in here for v in (m.value, m.theory or 0.0)], False)
         data += [trace | panel.trace for margin in here for trace in _margin(margin, most)]
         x = {"range": [-0.03 * most, most], "nticks": 4, "rangemode": "tozero"}
@@ -175,9 +175,9 @@ def _margin(margin: "Margin", most: float) -> list[dict[str, Any]]:
     return traces
 
 
-def accuracies(found: "AccuracyTable") -> Figure:
+def accuracies(table: "AccuracyTable") -> Figure:
     """Draw the largest error over the control period: a panel for each condition, and dashed theory's slope."""
-    groups = found.groups
+    groups = table.groups
     grid = panels(1, len(groups), (0.08, 0))
     data: list[dict] = []
     layout: dict[str, Any] = {"annotations": []}

@@ -18,20 +18,20 @@ if TYPE_CHECKING:
 FALLS, RISES = "#DCEAF4", "#C05A21"  # of V; light and dark apart from hue
 
 
-def meanings(found: "Sequence[Basin]") -> dict[str, str]:
+def meanings(drawn: "Sequence[Basin]") -> dict[str, str]:
     """Return colour -> its meaning, for the colours that occur in any of the maps."""
-    after = region.convergence_times(found)
-    there = {int(k) for basin in found for k in np.unique(region.colour_indices(basin, after))}
+    after = region.convergence_times(drawn)
+    there = {int(k) for basin in drawn for k in np.unique(region.colour_indices(basin, after))}
     texts = region.meanings(after, "at rest, known after {:g} s", "does not come to rest here")
     return {region.COLOURS[k]: text for k, text in texts.items() if k in there}
 
 
-def basins(found: "Sequence[Basin]", after: Sequence[float]) -> Figure:
+def basins(drawn: "Sequence[Basin]", after: Sequence[float]) -> Figure:
     """Draw the maps of one plant: a panel a law, x across, x' up; `after` is from `convergence_times` of all maps."""
-    grid, unit = panels(1, len(found), (0.02, 0)), found[0].unit
+    grid, unit = panels(1, len(drawn), (0.02, 0)), drawn[0].unit
     data: list[dict] = []
     layout: dict[str, Any] = {"annotations": []}
-    for panel, basin in zip(grid, found, strict=True):
+    for panel, basin in zip(grid, drawn, strict=True):
         data.append(_plane(panel, basin.x, basin.v, region.colour_indices(basin, after), region.COLOURS))
         law = panel.title(words.law(basin.law), font={"color": words.colour(basin.law)})
         share = {"x": panel.x[1], "xanchor": "right", "font": {"size": 11, "color": style.MUTED}}
@@ -59,12 +59,12 @@ def _plane(panel: Panel, x: np.ndarray, v: np.ndarray, classes: np.ndarray, colo
     }
 
 
-def fields(found: "Sequence[Field]") -> Figure:
+def fields(drawn: "Sequence[Field]") -> Figure:
     """Draw where V rises, dark, and the line s = 0: a panel per plant, x across, x' up."""
-    grid = panels(1, len(found), (0.045, 0))
+    grid = panels(1, len(drawn), (0.045, 0))
     data: list[dict] = []
-    layout: dict[str, Any] = {"annotations": plant_titles(grid, [field.plant for field in found])}
-    for panel, field, title in zip(grid, found, layout["annotations"], strict=True):
+    layout: dict[str, Any] = {"annotations": plant_titles(grid, [field.plant for field in drawn])}
+    for panel, field, title in zip(grid, drawn, layout["annotations"], strict=True):
         title["text"] += f", {100 * field.share:.0f} %"
         data.append(_plane(panel, field.x, field.v, field.rises, (FALLS, RISES)))
         zero = {

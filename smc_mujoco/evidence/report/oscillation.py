@@ -55,16 +55,16 @@ def oscillations(work: Work) -> tuple[Oscillation, ...]:
             work.folder / f"chattering-{plant}.json",
             [plan.laws, LAG, DURATION, GAINS],
             lambda: _on(plant, plan.laws, work.threads, report),
-            lambda found, path: write_json(path, [dataclasses.asdict(one) for one in found]),
+            lambda rows, path: write_json(path, [dataclasses.asdict(one) for one in rows]),
             lambda path: [Oscillation(**entry) for entry in read_json(path)],
         )
 
-    return tuple(one for found in work.each("chattering", "plants", plan.plants, compute) for one in found)
+    return tuple(one for rows in work.each("chattering", "plants", plan.plants, compute) for one in rows)
 
 
 def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) -> list[Oscillation]:
     """Return the limit cycles on a plant. Laws whose chattering cannot be predicted are left out."""
-    found, cases = [], [case(plant, law, "nominal", DURATION, GAINS, changes={"actuator": Lag(LAG)}) for law in laws]
+    rows, cases = [], [case(plant, law, "nominal", DURATION, GAINS, changes={"actuator": Lag(LAG)}) for law in laws]
     traces = run(cases, threads)
     changes = step_halving(traces, 0, threads)
     for done, (one, trace, change) in enumerate(zip(cases, traces, changes, strict=True)):
@@ -74,7 +74,7 @@ def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) 
         except ScenarioError:
             continue
         amplitude, frequency = NO_CYCLE if trace.diverged_at is not None else channel_cycle(trace)
-        found.append(
+        rows.append(
             Oscillation(
                 plant=plant,
                 law=one.law.name,
@@ -87,15 +87,15 @@ def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) 
                 marked=change.marked,
             )
         )
-    return found
+    return rows
 
 
-def sentence(found: tuple[Oscillation, ...]) -> str:
+def sentence(rows: tuple[Oscillation, ...]) -> str:
     """Return in a sentence how many limit cycles were predicted, how many were found, and how large the error is."""
-    both = [one for one in found if not math.isnan(one.error)]
-    calm = sum(math.isnan(one.amplitude) and math.isnan(one.measured_amplitude) for one in found)
-    text = f"Of {len(found)} pairs of plant and law {len(both)} are predicted to oscillate and do; {calm} do neither"
-    if wrong := len(found) - len(both) - calm:
+    both = [one for one in rows if not math.isnan(one.error)]
+    calm = sum(math.isnan(one.amplitude) and math.isnan(one.measured_amplitude) for one in rows)
+    text = f"Of {len(rows)} pairs of plant and law {len(both)} are predicted to oscillate and do; {calm} do neither"
+    if wrong := len(rows) - len(both) - calm:
         text += f"; for {wrong} prediction and run disagree"
     if not both:
         return f"{text}."

@@ -117,7 +117,7 @@ def pivot(cells: Iterable[tuple[Row, Column, Cell]]) -> dict[Row, dict[Column, C
 
 def set_margins(findings: Findings) -> dict[tuple[str, str, str], dict[str, Any]]:
     """Return (kind, plant, law) -> set of gains -> Margin; a law that a set has no gains for lacks that set."""
-    return pivot(((m.kind, m.plant, m.law), name, m) for name, found in findings.by_set.items() for m in found)
+    return pivot(((m.kind, m.plant, m.law), name, m) for name, margins in findings.by_set.items() for m in margins)
 
 
 def checks(sets: Sequence[str], claim: Claim) -> list[SimpleNamespace]:
@@ -137,8 +137,8 @@ def link(what: str) -> str:
     """Return the anchor of the metric that a check names, else that of "verdict"."""
     names = {called: m.name for m in metrics() for called in (m.name, words.metric(m.name))}
     known = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
-    found = re.search(rf"(?<!\w)({known})(?!\w)", what)
-    return f"metric-{names[found[1]]}" if found else "verdict"
+    match = re.search(rf"(?<!\w)({known})(?!\w)", what)
+    return f"metric-{names[match[1]]}" if match else "verdict"
 
 
 def uri(kind: str, data: bytes) -> str:

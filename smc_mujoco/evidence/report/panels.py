@@ -79,11 +79,11 @@ class Panel(NamedTuple):
 def panels(rows: int, columns: int, gaps: tuple[float, float]) -> list[Panel]:
     """Return the panels of a grid, row by row; gaps across and up are shares of the whole."""
     width, height = (1 - gaps[0] * (columns - 1)) / columns, (1 - gaps[1] * (rows - 1)) / rows
-    found = []
+    boxes = []
     for k in range(rows * columns):
         left, top = (k % columns) * (width + gaps[0]), 1 - (k // columns) * (height + gaps[1])
-        found.append(Panel("" if k == 0 else str(k + 1), (left, left + width), (max(top - height, 0.0), top)))
-    return found
+        boxes.append(Panel("" if k == 0 else str(k + 1), (left, left + width), (max(top - height, 0.0), top)))
+    return boxes
 
 
 def plant_titles(grid: Sequence[Panel], plants: Sequence[str]) -> list[dict[str, Any]]:

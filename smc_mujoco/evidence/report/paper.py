@@ -51,11 +51,11 @@ def report(
     about, folder = find_paper(paper), Path(out)
     with bar("claims", evaluations(None, None, quick, about), shown=progress, counted=True) as drawn:
         done = audit(about, quick=quick, threads=threads, report=drawn.advance)
-    found = evidence.document(done)
-    write_json(folder / "evidence.json", found)
+    document = evidence.document(done)
+    write_json(folder / "evidence.json", document)
     done.badge(folder / "badge.svg")
     done.figure(folder / "checks.svg")
-    html = page(done, found["seal"], len(found["runs"]), (folder / "checks.svg").read_bytes())
+    html = page(done, document["seal"], len(document["runs"]), (folder / "checks.svg").read_bytes())
     with replacing(folder / "report.html") as part:
         part.write_text(html, encoding="utf-8")
     return folder / "report.html"
@@ -65,7 +65,7 @@ def page(done: Audit, seal: str, runs: int, figure: bytes) -> str:
     """Return an audit as HTML."""
     from markupsafe import Markup
 
-    found = Counter(claim.verdict for claim in done.claims)
+    counts = Counter(claim.verdict for claim in done.claims)
     kinds = (*VERDICTS, *ANSWERS.values())
     sets = list(done.claims[0].verdicts)
     return (
@@ -76,7 +76,7 @@ def page(done: Audit, seal: str, runs: int, figure: bytes) -> str:
             js=Markup((TEMPLATES / "page.js").read_text(encoding="utf-8")),
             paper=done.paper,
             claims=done.claims,
-            counts={verdict: found[verdict] for verdict in kinds if found[verdict]},
+            counts={verdict: counts[verdict] for verdict in kinds if counts[verdict]},
             summary=summary(done.claims),
             sets=sets,
             gains_set=sets[-1],
@@ -96,12 +96,12 @@ def page(done: Audit, seal: str, runs: int, figure: bytes) -> str:
 
 def gains(done: Audit, name: str) -> dict[tuple[str, str], list[str]]:
     """Return (law, its gains in words) -> the plants on which runs under a set of gains had them."""
-    found: dict[tuple[str, str], list[str]] = {}
+    plants: dict[tuple[str, str], list[str]] = {}
     for sets in done.used.values():
         for one in sets.get(name, {}).values():
             law, plant = one.scenario.law, words.plant(one.scenario.plant.name)
             values = ", ".join(f"{gain} = {number(value)}" for gain, value in law.gains.items())
-            on = found.setdefault((law.name, values), [])
+            on = plants.setdefault((law.name, values), [])
             if plant not in on:
                 on.append(plant)
-    return dict(sorted(found.items()))
+    return dict(sorted(plants.items()))

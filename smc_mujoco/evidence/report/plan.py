@@ -121,9 +121,9 @@ class Work:
 
     def each(self, stage: str, unit: str, items: Sequence[Item], compute: Callable[[Item, Report], T]) -> list[T]:
         """Return compute(item, report) for each item of a stage; `report` takes the progress within that item."""
-        found = []
+        results = []
         with self.bars.stage(stage, f"{len(items)} {unit}") as bar:
             for k, item in enumerate(items):
-                found.append(compute(item, lambda done, total, k=k: bar.reached(k + done / (total or 1), len(items))))
+                results.append(compute(item, lambda done, total, k=k: bar.reached(k + done / (total or 1), len(items))))
                 bar.reached(k + 1, len(items))
-        return found
+        return results

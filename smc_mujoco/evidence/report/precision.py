@@ -35,7 +35,7 @@ def accuracies(work: Work) -> AccuracyTable:
         )
 
     pairs = [(plant, condition) for plant in plan.accurate for condition in CONDITIONS]
-    return AccuracyTable(row for found in work.each("accuracy", "tables", pairs, compute) for row in found)
+    return AccuracyTable(row for rows in work.each("accuracy", "tables", pairs, compute) for row in rows)
 
 
 def sentences(table: AccuracyTable) -> Iterator[str]:

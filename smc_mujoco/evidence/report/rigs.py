@@ -44,8 +44,8 @@ class Machine:
     @property
     def gains(self) -> str:
         """Where the gains of the laws come from, in words."""
-        found = in_words({words.style.law_name(law): [law.source] for law in self.rig.laws})
-        return found[:1].upper() + found[1:]
+        text = in_words({words.style.law_name(law): [law.source] for law in self.rig.laws})
+        return text[:1].upper() + text[1:]
 
     def unit(self, metric: str) -> str:
         """Return the unit of a metric on this machine."""
@@ -91,14 +91,14 @@ class Repeated:
 
 def machines(work: Work) -> tuple[Machine, ...]:
     """Return the comparison of each rig's laws on its parameter sets."""
-    plan, found = work.plan, []
+    plan, twins = work.plan, []
     for name in plan.rigs:
         twin = rig(name)
         runs = ensemble.runs(twin, seeds=plan.seeds, duration=plan.duration)
         with work.bars.stage("rigs", f"{len(runs)} runs", bar=False):
             table = study(runs, work.folder / "rigs" / name, threads=work.threads, progress=work.bars.shown)
-        found.append(Machine(rig=twin, boards=tuple(leaderboard(table, words.HEADLINE, relevant=plan.relevant))))
-    return tuple(found)
+        twins.append(Machine(rig=twin, boards=tuple(leaderboard(table, words.HEADLINE, relevant=plan.relevant))))
+    return tuple(twins)
 
 
 def repeated(work: Work, folder: Path | None) -> tuple[Repeated, ...]:
@@ -126,20 +126,20 @@ def read(folder: Path) -> list[tuple[Path, Rig, Mapping[str, np.ndarray]]]:
     if not os.path.isdir(folder):
         raise ScenarioError(f"no folder at {printable(str(folder))}: give one with records, CSV or npz files")
     known = [twin for twin in map(rig, rigs()) if twin.free]
-    found = []
+    files = []
     for path in sorted(file for file in folder.iterdir() if file.suffix in (".csv", ".npz")):
         record = records.load(path)
         if isinstance(record, Trace):
             continue
         mine = next((twin for twin in known if set(twin.needed) <= set(record)), None)
         if mine is not None:
-            found.append((path, mine, record))
-    if not found:
+            files.append((path, mine, record))
+    if not files:
         has = "; ".join(f"{twin.name} {', '.join(twin.needed)}" for twin in known)
         raise ScenarioError(
             f"no record in {printable(str(folder))} has the columns of a rig: give those of one of {has}"
         )
-    return found
+    return files
 
 
 def fit(values: Mapping[str, float], unit: str = "%") -> str:

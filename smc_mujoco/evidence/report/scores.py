@@ -84,7 +84,7 @@ def scores(table: "Table", relevant: float = RELEVANT) -> tuple[Score, ...]:
     boards = leaderboard(table, words.COLUMNS, by=("plant",), relevant=relevant)
     blocks = {(block.plant, block.condition, board.metric): block for board in boards for block in board.blocks}
     by_row = {metric: paired_runs.values(table, metric) for metric in words.COLUMNS}
-    found = []
+    rows = []
     for group in paired_runs.groups(table, by=("plant", "condition")):
         ((plant, condition),) = group.blocks
         (ran,) = paired_runs.scenarios(table, group)
@@ -113,19 +113,19 @@ def scores(table: "Table", relevant: float = RELEVANT) -> tuple[Score, ...]:
                     floor=paired_runs.floor(ran, CATALOGUE[metric].unit),
                     barred=bool(block.barred),
                 )
-                found.append(score)
-    return tuple(found)
+                rows.append(score)
+    return tuple(rows)
 
 
 def places(table: "Table", relevant: float = RELEVANT) -> tuple[Place, ...]:
     """Return every law's place in each metric that the overview ranks, by plant and over all plants."""
     boards = leaderboard(table, words.RANKED, by=("plant",), relevant=relevant)
-    found = [place for board in boards for place in _places(board)]
+    in_blocks = [place for board in boards for place in _places(board)]
     by_law: dict[tuple[str, str], list[Place]] = {}
-    for place in found:
+    for place in in_blocks:
         by_law.setdefault((place.metric, place.law), []).append(place)
     most = {metric: max(len(own) for (name, _), own in by_law.items() if name == metric) for metric, _ in by_law}
-    return (*found, *(_overall(own) for (metric, _), own in by_law.items() if len(own) == most[metric]))
+    return (*in_blocks, *(_overall(own) for (metric, _), own in by_law.items() if len(own) == most[metric]))
 
 
 def _places(board: Board) -> list[Place]:

@@ -185,12 +185,12 @@ def all_margins(work: Work) -> tuple[Margin, ...]:
     return _margins(work, "margins", GAINS, laws, plan.kinds)
 
 
-def margins_by_set(work: Work, found: Sequence[Margin]) -> dict[str, tuple[Margin, ...]]:
+def margins_by_set(work: Work, margins: Sequence[Margin]) -> dict[str, tuple[Margin, ...]]:
     """Return set of gains -> margins of the kinds that are compared, of the laws that the set has gains for."""
     plan = work.plan
     if not plan.compared:
         return {}
-    by_set = {GAINS: tuple(margin for margin in found if margin.kind in plan.compared)}
+    by_set = {GAINS: tuple(margin for margin in margins if margin.kind in plan.compared)}
     for name in (name for name in sets.SETS if name != GAINS):
         laws = {plant: tuple(laws) for plant, laws in about.laws_of(plan, name).items()}
         by_set[name] = _margins(work, f"margins-{name}", name, laws, plan.compared)
@@ -214,7 +214,7 @@ def _margins(
             margin_search.load,
         )
 
-    return tuple(margin for found in work.each(stage, "plants", list(laws), compute) for margin in found)
+    return tuple(margin for margins in work.each(stage, "plants", list(laws), compute) for margin in margins)
 
 
 def all_basins(work: Work) -> tuple[Basin, ...]:
@@ -271,19 +271,19 @@ def all_scenes(work: Work) -> tuple[films.Scene, ...]:
 
 def fields(plan: Plan) -> tuple[Field, ...]:
     """Return V' of the paper's law on the state plane of every plant."""
-    found = []
+    planes = []
     for name in plan.plants if words.PAPER in plan.laws else ():
         plant, law = find_plant(name), sets.law(name, words.PAPER, GAINS)
         lam, k1 = law.gains["lam"], law.gains["k1"]
         x, v = lyapunov.plane(plant, k1, FIELD_POINTS)
         rate, s = lyapunov.vdot(plant, lam, k1, x, v), lyapunov.surface(plant, lam, k1, x, v)
-        found.append(Field(plant=name, x=x[0], v=v[:, 0], vdot=rate, s=s))
-    return tuple(found)
+        planes.append(Field(plant=name, x=x[0], v=v[:, 0], vdot=rate, s=s))
+    return tuple(planes)
 
 
 def fronts(plan: Plan) -> tuple[Front, ...]:
     """Return error against effort, of the tunings that come with the package."""
-    found = []
+    pairs = []
     for plant in plan.plants:
         for law in plan.laws:
             with contextlib.suppress(ScenarioError):
@@ -295,5 +295,5 @@ def fronts(plan: Plan) -> tuple[Front, ...]:
                     variation=tuple(variation for _, variation in tuned.front),
                     chosen=tuned.best,
                 )
-                found.append(front)
-    return tuple(found)
+                pairs.append(front)
+    return tuple(pairs)

@@ -47,15 +47,15 @@ def runs(
     given = rig.laws if laws is None else laws
     if not (chosen := [shipped.get(one, one) if isinstance(one, str) else one for one in given]):
         raise ScenarioError(f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)")
-    found, around = [], starts or Starts(x0=rig.x0)
+    scenarios, around = [], starts or Starts(x0=rig.x0)
     for name, member in rig.members().items():
         fields: dict[str, Any] = member.machine(Values(**member.values))
         own = {key: value for key, value in fields.items() if key not in BY_STARTS}
         plant = own.pop("plant")
         base = grid([plant], chosen, ["nominal"], seeds, gains, duration, around)
         free: dict[str, Any] = {"u_max": None, "physics_step": None} | own
-        found += [dataclasses.replace(scenario, **free).named(name) for scenario in base]
-    return found
+        scenarios += [dataclasses.replace(scenario, **free).named(name) for scenario in base]
+    return scenarios
 
 
 def wins(board: Any) -> dict[str, int]:
@@ -75,10 +75,10 @@ def verdict(boards: Sequence[Any]) -> str:
     """
     lines = []
     for board in boards:
-        count, found = len(board.blocks), wins(board)
+        count, blocks_won = len(board.blocks), wins(board)
         if board.winner:
             lines.append(f"{board.metric}: {board.winner} wins on all {count} parameter sets")
             continue
-        others = ", ".join(f"{law} on {number}" for law, number in found.items()) or "none on any"
+        others = ", ".join(f"{law} on {number}" for law, number in blocks_won.items()) or "none on any"
         lines.append(f"{board.metric}: no law wins on all {count} parameter sets ({others})")
     return "\n".join(lines)

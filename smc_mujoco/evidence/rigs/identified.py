@@ -47,25 +47,27 @@ class Identified:
     @property
     def notes(self) -> list[str]:
         """Sentences on what the records cannot determine, and on a poor fit."""
-        names, found = list(self.values), []
+        names, sentences = list(self.values), []
         for i, one in enumerate(names):
             for j, other in enumerate(names[:i]):
                 if abs(self.correlations[i, j]) > MAX_CORRELATION:
-                    found.append(f"{other} and {one} cannot be told apart (correlation {self.correlations[i, j]:.3f})")
+                    sentences.append(
+                        f"{other} and {one} cannot be told apart (correlation {self.correlations[i, j]:.3f})"
+                    )
         for name, value in self.values.items():
             quantity = self.rig.quantities[name]
             if value in (quantity.least, quantity.most):
-                found.append(f"{name} is at the end of its range, {value:g} {quantity.unit}".rstrip())
+                sentences.append(f"{name} is at the end of its range, {value:g} {quantity.unit}".rstrip())
             elif self.errors[name] > abs(value):
-                found.append(f"{name} may as well be 0 ({value:.3g} ± {self.errors[name]:.2g})")
-        found += self._scale_notes() + self._loss_notes()
+                sentences.append(f"{name} may as well be 0 ({value:.3g} ± {self.errors[name]:.2g})")
+        sentences += self._scale_notes() + self._loss_notes()
         if (worst := min(min(fit.values()) for fit in self.fits)) < POOR:
             poor = f"the twin {worst}" if isinstance(worst, Fall) else f"the worst fit is {worst:.0f} %"
-            found.append(
+            sentences.append(
                 f"{poor}: the model lacks something, a column is wrong or in another unit, or "
                 "the search ended in a local minimum; start from other values, with more starts or another seed"
             )
-        return found
+        return sentences
 
     def _scale_notes(self) -> list[str]:
         """Sentences on quantities that cannot be negative and are far from their values before."""
@@ -85,15 +87,15 @@ class Identified:
 
     def _loss_notes(self) -> list[str]:
         """Sentences on whole records that the values before repeat better."""
-        found = []
+        sentences = []
         for i, (fit, before) in enumerate(zip(self.fits, self.fits_before, strict=True)):
             if min(fit.values()) < min(before.values()) - LOSS:
-                found.append(
+                sentences.append(
                     f"record {i + 1}, repeated as a whole, fits by {percent(fit)} and by {percent(before)} with the "
                     "values before, though its pieces fit better: errors add up over the record, or the model lacks "
                     "something"
                 )
-        return found
+        return sentences
 
     def drawn(self, count: int = 8, seed: int = 0) -> Rig:
         """Return the rig with an ensemble of other sets of values that the records allow, for rankings over them.
@@ -116,8 +118,8 @@ class Identified:
         )
 
     def __repr__(self) -> str:
-        found = ", ".join(f"{name} = {value:.4g} ± {self.errors[name]:.1g}" for name, value in self.values.items())
-        return f"identified({self.rig.name!r}, {found})"
+        values = ", ".join(f"{name} = {value:.4g} ± {self.errors[name]:.1g}" for name, value in self.values.items())
+        return f"identified({self.rig.name!r}, {values})"
 
     def save(self, path: str | Path) -> Path:
         """Write values, errors, correlations and fits to a JSON file. Return its path."""

@@ -77,13 +77,13 @@ def identify(
         replays, slopes, by_steps = _solved(twin, names, data, starts, seed, most, drawn.advance)
         errors, correlations = statistics(replays, slopes, by_steps)
     values = replays.values(slopes.point)
-    found = twin.with_values(values, "identified from records")
-    states, steps = _starting_states(found, data, replays, slopes.point), replays.short_steps
+    fitted = twin.with_values(values, "identified from records")
+    states, steps = _starting_states(fitted, data, replays, slopes.point), replays.short_steps
     return Identified(
-        rig=found, before=twin, values=values, errors=errors, correlations=correlations,
-        fits=tuple(found.fits(data, states=states, **steps)),
+        rig=fitted, before=twin, values=values, errors=errors, correlations=correlations,
+        fits=tuple(fitted.fits(data, states=states, **steps)),
         fits_before=tuple(twin.fits(data, **steps)) if steps else fits_before,
-        predictions=tuple(found.predictions(data, states=states, **steps)), evaluations=replays.evaluations,
+        predictions=tuple(fitted.predictions(data, states=states, **steps)), evaluations=replays.evaluations,
     )  # fmt: skip
 
 
@@ -137,7 +137,7 @@ def _ignore(count: int) -> None:
 
 
 def _starting_states(
-    found: Rig, data: Sequence[Mapping[str, Any]], replays: Replays, point: Point
+    fitted: Rig, data: Sequence[Mapping[str, Any]], replays: Replays, point: Point
 ) -> list[np.ndarray | None]:
     """Return the state from which each record is repeated as a whole, (2n,); None for the measured one.
 
@@ -147,7 +147,7 @@ def _starting_states(
         return [None] * len(data)
     if replays.closed:
         return [replays.state(point, k) for k in range(len(data))]
-    whole_records = Replays(found, [], data, False, _ignore, whole=True)
+    whole_records = Replays(fitted, [], data, False, _ignore, whole=True)
     whole_records.steps = replays.short_steps
     firsts = [next(k for k, piece in enumerate(replays.pieces) if piece.record == i) for i in range(len(data))]
     candidates = [whole_records.start, Point(np.zeros(0), point.states[firsts])]

@@ -82,10 +82,10 @@ def torques(plant: Plant, data: Record, columns: Columns) -> Record:
     own, model = Filter(data, columns), plant.load()
     state, joints, dofs = mujoco.MjData(model), joint_ids(model), dof_ids(model)
     x, v, a = (np.column_stack([own.cubic(name, order) for name in columns.x]) for order in range(3))
-    found = np.empty_like(x)
+    forces = np.empty_like(x)
     at = model.jnt_qposadr[joints]
     for k in range(len(x)):
         state.qpos[at], state.qvel[dofs], state.qacc[dofs] = x[k], v[k], a[k]
         mujoco.mj_inverse(model, state)
-        found[k] = state.qfrc_inverse[dofs]
-    return {name: own.low(found[:, i]) for i, name in enumerate(columns.torque)}
+        forces[k] = state.qfrc_inverse[dofs]
+    return {name: own.low(forces[:, i]) for i, name in enumerate(columns.torque)}

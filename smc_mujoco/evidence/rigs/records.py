@@ -87,16 +87,16 @@ def load(path: str | os.PathLike[str], names: Mapping[str, str] | None = None) -
       ScenarioError: no such file, not a file of columns, or an unknown column.
     """
     with reading(path, "record", "give the path of a CSV file, or of an npz file with arrays by column") as file:
-        found = _npz(file) if file.suffix == ".npz" else None
-    if found is None:
-        found = _csv(file)
-    elif not found:
+        columns = _npz(file) if file.suffix == ".npz" else None
+    if columns is None:
+        columns = _csv(file)
+    elif not columns:
         return traces.load(file)
     for ours, theirs in (names or {}).items():
-        if theirs not in found:
-            raise ScenarioError(f"{path} has no column {theirs!r} (it has {', '.join(found)}): give one that it has")
-        found[ours] = found[theirs]
-    return found
+        if theirs not in columns:
+            raise ScenarioError(f"{path} has no column {theirs!r} (it has {', '.join(columns)}): give one that it has")
+        columns[ours] = columns[theirs]
+    return columns
 
 
 def _npz(file: Path) -> Record:
@@ -109,8 +109,8 @@ def _csv(file: Path) -> Record:
     """Return the columns of a CSV file. A cell that is empty, or not a number, is NaN."""
     rows = [row for _, row in csv_rows(file)]
     if len(rows) < 2:
-        found = "no lines" if not rows else "only 1 line"
-        raise ScenarioError(f"{file} has {found}: give a first line with the columns' names, and samples")
+        count = "no lines" if not rows else "only 1 line"
+        raise ScenarioError(f"{file} has {count}: give a first line with the columns' names, and samples")
     heads = [name.split("[")[0].strip().lstrip("# ") for name in rows[0]]
     if wrong := next((i for i, row in enumerate(rows) if len(row) != len(heads)), None):
         raise ScenarioError(
@@ -223,18 +223,18 @@ def noise(data: Record, columns: Columns) -> float:
 def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
     """Return a column as finite floats, (K,)."""
     try:
-        found = np.asarray(values, float)
+        array = np.asarray(values, float)
     except (TypeError, ValueError, OverflowError):
         raise ScenarioError(f"column {name} of {rig} is {shown(values)}: give numbers") from None
-    if found.ndim != 1:
-        raise ScenarioError(f"column {name} of {rig} has the shape {found.shape}: give one number a sample")
-    wrong = np.flatnonzero(~np.isfinite(found))
+    if array.ndim != 1:
+        raise ScenarioError(f"column {name} of {rig} has the shape {array.shape}: give one number a sample")
+    wrong = np.flatnonzero(~np.isfinite(array))
     if len(wrong):
         raise ScenarioError(
-            f"column {name} of {rig} is {found[wrong[0]]} at sample {wrong[0]}, one of {len(wrong)} that are not "
+            f"column {name} of {rig} is {array[wrong[0]]} at sample {wrong[0]}, one of {len(wrong)} that are not "
             "finite: fill them in, or cut the record there"
         )
-    return found
+    return array
 
 
 def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.ndarray, np.ndarray]:
@@ -243,8 +243,8 @@ def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.nd
     They come from the columns `state`; if there are none, from a cubic through the samples about it.
     """
     if columns.state:
-        found = np.array([data[name][at] for name in columns.state])
-        return found[: len(columns.x)], found[len(columns.x) :]
+        measured = np.array([data[name][at] for name in columns.state])
+        return measured[: len(columns.x)], measured[len(columns.x) :]
     first = max(0, at - STATE_SAMPLES)
     last = min(len(data[columns.time]), at + STATE_SAMPLES + 1)
     times = period * (np.arange(first, last) - at)

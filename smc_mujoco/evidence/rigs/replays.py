@@ -205,18 +205,18 @@ class Replays:
         self.evaluations += len(points)
         rigs = [self.rig(point) for point in points]
         if self.twin.dynamics is not None:
-            found = [[each[0] for each in rig.predictions(list(self.data))] for rig in rigs]
+            predictions = [[each[0] for each in rig.predictions(list(self.data))] for rig in rigs]
         else:
-            found = self._replayed(rigs, points, self.steps)
+            predictions = self._replayed(rigs, points, self.steps)
         self.report(len(points))
         if not self.corrections:
-            return found
+            return predictions
         return [
             [
                 {name: values + added[name] for name, values in each.items()}
                 for each, added in zip(one, self.corrections, strict=True)
             ]
-            for one in found
+            for one in predictions
         ]
 
     def correct(self, point: Point, halvings: int) -> bool:
@@ -317,15 +317,15 @@ class Replays:
         names = [*twin.columns.x, *([twin.columns.u] if self.closed else [])]
         rates = [records.rate(data[name], period) for name in twin.columns.x]
         varied = np.array([each.std() or 1.0 for each in (*(data[name] for name in twin.columns.x), *rates)])
-        found = []
+        pieces = []
         for first, last in itertools.pairwise(ends):
             duration = None if count == 1 else float(period * (last - first))
             part = twin.part(self.data[i], float(period * first), duration, self.closed)
             skipped = round((twin.score_from - twin.start) / period) if self.closed else 0
             measured = {name: data[name][first + skipped : last + 1] for name in names}
             spread = {name: _norm(data[name]) for name in names}
-            found.append(Piece(i, part, skipped, measured, spread, STATE_SCALE * varied[self.free]))
-        return found
+            pieces.append(Piece(i, part, skipped, measured, spread, STATE_SCALE * varied[self.free]))
+        return pieces
 
 
 def _norm(values: np.ndarray) -> float:

@@ -403,9 +403,9 @@ class Rig:
             angles in degrees.
         """
         rig, data = self.reading([record])
-        found = rig.fits(data, rounded)[0]
-        rig.refuse_degrees(data[0], found)
-        return found
+        fit = rig.fits(data, rounded)[0]
+        rig.refuse_degrees(data[0], fit)
+        return fit
 
     def refuse_degrees(self, record: Mapping[str, Any], fit: Mapping[str, float]) -> None:
         """Raise ScenarioError if a record has degrees in place of radians.
@@ -447,12 +447,12 @@ class Rig:
           changes: fields of the replays that differ, such as their physics step.
         """  # fmt: skip
         predictions = self.predictions(many, rounded, states, **changes)
-        found = [percentages(*each[:2]) for each in predictions]
+        fits = [percentages(*each[:2]) for each in predictions]
         if self.controller is not None:
-            for fit, (predicted, measured, t) in zip(found, predictions, strict=True):
+            for fit, (predicted, measured, t) in zip(fits, predictions, strict=True):
                 if (fall := fallen({name: predicted[name] for name in self.columns.x}, measured, t)) is not None:
                     fit.update(dict.fromkeys(fit, fall))
-        return [{"u" if name == self.columns.u else name: value for name, value in fit.items()} for fit in found]
+        return [{"u" if name == self.columns.u else name: value for name, value in fit.items()} for fit in fits]
 
     def predictions(
         self,
@@ -473,7 +473,7 @@ class Rig:
             ]
         pairs = zip(many, states or [None] * len(many), strict=True)
         traces = run([self.repeated(self.part(one), rounded, state, **changes) for one, state in pairs])
-        found = []
+        replayed = []
         for each, trace in zip(data, traces, strict=True):
             period = trace.scenario.control_period
             first, after = round(self.score_from / period), round((self.score_from - self.start) / period)
@@ -485,8 +485,8 @@ class Rig:
                 )
             predicted = {name: values[after:] for name, values in self.predicted(trace).items()}
             parts = {name: each[name][first : first + len(values)] for name, values in predicted.items()}
-            found.append((predicted, parts, each[time][first : first + len(trace.t) - after]))
-        return found
+            replayed.append((predicted, parts, each[time][first : first + len(trace.t) - after]))
+        return replayed
 
     def idle(self, record: Mapping[str, Any]) -> dict[str, float]:
         """Return the fit of a machine that does nothing, as a baseline for twins. Names and unit are those of `fit`.
@@ -514,12 +514,12 @@ class Rig:
     def predicted(self, trace: Trace) -> Record:
         """Return the columns of a record that a replay gives, (K,) each, without the columns' offset."""
         sensor = trace.scenario.sensor
-        found = {}
+        by_column = {}
         for i, name in enumerate(self.columns.x):
-            found[name] = trace.x[:, i] + (sensor.bias if sensor else 0.0)
+            by_column[name] = trace.x[:, i] + (sensor.bias if sensor else 0.0)
             if quantum := sensor.quantum(trace.scenario.plant.units[i] == "rad") if sensor else 0.0:
-                found[name] = quantum * np.floor(found[name] / quantum + 0.5)
-        return found | ({} if trace.scenario.law.name == "none" else {self.columns.u: trace.u[:, 0]})
+                by_column[name] = quantum * np.floor(by_column[name] / quantum + 0.5)
+        return by_column | ({} if trace.scenario.law.name == "none" else {self.columns.u: trace.u[:, 0]})
 
     def torques(self, record: Mapping[str, Any]) -> Record:
         """Return the torque of each joint that a record's measured motion takes, below 5 Hz, N m."""
@@ -534,13 +534,13 @@ class Rig:
 
 def percentages(predicted: Record, measured: Record) -> dict[str, float]:
     """Return the fit of each column, percent: 100 (1 - |y - yhat| / |y - mean y|)."""
-    found = {}
+    percent = {}
     for name, values in predicted.items():
         y = measured[name]
         with np.errstate(all="ignore"):
             share = float(np.linalg.norm(y - values) / np.linalg.norm(y - y.mean()))
-        found[name] = 100.0 * (1.0 - share) if np.isfinite(share) else UNSCORED
-    return found
+        percent[name] = 100.0 * (1.0 - share) if np.isfinite(share) else UNSCORED
+    return percent
 
 
 def fallen(predicted: Record, measured: Record, t: np.ndarray) -> Fall | None:

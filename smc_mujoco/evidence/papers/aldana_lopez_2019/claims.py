@@ -99,8 +99,8 @@ def disturbed(runs):
     """Time from which |s| stays within 1 mm/s under d = 0.5 sin 5t, with k = 0.6, over the least bound."""
     law = runs.law(runs.plant, *runs.laws, k=runs.values["k"])
     cells = {f"from {start:g} m/s": (runs.plant, law, start) for start in runs.values["starts"]}
-    found = times(runs, cells, SWITCHING)
-    return {"time / least bound": {name: time / least_bound(law) for name, time in found.items()}}
+    measured = times(runs, cells, SWITCHING)
+    return {"time / least bound": {name: time / least_bound(law) for name, time in measured.items()}}
 
 
 def general(runs):

@@ -197,11 +197,11 @@ def observer_free(runs):
     """Claim 1: observer-free."""
     velocities = ("measured", *FILTERS.values())
     grid = [runs.scenario(plant, OURS, *runs.conditions, velocity=one) for plant in runs.plants for one in velocities]
-    found = np.reshape([each["settling_time"] for each in runs.scores(grid)], (len(runs.plants), -1)).tolist()
+    times = np.reshape([each["settling_time"] for each in runs.scores(grid)], (len(runs.plants), -1)).tolist()
     what = "|settling time / with true xdot - 1|"
     return [  # NaN if neither settles: noise may keep both out of the band
         runs.check("settling time", f"{plant}, {name}: {what}", abs(ratio(time, true) - 1.0), sentence=name)
-        for plant, (true, *filtered) in zip(runs.plants, found, strict=True)
+        for plant, (true, *filtered) in zip(runs.plants, times, strict=True)
         for name, time in zip(FILTERS, filtered, strict=True)
     ]
 
@@ -238,8 +238,8 @@ def scalable(runs):
     for plant in runs.plants:
         networks = [find_plant(plant, n=n) for n in sizes]
         grid = [runs.scenario(plant, OURS, plant=one, duration=SHORT, integrator="implicitfast") for one in networks]
-        least, *found = (scores["settling_time"] for scores in runs.scores(grid))
-        ratios |= {f"{plant}, N = {n}": ratio(time, least) for n, time in zip(sizes[1:], found, strict=True)}
+        least, *times = (scores["settling_time"] for scores in runs.scores(grid))
+        ratios |= {f"{plant}, N = {n}": ratio(time, least) for n, time in zip(sizes[1:], times, strict=True)}
     return {"settling time / that of N = 2": ratios}
 
 
@@ -375,7 +375,7 @@ def decreases(runs):
         at = np.unravel_index(np.argmax(rate), rate.shape)
         share[name], worst[name] = np.mean(rate > 0.0), (rate[at], x[at], v[at])
     names = ("largest Vdot", "largest Vdot, at x", "largest Vdot, at v")
-    beside = {what: {name: found[k] for name, found in worst.items()} for k, what in enumerate(names)}
+    beside = {what: {name: points[k] for name, points in worst.items()} for k, what in enumerate(names)}
     return {"share of the plane with Vdot > 0": share} | beside
 
 
@@ -787,13 +787,13 @@ def tolerance(runs):
 
 def growth(runs, law):
     """Return the growth of max |u|, far off against nearer or late against early, as a share; worst plant."""
-    found, samples = [], round(HELD / CONTROL_PERIOD)
+    rises, samples = [], round(HELD / CONTROL_PERIOD)
     for plant in runs.plants:
         bound, start = runs.law(plant, law), scale(runs.scenario(plant, law))
         near, far = (np.abs(commanded(bound, np.full(2 * samples, factor * start))) for factor in (10.0, 100.0))
         sooner = near[:samples].max()
-        found.append(max(ratio(far[:samples].max(), sooner), ratio(near.max(), sooner)) - 1.0)
-    return max(found)
+        rises.append(max(ratio(far[:samples].max(), sooner), ratio(near.max(), sooner)) - 1.0)
+    return max(rises)
 
 
 def estimated(runs, law):

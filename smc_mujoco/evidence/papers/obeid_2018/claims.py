@@ -37,7 +37,7 @@ def limit(runs):
     """Largest |s| of the last half over eps, under d = D sin 2t with D below and above 2 sqrt(eps/h) - 1."""
     (plant,), (law,), periods = runs.plants, runs.laws, runs.values["periods"]
     eps, sides = runs.law(plant, law).gains["eps"], dict(zip(("below", "above"), runs.values["shares"], strict=True))
-    found = {}
+    measured = {}
     for side, share in sides.items():
         grid = {}
         for h in periods:
@@ -46,8 +46,8 @@ def limit(runs):
             name = f"{1e3 * h:g} ms, D = {size:.3g} N"
             grid[name] = runs.scenario(plant, law, law=adapted, control_period=h, disturbance=d)
         shares = {name: half(trace.s) / eps for name, trace in runs.traced(grid).items()}
-        found[f"{side}: largest |s| of the last half / eps"] = shares
-    return found
+        measured[f"{side}: largest |s| of the last half / eps"] = shares
+    return measured
 
 
 def predefined(runs):

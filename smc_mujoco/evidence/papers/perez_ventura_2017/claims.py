@@ -45,11 +45,11 @@ def predicted(k1, k2, lag):
 def compared(runs, law, expected):
     """Return measured amplitude and frequency over those expected of a lag, and the exponent of the amplitude."""
     lags = runs.values["lags"][QUICK if runs.quick else 0 :]
-    found = {lag: cycle(trace) for lag, trace in runs.traced({lag: behind(runs, law, lag) for lag in lags}).items()}
+    cycles = {lag: cycle(trace) for lag, trace in runs.traced({lag: behind(runs, law, lag) for lag in lags}).items()}
     return {
-        "amplitude / predicted": {f"{1e3 * lag:g} ms": a / expected(lag)[0] for lag, (a, _) in found.items()},
-        "frequency / predicted": {f"{1e3 * lag:g} ms": f / expected(lag)[1] for lag, (_, f) in found.items()},
-        "exponent of the amplitude in the ATC": exponent(lags, [amplitude for amplitude, _ in found.values()]),
+        "amplitude / predicted": {f"{1e3 * lag:g} ms": a / expected(lag)[0] for lag, (a, _) in cycles.items()},
+        "frequency / predicted": {f"{1e3 * lag:g} ms": f / expected(lag)[1] for lag, (_, f) in cycles.items()},
+        "exponent of the amplitude in the ATC": exponent(lags, [amplitude for amplitude, _ in cycles.values()]),
     }
 
 
@@ -87,9 +87,9 @@ def some_disturbance(runs):
         d = smc.Sine(bound, omega)
         for law in (relay(runs, bound), super_twisting(runs, bound * omega)):
             scenarios.append(behind(runs, law, lag, disturbance=d))
-    found = [size_and_power(trace) for trace in runs.traces(scenarios)]
+    measured = [size_and_power(trace) for trace in runs.traces(scenarios)]
     names = [f"|d| <= {bound:g} N, {1e3 * lag:g} ms" for bound, lag in cases]
-    ratios = np.divide(found[::2], found[1::2])
+    ratios = np.divide(measured[::2], measured[1::2])
     return {
         "amplitude, FOSMC / STA": dict(zip(names, ratios[:, 0], strict=True)),
         "power, FOSMC / STA": dict(zip(names, ratios[:, 1], strict=True)),
@@ -117,9 +117,9 @@ def crossover(runs):
     equal = (2.0 * MARGIN * bound / math.pi) / predicted(1.5 * math.sqrt(slope), 1.1 * slope, 1.0)[0]
     lags = [equal, equal / 2.0, equal * 2.0]
     scenarios = [behind(runs, law, lag, duration=2.0 + 150.0 * lag) for lag in lags for law in (twisting, sign)]
-    found = [cycle(trace)[0] for trace in runs.traces(scenarios)]
+    amplitudes = [cycle(trace)[0] for trace in runs.traces(scenarios)]
     names = ("at the crossover", "at half of it", "at twice of it")
-    ratios = np.divide(found[::2], found[1::2])
+    ratios = np.divide(amplitudes[::2], amplitudes[1::2])
     return {f"amplitude, STA / FOSMC, {name}": ratio for name, ratio in zip(names, ratios, strict=True)} | {
         "ATC at the crossover, s": equal
     }

@@ -44,9 +44,9 @@ def commands(record: Record, first: int) -> np.ndarray:
 
     The replay does not know the samples before its start, so that term follows from the first recorded command.
     """
-    gains, found = cascade.defaults, np.zeros(len(record["t"]) - first)
-    found[0] = record["u"][first] - gains["kv"] * gains["kp"] * (record["r"][first] - record["x"][first])
-    return found
+    gains, u = cascade.defaults, np.zeros(len(record["t"]) - first)
+    u[0] = record["u"][first] - gains["kv"] * gains["kp"] * (record["r"][first] - record["x"][first])
+    return u
 
 
 EMPS = Rig(

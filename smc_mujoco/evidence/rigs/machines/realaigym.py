@@ -37,11 +37,11 @@ SETS = {
 
 def quantities():
     """Return name -> Quantity: identified numbers, else those of model 1.0, and the boards' limit of torque."""
-    found = {
+    measured = {
         name: Quantity(IDENTIFIED.get(name, value), UNITS[name], FOUND if name in IDENTIFIED else SOURCE, 0.0)
         for name, value in MODEL_1_0.items()
     }
-    return found | {"torque_limit": Quantity(6.0, "N m", f"{SOURCE}: the boards' limit", 0.0, 12.0)}
+    return measured | {"torque_limit": Quantity(6.0, "N m", f"{SOURCE}: the boards' limit", 0.0, 12.0)}
 
 
 def plant_of(name, q):
