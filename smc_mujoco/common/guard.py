@@ -139,9 +139,9 @@ def limit() -> None:
         import resource
     except ImportError:  # Windows
         return
-    for kind, most in ((resource.RLIMIT_DATA, MEMORY), (resource.RLIMIT_FSIZE, DISK), (resource.RLIMIT_CORE, 0)):
+    for kind, maximum in ((resource.RLIMIT_DATA, MEMORY), (resource.RLIMIT_FSIZE, DISK), (resource.RLIMIT_CORE, 0)):
         with contextlib.suppress(OSError, ValueError):  # the system sets a lower bound already
-            resource.setrlimit(kind, (most, resource.getrlimit(kind)[1]))
+            resource.setrlimit(kind, (maximum, resource.getrlimit(kind)[1]))
 
 
 def run(folder: Path) -> None:

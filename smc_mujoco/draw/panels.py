@@ -481,12 +481,12 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
         ax.annotate(words, (time, 1.0), place, ("data", "axes fraction"), "offset points", **look)
 
 
-def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], held: Sequence[Sequence[int]]) -> None:
+def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], rests: Sequence[Sequence[int]]) -> None:
     """Draw v over x of traces, and of a reference that moves.
 
-    A ring marks the start of a trace, a diamond a sample in `held`, at which friction holds it.
+    A ring marks the start of a trace, a diamond a sample in `rests`, at which friction holds it.
     """
-    drawn = list(zip(traces, colours, held, phase_dashes(traces), strict=True))
+    drawn = list(zip(traces, colours, rests, phase_dashes(traces), strict=True))
     for trace, colour, samples, dash in reversed(drawn):
         for x, v in zip(trace.x.T[light(trace.x.shape[1])], trace.v.T[light(trace.x.shape[1])], strict=True):
             ax.plot(

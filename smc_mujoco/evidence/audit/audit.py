@@ -119,9 +119,9 @@ def audit(
     for name in sets(audited, gains, quick):
         runs = Runs(audited, name, quick, substitute, threads, rows, shared)
         for entry in sorted(entries, key=lambda entry: entry.late):
-            own = runs.of(entry)
-            evidence[entry.id][name] = measure(entry, own)
-            used[entry.id][name] = own.used
+            its_runs = runs.of(entry)
+            evidence[entry.id][name] = measure(entry, its_runs)
+            used[entry.id][name] = its_runs.used
             report(1)
     if quick:
         instead = {entry.id: f"; here, quickly, {entry.quick}" if entry.quick else "" for entry in entries}
@@ -233,9 +233,9 @@ def _evidence(entry: Entry, returned: Any, met: Collection[str]) -> Iterator[Che
             cure = f"its measures are {', '.join(str(one) for one, cases in values.items() if cases) or 'none'}"
             raise ScenarioError(f"it returns no {threshold.measure!r}, of which holds_if is: {cure}")
         yield from threshold.evidence(values[threshold.measure])
-    asked = {threshold.measure for threshold in entry.thresholds}
+    with_threshold = {threshold.measure for threshold in entry.thresholds}
     for measure, cases in values.items():
-        for case, value in cases.items() if measure not in asked else ():
+        for case, value in cases.items() if measure not in with_threshold else ():
             yield Beside(f"{case}: {measure}" if case else measure, value)
 
 

@@ -108,10 +108,12 @@ def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
 def _run(scenario: Scenario) -> dict[str, Any]:
     """Return what a reader wants to know of a run; its name is a hash of all that is."""
     plant, suite = scenario.plant, plants().get(scenario.plant.name)
-    own = {name: value for name, value in plant.parameters.items() if not suite or suite.parameters.get(name) != value}
+    changed = {
+        name: value for name, value in plant.parameters.items() if not suite or suite.parameters.get(name) != value
+    }
     return {
         "plant": plant.name,
-        "parameters": own | ({"n": plant.n} if not suite or plant.n != suite.n else {}),  # other than the suite's
+        "parameters": changed | ({"n": plant.n} if not suite or plant.n != suite.n else {}),  # other than the suite's
         "law": scenario.law.name,
         "gains": dict(scenario.law.gains),
         "condition": condition(scenario),

@@ -47,8 +47,8 @@ def survivors(
         one claim, set of gains and mutant. Those of a claim that is lost already count as done.
     """
     audited = as_paper(paper)
-    asked = {entry.id: entry for entry in wanted(audited, only) if not entry.immune}
-    left = dict(asked)
+    tested = {entry.id: entry for entry in wanted(audited, only) if not entry.immune}
+    left = dict(tested)
     names = sets(audited, gains, quick)
 
     def measured(entries: Iterable[Entry], law: str, mutant: str) -> Iterator[tuple[str, str, Evidence | None]]:
@@ -69,7 +69,7 @@ def survivors(
     intact = {(id, name): evidence for id, name, evidence in measured(left.values(), "", "")}
     holding = {id: any(any(sentences(intact[id, name] or [], left[id].quantifier)) for name in names) for id in left}
     for mutant in MUTANTS:
-        report((len(asked) - len(left)) * len(names))
+        report((len(tested) - len(left)) * len(names))
         for law in sorted({first_law(entry) for entry in left.values()}):
             about = [entry for entry in left.values() if first_law(entry) == law]
             for id, name, evidence in measured(about, law, mutant):
@@ -86,8 +86,8 @@ def evaluations(
 ) -> int:
     """Return the number of evaluations that `survivors` reports, for a progress bar."""
     audited = as_paper(paper)
-    asked = [entry for entry in wanted(audited, only) if not entry.immune]
-    return len(asked) * len(sets(audited, gains, quick)) * (1 + len(MUTANTS))
+    tested = [entry for entry in wanted(audited, only) if not entry.immune]
+    return len(tested) * len(sets(audited, gains, quick)) * (1 + len(MUTANTS))
 
 
 def first_law(entry: Entry) -> str:

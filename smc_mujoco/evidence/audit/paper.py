@@ -234,8 +234,8 @@ class Home(NamedTuple):
 @functools.cache
 def catalogue() -> Catalogue[Home]:
     """Return where every paper is that ships, or comes with another package, by name."""
-    own = {name: Home(folder, f"{SHIPPED}.{name}") for name, folder in shipped().items()}
-    return Catalogue(own, added("smc_mujoco.papers", _of_package))
+    of_suite = {name: Home(folder, f"{SHIPPED}.{name}") for name, folder in shipped().items()}
+    return Catalogue(of_suite, added("smc_mujoco.papers", _of_package))
 
 
 def _of_package(point: EntryPoint) -> Home:
@@ -416,14 +416,14 @@ def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Pa
     values.setdefault("read", paper.read)
     names: dict[str, Any] = {field: _names(field, values.pop(field, [])) for field in ("plants", "laws", "conditions")}
     function = find(f"function of {CODE}", values.pop("function"), functions)
-    asked = values.pop("holds_if")
-    if not asked:
+    condition = values.pop("holds_if")
+    if not condition:
         raise ScenarioError(f"it has no threshold: write holds_if, {OF_CLAIM['holds_if'][1]}")
-    thresholds = () if isinstance(asked, str) else tuple(_thresholds(asked))
+    thresholds = () if isinstance(condition, str) else tuple(_thresholds(condition))
     texts: dict[str, Any] = {"measured": _text((inspect.getdoc(function) or "").partition("\n\n")[0]).rstrip(".")}
     fields = _fields("runs", values.pop("runs", ""))
     quantifier = find("quantifier", values.pop("quantifier", "named"), QUANTIFIERS)
-    words = values.pop("words", asked if isinstance(asked, str) else ", ".join(map(str, thresholds)))
+    words = values.pop("words", condition if isinstance(condition, str) else ", ".join(map(str, thresholds)))
     entry = Entry(
         **texts | values | names,
         holds_if=words,
@@ -488,9 +488,9 @@ def _check_names(entry: Entry, paper: Paper) -> None:
                 paper.law(plant, law, gains)
 
 
-def _thresholds(asked: Mapping[str, Any]) -> Iterator[Threshold]:
+def _thresholds(conditions: Mapping[str, Any]) -> Iterator[Threshold]:
     """Yield the thresholds in a table: measure -> text, or {asked, sentence}."""
-    for measure, one in asked.items():
+    for measure, one in conditions.items():
         if isinstance(one, dict):
             for field in one:
                 find(f"field of the threshold of {measure!r}", field, dict.fromkeys(("asked", "sentence")))
@@ -501,19 +501,19 @@ def _thresholds(asked: Mapping[str, Any]) -> Iterator[Threshold]:
 
 def _sets(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return set of gains -> plant -> law -> gains; None for a set of the suite."""
-    own = dict(_table(data, "gains"))
-    for key in own:
+    tables = dict(_table(data, "gains"))
+    for key in tables:
         if key in SETS:
             raise ScenarioError(f"gains.{key} is a set of the suite: give yours another name, such as gains.paper")
-    listed = _names("sets", data.get("sets", list(own) or ["default"]))
+    listed = _names("sets", data.get("sets", list(tables) or ["default"]))
     sets: dict[str, Any] = {}
     for key in listed or ["default"]:
-        if key not in own:
-            find("set of gains in sets", key, dict.fromkeys((*own, *SETS)))
+        if key not in tables:
+            find("set of gains in sets", key, dict.fromkeys((*tables, *SETS)))
             sets[key] = None
             continue
         of_set: dict[str, dict[str, Any]] = {}
-        for law_or_plant, values in _typed(f"gains.{key}", own[key], dict, "a table").items():
+        for law_or_plant, values in _typed(f"gains.{key}", tables[key], dict, "a table").items():
             one = _typed(f"gains.{key}.{law_or_plant}", values, dict, "a table of gains")
             if one and all(isinstance(value, dict) for value in one.values()):
                 of_set[law_or_plant] = one

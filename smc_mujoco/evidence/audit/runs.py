@@ -96,21 +96,21 @@ class Runs:
 
     def of(self, entry: Entry) -> "Runs":
         """Return these runs as a claim sees them: with its names and fields, and none used yet."""
-        own = copy.copy(self)
-        own._entry, own.used, own.asked = entry, {}, set()
-        return own
+        runs = copy.copy(self)
+        runs._entry, runs.used, runs.asked = entry, {}, set()
+        return runs
 
     def at(self, law: str, gains: Mapping[str, float], quick: bool) -> "Runs":
         """Return the claim's runs with some gains of a law in place of the set's; they count as used by the claim."""
-        own = copy.copy(self)
-        own._searched, own.quick = {law: dict(gains)}, quick
-        return own
+        runs = copy.copy(self)
+        runs._searched, runs.quick = {law: dict(gains)}, quick
+        return runs
 
     def on(self, plant: str) -> "Runs":
         """Return the claim's runs on one of its plants; they count as used by the claim."""
-        own = copy.copy(self)
-        own._entry = self._entry and dataclasses.replace(self._entry, plants=(plant,))
-        return own
+        runs = copy.copy(self)
+        runs._entry = self._entry and dataclasses.replace(self._entry, plants=(plant,))
+        return runs
 
     @property
     def plants(self) -> tuple[str, ...]:

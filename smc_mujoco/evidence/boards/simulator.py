@@ -124,11 +124,11 @@ def cases(key: int = 0) -> list[Case]:
         for factor in map(float, ramp):
             changed = {parameter: factor * MODEL_1_1[parameter]}
             model(name, factor, **changed)
-    for name, most in (("b1", 0.1), ("b2", 0.1), ("cf1", 0.2), ("cf2", 0.2)):
-        for value in map(float, np.linspace(-most, most, LEVELS)):
+    for name, largest in (("b1", 0.1), ("b2", 0.1), ("cf1", 0.2), ("cf2", 0.2)):
+        for value in map(float, np.linspace(-largest, largest, LEVELS)):
             model(name, value, **{name: value})
-    for test, most in (("velocity_noise", 0.5), ("torque_noise", 1.1)):
-        for level, value in enumerate(map(float, np.linspace(0.0, most, LEVELS))):
+    for test, largest in (("velocity_noise", 0.5), ("torque_noise", 1.1)):
+        for level, value in enumerate(map(float, np.linspace(0.0, largest, LEVELS))):
             for repeat in range(REPEATS):
                 noise: dict[str, Any] = {test: value}
                 made.append(Case(test=test, name=test, value=value, seed=level * REPEATS + repeat, **noise))
@@ -185,7 +185,7 @@ def robustness(scenario: Scenario, report: Callable[[float, float], None] | None
 def upright(state: np.ndarray) -> bool:
     """Return whether a state (q1, q2, q1', q2') is within WITHIN of upright and at rest."""
     angles = [math.remainder(state[0] - math.pi, 2.0 * math.pi), math.remainder(state[1], 2.0 * math.pi)]
-    return all(abs(value) < most for value, most in zip((*angles, *state[2:]), WITHIN, strict=True))
+    return all(abs(value) < limit for value, limit in zip((*angles, *state[2:]), WITHIN, strict=True))
 
 
 class Machine:

@@ -62,7 +62,7 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
         raise ScenarioError(f"certify is about a Scenario, not {shown(scenario)}: give smc.Scenario(...)")
     _check(scenario)
     plant, law = scenario.plant, scenario.law
-    d0, rate = (own + more for own, more in zip(_bounds(scenario), _class(within), strict=True))
+    d0, rate = (bound + more for bound, more in zip(_bounds(scenario), _class(within), strict=True))
     u_max = scenario.limits[0]
     values = {name: float(value) for name, value in vars(plant.values(scenario.mismatch)).items()}
     document: dict[str, Any] = {
@@ -219,12 +219,12 @@ def _restoring(loop: Loop, terms: list[float]) -> Iterator[dict]:
     tail = max(tail, 2.0 * math.pi if A else 0.0)
     x = np.linspace(0.0, 2.0 * tail, 20001)[1:]
     share = 1.0 - loop.phi(x) / loop.sigma(loop.c * x)
-    least = min(1.0, float(share.min()), 1.0 if loop.switches else 1.0 - (A + B) / (loop.steep * loop.c))
-    if least < 0.0 or C > 0.0 or (C == 0.0 and B > 0.0):
+    smallest = min(1.0, float(share.min()), 1.0 if loop.switches else 1.0 - (A + B) / (loop.steep * loop.c))
+    if smallest < 0.0 or C > 0.0 or (C == 0.0 and B > 0.0):
         at = float(x[share.argmin()]) if share.min() < 0.0 else _far(loop)
         yield _condition("restoring", _share(loop, at), at=at)
         return
-    margin = least - TIGHT * max(abs(least), 0.1) * (least < 1.0)
+    margin = smallest - TIGHT * max(abs(smallest), 0.1) * (smallest < 1.0)
     for count in BOXES:
         edges = [float(f"{edge:.9g}") for edge in tail * np.linspace(0.0, 1.0, count + 1) ** 2]
         yield _condition("restoring", margin, boxes=[*map(list, itertools.pairwise(edges)), [edges[-1], None]])

@@ -157,8 +157,8 @@ class _Grid:
         self.W[0] = np.maximum(self.W[0], self.W[0, ::-1])
         self.corners = np.stack([self.W[:-1, :-1], self.W[1:, :-1], self.W[:-1, 1:], self.W[1:, 1:]])
         self.low, self.high = self.corners.min(0), self.corners.max(0)
-        least, most = falls(loop, self.x, s, self.corners)
-        self.bad = most >= -SLACK * (most - least) - 1e-7
+        lowest, highest = falls(loop, self.x, s, self.corners)
+        self.bad = highest >= -SLACK * (highest - lowest) - 1e-7
         self.sure = np.zeros_like(self.bad)
         self.border = min(self.W[-1].min(), self.W[:, 0].min(), self.W[:, -1].min())
         self.limit = 1.0
@@ -257,7 +257,7 @@ def _smooth(W: np.ndarray, count: int, switches: bool) -> np.ndarray:
 def _sweep(W, open_, cells, shares, decay):
     """Update W in four orders of its nodes, and return its largest change."""
     nx, ns = W.shape
-    most = 0.0
+    change = 0.0
     for order in range(4):
         for a in range(nx):
             i = a if order % 2 == 0 else nx - 1 - a
@@ -275,9 +275,9 @@ def _sweep(W, open_, cells, shares, decay):
                         value = (1.0 - f) * low + f * ((1.0 - g) * W[p + 1, q] + g * W[p + 1, q + 1])
                     worst = max(worst, value)
                 new = 1.0 - decay[i, j] * (1.0 - worst)
-                most = max(most, abs(new - W[i, j]))
+                change = max(change, abs(new - W[i, j]))
                 W[i, j] = new
-    return most
+    return change
 
 
 def falls(loop: Loop, x: np.ndarray, s: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -108,8 +108,8 @@ def claims(
                 or ["Every claim is lost by a mutant of its law, or says why it cannot be."]
             )
         )
-        asked = [about.claims[claim.id] for claim in verdicts]
-        for entry in [entry for entry in asked if entry.immune]:
+        entries = [about.claims[claim.id] for claim in verdicts]
+        for entry in [entry for entry in entries if entry.immune]:
             terminal.note(f"claim {entry.id} cannot be lost: {entry.immune}", wrap=True)
     notes = [f"{terminal.seconds:.0f} s", "quick: coarser grids than the claims say" * quick]
     notes.append(f"wrote {printable(', '.join(map(str, written)))}" if written else "")

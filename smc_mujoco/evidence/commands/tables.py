@@ -38,8 +38,8 @@ COLOURS = {
 MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}
 
 
-def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], own: Collection[str]) -> Table:
-    """Return RealAIGym's simulation board or robustness board of a robot, with the rows named in `own` in bold."""
+def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], bold: Collection[str]) -> Table:
+    """Return RealAIGym's simulation board or robustness board of a robot, with the rows named in `bold` in bold."""
     tests = isinstance(rows[0], RobustnessRow)
     title, heads = BOARDS["robustness" if tests else "simulation"]
     columns = [Column(head, justify="right") for head in heads]
@@ -48,7 +48,7 @@ def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], own: Collec
         values = row[1:8] if tests else row[1:7]
         digits = (1,) * 6 + (3,) if tests else (2, 2, 2, 3, 1, 3)
         cells = [f"{value:.{places}f}" for value, places in zip(values, digits, strict=True)]
-        table.add_row(row.name, *cells, style="bold" if row.name in own else None)
+        table.add_row(row.name, *cells, style="bold" if row.name in bold else None)
     return table
 
 

@@ -143,21 +143,21 @@ def losses(by_cell: Cells, metrics: Sequence[str], law: str = words.PAPER) -> li
     """Return the cells in which another law is better than this one, worst first."""
     lost: list[Loss] = []
     for (plant, condition, metric), scores in by_cell.items():
-        own = next((s for s in scores if s.law == law), None)
-        if metric not in metrics or own is None or not own.beaten:
+        score = next((s for s in scores if s.law == law), None)
+        if metric not in metrics or score is None or not score.beaten:
             continue
         best = min((s for s in scores if s.best), key=lambda s: s.median, default=None)
         if best is not None and math.isfinite(best.median):
-            least = max(best.floor, ROUNDING)
+            resolution = max(best.floor, ROUNDING)
             loss = Loss(
                 metric=metric,
                 plant=plant,
                 condition=condition,
-                own=own.median,
+                own=score.median,
                 rival=best.median,
                 law=best.law,
-                times=own.median / max(best.median, least),
-                rounded=best.median < least,
+                times=score.median / max(best.median, resolution),
+                rounded=best.median < resolution,
                 settles=settles(by_cell, plant, condition, best.law),
             )
             lost.append(loss)
@@ -203,8 +203,8 @@ def attacked(findings: "Findings") -> dict[str, WorstCases]:
 def robust(attacked: Mapping[str, WorstCases]) -> str:
     """Return which law has the smallest error in the worst case on each plant, and where it is not first by median."""
     first = [rows[0] for rows in attacked.values()]
-    least = [min(rows, key=lambda one: one.median) for rows in attacked.values()]
-    others = [one for one in least if one not in first]
+    lowest = [min(rows, key=lambda one: one.median) for rows in attacked.values()]
+    others = [one for one in lowest if one not in first]
     text = f"smallest rms error found (in brackets its median): {'; '.join(map(_both, first))}."
     return text + f" First by the median alone: {'; '.join(map(_both, others))}." * bool(others)
 
@@ -218,10 +218,10 @@ def _both(one: WorstCase) -> str:
 
 def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
     """Return the paper's verdict in one line: how its law does, and how many of its claims hold."""
-    own = [row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER]
+    of_paper = [row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER]
     parts = []
-    if own:
-        of, lost, alone = (sum(getattr(row, name) for row in own) for name in ("of", "lost", "alone"))
+    if of_paper:
+        of, lost, alone = (sum(getattr(row, name) for row in of_paper) for name in ("of", "lost", "alone"))
         parts.append(f"its observer-free law is beaten in {lost} of {of} comparisons and wins in {alone or 'none'}")
     if findings.claims:
         parts.append(f"of its {len(findings.claims)} checked claims, {_verdicts(findings)}")
@@ -301,25 +301,25 @@ def _settled(findings: "Findings") -> str:
     share = {place.law: place.median for place in overall(findings, "settles")}
     if not share:
         return ""
-    least, most = min(share, key=share.__getitem__), max(share, key=share.__getitem__)
-    text = "Every run settles" if share[least] == 1 else f"{100 * share[least]:.0f}\u00a0% of every law’s runs settle"
-    if f"{share[least]:.2f}" != f"{share[most]:.2f}":
-        text = f"{words.law(least)} settles least often, in {100 * share[least]:.0f} % of its runs; a run that does "
+    worst, best = min(share, key=share.__getitem__), max(share, key=share.__getitem__)
+    text = "Every run settles" if share[worst] == 1 else f"{100 * share[worst]:.0f}\u00a0% of every law’s runs settle"
+    if f"{share[worst]:.2f}" != f"{share[best]:.2f}":
+        text = f"{words.law(worst)} settles least often, in {100 * share[worst]:.0f} % of its runs; a run that does "
         text += "not settle may still be calm"
     return f"{text}. {findings.about.failed or 'None'} of {findings.about.runs} runs failed."
 
 
 def _paper(findings: "Findings", metrics: Sequence[str]) -> str:
-    own = {metric: row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER}
-    if not own:
+    of_paper = {metric: row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER}
+    if not of_paper:
         return ""
     lost = losses(cells(findings.scores), metrics)
     beaten = f"; it is beaten in {len(lost)} comparisons, listed below, in half of them by a factor of " if lost else ""
     beaten += f"{words.number(lost[(len(lost) - 1) // 2].times)} or more" if lost else ""
     return (
         "The paper’s observer-free law leads, or is level with what leads, in "
-        f"{joined([f'{row.best} on {words.metric(metric)}' for metric, row in own.items()])}, "
-        f"of {own[metrics[0]].of} cells each{beaten}."
+        f"{joined([f'{row.best} on {words.metric(metric)}' for metric, row in of_paper.items()])}, "
+        f"of {of_paper[metrics[0]].of} cells each{beaten}."
     )
 
 

@@ -91,10 +91,10 @@ def fronts(drawn: "Sequence[Front]") -> Figure:
     data: list[dict] = []
     layout: dict[str, Any] = {"annotations": plant_titles(grid, plants)}
     for panel, plant in zip(grid, plants, strict=True):
-        own = [front for front in drawn if front.plant == plant]
-        data += [trace | panel.trace for front in own for trace in _front(front)]
-        across = _span([v for f in own for v in (*f.variation, f.chosen[1])], 1e-3)
-        up = _span([v for f in own for v in (*f.tracking, f.chosen[0])], None)
+        on_plant = [front for front in drawn if front.plant == plant]
+        data += [trace | panel.trace for front in on_plant for trace in _front(front)]
+        across = _span([v for f in on_plant for v in (*f.variation, f.chosen[1])], 1e-3)
+        up = _span([v for f in on_plant for v in (*f.tracking, f.chosen[0])], None)
         x = POWERS | {"title": {"text": "variation, 1/s"}, "range": across, "tickangle": 0}
         y = POWERS | {"dtick": 1, "range": up}
         y |= {"title": {"text": "tracking, s²"}} if panel is grid[0] else {}
@@ -109,14 +109,14 @@ def fronts(drawn: "Sequence[Front]") -> Figure:
     return figure(data, layout, 380 + legend, (60, 12, 62 + legend, 54), showlegend=True)
 
 
-def _span(values: Sequence[float], least: float | None) -> list[float]:
+def _span(values: Sequence[float], floor: float | None) -> list[float]:
     """Return the ends of a logarithmic axis, in decades.
 
-    It shows all values down to `least` of the largest, or up to 1000 times the smallest where that is None.
+    It shows all values down to `floor` of the largest, or up to 1000 times the smallest where that is None.
     """
     above = [v for v in values if v > 0] or [1.0]
-    low, high = (min(above), min(max(above), 1e3 * min(above))) if least is None else (0.0, max(above))
-    low = max(low, min(above), (least or 0.0) * high)
+    low, high = (min(above), min(max(above), 1e3 * min(above))) if floor is None else (0.0, max(above))
+    low = max(low, min(above), (floor or 0.0) * high)
     return [math.log10(low) - 0.15, math.log10(high) + 0.15]
 
 
@@ -146,14 +146,14 @@ def margins(drawn: "Sequence[Margin]", kind: str) -> Figure:
     layout: dict[str, Any] = {"annotations": plant_titles(grid, plants)}
     for panel, plant in zip(grid, plants, strict=True):
         here = [margin for margin in drawn if (margin.plant, margin.kind) == (plant, kind)]
-        _, _, most = scale([v for m in here for v in (m.value, m.theory or 0.0)], False)
-        data += [trace | panel.trace for margin in here for trace in _margin(margin, most)]
-        x = {"range": [-0.03 * most, most], "nticks": 4, "rangemode": "tozero"}
+        _, _, end = scale([v for m in here for v in (m.value, m.theory or 0.0)], False)
+        data += [trace | panel.trace for margin in here for trace in _margin(margin, end)]
+        x = {"range": [-0.03 * end, end], "nticks": 4, "rangemode": "tozero"}
         layout |= panel.axes(x, law_axis(laws, panel is grid[0]))
     return figure(data, layout, 98 + 19 * len(laws), (172, 14, 42, 28))
 
 
-def _margin(margin: "Margin", most: float) -> list[dict[str, Any]]:
+def _margin(margin: "Margin", end: float) -> list[dict[str, Any]]:
     colour, name = words.colour(margin.law), _named(margin.law)
     common = {"type": "scatter", "mode": "markers", "y": [name], "cliponaxis": False}
     if math.isnan(margin.value):
@@ -161,7 +161,7 @@ def _margin(margin: "Margin", most: float) -> list[dict[str, Any]]:
         hover = f"<b>{name}</b><br>not within bounds without any, either<extra></extra>"
         return [common | {"x": [0.0], "marker": cross, "hovertemplate": hover}]
     unit = words.either([margin.unit])
-    beyond, at = margin.value >= margin.searched, min(margin.value, most)
+    beyond, at = margin.value >= margin.searched, min(margin.value, end)
     marker = {"size": 10, "color": colour, "symbol": "triangle-right" if beyond else "circle"}
     hover = f"<b>{name}</b><br>{'at least ' if beyond else ''}{_quantity(margin.value, unit)}"
     hover += f" (to {words.number(margin.resolution)})<extra></extra>"

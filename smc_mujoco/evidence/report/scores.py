@@ -89,10 +89,10 @@ def scores(table: "Table", relevant: float = RELEVANT) -> tuple[Score, ...]:
         ((plant, condition),) = group.blocks
         (ran,) = paired_runs.scenarios(table, group)
         for metric in words.COLUMNS:
-            own = group.scores(by_row[metric])
-            for law in sorted(own.values, key=order.index):
+            by_law = group.scores(by_row[metric])
+            for law in sorted(by_law.values, key=order.index):
                 block = blocks[plant, condition, metric]
-                interval = median_of(own.values[law], samples=samples_of(own.sets[law]))
+                interval = median_of(by_law.values[law], samples=samples_of(by_law.sets[law]))
                 wins = block.winner == law
                 score = Score(
                     plant=plant,
@@ -124,8 +124,10 @@ def places(table: "Table", relevant: float = RELEVANT) -> tuple[Place, ...]:
     by_law: dict[tuple[str, str], list[Place]] = {}
     for place in in_blocks:
         by_law.setdefault((place.metric, place.law), []).append(place)
-    most = {metric: max(len(own) for (name, _), own in by_law.items() if name == metric) for metric, _ in by_law}
-    return (*in_blocks, *(_overall(own) for (metric, _), own in by_law.items() if len(own) == most[metric]))
+    blocks = {
+        metric: max(len(of_law) for (name, _), of_law in by_law.items() if name == metric) for metric, _ in by_law
+    }
+    return (*in_blocks, *(_overall(of_law) for (metric, _), of_law in by_law.items() if len(of_law) == blocks[metric]))
 
 
 def _places(board: Board) -> list[Place]:

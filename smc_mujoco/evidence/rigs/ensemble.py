@@ -50,10 +50,10 @@ def runs(
     scenarios, around = [], starts or Starts(x0=rig.x0)
     for name, member in rig.members().items():
         fields: dict[str, Any] = member.machine(Values(**member.values))
-        own = {key: value for key, value in fields.items() if key not in BY_STARTS}
-        plant = own.pop("plant")
+        kept = {key: value for key, value in fields.items() if key not in BY_STARTS}
+        plant = kept.pop("plant")
         base = grid([plant], chosen, ["nominal"], seeds, gains, duration, around)
-        free: dict[str, Any] = {"u_max": None, "physics_step": None} | own
+        free: dict[str, Any] = {"u_max": None, "physics_step": None} | kept
         scenarios += [dataclasses.replace(scenario, **free).named(name) for scenario in base]
     return scenarios
 

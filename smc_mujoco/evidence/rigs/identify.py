@@ -176,15 +176,15 @@ def _of_plant(plant: Plant, base: Scenario | None) -> Rig:
     own = {}
     if base is not None:
         own = {name: getattr(base, name) for name in OF_RUN if getattr(base, name) is not None}
-    least = dict.fromkeys(plant.parameters, -np.inf)
-    least |= dict.fromkeys((FRICTIONS | INERTIAS | {*plant.dry, *plant.added}) & set(plant.parameters), 0.0)
-    least |= dict.fromkeys(plant.positive, 1e-6)
+    lower = dict.fromkeys(plant.parameters, -np.inf)
+    lower |= dict.fromkeys((FRICTIONS | INERTIAS | {*plant.dry, *plant.added}) & set(plant.parameters), 0.0)
+    lower |= dict.fromkeys(plant.positive, 1e-6)
     ends = column_ends(plant)
     return Rig(
         name=plant.name,
         label=plant.label or plant.name,
         quantities={
-            name: Quantity(value, "", "nominal value of the plant", least[name])
+            name: Quantity(value, "", "nominal value of the plant", lower[name])
             for name, value in plant.parameters.items()
         },
         machine=lambda q: own | {"plant": dataclasses.replace(plant, parameters=vars(q))},

@@ -61,14 +61,14 @@ class Filter:
 
 def times(data: Record, columns: Columns) -> np.ndarray:
     """Return the times at which torques are compared, s."""
-    own = Filter(data, columns)
-    return own.inner(data[columns.time][:: own.stride])
+    filtered = Filter(data, columns)
+    return filtered.inner(data[columns.time][:: filtered.stride])
 
 
 def measured(data: Record, columns: Columns) -> Record:
     """Return the recorded torque of each joint, below CUTOFF, N m."""
-    own = Filter(data, columns)
-    return {name: own.low(own.cubic(name)) for name in columns.torque}
+    filtered = Filter(data, columns)
+    return {name: filtered.low(filtered.cubic(name)) for name in columns.torque}
 
 
 def long_enough(data: Record, columns: Columns) -> bool:
@@ -79,13 +79,13 @@ def long_enough(data: Record, columns: Columns) -> bool:
 
 def torques(plant: Plant, data: Record, columns: Columns) -> Record:
     """Return the torque of each joint in the measured motion, below CUTOFF, N m, by MuJoCo's inverse dynamics."""
-    own, model = Filter(data, columns), plant.load()
+    filtered, model = Filter(data, columns), plant.load()
     state, joints, dofs = mujoco.MjData(model), joint_ids(model), dof_ids(model)
-    x, v, a = (np.column_stack([own.cubic(name, order) for name in columns.x]) for order in range(3))
+    x, v, a = (np.column_stack([filtered.cubic(name, order) for name in columns.x]) for order in range(3))
     forces = np.empty_like(x)
     at = model.jnt_qposadr[joints]
     for k in range(len(x)):
         state.qpos[at], state.qvel[dofs], state.qacc[dofs] = x[k], v[k], a[k]
         mujoco.mj_inverse(model, state)
         forces[k] = state.qfrc_inverse[dofs]
-    return {name: own.low(forces[:, i]) for i, name in enumerate(columns.torque)}
+    return {name: filtered.low(forces[:, i]) for i, name in enumerate(columns.torque)}

@@ -101,8 +101,8 @@ def load(path: str | os.PathLike[str], names: Mapping[str, str] | None = None) -
 
 def _npz(file: Path) -> Record:
     """Return the columns of an npz file; none if it is a saved trace."""
-    with file.open("rb") as opened, np.load(opened) as held:
-        return {} if "about" in held else {name: held[name] for name in held}
+    with file.open("rb") as opened, np.load(opened) as arrays:
+        return {} if "about" in arrays else {name: arrays[name] for name in arrays}
 
 
 def _csv(file: Path) -> Record:

@@ -231,10 +231,12 @@ class Replays:
         if not (plain := rig.repeated(self._part(0), rounded=False)).realistic:
             return False
         self.steps = _steps(plain, 0)
-        own, coarse, fine = (self._replayed([rig], [point], _steps(plain, k))[0] for k in (0, halvings - 1, halvings))
+        plain_steps, coarse, fine = (
+            self._replayed([rig], [point], _steps(plain, k))[0] for k in (0, halvings - 1, halvings)
+        )
         self.corrections = [
             {name: 2.0 * b[name] - a[name] - values for name, values in each.items()}
-            for each, a, b in zip(own, coarse, fine, strict=True)
+            for each, a, b in zip(plain_steps, coarse, fine, strict=True)
         ]
         return True
 

@@ -214,8 +214,8 @@ class Rig:
         """
         if law is None and self.controller is None:
             raise ScenarioError(f"the controller of {self.name} is not known: give a law")
-        own: dict[str, Any] = {"law": law or self.controller}
-        return Scenario(**self.machine(Values(**self.values)) | own | fields)
+        controlled: dict[str, Any] = {"law": law or self.controller}
+        return Scenario(**self.machine(Values(**self.values)) | controlled | fields)
 
     def replay(
         self,

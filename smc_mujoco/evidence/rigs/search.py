@@ -150,9 +150,9 @@ def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
     costs = np.array([[cost([rows]) for rows in one] for one in replays.residuals(trials)])
     reached = []
     for i, group in enumerate(groups):
-        own = costs[i * size : (i + 1) * size]
-        states = [group[variant].states[k] for k, variant in enumerate(own.argmin(axis=0))]
-        reached.append((Point(group[0].values, np.array(states)), float(own.min(axis=0).sum())))
+        of_length = costs[i * size : (i + 1) * size]
+        states = [group[variant].states[k] for k, variant in enumerate(of_length.argmin(axis=0))]
+        reached.append((Point(group[0].values, np.array(states)), float(of_length.min(axis=0).sum())))
     return min(reached, key=lambda each: each[1])
 
 

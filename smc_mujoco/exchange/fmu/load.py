@@ -377,8 +377,8 @@ def _without_meaning(file: str, strange: Sequence[str], known: Mapping[str, Any]
     meaning = [
         f"say what {'they are' if some else 'it is'}, variables={{'x': {n!r}}} (--variables x={n}), or" for n in real
     ]
-    held = strange[-1]
-    hold = f"hold {'them' if some else 'it'}, constants={{{held!r}: 0.0}} (--constants {held}=0)"
+    last = strange[-1]
+    hold = f"hold {'them' if some else 'it'}, constants={{{last!r}: 0.0}} (--constants {last}=0)"
     return ScenarioError(" ".join([f"{what} nothing that a law measures:", *meaning, hold]))
 
 
@@ -408,8 +408,8 @@ def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
         if not ours.isidentifier() or ours.startswith("_") or ours in gains or math.isnan(start):
             continue
         start = math.copysign(math.inf, start) if abs(start) >= UNBOUNDED else start
-        least = math.nan if variable.min is None else float(variable.min)
-        gains[ours] = variable.name, Gain(start, nonnegative=least == 0.0)
+        lower = math.nan if variable.min is None else float(variable.min)
+        gains[ours] = variable.name, Gain(start, nonnegative=lower == 0.0)
     return gains
 
 

@@ -50,15 +50,15 @@ def live(
     """
     names = [plants] if isinstance(plants, str | Plant) else taken("plants", plants)
     chosen = known.checked(names or PLANTS)
-    own = [_own(law) for law in (listed_laws(laws) if laws else ())]
-    functions = {("law", law.name): to_js(law) for law in own}
-    offered = list(own)
+    users = [_own(law) for law in (listed_laws(laws) if laws else ())]
+    functions = {("law", law.name): to_js(law) for law in users}
+    offered = list(users)
     for one in _library(chosen):
         with contextlib.suppress(ScenarioError):  # raised for one that has no translation, such as a law in C
             if (one.kind, one.name) not in functions:
                 functions[one.kind, one.name] = to_js(one)
                 offered.append(one)
-    page = known.facts(chosen, offered, own)
+    page = known.facts(chosen, offered, users)
     folder = _writable(Path(out))
     vendor = npm.fetched()
     shutil.copytree(PAGE, folder, dirs_exist_ok=True)

@@ -69,7 +69,7 @@ def checked(names: Sequence[str | Plant]) -> list[Plant]:
     return chosen
 
 
-def facts(chosen: Sequence[Plant], offered: Sequence[Component], own: Sequence[Component]) -> dict[str, Any]:
+def facts(chosen: Sequence[Plant], offered: Sequence[Component], users: Sequence[Component]) -> dict[str, Any]:
     """Return facts.json as a dict."""
     kinds = {kind: [one for one in offered if one.kind == kind] for kind in ("law", "surface", "estimator")}
     return {
@@ -91,8 +91,8 @@ def facts(chosen: Sequence[Plant], offered: Sequence[Component], own: Sequence[C
             "off_rail": arrows.RAIL_DISTANCE,
             "shortest": arrows.MIN_LENGTH,
         },
-        "own": [law.name for law in own],
-        "plants": {plant.name: _plant(plant, kinds, own) for plant in chosen},
+        "own": [law.name for law in users],
+        "plants": {plant.name: _plant(plant, kinds, users) for plant in chosen},
         "laws": {law.name: _component(law) | _law(law) for law in kinds["law"]},
         "surfaces": {one.name: _component(one) for one in kinds["surface"]},
         "estimators": {one.name: _component(one) for one in kinds["estimator"]},
@@ -127,14 +127,14 @@ def _law(law: Component) -> dict[str, Any]:
     }
 
 
-def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], own: Sequence[Component]) -> dict[str, Any]:
+def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], users: Sequence[Component]) -> dict[str, Any]:
     """Return the facts about a plant, with gains and ranges of the components that are offered on it."""
     model = mujoco.MjModel.from_xml_path(str(_mjcf(plant)))
     joints = [model.joint(int(joint)) for joint in joint_ids(model)]
     resolved = defaults.Scenario(plant=plant, law="none").resolved
     suited = set(laws(plant))
     offered = [law for law in kinds["law"] if (law.name in suited if law.name in laws() else fits(law, plant))]
-    gains = {law.name: _gains(law, plant, law in own) for law in offered}
+    gains = {law.name: _gains(law, plant, law in users) for law in offered}
     return {
         "label": style.plant_name(plant),
         "equation": _equation(plant),
@@ -157,16 +157,16 @@ def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], own: Sequence
         "ranges": {law.name: _ranges(law, plant, gains[law.name]) for law in offered},
         "surface_ranges": {one.name: _ranges(one, plant, one.gains) for one in kinds["surface"]},
         "estimator_ranges": {one.name: _ranges(one, plant, one.gains) for one in kinds["estimator"]},
-        "start": _opening([law.name for law in own if law.name in gains], list(gains)),
+        "start": _opening([law.name for law in users if law.name in gains], list(gains)),
         "started": max(range(plant.n), key=lambda i: abs(resolved.x0[i])),
         "beside": abs(plant.lane[0]) > abs(plant.lane[1]),
         "conditions": _conditions(plant, resolved),
     }
 
 
-def _opening(own: Sequence[str], offered: Sequence[str]) -> list[str]:
+def _opening(users: Sequence[str], offered: Sequence[str]) -> list[str]:
     """Return the names of at most two laws with which the page opens: the user's, then START, then the first ones."""
-    names = [*own, *(name for name in START if name in offered), *(name for name in offered if name != "none")]
+    names = [*users, *(name for name in START if name in offered), *(name for name in offered if name != "none")]
     return list(dict.fromkeys(names))[:2]
 
 
@@ -268,10 +268,10 @@ def _part(model: mujoco.MjModel, field: Field) -> dict[str, Any]:
     }
 
 
-def _gains(law: Component, plant: Plant, own: bool) -> dict[str, float]:
+def _gains(law: Component, plant: Plant, users: bool) -> dict[str, float]:
     """Return a law's gains on a plant: its own, or tuned ones for a law of the library that has them."""
     values = dict(law.gains)
-    if not own:
+    if not users:
         with contextlib.suppress(ScenarioError):
             values = dict(gain_sets.law(plant, law.name).gains)
     return values

@@ -238,8 +238,8 @@ def scalable(runs):
     for plant in runs.plants:
         networks = [find_plant(plant, n=n) for n in sizes]
         grid = [runs.scenario(plant, OURS, plant=one, duration=SHORT, integrator="implicitfast") for one in networks]
-        least, *times = (scores["settling_time"] for scores in runs.scores(grid))
-        ratios |= {f"{plant}, N = {n}": ratio(time, least) for n, time in zip(sizes[1:], times, strict=True)}
+        time_of_two, *times = (scores["settling_time"] for scores in runs.scores(grid))
+        ratios |= {f"{plant}, N = {n}": ratio(time, time_of_two) for n, time in zip(sizes[1:], times, strict=True)}
     return {"settling time / that of N = 2": ratios}
 
 
@@ -394,14 +394,14 @@ def globally_stable(runs):
     """Claim 20: globally asymptotically stable, any lambda > 0."""
     positions, rates, ratios = (runs.values[name] for name in ("positions", "rates", "ratios"))
     starts = [(position, rate) for position in positions for rate in ((0.0,) if runs.quick else rates)]
-    least = {name: smallest_lam(runs, name) for name in runs.plants}
-    cells = [(name, share) for name in runs.plants if least[name] > 0.0 for share in ratios]
-    lams = [(name, share * least[name]) for name, share in cells]
-    own = [(name, runs.law(name, OURS).gains["lam"]) for name in runs.plants]
-    shares = iter(converging(runs, [*lams, *own], starts))
+    smallest = {name: smallest_lam(runs, name) for name in runs.plants}
+    cells = [(name, share) for name in runs.plants if smallest[name] > 0.0 for share in ratios]
+    lams = [(name, share * smallest[name]) for name, share in cells]
+    unscaled = [(name, runs.law(name, OURS).gains["lam"]) for name in runs.plants]
+    shares = iter(converging(runs, [*lams, *unscaled], starts))
     return {
         "share that converges": {f"{name}, {share:g} of the smallest lambda": next(shares) for name, share in cells},
-        "smallest lambda": least,
+        "smallest lambda": smallest,
         "share at the set's lambda": {name: next(shares) for name in runs.plants},
     }
 
@@ -444,9 +444,9 @@ def larger_undershoot(runs):
 
 def moderate_undershoot(runs):
     """Claim 31: Van der Pol: moderate undershoot."""
-    over, asked = overshoot(runs, runs.plant, OURS), runs.thresholds["overshoot, %"]
-    what = f"{runs.plant}: overshoot of {OURS}, percentage points outside {asked.text} %"
-    checked = runs.check("overshoot, %", what, asked.distance(over))  # one: every number meets one end of the range
+    over, threshold = overshoot(runs, runs.plant, OURS), runs.thresholds["overshoot, %"]
+    what = f"{runs.plant}: overshoot of {OURS}, percentage points outside {threshold.text} %"
+    checked = runs.check("overshoot, %", what, threshold.distance(over))  # one: every number meets one end of the range
     return [checked, Beside(f"{runs.plant}: overshoot of {OURS}, %", over)]
 
 
@@ -569,10 +569,10 @@ def smooth_under_noise(runs):
     plant = runs.plant
     (trace,) = runs.traces([runs.scenario(plant, OURS, "noise")])
     std, step, share = fluctuation(trace)
-    most = command_bound(runs, plant)
+    bound = command_bound(runs, plant)
     return {
-        "standard deviation of u with noise, over min(lambda, u_max)": {plant: ratio(std, most)},
-        "largest step of u with noise, over min(lambda, u_max)": {plant: ratio(step, most)},
+        "standard deviation of u with noise, over min(lambda, u_max)": {plant: ratio(std, bound)},
+        "largest step of u with noise, over min(lambda, u_max)": {plant: ratio(step, bound)},
         "share of u above 50 Hz with noise": {plant: share},
         "share of u above 50 Hz with noise, over the whole run": {plant: runs.score(plant, OURS, "noise")["hf_share"]},
     }

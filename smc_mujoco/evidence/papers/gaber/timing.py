@@ -30,7 +30,7 @@ def nanoseconds(laws: Mapping[str, Component], quick: bool = False) -> dict[str,
     functions = {
         name: cfunctions.compile_component(law) for name, law in laws.items()
     }  # kept alive while their addresses are used
-    least, loop = dict.fromkeys(laws, np.inf), _loop()
+    shortest, loop = dict.fromkeys(laws, np.inf), _loop()
     for _ in range(QUICK_ROUNDS if quick else ROUNDS):
         for name, law in laws.items():
             seen, gains = np.zeros(len(AT)), np.array([*law.gains.values(), 0.0])
@@ -40,8 +40,8 @@ def nanoseconds(laws: Mapping[str, Component], quick: bool = False) -> dict[str,
             addresses = np.array([a.ctypes.data for a in arrays])
             start = time.perf_counter()
             loop(functions[name].address, seen, states, addresses)
-            least[name] = min(least[name], time.perf_counter() - start)
-    return {name: 1e9 * seconds / CALLS for name, seconds in least.items()}
+            shortest[name] = min(shortest[name], time.perf_counter() - start)
+    return {name: 1e9 * seconds / CALLS for name, seconds in shortest.items()}
 
 
 @functools.cache

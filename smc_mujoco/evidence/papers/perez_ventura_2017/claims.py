@@ -131,5 +131,8 @@ def redesigned(runs):
     best = math.sqrt(16.0 * k2 / math.pi) / HALF
     laws = [runs.law(runs.plants[0], "super_twisting", k1=factor * best, k2=k2) for factor in (1.0, 0.5, 2.0)]
     scenarios = [behind(runs, law, runs.values["lag"]) for law in laws]
-    least, half, twice = (cycle(trace)[0] for trace in runs.traces(scenarios))
-    return {"amplitude with half of k1 / least": half / least, "amplitude with twice k1 / least": twice / least}
+    as_designed, half, twice = (cycle(trace)[0] for trace in runs.traces(scenarios))
+    return {
+        "amplitude with half of k1 / least": half / as_designed,
+        "amplitude with twice k1 / least": twice / as_designed,
+    }

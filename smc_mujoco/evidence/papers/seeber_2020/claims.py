@@ -51,9 +51,9 @@ def time(runs):
     scenarios = [runs.scenario(plant, law, v0=start) for law in runs.laws for start in starts]
     times = np.reshape([settled(trace, trace.v, BAND) for trace in runs.traces(scenarios)], (2, len(starts)))
     names = [f"from {start:g} m/s" for start in starts]
-    least = np.array(starts) / scenarios[0].u_max
+    shortest = np.array(starts) / scenarios[0].u_max
     return {
-        "time to |s| <= 1 mm/s / |s0| / U, conditioned": dict(zip(names, times[0] / least, strict=True)),
+        "time to |s| <= 1 mm/s / |s0| / U, conditioned": dict(zip(names, times[0] / shortest, strict=True)),
         "time, plain / conditioned": dict(zip(names, times[1] / times[0], strict=True)),
     }
 

@@ -123,9 +123,9 @@ def commands(record: Record, first: int) -> np.ndarray:
 
     arm, pendulum = (filtered(z[: first + 1])[-1] for z in (record["theta"] - record["target_theta"],
                                                            record["alpha"] - target))  # fmt: skip
-    held = (gains["kd"] * arm + gains["kd_free"] * pendulum) * lag ** -np.arange(float(n))
+    derivatives = (gains["kd"] * arm + gains["kd_free"] * pendulum) * lag ** -np.arange(float(n))
     moved = gains["kp_free"] * target[first:] + gains["kd_free"] * filtered(target[first:])
-    return record.get("feedforward", np.zeros(first + n))[first:] + held - moved
+    return record.get("feedforward", np.zeros(first + n))[first:] + derivatives - moved
 
 
 TORQUE_PER_VOLT = 5.07081e-3  # N m/V, of the quantities below
