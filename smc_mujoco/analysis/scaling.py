@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 TREND = 1.5  # ratio of the errors in one part of a run and the next above which they fall or grow; chosen
-CLOSE = 0.2  # difference of two orders up to which they agree
+ORDER_BAND = 0.2  # difference of two orders up to which they agree
 LEVEL = 0.5  # how far the local order at the shortest periods lies below theory's where an error levels off; chosen
 CONFIDENCE = 0.95  # of intervals
 QUANTITIES = ("e", "s")
@@ -51,7 +51,7 @@ class Scaling:
     @property
     def as_promised(self) -> bool:
         """Whether the order is within 0.2 of theory's."""
-        return self.theory is not None and abs(self.order - self.theory) <= CLOSE
+        return self.theory is not None and abs(self.order - self.theory) <= ORDER_BAND
 
     def __str__(self) -> str:
         if math.isnan(self.order):
@@ -212,8 +212,8 @@ def _difference(
         return []
     told = not interval[0] <= 0.0 < theory <= interval[1]
     contained = "its interval contains " + ("the promised order" if told else f"0 and {theory:.2g}: {UNTOLD}")
-    if order >= theory - CLOSE:
-        return [] if told and order <= theory + CLOSE else ["falls faster than promised" if told else contained]
+    if order >= theory - ORDER_BAND:
+        return [] if told and order <= theory + ORDER_BAND else ["falls faster than promised" if told else contained]
     seen = [text for name, text in reasons.items() if name != "always"]
     if interval[0] <= theory <= interval[1]:
         seen.append(contained)

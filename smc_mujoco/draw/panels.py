@@ -42,14 +42,14 @@ LEAVING = 0.6  # points, width of a curve that leaves its panel
 COINCIDENT = 0.02  # of a panel's height, about the width of a line: curves no farther apart are dashed in turn
 MOSTLY = 0.99  # of the samples of curves that coincide, so that controls that switch a sample apart do; chosen
 DASH = 5.0  # widths of a line
-WIDE, MAX_BANDS = 0.2, 1  # mean height of a wide band, of a panel's; more of them need a row each; chosen
+MIN_WIDE_BAND, MAX_BANDS = 0.2, 1  # mean height of a wide band, of a panel's; more of them need a row each; chosen
 VISIBLE = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
-SMALL = 0.03  # of a unit: axes with smaller values show thousandths, such as mm; chosen
+MAX_SMALL_AXIS = 0.03  # of a unit: axes with smaller values show thousandths, such as mm; chosen
 FLAT = 0.02  # of a panel's height: x that stays within it rests; chosen
 ZOOM = 1.3, 0.5  # of the time until all rest: what panels over time show, if that is less than this part of the run
 ROUNDING, DECADES = 1e-9, 20.0  # rad or m: smaller errors are drawn at it; least ratio of a logarithmic axis, chosen
 JUMP = 2.0  # a reference jumps where its rate is more than this many times the 99 % quantile; chosen
-ALIKE = {  # quantity -> the one that has its unit
+QUANTITY_OF_UNIT = {  # quantity -> the one that has its unit
     **dict.fromkeys(("spread", "e", "worst", "joint", "settling"), "x"),
     **dict.fromkeys(("largest", "applied"), "u"),
     **dict.fromkeys(("reaction", "d"), "force"),
@@ -107,7 +107,7 @@ class Panel(NamedTuple):
     def thousandths(self) -> bool:
         """Whether its axis shows thousandths of the unit, as all its values are small."""
         largest = max(map(abs, span(self.traces, self.quantity)))
-        return 0.0 < largest < SMALL and not self.unitless and self.quantity not in OF_ARMS
+        return 0.0 < largest < MAX_SMALL_AXIS and not self.unitless and self.quantity not in OF_ARMS
 
     @property
     def unitless(self) -> bool:
@@ -122,7 +122,7 @@ class Panel(NamedTuple):
         if self.quantity in ("tip", "contact") or self.unitless:
             return ""
         small = self.thousandths or self.quantity in THOUSANDTHS
-        return f" ({'m' * small}{style.units(self.group)[ALIKE.get(self.quantity, self.quantity)]})"
+        return f" ({'m' * small}{style.units(self.group)[QUANTITY_OF_UNIT.get(self.quantity, self.quantity)]})"
 
     @property
     def label(self) -> str:
@@ -572,7 +572,7 @@ def crowded(panel: Panel) -> bool:
     wide = 0
     for trace in panel.traces:
         band = columns(trace.t, trace.u, COLUMNS)
-        wide += float(np.mean(band.high.max(axis=1) - band.low.min(axis=1))) > WIDE * (high - low)
+        wide += float(np.mean(band.high.max(axis=1) - band.low.min(axis=1))) > MIN_WIDE_BAND * (high - low)
     return wide > MAX_BANDS
 
 

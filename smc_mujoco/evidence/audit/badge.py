@@ -10,7 +10,7 @@ from smc_mujoco.evidence.audit.verdict import ANSWERS, NOT_TESTABLE, PARTLY, REF
 
 COLOURS = {SUPPORTED: "#2b7a3d", PARTLY: "#8a6100", REFUTED: "#b3322b", NOT_TESTABLE: "#6a6a6a"}  # white on each: 5:1
 COLOURS |= dict.fromkeys(ANSWERS.values(), "#3d5a80")  # of a question
-SHORT = {PARTLY: "partly"}
+SHORT_WORDS = {PARTLY: "partly"}
 LABEL = "#444"
 HEIGHT, SIZE, MARGIN = 20, 11, 6  # px
 FONT = "Verdana,Geneva,DejaVu Sans,sans-serif"
@@ -28,7 +28,7 @@ def svg(name: str, claims: Sequence[Claim]) -> str:
     """Return the badge: the paper's name, and a field for each verdict that some sentence of the paper has."""
     counts = totals(claims)
     fields = [(f"claims of {name}", LABEL)]
-    fields += [(f"{count} {SHORT.get(one, one)}", COLOURS[one]) for one, count in counts.items()]
+    fields += [(f"{count} {SHORT_WORDS.get(one, one)}", COLOURS[one]) for one, count in counts.items()]
     about = f"{fields[0][0]}: {', '.join(text for text, _ in fields[1:])}"
     boxes, texts, x = [], [], 0.0
     for text, colour in fields:

@@ -19,8 +19,8 @@ from smc_mujoco.evidence.audit.paper import Allowed, Entry, failed
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.verdict import Beside, Check, Evidence
 
-SPREAD, NEAR = 6, 3  # sets of gains tried over the whole bounds, and around the best of them
-QUICK_SPREAD, QUICK_NEAR = 2, 0  # in a quick audit
+SPREAD_SETS, NEAR_SETS = 6, 3  # sets of gains tried over the whole bounds, and around the best of them
+QUICK_SPREAD_SETS, QUICK_NEAR_SETS = 2, 0  # in a quick audit
 SHRINK = 0.25  # share of the bounds, on a logarithmic scale, around the best
 DRAWS = 2000  # points drawn for gains that meet the conditions of the theorem
 
@@ -68,7 +68,7 @@ def _decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], pre
         return one.rank[0] != (entry.over == "all")
 
     def search() -> None:
-        spread, near = (QUICK_SPREAD, QUICK_NEAR) if runs.quick else (SPREAD, NEAR)
+        spread, near = (QUICK_SPREAD_SETS, QUICK_NEAR_SETS) if runs.quick else (SPREAD_SETS, NEAR_SETS)
         if any(decides(gains, True) for gains in theorem.points(theorem.allowed.bounds, spread)):
             return
         centre = best(quickly, key=lambda one: one.rank).gains

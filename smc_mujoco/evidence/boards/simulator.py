@@ -44,7 +44,7 @@ SEED = 20240  # of all random numbers; chosen before any run
 STEP, STEPS = 2e-3, 5000  # s; number of
 WITHIN = (0.35, 0.35, 1.0, 1.0)  # rad, rad, rad/s, rad/s, of upright and at rest
 LEVELS, REPEATS, PROFILES, PULSES = 21, 10, 50, 3
-GAP, WIDTH, AMPLITUDE = 1.0, (0.05, 0.1), (0.5, 5.0)  # s between pulses, s, N m
+MIN_PULSE_GAP, PULSE_WIDTH, PULSE_AMPLITUDE = 1.0, (0.05, 0.1), (0.5, 5.0)  # s between pulses, s, N m
 SCALED = {"m1r1": "r1", "I1": "I1", "m2r2": "r2", "m2": "m2", "I2": "I2"}  # what is scaled -> the parameter
 FIELDS = len(Measurement._fields)
 T, DT, LIMIT, USES, X, V, E, DE, Q, DQ, F, G, FQ, GQ = (  # places in a measurement
@@ -144,12 +144,12 @@ def cases(key: int = 0) -> list[Case]:
 
 
 def _pulses(rng: np.random.Generator) -> tuple[tuple[float, float, float], ...]:
-    """Return the pulses of the driven joint: half of those of a profile, which lie at least GAP apart."""
+    """Return the pulses of the driven joint: half of those of a profile, which lie at least MIN_PULSE_GAP apart."""
     count = 2 * PULSES
-    centres = np.cumsum(GAP + rng.uniform(0.0, (STEP * STEPS - (count + 1) * GAP) / count, count))
-    widths, reach = rng.uniform(*WIDTH, PULSES), AMPLITUDE[1] - AMPLITUDE[0]
+    centres = np.cumsum(MIN_PULSE_GAP + rng.uniform(0.0, (STEP * STEPS - (count + 1) * MIN_PULSE_GAP) / count, count))
+    widths, reach = rng.uniform(*PULSE_WIDTH, PULSES), PULSE_AMPLITUDE[1] - PULSE_AMPLITUDE[0]
     amplitudes = rng.uniform(-reach, reach, PULSES)
-    amplitudes += np.copysign(AMPLITUDE[0], amplitudes)
+    amplitudes += np.copysign(PULSE_AMPLITUDE[0], amplitudes)
     rows = zip(rng.permutation(centres)[:PULSES], widths, amplitudes, strict=True)
     return tuple((float(centre), float(width), float(amplitude)) for centre, width, amplitude in rows)
 

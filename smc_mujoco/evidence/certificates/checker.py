@@ -165,27 +165,24 @@ def levels(doc, part, e, f):
     need(rising and xs[0] == 0 and [-s for s in reversed(ss)] == ss and W[0] == W[0][::-1], "a symmetric, rising grid")
     need(len(W) == len(xs) and all(len(row) == len(ss) for row in W) and e.n == 1, "the size of the grid")
     need(f.room >= 0 and 0 < inner < outer < border and all(0 <= w <= 1 for row in W for w in row), "the levels")
-    corners_inside, (x, v) = [], part["start"]
+    inside, (x, v) = [], part["start"]
     for i, (x0, x1) in enumerate(pairwise(xs)):
         for j, (s0, s1) in enumerate(pairwise(ss)):
             corners = W[i][j], W[i + 1][j], W[i][j + 1], W[i + 1][j + 1]
-            corners_inside += [(x0, s0), (x1, s0), (x0, s1), (x1, s1)] if min(corners) <= inner else []
+            inside += [(x0, s0), (x1, s0), (x0, s1), (x1, s1)] if min(corners) <= inner else []
             if max(corners) >= inner and min(corners) <= outer:
                 need(falls(e, f, d0, (x0, x1, s0, s1), corners), f"W at x {x0} to {x1}, s {s0} to {s1}")
         a, b = W[i][middle], W[i + 1][middle]  # where s stays 0, x' = -c x
         need(f.kind != "sgn" or b > a or max(a, b) < inner or min(a, b) > outer, f"sliding at x {x0} to {x1}")
-    need(part["bound"] == max(x for x, _ in corners_inside), "the bound")
+    need(part["bound"] == max(x for x, _ in inside), "the bound")
     x, s = (1 if x >= 0 else -1) * arb(x), (1 if x >= 0 else -1) * (v + f.c * x)
     i, j = (sum(bool(z >= edge) for edge in edges) - 1 for z, edges in ((x, xs), (s, ss)))
     at = max(*W[i][j : j + 2], *W[i + 1][j : j + 2]) if x < xs[-1] and abs(s) < ss[-1] else 1
     if f.kind == "sgn":
         (box,) = (one for one in doc["parts"] if one["theorem"] == "reaching")
-        need(
-            all(x <= box["X"] and abs(s) <= box["S"] for x, s in corners_inside),
-            "an inner set from which s = 0 is reached",
-        )
+        need(all(x <= box["X"] and abs(s) <= box["S"] for x, s in inside), "an inner set from which s = 0 is reached")
     elif d0 == 0:
-        quadratic(part["P"], e, f, corners_inside)
+        quadratic(part["P"], e, f, inside)
     return {"actuator": f.room, "start": arb(outer) - at}
 
 

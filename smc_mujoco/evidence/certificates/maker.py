@@ -28,7 +28,7 @@ from smc_mujoco.evidence.certificates.loops import Loop, loop_of
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, Pulse, Sine, Step
 
-REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 3.0 * max(map(abs, plant.x0))}  # of a grid in x: chosen
+GRID_REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 3.0 * max(map(abs, plant.x0))}  # in x: chosen
 TIGHT = 1e-4  # share by which a margin is stated below the true one
 BOXES = (64, 256, 1024, 4096)  # tried in turn
 ROUNDED = 0.98  # factor on the largest set that a condition allows: chosen
@@ -172,7 +172,7 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
     if law.name == "super_twisting":
         return [_super_twisting(document, loop, law, judge)]
     parts = [_saturated(document, loop, terms, judge)]
-    single, reach, box = plant["n"] == 1, REACH[scenario.plant.unit](scenario.plant), None
+    single, reach, box = plant["n"] == 1, GRID_REACH[scenario.plant.unit](scenario.plant), None
     if single and law.name in ("classical", "terminal"):
         reaching = _reaching(0.5 * loop.c if law.name == "classical" else 0.0, reach, judge)
         box = reaching["X"], reaching["S"]

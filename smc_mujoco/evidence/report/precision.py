@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from smc_mujoco.analysis.scaling import CLOSE
+from smc_mujoco.analysis.scaling import ORDER_BAND
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.plan import GAINS, Report, Work
 from smc_mujoco.studies.accuracy import AccuracyTable, accuracy, load
@@ -45,6 +45,6 @@ def sentences(table: AccuracyTable) -> Iterator[str]:
         kept = sum(one.as_promised for one in promised)
         plant, _, condition = title.partition(", ")
         yield (
-            f"{words.plant(plant)}, {condition}: the order of s is within {CLOSE:g} of theory’s for {kept} of "
+            f"{words.plant(plant)}, {condition}: the order of s is within {ORDER_BAND:g} of theory’s for {kept} of "
             f"{len(promised)} laws."
         )

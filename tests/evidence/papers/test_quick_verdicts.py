@@ -46,7 +46,7 @@ def golden(name: str) -> dict[str, Record]:
 
 def quick_verdicts(name: str, only: list[str] | None = None) -> dict[str, Record]:
     """Return claim -> record of a quick audit, without timings; check whose runs it used."""
-    with mock.patch.object(search, "QUICK_SPREAD", 1):  # the verdicts are those of two, in less time
+    with mock.patch.object(search, "QUICK_SPREAD_SETS", 1):  # the verdicts are those of two, in less time
         found = audit(name, only, GAINS.get(name), quick=True)
     for id, sets in found.used.items():
         check_runs(name, id, [one.scenario for used in sets.values() for one in used.values()])

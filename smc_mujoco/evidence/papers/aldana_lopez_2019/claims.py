@@ -8,7 +8,7 @@ from smc_mujoco.evidence.papers.measures import settled
 BAND = 1e-6  # m/s, of |s|: it counts as reached
 SWITCHING = 1e-3  # m/s, the band with a switching gain, which chatters in k dt
 FAR, BEYOND = 5000.0, 0.02  # m/s, a start that stands for infinity; share of the time that may lie beyond it
-CLOSE = 0.3  # least k p: below it a sample of 10 us takes s across the band
+MIN_KP = 0.3  # least k p: below it a sample of 10 us takes s across the band
 LONGER = 1.5  # least bounds that a run lasts
 
 
@@ -39,7 +39,7 @@ def general_margins(gains):
     steep = (A * FAR**p + B * FAR**q) ** k * 1e-5 / FAR
     return conditions | {
         "time beyond the start < 2 %": BEYOND - beyond,
-        "k p >= 0.3, for the band": k * p - CLOSE,
+        "k p >= 0.3, for the band": k * p - MIN_KP,
         "first step < 1 % of the start": 0.01 - steep,
     }
 

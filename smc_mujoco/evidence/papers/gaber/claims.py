@@ -36,7 +36,7 @@ RIVALS = LAWS[1:]
 UNCLAMPED = "super_twisting_unclamped"  # as published; in the first gains its integral is clamped
 CONDITIONED = "conditioned_super_twisting"  # not the paper's: without the wind-up of the plain one
 OF_SCALE = 0.005  # share of a scale; chosen
-LONG, PERIOD = 40.0, 5e-3  # s; s, of control and physics: runs near rest, where the smooth law asks no more
+LONG_RUN, PERIOD = 40.0, 5e-3  # s; s, of control and physics: runs near rest, where the smooth law asks no more
 COARSE = 8  # control periods between which a quick search ends, chosen; it tries none shorter, with a quick integrator
 MIN_LAMBDA = 1e-3  # N m s or N s: the lambda that stands for "any lambda > 0"
 INNER, ROUNDS, QUICK_ROUNDS = 8, 3, 2  # 8 values at once divide a range by 9: three times, and it is known to 1.2 %
@@ -54,7 +54,7 @@ def long_run(runs, plant, lam, position, rate=0.0):
     """Return a run of 40 s with another lambda, from position times x0 with every channel at rate times |x0| per s."""
     x0, law = find_plant(plant).x0, with_gains(runs.law(plant, OURS), lam=lam)
     start = {"x0": [position * x for x in x0], "v0": rate * max(map(abs, x0))}
-    return runs.scenario(plant, OURS, law=law, duration=LONG, control_period=PERIOD, physics_step=PERIOD, **start)
+    return runs.scenario(plant, OURS, law=law, duration=LONG_RUN, control_period=PERIOD, physics_step=PERIOD, **start)
 
 
 def command_bound(runs, plant):
@@ -736,7 +736,7 @@ OPPOSITE = {"<": ">=", "<=": ">", ">": "<="}
 # Cells that hold for any runs: of the law that is the reference, of laws without estimates, of tanh.
 CERTAIN = {(name, "classical") for name in ("no chattering", "delay-tolerant", "observer-free")}
 CERTAIN |= {("observer-free", "adaptive"), ("observer-free", "proposed"), ("bounded input", "proposed")}
-HELD = 1.0  # s, chosen
+HOLD_DURATION = 1.0  # s, chosen
 PROBES = 50  # chosen
 
 
@@ -787,7 +787,7 @@ def tolerance(runs):
 
 def growth(runs, law):
     """Return the growth of max |u|, far off against nearer or late against early, as a share; worst plant."""
-    rises, samples = [], round(HELD / CONTROL_PERIOD)
+    rises, samples = [], round(HOLD_DURATION / CONTROL_PERIOD)
     for plant in runs.plants:
         bound, start = runs.law(plant, law), scale(runs.scenario(plant, law))
         near, far = (np.abs(commanded(bound, np.full(2 * samples, factor * start))) for factor in (10.0, 100.0))
