@@ -147,7 +147,7 @@ class Component:
         return dataclasses.replace(self, name=name, template=template)
 
     def sourced(self, kind: str, search: Search | None = None) -> "Component":
-        """Return the same law with another source of its gains, a key of `source.KINDS`; a law without gains has none.
+        """Return the same law with another source of its gains, one of `source.KINDS`; a law without gains has none.
 
         Raises:
           ScenarioError: an unknown kind.

@@ -16,14 +16,14 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
 
 NONE, DEFAULT, TUNED, SHIPPED, STUDY, YOURS = "none", "default", "tuned here", "shipped", "study", "yours"
-KINDS = {  # kind -> what it means
-    NONE: "the law has no gains",
-    DEFAULT: "the defaults of the law's own file",
-    TUNED: "result of a search that the user ran",
-    SHIPPED: "those of the package for this plant",
-    STUDY: "those of a published study",
-    YOURS: "given by the user",
-}
+KINDS = (
+    NONE,  # the law has no gains
+    DEFAULT,  # the defaults of the law's own file
+    TUNED,  # result of a search that the user ran
+    SHIPPED,  # those of the package for this plant
+    STUDY,  # those of a published study
+    YOURS,  # given by the user
+)
 
 ENDED = {True: "converged", False: "not converged", None: "convergence not tested"}
 
@@ -66,7 +66,7 @@ class Source:
     """Where a set of gains comes from.
 
     Attributes:
-      kind: a key of KINDS.
+      kind: one of KINDS.
       gains: the set.
       search: the search that the gains are the result of, or None.
     """
@@ -76,7 +76,7 @@ class Source:
     search: Search | None = None
 
     def __post_init__(self):
-        find("source of gains", self.kind, KINDS)
+        find("source of gains", self.kind, dict.fromkeys(KINDS))
 
     def __str__(self) -> str:
         return f"{self.kind} ({self.search})" if self.search else self.kind

@@ -1,5 +1,6 @@
 """What each velocity estimator gives on polynomials, sines and noise, and inside a run."""
 
+import cmath
 import itertools
 import math
 
@@ -11,6 +12,7 @@ from scipy.signal import savgol_coeffs
 import smc_mujoco as smc
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.estimator import Reading, catalogue
+from smc_mujoco.control.estimators.kalman import square_root
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.simulation import reference
 
@@ -278,6 +280,11 @@ def test_kalman_s_gains_are_those_of_the_riccati_equation(lam):
     for h in (1.0, 1e-3):
         out = both(smc.estimator("kalman", sigma=0.01, q=lam * 1e-4 / h**5), x, h=h) * np.array([[h], [h * h]])
         np.testing.assert_allclose(out, np.transpose(expected), rtol=1e-5, atol=1e-7 * np.abs(expected).max())
+
+
+def test_the_square_roots_of_kalman_s_factors_are_those_of_complex_numbers():
+    for a, b in itertools.product((-3.0, -1.0, 0.0, 0.5, 4.0), repeat=2):
+        assert complex(*square_root.py_func(a, b)) == pytest.approx(cmath.sqrt(complex(a, b)), rel=1e-15)
 
 
 def test_kalman_is_the_best_of_the_linear_observers_on_its_own_model():

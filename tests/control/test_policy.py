@@ -4,6 +4,7 @@ The libraries themselves are no dependency: where they are installed, the last t
 """
 
 import contextlib
+import math
 import pickle
 import platform
 import sys
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.episodes import columns, dm_control_suite, driven_by_dm, flat, run_of
+from helpers.words import refusal
 
 import smc_mujoco as smc
 from smc_mujoco.common import guard
@@ -331,13 +333,16 @@ def test_the_policy_of_a_model_is_taken_as_it_is_now(torch):
 # errors
 
 
-@pytest.mark.parametrize(
-    ("act", "words"), [(3, "policy is 3"), ("net.h5", "file of .onnx"), ("net.onnx", "no policy at net.onnx")]
-)
-def test_what_is_no_policy_is_one_sentence(act, words):
-    with pytest.raises(smc.ScenarioError, match=words) as raised:
-        smc.policy(act)
-    assert "\n" not in str(raised.value)
+def test_what_is_no_policy_is_one_sentence(snapshot):
+    assert {act: refusal(smc.policy, act) for act in (3, "net.h5", "net.onnx")} == snapshot
+
+
+def test_what_is_no_action_ends_the_run_with_a_sentence(snapshot):
+    wrong = {"two": lambda _: (1.0, 2.0), "none": lambda _: None}
+    ends = {name: briefly(smc.policy(act)).failure for name, act in wrong.items()}
+    free = smc.Scenario(plant="duffing", law=smc.policy(lambda _: 1.0), duration=0.002, u_max=math.inf)
+    ends["no bound"] = smc.run(free).failure
+    assert ends == snapshot
 
 
 class Broken:

@@ -157,6 +157,10 @@ def test_an_unknown_property_or_family_is_named(options, sentence):
         suitable(**options)
 
 
+def test_a_property_is_said_as_recorded(snapshot):
+    assert {name: one.words for name, one in PROPERTIES.items()} == snapshot
+
+
 def test_gains_that_are_held_are_not_counted():
     assert searched(catalogue()["super_twisting"]) == ["k1", "k2", "c"]
 

@@ -163,7 +163,7 @@ REFUSED = {
     "sets": (lambda: smc.cartesian_path(ARM(), (0, 1), [{0.1}, {0.2}], site="tip"), "give a position (x, y, z)"),
     "beyond reach": (
         lambda: smc.cartesian_path("double_pendulum", (0, 1), [(0.0, 0.0, 0.46), (0.0, 0.0, 9.0)], body="lower"),
-        "m away; give points within reach",
+        "the tip of double_pendulum does not reach (0, 0, 0.4601) m, point 1 of 101 on its path: it stays 8.",
     ),
     "free joint": (
         lambda: smc.cartesian_path("cart_pole", (0, 1), [(0, 0, 0)] * 2, body="cart"),
@@ -171,7 +171,7 @@ REFUSED = {
     ),
     "no quaternion": (
         lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2, site="tip", orientation=(0, 0, 0)),
-        "give a quaternion",
+        "orientation is (0, 0, 0): give a quaternion (w, x, y, z)",
     ),
     "times backwards": (lambda: smc.Waypoints((0.0, 1.0, 0.5), (0, 1, 2)), "Waypoints, item 2: 0.5 s comes after 1 s"),
 }
