@@ -8,13 +8,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.certificates import certificate
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
 from smc_mujoco.common.progress import Bar
 from smc_mujoco.evidence import boards
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
-from smc_mujoco.evidence.certificates.certificate import Certificate
 from smc_mujoco.evidence.rigs.identified import Identified
 from smc_mujoco.evidence.rigs.rig import Fall
 
@@ -39,34 +39,6 @@ CLAIMS = Claims(
         ),
     ]
 )  # fmt: skip
-LEVELS = {
-    "x": [0.0, 1.0, 2.0], "s": [-2.0, 0.0, 2.0], "W": [[0.5, 0.0, 0.5], [0.75, 0.25, 0.5], [1.0, 1.0, 1.0]],
-    "start": [0.5, 0.0], "inner": 0.1, "outer": 0.6, "bound": 0.45,
-}  # fmt: skip
-MARGINS = {
-    "saturated PD": {"damping": -0.25, "restoring": 0.125, "local": 3.0},
-    "level sets": {"actuator": 1.5, "start": 0.2},
-}
-PARTS = [
-    {"theorem": theorem, "holds": min(its.values()) >= 0.0} | (LEVELS if theorem == "level sets" else {})
-    | {"conditions": [{"name": name, "margin": margin} for name, margin in its.items()]}
-    for theorem, its in MARGINS.items()
-]  # fmt: skip
-
-
-def certificate(**changes):
-    """A certificate of Duffing's equation whose numbers nobody proved."""
-    gains = {"lam": 6.0, "k1": 3.0}
-    plant = {"name": "duffing", "n": 1, "parameters": dict(smc.plant("duffing").parameters), "mechanism": "equation"}
-    plain = {"format": "x", "plant": plant, "law": {"name": "observer_free", "gains": gains}, "u_max": 6.0, "unit": "m"}
-    bounds = {
-        "disturbance": 2.0,
-        "slope": None,
-        "leaves_out": {"delay": "4 ms", "noise": ""},
-        "parts": PARTS,
-        "seal": "y",
-    }
-    return Certificate(data=plain | bounds | changes)
 
 
 def identified(count):

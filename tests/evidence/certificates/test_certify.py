@@ -159,10 +159,6 @@ def test_what_is_left_out_is_said_with_what_the_scenario_has():
     [
         ({"law": smc.law("twisting")}, "twisting on duffing"),
         ({"plant": "cart_pole", "law": smc.law("observer_free")}, "cart_pole"),
-        ({"law": smc.law("pid")}, "integral"),
-        ({"model": "nominal"}, "nominal"),
-        ({"reference": smc.Constant(0.5)}, "reference"),
-        ({"mechanism": "springs"}, "springs"),
         ({"disturbance": smc.OrnsteinUhlenbeck(1.0, 1.0)}, "no bound"),
     ],
 )
@@ -436,11 +432,6 @@ def test_region_of_van_der_pol_as_a_share_of_the_true_one():
     assert (found.outcome[inside] == 1).all()
 
 
-def test_a_class_of_more_than_disturbances_has_no_certificate():
-    with pytest.raises(smc.ScenarioError, match="disturbances alone"):
-        smc.certify(scenario("duffing"), within=smc.Uncertainty(disturbance=1.0, mass=(0.7, 1.3)))
-
-
 def test_without_damping_no_bound_holds_from_everywhere():
     """What docs/what_the_author_may_claim.md says of d = d0 sgn(v): swings shrink from 10 rad and grow from 20."""
     free = smc.plant("inverted_pendulum", b=0.0)
@@ -465,17 +456,6 @@ def test_an_unknown_gain_of_the_input_needs_only_its_share_of_the_force():
             v = v + 1e-3 * a
             x = x + 1e-3 * v
         assert bool(np.abs(x).max() < 1e-3) is rests
-
-
-def test_a_certificate_draws_its_state_plane(tmp_path):
-    for plant in ("duffing", "van_der_pol"):
-        made = certificate(plant, disturbance=FORCE[plant])
-        trace = smc.run(scenario(plant))
-        made.figure(tmp_path / f"{plant}.png", [trace])
-        assert (tmp_path / f"{plant}.png").stat().st_size > 20_000
-    with pytest.raises(smc.ScenarioError, match="plane"):
-        certificate("pendulum_network").figure(tmp_path / "n.png")
-    assert "saturated PD" in certificate("duffing")._repr_html_()
 
 
 def test_the_command_proves_writes_and_checks(tmp_path, monkeypatch, capsys):

@@ -1,0 +1,364 @@
+"""What the checker and the search compute, against plain formulas and dense samples of the loop."""
+
+import itertools
+import math
+import re
+from types import SimpleNamespace as Space
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.control import gain_sets
+
+pytest.importorskip("flint", reason="python-flint is not installed: the extra proof does")
+from smc_mujoco.evidence.certificates import checker, loops, maker, search
+from smc_mujoco.evidence.certificates.checker import arb
+
+LAWS = {
+    "observer_free": {"lam": 2.3, "k1": 1.7},
+    "boundary_layer": {"k": 2.3, "c": 1.7, "phi": 0.4},
+    "classical": {"k": 2.3, "c": 1.7},
+    "pid": {"kp": 5.1, "ki": 0.0, "kd": 2.9},
+    "lqr": {"a1": 0.7, "a2": -0.3, "b": 1.9, "q1": 12.0, "q2": 1.3, "r": 0.6},
+}
+
+
+def space(**values):
+    """Numbers by name, as balls."""
+    return Space(**{name: arb(value) for name, value in values.items()})
+
+
+def plant(**terms):
+    """A plant of the checker, in one channel: M x'' = A sin x + B x + C x^3 - (E + F x^2) x'."""
+    return Space(**vars(space(**dict.fromkeys("ABCEF", 0.0) | {"M": 1.3, "kc": 0.0} | terms)), n=1)
+
+
+def loop(law, terms, d0=0.0):
+    """The same plant with a law, as the search has it."""
+    its = [dict.fromkeys("ABCEF", 0.0) | terms][0]
+    return loops._loop(1.3, [its[name] for name in "ABCEF"], Space(name=law, **LAWS[law]), 4.0, d0)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_maker_and_checker_have_the_same_force_of_a_law(law):
+    f, made = checker.feedback({"name": law, "gains": LAWS[law]}, 4.0), loop(law, {})
+    assert float(f.c) == pytest.approx(made.c)
+    assert math.inf if f.a is None else float(f.a) == pytest.approx(made.steep)
+    for s in (-3.1, -0.7, -0.05, 0.02, 0.3, 2.6):
+        assert float(checker.sigma(f, arb(s))) == pytest.approx(float(made.sigma(np.array(s))))
+        rise = (made.sigma(np.array(s + 1e-6)) - made.sigma(np.array(s - 1e-6))) / 2e-6
+        assert float(checker.slope(f, arb(s))) == pytest.approx(float(rise), rel=1e-6, abs=1e-6)
+    assert float(f.room) == pytest.approx(0.0 if law in ("pid", "lqr") else 4.0 - 2.3)
+
+
+def test_gains_of_a_quadratic_law_solve_its_riccati_equation():
+    its = Space(name="lqr", **LAWS["lqr"])
+    k = np.array([loops.linear_gains(its)])
+    A, P = np.array([[0.0, 1.0], [its.a1, its.a2]]), np.zeros((2, 2))
+    P[1] = its.r * k / its.b  # k = b' P / r
+    P[0, 1] = P[1, 0]
+    P[0, 0] = k[0, 0] * its.r * k[0, 1] - its.a1 * P[1, 1] - its.a2 * P[0, 1]
+    np.testing.assert_allclose(A.T @ P + P @ A - k.T @ k * its.r, -np.diag([its.q1, its.q2]), atol=1e-9)
+
+
+def test_margins_of_a_saturated_law_are_those_of_its_theorem():
+    A, B, C = 0.4, 0.3, -0.2
+    e, feeds = (Space(**vars(plant(A=A, B=B, C=cubic, E=0.9, kc=0.5)) | {"n": 2}) for cubic in (C, -C))
+    f = checker.feedback({"name": "observer_free", "gains": LAWS["observer_free"]}, 4.0)
+    V = {"v^2": 0.65, "sigma": 1 / 1.7, "cos x - 1": A, "x^2": -B / 2, "x^4": -C / 4, "springs": 0.25}
+    x = np.linspace(0.0, 2.0, 4001)[1:]
+    share = (1.0 - (A * np.sin(x) + B * x + C * x**3) / (2.3 * np.tanh(1.7 * x))).min()
+    boxes = [*map(list, itertools.pairwise([*np.linspace(0.0, 2.0, 201).tolist(), None]))]
+    weak = {"margin": 1.0 - (A * math.sin(9.0) + 9.0 * B - 729.0 * C) / (2.3 * math.tanh(15.3)), "at": 9.0}
+    expected = {"damping": 0.9, "restoring": None, "actuator": 1.7, "local": 2.3 * 1.7 - A - B}
+
+    for mechanism, coupling in (("equation", 0.5), ("springs", -0.5 * 0.2172336282112216)):
+
+        def margins(told, e=e, mechanism=mechanism, **changes):
+            data = {"V": V | changes, "conditions": [None, told]}
+            found = checker.saturated({"plant": {"mechanism": mechanism}}, data, e, f)
+            return {name: value and float(value) for name, value in found.items()}
+
+        assert margins({"margin": 0.9999 * share, "boxes": boxes}) == pytest.approx(expected | {"coupling": coupling})
+        for factor, said in ((0.999, "a tight margin"), (1.001, "x from")):
+            with pytest.raises(checker.Refused, match=said):
+                margins({"margin": factor * share, "boxes": boxes})
+        assert margins(weak, feeds, **{"x^4": C / 4}) == pytest.approx(expected | {"coupling": coupling})
+        with pytest.raises(checker.Refused, match="the margin of restoring"):
+            margins(weak)  # whose spring does not feed the motion
+        for name, value in V.items():
+            with pytest.raises(checker.Refused, match=re.escape(f"the coefficient of {name} in V")):
+                margins(weak, **{name: value + 1e-6})
+
+
+@pytest.mark.parametrize(
+    "terms", [{"A": 0.8}, {"B": -0.7, "E": 0.3}, {"C": -0.9, "F": -0.4}, {"C": 0.5, "E": 2.9, "F": 0.8}]
+)
+def test_a_set_is_reached_up_to_where_the_plant_is_as_strong_as_the_law(terms):
+    e, made = plant(**terms), loop("classical", terms)
+    f = checker.feedback({"name": "classical", "gains": LAWS["classical"]}, 4.0)
+    doc = {"disturbance": 0.35, "law": {"name": "classical"}}
+
+    def strongest(x, s):
+        v = s - 1.7 * x
+        return np.abs(made.phi(x) + (1.3 * 1.7 - made.D(x)) * v) + 0.35
+
+    def accepted(X):
+        try:
+            return checker.reaching(doc, {"X": X, "S": 0.5 * X}, e, f)
+        except checker.Refused:
+            return None
+
+    sizes = np.linspace(0.05, 1.2, 47)
+    found = max(X for X in sizes if accepted(X))
+    x, s = np.meshgrid(*np.linspace(-1.0, 1.0, 201)[None].repeat(2, 0))
+    exact = max(X for X in sizes if strongest(x * X, 0.5 * s * X).max() < 2.3)
+    assert 0.85 * exact <= found <= exact
+    margins = accepted(found)
+    assert margins
+    assert float(margins["reaching"]) == pytest.approx(2.3 - strongest(found, -0.5 * found))
+    assert float(margins["actuator"]) == pytest.approx(1.7)
+
+
+def test_a_terminal_surface_holds_up_to_where_its_term_and_the_plant_are_as_strong_as_the_law():
+    terms = {"B": -0.3, "E": 0.4, "F": 0.2}
+    e, made = plant(**terms), loop("classical", terms)
+    gains = {"k": 2.3, "b": 0.9, "p": 0.7, "bound": 0.55}
+    f = checker.feedback({"name": "terminal", "gains": gains}, 4.0)
+    doc = {"disturbance": 0.2, "law": {"name": "terminal"}}
+
+    def strongest(x):
+        v, vs = 0.9 * x**0.7, 0.9 * x**0.4
+        return np.abs(made.phi(x) + made.D(x) * v + np.minimum(0.9 * 0.7 * vs, 0.55) - 1.3 * 0.9 * 0.7 * vs) + 0.2
+
+    margins = checker.reaching(doc, {"X": 0.6, "S": 0.0}, e, f)
+    assert float(margins["reaching"]) == pytest.approx(2.3 - strongest(0.6))
+    assert float(margins["actuator"]) == pytest.approx(4.0 - 2.3 - 0.55)
+    with pytest.raises(checker.Refused, match="reaching"):
+        checker.reaching(doc, {"X": 9.0, "S": 0.0}, e, f)
+    with pytest.raises(checker.Refused, match=r"\|s\| <= c X"):
+        checker.reaching(doc, {"X": 0.6, "S": 0.1}, e, f)
+
+
+def test_margins_of_super_twisting_are_those_of_its_form():
+    X, q, L, d0, slope = 0.4, 0.05, 1.1, 0.15, 0.25
+    B, C, E, F, M, c = -0.6, -0.5, 0.3, -0.2, 1.3, 1.7
+    p, w, r = 4.5, -1.0, 0.97
+    gains = {"k1": 3.0, "k2": 2.6, "c": c}
+    f = checker.feedback({"name": "super_twisting", "gains": gains}, 4.0)
+    det = p * r - w * w
+    z1, z2 = math.sqrt(q * r / det), math.sqrt(q * p / det)
+    v = z1**2 + c * X
+    lag = M * c - (E + F * X * X)  # the largest |M c - D|
+    fastest = (abs(B) + 3.0 * abs(C) * X**2 + c * lag) * v + lag * (3.0 * z1 + z2) / M + 2.0 * abs(F) * X * v * v
+    held = z2 + X * (abs(B) + abs(C) * X**2) + lag * v + d0
+    expected = {"integral": 2.6 - slope, "slope": L - fastest - slope, "actuator": 4.0 - held - 3.0 * z1}
+    doc, part = {"disturbance": d0, "slope": slope, "u_max": 4.0}, {"P": [p, w, r], "L": L, "q": q, "X": X}
+    e = plant(B=B, C=C, E=E, F=F)
+    margins = checker.super_twisting(doc, part, e, f)
+    assert {name: float(value) for name, value in margins.items()} == pytest.approx(expected)
+    clamped = checker.feedback({"name": "super_twisting", "gains": gains | {"w_max": 1.9}}, 4.0)
+    assert float(checker.super_twisting(doc, part, e, clamped)["actuator"]) == pytest.approx(
+        min(expected["actuator"], 1.9 - held)
+    )
+    assert float(checker.super_twisting(doc | {"u_max": None}, part, e, f)["actuator"]) == 0.0
+    steep = plant(A=-0.8, E=E)  # its force is steepest at 0
+    told = float(checker.super_twisting(doc, part, steep, f)["slope"])
+    lag = M * c - E
+    exact = L - (0.8 + c * lag) * v - lag * (3.0 * z1 + z2) / M - slope
+    assert exact - 0.1 < told <= exact + 1e-9
+    for bad in ({"P": [p, 0.6, r]}, {"P": [p, -2.5, r]}, {"L": 2.7}, {"q": 3.0}, {"L": -1.1}, {"q": -q}):
+        with pytest.raises(checker.Refused):
+            checker.super_twisting(doc, part | bad, e, f)
+
+
+@pytest.mark.parametrize("law", ["observer_free", "boundary_layer", "classical"])
+def test_w_falls_in_a_cell_where_it_falls_at_all_samples_and_both_sides_say_so(law):
+    terms, d0 = {"A": 0.4, "B": -0.3, "C": -0.2, "E": 0.6, "F": 0.3}, 0.25
+    e, made = plant(**terms), loop(law, terms, d0)
+    f = checker.feedback({"name": law, "gains": LAWS[law]}, 4.0)
+    random, seen = np.random.default_rng(6), []
+    for _ in range(60):
+        x, s = np.cumsum(random.uniform(0.02, 0.15, 2)), random.choice([-1.0, 1.0]) * random.uniform(0.05, 0.5)
+        edges = np.array([s, s + 0.1]) if s > 0.0 else np.array([s - 0.1, s])
+        corners = random.uniform(0.2, 0.6, 4)
+        corners[3] = corners[1] + corners[2] - corners[0] + random.uniform(-0.01, 0.01)
+        least, most = search.falls(made, x, edges, corners.reshape(4, 1, 1))
+        a, b = np.meshgrid(np.linspace(0.0, 1.0, 5), np.linspace(0.0, 1.0, 5), indexing="ij")
+        X, S = x[0] + a * np.diff(x), edges[0] + b * 0.1
+        w00, w10, w01, w11 = corners
+        Wx = ((1 - b) * (w10 - w00) + b * (w11 - w01)) / np.diff(x)
+        Ws = ((1 - a) * (w01 - w00) + a * (w11 - w10)) / 0.1
+        rates = [Wx * (S - 1.7 * X) + Ws * made.fall(X, S, d) for d in (-d0, d0)]
+        worst = np.maximum(*rates)
+        assert (least[0, 0], most[0, 0]) == (pytest.approx(worst.min()), pytest.approx(worst.max()))
+        proven = checker.falls(e, f, arb(d0), (*x, *edges), tuple(corners))
+        seen.append((proven, worst.max() / np.abs(worst).max()))
+    assert all(top < 0.0 for proven, top in seen if proven)
+    assert all(proven for proven, top in seen if top < -0.05)
+    assert {proven for proven, _ in seen} == {True, False}
+
+
+def test_a_form_attracts_where_it_falls_on_a_dense_grid():
+    terms = {"A": 0.7, "B": 0.2, "C": -0.3, "E": -0.4, "F": 0.5}
+    e, made = plant(**terms), loop("observer_free", terms)
+    f = checker.feedback({"name": "observer_free", "gains": LAWS["observer_free"]}, 4.0)
+    h, D0 = 1e-6, float(made.D(np.zeros(())))
+    A = np.array([[-1.7, 1.0], [(0.9 + D0 * 1.7) / 1.3 - 1.7**2, 1.7 - (D0 + 2.3) / 1.3]])
+    np.testing.assert_allclose(A[1], [made.fall(h, 0.0, 0.0) / h, made.fall(0.0, h, 0.0) / h], rtol=1e-5)
+
+    def attracts(P):
+        try:
+            checker.quadratic([P[0, 0], P[0, 1], P[1, 1]], e, f, ())
+        except checker.Refused:
+            return False
+        return True
+
+    P = search.form(made, 2.0, attracts)
+    assert P is not None
+    np.testing.assert_allclose((A.T @ P + P @ A) / (A.T @ P + P @ A)[0, 0], np.diag([1.0, 1.0 / 1.7**2]), atol=1e-9)
+
+    def falls(P):
+        angle, radius = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 361), np.linspace(0.02, 1.0, 50))
+        z = np.linalg.solve(np.linalg.cholesky(P).T, np.stack([np.cos(angle), np.sin(angle)]).reshape(2, -1))
+        z = z * radius.ravel()
+        rate = np.stack([z[1] - 1.7 * z[0], made.fall(z[0], z[1], 0.0)])
+        return bool((np.sum(z * (P @ rate), axis=0) < 0.0).all())
+
+    scales = np.geomspace(0.3, 40.0, 60)
+    assert falls(P)
+    proven, exact = (max(k for k in scales if test(P / k)) for test in (attracts, falls))
+    assert 1.0 <= proven < 1.3  # the search leaves a tenth
+    assert 0.2 * exact < proven <= exact
+    inside = np.linalg.solve(np.linalg.cholesky(P).T, [[0.6], [0.8]]).ravel()  # on the border of z' P z <= 1
+    numbers = [P[0, 0], P[0, 1], P[1, 1]]
+    checker.quadratic(numbers, e, f, [tuple(0.999 * inside)])
+    with pytest.raises(checker.Refused, match="a form around the inner set"):
+        checker.quadratic(numbers, e, f, [tuple(1.001 * inside)])
+
+
+def test_w_is_the_time_to_the_target_along_the_loop():
+    """1 - exp(-T) of nodes from which the loop, without a disturbance, takes the time T at a cost of 1."""
+    terms = {"B": -0.3, "E": 0.6}
+    made = loop("observer_free", terms)
+    x, s = search.axis(1.5, 0.01), search.axis(2.5, 0.015)
+    X, S = np.meshgrid(x, s, indexing="ij")
+    far = np.maximum(np.abs(X) / 0.1, np.abs(S) / 0.15) > 1.0
+    W = search.times(made, x, s, far.astype(float))
+    for i, j in ((150, 130), (180, 160), (165, 70), (60, 150)):
+        z, t = np.array([x[i], s[j]]), 0.0
+        while max(abs(z[0]) / 0.1, abs(z[1]) / 0.15) > 1.0:
+            half = z + 5e-4 * np.array([z[1] - 1.7 * z[0], made.fall(z[0], z[1], 0.0)])
+            z, t = z + 1e-3 * np.array([half[1] - 1.7 * half[0], made.fall(half[0], half[1], 0.0)]), t + 1e-3
+        assert W[i, j] == pytest.approx(1.0 - math.exp(-t), abs=0.04)
+    pushed = search.times(loop("observer_free", terms, 0.2), x, s, far.astype(float))
+    assert (pushed > W - 0.02).all()
+    assert np.mean(pushed - W) > 0.01
+
+
+def test_a_grid_has_its_least_step_about_0_and_reaches_its_ends():
+    nodes = search.axis(3.0, 0.004)
+    assert len(nodes) == 221
+    np.testing.assert_allclose(nodes, -nodes[::-1])
+    assert nodes[-1] == 3.0
+    assert nodes[111] == pytest.approx(0.004, rel=1e-5)
+    steps = np.diff(nodes[110:])
+    assert (np.diff(steps) > -1e-5).all()
+    np.testing.assert_allclose(np.diff(search.axis(3.0, 1.0)), 3.0 / 110, rtol=0.05)  # no wider than even
+
+
+@pytest.mark.parametrize(
+    ("terms", "d0", "at"), [({"B": -0.7}, 0.5, None), ({"B": 2.5}, 0.5, None), ({"B": -0.7}, 0.0, 0.0)]
+)
+def test_the_loop_rests_where_forces_balance(terms, d0, at):
+    made = loop("boundary_layer", terms, d0)
+    slope = 2.3 * 1.7 / 0.4 - terms["B"]
+    expected = d0 / slope if at is None else at
+    assert search.rest(made, 2.0) == pytest.approx(expected, abs=1e-12)
+    assert math.isnan(search.rest(loop("boundary_layer", {"B": 30.0}, d0), 2.0))
+
+
+def test_the_set_of_a_bounded_disturbance_holds_the_linear_loops_worst_case():
+    """With d switching against the motion, for a boundary layer so wide that the loop is linear."""
+    made = loops._loop(1.3, [0.0, -0.3, 0.0, 0.6, 0.0], Space(name="boundary_layer", k=2.3, c=1.7, phi=1.1), 4.0, 0.5)
+    P = search.form(made, 2.0, lambda P: True)
+    assert P is not None
+    Q, z, far = np.linalg.inv(P), np.zeros(2), 0.0
+    for k in range(40_000):
+        d = 0.5 if (k // 700) % 2 else -0.5
+        z = z + 1e-3 * np.array([z[1] - 1.7 * z[0], made.fall(z[0], z[1], d)])
+        far = max(far, z @ P @ z)
+    assert 0.2 < far <= 1.0
+    assert math.sqrt(Q[0, 0]) < 1.6 * search.rest(made, 2.0)
+
+
+# the maker
+
+
+def refused(**changes):
+    """What is said of a scenario that no theorem is about."""
+    fields = {"plant": "duffing", "law": smc.law("observer_free", lam=6.0, k1=3.0)} | changes
+    with pytest.raises(smc.ScenarioError) as error:
+        smc.certify(smc.Scenario(**fields))
+    return str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "what"),
+    [
+        ({"plant": "pendulum_network", "law": "super_twisting"}, "super_twisting on the 5 pendulums of a network"),
+        ({"model": "nominal"}, "model='nominal'"),
+        ({"law": "classical", "surface": "linear"}, "a surface"),
+        ({"feedforward": smc.Sine(1.0, 2.0)}, "a feedforward"),
+        ({"reference": smc.Constant(0.5)}, "a reference that is not 0"),
+        ({"plant": "pendulum_network", "u_max": (5.0, 6.0, 6.0, 6.0, 6.0)}, "gains or bounds by channel"),
+        ({"actuator": smc.DCMotor(command="voltage")}, "a motor's voltage as u"),
+        ({"law": smc.law("pid", ki=0.5)}, "pid with an integral"),
+        ({"mechanism": "springs"}, "mechanism 'springs'"),
+    ],
+)
+def test_what_no_theorem_is_about_is_named(changes, what):
+    assert refused(**changes) == f"there is no theorem for {what}: certify a scenario without it"
+
+
+def test_what_is_given_instead_of_a_class_or_a_scenario_is_named():
+    scenario = smc.Scenario(plant="duffing", law="observer_free")
+    for given, within, said in (
+        ("duffing", None, "certify is about a Scenario, not 'duffing': give smc.Scenario(...)"),
+        (scenario, 2.0, "within is 2.0: give a class, such as smc.Uncertainty(disturbance=2.0)"),
+        (
+            scenario,
+            smc.Uncertainty(disturbance=1.0, hold=0.2),
+            "a certificate is about disturbances alone: give a class with disturbance and slope only",
+        ),
+    ):
+        with pytest.raises(smc.ScenarioError) as error:
+            smc.certify(given, within)
+        assert str(error.value) == said
+
+
+@pytest.mark.parametrize(
+    ("signals", "bounds"),
+    [
+        ((), (0.0, 0.0)),
+        (smc.Constant(-0.5), (0.5, 0.0)),
+        (smc.Sine(-0.5, 3.0), (0.5, 1.5)),
+        ((smc.Sine(0.5, 3.0), smc.Constant(0.25)), (0.75, 1.5)),
+        (smc.Step(0.5, 1.0), (0.5, math.inf)),
+        (smc.Pulse(-0.5, 1.0, 2.0), (0.5, math.inf)),
+    ],
+)
+def test_bounds_of_a_disturbance_are_those_of_its_sum(signals, bounds):
+    assert maker._bounds(smc.Scenario(plant="duffing", law="pid", disturbance=signals)) == pytest.approx(bounds)
+
+
+def test_what_is_left_out_is_said_in_full(snapshot):
+    plain = smc.Scenario(plant="duffing", law=gain_sets.law("duffing", "observer_free"))
+    machine = smc.Scenario(
+        plant="duffing", law=gain_sets.law("duffing", "observer_free"), friction=smc.Coulomb(0.3), input_delay=0.004,
+        noise=smc.Noise(position=0.01, velocity=0.02), sensor=smc.Encoder(2000), velocity="levant",
+        actuator=smc.Lag(0.01), jump=smc.Jump(1.0, {"M": 1.2}), control_period=0.002,
+    )  # fmt: skip
+    told = [f"{name}: {text}" for one in (plain, machine) for name, text in maker.left_out(one).items()]
+    assert "\n".join(told) == snapshot
