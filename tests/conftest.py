@@ -10,14 +10,25 @@ install elsewhere compile a function once. Bytecode is kept too: otherwise each 
 import gc
 import importlib
 import os
+import re
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from syrupy.assertion import SnapshotAssertion
 
 pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).parents[1]
+VARYING = {  # in a sentence: members of a catalogue, addresses, and what Python and numba say, which differs by version
+    re.compile(r"(choose from (?=(\S+, ){5})|or one of (?=(\S+, ){4}))[^;]*"): r"\1many",
+    re.compile(r" at 0x\w+"): "",
+    re.compile(r"(\(\w+Error, |\(Expecting ).*\)(?=: )"): r"\1...)",
+    re.compile(r"((?:Attribute|ZeroDivision)Error \().*\)(?= in )"): r"\1...)",
+    re.compile(r"(does not compile: ).*"): r"\1...",
+}
+VALUE = re.compile(r" is .*: ")  # in a refusal, between what is refused and the cure
 os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".pytest_cache" / "numba"))
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
@@ -49,6 +60,7 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return "pytest.mark.quick" not in collection_path.read_text(encoding="utf-8") or None
 
 
+@pytest.hookimpl(trylast=True)  # snapshots of what is left out here are not unused: syrupy has seen all items
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Keep the first case of each quick test that is not slow, where quick tests are asked for."""
     if not config.getoption("quick"):
@@ -57,6 +69,38 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     first = set({item.nodeid.split("[")[0]: item for item in reversed(quick)}.values())
     config.hook.pytest_deselected(items=[item for item in items if item not in first])
     items[:] = [item for item in items if item in first]
+
+
+@pytest.fixture
+def refused(request: pytest.FixtureRequest, snapshot: SnapshotAssertion) -> Iterator[Callable[..., str]]:
+    """A function that checks that a call is refused with one sentence. A test's sentences are recorded.
+
+    Of those that differ in a value alone one is recorded, and none for each member of a catalogue (not `recorded`).
+    """
+    from smc_mujoco.common.errors import ScenarioError
+
+    sentences: dict[str, str] = {}
+    folder = str(request.getfixturevalue("tmp_path")) if "tmp_path" in request.fixturenames else None
+
+    def check(call: Callable[[], object], *parts: object, recorded: bool = True) -> str:
+        with pytest.raises(ScenarioError) as caught:
+            call()
+        sentence = str(caught.value)
+        assert sentence
+        assert "\n" not in sentence
+        assert len(sentence) < 1100
+        for part in parts:
+            assert str(part) in sentence
+        if recorded:
+            for pattern, plain in VARYING.items():
+                sentence = pattern.sub(plain, sentence)
+            sentence = sentence.replace(folder, "FOLDER") if folder else sentence
+            sentences.setdefault(VALUE.sub(" is ...: ", sentence), sentence)
+        return str(caught.value)
+
+    yield check
+    if sentences:
+        assert list(sentences.values()) == snapshot
 
 
 @pytest.fixture

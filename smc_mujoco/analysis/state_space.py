@@ -76,7 +76,7 @@ def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: np.ndarray, name: 
     """
     b = rates(model, data)[model.nv : 2 * model.nv, 2 * model.nv + model.na :][:, driven]
     mujoco.mj_forward(model, data)
-    data.ctrl[driven] -= np.linalg.lstsq(b, data.qacc, rcond=None)[0]
+    data.ctrl[driven] -= np.linalg.lstsq(b, data.qacc)[0]
     mujoco.mj_forward(model, data)
     if np.abs(data.qacc).max() > MAX_REST_ACCELERATION:
         x = ", ".join(f"{one:g}" for one in data.qpos)

@@ -248,7 +248,8 @@ def _keywords(node: ast.Call) -> dict[str, Any]:
     keywords: dict[str, Any] = {}
     for word in node.keywords:
         if str(word.arg) in keywords:
-            raise ScenarioError(f"condition has {word.arg} twice, in {shown(ast.unparse(node))}: give it once")
+            call = shown(ast.unparse(node).removeprefix("_"))
+            raise ScenarioError(f"condition has {word.arg} twice, in {call}: give it once")
         keywords[str(word.arg)] = _parsed(word.value)
     return keywords
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.gains_for import _force_headroom
+from smc_mujoco.analysis.gains_for import _force_headroom, _largest_size
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 
 COARSELY = pytest.mark.usefixtures("coarse_grid")
@@ -76,15 +76,14 @@ def test_an_amplitude_and_a_frequency_decide_size_and_speed():
 
 
 @COARSELY
-def test_a_frequency_that_no_speed_has_is_refused_with_the_least_there_is():
-    with pytest.raises(smc.ScenarioError, match=r"oscillates at 66.* Hz at least"):
-        smc.gains_for("classical", "duffing", frequency=5.0, **LAG)
+def test_a_frequency_that_no_speed_has_is_refused_with_the_least_there_is(refused):
+    refused(lambda: smc.gains_for("classical", "duffing", frequency=5.0, **LAG), "oscillates at 66", recorded=False)
 
 
 @pytest.mark.slow
-def test_speeds_at_which_a_law_has_no_cycle_do_not_count():
-    with pytest.raises(smc.ScenarioError, match="oscillates at 18 Hz at least"):
-        smc.gains_for("super_twisting", "duffing", frequency=10.0, **LAG)
+def test_speeds_at_which_a_law_has_no_cycle_do_not_count(refused):
+    said = "frequency is 10, and the law oscillates at 18 Hz at least, at whatever speed: give a larger one"
+    refused(lambda: smc.gains_for("super_twisting", "duffing", frequency=10.0, **LAG), said, recorded=False)
 
 
 @smc.law_function(gains={"k": 1.0})
@@ -93,19 +92,30 @@ def without_units(y, gains, memory):
 
 
 @pytest.mark.parametrize(
-    ("law", "wanted", "said"),
+    ("law", "wanted"),
     [
-        ("classical", {}, "needs a wanted amplitude, a frequency or both"),
-        ("classical", {"amplitude": -1.0}, "amplitude is -1"),
-        ("classical", {"frequency": 100.0, "u_max": 0.005}, "are 800 times what u_max allows, .* at most 100 times"),
-        (without_units(), {"amplitude": 1e-3}, "knows no unit of without_units's gain 'k'"),
-        (
-            smc.law("classical", k=(1.0, 2.0)),
-            {"amplitude": 1.0, "plant": "double_pendulum"},
-            "one number for each gain",
-        ),
+        ("classical", {}),
+        ("classical", {"amplitude": -1.0}),
+        ("classical", {"frequency": 100.0, "u_max": 0.005}),
+        (without_units(), {"amplitude": 1e-3}),
+        (smc.law("classical", k=(1.0, 2.0)), {"amplitude": 1.0, "plant": "double_pendulum"}),
     ],
 )
-def test_bad_input_is_one_sentence(law, wanted, said):
-    with pytest.raises(smc.ScenarioError, match=said):
-        smc.gains_for(law, **({"plant": "duffing"} | wanted), **LAG)
+def test_bad_input_is_one_sentence(law, wanted, refused):
+    refused(lambda: smc.gains_for(law, **({"plant": "duffing"} | wanted), **LAG))
+
+
+def test_the_largest_size_is_where_the_amplitude_is_the_wanted_one(refused):
+    """Of amplitudes in proportion to the size, to its square, and of one that is lost above a size."""
+    for power, wanted, limit in (
+        (1.0, 0.3, 9.0),
+        (1.0, 7.0, 9.0),
+        (2.0, 0.01, 9.0),
+        (2.0, 30.0, 40.0),
+        (0.5, 3.0, 5.0),
+    ):
+        size = _largest_size(lambda q, power=power: 2.0 * q**power, wanted, limit)
+        assert 0.999 <= size / min((wanted / 2.0) ** (1.0 / power), limit) <= 1.0
+    assert _largest_size(lambda q: q if q < 3.0 else math.nan, 10.0, 100.0) == pytest.approx(3.0, rel=1e-3)
+    assert _largest_size(lambda q: math.nan, 10.0, 100.0) == 100.0
+    refused(lambda: _largest_size(lambda q: 1.0, 0.1, 100.0))

@@ -1,5 +1,6 @@
 """Theory at rest against MuJoCo, on the study's five plants; its closed forms against eigenvalues."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -75,9 +76,21 @@ def test_a_network_has_the_modes_of_its_path_graph():
 
 
 @pytest.mark.parametrize("name", ["cart_pole", "overhead_crane"])
-def test_a_joint_without_an_actuator_is_refused(name):
-    with pytest.raises(smc.ScenarioError, match=f"{name} has no theory here: give a plant with equal joints"):
-        linear_theory.smallest_lam(smc.plant(name), 1.0)
+def test_a_joint_without_an_actuator_is_refused(name, refused):
+    refused(lambda: linear_theory.smallest_lam(smc.plant(name), 1.0))
+
+
+def test_a_plant_coupled_by_more_than_springs_or_whose_joints_differ_is_refused(refused):
+    def dragged(x, v, i, p):
+        return -x[i] - 0.1 * v[0], 1.0
+
+    def uneven(x, v, i, p):
+        return -x[i] - (i + 1.0) * x[i] ** 3, 1.0
+
+    pair = smc.plant("pendulum_network", n=2)
+    refused(lambda: linear_theory.smallest_lam(dataclasses.replace(pair, nominal=dragged), 1.0))
+    law = smc.law("observer_free")
+    refused(lambda: linear_theory.tolerated_force(dataclasses.replace(pair, nominal=uneven), law, 0.1))
 
 
 @pytest.mark.parametrize("name", ["classical", "adaptive", "super_twisting"])
@@ -88,10 +101,23 @@ def test_a_law_that_switches_has_no_theory(name):
     assert linear_theory.tolerated_force(plant, law, 0.1) is None
 
 
-@pytest.mark.parametrize("lam", [-1.0, math.nan, math.inf])
-def test_a_gain_out_of_range_is_refused(lam):
-    with pytest.raises(smc.ScenarioError, match="lam is"):
-        linear_theory.critical_delay(smc.plant("duffing"), lam, 1.0)
+def test_every_argument_out_of_range_is_refused_by_its_name(refused):
+    plant, law = smc.plant("duffing"), smc.law("observer_free")
+    calls = (
+        lambda x: linear_theory.smallest_lam(plant, x),
+        lambda x: linear_theory.lam_range(plant, x, 1e-3),
+        lambda x: linear_theory.critical_delay(plant, x, 1.0),
+        lambda x: linear_theory.critical_delay(plant, 1.0, x),
+        lambda x: linear_theory.critical_delay(plant, 1.0, 1.0, x),
+        lambda x: linear_theory.steady_error(plant, x, 1.0, 0.2),
+        lambda x: linear_theory.steady_error(plant, 1.0, x, 0.2),
+        lambda x: linear_theory.tolerated_force(plant, law, x),
+    )
+    for call in calls:
+        for x in (-1.0, math.nan, math.inf):
+            refused(lambda call=call, x=x: call(x))
+    refused(lambda: linear_theory.steady_error(plant, 1.0, 1.0, math.nan))
+    refused(lambda: linear_theory.tolerated_force(plant, law, 0.0))
 
 
 # smallest lambda

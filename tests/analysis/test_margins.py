@@ -264,7 +264,7 @@ def test_margins_survive_their_file(found, tmp_path):
     json.loads(path.read_text(), parse_constant=pytest.fail)
 
 
-def test_a_csv_file_of_margins_has_a_row_for_each(found, tmp_path):
+def test_a_csv_file_of_margins_has_a_row_for_each(found, tmp_path, refused):
     path = margins.save_csv([*found, ROUGH], tmp_path / "margins.csv")
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -274,33 +274,29 @@ def test_a_csv_file_of_margins_has_a_row_for_each(found, tmp_path):
         }
         assert row["value"] == str(margin.value)
         assert row["theory"] == ("" if margin.theory is None else str(margin.theory))
-    with pytest.raises(smc.ScenarioError, match=r"end the name in .csv"):
-        margins.save_csv([], tmp_path / "margins.json")
+    refused(lambda: margins.save_csv([], tmp_path / "margins.json"))
 
 
 @pytest.mark.parametrize("text", ["", "3", '[{"plant": 1}]'])
-def test_what_holds_no_margins_is_refused(text, tmp_path):
+def test_what_holds_no_margins_is_refused(text, tmp_path, refused):
     path = tmp_path / "margins.json"
     path.write_text(text)
-    with pytest.raises(smc.ScenarioError, match="is not a file of margins"):
-        margins.load(path)
-    with pytest.raises(smc.ScenarioError, match=r"end the name in .json"):
-        margins.save([], tmp_path / "margins.csv")
+    refused(lambda: margins.load(path))
+    refused(lambda: margins.save([], tmp_path / "margins.csv"))
 
 
 @pytest.mark.parametrize(
-    ("arguments", "sentence"),
+    "arguments",
     [
-        ((["duffin"], ["classical"], ["delay"], "study"), "did you mean 'duffing'"),
-        ((["duffing"], ["classic"], ["delay"], "study"), "did you mean 'classical'"),
-        ((["duffing"], ["classical"], ["delays"], "study"), "did you mean 'delay'"),
-        ((["duffing"], ["classical"], {"delay": 1.0}, "study"), "give several, such as a list"),
-        ((["duffing"], ["classical"], ["delay"], "best"), "unknown set of gains"),
+        (["duffin"], ["classical"], ["delay"], "study"),
+        (["duffing"], ["classic"], ["delay"], "study"),
+        (["duffing"], ["classical"], ["delays"], "study"),
+        (["duffing"], ["classical"], {"delay": 1.0}, "study"),
+        (["duffing"], ["classical"], ["delay"], "best"),
     ],
 )
-def test_an_unknown_name_is_refused_with_the_cure(arguments, sentence):
-    with pytest.raises(smc.ScenarioError, match=sentence):
-        margins.margins(*arguments)
+def test_an_unknown_name_is_refused_with_the_cure(arguments, refused):
+    refused(lambda: margins.margins(*arguments))
 
 
 def test_the_command_prints_a_table_and_writes_a_file(tmp_path, capsys):

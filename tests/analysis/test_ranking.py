@@ -143,15 +143,13 @@ def test_intervals_are_the_same_each_time_and_in_any_order():
 
 
 @pytest.mark.parametrize("values", [[], [1.0, math.nan], np.zeros((2, 2, 2))])
-def test_values_that_are_none_are_refused(values):
-    with pytest.raises(ScenarioError, match="give"):
-        median_interval(values)
+def test_values_that_are_none_are_refused(values, refused):
+    refused(lambda: median_interval(values))
 
 
 @pytest.mark.parametrize(("name", "value"), [("level", 1.0), ("level", 0.0), ("resamples", 9), ("seed", -1)])
-def test_a_level_or_a_number_of_resamples_out_of_range_is_refused(name, value):
-    with pytest.raises(ScenarioError, match=name):
-        median_interval([1.0, 2.0], **{name: value})
+def test_a_level_or_a_number_of_resamples_out_of_range_is_refused(name, value, refused):
+    refused(lambda: median_interval([1.0, 2.0], **{name: value}))
 
 
 @pytest.mark.parametrize(("k", "n"), [(0, 1), (0, 17), (3, 20), (15, 15), (20, 20)])
@@ -488,9 +486,8 @@ def test_over_several_conditions_only_what_holds_in_each_is_told():
 
 
 @pytest.mark.parametrize("other", [np.zeros((2, 3)), np.array([[1.0, math.nan]])])
-def test_laws_of_different_cells_are_refused(other):
-    with pytest.raises(ScenarioError, match="cells"):
-        compare({"a": np.array([[1.0, 2.0]]), "b": other})
+def test_laws_of_different_cells_are_refused(other, refused):
+    refused(lambda: compare({"a": np.array([[1.0, 2.0]]), "b": other}))
 
 
 # leaderboards
@@ -604,21 +601,20 @@ def test_a_metric_that_does_not_apply_has_no_board():
     assert [b.metric for b in leaderboard(study(), ["spread_settling_time", "itae"])] == ["itae", "itae"]
 
 
-def test_what_cannot_be_compared_is_refused():
+def test_what_cannot_be_compared_is_refused(refused):
     table = study()
     first = (table.column("law") == "a") == (table.column("condition") == "nominal")
-    for bad, options, words in (
-        (table.taken(slice(0, 0)), {}, "no runs"),
-        (table, {"metrics": ["speed"]}, "unknown metric"),
-        (table, {"metrics": ()}, "metrics is"),
-        (table, {"by": ("law",)}, "unknown group"),
-        (table, {"seed": 0.5}, "seed is 0.5"),
-        (table, {"level": 1.5}, "level"),
-        (table.taken(np.r_[0:240, 0]), {}, "several runs of a on van_der_pol, nominal, seed 0"),
-        (table.taken(first), {}, "a, b, c have no run of van_der_pol in common"),
+    for bad, options in (
+        (table.taken(slice(0, 0)), {}),
+        (table, {"metrics": ["speed"]}),
+        (table, {"metrics": ()}),
+        (table, {"by": ("law",)}),
+        (table, {"seed": 0.5}),
+        (table, {"level": 1.5}),
+        (table.taken(np.r_[0:240, 0]), {}),
+        (table.taken(first), {}),
     ):
-        with pytest.raises(ScenarioError, match=words):
-            leaderboard(bad, **options)
+        refused(lambda bad=bad, options=options: leaderboard(bad, **options))
 
 
 def printed(boards: list[Board], width: int = 100) -> str:

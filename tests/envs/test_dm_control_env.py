@@ -333,36 +333,34 @@ class Lost(smc.Signal):
 UNEVEN = smc.DCMotor(inductance=0.0, ripple=0.1)
 
 
-def test_bad_input_is_one_sentence():
-    for make, words in (
-        (lambda: suite.load("dufing"), "did you mean 'duffing'"),
-        (lambda: suite.load("duffing", "swing_up"), "task 'swing_up' is not for duffing: choose from regulate, track"),
-        (lambda: suite.load("duffing", "regulat"), "did you mean 'regulate'"),
-        (lambda: suite.load(3), "plant is 3: give a name"),
-        (lambda: suite.load("duffing", random="a"), "random is 'a'"),
-        (lambda: suite.load("duffing", changes={"noise": smc.Noise(0.1)}), "unknown field of an environment"),
-        (lambda: suite.load("duffing", changes={"u_max": np.inf}), "u_max is inf"),
-        (lambda: suite.load("duffing", changes={"actuator": UNEVEN}), "environments have no DCMotor with a ripple"),
-        (lambda: suite.load("duffing", changes={"reference": smc.Sine(0.1, 1.0)}), "take 'track'"),
-        (lambda: suite.load("duffing", "track", changes={"reference": Lost(1.0)}), "finite number at t = 1.001 s"),
-        (lambda: suite.load("duffing", changes=3), "changes is 3"),
-        (lambda: suite.load("duffing", "track", {"time_limit": 1.0}, changes=3), "changes is 3"),
-        (lambda: suite.load("duffing", "track", 3), "task_kwargs is 3: give a mapping of random, time_limit"),
-        (lambda: suite.load("duffing", "track", {"randon": 1}), "in task_kwargs 'randon': did you mean 'random'"),
-        (lambda: suite.load("duffing", "track", None, {"n_sub_steps": 1}), "in environment_kwargs 'n_sub_steps'"),
-        (lambda: suite.load("duffing", "track", {"time_limit": -1.0}), "duration is -1"),
-        (lambda: suite.load("duffing").task.setting.command([np.inf]), "action is \\[inf\\]: give finite numbers"),
-        (lambda: suite.load("duffing").task.setting.command(["left"]), "action is \\['left'\\]"),
-        (lambda: suite.load("duffing").task.setting.command([[0.0], [0.0, 1.0]]), "of shape \\(1,\\)"),
-        (lambda: smc.agent("classical", 3), "environment is 3: give one of smc_mujoco.suite"),
-        (lambda: smc.agent("clasical", suite.load("duffing")), "did you mean 'classical'"),
+def test_bad_input_is_one_sentence(refused):
+    for make in (
+        lambda: suite.load("dufing"),
+        lambda: suite.load("duffing", "swing_up"),
+        lambda: suite.load("duffing", "regulat"),
+        lambda: suite.load(3),
+        lambda: suite.load("duffing", random="a"),
+        lambda: suite.load("duffing", changes={"noise": smc.Noise(0.1)}),
+        lambda: suite.load("duffing", changes={"u_max": np.inf}),
+        lambda: suite.load("duffing", changes={"actuator": UNEVEN}),
+        lambda: suite.load("duffing", changes={"reference": smc.Sine(0.1, 1.0)}),
+        lambda: suite.load("duffing", "track", changes={"reference": Lost(1.0)}),
+        lambda: suite.load("duffing", changes=3),
+        lambda: suite.load("duffing", "track", {"time_limit": 1.0}, changes=3),
+        lambda: suite.load("duffing", "track", 3),
+        lambda: suite.load("duffing", "track", {"randon": 1}),
+        lambda: suite.load("duffing", "track", None, {"n_sub_steps": 1}),
+        lambda: suite.load("duffing", "track", {"time_limit": -1.0}),
+        lambda: suite.load("duffing").task.setting.command([np.inf]),
+        lambda: suite.load("duffing").task.setting.command(["left"]),
+        lambda: suite.load("duffing").task.setting.command([[0.0], [0.0, 1.0]]),
+        lambda: smc.agent("classical", 3),
+        lambda: smc.agent("clasical", suite.load("duffing")),
     ):
-        with pytest.raises(smc.ScenarioError, match=words) as raised:
-            make()
-        assert "\n" not in str(raised.value)
+        refused(make)
 
 
-def test_an_agent_whose_law_fails_says_so():
+def test_an_agent_whose_law_fails_says_so(refused):
     @smc.law_function
     def broken(y, gains, memory):
         return 1.0 / (y.t - 0.001), 0.0
@@ -371,5 +369,4 @@ def test_an_agent_whose_law_fails_says_so():
     timestep = environment.reset()
     act = smc.agent(broken, environment)
     timestep = environment.step(act(timestep))
-    with pytest.raises(smc.ScenarioError, match=r"law 'broken' raised ZeroDivisionError .* at t = 0.001 s"):
-        act(timestep)
+    refused(lambda: act(timestep))

@@ -129,7 +129,7 @@ class Untyped(Sliding):
         return float(str(v)), 0.0, 0.0
 
 
-def test_a_friction_that_raises_ends_its_episode_and_the_next_one_begins():
+def test_a_friction_that_raises_ends_its_episode_and_the_next_one_begins(refused):
     changes = {"friction": Slippery(), "duration": 1.0, "x0": 0.0}
     one, many = PlantEnv("duffing", changes=changes), BatchEnv("duffing", 2, changes=changes)
     many.reset(seed=0)
@@ -141,8 +141,7 @@ def test_a_friction_that_raises_ends_its_episode_and_the_next_one_begins():
     found = [many.step([[1.0], [0.0]])[2].tolist() for _ in range(40)]
     assert found[0] == [False, False]
     assert found[found.index([True, False]) + 1] == [False, False]  # the first copy begins a new episode
-    with pytest.raises(smc.ScenarioError, match="friction Untyped needs functions that compile, but Untyped does not"):
-        PlantEnv("duffing", changes={"friction": Untyped()})
+    refused(lambda: PlantEnv("duffing", changes={"friction": Untyped()}))
 
 
 class Giving(Batch):
@@ -504,34 +503,32 @@ except ValueError as error:
     assert fresh(code, MUJOCO_GL="disabled") == ["ScenarioError", "True"]
 
 
-def test_bad_input_is_one_sentence():
-    for make, words in (
-        (lambda: PlantEnv("duffing", render_mode="human"), "render_mode is 'human'"),
-        (lambda: PlantEnv("duffing").reset(options={"x1": 0.0}), "choose from v0, x0"),
-        (lambda: PlantEnv("duffing").reset(options={"x0": [0.0, 1.0]}), "x0 has 2 values for 1 channels"),
-        (lambda: PlantEnv("duffing").step([0.0, 0.0]), r"of shape \(1,\)"),
-        (lambda: PlantEnv("duffing").step([np.nan]), "action is \\[nan\\]"),
-        (lambda: PlantEnv("duffing").step([-np.inf]), "action is \\[-inf\\]: give finite numbers"),
-        (lambda: PlantEnv("duffing").step("left"), "action is 'left'"),
-        (lambda: PlantEnv("duffing").reset(options=3), "options is 3: give a mapping"),
-        (lambda: begun(2).step([[1e300], [np.inf]]), r"action is \[inf\] for copy 1: give finite numbers"),
-        (lambda: begun(2).step([0.0, 0.0]), r"of shape \(2, 1\)"),
-        (lambda: begun(2).reset(options={"reset_mask": [True, False]}), "reset_mask is .* give an array of 2 bools"),
-        (lambda: begun(2).reset(options={"reset_mask": np.zeros(2, bool)}), "one of them True"),
-        (lambda: BatchEnv("duffing", 1).reset(options={"reset_mask": np.ones(1, bool)}), "call reset without it"),
-        (lambda: BatchEnv("duffing", 2, autoreset_mode="never"), "autoreset_mode is 'never': choose from 'NextStep'"),
-        (lambda: BatchEnv("duffing", 2, render_mode="rgb_array"), "copies are not drawn"),
-        (lambda: BatchEnv("duffing", 2, max_episode_steps=0), "max_episode_steps is 0"),
-        (lambda: BatchEnv("duffing", 2).reset(seed=1.5), "seed is 1.5: give a whole number"),
-        (lambda: over().step([[0.0]]), "episode of copy 0 is over: reset it"),
-        (lambda: BatchEnv("duffing", 0), "num_envs is 0"),
-        (lambda: BatchEnv("duffing", 2).step([[0.0], [0.0]]), "call reset first"),
-        (lambda: BatchEnv("duffing", 2).reset(seed=[1]), "seed has 1 values for 2 copies"),
-        (lambda: BatchEnv("duffing", 2).reset(seed="a"), "seed is 'a'"),
-        (lambda: smc.agent("classical", BatchEnv("duffing", 2)), "give one of smc_mujoco.suite"),
-        (lambda: smc.agent("clasical", PlantEnv("duffing")), "did you mean 'classical'"),
-        (lambda: smc.agent("classical", PlantEnv("duffing"))(np.zeros(1)), "what the environment returned"),
+def test_bad_input_is_one_sentence(refused):
+    for make in (
+        lambda: PlantEnv("duffing", render_mode="human"),
+        lambda: PlantEnv("duffing").reset(options={"x1": 0.0}),
+        lambda: PlantEnv("duffing").reset(options={"x0": [0.0, 1.0]}),
+        lambda: PlantEnv("duffing").step([0.0, 0.0]),
+        lambda: PlantEnv("duffing").step([np.nan]),
+        lambda: PlantEnv("duffing").step([-np.inf]),
+        lambda: PlantEnv("duffing").step("left"),
+        lambda: PlantEnv("duffing").reset(options=3),
+        lambda: begun(2).step([[1e300], [np.inf]]),
+        lambda: begun(2).step([0.0, 0.0]),
+        lambda: begun(2).reset(options={"reset_mask": [True, False]}),
+        lambda: begun(2).reset(options={"reset_mask": np.zeros(2, bool)}),
+        lambda: BatchEnv("duffing", 1).reset(options={"reset_mask": np.ones(1, bool)}),
+        lambda: BatchEnv("duffing", 2, autoreset_mode="never"),
+        lambda: BatchEnv("duffing", 2, render_mode="rgb_array"),
+        lambda: BatchEnv("duffing", 2, max_episode_steps=0),
+        lambda: BatchEnv("duffing", 2).reset(seed=1.5),
+        lambda: over().step([[0.0]]),
+        lambda: BatchEnv("duffing", 0),
+        lambda: BatchEnv("duffing", 2).step([[0.0], [0.0]]),
+        lambda: BatchEnv("duffing", 2).reset(seed=[1]),
+        lambda: BatchEnv("duffing", 2).reset(seed="a"),
+        lambda: smc.agent("classical", BatchEnv("duffing", 2)),
+        lambda: smc.agent("clasical", PlantEnv("duffing")),
+        lambda: smc.agent("classical", PlantEnv("duffing"))(np.zeros(1)),
     ):
-        with pytest.raises(smc.ScenarioError, match=words) as raised:
-            make()
-        assert "\n" not in str(raised.value)
+        refused(make)

@@ -2,7 +2,6 @@
 
 import dataclasses
 import pickle
-import re
 
 import numpy as np
 import pytest
@@ -123,63 +122,30 @@ def test_a_plants_channels_suggest_what_a_scenario_leaves_out():
 
 
 REFUSED = {
-    "no law": (lambda: smc.Scenario(**BOTH), "law is None: give smc.law(...), your own law, or a name"),
-    "law of one channel alone": (
-        lambda: smc.plant_from(
-            PENDULUM, channels={"shoulder": smc.Channel(motor=True, law="classical"), "elbow": {"motor": True}}
-        ),
-        "channel 'elbow' has no law and others have: give each one, or none",
+    "no law": lambda: smc.Scenario(**BOTH),
+    "law of one channel alone": lambda: smc.plant_from(
+        PENDULUM, channels={"shoulder": smc.Channel(motor=True, law="classical"), "elbow": {"motor": True}}
     ),
-    "channel's bound": (
-        lambda: smc.plant_from(PENDULUM, channels={"elbow": smc.Channel(motor=True, u_max=-1.0)}),
-        "u_max of channel 'elbow' is -1",
+    "channel's bound": lambda: smc.plant_from(PENDULUM, channels={"elbow": smc.Channel(motor=True, u_max=-1.0)}),
+    "channel's reference": lambda: smc.Scenario(
+        plant=smc.plant_from(PENDULUM, channels={"elbow": smc.Channel(motor=True, reference=0.3)}), law="classical"
     ),
-    "channel's reference": (
-        lambda: smc.Scenario(
-            plant=smc.plant_from(PENDULUM, channels={"elbow": smc.Channel(motor=True, reference=0.3)}), law="classical"
-        ),
-        "reference is 0.3: give one signal",
+    "unknown joint": lambda: smc.Scenario(law={"shoulder": "classical", "elbo": "classical"}, **BOTH),
+    "missing joint": lambda: smc.Scenario(law="classical", reference={"shoulder": SINE}, **BOTH),
+    "too many": lambda: smc.Scenario(law=["classical"] * 3, **BOTH),
+    "bad bound": lambda: smc.Scenario(law="classical", u_max=[1.0, -2.0], **BOTH),
+    "joint law in one channel": lambda: smc.Scenario(law=["classical", "unit_vector"], **BOTH),
+    "gains by channel in one channel": lambda: smc.Scenario(law=["classical", smc.law("twisting", r1=[4, 3])], **BOTH),
+    "noise as reference": lambda: smc.Scenario(
+        law="classical", reference=[SINE, smc.OrnsteinUhlenbeck(0.1, 1.0)], **BOTH
     ),
-    "unknown joint": (
-        lambda: smc.Scenario(law={"shoulder": "classical", "elbo": "classical"}, **BOTH),
-        "unknown driven joint of double_pendulum in law 'elbo': did you mean 'elbow'?",
-    ),
-    "missing joint": (
-        lambda: smc.Scenario(law="classical", reference={"shoulder": SINE}, **BOTH),
-        "reference has nothing for joint 'elbow' of double_pendulum",
-    ),
-    "too many": (
-        lambda: smc.Scenario(law=["classical"] * 3, **BOTH),
-        "law has 3 values for the 2 driven channels of double_pendulum",
-    ),
-    "bad bound": (lambda: smc.Scenario(law="classical", u_max=[1.0, -2.0], **BOTH), "u_max[1] is -2"),
-    "joint law in one channel": (
-        lambda: smc.Scenario(law=["classical", "unit_vector"], **BOTH),
-        "the law of channel 1 is 'unit_vector', of many joints",
-    ),
-    "gains by channel in one channel": (
-        lambda: smc.Scenario(law=["classical", smc.law("twisting", r1=[4, 3])], **BOTH),
-        "with gains by channel",
-    ),
-    "noise as reference": (
-        lambda: smc.Scenario(law="classical", reference=[SINE, smc.OrnsteinUhlenbeck(0.1, 1.0)], **BOTH),
-        "reference is OrnsteinUhlenbeck, which is noise",
-    ),
-    "gain of a surface": (lambda: smc.surface("linear", c=[1, 2]), "linear's c is (1, 2): give one number"),
-    "wrong degree": (
-        lambda: smc.Scenario(law=["classical", "twisting"], surface="pid", **BOTH),
-        "law 'twisting' acts on the error",
-    ),
-    "tuning": (
-        lambda: smc.tune("double_pendulum", smc.law("classical", k=[1, 2]), budget=1),
-        "one number for each gain",
-    ),
-    "in C": (lambda: smc.law_to_c(smc.law("classical", k=[1, 2])), "has gains by channel"),
+    "gain of a surface": lambda: smc.surface("linear", c=[1, 2]),
+    "wrong degree": lambda: smc.Scenario(law=["classical", "twisting"], surface="pid", **BOTH),
+    "tuning": lambda: smc.tune("double_pendulum", smc.law("classical", k=[1, 2]), budget=1),
+    "in C": lambda: smc.law_to_c(smc.law("classical", k=[1, 2])),
 }
 
 
-def test_bad_input_is_one_sentence():
-    for make, said in REFUSED.values():
-        with pytest.raises(smc.ScenarioError, match=re.escape(said)) as caught:
-            make()
-        assert "\n" not in str(caught.value)
+def test_bad_input_is_one_sentence(refused):
+    for make in REFUSED.values():
+        refused(make)

@@ -116,16 +116,15 @@ def test_a_law_that_raises_late_ends_the_run_with_its_own_reason():
 
 
 @pytest.mark.parametrize(
-    ("fields", "says"),
+    "fields",
     [
-        ({"clock": smc.Clock(jitter=1e-3)}, "not shorter than the control period"),
-        ({"clock": smc.Clock(jitter=1e-4), "physics_step": 5e-4}, "shorter than a physics step"),
-        ({"clock": 0.5}, "smc.Clock"),
+        {"clock": smc.Clock(jitter=1e-3)},
+        {"clock": smc.Clock(jitter=1e-4), "physics_step": 5e-4},
+        {"clock": 0.5},
     ],
 )
-def test_a_clock_that_cannot_run_is_refused(fields, says):
-    with pytest.raises(smc.ScenarioError, match=says):
-        smc.Scenario(plant="duffing", law="classical", **fields)
+def test_a_clock_that_cannot_run_is_refused(fields, refused):
+    refused(lambda: smc.Scenario(plant="duffing", law="classical", **fields))
 
 
 def test_a_clock_comes_back_from_a_file_and_from_text(tmp_path):

@@ -91,93 +91,82 @@ def test_the_suites_conditions_go_by_their_names():
     assert find_condition("noise") is NAMED["noise"]
 
 
-def test_conditions_add_up():
+def test_conditions_add_up(refused):
     duffing = smc.plant("duffing")
     both = find_condition("sine + coulomb + constant").on(duffing, 4.0)
     assert both == {"disturbance": (smc.Sine(0.2, 5.0), smc.Constant(0.2)), "friction": smc.Coulomb(0.1)}
     assert find_condition("noise + noise").on(duffing, 4.0) == {"noise": smc.Noise(0.01, 0.05)}
-    with pytest.raises(smc.ScenarioError, match="'light' and 'heavy' both set mismatch"):
-        find_condition("light + heavy").on(duffing, 4.0)
+    refused(lambda: find_condition("light + heavy").on(duffing, 4.0))
     assert (WORN + find_condition("noise")).on(duffing, 4.0)["noise"] == smc.Noise(0.01, 0.05)
     assert (WORN + "noise").name == "worn gear + noise"
-    with pytest.raises(smc.ScenarioError, match="condition is 3: give a name"):
-        _ = WORN + 3  # pyright: ignore[reportOperatorIssue]
+    refused(lambda: WORN + 3)  # pyright: ignore[reportOperatorIssue]
 
 
-def test_a_condition_of_any_values_has_a_text_and_joins_others():
+def test_a_condition_of_any_values_has_a_text_and_joins_others(refused):
     array = smc.condition("array", x0=np.array([0.3]))
     assert parse(str(array)) == array
     (run,) = smc.grid("duffing", "none", array + smc.condition("again", x0=np.array([0.3])))
     assert run.resolved.x0 == (0.3,)
     odd = smc.condition("odd", noise=np.zeros(1, "f4,i4"))
-    with pytest.raises(smc.ScenarioError, match="'odd' and 'noise' both set noise"):
-        smc.grid("duffing", "none", odd + find_condition("noise"))
+    refused(lambda: smc.grid("duffing", "none", odd + find_condition("noise")))
 
 
 def test_what_happens_once_does_so_at_half_time():
     assert NAMED["pulse"].on(smc.plant("duffing"), 3.0)["disturbance"].time == 1.5
 
 
-def test_a_text_that_is_none_is_one_sentence():
-    for text, words in (
-        ("worn: friction=Coulomb(k=3)", "unknown field of Coulomb 'k'|takes level"),
-        ("worn: friction=open('x')", "unknown part, signal or estimator 'open'"),
-        ("worn: friction=().__class__", "give numbers, texts and parts"),
-        ("worn: friction=[i for i in (1,)]", "give numbers, texts and parts"),
-        ("worn: friction=Coulomb(0.05", "cannot be read"),
-        ("worn: friction=Coulomb(-'a')", "a value is 'a'"),
-        ("worn: Coulomb(1)", "cannot be read"),
-        ("worn: **{'a': 1}", "cannot be read"),
-        ("worn: frction=1", "did you mean 'friction'"),
-        ("worn: plant='duffing'", "which the grid sets itself"),
-        ("worn:", "has no fields"),
-        ("worn: x0=1, x0=2", "has x0 twice"),
-        ("worn: friction=Coulomb(level=1, level=2)", "has level twice"),
-        ("worn: mismatch={'mass': 1.3, **{'mass': 2}}", "give numbers, texts and parts"),
-        (": input_delay=0.01", "a condition's name"),
-        ("noise: input_delay=0.01", "is a name of the suite"),
-        ("noisy", "did you mean 'noise'"),
-        ("worn friction=Coulomb(0.05)", "has no colon: write a name, a colon and fields"),
-        ("noise + ", "unknown condition ''"),
-        ("a" * 10**5 + ": x=" + "(" * 10**4, "cannot be read"),
+def test_a_text_that_is_none_is_one_sentence(refused):
+    for text in (
+        "worn: friction=Coulomb(k=3)",
+        "worn: friction=xyzzyx('x')",
+        "worn: friction=().__class__",
+        "worn: friction=[i for i in (1,)]",
+        "worn: friction=Coulomb(0.05",
+        "worn: friction=Coulomb(-'a')",
+        "worn: Coulomb(1)",
+        "worn: **{'a': 1}",
+        "worn: frction=1",
+        "worn: plant='duffing'",
+        "worn:",
+        "worn: x0=1, x0=2",
+        "worn: friction=Coulomb(level=1, level=2)",
+        "worn: mismatch={'mass': 1.3, **{'mass': 2}}",
+        ": input_delay=0.01",
+        "noise: input_delay=0.01",
+        "noisy",
+        "worn friction=Coulomb(0.05)",
+        "noise + ",
+        "a" * 10**5 + ": x=" + "(" * 10**4,
     ):
-        with pytest.raises(smc.ScenarioError, match=words) as error:
-            find_condition(text)
-        assert "\n" not in str(error.value)
+        refused(lambda text=text: find_condition(text))
 
 
-def test_a_name_of_thousands_is_one_sentence():
-    with pytest.raises(smc.ScenarioError, match=r"joins 3,001 conditions: give at most 20"):
-        smc.grid(["duffing"], ["classical"], ["noise+" * 3000 + "noise"], 1)
-    with pytest.raises(smc.ScenarioError, match=r"x0 is \{1: 2\}: give one number, or a list of one for each channel"):
-        smc.Scenario(plant="duffing", law="classical", x0={1: 2})  # pyright: ignore[reportArgumentType]
+def test_a_name_of_thousands_is_one_sentence(refused):
+    refused(lambda: smc.grid(["duffing"], ["classical"], ["noise+" * 3000 + "noise"], 1))
+    refused(lambda: smc.Scenario(plant="duffing", law="classical", x0={1: 2}))  # pyright: ignore[reportArgumentType]
 
 
-def test_a_file_holds_a_condition_a_line(tmp_path):
+def test_a_file_holds_a_condition_a_line(tmp_path, refused):
     path = tmp_path / "conditions.txt"
     path.write_text(f"# of the workshop\n\n{WORN}\nnoise + coulomb\n")
     assert [one.name for one in from_file(path)] == ["worn gear", "noise + coulomb"]
     path.write_text("# two\n\nworn x0=1\n")
-    with pytest.raises(smc.ScenarioError, match=r"line 3 of .*conditions.txt.* has no colon"):
-        from_file(path)
-    with pytest.raises(smc.ScenarioError, match="no file of conditions"):
-        from_file(tmp_path / "none.txt")
+    refused(lambda: from_file(path))
+    refused(lambda: from_file(tmp_path / "none.txt"))
 
 
-def test_a_pipe_or_a_folder_is_no_file_of_conditions(tmp_path):
+def test_a_pipe_or_a_folder_is_no_file_of_conditions(tmp_path, refused):
     os.mkfifo(tmp_path / "pipe")
     for path in (tmp_path / "pipe", tmp_path, Path("/dev/zero")):
-        with pytest.raises(smc.ScenarioError, match="file of conditions"):
-            from_file(path)
+        refused(lambda path=path: from_file(path))
 
 
 # grids
 
 
-def test_conditions_of_one_name_that_differ_are_refused():
+def test_conditions_of_one_name_that_differ_are_refused(refused):
     light, heavy = (smc.condition("loaded", mismatch={"mass": factor}) for factor in (0.9, 1.1))
-    with pytest.raises(smc.ScenarioError, match="two conditions have the name 'loaded'"):
-        smc.grid("duffing", "classical", [light, heavy])
+    refused(lambda: smc.grid("duffing", "classical", [light, heavy]))
     assert len(smc.grid("duffing", "classical", [light, light, "noise + coulomb", "noise + coulomb"])) == 4
 
 
@@ -188,9 +177,8 @@ def test_conditions_suit_a_plant_that_they_have_numbers_for(arm):
     assert applicable(names, [duffing, arm], 1.0) == ["nominal", "coulomb"]
 
 
-def test_a_condition_that_starts_at_0_is_nothing_to_tune_for():
-    with pytest.raises(smc.ScenarioError, match=r"duffing starts at 0 under 'rest'.*smc.starts"):
-        smc.tune("duffing", "classical", 2, conditions=["nominal", smc.condition("rest", x0=0.0)])
+def test_a_condition_that_starts_at_0_is_nothing_to_tune_for(refused):
+    refused(lambda: smc.tune("duffing", "classical", 2, conditions=["nominal", smc.condition("rest", x0=0.0)]))
 
 
 def test_a_grid_has_conditions_of_ones_own_under_their_names():
@@ -220,12 +208,11 @@ def test_starts_are_around_the_plants_own_or_around_a_given_one():
     assert len({s.resolved.x0 for s in away}) == 4
 
 
-def test_no_grid_has_the_starts_and_the_noise_of_tuning():
+def test_no_grid_has_the_starts_and_the_noise_of_tuning(refused):
     tuned = {s.seed for s in Objective().scenarios("duffing", smc.law("classical"), 0)}
     assert min(tuned) >= GRID_SEEDS
     assert len(tuned) == 7
-    with pytest.raises(smc.ScenarioError, match="seed is"):
-        smc.grid("duffing", "none", "nominal", [GRID_SEEDS])
+    refused(lambda: smc.grid("duffing", "none", "nominal", [GRID_SEEDS]))
     starts = [s.resolved.x0[0] for s in Objective().scenarios("duffing", smc.law("classical"), 0)]
     assert len(set(starts)) == 7
     assert all(abs(x / 1.5 - 1.0) <= 0.2 for x in starts)
@@ -252,25 +239,18 @@ SLOW, QUICK = smc.law("classical", k=2.0), smc.law("classical", k=6.0)
 
 
 @pytest.mark.parametrize(
-    ("changed", "words"),
+    "changed",
     [
-        (
-            {"laws": [SLOW, QUICK]},
-            r"laws .* 'classical', classical\(k=2.*k=6.*: name one of them, as .*named\('slow'\)",
-        ),
-        ({"laws": ["classical", QUICK]}, "two laws have the name 'classical', classical and"),
-        (
-            {"plants": ["duffing", smc.plant("duffing", beta=5.0)]},
-            r"two plants have the name 'duffing', plant.*beta=1\b.* and .*beta=5\b",
-        ),
-        ({"conditions": [WORN, smc.condition("worn gear", u_max=3.0)]}, "two conditions have the name 'worn gear'"),
-        ({"laws": [pid(k=2.0)]}, r"your law 'pid' has .* or give law.named\('my_pid'\)"),
+        {"laws": [SLOW, QUICK]},
+        {"laws": ["classical", QUICK]},
+        {"plants": ["duffing", smc.plant("duffing", beta=5.0)]},
+        {"conditions": [WORN, smc.condition("worn gear", u_max=3.0)]},
+        {"laws": [pid(k=2.0)]},
     ],
 )
-def test_grid_refuses_two_things_of_one_name(changed, words):
+def test_grid_refuses_two_things_of_one_name(changed, refused):
     given = {"plants": "duffing", "laws": "classical"}
-    with pytest.raises(smc.ScenarioError, match=words):
-        smc.grid(**(given | changed))
+    refused(lambda: smc.grid(**(given | changed)))
     assert len(smc.grid(["duffing"] * 2, [SLOW, smc.law("classical", k=2.0), pid().named("my pid")])) == 6
 
 
@@ -298,20 +278,18 @@ def test_grid_warns_of_gains_for_other_parameters():
         smc.grid(smc.plant("pendulum_network", n=7), "pid")
 
 
-def test_start_is_set_by_condition_or_starts():
+def test_start_is_set_by_condition_or_starts(refused):
     for search in (smc.grid, smc.margins, smc.tune, smc.basin):
         far = smc.condition("far", x0=1.0)
         fields = {"conditions": far} if search in (smc.grid, smc.tune) else {"condition": far}
         more = {} if search is smc.basin else {"starts": smc.starts(x0=0.5)}
-        with pytest.raises(smc.ScenarioError, match=r"condition 'far' .*x0"):
-            search("duffing", "classical", **fields, **more)
+        refused(lambda search=search, fields=fields, more=more: search("duffing", "classical", **fields, **more))
         assert [s.resolved.x0 for s in smc.grid("duffing", "classical", far, starts=smc.starts(spread=0.1))] == [(1.0,)]
 
 
-def test_grid_asks_where_a_model_at_rest_starts(arm):
+def test_grid_asks_where_a_model_at_rest_starts(arm, refused):
     law = smc.law("classical")
-    with pytest.raises(smc.ScenarioError, match=r"arm starts at rest at 0 .* 'nominal'.*smc.starts\(x0=0.5\) or --x0"):
-        smc.grid(["duffing", arm], law, ["noise", "nominal"], 2)
+    refused(lambda: smc.grid(["duffing", arm], law, ["noise", "nominal"], 2))
     moved = smc.condition("a", reference=smc.Step(0.1)), smc.condition("b", v0=0.1)
     moved += (smc.condition("c", feedforward=smc.Step(0.1)),)
     assert len(smc.grid(arm, law, [*moved, "noise", "sine", "encoder"], 2)) == 12
@@ -320,10 +298,9 @@ def test_grid_asks_where_a_model_at_rest_starts(arm):
     assert smc.grid(smc.plant_from(held, ["shoulder"]), law, "nominal")  # gravity moves it
 
 
-def test_margins_of_a_model_that_rests_at_0_ask_where_to_start(arm):
+def test_margins_of_a_model_that_rests_at_0_ask_where_to_start(arm, refused):
     law = smc.law("boundary_layer", k=10.0, c=4.0, phi=0.5)
-    with pytest.raises(smc.ScenarioError, match=r"arm starts at 0.*smc.starts"):
-        smc.margins(arm, law, "delay")
+    refused(lambda: smc.margins(arm, law, "delay"))
     (found,) = smc.margins(arm, law, "delay", quick=True, starts=smc.starts(x0=0.4))
     assert (found.plant, found.law, found.unit) == ("arm", "boundary_layer", "s")
     assert found.value > 0.0
@@ -344,9 +321,8 @@ def test_a_region_of_a_model_is_asked_for_its_reach(arm):
     assert smc.basin(arm, law, **grid, duration=3.0, condition="coulomb").plant == "arm"
 
 
-def test_a_model_is_tuned_in_conditions_of_ones_own(arm):
-    with pytest.raises(smc.ScenarioError, match=r"arm starts at 0.*smc.starts"):
-        smc.tune(arm, "observer_free", budget=4, conditions="nominal")
+def test_a_model_is_tuned_in_conditions_of_ones_own(arm, refused):
+    refused(lambda: smc.tune(arm, "observer_free", budget=4, conditions="nominal"))
     goal = Objective(conditions=("nominal",), duration=0.5)
     found = smc.tune(arm, "observer_free", 4, objective=goal, conditions=[WORN], starts=smc.starts(x0=0.4))
     assert [one.name for one in found.definition.conditions] == ["worn gear"]

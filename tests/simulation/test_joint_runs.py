@@ -2,7 +2,6 @@
 
 import math
 import pickle
-import re
 
 import mujoco
 import numpy as np
@@ -204,7 +203,7 @@ def beyond(y, gains, memory):
     return -y.e, y.e
 
 
-def test_a_push_gives_its_impulse_to_its_body():
+def test_a_push_gives_its_impulse_to_its_body(refused):
     """A sphere that swings freely, without gravity: l F dt of angular momentum, F dt = 2 width peak / pi."""
     text = """<mujoco><option gravity="0 0 0"/><worldbody><body name="bob"><joint name="a" axis="0 1 0"/>
       <geom type="sphere" size="0.01" pos="0 0 -1" mass="2"/></body></worldbody></mujoco>"""
@@ -213,8 +212,7 @@ def test_a_push_gives_its_impulse_to_its_body():
     trace = smc.run(smc.Scenario(plant=plant, law="none", disturbance=push, duration=0.2))
     assert np.abs(trace.v[trace.t < 0.1]).max() == 0.0
     assert trace.v[-1, 0] == pytest.approx(30.0 * 0.02 * 2 / math.pi / 2.0, rel=1e-3)
-    with pytest.raises(smc.ScenarioError, match="unknown body of bob in a Push 'bub': did you mean 'bob'"):
-        smc.Scenario(plant=plant, law="none", disturbance=smc.Push("bub"))
+    refused(lambda: smc.Scenario(plant=plant, law="none", disturbance=smc.Push("bub")))
 
 
 def test_a_failing_law_ends_its_own_run_with_the_reason():
@@ -254,44 +252,24 @@ WELDED = """
 """
 TORQUE = "computed_torque_sliding"
 REFUSED = {
-    "gain of another length": (
-        lambda: smc.Scenario(plant="double_pendulum", law=smc.law(TORQUE, k=[1.0, 2.0, 3.0])),
-        "gain k of computed_torque_sliding has 3 values, (1, 2, 3), and double_pendulum has 2 driven channels",
+    "gain of another length": lambda: smc.Scenario(plant="double_pendulum", law=smc.law(TORQUE, k=[1.0, 2.0, 3.0])),
+    "no gain": lambda: smc.law(TORQUE, k=[]),
+    "bad gain": lambda: smc.law(TORQUE, k=[1.0, -1.0]),
+    "free joint": lambda: smc.Scenario(plant="cart_pole", law=TORQUE),
+    "one joint": lambda: smc.Scenario(plant="duffing", law=TORQUE),
+    "surface": lambda: smc.Scenario(plant="double_pendulum", law=TORQUE, surface="terminal"),
+    "singular": lambda: smc.Scenario(
+        plant=smc.plant_from(TWICE, channels={n: smc.Channel(motor=True) for n in "ab"}, name="twice"), law=TORQUE
     ),
-    "no gain": (lambda: smc.law(TORQUE, k=[]), "computed_torque_sliding's k is []"),
-    "bad gain": (lambda: smc.law(TORQUE, k=[1.0, -1.0]), "computed_torque_sliding's k[1] is -1: give"),
-    "free joint": (
-        lambda: smc.Scenario(plant="cart_pole", law=TORQUE),
-        "commands them all, and cart_pole has 1 without an actuator",
+    "welded": lambda: smc.Scenario(
+        plant=smc.plant_from(WELDED, channels={n: smc.Channel(motor=True) for n in "ab"}, name="welded"), law=TORQUE
     ),
-    "one joint": (
-        lambda: smc.Scenario(plant="duffing", law=TORQUE),
-        "law 'computed_torque_sliding' is of many joints, and duffing has one: give a law of one channel",
-    ),
-    "surface": (
-        lambda: smc.Scenario(plant="double_pendulum", law=TORQUE, surface="terminal"),
-        "is of many joints and has its own surface",
-    ),
-    "singular": (
-        lambda: smc.Scenario(
-            plant=smc.plant_from(TWICE, channels={n: smc.Channel(motor=True) for n in "ab"}, name="twice"), law=TORQUE
-        ),
-        "the mass matrix of twice is singular at x0",
-    ),
-    "welded": (
-        lambda: smc.Scenario(
-            plant=smc.plant_from(WELDED, channels={n: smc.Channel(motor=True) for n in "ab"}, name="welded"), law=TORQUE
-        ),
-        "welded has no nominal model: equality constraints hold its joints together",
-    ),
-    "in C": (lambda: smc.law_to_c(TORQUE), "law 'computed_torque_sliding' is of many joints"),
-    "chattering": (lambda: smc.chattering(TORQUE, plant="double_pendulum"), "is of many joints"),
+    "in C": lambda: smc.law_to_c(TORQUE),
+    "chattering": lambda: smc.chattering(TORQUE, plant="double_pendulum"),
 }
 
 
 @pytest.mark.filterwarnings("ignore:Inertia matrix is too close to singular")
-def test_bad_input_is_one_sentence():
-    for make, said in REFUSED.values():
-        with pytest.raises(smc.ScenarioError, match=re.escape(said)) as caught:
-            make()
-        assert "\n" not in str(caught.value)
+def test_bad_input_is_one_sentence(refused):
+    for make in REFUSED.values():
+        refused(make)

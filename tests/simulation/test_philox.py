@@ -191,13 +191,6 @@ def test_two_process_noises_of_one_run_are_independent():
     assert abs(np.corrcoef(one[:, 0], two[:, 0])[0, 1]) < 4 / math.sqrt(20.0 / (2 * TAU))
 
 
-@pytest.mark.parametrize("dt", [1e-12, 1e-300])
-def test_process_noise_with_absurdly_many_knots_is_refused(dt):
-    """Each knot costs time: 1e13 of them would hang in compiled code that hears no Ctrl-C."""
-    with pytest.raises(smc.ScenarioError, match="dt"):
-        smc.Scenario(plant="duffing", law="none", disturbance=smc.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=dt))
-
-
 def test_uniform_numbers_are_numpys_53_bits_of_a_block():
     for k in range(1, 50):
         word = int(numpys(7, 3, 5, k)[0])

@@ -95,18 +95,15 @@ def test_the_model_of_a_run_has_no_picture_to_paint():
     assert 0 < models.compile_model(scenario()).ntexdata < 100 < scenario().plant.load().ntexdata
 
 
-def test_what_is_no_scenario_is_refused():
+def test_what_is_no_scenario_is_refused(refused):
     for thing in (None, 5, "duffing", smc.plant("duffing"), {}.get):
-        with pytest.raises(smc.ScenarioError, match="Scenario"):
-            smc.run(thing)
-        with pytest.raises(smc.ScenarioError, match="Scenario"):
-            smc.run([scenario(), thing])
+        refused(lambda thing=thing: smc.run(thing))
+        refused(lambda thing=thing: smc.run([scenario(), thing]))
 
 
-def test_a_bad_number_of_threads_is_refused():
+def test_a_bad_number_of_threads_is_refused(refused):
     for threads in (0, -1, True, 1.5, "2", math.nan, [2]):
-        with pytest.raises(smc.ScenarioError, match="threads is"):
-            smc.run([scenario()], threads=threads)
+        refused(lambda threads=threads: smc.run([scenario()], threads=threads))
 
 
 @pytest.mark.parametrize("threads", [1, 2, 64, np.int64(2)])
@@ -492,17 +489,15 @@ def test_a_law_may_simulate_a_model_of_its_own():
     )
 
 
-def test_a_law_from_a_file_without_its_code_is_refused(tmp_path):
+def test_a_law_from_a_file_without_its_code_is_refused(tmp_path, refused):
     smc.run(scenario(made(lambda y, gains, memory: (0.0, 0.0)))).save(tmp_path / "a.npz")
-    with pytest.raises(smc.ScenarioError, match="lambda"):
-        smc.run(smc.load(tmp_path / "a.npz").scenario)
+    refused(lambda: smc.run(smc.load(tmp_path / "a.npz").scenario))
 
 
-def test_an_estimator_from_a_file_without_its_code_is_refused(tmp_path):
+def test_an_estimator_from_a_file_without_its_code_is_refused(tmp_path, refused):
     mine = smc.estimator_function()(lambda y, gains, memory: y.v)()
     smc.run(scenario(velocity=mine)).save(tmp_path / "a.npz")
-    with pytest.raises(smc.ScenarioError, match="lambda"):
-        smc.run(smc.load(tmp_path / "a.npz").scenario)
+    refused(lambda: smc.run(smc.load(tmp_path / "a.npz").scenario))
 
 
 # the process around it

@@ -552,9 +552,10 @@ class SourNoise(smc.Signal):
         ({"velocity": smc.estimator_function(sour_estimator)()}, "estimator 'sour_estimator' raised ValueError (sour)"),
         ({"surface": smc.surface_function(sour_surface)()}, "surface 'sour_surface' raised ValueError (sour)"),
         ({"reference": Sour()}, "Sour raised ValueError (sour)"),
+        ({"feedforward": Sour()}, "Sour raised ValueError (sour)"),
         ({"disturbance": [smc.OrnsteinUhlenbeck(0.1, 0.1), SourNoise()]}, "SourNoise raised ValueError (sour)"),
     ],
-    ids=["estimator", "surface", "reference", "disturbance"],
+    ids=["estimator", "surface", "reference", "feedforward", "disturbance"],
 )
 def test_every_part_that_raises_is_named_without_a_second_run(fields, words, monkeypatch):
     one = scenario(plant=THREE, x0=(1.0, 3.0, 2.0), **fields)
@@ -581,15 +582,13 @@ def test_a_trace_is_finite_up_to_its_end_in_all_its_signals(run):
         assert np.isnan(getattr(trace, name)[10:]).all()
 
 
-def test_a_motor_of_next_to_no_resistance_is_refused():
-    with pytest.raises(smc.ScenarioError, match=r"resistance is 4\.94066e-324: give at least 1e-09"):
-        smc.DCMotor(resistance=5e-324, inductance=0, torque_constant=1.0)
+def test_a_motor_of_next_to_no_resistance_is_refused(refused):
+    refused(lambda: smc.DCMotor(resistance=5e-324, inductance=0, torque_constant=1.0))
 
 
-def test_process_noise_of_more_knots_than_minutes_of_computing_is_refused():
+def test_process_noise_of_more_knots_than_minutes_of_computing_is_refused(refused):
     plant = smc.plant("pendulum_network", n=1000)
-    with pytest.raises(smc.ScenarioError, match="dt 5e-10 s makes too many knots: give 2e-07 s or more"):
-        scenario("none", plant=plant, disturbance=smc.OrnsteinUhlenbeck(0.1, 0.1, dt=5e-10))
+    refused(lambda: scenario("none", plant=plant, disturbance=smc.OrnsteinUhlenbeck(0.1, 0.1, dt=5e-10)))
     scenario("none", plant=plant, disturbance=smc.OrnsteinUhlenbeck(0.1, 0.1, dt=2e-7))
     scenario("none", plant=plant, disturbance=smc.OrnsteinUhlenbeck(0.1, 0.1), duration=1000.0, control_period=0.1)
 
@@ -703,10 +702,9 @@ def test_the_path_of_process_noise_does_not_change_with_what_is_put_before_it(be
     ],
     ids=["labels", "signs", "conditions", "both together"],
 )
-def test_names_that_make_the_same_file_are_refused(conditions):
+def test_names_that_make_the_same_file_are_refused(conditions, refused):
     runs = {c: {label: scenario(seed=seed) for label, seed in labels.items()} for c, labels in conditions.items()}
-    with pytest.raises(smc.ScenarioError, match="same file name"):
-        smc.Scene(title="T", conditions=runs)
+    refused(lambda: smc.Scene(title="T", conditions=runs))
 
 
 # (l) users' signals
@@ -749,7 +747,7 @@ def test_a_trace_of_a_signal_of_one_s_own_comes_back_as_it_was_where_its_class_i
 @pytest.mark.parametrize("field", ["reference", "disturbance"])
 @pytest.mark.parametrize("kind", [Ramp(0.3), Sine(0.2, 5.0)], ids=lambda s: type(s).__name__)
 def test_a_trace_of_a_signal_that_is_gone_loads_and_compares_and_is_refused_only_when_run(
-    field, kind, tmp_path, monkeypatch
+    field, kind, tmp_path, monkeypatch, refused
 ):
     trace = smc.run(scenario(**{field: kind}))
     path = trace.save(tmp_path / "a.npz")
@@ -763,8 +761,7 @@ def test_a_trace_of_a_signal_that_is_gone_loads_and_compares_and_is_refused_only
     assert loaded.scenario != scenario(**{field: smc.Sine(0.2, 5.0)})
     assert smc.load(loaded.save(tmp_path / "b.npz")).scenario == loaded.scenario
     assert dataclasses.replace(loaded.scenario, seed=1).seed == 1
-    with pytest.raises(smc.ScenarioError, match=type(kind).__name__):
-        smc.run(loaded.scenario)
+    refused(lambda: smc.run(loaded.scenario))
     repaired = dataclasses.replace(loaded.scenario, **{field: kind})
     assert same(smc.run(repaired), trace)
 
@@ -871,14 +868,18 @@ def test_the_generalised_force_of_a_horizontal_force_is_that_of_the_jacobian(joi
 @pytest.mark.parametrize(
     "drive", ['tendon="t"', 'joint="j" gear="2"', 'joint="j" gear="-1"', 'joint="j" gear="0"', 'jointinparent="j"']
 )
-def test_an_actuator_that_is_no_motor_of_gear_1_on_a_joint_is_refused(drive):
-    with pytest.raises(smc.ScenarioError, match="'u' does not drive a joint with gear 1"):
-        channels(mechanism(drive))
+def test_an_actuator_that_is_no_motor_of_gear_1_on_a_joint_is_refused(drive, refused):
+    refused(lambda: channels(mechanism(drive)))
 
 
-def test_a_joint_along_no_world_axis_is_refused():
-    with pytest.raises(smc.ScenarioError, match="axis"):
-        channels(mechanism('joint="j"', axis="1 1 0"))
+def test_a_joint_along_no_world_axis_is_refused(refused):
+    refused(lambda: channels(mechanism('joint="j"', axis="1 1 0")))
+
+
+def test_a_channel_without_a_sensor_of_velocity_is_refused(refused):
+    body = '<worldbody><body><joint name="j"/><geom size="0.1"/></body></worldbody>'
+    text = f'<mujoco>{body}<sensor><jointpos joint="j"/></sensor></mujoco>'
+    refused(lambda: channels(mujoco.MjModel.from_xml_string(text)))
 
 
 # (o) infinite disturbances
@@ -1032,16 +1033,14 @@ def test_ctrl_c_that_comes_while_numba_compiles_is_heard_when_it_is_done(monkeyp
     ],
     ids=lambda error: type(error).__name__,
 )
-def test_memory_that_runs_out_is_said_in_one_sentence(error, monkeypatch):
+def test_memory_that_runs_out_is_said_in_one_sentence(error, monkeypatch, refused):
     def runs_out(*arguments):
         raise error
 
     monkeypatch.setattr(RUN, "ScenarioBatch", runs_out)
-    with pytest.raises(smc.ScenarioError, match=r"no memory for 2 runs at once, about \d+ MiB"):
-        smc.run([scenario(), scenario(seed=1)])
+    refused(lambda: smc.run([scenario(), scenario(seed=1)]))
     monkeypatch.setattr(reference, "simulate", runs_out)
-    with pytest.raises(smc.ScenarioError, match="no memory for 1 run at once"):
-        plainly(scenario(made(lambda y, gains, memory: (json.dumps(y.t), 0.0))))
+    refused(lambda: plainly(scenario(made(lambda y, gains, memory: (json.dumps(y.t), 0.0)))))
 
 
 @pytest.mark.parametrize("error", [ValueError("sour"), mujoco.FatalError("sour")])

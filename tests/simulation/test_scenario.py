@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.simulation.signals import PerChannel, Relay
 
 pytestmark = pytest.mark.quick
 
 NAN, INF = math.nan, math.inf
+COME = smc.Step(1.0)
 TINY, HUGE = 1e-320, 1e308  # subnormal; its quotient with anything small overflows
 
 
@@ -25,19 +27,6 @@ def scenario(**fields):
 def brief(value) -> str:
     """A test's name for a value."""
     return repr(value)[:20]
-
-
-def refused(make, *words: str) -> str:
-    """The sentence with which `make` is refused; it holds every word."""
-    with pytest.raises(smc.ScenarioError) as caught:
-        make()
-    message = str(caught.value)
-    assert message
-    assert "\n" not in message
-    assert len(message) < 1100
-    for word in words:
-        assert word in message
-    return message
 
 
 NO_NUMBERS = [
@@ -58,13 +47,13 @@ NO_NUMBERS = [
 
 
 @pytest.mark.parametrize("field", ["duration", "control_period", "input_delay", "physics_step"])
-def test_a_field_that_is_no_number_is_refused(field):
+def test_a_field_that_is_no_number_is_refused(field, refused):
     for value in NO_NUMBERS:
         if field != "physics_step" or value is not None:
             refused(lambda value=value: scenario(**{field: value}), field, repr(value))
 
 
-def test_a_bound_is_none_one_number_or_one_a_channel():
+def test_a_bound_is_none_one_number_or_one_a_channel(refused):
     assert scenario(u_max=None) == scenario(u_max=6.0) == scenario()
     for value in NO_NUMBERS:
         if isinstance(value, list | tuple | np.ndarray) and len(value) == 1:
@@ -74,7 +63,7 @@ def test_a_bound_is_none_one_number_or_one_a_channel():
 
 
 @pytest.mark.parametrize("field", ["duration", "control_period", "u_max", "input_delay", "physics_step"])
-def test_a_field_out_of_its_range_is_refused(field):
+def test_a_field_out_of_its_range_is_refused(field, refused):
     for value in (NAN, -INF, -1.0, *(() if field == "u_max" else (INF,))):
         refused(lambda value=value: scenario(**{field: value}), field, f"{value:g}")
     for value in () if field == "input_delay" else (0, -0.0):
@@ -83,7 +72,7 @@ def test_a_field_out_of_its_range_is_refused(field):
         refused(lambda: scenario(**{field: 10**400}), field)
 
 
-def test_absurd_clocks_are_refused_and_not_run():
+def test_absurd_clocks_are_refused_and_not_run(refused):
     for fields in (
         {"duration": HUGE},
         {"duration": 1e300, "physics_step": 1e-12},
@@ -139,12 +128,12 @@ def test_a_run_lasts_the_whole_periods_that_fit():
 
 
 @pytest.mark.parametrize("step", [2e-3, 3e-4, 0.9e-3, 1.0, 1e-3 / 1.5])
-def test_a_physics_step_that_does_not_divide_the_period_is_refused(step):
+def test_a_physics_step_that_does_not_divide_the_period_is_refused(step, refused):
     refused(lambda: scenario(physics_step=step), "physics_step", f"{step:g}", "0.001")
 
 
 @pytest.mark.parametrize("name", ["duffing", "pendulum_network"])
-def test_one_parameter_under_two_names_is_refused(name):
+def test_one_parameter_under_two_names_is_refused(name, refused):
     plant = smc.plant(name)
     both = {"mass": 1.2, plant.mass: 1.5}
     words = f"{plant.mass} 1.5 and mass 1.2, which are the same parameter of {name}: give one of them"
@@ -162,31 +151,31 @@ def test_a_physics_step_that_divides_up_to_rounding_divides_exactly(count):
 
 
 @pytest.mark.parametrize("delay", [1e-4, 1.5e-3, 0.0107])
-def test_a_delay_that_is_no_whole_number_of_steps_is_refused(delay):
+def test_a_delay_that_is_no_whole_number_of_steps_is_refused(delay, refused):
     refused(lambda: scenario(input_delay=delay), "input_delay", f"{delay:g}", "0.001")
 
 
-def test_a_delay_beyond_the_run_is_refused():
+def test_a_delay_beyond_the_run_is_refused(refused):
     refused(lambda: scenario(duration=1.0, input_delay=2.0), "input_delay", "2")
 
 
-def test_a_run_shorter_than_a_period_is_refused():
+def test_a_run_shorter_than_a_period_is_refused(refused):
     refused(lambda: scenario(duration=0.05, control_period=0.1), "duration", "0.05", "0.1")
 
 
-def test_process_noise_with_more_knots_than_a_run_may_have_steps_is_refused():
+def test_process_noise_with_more_knots_than_a_run_may_have_steps_is_refused(refused):
     refused(lambda: scenario(disturbance=smc.OrnsteinUhlenbeck(sigma=0.1, tau=0.1, dt=1e-300)), "dt", "1e-300")
 
 
 @pytest.mark.parametrize("field", ["x0", "v0"])
-def test_a_state_that_is_no_finite_number_is_refused(field):
+def test_a_state_that_is_no_finite_number_is_refused(field, refused):
     odd = [NAN, INF, -2e6, 10**400, True, "1", [NAN], [[1.0]], ["a"], [None], ..., b"1", {"a": 1.0}, np.zeros((1, 1))]
     for value in odd:
         refused(lambda value=value: scenario(**{field: value}), field)
 
 
 @pytest.mark.parametrize("field", ["x0", "v0"])
-def test_a_state_of_the_wrong_length_is_refused(field):
+def test_a_state_of_the_wrong_length_is_refused(field, refused):
     plant = smc.plant("pendulum_network", n=3)
     for value in ([], [1.0, 2.0], np.zeros(4), np.zeros((10, 10))):
         words = f"{len(value)} values", "3 channels"
@@ -213,7 +202,7 @@ def test_a_network_recycles_the_paper_s_initial_positions(n):
     assert made.resolved.x0 == tuple(first[i % 5] for i in range(n))
 
 
-def test_an_unknown_name_suggests_the_nearest():
+def test_an_unknown_name_suggests_the_nearest(refused):
     for make, wrong, near in (
         (lambda: scenario(plant="dufing"), "dufing", "duffing"),
         (lambda: scenario(plant="pendulum_netwrok"), "pendulum_netwrok", "pendulum_network"),
@@ -230,7 +219,7 @@ def test_an_unknown_name_suggests_the_nearest():
         assert f"did you mean '{near}'" in message
 
 
-def test_a_name_near_to_none_lists_them_all():
+def test_a_name_near_to_none_lists_them_all(refused):
     message = refused(lambda: scenario(law="zzz"), "'zzz'")
     assert all(name in message for name in smc.laws())
 
@@ -238,7 +227,7 @@ def test_a_name_near_to_none_lists_them_all():
 ODD = [None, 5, 1.5, True, [], {}, ..., np.eye(30), np.array(["duffing", "x"]), len]
 
 
-def test_what_is_no_name_at_all_is_refused_and_finds_nothing():
+def test_what_is_no_name_at_all_is_refused_and_finds_nothing(refused):
     for value in ODD:
         for field in ("plant", "law", *(() if value is None else ("velocity", "integrator"))):  # None means the default
             refused(lambda field=field, value=value: scenario(**{field: value}), field)
@@ -246,12 +235,12 @@ def test_what_is_no_name_at_all_is_refused_and_finds_nothing():
             refused(lambda find=find, value=value: find(value))
 
 
-def test_a_law_is_no_estimator_and_an_estimator_no_law():
+def test_a_law_is_no_estimator_and_an_estimator_no_law(refused):
     refused(lambda: scenario(velocity=smc.law("classical")), "velocity", "classical")
     refused(lambda: scenario(law=smc.estimator("measured")), "law", "measured")
 
 
-def test_a_disturbance_that_is_no_signal_is_refused():
+def test_a_disturbance_that_is_no_signal_is_refused(refused):
     for value in (5.0, "sine", [5.0], [smc.Constant(1.0), None], smc.Sine, ..., np.zeros(3)):
         refused(lambda value=value: scenario(disturbance=value), "disturbance")
 
@@ -263,7 +252,7 @@ def test_a_disturbance_is_none_one_or_several():
     assert scenario(disturbance=[sine, smc.Constant(1.0)]).disturbance == (sine, smc.Constant(1.0))
 
 
-def test_a_reference_that_is_not_one_signal_is_refused():
+def test_a_reference_that_is_not_one_signal_is_refused(refused):
     for value in (0.0, "0", [], [smc.Constant(0.0)] * 2, ...):
         refused(lambda value=value: scenario(reference=value), "reference")
 
@@ -274,7 +263,7 @@ def test_what_is_left_out_or_none_is_quiet():
     assert made.resolved.velocity == smc.estimator("measured")
 
 
-def test_a_reference_that_is_noise_is_refused():
+def test_a_reference_that_is_noise_is_refused(refused):
     refused(lambda: scenario(reference=smc.OrnsteinUhlenbeck(1.0, 1.0)), "reference", "OrnsteinUhlenbeck")
 
 
@@ -291,7 +280,7 @@ SIGNALS = [
 
 
 @pytest.mark.parametrize("signal", SIGNALS, ids=lambda s: type(s).__name__)
-def test_every_parameter_of_every_signal_must_be_a_finite_number(signal):
+def test_every_parameter_of_every_signal_must_be_a_finite_number(signal, refused):
     for name in signal.parameters():
         for value in (NAN, INF, None, "1", True, [1.0], np.zeros(2), 1j, 10**400):
             change = {name: value}
@@ -308,40 +297,50 @@ def test_every_parameter_of_every_signal_must_be_a_finite_number(signal):
         (lambda value: smc.OrnsteinUhlenbeck(1.0, 1.0, dt=value), "dt"),
     ],
 )
-def test_widths_and_time_constants_are_positive(make, name):
+def test_widths_and_time_constants_are_positive(make, name, refused):
     for value in (0.0, -1.0):
         refused(lambda value=value: make(value), name, f"{value:g}")
 
 
-def test_the_spread_of_process_noise_is_not_negative():
+def test_the_spread_of_process_noise_is_not_negative(refused):
     refused(lambda: smc.OrnsteinUhlenbeck(-0.1, 1.0), "sigma", "-0.1")
 
 
 @pytest.mark.parametrize("field", ["position", "velocity"])
-def test_measurement_noise_is_a_finite_number_not_negative(field):
+def test_measurement_noise_is_a_finite_number_not_negative(field, refused):
     for value in (NAN, INF, -0.1, None, "1", True, np.zeros(2)):
         refused(lambda value=value: smc.Noise(**{field: value}), "Noise", field)
 
 
-def test_a_noise_that_is_no_noise_is_refused():
+def test_a_noise_that_is_no_noise_is_refused(refused):
     for value in (0.1, "loud", smc.Constant(0.1), np.eye(30)):
         refused(lambda value=value: scenario(noise=value), "noise")
 
 
-def test_a_mismatch_that_is_no_mapping_is_refused():
+def test_an_error_of_measurement_is_a_known_signal(refused):
+    for error in (0.1, smc.OrnsteinUhlenbeck(0.1, 1.0), smc.Gust(1.0, 0.0, 1.0), Relay(1.0), PerChannel((COME,))):
+        refused(lambda error=error: smc.Noise(velocity_error=error))
+        refused(lambda error=error: smc.Noise(position_error=error))
+
+
+def test_a_push_is_on_a_body_that_has_a_name(refused):
+    refused(lambda: smc.Push(3))
+
+
+def test_a_mismatch_that_is_no_mapping_is_refused(refused):
     for value in (1.3, "M", ["M"], [("M", 1.3)], np.eye(30)):
         refused(lambda value=value: scenario(mismatch=value), "mismatch")
         refused(lambda value=value: smc.Jump(0.5, value), "Jump")
 
 
-def test_a_factor_must_be_a_finite_number():
+def test_a_factor_must_be_a_finite_number(refused):
     for value in (NAN, INF, None, "2", True, [2.0]):
         refused(lambda value=value: scenario(mismatch={"alpha": value}), "mismatch", "alpha")
         refused(lambda value=value: smc.Jump(0.5, {"alpha": value}), "Jump", "alpha")
 
 
 @pytest.mark.parametrize(("name", "value"), [("mass", 0.0), ("M", -1.0)])
-def test_a_plant_keeps_a_positive_mass(name, value):
+def test_a_plant_keeps_a_positive_mass(name, value, refused):
     refused(lambda: scenario(mismatch={name: value}), name, f"{value:g}")
     refused(lambda: scenario(jump=smc.Jump(0.5, {name: value})), name, f"{value:g}")
 
@@ -355,7 +354,7 @@ def test_a_plant_keeps_a_positive_mass(name, value):
     ],
     ids=str,
 )
-def test_factors_that_together_leave_no_mechanism_are_refused(fields):
+def test_factors_that_together_leave_no_mechanism_are_refused(fields, refused):
     refused(lambda: scenario(**fields), "duffing")
 
 
@@ -364,22 +363,22 @@ def test_mass_means_the_plant_s_mass():
     assert vars(smc.plant("pendulum_network").values({"mass": 2.0}))["m"] == 1.0
 
 
-def test_a_jump_after_the_end_is_refused():
+def test_a_jump_after_the_end_is_refused(refused):
     for time in (1.0, 1.5, 1e300):
         refused(lambda time=time: scenario(duration=1.0, jump=smc.Jump(time, {"M": 2.0})), "jump", f"{time:g}")
 
 
-def test_a_jump_s_time_is_a_finite_number_not_negative():
+def test_a_jump_s_time_is_a_finite_number_not_negative(refused):
     for time in (NAN, INF, -0.1, None, "1", True):
         refused(lambda time=time: smc.Jump(time, {"M": 2.0}), "Jump", "time")
 
 
-def test_a_jump_that_is_no_jump_is_refused():
+def test_a_jump_that_is_no_jump_is_refused(refused):
     for value in (0.5, {"M": 2.0}, (0.5, {"M": 2.0}), "now"):
         refused(lambda value=value: scenario(jump=value), "jump")
 
 
-def test_a_seed_is_a_whole_number_that_a_float_holds():
+def test_a_seed_is_a_whole_number_that_a_float_holds(refused):
     for seed in (-1, 2**53, 1.5, True, None, "1", NAN, [1]):
         refused(lambda seed=seed: scenario(seed=seed), "seed", repr(seed))
 
@@ -394,7 +393,7 @@ def test_a_seed_may_come_from_numpy():
     assert type(scenario(seed=np.int64(3)).seed) is int
 
 
-def test_a_network_s_size_is_a_whole_number_in_its_range():
+def test_a_network_s_size_is_a_whole_number_in_its_range(refused):
     for n in (1, 0, -3, 1001, 2.5, NAN, INF, None, "3", "many", [3], np.array([2, 3])):
         refused(lambda n=n: smc.plant("pendulum_network", n=n), "pendulum_network", "n")
 
@@ -407,52 +406,52 @@ def test_a_network_takes_every_size_in_its_range(n):
     assert len(made.x0) == n
 
 
-def test_a_single_plant_takes_no_size():
+def test_a_single_plant_takes_no_size(refused):
     refused(lambda: smc.plant("duffing", n=2), "duffing", "2")
 
 
-def test_every_parameter_of_every_plant_must_be_a_finite_number():
+def test_every_parameter_of_every_plant_must_be_a_finite_number(refused):
     for value in (NAN, INF, None, "1", True, [1.0]):
         refused(lambda value=value: smc.plant("duffing", beta=value), "duffing", "beta")
     for plant in smc.plants():
         for name in smc.plant(plant).parameters:
-            refused(lambda plant=plant, name=name: smc.plant(plant, **{name: NAN}), plant, name)
+            refused(lambda plant=plant, name=name: smc.plant(plant, **{name: NAN}), plant, name, recorded=False)
 
 
-def test_every_gain_of_every_law_must_be_a_finite_number():
+def test_every_gain_of_every_law_must_be_a_finite_number(refused):
     for value in (NAN, INF, None, "1", True, [], [NAN], 10**400):
         refused(lambda value=value: smc.law("classical", c=value), "classical", "c")
     for law in smc.laws():
         for name, default in smc.law(law).gains.items():
             for value in (NAN,) if default == INF else (NAN, INF):  # a bound that may be none
-                refused(lambda change={name: value}, law=law: smc.law(law, **change), law, name)
+                refused(lambda change={name: value}, law=law: smc.law(law, **change), law, name, recorded=False)
 
 
-def test_gains_that_must_be_positive_are():
+def test_gains_that_must_be_positive_are(refused):
     refused(lambda: smc.law("boundary_layer", phi=0.0), "phi", "0")
     refused(lambda: smc.law("observer_free", lam=-1.0), "lam", "-1")
 
 
-def test_a_law_s_memory_is_a_whole_number_of_floats():
+def test_a_law_s_memory_is_a_whole_number_of_floats(refused):
     for memory in (0, -1, 10_001, 1.5, NAN, INF, None, "8", "much", [8]):
         refused(lambda memory=memory: smc.law_function(memory=memory), "memory")
 
 
-def test_a_gain_s_name_can_be_written_after_a_dot():
+def test_a_gain_s_name_can_be_written_after_a_dot(refused):
     for name in ("1k", "k 1", "_k", "", "lambda", "class", 5):
         refused(lambda name=name: smc.law_function(gains={name: 1.0}), "gain", repr(name))
 
 
-def test_gains_are_names_with_finite_defaults():
+def test_gains_are_names_with_finite_defaults(refused):
     for gains in (["k"], "k", 5, {"k": "1"}, {"k": NAN}):
         refused(lambda gains=gains: smc.law_function(gains=gains), "gain")
 
 
-def test_a_positive_gain_is_one_of_the_gains():
+def test_a_positive_gain_is_one_of_the_gains(refused):
     refused(lambda: smc.law_function(gains={"lam": 1.0}, positive=("lamb",)), "lamb", "lam")
 
 
-def test_a_law_is_checked_even_when_it_was_put_together_by_hand():
+def test_a_law_is_checked_even_when_it_was_put_together_by_hand(refused):
     gains = {"k": NAN, "c": 1.0}
     refused(lambda: scenario(law=dataclasses.replace(smc.law("classical"), gains=gains)), "k", "nan")
 
@@ -524,7 +523,7 @@ def test_a_variant_differs_in_what_was_replaced_and_nothing_else():
     assert dataclasses.replace(variant, seed=7) == full()
 
 
-def test_a_variant_is_checked_like_any_other():
+def test_a_variant_is_checked_like_any_other(refused):
     refused(lambda: dataclasses.replace(scenario(), duration=-1.0), "duration")
 
 
@@ -536,14 +535,23 @@ def test_a_scenario_shows_its_fields():
 # laws, models, surfaces
 
 
-def test_a_surface_that_is_none_is_refused():
+def test_a_surface_that_is_none_is_refused(refused):
     for value in ("", 0, False, [], 5, "lienar"):
         refused(lambda value=value: scenario(surface=value), "surface")
 
 
 @pytest.mark.parametrize("law", ["twisting", "nested_third_order", "pid"])
-def test_a_law_of_the_error_and_its_rates_takes_no_surface(law):
+def test_a_law_of_the_error_and_its_rates_takes_no_surface(law, refused):
     refused(lambda: scenario(law=law, surface="linear"), f"'{law}'", "'linear'")
+
+
+@smc.surface_function(gains={"c": 1.0}, relative_degree=2)
+def of_degree_two(y, gains, memory):
+    return y.e, 0.0
+
+
+def test_a_surface_has_the_relative_degree_that_its_law_needs(refused):
+    refused(lambda: scenario(surface=of_degree_two()))
 
 
 def test_a_law_that_cannot_do_without_the_model_gets_it_unless_told_otherwise():
@@ -553,7 +561,7 @@ def test_a_law_that_cannot_do_without_the_model_gets_it_unless_told_otherwise():
     assert dataclasses.replace(without, law=smc.law("classical")).resolved.model == "none"
 
 
-def test_a_law_for_other_plants_is_refused():
+def test_a_law_for_other_plants_is_refused(refused):
     refused(lambda: scenario(plant="duffing", law="swing_up"), "'swing_up'", "inverted_pendulum")
 
 
@@ -565,34 +573,20 @@ def test_a_missed_condition_warns_once_where_it_was_written():
     assert again == law
 
 
-@pytest.mark.parametrize(
-    ("fields", "said"),
-    [
-        ({"law": "STA"}, "unknown law 'STA': did you mean 'super_twisting'?"),
-        ({"law": "CTA"}, "unknown law 'CTA': did you mean 'computed_torque' or 'continuous_twisting'?"),
-        ({"law": "ISMC"}, "unknown law 'ISMC': did you mean 'integral'?"),
-        ({"law": "pid", "reference": 0.5}, "reference is 0.5: give one signal, such as smc.Constant(0.5)"),
-    ],
-)
-def test_the_field_s_usual_words_are_understood(fields, said):
-    with pytest.raises(smc.ScenarioError) as error:
-        smc.Scenario(plant="duffing", **fields)
-    assert str(error.value) == said
+@pytest.mark.parametrize("fields", [{"law": "STA"}, {"law": "CTA"}, {"law": "ISMC"}, {"law": "pid", "reference": 0.5}])
+def test_the_field_s_usual_words_are_understood(fields, refused):
+    refused(lambda: smc.Scenario(plant="duffing", **fields))
 
 
-def test_what_belongs_elsewhere_is_sent_there(tmp_path):
+def test_what_belongs_elsewhere_is_sent_there(tmp_path, refused):
     scenario = smc.Scenario(plant="duffing", law="pid", duration=0.01)
-    with pytest.raises(smc.ScenarioError, match=r"call smc\.margins\(\['duffing'\], \['pid'\]\)"):
-        smc.margins(scenario)  # pyright: ignore[reportArgumentType]
-    with pytest.raises(smc.ScenarioError, match=r"table is Trace.*: smc\.figure draws traces"):
-        smc.plot(smc.run(scenario))  # pyright: ignore[reportArgumentType]
-    with pytest.raises(smc.ScenarioError, match=r"traces is Table.*: smc\.plot draws a table"):
-        smc.figure(smc.study([scenario], tmp_path))  # pyright: ignore[reportArgumentType]
+    refused(lambda: smc.margins(scenario))  # pyright: ignore[reportArgumentType]
+    refused(lambda: smc.plot(smc.run(scenario)))  # pyright: ignore[reportArgumentType]
+    refused(lambda: smc.figure(smc.study([scenario], tmp_path)))  # pyright: ignore[reportArgumentType]
 
 
-@pytest.mark.parametrize(
-    ("field", "words"), [({"control_period": 1e306}, "duration"), ({"clock": smc.Clock(1e-310)}, "jitter")]
-)
-def test_a_period_that_would_need_countless_default_steps_is_refused_at_once(field, words):
-    with pytest.raises(smc.ScenarioError, match=words):
-        smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01, actuator=[smc.Lag(0.01)], **field))
+@pytest.mark.parametrize("field", [{"control_period": 1e306}, {"clock": smc.Clock(1e-310)}])
+def test_a_period_that_would_need_countless_default_steps_is_refused_at_once(field, refused):
+    refused(
+        lambda: smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01, actuator=[smc.Lag(0.01)], **field))
+    )

@@ -1,7 +1,5 @@
 """References through waypoints: least jerk, smoothness, and a tip that follows a path in space."""
 
-import re
-
 import mujoco
 import numpy as np
 import pytest
@@ -153,36 +151,33 @@ def test_a_run_of_the_arm_follows_a_path_in_space():
 
 ARM = arms.arm
 REFUSED = {
-    "no tip": (lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2), "site is None and body is None"),
-    "unknown site": (lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2, site="tp"), "unknown site of arm 'tp'"),
-    "one coordinate": (lambda: smc.cartesian_path(ARM(), (0, 1), [0.0, 1.0], site="tip"), "give a position (x, y, z)"),
-    "two and three coordinates": (
-        lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0), (0, 0)], site="tip"),
-        "give a position (x, y, z)",
-    ),
-    "sets": (lambda: smc.cartesian_path(ARM(), (0, 1), [{0.1}, {0.2}], site="tip"), "give a position (x, y, z)"),
-    "beyond reach": (
-        lambda: smc.cartesian_path("double_pendulum", (0, 1), [(0.0, 0.0, 0.46), (0.0, 0.0, 9.0)], body="lower"),
-        "the tip of double_pendulum does not reach (0, 0, 0.4601) m, point 1 of 101 on its path: it stays 8.",
-    ),
-    "free joint": (
-        lambda: smc.cartesian_path("cart_pole", (0, 1), [(0, 0, 0)] * 2, body="cart"),
-        "without an actuator",
-    ),
-    "no quaternion": (
-        lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2, site="tip", orientation=(0, 0, 0)),
-        "orientation is (0, 0, 0): give a quaternion (w, x, y, z)",
-    ),
-    "times backwards": (lambda: smc.Waypoints((0.0, 1.0, 0.5), (0, 1, 2)), "Waypoints, item 2: 0.5 s comes after 1 s"),
+    "no tip": lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2),
+    "unknown site": lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2, site="tp"),
+    "one coordinate": lambda: smc.cartesian_path(ARM(), (0, 1), [0.0, 1.0], site="tip"),
+    "two and three coordinates": lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0), (0, 0)], site="tip"),
+    "sets": lambda: smc.cartesian_path(ARM(), (0, 1), [{0.1}, {0.2}], site="tip"),
+    "free joint": lambda: smc.cartesian_path("cart_pole", (0, 1), [(0, 0, 0)] * 2, body="cart"),
+    "no quaternion": lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2, site="tip", orientation=(0, 0, 0)),
+    "start of another arm": lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2, site="tip", x0=(0.1,) * 9),
+    "times backwards": lambda: smc.Waypoints((0.0, 1.0, 0.5), (0, 1, 2)),
 }
 
 
-def test_bad_input_is_one_sentence():
-    for make, said in REFUSED.values():
-        with pytest.raises(smc.ScenarioError, match=re.escape(said)):
-            make()
+def test_bad_input_is_one_sentence(refused):
+    for make in REFUSED.values():
+        refused(make)
 
 
-def test_a_path_of_countless_pieces_is_refused_at_once():
-    with pytest.raises(smc.ScenarioError, match="step 1e-09 s divides 1 s into"):
-        smc.cartesian_path("panda", [0.0, 1.0], [[0.5, 0.0, 0.5], [0.4, 0.0, 0.5]], body="link7", step=1e-9)
+def test_a_point_beyond_reach_is_named_with_its_distance(refused):
+    points = [(0.0, 0.0, 0.46), (0.0, 0.0, 9.0)]
+    said = (
+        "the tip of double_pendulum does not reach (0, 0, 0.4601) m, point 1 of 101 on its path: it stays 8.",
+        "m away; give points within reach, or another x0",
+    )
+    refused(lambda: smc.cartesian_path("double_pendulum", (0, 1), points, body="lower"), *said, recorded=False)
+
+
+def test_a_path_of_countless_pieces_is_refused_at_once(refused):
+    refused(
+        lambda: smc.cartesian_path("panda", [0.0, 1.0], [[0.5, 0.0, 0.5], [0.4, 0.0, 0.5]], body="link7", step=1e-9)
+    )

@@ -173,45 +173,35 @@ def test_second(r): assert r.overshoot < 0.1
 
 
 @pytest.mark.parametrize(
-    ("call", "sentence"),
+    "call",
     [
-        ("'duffing', 'clasical', step=1", "unknown law 'clasical': did you mean 'classical'?"),
-        ("'duffing', 'classical', step=0", "step is 0: give the height of the step"),
-        ("'duffing', 'classical', step='1'", "step is '1': give a number"),
-        (
-            "'duffing', 'classical', step=1, frction=1",
-            "unknown field of a Scenario 'frction': did you mean 'friction'?",
-        ),
-        (
-            "'duffing', 'classical', step=1, condition='noisy'",
-            "unknown condition 'noisy': did you",
-        ),
-        ("'cart_pole', 'none', step=1, condition='jump_mild'", "'jump_mild' has no numbers for plant 'cart_pole'"),
-        ("'duffing', 'classical', step=1, reference=smc.Step(2)", "leave it out, as it is the step of 1"),
-        ("'duffing', lambda y, g, m: (0.0, 0.0), step=1", "put @smc.law_function(gains={...}) above the function"),
+        "'duffing', 'clasical', step=1",
+        "'duffing', 'classical', step=0",
+        "'duffing', 'classical', step='1'",
+        "'duffing', 'classical', step=1, frction=1",
+        "'duffing', 'classical', step=1, condition='noisy'",
+        "'cart_pole', 'none', step=1, condition='jump_mild'",
+        "'duffing', 'classical', step=1, reference=smc.Step(2)",
+        "'duffing', lambda y, g, m: (0.0, 0.0), step=1",
     ],
 )
-def test_a_mistake_is_one_sentence(step_response, call, sentence):
-    with pytest.raises(smc.ScenarioError) as said:
-        eval(f"step_response({call})", {"smc": smc, "step_response": step_response})
-    assert sentence in str(said.value)
-    assert "\n" not in str(said.value)
+def test_a_mistake_is_one_sentence(step_response, call, refused):
+    refused(lambda: eval(f"step_response({call})", {"smc": smc, "step_response": step_response}))
 
 
 @pytest.mark.parametrize(
-    ("limits", "sentence"),
+    "limits",
     [
-        ({}, "check has no limits"),
-        ({"overshot": 5}, "unknown metric 'overshot': did you mean 'overshoot'?"),
-        ({"spread_bound": 5}, "spread_bound compares channels and duffing has one"),
-        ({"overshoot": (5, 1)}, "give the lower one first"),
-        ({"overshoot": (1, 2, 3)}, "give the highest value, or (lowest, highest)"),
+        {},
+        {"overshot": 5},
+        {"spread_bound": 5},
+        {"overshoot": (5, 1)},
+        {"overshoot": (1, 2, 3)},
     ],
 )
-def test_a_limit_that_is_none_is_one_sentence(step_response, limits, sentence):
+def test_a_limit_that_is_none_is_one_sentence(step_response, limits, refused):
     r = step_response("duffing", "none", step=1, duration=0.01)
-    with pytest.raises(smc.ScenarioError, match=re.escape(sentence)):
-        r.check(**limits)
+    refused(lambda: r.check(**limits))
 
 
 # what a response is
@@ -247,22 +237,18 @@ def test_a_pole_on_a_cart_has_its_own_metrics_in_its_own_unit(pole):
         pole.spread_bound  # noqa: B018
 
 
-def test_check_takes_metrics_of_a_group_by_its_name(pole):
+def test_check_takes_metrics_of_a_group_by_its_name(pole, refused):
     pole.check(**{"free peak": 1.0, "free settling_time": 1.0})
     with pytest.raises(AssertionError, match=r"^free peak is .* rad, not"):
         pole.check(**{"free peak": 1e-6})
-    with pytest.raises(smc.ScenarioError, match="unknown metric 'free max_u'"):
-        pole.check(**{"free max_u": 1.0})
+    refused(lambda: pole.check(**{"free max_u": 1.0}))
 
 
-def test_a_golden_metric_that_no_longer_exists_is_named_with_the_cure(pole, tmp_path):
+def test_a_golden_metric_that_no_longer_exists_is_named_with_the_cure(pole, tmp_path, refused):
     golden.record(tmp_path / "a.json", "test", pole, None, {"free peak": 0.1})
     text = (tmp_path / "a.json").read_text().replace("free peak", "hinge peak")
     (tmp_path / "a.json").write_text(text)
-    with pytest.raises(
-        smc.ScenarioError, match=r"a\.json, test: unknown metric 'hinge peak'.*; or run pytest --smc-update"
-    ):
-        golden.compare(tmp_path / "a.json", "test", pole, None, {})
+    refused(lambda: golden.compare(tmp_path / "a.json", "test", pole, None, {}))
 
 
 def test_golden_metrics_hold_the_pole_too(pole, tmp_path):
@@ -390,23 +376,20 @@ def test_recording_one_test_keeps_the_others(session, pytester):
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"test": 3}'])
-def test_a_broken_golden_file_is_one_sentence(tmp_path, text):
+def test_a_broken_golden_file_is_one_sentence(tmp_path, text, refused):
     (tmp_path / "a.json").write_text(text)
-    with pytest.raises(smc.ScenarioError, match=r"a\.json cannot be read .*: delete it and run pytest --smc-update"):
-        golden.read(tmp_path / "a.json")
+    refused(lambda: golden.read(tmp_path / "a.json"))
 
 
-def test_where_nothing_can_be_recorded_is_one_sentence(step_response, tmp_path, monkeypatch):
+def test_where_nothing_can_be_recorded_is_one_sentence(step_response, tmp_path, monkeypatch, refused):
     def refuse(_):
         raise PermissionError(13, "Permission denied")
 
     response = step_response("duffing", "none", step=0.1, duration=0.01)
     monkeypatch.setattr(golden, "replacing", refuse)  # nothing is forbidden to root
-    with pytest.raises(smc.ScenarioError, match=r"a\.json cannot be written \(Permission denied\): record"):
-        golden.record(tmp_path / "a.json", "test", response, None, {"overshoot": 1.0})
+    refused(lambda: golden.record(tmp_path / "a.json", "test", response, None, {"overshoot": 1.0}))
     for put in (golden.record, golden.compare):
-        with pytest.raises(smc.ScenarioError, match=r"golden is given 0\.5: give what step_response returned"):
-            put(tmp_path / "a.json", "test", 0.5, None, {})
+        refused(lambda put=put: put(tmp_path / "a.json", "test", 0.5, None, {}))
 
 
 @pytest.mark.parametrize(

@@ -241,7 +241,7 @@ def test_a_force_is_searched_up_to_what_the_actuator_gives_and_no_further():
 
 
 @pytest.mark.parametrize("law", ["extended_state", "disturbance_observer"])
-def test_a_gain_over_another_is_searched_up_to_what_the_actuator_gives(law):
+def test_a_gain_over_another_is_searched_up_to_what_the_actuator_gives(law, refused):
     tuned = tune("duffing", law, budget=EVALUATIONS_PER_GAIN, objective=LEAN)
     order = list(tuned.bounds)
     forces = [e.gains[order.index("k")] / e.gains[order.index("b")] for e in tuned.history]
@@ -249,13 +249,11 @@ def test_a_gain_over_another_is_searched_up_to_what_the_actuator_gives(law):
     assert sum(force > 6.0 * (1.0 - search_space.ROUNDING_TOLERANCE) for force in forces) > 3
     beyond = dataclasses.replace(tuned, law=dataclasses.replace(tuned.law, gains={**tuned.law.gains, "k": 1e3}))
     assert beyond.at_bound["k"] == "upper"
-    with pytest.raises(smc.ScenarioError, match="beyond their actuator"):
-        compare([tuned, beyond])
+    refused(lambda: compare([tuned, beyond]))
 
 
-def test_a_gain_is_divided_by_one_that_the_law_has():
-    with pytest.raises(smc.ScenarioError, match="gain that k is divided by 'B'"):
-        smc.law_function(gains={"k": Gain(1.0, over="B"), "b": 1.0})(lambda y, gains, memory: (0.0, 0.0))
+def test_a_gain_is_divided_by_one_that_the_law_has(refused):
+    refused(lambda: smc.law_function(gains={"k": Gain(1.0, over="B"), "b": 1.0})(lambda y, gains, memory: (0.0, 0.0)))
 
 
 def test_a_held_gain_keeps_its_value():
@@ -277,9 +275,8 @@ def test_gains_without_units_are_searched_about_their_defaults_with_a_warning():
         assert low * high == pytest.approx(failing().gains[name] ** 2)
 
 
-def test_a_gain_without_a_unit_that_is_not_positive_is_refused():
-    with pytest.raises(smc.ScenarioError, match="unit"):
-        tune("duffing", smc.law_function(one_gain, gains={"k": 0.0})(), budget=5, objective=LEAN)
+def test_a_gain_without_a_unit_that_is_not_positive_is_refused(refused):
+    refused(lambda: tune("duffing", smc.law_function(one_gain, gains={"k": 0.0})(), budget=5, objective=LEAN))
 
 
 def test_a_search_leaves_a_box_that_lacks_the_optimum_by_a_decade_and_says_so():
@@ -317,7 +314,7 @@ def test_a_run_that_fails_costs_more_than_any_other_and_less_the_later_it_fails(
 # equal terms
 
 
-def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, rival):
+def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, rival, refused):
     assert {one.law.name for one in compare([rival, found])} == {"classical", "observer_free"}
     assert compare([rival, found]) == sorted([rival, found], key=lambda one: one.objective)
     unequal = {
@@ -332,12 +329,10 @@ def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, rival):
     away = dataclasses.replace(rival, law=dataclasses.replace(rival.law, function=None))
     assert len(compare([away, found])) == 2
     unequal["bounds "] = dataclasses.replace(away, bounds=dict(away.bounds) | {"k": (1e-3, 1e3)})
-    for what, one in unequal.items():
-        with pytest.raises(smc.ScenarioError, match=what.strip()):
-            compare([found, one])
+    for one in unequal.values():
+        refused(lambda one=one: compare([found, one]))
     for nothing in ([], [1]):
-        with pytest.raises(smc.ScenarioError, match="list of tunings"):
-            compare(nothing)
+        refused(lambda nothing=nothing: compare(nothing))
 
 
 def test_every_law_of_the_paper_is_bounded_by_the_same_u():
@@ -358,43 +353,39 @@ def test_a_tuning_is_saved_and_read_back_as_it_was(found, tmp_path):
     assert set(held["versions"]) == {"smc_mujoco", "mujoco", "numba", "numpy", "scipy", "cmaes"}
 
 
-def test_what_is_no_tuning_is_refused(found, tmp_path):
+def test_what_is_no_tuning_is_refused(found, tmp_path, refused):
     broken = tmp_path / "broken.json"
     for text in ("", "[]", "{}", '{"scenario": {}}'):
         broken.write_text(text)
-        with pytest.raises(smc.ScenarioError, match="is not a tuning"):
-            load(broken)
-    with pytest.raises(smc.ScenarioError, match="no tuning at"):
-        load(tmp_path / "none.json")
-    with pytest.raises(smc.ScenarioError, match=r"\.json"):
-        found.save(tmp_path / "it.txt")
+        refused(lambda: load(broken))
+    refused(lambda: load(tmp_path / "none.json"))
+    refused(lambda: found.save(tmp_path / "it.txt"))
 
 
 # bad input
 
 
 @pytest.mark.parametrize(
-    ("changed", "message"),
+    "changed",
     [
-        ({"plant": "dufing"}, "unknown plant 'dufing': did you mean 'duffing'"),
-        ({"plant": 3}, "plant is 3"),
-        ({"law": "clasical"}, "unknown law 'clasical'"),
-        ({"law": "none"}, "no gain to tune"),
-        ({"law": "hierarchical"}, "hierarchical"),
-        ({"plant": "cart_pole", "law": "classical"}, "cart_pole"),
-        ({"budget": 0}, "budget is 0"),
-        ({"budget": 2.5}, "budget is 2.5"),
-        ({"seed": -1}, "seed is -1"),
-        ({"objective": "best"}, "unknown objective 'best'"),
-        ({"threads": 0}, "threads is 0"),
+        {"plant": "dufing"},
+        {"plant": 3},
+        {"law": "clasical"},
+        {"law": "none"},
+        {"law": "hierarchical"},
+        {"plant": "cart_pole", "law": "classical"},
+        {"budget": 0},
+        {"budget": 2.5},
+        {"seed": -1},
+        {"objective": "best"},
+        {"threads": 0},
     ],
 )
-def test_bad_input_is_one_sentence(changed, message):
-    with pytest.raises(smc.ScenarioError, match=message):
-        tune(**({"plant": "duffing", "law": "classical", "budget": 5, "objective": LEAN} | changed))
+def test_bad_input_is_one_sentence(changed, refused):
+    refused(lambda: tune(**({"plant": "duffing", "law": "classical", "budget": 5, "objective": LEAN} | changed)))
 
 
-def refused(y, gains, memory):
+def not_yet(y, gains, memory):
     raise ValueError("not yet")
 
 
@@ -403,12 +394,11 @@ def mistyped(y, gains, memory):
 
 
 @pytest.mark.filterwarnings("ignore:.*does not compile", "ignore:.* no unit")
-@pytest.mark.parametrize(("function", "why"), [(refused, "ValueError"), (mistyped, "AttributeError .*'q'")])
-def test_a_law_that_fails_by_itself_is_not_searched_and_says_why(function, why, monkeypatch, tmp_path):
+@pytest.mark.parametrize("function", [not_yet, mistyped])
+def test_a_law_that_fails_by_itself_is_not_searched_and_says_why(function, monkeypatch, tmp_path, refused):
     law = smc.law_function(gains={"k": 3.0})(function)
     monkeypatch.setattr(search, "_search", None)
-    with pytest.raises(smc.ScenarioError, match=f"{law.name} cannot be tuned, .* raised {why}.*, at t = .*: correct"):
-        fair_gains(smc.plant("duffing"), [law], tmp_path, budget=4)
+    refused(lambda: fair_gains(smc.plant("duffing"), [law], tmp_path, budget=4))
 
 
 @pytest.mark.parametrize(
@@ -420,9 +410,8 @@ def test_a_law_that_fails_by_itself_is_not_searched_and_says_why(function, why, 
         for value in (0.0, math.inf, "1")
     ],
 )
-def test_a_bad_objective_is_refused(changed):
-    with pytest.raises(smc.ScenarioError):
-        Objective(**changed)
+def test_a_bad_objective_is_refused(changed, refused):
+    refused(lambda: Objective(**changed))
 
 
 # the command
