@@ -2,14 +2,17 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.words import words
+from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
 from smc_mujoco.evidence import boards
-from smc_mujoco.evidence.boards import entries, simulator
+from smc_mujoco.evidence.boards import entries, simulator, standings
 from smc_mujoco.evidence.boards.scoring import VERSIONS, of_arrays
 from smc_mujoco.evidence.boards.simulator import Case, Machine
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1
@@ -151,28 +154,122 @@ def test_what_a_case_does_to_the_torque_and_the_motion(case, machines):
 
 
 def test_the_grid_is_the_published_one():
+    """Each level of each way in which the machine differs, as the table at the head of `simulator` says."""
+    scaled = {"m1r1": "r1", "I1": "I1", "m2r2": "r2", "m2": "m2", "I2": "I2"}
+    ends = {"Ir": (0.0, 1e-4)} | dict.fromkeys(scaled, (0.75, 1.25))
+    ends |= {"b1": (-0.1, 0.1), "b2": (-0.1, 0.1), "cf1": (-0.2, 0.2), "cf2": (-0.2, 0.2)}
+    expected = [
+        Case(test="model", name=name, value=value, parameters={scaled.get(name, name): value * known})
+        for name, (low, high) in ends.items()
+        for known in (MODEL_1_1[scaled[name]] if name in scaled else 1.0,)
+        for value in np.linspace(low, high, 21).tolist()
+    ]
+    for test, most in (("velocity_noise", 0.5), ("torque_noise", 1.1)):
+        levels = enumerate(np.repeat(np.linspace(0.0, most, 21), 10).tolist())
+        expected += [Case(test=test, name=test, value=value, seed=k, **{test: value}) for k, value in levels]
+    answers = np.linspace(0.1, 2.0, 21).tolist()
+    expected += [Case(test="torque_response", name="torque_response", value=each, response=each) for each in answers]
+    expected += [Case(test="delay", name="delay", value=k * 2e-3, delay=k) for k in range(21)]
     grid = simulator.cases()
-    counts = {test: sum(case.test == test for case in grid) for test in simulator.TESTS}
-    assert list(counts.values()) == [210, 210, 210, 21, 21, 50]
+    assert grid[:-50] == expected
+    kinds = [(case.test, case.name, case.value) for case in grid[-50:]]
+    assert kinds == [("perturbations", "perturbations", k) for k in range(50)]
     assert grid == simulator.cases()
     assert [one.pulses == other.pulses for one, other in zip(grid, simulator.cases(7), strict=True)].count(False) == 50
-    values = {name: [case.value for case in grid if case.name == name] for name in ("Ir", "m2r2", "b1", "cf2", "delay")}
-    for name, (first, last) in {
-        "Ir": (0, 1e-4),
-        "m2r2": (0.75, 1.25),
-        "b1": (-0.1, 0.1),
-        "cf2": (-0.2, 0.2),
-        "delay": (0, 0.04),
-    }.items():
-        np.testing.assert_allclose(values[name], np.linspace(first, last, 21), atol=1e-15)
-    pulses = [pulse for case in grid for pulse in case.pulses]
-    assert len(pulses) == 150
-    assert all(1.0 <= centre <= 9.0 and 0.05 <= width <= 0.1 and 0.5 <= abs(a) <= 5.0 for centre, width, a in pulses)
 
 
-@smc.law_function(plants=("acrobot",))
+def test_pulses_are_apart_in_any_order_and_of_the_published_sizes():
+    pulses = np.array([case.pulses for case in simulator.cases()[-50:]])
+    assert pulses.shape == (50, 3, 3)
+    assert np.diff(np.sort(pulses[..., 0], axis=1)).min() >= 1.0
+    assert {tuple(np.argsort(row)) for row in pulses[..., 0]} >= {(0, 1, 2), (2, 1, 0)}
+    assert len(np.unique(pulses)) == pulses.size
+    for k, (low, high) in enumerate([(1.0, 9.0), (0.05, 0.1), (0.5, 5.0)]):
+        size = np.abs(pulses[..., k])
+        assert low <= size.min() < low + 0.1 * (high - low)
+        assert high - 0.1 * (high - low) < size.max() <= high
+    assert 0.3 < np.mean(pulses[..., 2] > 0.0) < 0.7
+
+
+@smc.law_function(plants=boards.ROBOTS)
 def mine(y, gains, memory):
-    return -y.v, y.x
+    u = 0.3 * y.x - 0.2 * y.v + 0.1 * y.e - 0.05 * y.de + 0.07 * y.q - 0.03 * y.dq + 0.5 * y.t + 10.0 * y.dt
+    return u + 2e-3 * (y.f + y.fq) + 1e-4 * (y.g + 2.0 * y.gq) + 0.1 * y.limit + 0.01 * y.model, y.x
+
+
+@ROBOTS
+def test_torque_and_motion_of_a_case_are_those_of_its_formulas(robot):
+    """Each torque from what the law may see of the states, each state from the one before by the equation of motion."""
+    noises, changed = {"velocity_noise": 0.1, "torque_noise": 0.2}, {"m2": 0.55, "b1": 0.03}
+    case = Case(response=1.3, delay=2, pulses=((0.02, 0.05, 1.5),), seed=4, parameters=changed, **noises)
+    scenario = dataclasses.replace(boards.on_board(robot, mine), noise_key=6, u_max=2.5, model="nominal")
+    states, torque = Machine(scenario).simulate(case)
+    noise = np.random.default_rng([simulator.SEED, 4, 6]).normal(size=(5000, 3)) * [0.1, 0.1, 0.2]
+    plant, driven = smc.plant(robot), ["pendubot", "acrobot"].index(robot)
+    p, order = type("P", (), dict(plant.parameters)), [driven, 1 - driven]
+    last, t = 0.0, 2e-3 * np.arange(60)
+    for k in range(60):
+        seen = states[max(0, k - 2)]
+        (x, q), (v, dq) = seen[:2][order], (seen[2:] + noise[k, :2])[order]
+        (f, g), (fq, gq) = (plant.nominal(np.array([x, q]), np.array([v, dq]), i, p) for i in range(2))
+        u = (
+            0.4 * x
+            - 0.25 * v
+            + 0.07 * q
+            - 0.03 * dq
+            + 0.5 * t[k]
+            + 0.02
+            + 2e-3 * (f + fq)
+            + 1e-4 * (g + 2.0 * gq)
+            + 0.26
+        )
+        last += 1.3 * (np.clip(u, -2.5, 2.5) - last)
+        last = np.clip(last + noise[k, 2], -2.5, 2.5)
+        assert torque[k] == pytest.approx(last, abs=1e-12), k
+    assert np.abs(torque).max() == 2.5
+    known = tuple((MODEL_1_1 | changed).values())
+    force = np.eye(2)[driven] * (torque[:60] + 1.5 * np.exp(-(((t - 0.02) / 0.05) ** 2) / 2.0))[:, None]
+    for k in range(0, 60, 7):
+        slope = lambda _, state, k=k: simulator._slope.py_func(tuple(state), *force[k], known)  # noqa: E731
+        end = solve_ivp(slope, (0.0, 2e-3), states[k], rtol=1e-10, atol=1e-12).y[:, -1]
+        np.testing.assert_allclose(states[k + 1], end, atol=1e-6)
+
+
+def test_a_level_is_survived_by_more_than_half_of_its_runs(monkeypatch):
+    """A machine that ends up as often as its case says, of one level in the first test and three in the others."""
+    ends = [3.4, 3.4, 0.0, 3.4, 0.0, 0.0, 3.4, 0.0]  # up, or hanging
+    names = ["a", "b", "b", "b", "c", "c", "d", "d"]
+    tests = ["model"] * 4 + [*simulator.TESTS[1:3], *simulator.TESTS[1:3]]
+    grid = [
+        Case(test=test, name=name, value=0.5, delay=k) for k, (test, name) in enumerate(zip(tests, names, strict=True))
+    ]
+    stub = SimpleNamespace(simulate=lambda case: (np.array([[0.0] * 4, [ends[case.delay], 0, 0, 0]]), None))
+    monkeypatch.setattr(simulator, "Machine", lambda scenario: stub)
+    monkeypatch.setattr(simulator, "cases", lambda key: grid)
+    told = []
+    found = simulator.robustness(boards.entry("acrobot"), report=lambda *done: told.append(done))
+    assert told == [(k + 1, 8) for k in range(8)]
+    assert list(found.survived) == list(simulator.TESTS)
+    assert found.survived["model"] == (("a", 0.5, True), ("b", 0.5, True))
+    assert found.survived["velocity_noise"] == (("c", 0.5, False), ("d", 0.5, True))
+    assert found.survived["torque_noise"] == (("c", 0.5, False), ("d", 0.5, False))
+
+
+def test_percent_and_score_weigh_tests_alike_and_parameters_count_levels():
+    model = (("a", 1.0, True), ("a", 2.0, False), ("b", 1.0, True), ("b", 2.0, True))
+    found = boards.Robustness({"model": model, "delay": (("delay", 0.0, False), ("delay", 1.0, True))})
+    assert (found.percent, found.score) == ({"model": 75.0, "delay": 50.0}, 0.625)
+    assert (found.parameters, found.noise_key) == ({"a": 1, "b": 2}, 0)
+
+
+@pytest.mark.parametrize("k", range(4))
+def test_upright_is_within_the_published_bounds_after_any_turns(k):
+    bound = np.array([0.35, 0.35, 1.0, 1.0])[k] * np.eye(4)[k]
+    top = np.array([math.pi, 0.0, 0.0, 0.0])
+    turns = np.array([2.0 * math.pi, -4.0 * math.pi, 0.0, 0.0])
+    for sign in (1.0, -1.0):
+        assert simulator.upright(top + sign * 0.999 * bound + turns)
+        assert not simulator.upright(top + sign * 1.001 * bound)
 
 
 def test_no_law_of_a_user_s_can_know_its_noise(monkeypatch):
@@ -209,7 +306,7 @@ def test_the_entry_swings_up_and_balances(robot, traces):
 
 
 @ROBOTS
-def test_any_smooth_feedback_scores_the_same_and_a_switching_one_loses(robot, traces):
+def test_any_smooth_feedback_scores_the_same_and_a_switching_one_loses(robot, traces, snapshot):
     """The control experiments: the score is the trajectory's, so no row may be read as a success of sliding mode."""
     rows = boards.experiments(robot)
     assert rows[boards.NAME] == traces[robot].scenario
@@ -228,8 +325,10 @@ def test_any_smooth_feedback_scores_the_same_and_a_switching_one_loses(robot, tr
     top = np.array([row.name for row in boards.board(found)])
     assert set(rows) <= set(top)
     said = boards.comparison(found, {boards.NAME + "*": ALL})
+    assert words(said) == snapshot
     assert f"{score['trajectory + sliding']:.3f} with a sliding mode" in said
     assert said.endswith(f"is 1.000: number 1 of {len(boards.ROBUSTNESS[robot]) + 1}")
+    assert said.startswith(boards.comparison(found, None))
 
 
 def test_feedback_of_a_control_experiment_is_what_its_name_says():
@@ -311,6 +410,44 @@ def test_an_entry_is_exported_to_c():
     assert "tanh" in code
 
 
+def found_of(survived, **percent):
+    """A result of this percent of 20 levels in each test, and this many of the 21 values of each of two parameters."""
+    levels = {test: [(test, k, 5 * k < percent.get(test, 100)) for k in range(20)] for test in simulator.TESTS}
+    return boards.Robustness(levels | {"model": [(name, k, k < survived) for name in ("Ir", "b1") for k in range(21)]})
+
+
+@ROBOTS
+def test_the_verdict_says_where_a_row_stands_and_what_is_better(robot, monkeypatch, snapshot):
+    trace, said = SimpleNamespace(scenario=boards.on_board(robot, "none")), []
+    best = boards.Criteria(0.3, 3.0, 6.0, 1.0, 0.5, 0.001, 20.0)
+    middle = boards.Criteria(1.2, 10.0, 6.0, 1.0, 2.0, 0.02, 100.0)
+    for values in (best, middle, best._replace(velocity_cost=1e3), best._replace(swing_up_time=math.inf)):
+        monkeypatch.setattr(standings, "criteria", lambda _, values=values: values)
+        said.append(boards.verdict(robot, trace, None))
+        said += [
+            boards.verdict(robot, trace, one, "mine") for one in (found_of(21), found_of(11), found_of(10, delay=90))
+        ]
+        said.append(", ".join(f"{row.name} {row.score:.9g}" for row in boards.board(trace, "mine")))
+    rows = boards.robustness_board(robot, {"a": found_of(21), "b": found_of(2, delay=10)})
+    said += [str(rows[0]), ", ".join(f"{row.name} {row.score:.9g}" for row in rows)]
+    assert "\n".join(said) == snapshot
+
+
+def test_an_entry_is_described_and_runs_by_the_rules(snapshot):
+    said = []
+    for template in (entries.acrobot_swing_up, entries.pendubot_swing_up):
+        about = {name: value for name, value in vars(template).items() if name not in ("function", "conditions")}
+        said += [f"{name}: {value}" for name, value in about.items()] + [str(template.function.__doc__)]
+        ((words, holds),) = template.conditions.items()
+        said += [f"{words}: {[holds(SimpleNamespace(k=k, phi=6.0)) for k in (2.999, 3.0, 3.001)]}"]
+    runs = [(name, run) for robot in boards.ROBOTS for name, run in boards.experiments(robot).items()]
+    said += [f"{name}: {run.law.of_channel(0)}, {run.velocity}" for name, run in runs]
+    assert "\n".join([*said, str(boards.on_board("pendubot", "none"))]) == snapshot
+    assert str(dataclasses.replace(runs[0][1], law="none", velocity="measured")) == str(
+        boards.on_board("acrobot", "none")
+    )
+
+
 # errors and the command
 
 
@@ -323,28 +460,46 @@ def ruled(**fields):
     return dataclasses.replace(short, scenario=boards.entry("acrobot", **fields))
 
 
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        (lambda: boards.entry("acrobat"), "acrobot"),
-        (lambda: boards.entry("acrobot", "slide"), "sliding"),
-        (lambda: boards.board(smc.run(boards.entry("acrobot", duration=0.01))), "duration of the run is 0.01"),
-        (lambda: boards.board(ruled(x0=3.0)), "x0 of the run"),
-        (lambda: boards.board(ruled(plant=smc.plant("acrobot", m2=0.3))), "m2 of the run is 0.3 and on the boards 0.6"),
-        (lambda: boards.board(ruled(disturbance=smc.Sine(0.5, 1.0))), "disturbance of the run is"),
-        (lambda: boards.board(ruled(), "TVLQR"), "'TVLQR', which a published row has: give another"),
-        (lambda: boards.robustness_board("acrobot", ALL, boards.ROBUSTNESS["acrobot"][0].name), "a published row has"),
-        (lambda: boards.criteria(smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))), "robot"),
-        (lambda: boards.score({"energy": 1.0}), "swing_up_time of board v2 is missing"),
-        (lambda: boards.score(boards.SIMULATION["acrobot"]["v2"][0], "v1"), "max_torque of board v1 is missing"),
-        (lambda: boards.score(boards.SIMULATION["acrobot"]["v2"][0], "v3"), "v1"),
-        (lambda: Machine(smc.Scenario(plant="acrobot", law="none", reference=smc.Sine(1.0, 2.0))), "leave out"),
-    ],
-)
-def test_a_mistake_is_one_sentence(wrong, words):
-    with pytest.raises(smc.ScenarioError, match=words) as raised:
-        wrong()
-    assert "\n" not in str(raised.value)
+@smc.law_function(plants=("acrobot",))
+def raising(y, gains, memory):
+    return 1 // int(y.q > 9.0), y.x
+
+
+def test_a_mistake_is_one_sentence(snapshot):
+    short, duffing = boards.entry("acrobot", duration=0.01), smc.Scenario(plant="duffing", law="none", duration=0.01)
+    rows, law = boards.SIMULATION["acrobot"]["v2"], {"plant": "acrobot", "law": "none"}
+    mistakes = [
+        lambda: boards.entry("acrobat"),
+        lambda: boards.entry("acrobot", "slide"),
+        lambda: boards.experiments("acrobat"),
+        lambda: boards.board(smc.run(short)),
+        lambda: boards.board(smc.run(duffing)),
+        lambda: boards.board(ruled(x0=3.0)),
+        lambda: boards.board(ruled(plant=smc.plant("acrobot", m2=0.3))),
+        lambda: boards.board(ruled(disturbance=smc.Sine(0.5, 1.0))),
+        lambda: boards.board(ruled(u_max=3.0)),
+        lambda: boards.board(ruled(), "TVLQR"),
+        lambda: boards.board(ruled(), "\n"),
+        lambda: boards.robustness_board("acrobat", ALL),
+        lambda: boards.robustness_board("acrobot", ALL, boards.ROBUSTNESS["acrobot"][0].name),
+        lambda: boards.criteria(smc.run(duffing)),
+        lambda: boards.score({"energy": 1.0}),
+        lambda: boards.score(rows[0], "v1"),
+        lambda: boards.score(rows[0], "v3"),
+        lambda: boards.score(rows[0]._replace(energy=-1.0)),
+        lambda: Machine(duffing),
+        lambda: Machine(smc.Scenario(**law, reference=smc.Sine(1.0, 2.0))),
+        lambda: Machine(smc.Scenario(**law, feedforward=smc.Constant(1.0))),
+        lambda: Machine(smc.Scenario(**law, surface=smc.surface("linear", c=1.0))),
+        lambda: Machine(boards.on_board("acrobot", raising())).simulate(Case()),
+    ]
+    said = []
+    for wrong in mistakes:
+        with pytest.raises(smc.ScenarioError) as raised:
+            wrong()
+        said.append(str(raised.value))
+    assert not [one for one in said if "\n" in one]
+    assert "\n".join(said) == snapshot
 
 
 def test_a_law_that_does_not_compile_is_refused():

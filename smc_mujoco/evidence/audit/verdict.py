@@ -307,12 +307,14 @@ def sentences(evidence: Evidence, quantifier: str = NAMED) -> list[bool]:
     return [any(holds) if quantifier == EXISTENTIAL else all(holds) for holds in checks.values()]
 
 
-def combined(verdicts: Mapping[str, str], quantifier: str = NAMED) -> tuple[str, bool, str]:
-    """Return the verdict over all sets of gains, whether it flips between them, and a sentence about that."""
+def combined(
+    verdicts: Mapping[str, str], quantifier: str = NAMED, answers: Mapping[str, str] | None = None
+) -> tuple[str, bool, str]:
+    """Return the verdict over all sets of gains, whether it flips, and a sentence about that, in answers if given."""
     kinds = set(verdicts.values())
     if len(kinds) == 1:
         return kinds.pop(), False, ""
-    each = ", ".join(f"{kind} with {name} gains" for name, kind in verdicts.items())
+    each = ", ".join(f"{(answers or {}).get(kind, kind)} with {name} gains" for name, kind in verdicts.items())
     decisive = {UNIVERSAL: REFUTED, EXISTENTIAL: SUPPORTED}.get(quantifier)
     if decisive in kinds:
         return str(decisive), True, f"The claim is {quantifier}, so that one set of gains decides: {each}."
@@ -322,9 +324,10 @@ def combined(verdicts: Mapping[str, str], quantifier: str = NAMED) -> tuple[str,
 def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     """Return a claim with its verdict, from set of gains -> checks and the numbers beside them."""
     verdicts = {name: verdict(some, statement.quantifier) for name, some in evidence.items()}
-    overall, flips, sentence = combined(verdicts, statement.quantifier)
-    if statement.whose == OURS:
-        overall, verdicts = ANSWERS[overall], {name: ANSWERS[one] for name, one in verdicts.items()}
+    answers = ANSWERS if statement.whose == OURS else None
+    overall, flips, sentence = combined(verdicts, statement.quantifier, answers)
+    if answers:
+        overall, verdicts = answers[overall], {name: answers[one] for name, one in verdicts.items()}
     shared = {field.name: getattr(statement, field.name) for field in dataclasses.fields(Statement)}
     return Claim(
         **shared | {"note": " ".join(filter(None, (statement.note, sentence)))},

@@ -200,6 +200,7 @@ class Machine:
                 "surface, reference and feedforward"
             )
         law, velocity = scenario.law.of_channel(0), resolved.velocity
+        self.name = law.name
         try:
             self.law, self.estimator = cfunctions.compile_component(law), cfunctions.compile_component(velocity)
         except NotCompilable as error:
@@ -227,7 +228,7 @@ class Machine:
                 self.limit, self.uses_model, noise, pulse, case.response, case.delay, states, torque,
             )  # fmt: skip
         if raised:
-            raise ScenarioError(f"law {self.law!r} raised an exception in the robustness test; run it in a scenario")
+            raise ScenarioError(f"law {self.name!r} raised an exception in the robustness test; run it in a scenario")
         return states, torque
 
 

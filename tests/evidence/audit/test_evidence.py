@@ -3,10 +3,10 @@
 import colorsys
 import dataclasses
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 import typer
@@ -18,7 +18,7 @@ from smc_mujoco.common.files import from_json
 from smc_mujoco.draw import style
 from smc_mujoco.evidence.audit import badge, evidence
 from smc_mujoco.evidence.audit.audit import audit
-from smc_mujoco.evidence.audit.verdict import ANSWERS, PARTLY, REFUTED, SUPPORTED, VERDICTS
+from smc_mujoco.evidence.audit.verdict import ANSWERS, REFUTED, VERDICTS
 from smc_mujoco.evidence.commands import papers, tables
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies.run_key import portable_key
@@ -28,10 +28,14 @@ title = "Small"
 authors = "A. Nobody"
 source = "nowhere, 2026"
 read = "full text"
+access = "a library"
+note = "Nothing is known."
 runs = "duration=0.2"
 sets = ["slow", "tuned"]
 [conditions]
 pushed = "disturbance=Sine(amplitude=0.5, omega=2.0)"
+[plants]
+bent = { plant = "duffing", beta = 0.75 }
 [gains.slow]
 classical = { k = 3.0, c = 2.0 }
 [[claim]]
@@ -40,7 +44,7 @@ whose = "paper"
 text = "the law is calm"
 where = "p. 1"
 function = "calm"
-plants = ["duffing"]
+plants = ["bent"]
 laws = ["classical"]
 conditions = ["pushed", "noise"]
 holds_if = { "TV rate" = "< 1e9", "largest |x|" = "< 1e-9" }
@@ -113,6 +117,14 @@ def test_a_claim_leads_to_its_runs_numbers_threshold_and_verdict(told):
     assert set(told["paper"]["files"]) == {"paper.toml", "claims.py"}
 
 
+def test_it_holds_what_is_recorded(told, snapshot):
+    """Its fields and words. Hashes, numbers of runs, versions and the order of runs, by their hashes, are left out."""
+    runs = sorted(told["runs"].values(), key=lambda run: json.dumps([run["condition"], run["gains"]]))
+    text = json.dumps(told | {"runs": runs, "software": [*told["software"]]}, indent=1)
+    text = re.sub('"[0-9a-f]{16}(?:[0-9a-f]{48})?"', '"HASH"', text)
+    assert re.sub(r'("(?:value|k|c)": )[\d.e-]+', r"\1#", text) == snapshot
+
+
 def test_nothing_of_the_machine_is_in_it(told, folder):
     text = json.dumps(told)
     assert str(folder.parent) not in text
@@ -164,25 +176,6 @@ def test_evidence_of_mutants_or_under_another_ending_is_refused(folder, done, tm
 
 
 # badges
-
-
-def claim(verdict):
-    return type("One", (), {"verdict": verdict, "whose": "paper"})()
-
-
-def test_a_badge_has_a_field_for_each_verdict_that_occurs(tmp_path):
-    text = badge.svg("a <b>", [claim(SUPPORTED)] * 12 + [claim(REFUTED), claim(PARTLY)])
-    root = ElementTree.fromstring(text)
-    assert root.attrib["aria-label"] == "claims of a <b>: 12 supported, 1 partly, 1 refuted"
-    shown = [one.text for one in root.iter() if one.tag.endswith("}text") and "aria-hidden" not in one.attrib]
-    assert shown == ["claims of a <b>", "12 supported", "1 partly", "1 refuted"]
-    boxes = [one for one in root.iter() if one.tag.endswith("}rect") and one.attrib.get("x")]
-    ends = [float(one.attrib["x"]) + float(one.attrib["width"]) for one in boxes]
-    assert ends == [*(float(one.attrib["x"]) for one in boxes[1:]), float(root.attrib["width"])]
-    for box, word in zip(boxes, shown, strict=True):
-        assert float(box.attrib["width"]) > style.width(word, badge.SIZE) + badge.MARGIN
-    with pytest.raises(ScenarioError, match=r"end the name in \.svg"):
-        badge.save("a", [], tmp_path / "badge.png")
 
 
 def test_verdicts_have_colours_of_their_own_from_green_to_red_and_answers_another():

@@ -91,7 +91,13 @@ def test_the_template_runs_and_the_wrong_sign_loses_its_claims(tmp_path):
     assert [path.name for path in written] == [FILE, CODE]
     found = paper(tmp_path / "levant")
     assert (found.name, list(found.claims), list(found.sets)) == ("levant", ["1", "2"], ["paper"])
-    assert [one.verdict for one in claims(paper=found)] == ["yes", SUPPORTED]  # a question, and a sentence
+    first, second = claims(paper=found)
+    assert [first.verdict, second.verdict] == ["yes", SUPPORTED]  # a question, and a sentence
+    assert list(first.numbers["paper"]) == [f"{plant}: ultimate bound / |x0|" for plant in found.claims["1"].plants]
+    assert list(second.numbers["paper"]) == ["exponent, distance from 2"]
+    assert list(second.beside["paper"]) == ["exponent"] + [
+        f"{k}: largest |s|" for k in found.claims["2"].values["periods"]
+    ]
     with pytest.raises(ScenarioError, match="is there already"):
         new(tmp_path / "levant")
 

@@ -4,8 +4,6 @@ import pytest
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.audit.audit import audit
-from smc_mujoco.evidence.audit.badge import svg
-from smc_mujoco.evidence.audit.verdict import DERIVED, OURS, PAPER, Statement, check, judged, summary, totals
 
 pytestmark = pytest.mark.quick
 
@@ -46,20 +44,6 @@ def written(tmp_path):
         return tmp_path
 
     return write
-
-
-def claim(whose, holds, read="abstract"):
-    statement = Statement(id=whose, text="t", where="w", measured="m", holds_if="h", whose=whose, read=read)
-    return judged(statement, {"paper": [check("x", 1.0 if holds else 3.0, "<", 2.0)]})
-
-
-def test_totals_and_badge_count_the_paper_s_own_sentences_and_questions_have_answers():
-    claims = [claim(PAPER, True), claim(DERIVED, False), claim(OURS, False), claim(OURS, True)]
-    assert [one.verdict for one in claims] == ["supported", "refuted", "no", "yes"]
-    assert totals(claims) == {"supported": 1}
-    assert "refuted" not in svg("small", claims)
-    assert "1 supported" in svg("small", claims)
-    assert "own sentences (abstract read): ● 1 supported; derived from it: ○ 1 refuted; questions" in summary(claims)
 
 
 def decided(folder):
