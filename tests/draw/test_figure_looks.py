@@ -6,6 +6,7 @@ import itertools
 import matplotlib.text
 import numpy as np
 import pytest
+from helpers.sketch import sketch
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
@@ -390,6 +391,14 @@ def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size):
     assert [ax.get_title(loc="right") for ax in page.axes[:3]] == ["never", "", ""]
     with pytest.raises(smc.ScenarioError, match="unknown metric 'itea': did you mean 'itae'"):
         smc.plot(Rows(), metrics=["itea"])
+
+
+@pytest.mark.parametrize("size", [None, COLUMN])
+def test_a_board_of_made_up_runs_as_recorded(size, snapshot):
+    rows = Rows(laws=("classical", "super_twisting", "adaptive"), still="duffing" if size else "", tiny=size is None)
+    rows.rows = [row for row in rows.rows if row[0] == "duffing"]
+    metrics = ["settling_time", "ultimate_bound", "settles"]
+    assert sketch(smc.plot(rows, metrics=metrics, size=size, title="A board" if size else None)) == snapshot
 
 
 def test_the_axis_of_a_board_comprises_intervals_that_reach_to_never():

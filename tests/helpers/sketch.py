@@ -72,6 +72,7 @@ def _axes(axes: Axes) -> list[str]:
         grid = [line.get_visible() for line in axis.get_gridlines()[:1]]
         ticks = [(one.label1.get_visible(), one.tick1line.get_markersize()) for one in axis.get_major_ticks()[:1]]
         kind = type(axis.get_major_formatter()).__name__
+        kind += f" {[text.get_text() for text in axis.get_ticklabels()]}" if kind == "FuncFormatter" else ""
         lines.append(f"{name} {scale} {numbers(axis.get_view_interval())} grid {grid} ticks {ticks} {kind}")
     titles = [axes._left_title, axes.title, axes._right_title, axes.xaxis.label, axes.yaxis.label]
     lines += [_text(text) for text in (*titles, *axes.texts) if text.get_text()]

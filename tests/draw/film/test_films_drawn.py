@@ -1,6 +1,8 @@
 """What films of made-up motion draw, recorded: letters and badges, charts, arrows, bars and the paths of tips."""
 
+import contextlib
 import dataclasses
+import itertools
 import math
 from types import SimpleNamespace
 
@@ -10,13 +12,13 @@ import pytest
 from helpers import arms, sketch
 from helpers.sketch import Pen, failed, made, numbers
 from matplotlib.figure import Figure
-from PIL import ImageDraw
+from PIL import Image, ImageDraw
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw import style
+from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import finite
-from smc_mujoco.draw.film import arm, arrows, camera, charts
+from smc_mujoco.draw.film import arm, arrows, camera, charts, film, pace
 from smc_mujoco.draw.film.canvas import roundness
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.stage import Stage
@@ -175,3 +177,89 @@ def test_the_stage_of_two_machines_with_arrows_ghosts_and_shadows(kind, pen, sna
 def test_a_model_without_round_shapes_has_no_radii():
     box = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom type='box' size='1 1 1'/></worldbody></mujoco>")
     assert roundness(box).tolist() == [0.0, 0.0]
+
+
+def test_states_of_machines_with_friction_a_gear_and_stops(snapshot):
+    """Runs that move, rest, and touch a stop at the start of each second."""
+    rub, gear = {"friction": smc.Coulomb(0.2)}, {"actuator": smc.Backlash(0.2)}
+    kinds = [
+        rub,
+        gear,
+        rub | gear,
+        {"contact": "stops"},
+        {"contact": "stops", **gear},
+        {"friction": smc.Viscous(1.0)} | gear,
+        {},
+    ]
+    said = []
+    for kind in kinds:
+        trace = made(smc.Scenario(plant="duffing", law="none", duration=4.0, **kind))
+        still = (trace.t % 2.0 > 1.0)[:, None]
+        pushes = (np.sign(np.sin(3.0 * trace.t)) * ((trace.t % 1.0 > 0.2) | (trace.t % 1.0 < 0.01)))[:, None]
+        x = np.where(trace.t % 1.0 < 0.01, 2.0, 0.1)[:, None]
+        moved = {"x": x, "v": np.where(still, 0.0, 1.0), "reaction": pushes, "force": -pushes}
+        told = states.timeline(dataclasses.replace(trace, **moved), np.arange(0.0, 4.0, 1 / 30))
+        runs = [(now and f"{now.words} {now.mood}", len([*run])) for now, run in itertools.groupby(told)]
+        said.append(f"{kind}: {runs} {states.has_dry_friction(trace.scenario)} {states.has_contact(trace.scenario)}")
+    two = made(smc.Scenario(plant="cart_pole", law="none", duration=1.0, **rub, **gear))
+    halves = dataclasses.replace(
+        two, v=np.column_stack([0.0 * two.t, 1.0 + two.t]), force=np.column_stack([two.t, 0.0 * two.t])
+    )
+    said += [str(states.timeline(halves, np.array([0.5])))]
+    assert "\n".join(said) == snapshot
+
+
+def test_speeds_of_a_film_of_made_up_motion(snapshot):
+    """Times, and speeds with their numbers of frames; of an arm that is hit, and of a machine that fails."""
+    push = smc.Push("hand", y=30.0, z=40.0, time=1.0, width=0.1)
+    hit = machine(arms.arm(), "none", duration=3.0)
+    hit = dataclasses.replace(hit, scenario=dataclasses.replace(hit.scenario, disturbance=push))
+    lost = failed(machine("duffing", duration=3.0), 900, "the law raised ValueError: no")
+    jump = machine("duffing", duration=3.0)
+    jump = dataclasses.replace(jump, x=np.clip((jump.t - 1.0) / 0.2, 0.0, 1.0)[:, None])
+    said = []
+    for traces in ([hit], [lost], [jump], [jump, lost]):
+        clock = pace.clock(traces, 30.0)
+        runs = [(float(speed), len([*run])) for speed, run in itertools.groupby(clock.speeds.tolist())]
+        said.append(f"{numbers(clock.times[[0, 1, 10, -2, -1]])} {runs}")
+    assert "\n".join(said) == snapshot
+
+
+def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path, snapshot):
+    """Of a film, a clip and a still; the pictures are blank."""
+    asked, wrote = [], []
+
+    def blank(traces, shown, labels, title, size, chosen=None):
+        looks = f"{labels} {title} {size} {chosen}"
+        asked.append(f"{len(shown.times)} {numbers(shown.times[[0, -1]])} {set(shown.speeds.tolist())} {looks}")
+        yield from (paper(size) - np.uint8(k) for k in range(len(shown.times)))
+
+    @contextlib.contextmanager
+    def encoder(part, shape, fps):
+        part.write_bytes(b"")
+        wrote.append(f"{part.suffix} {shape} {fps}")
+        yield lambda picture: None
+
+    monkeypatch.setattr(film, "frames", blank)
+    monkeypatch.setattr(film, "encoder", encoder)
+    trace, size, told = machine("duffing", duration=5.0), (320, 180), []
+    looks = {"labels": ["a"], "title": "b", "size": size, "camera": (10.0, -20.0)}
+    film.film(trace, tmp_path / "first.mp4")
+    film.film(trace, tmp_path / "a.mp4", fps=10.0, speed=2.0, report=told.append, **looks)
+    film.still(trace, 0.5, tmp_path / "a.png")
+    film.still(trace, 5.0, tmp_path / "b.png", **looks)
+    film.clip(trace, tmp_path / "a.webp", size=size)
+    film.clip(trace, tmp_path / "b.webp", span=(1.0, 1.5), fps=10.0, speed=1.0, report=told.append, **looks)
+    durations = []
+    with Image.open(tmp_path / "b.webp") as clip:
+        for frame in range(clip.n_frames):
+            clip.seek(frame)
+            durations.append(clip.info.get("duration"))
+    refused = {"span": (1.0,)}, {"span": (9.0, 9.5)}, {"span": (0.0, 4.0), "fps": 120.0, "speed": 0.5}, {"fps": 121.0}
+    sentences = []
+    for options in refused:
+        with pytest.raises(smc.ScenarioError) as error:
+            film.clip(trace, tmp_path / "c.webp", **options)
+        sentences.append(str(error.value))
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert "\n".join([*asked, *wrote, *sentences, f"{sum(told)} {names} {durations}"]) == snapshot
