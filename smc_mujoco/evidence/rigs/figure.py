@@ -51,7 +51,8 @@ def residual_figure(
                 residual = values - predicted[twin][name]
                 left.plot(t, predicted[twin][name], color=colour, lw=0.9)
                 right.plot(t, residual, color=colour, lw=0.7)
-                reached.append(f"{twin} {list(fits[twin].values())[k]:.1f} %")
+                fit = list(fits[twin].values())[k]
+                reached.append(f"{twin} {fit:.1f}{' %' * (fit > -np.inf)}")
                 left_over.append(f"{twin} {np.sqrt(np.mean(residual**2)):.3g}")
             left.set(ylabel=f"{name} ({units[name]})", title=f"fit: {', '.join(reached)}")
             right.set_title(f"residual, rms: {', '.join(left_over)}")

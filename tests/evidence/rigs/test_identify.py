@@ -8,6 +8,7 @@ import re
 
 import numpy as np
 import pytest
+from helpers.sketch import sketch
 from matplotlib.figure import Figure
 from scipy.stats import chi2
 from typer.testing import CliRunner
@@ -18,6 +19,7 @@ from smc_mujoco.evidence.rigs import identify as identification
 from smc_mujoco.evidence.rigs import records, uncertainty
 from smc_mujoco.evidence.rigs.figure import residual_figure
 from smc_mujoco.evidence.rigs.replays import Point, Replays
+from smc_mujoco.evidence.rigs.rig import Fall
 
 AXIS = smc.rig("emps")
 PENDULUM = smc.rig("simple_pendulum_ak80")
@@ -270,25 +272,12 @@ def test_masses_and_frictions_stay_physical():
     assert {name: each.least for name, each in ranges.items()} == {"M": 1e-6, "b": 0.0, "cf": 0.0, "offset": -math.inf}
 
 
-def test_a_record_in_milliseconds_is_refused_before_it_is_simulated():
-    record = pushed(1, 0.2)
-    with pytest.raises(smc.ScenarioError, match=r"every 1 s and lasts 200 s: give time in s \(a column in ms divided"):
-        smc.identify(smc.plant("servo_axis"), record | {"t": 1e3 * record["t"]})
-
-
 def test_a_command_beyond_the_default_bound_is_replayed_as_it_was():
     plant = smc.plant("duffing")
     run = smc.run(smc.Scenario(plant=plant, law="none", feedforward=smc.Sine(20.0, 3.0), u_max=30.0, duration=1.0))
     record = {"t": run.t, "x": run.x[:, 0], "u": run.u[:, 0]}
     assert abs(record["u"]).max() > 15.0
     assert identification._of_plant(plant, None).fit(record)["x"] > 99.9
-
-
-def test_a_command_in_another_unit_is_told_by_its_common_factor(found):
-    values = {name: 10.0 * value for name, value in found.before.values.items() if name in found.values}
-    quantities = ", ".join(name for name in values if name not in ("coulomb", "offset"))
-    told = dataclasses.replace(found, values=values).notes[-1]
-    assert told == f"{quantities} and coulomb are 10 times what they were before: look at the unit of the command"
 
 
 def test_a_poor_fit_is_said(found):
@@ -335,16 +324,16 @@ def test_results_are_saved_and_drawn(found, tmp_path):
     assert all(path.stat().st_size > 1000 for path in tmp_path.glob("fit.*"))
 
 
-def test_residuals_are_what_was_measured_less_what_was_predicted(tmp_path, monkeypatch):
+def test_residuals_are_what_was_measured_less_what_was_predicted(tmp_path, monkeypatch, snapshot):
     drawn = []
     monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
-    t, measured, predicted = np.arange(3.0), {"x": np.array([1.0, 2.0, 6.0])}, {"x": np.array([2.0, 4.0, 4.0])}
-    residual_figure("A", t, measured, {"twin": predicted}, {"twin": {"x": 87.6}}, {"x": "m"}, tmp_path / "a")
-    left, right = drawn[0].axes
-    assert [line.get_ydata().tolist() for line in left.lines] == [[1.0, 2.0, 6.0], [2.0, 4.0, 4.0]]
-    assert list(right.lines[-1].get_ydata()) == [-1.0, -2.0, 2.0]
-    assert right.get_title(loc="left") == "residual, rms: twin 1.73"
-    assert left.get_title(loc="left") == "fit: twin 87.6 %"
+    t, measured = np.arange(3.0), {"x": np.array([1.0, 2.0, 6.0]), "u": np.array([0.5, 0.0, 4.0])}
+    twins = {"twin": {name: 2.0 * values for name, values in measured.items()}, "driver": dict.fromkeys(measured, t)}
+    fits = {"twin": {"x": 87.6, "u": 3.25}, "driver": {"x": Fall(8.44), "u": Fall(8.44)}}
+    paths = residual_figure("A", t, measured, twins, fits, {"x": "m", "u": "V"}, tmp_path / "a.png")
+    assert [path.name for path in paths] == ["a.svg", "a.png"]
+    assert list(drawn[0].axes[1].lines[-2].get_ydata()) == [-1.0, -2.0, -6.0]
+    assert sketch(drawn[0]) == snapshot
 
 
 def test_files_of_columns_and_traces_are_read_alike(moved, tmp_path):
@@ -389,8 +378,3 @@ def test_files_that_are_no_columns_get_one_sentence(content, sentence, tmp_path)
     assert sentence in str(error.value)
     with pytest.raises(smc.ScenarioError, match="no record at"):
         records.load(tmp_path / "b.csv")
-
-
-def test_noise_of_a_run_is_in_its_record(swung):
-    noise = records.of_trace(swung, PENDULUM.columns)["position"] - math.pi - swung.x[:, 0]
-    assert np.std(noise) == pytest.approx(math.hypot(1e-3, 2 * math.pi / 4096 / math.sqrt(12)), rel=0.1)

@@ -1,0 +1,242 @@
+"""The parts of identification on a record that a formula makes: y = a f(t) + b g(t) + x0 of each piece."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import butter, freqz
+
+import smc_mujoco as smc
+from smc_mujoco.evidence.rigs import inverse, records, replays, search, uncertainty
+from smc_mujoco.evidence.rigs.controllers import CONTROLLERS, cascade
+from smc_mujoco.evidence.rigs.replays import Piece, Point, Replays, Slopes
+from smc_mujoco.evidence.rigs.rig import Fall, Quantity, fallen, percentages
+from smc_mujoco.simulation.reference import Measurement, Values
+
+pytestmark = pytest.mark.quick
+
+TRUE = np.array([2.0, -0.5])
+T = np.linspace(0.0, 1.0, 400)
+SPREAD = 4.0
+
+
+def curves(t):
+    return np.column_stack([np.sin(9.0 * t), t**2])
+
+
+class Curve(Replays):
+    """Replays of a formula, which is linear in the quantities a >= 0 and b, and in the offset of each of 3 pieces."""
+
+    def __init__(self, noise=0.0, start=(1.0, 1.0), spread=SPREAD):
+        random = np.random.default_rng(1)
+        y = curves(T) @ TRUE + 0.3 * np.repeat([1.0, -1.0, 0.5], [150, 150, 100]) + noise * random.normal(size=T.size)
+        self.parts = np.split(np.arange(T.size), [150, 300])
+        self.pieces = [Piece(0, None, 0, {"y": y[part]}, {"y": spread}, np.ones(1)) for part in self.parts]
+        self.names, self.free, self.data, self.evaluations = ["a", "b"], np.arange(1), [None], 0
+        self.low, self.high, self.first, self.tried = np.array([0.0, -50.0]), np.array([80.0, 50.0]), start, []
+
+    @property
+    def start(self):
+        return Point(np.array(self.first), np.zeros((3, 1)))
+
+    def predicted(self, points):
+        self.evaluations += len(points)
+        self.tried += points
+        return [
+            [{"y": curves(T[part]) @ one.values + one.states[k]} for k, part in enumerate(self.parts)] for one in points
+        ]
+
+    def at_rest(self, point):
+        return Point(point.values, 0.0 * point.states)
+
+    def correct(self, point, halvings):
+        return False
+
+
+def block(k, rows):
+    """Columns of the quantities and of the three offsets, for the rows of a piece."""
+    return np.column_stack([-curves(T[rows]), -np.eye(3)[[k]].repeat(len(rows), 0)]) / SPREAD
+
+
+@pytest.mark.parametrize("values", [(1.0, 1.0), (0.0, -50.0), (80.0, 0.0)], ids=["inside", "lowest", "highest"])
+def test_slopes_are_derivatives_also_at_the_ends_of_ranges(values):
+    curve = Curve(spread=100.0 * SPREAD)
+    slopes = curve.slopes(Point(np.array(values), np.zeros((3, 1))))
+    for k, part in enumerate(curve.parts):
+        exact = block(k, part) / 100.0
+        np.testing.assert_allclose(
+            np.hstack([slopes.by_values[k], slopes.by_states[k]]), exact[:, [0, 1, 2 + k]], atol=1e-9
+        )
+        expected = (curve.pieces[k].measured["y"] - curves(T[part]) @ values) / SPREAD / 100.0
+        np.testing.assert_allclose(slopes.residuals[k], expected, atol=1e-12)
+    assert (slopes.columns, slopes.records) == (1, 1)
+    assert slopes.fit == pytest.approx(100.0 * (1.0 - math.sqrt(sum(np.sum(r**2) for r in slopes.residuals))))
+
+
+def test_a_step_is_least_squares_with_damping_within_a_factor_of_ten():
+    curve = Curve(start=(1.0, 1.0))
+    slopes = curve.slopes(curve.start)
+    J, r = (np.concatenate(slopes.freed(rows)) for rows in (slopes.by_values, slopes.residuals))
+    np.testing.assert_allclose(search._moved(curve, slopes, 0.0), TRUE, atol=1e-6)
+    damped = np.linalg.solve(J.T @ J * (1.0 + 0.5 * np.eye(2)), -J.T @ r)
+    np.testing.assert_allclose(search._moved(curve, slopes, 0.5), 1.0 + damped)
+    for first, reached in (((0.1, 1.0), 1.0), ((25.0, 1.0), 2.5), ((1e-4, 1.0), 2.0), ((1.1e-4, 1.0), 1.1e-3)):
+        curve = Curve(start=first)
+        slopes = curve.slopes(curve.start)
+        assert search._moved(curve, slopes, 0.0)[0] == pytest.approx(reached, rel=1e-3)
+
+
+def test_moves_of_the_states_are_what_the_quantities_leave():
+    curve = Curve()
+    slopes = curve.slopes(curve.start)
+    step = TRUE - 1.0
+    np.testing.assert_allclose(slopes.moves(step).ravel(), [0.3, -0.3, 0.15], atol=1e-9)
+    after = slopes.stepped(step)
+    np.testing.assert_allclose(after.point.values, TRUE)
+    np.testing.assert_allclose(after.point.states.ravel(), [0.3, -0.3, 0.15], atol=1e-9)
+    assert after.cost < 1e-20
+    variants = search._variants(curve, slopes, TRUE)
+    expected = [share * np.array([0.3, -0.3, 0.15]) for share in (*search.SHARES, 0.0)]
+    np.testing.assert_allclose([one.states.ravel() for one in variants], expected, atol=1e-9)
+    curve.free = np.zeros(0, int)
+    assert len(search._variants(curve, slopes, TRUE)) == 1
+
+
+def test_a_search_reaches_least_squares_and_tries_no_rival_of_a_good_start(monkeypatch):
+    monkeypatch.setattr(search, "_by_torques", None)
+    curve = Curve(noise=0.002)
+    found = search.search(curve, 4, 0, 30)
+    rows = np.vstack([block(k, part) for k, part in enumerate(curve.parts)])
+    y = np.concatenate([piece.measured["y"] for piece in curve.pieces]) / SPREAD
+    exact = np.linalg.lstsq(-rows, y, rcond=None)[0]
+    np.testing.assert_allclose(found.point.values, exact[:2], rtol=1e-6)
+    np.testing.assert_allclose(found.point.states.ravel(), exact[2:], atol=1e-6)
+    assert found.fit > search.GOOD
+    assert curve.evaluations < 80
+    none = search.refine(curve, curve.start, 0)
+    assert none.point is not found.point
+    np.testing.assert_array_equal(none.point.values, curve.start.values)
+
+
+def test_further_starts_are_the_best_of_many_within_ranges_and_two_decades():
+    curve = Curve(start=(0.5, 30.0))
+    points = search._random(curve, 3, 7)
+    drawn = np.array([one.values for one in curve.tried])
+    assert len(drawn) == 3 * search.CANDIDATES
+    assert (drawn[:, 0] >= 0.01).all()
+    assert (drawn[:, 0] > 10.0).any()
+    assert (drawn[:, 0] <= 80.0).all()
+    assert (np.abs(drawn[:, 1]) <= 50.0).all()
+    assert (np.abs(drawn[:, 1]) >= 0.3).all()
+    assert {*np.sign(drawn[:, 1])} == {-1.0, 1.0}
+    costs = [replays.cost(rows) for rows in curve.residuals(list(curve.tried))]
+    assert [replays.cost(rows) for rows in curve.residuals(points)] == sorted(costs)[:3]
+    again = search._random(Curve(start=(0.5, 30.0)), 3, 7)
+    assert [one.values.tolist() for one in again] == [one.values.tolist() for one in points]
+    assert search.better(curve, points[2], points[0], points[1]) is points[0]
+
+
+def test_a_solution_that_is_worse_than_the_start_is_not_kept():
+    curve = Curve(start=tuple(TRUE))
+    bad = curve.slopes(Point(np.array([1.5, 3.0]), np.zeros((3, 1))))
+    kept = search.not_worse(curve, bad)
+    np.testing.assert_allclose(kept.point.values, TRUE, atol=1e-6)
+    assert search.not_worse(curve, kept) is kept
+
+
+def test_a_jackknife_leaves_out_one_block_after_the_other():
+    curve = Curve(noise=0.05)
+    slopes = search.refine(curve, curve.start, 5)
+    parts = math.ceil(uncertainty._blocks(slopes) / 3)
+    rows = np.vstack([block(k, part) for k, part in enumerate(curve.parts)])
+    y = np.concatenate(slopes.residuals)
+    blocks = np.concatenate(
+        [k * parts + np.arange(len(part)) * parts // len(part) for k, part in enumerate(curve.parts)]
+    )
+    found = np.array([np.linalg.lstsq(rows[blocks != b], y[blocks != b], rcond=None)[0][:2] for b in range(3 * parts)])
+    every = np.linalg.lstsq(rows, y, rcond=None)[0][:2]
+    expected = (len(found) - 1) / len(found) * (found - every).T @ (found - every)
+    np.testing.assert_allclose(uncertainty.jackknife(slopes), expected, rtol=1e-6)
+    noise = 0.05 / SPREAD * np.sqrt(np.diag(np.linalg.inv(rows.T @ rows))[:2])
+    np.testing.assert_allclose(np.sqrt(np.diag(expected)), noise, rtol=0.35)
+
+
+@pytest.mark.parametrize(("memory", "count"), [(0.0, 400), (0.9, 105), (0.995, 60)])
+def test_blocks_are_as_long_as_residuals_depend_on_each_other(memory, count):
+    """Of a residual whose correlation falls by `memory` from sample to sample, in two columns."""
+    random, r = np.random.default_rng(2), np.zeros((20_000, 2))
+    for k in range(1, len(r)):
+        r[k] = memory * r[k - 1] + random.normal(size=2)
+    slopes = Slopes(Point(np.zeros(0), np.zeros(0)), [r.ravel()], [], [], 2, 1)
+    assert uncertainty._blocks(slopes) == pytest.approx(count, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("value", "least", "most", "scale"),
+    [(3.0, 0.0, 100.0, 3.0), (-0.2, 0.0, 100.0, 1.0), (0.0, 0.0, math.inf, 1e-3), (0.2, -math.inf, 1.0, 0.2)],
+)
+def test_a_quantity_has_the_scale_of_its_value_or_a_hundredth_of_its_range(value, least, most, scale):
+    assert replays._scale(Quantity(value, "", "given here", least, most)) == pytest.approx(scale)
+
+
+def test_corrected_replays_have_steps_that_divide_the_period():
+    plain = smc.Scenario(plant="duffing", law="pid", control_period=0.0011)
+    assert replays._steps(plain, 0) == {"integrator": "RK4", "physics_step": pytest.approx(2.2e-4)}
+    assert replays._steps(plain, 2)["physics_step"] == pytest.approx(5.5e-5)
+    even = smc.Scenario(plant="duffing", law="pid", control_period=0.001)
+    assert replays._steps(even, 1)["physics_step"] == pytest.approx(1.25e-4)
+    late = smc.Scenario(plant="duffing", law="pid", input_delay=0.003, friction=smc.LuGre(0.3, 0.4, 0.01))
+    assert replays._steps(late, 1)["integrator"] == "implicitfast"
+    assert replays._steps(late, 1)["physics_step"] == late.resolved.physics_step / 2
+
+
+def test_residuals_are_shares_of_the_spread_up_to_the_worst():
+    curve = Curve()
+    piece = Piece(0, None, 0, {"y": np.zeros(4), "z": np.ones(4)}, {"y": 2.0, "z": 4.0}, np.ones(1))
+    given = {"y": np.array([1.0, -5.0, np.nan, np.inf]), "z": np.array([0.0, 1.0, 2.0, -np.inf])}
+    assert curve.relative(piece, given).tolist() == [-0.5, 0.25, 1.0, 0.0, 1.0, -0.25, -1.0, 1.0]
+    assert replays._norm(np.array([1.0, 3.0])) == pytest.approx(math.sqrt(2.0))
+    assert replays._norm(np.ones(3)) == 1.0
+
+
+@pytest.mark.parametrize("hertz", [0.8, 3.0, 5.0, 8.0])
+def test_torques_above_5_hz_are_left_out_by_four_poles_forward_and_backward(hertz):
+    t = 0.002 * np.arange(10_001)
+    columns = records.Columns(torque=("tau",))
+    data = {"t": t, "tau": np.sin(math.tau * hertz * t)}
+    (low,), at = inverse.measured(data, columns).values(), inverse.times(data, columns)
+    np.testing.assert_allclose(np.diff(at), 0.01, rtol=1e-9)
+    assert (at[0], at[-1]) == (pytest.approx(0.1), pytest.approx(19.9))
+    _, gain = freqz(*butter(4, 5.0, fs=100.0), worN=[hertz], fs=100.0)
+    middle = slice(300, -300)
+    np.testing.assert_allclose(low[middle], abs(gain[0]) ** 2 * np.sin(math.tau * hertz * at[middle]), atol=6e-3)
+
+
+@pytest.mark.parametrize(("seconds", "step", "enough"), [(1.0, 0.05, True), (0.99, 0.01, False), (2.0, 0.051, False)])
+def test_a_record_has_torques_from_1_s_on_at_20_hz(seconds, step, enough):
+    data = {"t": np.append(step * np.arange(round(seconds / step)), seconds)}
+    assert inverse.long_enough(data, records.Columns()) is enough
+
+
+def test_a_twin_falls_beyond_two_ranges_from_when_it_was_one_range_off():
+    t = np.linspace(10.0, 14.0, 5)
+    measured = {"x": np.array([0.0, 1.0, 0.5, 0.0, 1.0]), "y": np.zeros(5)}
+    near = {"x": np.array([0.0, 2.0, 2.5, 2.0, 2.0]), "y": np.full(5, 9.0)}  # y has no range
+    assert fallen(near, measured, t) is None
+    far = {"x": np.array([0.0, 2.0, 1.6, 2.1, 2.0])}
+    fall = fallen(far, measured, t)
+    assert isinstance(fall, Fall)
+    assert (fall.time, fall, str(fall)) == (12.0, -math.inf, "falls at 12.0 s")
+    assert fallen({"x": np.array([0.0, 1.0, np.nan, 0.0, 1.0])}, measured, t) == -math.inf
+    fit = percentages({"x": measured["x"] + 0.25, "y": np.ones(5)}, measured)
+    norm = np.linalg.norm(measured["x"] - 0.5)
+    assert fit == {"x": pytest.approx(100.0 * (1.0 - 0.25 * math.sqrt(5.0) / norm)), "y": -1e3}
+
+
+def test_the_cascade_of_the_axis_is_its_formula():
+    y = Measurement(0.0, 1e-3, 0.3, 0.2, 0.1, 0.2, 0.2, 0.0, 0.0, 0.0, 0.0)
+    u, _ = cascade.function(y, Values(kp=3.0, kv=5.0), np.zeros(0))
+    assert u == pytest.approx(5.0 * (3.0 * (0.2 - 0.3) - 0.2))
+    assert {name: one.label for name, one in CONTROLLERS.items()} == {
+        "state_feedback": "Rig's state feedback", "cascade": "Rig's cascade"
+    }  # fmt: skip
