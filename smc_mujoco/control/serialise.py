@@ -51,7 +51,7 @@ def restore(data: Mapping[str, Any], kind: str, known: Catalogue[Template]) -> C
         name=data["name"],
         gains=dict(data["gains"]),
         memory=data["memory"],
-        relative_degree=data.get("degree", 1),
+        relative_degree=data["degree"],
         function=None,
     )
 

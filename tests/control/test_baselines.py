@@ -106,11 +106,10 @@ def test_the_pid_s_memory_runs_by_the_control_period(dt):
     assert memory[2] == pytest.approx(1.0 - (1.0 + dt / 0.1) ** -round(0.2 / dt), rel=1e-9)
 
 
-def test_design_refuses_a_joint_without_an_actuator():
-    with pytest.raises(
-        smc.ScenarioError, match=r"cart_pole's channel 1 has no actuator, .* take the law 'hierarchical"
-    ):
-        design.lqr("cart_pole")
+def test_a_design_that_cannot_be_is_one_sentence(refused):
+    refused(lambda: design.lqr("cart_pole"))
+    for weights in ((3.0,), ((1.0,),), ((1.0, -1.0),), ((1.0, 1.0), 0.0)):
+        refused(lambda weights=weights: design.lqr("duffing", *weights))
 
 
 # LQR

@@ -4,7 +4,6 @@ import dataclasses
 import itertools
 
 import pytest
-from helpers.words import refusal
 
 from smc_mujoco.analysis.tuning import objective, result, search, search_space
 from smc_mujoco.control import gain_sets as gains
@@ -137,8 +136,9 @@ def test_the_law_without_a_clamp_takes_the_gains_of_its_rival(gain_set):
     assert dict(one.gains) == dict(other.gains) | {"w_max": one.gains["w_max"]}
 
 
-def test_what_has_no_gains_gets_a_sentence(snapshot):
+def test_what_has_no_gains_gets_a_sentence(refused):
     wrong = [("duffing", "classical", "best"), ("duffing", "hierarchical", "tuned"), ("duffing", "twisting", "study")]
     wrong += [("overhead_crane", "classical", "tuned"), ("duffing", "clasical", "study"), ("cart_pole", "pid", "study")]
-    assert {" ".join(arguments): refusal(gains.law, *arguments) for arguments in wrong} == snapshot
-    assert refusal(gains.paper_plant, 3) == snapshot
+    for arguments in wrong:
+        refused(lambda arguments=arguments: gains.law(*arguments))
+    refused(lambda: gains.paper_plant(3))

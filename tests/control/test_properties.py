@@ -133,6 +133,7 @@ def test_laws_are_chosen_by_all_that_is_asked():
     assert {"continuous_twisting"} == {"continuous_twisting", "twisting", "lqr"} & {*names("finite-time", "continuous")}
     assert set(names("two-gains")) < set(smc.laws())
     assert "pid" not in names("two-gains")
+    assert {"none", "classical"}.isdisjoint(names("one-gain"))
     assert "lqr" in names("two-gains")  # its weight r and its plant are held
     assert {"none"} == {"none", "pid", "classical"} & {*names("no-velocity")}
     assert {"none"} == {"none", "hierarchical"} & {*names("no-model", plant="cart_pole")}

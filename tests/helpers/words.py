@@ -6,21 +6,15 @@ Numbers have tests of their own, and their last digits differ between processors
 
 import re
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
-import pytest
 from matplotlib import colors
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.text import Text
 
-from smc_mujoco.common.errors import ScenarioError
-
 NUMBER = re.compile(r"[-+−]?\b\d+(?:[.,]\d+)*(?:e[-+]?\d+)?\b")
 SPACE = re.compile(r"[ \t─━-]{2,}")  # widths of columns depend on numbers
-LISTED = re.compile(r"choose from [\w, ]{200,}\.*")  # a whole catalogue
-PLACE = re.compile(r"(?<![\w.])(?:[A-Za-z]:)?[/\\][^\s'()]*[/\\]| at 0x[0-9a-fA-F]+")  # folders, addresses of objects
 
 
 def recorded(file: str, names: Iterable[str]) -> list[str]:
@@ -33,14 +27,6 @@ def recorded(file: str, names: Iterable[str]) -> list[str]:
         return list(names)
     text = record.read_text(encoding="utf-8")
     return [name for name in names if f"[{name}]\n" in text]
-
-
-def refusal(call: Callable[..., object], *args: Any, **kwargs: Any) -> str:
-    """Return the sentence with which a call is refused, without folders, addresses, and long lists of names."""
-    with pytest.raises(ScenarioError) as caught:
-        call(*args, **kwargs)
-    assert "\n" not in str(caught.value)
-    return LISTED.sub("choose from ...", PLACE.sub("", str(caught.value)))
 
 
 def words(text: str) -> str:

@@ -15,7 +15,7 @@ from helpers.words import recorded
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms.plant import catalogue, plant, write
 
-PLANTS = {name: one if one.n == one.sizes[0] else plant(name, n=3) for name, one in catalogue().items()}
+PLANTS = {name: one if one.n == one.sizes[0] else plant(name, n=12) for name, one in catalogue().items()}
 CASES = [f"{name} {how}" for name, one in PLANTS.items() for how in ("alone", *one.contacts, *one.mechanisms)]
 ARRAYS = {  # what is drawn, and what blows and springs are made of
     "body": ("pos", "quat", "mass", "inertia"),

@@ -9,7 +9,6 @@ import mujoco
 import numpy as np
 import pytest
 from helpers.episodes import dm_control_suite
-from helpers.words import refusal
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
@@ -261,7 +260,7 @@ def taken(name, key, value):
     return False
 
 
-def test_a_plant_takes_masses_and_lengths_above_0_and_none_of_its_parameters_beyond_1e15():
+def test_a_plant_takes_masses_and_lengths_above_0_and_none_of_its_parameters_beyond_1e15(refused):
     for name in NAMES:
         base = smc.plant(name)
         for key in base.parameters:
@@ -272,8 +271,13 @@ def test_a_plant_takes_masses_and_lengths_above_0_and_none_of_its_parameters_bey
             assert not taken(name, key, math.nextafter(1e15, math.inf))
             assert not taken(name, key, 0.0) or low <= 0.0
         for n in (base.sizes[0] - 1, base.sizes[1] + 1):
-            said = refusal(smc.plant, name, n=n)
-            assert said == "n of {} is {}: give a whole number from {} to {}".format(name, n, *base.sizes)
+            said = "n of {} is {}: give a whole number from {} to {}".format(name, n, *base.sizes)
+            assert refused(lambda name=name, n=n: smc.plant(name, n=n), recorded=False) == said
+    refused(lambda: smc.plant("duffing").load(nuserdata=-1))
+
+
+def test_springs_are_drawn_for_fifty_pendulums_and_no_more():
+    assert [len(smc.plant("pendulum_network", n=n).spec().skins) for n in (50, 51)] == [49, 0]
 
 
 @pytest.mark.parametrize("name", ["cart_pole", "pendulum_network", "overhead_crane"])

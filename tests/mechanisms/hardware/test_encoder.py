@@ -414,6 +414,12 @@ def test_every_channel_of_a_network_has_its_encoder():
     np.testing.assert_array_equal(x, q * np.floor(held / q + 0.5))
 
 
+def test_a_sensor_keeps_as_many_readings_as_are_under_way_in_parts_of_64():
+    for times, count in (({}, 0), ({"period": 0.02}, 64), ({"delay": 0.062}, 64), ({"delay": 0.063}, 128)):
+        assert smc.Encoder(**times).readings(1e-3) == count
+    assert smc.Encoder(delay=0.1265, period=1e-3).readings(5e-4) == 192
+
+
 # bad values
 
 
