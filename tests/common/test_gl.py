@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from smc_mujoco.common import gl
+
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has a choice of backend")
 
 REPORT = """
@@ -62,18 +64,6 @@ def test_unset_renders_where_egl_does(default):
     assert missing == "None" or missing.startswith("no film: egl does not render")
 
 
-def test_an_unknown_backend_is_replaced_and_named(default):
-    backend, note, missing = report(MUJOCO_GL="nonsense")
-    assert (backend, missing == "None") == (default[0], default[2] == "None")
-    assert note.startswith("MUJOCO_GL=nonsense is not a backend of MuJoCo: ")
-
-
-def test_a_backend_that_loads_is_kept_whatever_its_case(default):
-    if default[0] == "disabled":
-        pytest.skip("no backend here")
-    assert report(MUJOCO_GL=f" {default[0].upper()} ")[:2] == (default[0], "None")
-
-
 def test_without_libraries_all_but_films_works():
     backend, note, missing = report(hidden=ALL, MUJOCO_GL="osmesa")
     assert backend == "disabled"
@@ -82,38 +72,90 @@ def test_without_libraries_all_but_films_works():
     assert "MUJOCO_GL=osmesa" in missing
 
 
-def test_osmesa_that_is_missing_falls_back_to_egl(default):
-    if default[0] != "egl":
-        pytest.skip("no libEGL here")
-    backend, note, _ = report(hidden=("OSMesa",), MUJOCO_GL="osmesa")
-    assert (backend, note) == ("egl", "MUJOCO_GL=osmesa does not load here: egl is used instead")
-
-
-def test_egl_without_any_gl_library_is_not_taken():
-    # libEGL.so.1 alone satisfies the linker, and still `import mujoco` fails
-    assert report(hidden=("libGL", "libOpenGL", "OSMesa"))[0] == "disabled"
-
-
-def test_rendering_turned_off_stays_off():
-    backend, note, missing = report(MUJOCO_GL="off")
-    assert (backend, note) == ("off", "None")
-    assert missing == "no film: MUJOCO_GL=off turns rendering off: unset it"
-
-
 def test_a_display_that_is_not_there_is_named():
     backend, note, missing = report(MUJOCO_GL="glfw")
     assert (backend, note) == ("glfw", "None")
     assert missing.startswith("no film: MuJoCo cannot open a window")
 
 
-def test_a_conflicting_pyopengl_platform_is_named():
-    backend, _, missing = report(PYOPENGL_PLATFORM="glx")
-    assert backend == "disabled"
-    assert missing == "no film: PYOPENGL_PLATFORM=glx rules out what is installed: unset it"
-
-
 def test_choose_gl_sets_nothing_once_mujoco_is_imported():
     assert report(first="import os, mujoco; os.environ['MUJOCO_GL'] = 'glfw'\n")[0] == "glfw"
+
+
+EGL, MESA = {"libEGL.so.1", "libGL.so.1"}, {"libOSMesa.so.6"}
+HERE = "install a renderer (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri)"
+NEITHER = "no film: neither libEGL with libGL nor libOSMesa is here"
+BACKENDS = {  # MUJOCO_GL, libraries, PYOPENGL_PLATFORM, error of a trial -> backend, note, why pictures are missing
+    "all there": ("", EGL | MESA, "", None, "egl", None, None),
+    "only OSMesa": ("", MESA, "", None, "osmesa", None, None),
+    "OSMesa wanted": (" OSMesa ", EGL | MESA, "", None, "osmesa", None, None),
+    "no GL beside EGL": ("", {"libEGL.so.1"}, "", None, "disabled", None, f"{NEITHER}: {HERE}"),
+    "nothing there": (
+        "egl", set(), "", None, "disabled", "MUJOCO_GL=egl does not load here: films are off",
+        f"{NEITHER} (and MUJOCO_GL=egl cannot be used): {HERE}",
+    ),
+    "OSMesa wanted, not there": (
+        "osmesa", EGL, "", None, "egl", "MUJOCO_GL=osmesa does not load here: egl is used instead", None,
+    ),
+    "another word": ("x", EGL, "", None, "egl", "MUJOCO_GL=x is not a backend of MuJoCo: egl is used instead", None),
+    "turned off": ("0", EGL, "", None, "0", None, "no film: MUJOCO_GL=0 turns rendering off: unset it"),
+    "a platform for OSMesa": ("", EGL | MESA, "OSMesa", None, "osmesa", None, None),
+    "a platform for neither": (
+        "egl", EGL | MESA, "glx", None, "disabled", "MUJOCO_GL=egl does not load here: films are off",
+        "no film: PYOPENGL_PLATFORM=glx rules out what is installed (and MUJOCO_GL=egl cannot be used): unset it",
+    ),
+    "a broken driver": ("", EGL, "", "lost", "egl", None, f"no film: egl does not render (lost): {HERE}"),
+    "no window": (
+        "glx", EGL, "", "no display", "glx", None,
+        "no film: MuJoCo cannot open a window to render in (no display): set MUJOCO_GL=egl",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BACKENDS)
+def test_the_backend_is_the_wish_or_the_first_that_loads_and_the_rest_is_said(case, monkeypatch):
+    wish, libraries, platform, error, *expected = BACKENDS[case]
+    monkeypatch.setenv("MUJOCO_GL", wish)
+    monkeypatch.setenv("PYOPENGL_PLATFORM", platform)
+    monkeypatch.setattr(gl, "loads", libraries.__contains__)
+    monkeypatch.setattr(gl, "probe", lambda backend: error)
+    chosen = gl.choice.__wrapped__()
+    monkeypatch.setattr(gl, "choice", lambda: chosen)
+    assert [chosen.backend, gl.note(), gl.missing.__wrapped__()] == expected
+
+
+def test_systems_without_a_choice_take_the_wish(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "x")
+    monkeypatch.setattr(gl.sys, "platform", "darwin")
+    monkeypatch.setattr(gl, "probe", lambda backend: "no display")
+    chosen = gl.choice.__wrapped__()
+    monkeypatch.setattr(gl, "choice", lambda: chosen)
+    assert (chosen.wish, chosen.backend, gl.choose_gl(), gl.note()) == ("x", "x", "x", None)
+    assert gl.missing.__wrapped__() == (
+        "no film: MuJoCo cannot open a window to render in (no display): unset MUJOCO_GL"
+    )
+
+
+@pytest.mark.parametrize(
+    ("code", "error"),
+    [
+        ("import os; assert os.environ['MUJOCO_GL'] == 'egl'", None),
+        ("import sys; sys.exit(3)", "exit status 3"),
+        ("raise ValueError('one\\ntwo')", "two"),
+    ],
+)
+def test_a_trial_says_how_it_failed(code, error, monkeypatch):
+    assert gl.probe("egl", code) == error
+
+
+def test_a_trial_without_a_name_leaves_the_variable_and_one_that_hangs_ends(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "glfw")
+    assert gl.probe("", "import os; assert os.environ['MUJOCO_GL'] == 'glfw'") is None
+    monkeypatch.setattr(gl, "TIMEOUT", 0.01)
+    said = gl.probe("egl", "import time; time.sleep(9)")
+    assert said is not None
+    assert said.startswith("a trial failed: ")
+    assert "timed out after 0.01 seconds" in said
 
 
 IMPORT = """

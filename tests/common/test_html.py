@@ -91,3 +91,32 @@ def test_there_are_no_colours_but_the_page_s(made):
     parsed(made)
     assert not re.search(r"#[0-9a-fA-F]{3,6}\b|rgb\(|background", made)
     assert set(re.findall(r'(?:stroke|fill)="([^"]+)"', made)) <= {"none", "currentColor"}
+
+
+def test_pages_are_as_recorded(snapshot):
+    """Places and texts of a panel by hand: times 1 to 3 s, values -2 to 2 m, within the margins of 300 x 96 px."""
+    t, y = np.array([1.0, 1.5, 3.0]), np.array([-2.0, 1.0, 2.0])
+    made = {
+        "panel": html.panel(t, [y, -0.5 * y], "x (m)", reference=np.array([0.0, np.nan, 1.0])),
+        "table": html.table(("a", "b"), [(i, html.strong("<")) for i in range(14)], "c", "d", range(1, 2)),
+        "fields": html.fields({"k": 3.0, "law": "pid"}, "of a law", "note"),
+        "film": html.embedded(b"abc", "video/mp4", 12.6),
+        "picture": html.embedded(b"abc", "image/png"),
+    }
+    for name, text in made.items():
+        assert text.replace("><", ">\n<") == snapshot(name=name)
+    left, right, top, bottom = html._MARGINS
+    first, second, reference = points(made["panel"])
+    width, height = html.WIDTH - left - right, html.HEIGHT - top - bottom
+    np.testing.assert_allclose(first[:, 0], left + width * np.array([0.0, 0.25, 1.0]), atol=0.05)
+    np.testing.assert_allclose(first[:, 1], top + height * np.array([1.0, 0.25, 0.0]), atol=0.05)
+    np.testing.assert_allclose(second[:, 1], top + height * np.array([0.25, 0.625, 0.75]), atol=0.05)
+    np.testing.assert_allclose(reference[:, 1], top + height * np.array([0.5, 0.25]), atol=0.05)
+
+
+def test_a_constant_curve_is_at_the_top_of_a_range_of_its_own_size():
+    for level in (0.0, -4.0):
+        (curve,) = points(html.panel(np.arange(2.0), [np.full(2, level)], "x"))
+        assert (curve[:, 1] == html._MARGINS[2]).all()
+    assert html.panel(np.arange(1.0), [np.ones(1)], "x") == html.panel(np.arange(3.0), [], "x") == ""
+    assert html.table((), []) == html.table((), [], max_rows=1)

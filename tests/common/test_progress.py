@@ -96,3 +96,45 @@ def test_the_count_of_a_study_is_that_of_its_bar(monkeypatch, capsys):
         counts.stepped(1)
     last = [re.sub(", .* second", "", line) for line in capsys.readouterr().err.splitlines()[-2:]]
     assert last == ["7 of 8 runs 100 %, 0 s left", "8 of 8 runs 100 %, 0 s left"]
+
+
+def test_a_bar_says_its_share_its_count_and_the_time_left(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    shared, counted = progress.LogBar("runs", 8.0, False), progress.LogBar("claims", 8.0, True)
+    assert [str(shared), str(counted)] == ["runs 0 %", "claims 0/8"]
+    now[0] = 106.0
+    for bar in (shared, counted):
+        bar.advance(2.5)
+        bar.says("more", 0.5)
+    assert [str(shared), str(counted)] == ["more 38 %, 10 s left", "more 3/8, 10 s left"]
+    shared.reached(9.0, 4.0)
+    assert str(shared) == "more 100 %, 0 s left"
+    assert str(progress.LogBar("looking", None, False)) == "looking"
+
+
+def test_a_count_is_of_whole_runs_and_of_runs_a_second(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    counts = progress.Counter(8, 800, progress.Bar())
+    assert str(counts) == "0 of 8 runs, 0 a second"
+    now[0] = 104.0
+    counts.stepped(250)
+    assert str(counts) == "2 of 8 runs, 0.625 a second"
+    assert str(progress.Counter(0, 0, progress.Bar())) == "0 of 0 runs, 0 a second"
+
+
+def test_pieces_of_work_are_reported_as_their_sum():
+    reports: list[tuple[float, float]] = []
+    add = progress.summed(lambda *both: reports.append(both), 1.5, 9.0)
+    add(2.0)
+    add(0.25)
+    assert reports == [(3.5, 9.0), (3.75, 9.0)]
+
+
+def test_what_is_not_shown_draws_nothing(cell, capsys):
+    with progress.bar("runs", 2.0, shown=False) as bar:
+        bar.says("more", 1.0)
+    with progress.counter(0, 0, shown=True) as counts:
+        counts.stepped(1)
+    assert (cell, capsys.readouterr()) == ([], ("", ""))
