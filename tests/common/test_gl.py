@@ -1,9 +1,12 @@
 """The OpenGL backend: nothing is chosen before the first picture, which then works whatever MuJoCo took."""
 
+import ctypes.util
+import inspect
 import os
 import subprocess
 import sys
 
+import mujoco
 import pytest
 
 from smc_mujoco.common import gl
@@ -156,6 +159,21 @@ def test_a_trial_without_a_name_leaves_the_variable_and_one_that_hangs_ends(monk
     assert said is not None
     assert said.startswith("a trial failed: ")
     assert "timed out after 0.01 seconds" in said
+
+
+def test_renderers_have_mujoco_s_size_by_default_and_are_closed_at_the_end(monkeypatch):
+    sizes = [inspect.signature(made).parameters for made in (gl.renderer, mujoco.Renderer)]
+    assert [[size[name].default for name in ("height", "width")] for size in sizes] == [[240, 320]] * 2
+    closed = []
+    opened = type("Opened", (), {"close": lambda self: closed.append(self)})()
+    monkeypatch.setattr(gl, "_RENDERERS", {opened})
+    gl._close_all()
+    assert closed == [opened]
+
+
+def test_a_library_loads_if_the_linker_finds_it():
+    assert gl.loads(ctypes.util.find_library("c") or "libc.so.6")
+    assert not gl.loads("libnope.so.1")
 
 
 IMPORT = """
