@@ -27,6 +27,7 @@ from smc_mujoco.analysis.region_of_attraction import Basin
 from smc_mujoco.analysis.region_of_attraction import load as load_map
 from smc_mujoco.analysis.tuning import result
 from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.common import files
 from smc_mujoco.common.files import from_json, plain, reading, replacing, to_json, writable
 from smc_mujoco.evidence.audit.audit import document
 from smc_mujoco.evidence.audit.paper import new
@@ -282,3 +283,62 @@ def test_a_file_whose_writing_fails_stays_as_it_was(tmp_path):
         raise ZeroDivisionError
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_cells_of_a_csv_file_are_between_commas_or_semicolons(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text('\ufeff"t;s", x \n\n0.5,"1,5"\n,\n', encoding="utf-8")
+    assert files.csv_rows(file) == [(1, ["t;s", "x"]), (3, ["0.5", "1,5"]), (4, ["", ""])]
+    file.write_text('t;"x, m"\n0,5;-1,25\n', encoding="utf-8")
+    assert files.csv_rows(file) == [(1, ["t", "x. m"]), (2, ["0.5", "-1.25"])]
+    file.write_text("a,b\0\n")
+    with pytest.raises(smc.ScenarioError, match=r"a.csv is not a CSV file \(it is not text|\(Error, line contains NUL"):
+        files.csv_rows(file)
+
+
+def test_files_at_and_beyond_their_bounds(tmp_path, monkeypatch):
+    for name, bound in (("MAX_SIZE", 4_000_000), ("MAX_UNPACKED", 3_000_000), ("MAX_RATIO", 20), ("MAX_MEMBERS", 2)):
+        assert isinstance(getattr(files, name), int)
+        monkeypatch.setattr(files, name, bound)
+    file = tmp_path / "a"
+    file.write_bytes(bytes(4_000_000))
+    files._bounded(file)
+    file.write_bytes(bytes(4_100_000))
+    with pytest.raises(smc.ScenarioError, match=r"^it has 4 MB, more than 4 MB$"):
+        files._bounded(file)
+    for sizes, refused in (((1_000_000, 2_000_000), False), ((1_000_000, 2_000_001), True), ((1, 1, 1), True)):
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+            for i, size in enumerate(sizes):
+                archive.writestr(f"{i}", bytes(size))
+        said = f"it unpacks from 0 MB to {len(sizes)} files of {sum(sizes) / 1e6:.0f} MB in all, and 2 files and 3 MB "
+        with pytest.raises(smc.ScenarioError, match=f"^{said}are allowed$") if refused else contextlib.nullcontext():
+            files._bounded(file)
+    with zipfile.ZipFile(file, "w") as archive:  # large, but packed as large: its ratio is 1
+        archive.writestr("a", bytes(3_500_000))
+    files._bounded(file)
+
+
+def test_what_cannot_be_written_or_found_is_one_sentence(tmp_path):
+    cells, beside = "give one of cells between commas or semicolons, a CSV file", Path(files.__file__).parents[1]
+    refusals = {
+        lambda: files.ended("a.txt", ".json"): "cannot save to 'a.txt': end the name in .json",
+        lambda: files.ended("a\0.json", ".json"): r"cannot save to 'a\x00.json': end the name in .json",
+        lambda: writable(tmp_path): f"cannot write {tmp_path}: it is a folder, give the file in it a name",
+        lambda: writable("a\0"): r"cannot write 'a\x00': give a name without \0",
+        lambda: files.shipped("nope"): f"no folder 'nope' in {beside} or beside it: reinstall smc-mujoco",
+        lambda: files.csv_rows(tmp_path / "no"): f"no CSV file at {tmp_path / 'no'}: {cells}",
+        lambda: files.csv_rows(3): f"cannot read 3: {cells}",  # pyright: ignore[reportArgumentType]
+    }
+    for call, sentence in refusals.items():
+        with pytest.raises(smc.ScenarioError) as refused:
+            call()
+        assert str(refused.value) == sentence
+    assert files.ended("b/a.json", ".json") == Path("b/a.json")
+    (tmp_path / "old").write_text("old")
+    writable(tmp_path / "old")
+    writable(tmp_path / "new" / "a")
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["new", "old"]
+    with pytest.raises(OSError, match="torn"), files.no_room(28):
+        raise OSError(5, "torn")
+    with pytest.raises(smc.ScenarioError, match=r"written \(full\): make room"), files.no_room(28):
+        raise OSError(28, "full")
