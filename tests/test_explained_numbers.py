@@ -1,0 +1,144 @@
+"""An explanation has the numbers of the code: each sentence is made of a constant, and stands in the text."""
+
+import importlib
+import inspect
+import math
+from pathlib import Path
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis import gains_for, relevant_difference, scaling, step_halving
+from smc_mujoco.analysis import region_of_attraction as region
+from smc_mujoco.analysis.tuning import objective, result, search, search_space
+from smc_mujoco.analysis.worst_case import search as attack
+from smc_mujoco.analysis.worst_case import uncertainty
+from smc_mujoco.envs import tasks
+from smc_mujoco.metrics import catalogue, conventions, limit_cycle, tip
+from smc_mujoco.simulation import clock, conditions, controller, scenario, signals, time_series
+from smc_mujoco.testing import golden, plugin
+
+pytestmark = pytest.mark.quick
+
+margins = importlib.import_module("smc_mujoco.analysis.margins")  # smc.margins is the function
+ROOT = Path(__file__).parents[1]
+PARTS = {2: "half", 3: "third", 4: "quarter", 6: "sixth", 8: "eighth", 10: "tenth"}
+WORDS = {2: "two", 3: "three", 4: "four", 5: "five", 9: "nine"}
+
+
+def percent(share: float) -> str:
+    return f"{100.0 * share:g} %"
+
+
+def short(number: float) -> str:
+    """A power of ten, such as 1e-3."""
+    return f"1e{round(math.log10(number))}" if math.log10(number) % 1.0 in (0.0, 1.0) else str(number)
+
+
+def part(share: float) -> str:
+    """A share in words, such as eighth."""
+    return PARTS[round(1.0 / share)]
+
+
+SAID = {
+    margins: [
+        f"at most {percent(margins.TOLERATED_ERROR)} of its scale",
+        f"up to {WORDS[max(len(kind.levels) for kind in margins.MARGIN_KINDS.values())]} levels",
+        f"an {part(1 / uncertainty.JITTER_SHARES)} of one of jitter, or {percent(margins.FINE)} of other levels",
+    ],
+    margins.margins: [
+        f"runs of {margins.QUICK_DURATION:g} s and search to within {margins.QUANTA[margins.COARSE]} control periods",
+        f"control periods or {percent(margins.COARSE)}, for a first look",
+    ],
+    region: [
+        f"|e| <= {percent(conventions.SETTLING_BAND)} of X and |v| <= {percent(conventions.SETTLING_BAND)} of V",
+        f"({percent(math.sqrt(region.NEAR_SQUARE))})^2, a {part(math.sqrt(region.NEAR_SQUARE) / 0.02)} of the band",
+        f"for {percent(region.HORIZONS[0])} of the duration",
+        f"for {percent(region.HORIZONS[1])}, and those still undecided for the whole duration",
+        f"throughout the last {part(1 / region.EARLY_PARTS)} of the run",
+        f"smaller by a {part(1.0 - region.MAX_EARLY_RATIO)} than in the first",
+        f"less than {short(region.REST_TOLERANCE)} of X",
+        f"throughout the last {percent(conventions.LAST_PART)} of the run",
+        f"at most {percent(round(region.MAX_FINAL_RATIO - 1.0, 9))} larger than in the first",
+    ],
+    region.basin: [f"V is {region.VELOCITY_RATIO:g} X per second"],
+    search: [
+        f"A start has {search.EVALUATIONS_PER_GAIN} evaluations for each gain",
+        f"An {part(search.SCREENED_SHARE)} screens",
+        f"A {part(search.EVOLVED_SHARE)} evolves",
+        f"when {WORDS[result.AGREEING_STARTS]} starts end within {percent(result.AGREEMENT_TOLERANCE)} of the best J",
+        f"knows {result.MAX_SETS} near-optimal sets",
+        f"near-optimal within {percent(result.NEAR_OPTIMAL_TOLERANCE)} of the best J",
+        f"rounded to {WORDS[search.GAIN_DIGITS]} digits",
+        f"descends {['once', 'twice'][len(search.FIRST_RADII) - 1]}",
+    ],
+    search_space: [f"10^-{search_space.HALF_WIDTH:g} .. 10^{search_space.HALF_WIDTH:g}"],
+    search_space.at_bound: [f"within {percent(search_space.BOUND_MARGIN)} of a bound"],
+    search_space.widened: [f"{ {1.0: 'a decade'}[search_space.WIDENING] } wider on either side"],
+    objective: [
+        f"w = h times 1 s^2 = {short(objective.Objective().weight)} s^3",
+        f"costs {objective.Objective().weight * 2.0 / conditions.CONTROL_PERIOD:g} s^2",
+    ],
+    gains_for.gains_for: [f"Of {len(gains_for.SPEEDS)} speeds, from a {part(gains_for.SPEEDS[0])} to ten times"],
+    step_halving: [f"by more than {percent(step_halving.TOLERANCE)}"],
+    scaling: [f"by more than a factor of {scaling.TREND:g} from each"],
+    scaling.Scaling: [f"its {percent(scaling.CONFIDENCE)} interval"],
+    scaling.Scaling.as_promised: [f"within {scaling.ORDER_BAND:g} of theory's"],
+    relevant_difference: [f"more than {percent(relevant_difference.RELEVANT)} of the larger value"],
+    relevant_difference.without_rounding: [f"0 below {short(relevant_difference.ROUNDING)}"],
+    attack: [f"at most {attack.MAX_CORNERS}, each"],
+    uncertainty.default_class: [
+        f"up to a {part(uncertainty.DEFAULT_FORCE_SHARE)} of the force",
+        f"varies by {part(1.0 - uncertainty.DEFAULT_FRICTION_SCALE[0])} of it",
+    ],
+    smc.Scenario: [
+        f"Default: {scenario.U_MAX:g}, or the limit",
+        f"such step up to {1e3 * scenario.MAX_STEP:g} ms",
+        f"up to a {PARTS[scenario.DRIVE_STEPS]} of it or half of their time constant",
+        f"up to {1e3 * scenario.REALISTIC_STEP:g} ms with friction",
+        f"up to a {PARTS[scenario.MIN_JITTER_STEPS]} of the clock's jitter",
+        f"0 .. 2^{math.log2(scenario.MAX_SEED + 1):g} - 1",
+    ],
+    conditions: [
+        f"dry friction of {(level := conditions.NAMED['coulomb'].fields['friction'].level):g} N m or N is u_max / "
+        f"{scenario.U_MAX / level:g}",
+        f"late by up to {part(conditions.NAMED['jitter'].fields['clock'].jitter / conditions.CONTROL_PERIOD)} of the",
+        f"one sample in {round(1 / conditions.NAMED['missed'].fields['clock'].missed)} does".replace("10", "ten"),
+    ],
+    smc.Clock: [f"0 .. {clock.MAX_MISSED:g}"],
+    smc.TimeSeries.from_csv: [f"longer than {time_series.MAX_GAP_STEPS:g} median steps"],
+    smc.BandLimited: [f"N = {signals.SINUSOIDS}, phi_i uniform"],
+    smc.OrnsteinUhlenbeck: [f"`dt` defaults to {1e3 * smc.OrnsteinUhlenbeck(1.0, 1.0).dt:g} ms"],
+    smc.Impulse: [f"The default of {1e3 * smc.Impulse(1.0, 0.0).width:g} ms"],
+    conventions: [
+        f"settling band: |e| <= {percent(conventions.SETTLING_BAND)} of the scale",
+        f"the last {percent(conventions.LAST_PART)} of the run",
+        f"the samples with t >= t0 + {1 - conventions.LAST_PART:g} (tK - t0)",
+        f"|v| <= {percent(conventions.REST_SHARE)} of the group's largest |v|",
+        f"or {short(conventions.REST_SPEED)} rad/s or m/s if that is larger",
+    ],
+    catalogue.rise_time: [
+        f"from {percent(catalogue.RISE_LEVELS[0])} to {percent(catalogue.RISE_LEVELS[1])} of the way",
+        f">= {catalogue.RISE_LEVELS[1]:g} minus first with >= {catalogue.RISE_LEVELS[0]:g}",
+    ],
+    catalogue.hf_share: [f"above {catalogue.HIGH_FREQUENCY:g} Hz, 0 to 1"],
+    limit_cycle: [
+        f"at least {WORDS[limit_cycle.MIN_PERIODS]} periods",
+        f"not below {short(limit_cycle.MAX_MAGNITUDE)}",
+        f"less than a {part(limit_cycle.MIN_POWER_SHARE)} of the spectrum's power",
+        f"differs by more than {part(limit_cycle.MAX_CHANGE)} from the first",
+    ],
+    tip.tip_scores: [f"over the last {percent(1.0 - tip.FORCE_START)} of the run"],
+    tasks: [f"T(rms(w) / {tasks.RATE_MARGIN:g})", f"within {tasks.SWING_UP_SPREAD:g} rad of hanging"],
+    plugin.smc_golden._fixture_function: [f"within {percent(golden.RELATIVE)} of their recorded value"],
+    ROOT / "docs" / "design.md": [f"fails at |x| or |v| beyond {short(controller.MAX_STATE)}"],
+}
+
+
+@pytest.mark.parametrize("place", SAID, ids=lambda place: getattr(place, "__name__", str(place).split("/")[-1])[-30:])
+def test_an_explanation_has_the_numbers_of_the_code(place):
+    text = place.read_text(encoding="utf-8") if isinstance(place, Path) else inspect.getdoc(place)
+    text = " ".join(text.split())
+    assert SAID[place]
+    for sentence in SAID[place]:
+        assert sentence in text
