@@ -7,11 +7,14 @@ import math
 
 import numpy as np
 import pytest
+from helpers.words import words
 
 import smc_mujoco as smc
 from smc_mujoco import chattering, describing_function
+from smc_mujoco.analysis.chattering import Chattering, _assumptions, save
 from smc_mujoco.analysis.harmonics import Loop, play
 from smc_mujoco.analysis.linear_theory import critical_delay
+from smc_mujoco.analysis.step_halving import StepChange
 
 COARSELY = pytest.mark.usefixtures("coarse_grid")
 
@@ -307,6 +310,26 @@ def test_coupled_channels_are_named_in_the_assumptions():
     assert any(f"moves one of them {pair.coupling:.2g} times" in said for said in pair.assumptions)
     assert chattering("classical", plant="duffing", actuator=smc.Lag(0.01)).coupling == 0.0
     assert chattering("classical", plant="pendulum_network", actuator=smc.Lag(0.01)).coupling < 0.01
+
+
+def test_what_a_prediction_leaves_out_is_said(snapshot):
+    parts = {"actuator": (smc.RateLimit(50.0), smc.Backlash(0.02)), "friction": smc.Coulomb(0.1)}
+    more = {"sensor": smc.Encoder(counts=4096), "physics_step": 2.5e-4}
+    rough = Loop(smc.Scenario(plant="inverted_pendulum", law="classical", **parts, **more))
+    assert [words(one) for one in _assumptions(rough)] == snapshot
+
+
+def test_a_file_of_predictions_has_what_was_predicted_and_measured(tmp_path, snapshot):
+    run = smc.Scenario(plant="duffing", law=smc.law("classical", k=2.0, c=3.0))
+    sure = Chattering(
+        amplitude=0.5, amplitude_x=0.1, amplitude_u=2.0, frequency=20.0, power=3.0, third_harmonic=0.01, samples=50.0,
+        amplitude_range=(0.25, 0.6), frequency_range=(18.0, 21.0), coupling=0.0, gain=1.0 - 2.0j, response=0.25 + 0.5j,
+        assumptions=("about rest",),
+    )  # fmt: skip
+    possible = Chattering(amplitude_range=(0.0, 0.6), frequency_range=(18.0, 21.0))
+    changes = StepChange(0.02, 0.2), StepChange(0.0, math.inf)
+    path = save([run, run], [sure, possible], [(0.4, 19.0), (math.nan, math.nan)], changes, tmp_path / "a.json")
+    assert [json.loads(path.read_text()), [bool(sure), bool(possible), [one.mark for one in changes]]] == snapshot
 
 
 @COARSELY

@@ -304,6 +304,17 @@ def test_tasks_are_loaded_in_the_words_of_dm_control_s_suite():
     assert (scenario.duration, scenario.resolved.u_max) == (0.2, 2.0)
 
 
+def test_an_environment_says_what_it_takes_and_gives(snapshot):
+    said = []
+    for plant, task in (("duffing", "regulate"), ("cart_pole", "track")):
+        one = suite.load(plant, task, random=0, changes={"duration": 0.05, "control_period": 0.01})
+        first = one.reset()
+        limit, steps = one._step_limit, one._n_sub_steps
+        said += [one.action_spec(), one.reward_spec(), one.discount_spec(), dict(one.observation_spec()), limit, steps]
+        said += [first.step_type, first.reward, first.discount, one.control_timestep()]
+    assert [str(one) for one in said] == snapshot
+
+
 def test_a_mujoco_that_dm_control_does_not_know_is_one_sentence(monkeypatch):
     def unknown(model):
         raise AttributeError("'MjModel' object has no attribute 'flex_vertedge'")

@@ -473,6 +473,19 @@ def test_every_plant_has_an_id_and_gymnasium_keeps_its_own():
     assert "gymnasium" in gymnasium.spec("CartPole-v0").entry_point
 
 
+def test_an_environment_says_what_it_takes_and_gives(snapshot):
+    short = {"duration": 0.05, "control_period": 0.01}
+    said = []
+    for plant, task in (("duffing", "regulate"), ("cart_pole", "track")):
+        one, many = PlantEnv(plant, task, short), BatchEnv(plant, 2, task, short, max_episode_steps=3)
+        first, info = one.reset(seed=0)
+        said += [one.action_space, one.observation_space, one.metadata, one.max_samples, first.shape, sorted(info)]
+        said += [many.action_space, many.observation_space, many.metadata, many.max_samples, sorted(many.reset()[1])]
+    spec = gymnasium.spec("smc/Duffing-v0")
+    said += [spec.entry_point, spec.vector_entry_point, spec.kwargs, spec.order_enforce, spec.nondeterministic]
+    assert [str(one) for one in said] == snapshot
+
+
 # errors
 
 

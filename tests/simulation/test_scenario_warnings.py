@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import warnings
 
 import pytest
 
@@ -36,6 +37,47 @@ def test_numbers_in_another_unit_are_warned_of():
         with pytest.warns(smc.ScenarioWarning, match=words) as caught:
             dataclasses.replace(plain, **fields)
         assert {warning.filename for warning in caught} == {__file__}
+
+
+SUSPICIOUS = [  # fields of a number, and the ends of the numbers that are taken for another unit, with the end or not
+    (lambda x: {"x0": x}, (3.0 * math.pi, False), (720.0, True)),
+    (lambda x: {"reference": smc.Sine(-x, 1.0)}, (3.0 * math.pi, False), (720.0, True)),
+    (lambda x: {"disturbance": smc.Sine(0.2, 5.0, phase=x)}, (3.0 * math.pi, False), (720.0, True)),
+    (lambda x: {"v0": -x}, (100.0, False), (7200.0, True)),
+    (lambda x: {"actuator": smc.Backlash(x)}, (0.5, False), (math.inf, False)),
+    (lambda x: {"input_delay": round(x, 3)}, (1.0, True), (math.inf, False)),
+    (lambda x: {"mismatch": {"m": x}}, (10.0, True), (10.0, True)),
+    (lambda x: {"mismatch": {"m": x}}, (100.0, True), (100.0, True)),
+]
+
+
+def test_what_is_taken_for_another_unit_ends_where_it_should():
+    plain = smc.Scenario(plant="inverted_pendulum", law="none", duration=6.0)
+
+    def warned(fields):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            dataclasses.replace(plain, **fields)
+        return len(caught)
+
+    for fields, (low, with_low), (high, with_high) in SUSPICIOUS:
+        assert (warned(fields(low)), warned(fields(0.999 * low))) == (with_low, 0)
+        if math.isfinite(high):
+            assert (warned(fields(high)), warned(fields(1.001 * high))) == (with_high, 0)
+        else:
+            assert warned(fields(1.001 * low)) == 1
+
+
+def test_warnings_are_whole_sentences(snapshot):
+    plain = {"plant": "inverted_pendulum", "law": "none", "duration": 6.0}
+    motor, turned = {"actuator": smc.DCMotor(gear=1.0)}, {"x0": 30.0}
+    calls = [lambda fields=fields: smc.Scenario(**plain | fields) for fields, *_ in (*UNITS, (motor,), (turned,))]
+    said = []
+    for call in (*calls, lambda: smc.starts(spread=20)):
+        with pytest.warns(smc.ScenarioWarning) as caught:
+            call()
+        said += [str(one.message) for one in caught]
+    assert said == snapshot
 
 
 def test_spread_in_percent_is_warned_of():

@@ -12,11 +12,12 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from helpers.words import words
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.testing import golden, report
-from smc_mujoco.testing.limits import bound
+from smc_mujoco.testing import golden, plugin, report
+from smc_mujoco.testing.limits import bound, judge
 from smc_mujoco.testing.response import respond
 
 ROOT = Path(__file__).parents[2]
@@ -202,6 +203,40 @@ def test_a_mistake_is_one_sentence(step_response, call, refused):
 def test_a_limit_that_is_none_is_one_sentence(step_response, limits, refused):
     r = step_response("duffing", "none", step=1, duration=0.01)
     refused(lambda: r.check(**limits))
+
+
+class Recorder:
+    """What a plugin tells pytest, in place of pytest's parser and its configuration."""
+
+    def __init__(self):
+        self.told = []
+
+    def getgroup(self, *names):
+        self.told.append(names)
+        return self
+
+    def addoption(self, *names, **options):
+        self.told.append((names, options))
+
+    def addinivalue_line(self, *line):
+        self.told.append(line)
+
+
+def test_the_plugin_tells_pytest_of_its_options_and_its_marker(snapshot):
+    recorder = Recorder()
+    plugin.pytest_addoption(recorder)
+    plugin.pytest_configure(recorder)
+    assert recorder.told == snapshot
+
+
+def test_what_a_response_says_is_recorded(pole, step_response, snapshot):
+    short = step_response("duffing", "none", step=0.2, condition="sine", duration=0.01, u_max=3.0)
+    limits = [bound("overshoot", 7.0, "%", 5), bound("rise_time", math.inf, "s", (0.1, 0.3))]
+    limits += [bound("peak", 0.1, "m", 0.2), bound("chattering_amplitude", math.nan, "1", 0.0)]
+    with pytest.raises(AssertionError) as told:
+        judge(limits, "limit", "not", "r")
+    said = [words(repr(one)) for one in (pole, short)] + [words(short.table()).splitlines()[:3], str(told.value)]
+    assert said == snapshot
 
 
 # what a response is

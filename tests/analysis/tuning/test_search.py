@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.words import words
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import ranking
@@ -351,6 +352,18 @@ def test_a_tuning_is_saved_and_read_back_as_it_was(found, tmp_path):
     assert held["record"]["sets"][0] == list(found.gains.values())
     assert held["definition"]["conditions"] == ["nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"]
     assert set(held["versions"]) == {"smc_mujoco", "mujoco", "numba", "numpy", "scipy", "cmaes"}
+
+
+def test_a_tuning_says_what_was_searched_and_how(found, tmp_path, snapshot):
+    gains = {"lam": 2.0, "k1": 3.0}, {"lam": 6.0, "k1": 1e-3}
+    plain, extreme = (dataclasses.replace(found, law=dataclasses.replace(found.law, gains=one)) for one in gains)
+    failing = dataclasses.replace(plain, ends=(1.0, 1.005, 1.0101), screened=0, history=found.history[:1])
+    agreeing = dataclasses.replace(plain, ends=(1.0, 1.005, 1.0099))
+    tables = [one.tables[0] for one in (plain, extreme, failing, agreeing)]
+    said = [words(f"{one.title} {one.headings} {one.rows} {one.notes}") for one in tables] + [words(repr(plain))]
+    goals = Objective(u_max=12.0, chattering=0.01, conditions=("nominal", "sine")), Objective(weight=0.0)
+    stored = sorted(json.loads(found.save(tmp_path / "a.json").read_text()))
+    assert [*said, *map(str, goals), goals[0].describe(), stored] == snapshot
 
 
 def test_what_is_no_tuning_is_refused(found, tmp_path, refused):
