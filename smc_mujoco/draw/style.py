@@ -173,11 +173,15 @@ def _place(colour: str) -> tuple[float, float, float]:
 
     They are those of OKLab (B. Ottosson, 2020), strong colours dampened.
     """
-    c = np.array(rgb(colour)) / 255
-    cones = OKLAB_CONES @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
-    lightness, a, b = (OKLAB @ np.cbrt(cones)).tolist()
+    lightness, a, b = (OKLAB @ np.cbrt(OKLAB_CONES @ _linear(colour))).tolist()
     damp = min(1.0, MAX_CHROMA / math.hypot(a, b)) if a or b else 1.0
     return lightness / 3.0, damp * a, damp * b
+
+
+def _linear(colour: str) -> np.ndarray:
+    """Return the linear red, green and blue of a colour of sRGB, 0 .. 1."""
+    c = np.array(rgb(colour)) / 255
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
 def distance(one: str, other: str) -> float:
@@ -436,8 +440,7 @@ def letters_on(colour: str) -> str:
 
 def _luminance(colour: str) -> float:
     """Return the relative luminance of WCAG 2.2, 0 for black and 1 for white."""
-    red, green, blue = (((part / 255 + 0.055) / 1.055) ** 2.4 for part in rgb(colour))
-    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+    return float(np.array([0.2126, 0.7152, 0.0722]) @ _linear(colour))
 
 
 def short(value: float, digits: int = 2) -> str:

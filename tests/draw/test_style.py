@@ -107,3 +107,31 @@ def test_labels_tell_runs_of_one_law_apart_by_the_parameters_of_their_plants():
     heavy = smc.Scenario(plant="duffing", law="classical", mismatch={"mass": 1.3}, duration=0.01)
     assert style.labels(smc.run([runs[0], heavy]), None) == ["PID: M = 1", "Classical: M = 1.3"]
     assert style.distinct(["PID: k = 1", "LQR"]) == ["PID: k = 1", "LQR"]
+
+
+@pytest.mark.parametrize(
+    ("colour", "lab"),
+    [("#FFFFFF", (1.0, 0.0, 0.0)), ("#FF0000", (0.62796, 0.22486, 0.12585)), ("#00FF00", (0.86644, -0.23389, 0.1795)),
+     ("#0000FF", (0.45201, -0.03246, -0.31153)), ("#808080", (0.59987, 0.0, 0.0))],
+)  # fmt: skip
+def test_places_of_colours_are_those_of_oklab(colour, lab):
+    """Of B. Ottosson's own conversion; chroma is dampened to 0.12, and lightness counts a third."""
+    lightness, a, b = lab
+    damp = min(1.0, 0.12 / max(np.hypot(a, b), 1e-9))
+    assert style._place(colour) == pytest.approx((lightness / 3.0, damp * a, damp * b), abs=2e-4)
+
+
+def test_contrasts_are_those_of_wcag():
+    """Black on white is 21 : 1. Grey #757575 is the lightest on which white letters have 4.5 : 1."""
+    light, grey, black = (style._luminance(colour) + 0.05 for colour in ("#FFFFFF", "#757575", "#000000"))
+    assert light / black == pytest.approx(21.0)
+    assert 4.5 < light / grey < 4.7
+    assert (style.letters_on("#757575"), style.letters_on("#FFE000")) == (style.PAPER, style.INK)
+    assert style.lighter("#006400") == "#599A59"  # 35 % white
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.25, "0.25"), (6.0, "6"), (276.0, "280"), (99_999.0, "100000"), (2e6, "2e+06"), (0.0, "0")]
+)
+def test_short_numbers(value, text):
+    assert style.short(value) == text

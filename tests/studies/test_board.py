@@ -45,6 +45,7 @@ class Stand:
             "diverged_at": np.full(laws * count, math.nan),
             "itae": (sizes[:] * noise).ravel(),
             "settling_time": np.repeat([0.5, 1.0, math.inf], count),
+            "tv_rate": np.repeat([3.0, 2.0, 1.0], count),
             "ultimate_bound": np.repeat([0.1, 0.1, 0.1], count),
         }
 
@@ -201,6 +202,14 @@ def test_boards_say_as_recorded(options, stand, snapshot):
     assert "\n".join([plain(made, 100), *(one.verdict for one in made)]) == snapshot
 
 
+def test_boards_of_plants_in_several_units_as_recorded(snapshot):
+    """All metrics, by default; positions are in m and in rad."""
+    stand = Stand(conditions=("nominal", "noise"))
+    stand.columns["plant"] = np.where(stand.column("condition") == "noise", "inverted_pendulum", "duffing")
+    said = [plain(leaderboard(stand, by=by), 100) for by in (("plant",), ())]
+    assert "\n".join(said) == snapshot
+
+
 def test_why_there_is_no_winner_as_recorded(snapshot):
     (made,) = leaderboard(Stand(conditions=("nominal", "noise")), metrics=["itae"])
     first, second = made.blocks
@@ -239,7 +248,10 @@ def test_why_there_is_no_winner_as_recorded(snapshot):
     for name, change in changes.items():
         one = dataclasses.replace(made, **change)
         failures = filter(None, [one.failures(entry) for entry in one.entries])
-        said += [f"{name}: {one.result}; {one.too_few}; {', '.join(failures)}", *{each.sample for each in one.blocks}]
+        said += [
+            f"{name}: {one.result}; {one.too_few}; {', '.join(failures)}",
+            *dict.fromkeys(each.sample for each in one.blocks),
+        ]
         said += [board.key([one])] if name in ("repeated runs", "few for many", "sensor") else []
     assert "\n".join(said) == snapshot
 

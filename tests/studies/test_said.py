@@ -2,10 +2,16 @@
 
 import dataclasses
 import math
+import pickle
+import subprocess
+import sys
+import threading
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
+from helpers.sketch import failed, made
 from helpers.words import words
 
 import smc_mujoco as smc
@@ -13,9 +19,20 @@ from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.ranking import Rank
 from smc_mujoco.analysis.scaling import Accuracy, Scaling
 from smc_mujoco.common.tabular import plain
+from smc_mujoco.control import gain_sets
 from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.studies import accuracy as accuracies
-from smc_mujoco.studies import arms, cache, saved_traces, worst_case
+from smc_mujoco.studies import (
+    arms,
+    cache,
+    executors,
+    pickling,
+    replay,
+    run_key,
+    saved_traces,
+    study_replays,
+    worst_case,
+)
 from smc_mujoco.studies.accuracy import AccuracyTable, Run, Setup
 from smc_mujoco.studies.needs import NEEDS, Choice, ties
 from smc_mujoco.studies.scene import slug
@@ -189,3 +206,83 @@ def test_tasks_of_the_arm_as_recorded(snapshot):
     said += [repr(arms.gained(name)) for name in arms.GAINS] + [repr(arms.hybrid(one)) for one in (False, True)]
     said += [f"{arms.gained(name).source} {arms.gained(name).source.search}" for name in [*arms.GAINS][:1]]
     assert "\n".join(said) == snapshot
+
+
+def test_the_figures_of_worst_cases_are_of_their_runs_with_their_names(monkeypatch):
+    monkeypatch.setattr(worst_case, "run", lambda scenarios: [made(one) for one in scenarios])
+    one, other = attacked("classical", 0.2, 0.05), attacked("adaptive", 0.3, 0.06)
+    for page, labels in (
+        (one.figure(), ["as given", "worst found, rms error 0.200 m"]),
+        (WorstCases([one]).figure(), ["as given", "worst found, rms error 0.200 m"]),
+        (WorstCases([one, other]).figure(), ["classical: 0.200 m", "adaptive: 0.300 m"]),
+    ):
+        assert [text.get_text() for text in page.legends[0].get_texts()][:2] == labels
+        assert page.legends[0].get_title().get_text() == one.heading
+        names = ["error e (m)", "control u (N)", "disturbance d (N)", "velocity v (m/s)"]
+        assert sorted(ax.get_ylabel() for ax in page.axes) == sorted(names)
+    assert one.plot(title="mine", panels=["x"]).legends[0].get_title().get_text() == "mine"
+
+
+def test_an_accuracy_has_these_runs_by_default(monkeypatch, snapshot):
+    asked = []
+    monkeypatch.setattr(
+        accuracies, "stream", lambda scenarios, threads, report: asked.append((scenarios, threads)) or {}
+    )
+    with pytest.raises(KeyError):  # no run was measured
+        smc.accuracy("classical", "duffing")
+    (scenarios, threads), *_ = asked
+    runs = [
+        f"{one.seed} {one.control_period:g} {one.physics_step:g} {one.duration} {one.condition}" for one in scenarios
+    ]
+    gains = scenarios[0].law.gains == gain_sets.law("duffing", "classical").gains
+    assert "\n".join([f"{threads} {gains} {scenarios[0].condition}", *runs]) == snapshot
+
+
+def test_what_cannot_be_sent_or_replayed_is_said_as_recorded(monkeypatch, capsys, tmp_path, snapshot):
+    said = []
+
+    def told(call, *given):
+        with pytest.raises(smc.ScenarioError) as error:
+            call(*given)
+        said.append(str(error.value))
+
+    told(pickling.packed, threading.Lock())
+    told(executors.run_on_worker, b"cnot_there\nf\n.", [])
+    monkeypatch.setattr(run_key, "description", lambda one: {"versions": {"mujoco": "1", "numba": "2"}})
+    monkeypatch.setattr(run_key, "key", lambda *_, **__: "other")
+    monkeypatch.setattr(executors.platform, "python_version", lambda: "3")
+    told(executors.run_on_worker, pickle.dumps([RUN]), ["key"])
+    monkeypatch.setitem(sys.modules, "cloudpickle", None)
+    told(pickling.packed, threading.Lock())
+    trace = made(RUN)
+    unknown = dataclasses.replace(RUN.law, function=None)
+    said.append(replay._obstacle(dataclasses.replace(trace, scenario=dataclasses.replace(RUN, law=unknown))))
+    late = failed(trace, 1, "no"), failed(trace, 2, "no")
+    said += [replay._obstacle(one) for one in late] + [str(replay.Replay(True)), str(replay.replays([late[0]]))]
+    ended = subprocess.CompletedProcess([], 1, b"", b"Traceback\nValueError: no\n")
+    monkeypatch.setattr(replay.subprocess, "run", lambda *_, **__: ended)
+    told(replay._in_fresh_process, "verify", [])
+    monkeypatch.setattr(replay.subprocess, "run", mock.Mock(side_effect=subprocess.TimeoutExpired("x", 600.0)))
+    told(replay._in_fresh_process, "verify", [])
+    monkeypatch.setattr(study_replays, "has_user_code", lambda scenario: True)
+    monkeypatch.setattr(study_replays.run_key, "condition", lambda scenario: "nominal")
+    monkeypatch.setattr(study_replays, "_results", mock.Mock(side_effect=smc.ScenarioError("it cannot be sent")))
+    runs = {"a": RUN, "b": dataclasses.replace(RUN, law=smc.law("pid"))}
+    said.append(str(study_replays.replayed(runs, None, tmp_path, None, True)))
+    monkeypatch.setattr(study_replays, "_results", lambda runs, *_: dict.fromkeys(runs, "it differs") | {"b": ""})
+    for progress in (True, False):
+        found = study_replays.replayed(runs, None, tmp_path, None, progress)
+    said += [str({name: {k: v for k, v in row.items() if v is not None} for name, row in found.items()})]
+    said += [str({name: len(row) > 2 for name, row in found.items()}), (tmp_path / "replays.json").read_text()]
+    assert "\n".join([*said, capsys.readouterr().err]) == snapshot
+
+
+def test_what_a_script_defines_is_sent_with_its_code(monkeypatch):
+    """Pickle names it by `__main__`, which another process has not."""
+    names = {"__name__": "__main__"}
+    exec("def doubled(x):\n    return 2.0 * x", names)
+    monkeypatch.setattr(sys.modules["__main__"], "doubled", names["doubled"], raising=False)
+    sent = pickling.packed(names["doubled"])
+    monkeypatch.delattr(sys.modules["__main__"], "doubled")
+    assert pickle.loads(sent)(3.0) == 6.0
+    assert pickling.packed(math.hypot) == pickle.dumps(math.hypot)

@@ -231,7 +231,7 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path, sna
 
     def blank(traces, shown, labels, title, size, chosen=None):
         looks = f"{labels} {title} {size} {chosen}"
-        asked.append(f"{len(shown.times)} {numbers(shown.times[[0, -1]])} {set(shown.speeds.tolist())} {looks}")
+        asked.append(f"{len(shown.times)} {numbers(shown.times[[0, -1]])} {sorted(set(shown.speeds.tolist()))} {looks}")
         yield from (paper(size) - np.uint8(k) for k in range(len(shown.times)))
 
     @contextlib.contextmanager
