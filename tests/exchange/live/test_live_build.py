@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from smc_mujoco.cli import main
 from smc_mujoco.control import gain_sets
 from smc_mujoco.draw import style
 from smc_mujoco.exchange.live import build, npm
+from smc_mujoco.simulation import model as models
 
 MY_LAW = """
 import math
@@ -73,12 +75,13 @@ def test_skins_follow_the_bodies_as_in_mujoco(vendor, tmp_path):
     assert np.concatenate(moved) == pytest.approx(drawn.skinvert.reshape(-1, 3), abs=1e-4)
 
 
-def test_every_plant_of_the_page_has_laws_and_an_opening(vendor, tmp_path):
+def test_every_plant_of_the_page_has_laws_and_an_opening(vendor, tmp_path, snapshot):
     @smc.law_function(gains={"k": 1.0})
     def mine(y, gains, memory):
         return -gains.k * y.e, y.e
 
-    found = facts(smc.live(build.known.plants(), laws=[mine], out=tmp_path / "page"))
+    page = smc.live(build.known.plants(), laws=[mine], out=tmp_path / "page")
+    found = facts(page)
     assert {"inverted_pendulum", "cart_pole", "furuta"} <= set(found["plants"])
     assert set(build.PLANTS) == {name for name in smc.paper.PLANTS if smc.plant(name).n == 1}
     for plant in found["plants"].values():
@@ -86,6 +89,34 @@ def test_every_plant_of_the_page_has_laws_and_an_opening(vendor, tmp_path):
         assert set(plant["start"]) <= set(plant["laws"]) <= set(found["laws"])
         for condition in plant["conditions"]:
             assert condition["least"] <= condition["value"] <= condition["most"]
+    text = (page.parent / "facts.json").read_text()
+    assert recorded(json.loads(text, parse_float=lambda digits: float(f"{float(digits):.6g}"))) == snapshot
+
+
+def recorded(found: dict) -> str:
+    """Return the facts of some plants and components that come neither from tuning nor from other files."""
+    told = {name: one for name, one in found.items() if not isinstance(one, dict) or name in ("noise", "arrow")}
+    told |= {f"law {name}": found["laws"][name] for name in ("mine", "super_twisting", "hierarchical")}
+    told |= {"surface": found["surfaces"]["integral"], "estimator": found["estimators"]["levant"], "version": ""}
+    for name in ("duffing", "cart_pole", "furuta"):
+        plant = found["plants"][name]
+        for fact in {*plant} - {"mjcf", "laws", "gains", "fields", "skins", "start", "extent", "center", "conditions"}:
+            value = plant[fact]
+            if fact.endswith("ranges"):
+                value = {one: value[one] for one in ("mine", "integral", "levant") if one in value}
+            told[f"{name} {fact}"] = value
+        told |= {f"{name}, {row['name']}": row for row in plant["conditions"]}
+    return "\n".join(sorted(f"{name}: {json.dumps(value, ensure_ascii=False)}" for name, value in told.items()))
+
+
+def test_the_fields_of_a_model_follow_the_mass_as_in_a_run(vendor, tmp_path):
+    fields = facts(smc.live("inverted_pendulum", out=tmp_path / "page"))["plants"]["inverted_pendulum"]["fields"]
+    for at, mass in enumerate((1.0, 2.0)):
+        scenario = smc.Scenario(plant="inverted_pendulum", law="none", mismatch={"mass": mass})
+        model = models.with_values(models.compile_model(scenario), scenario)
+        for name, values in fields.items():
+            if not name.startswith("opt."):
+                assert np.ravel(getattr(model, name))[: len(values[at])] == pytest.approx(values[at], rel=1e-12), name
 
 
 def test_the_command_takes_a_file_of_laws_gains_and_a_name(vendor, tmp_path, capsys):
@@ -189,8 +220,60 @@ def test_an_npm_that_fails_is_quoted_and_leaves_no_cache(tmp_path, monkeypatch):
 
 
 def test_the_command_is_light_to_import():
-    import subprocess
-
     code = "import smc_mujoco.exchange.commands.live, sys; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert {"mujoco", "numba", "scipy", "smc_mujoco.draw"} & set(done.stdout.split()) == set()
+
+
+def test_what_npm_fetches_is_kept_with_its_licences_and_fetched_once(tmp_path, monkeypatch):
+    orders = []
+
+    def install(command, timeout, cwd):
+        orders.append((command, timeout, sorted(path.name for path in cwd.iterdir() if path.is_file())))
+        for name in (*npm.FILES, "three/LICENSE"):
+            file = cwd / "node_modules" / name
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(f"text of {name}")
+        return subprocess.CompletedProcess(command, 0)
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(npm.shutil, "which", lambda name: name)
+    monkeypatch.setattr(npm, "timed", install)
+    folder = npm.fetched()
+    assert npm.fetched() == folder == npm.cached()
+    assert (folder.parent, len(orders)) == (tmp_path / "smc_mujoco", 1)
+    ((command, timeout, files),) = orders
+    assert (command[:2], command[2:], timeout) == (["npm", "ci"], list(npm.FLAGS), 600.0)
+    assert files == ["package-lock.json", "package.json"]
+    texts = {file.name: file.read_text() for file in folder.iterdir()}
+    licences = texts.pop("licences.txt")
+    assert texts == {ours: f"text of {name}" for name, ours in npm.FILES.items()}
+    assert licences.startswith("mujoco.js, mujoco.wasm: MuJoCo, Copyright DeepMind Technologies Limited, Apache-2.0\n")
+    assert licences.endswith("\nthree.module.js, three.core.js: three.js, MIT\n\ntext of three/LICENSE")
+    assert [file.name for file in folder.parent.iterdir()] == [folder.name]
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        ("npm error code E1\nnpm error errno 5\nnpm error syscall open\nnpm error no net", "no net"),
+        ("a warning\nlast words\n", "last words"),
+        ("", "it says nothing"),
+    ],
+)
+def test_npm_s_error_is_told_in_its_words(said, why, tmp_path, monkeypatch):
+    monkeypatch.setattr(npm, "timed", lambda command, *_, **__: subprocess.CompletedProcess(command, 1, "", said))
+    with pytest.raises(smc.ScenarioError) as refused:
+        npm._install(["npm"], tmp_path)
+    assert str(refused.value) == (
+        f"npm could not fetch the live page's packages ({why}): check the network, then try again"
+    )
+
+
+def test_an_npm_that_does_not_end_is_told(tmp_path, monkeypatch):
+    def late(*_, **__):
+        raise npm.TimedOut
+
+    monkeypatch.setattr(npm, "timed", late)
+    with pytest.raises(smc.ScenarioError, match=r"^npm did not fetch .* within 10 minutes: try again later$"):
+        npm._install(["npm"], tmp_path)
