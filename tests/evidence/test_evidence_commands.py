@@ -137,6 +137,15 @@ STUBS = {  # of each command: the functions replaced, and what they give
         "simulation.run.run": ["a trace"],
     },
     "claims": {"evidence.audit.audit.audit": audited, "evidence.audit.mutants.survivors": lambda *_: {"3": "kept"}},
+    "papers": {
+        "evidence.audit.paper.new": [Path("mine/paper.toml"), Path("mine/claims.py")],
+        "evidence.audit.paper.papers": {"small": SimpleNamespace(authors="A. B", title="C", contents="3 claims")},
+        "evidence.audit.evidence.check": {"paper": {"authors": "A. B", "title": "C"}, "counts": {"supported": 2}},
+    },
+    "report": {
+        "evidence.report.report": lambda *_, **__: Path("report.html"),
+        "evidence.report.paper.report": lambda *_, **__: Path("report.html"),
+    },
     "identify": {
         "evidence.rigs.identify.identify": lambda of, many, *_, **__: identified(len(many)),
         "evidence.rigs.records.load": lambda file, names: f"columns of {file}",
@@ -162,6 +171,11 @@ LINES = (
     "claims --mutants --out all.json --evidence e.json --badge b.svg",
     "claims 4 --json --quick",
     "claims --json --mutants",
+    "papers",
+    "papers --new mine --check e.json",
+    "report --paper gaber --quick --threads 2",
+    "report --quick --out there --seeds 2 --law pid,lqr --records r --relevant 0.1",
+    "report --paper gaber --law pid",
     "identify emps a.csv b.csv c.csv --columns x=position --quantities mass,offset --set mass=5 --starts 2 --seed 3",
     "identify duffing a.csv --json found.json --figure fit",
     "identify emps a.csv --set mass=much",
@@ -177,6 +191,8 @@ def test_a_command_prints_and_hands_on_what_is_recorded(line, snapshot, tmp_path
     monkeypatch.setenv("COLUMNS", "100")
     monkeypatch.setattr("warnings.showwarning", None)
     notes, (command, *_) = Notes(), line.split()
+    if command == "report":
+        Path("report.html").write_bytes(bytes(260_000))
     monkeypatch.setattr("smc_mujoco.common.progress.bar", notes.bar)
     for name, gives in STUBS.get(command, {}).items():
         notes.stub(monkeypatch, name, gives)

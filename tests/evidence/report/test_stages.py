@@ -1,0 +1,271 @@
+"""How a report is put together: its plan, its progress, what it keeps, and small pieces of its stages."""
+
+import dataclasses
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.sketch import made
+
+import smc_mujoco as smc
+from smc_mujoco.control import gain_sets
+from smc_mujoco.evidence.report import about, films, oscillation, paper, precision, rigs, stages, words
+from smc_mujoco.evidence.report import report as make
+from smc_mujoco.evidence.report.plan import FULL, QUICK, Bars, Work
+from smc_mujoco.evidence.report.stages import Field
+from smc_mujoco.studies.accuracy import AccuracyTable
+
+
+def test_the_plans_of_the_full_and_the_quick_report_are_as_recorded(snapshot):
+    full, quick = (dataclasses.asdict(plan) for plan in (FULL, QUICK))
+    lines = [f"{name}: {value}" for name, value in full.items()]
+    lines += [f"quick {name}: {value}" for name, value in quick.items() if value != full[name]]
+    assert "\n".join(lines) == snapshot
+
+
+def work(tmp_path, plan=QUICK, shown=False):
+    return Work(plan=plan, folder=tmp_path, threads=3, bars=Bars(shown))
+
+
+def test_a_stage_shows_its_share_of_items_and_its_time(tmp_path, monkeypatch, capsys):
+    reached = []
+    monkeypatch.setattr(
+        "smc_mujoco.common.progress.Bar.reached", lambda self, done, whole: reached.append((done, whole))
+    )
+    monkeypatch.setattr("time.monotonic", iter([10.0, 13.4]).__next__)
+    bars = Bars(False)
+    its = dataclasses.replace(work(tmp_path), bars=bars)
+
+    def compute(item, report):
+        report(1, 4)
+        report(0, 0)
+        return item.upper()
+
+    assert its.each("maps", "plants", ["a", "b"], compute) == ["A", "B"]
+    assert reached == [(0.25, 2), (0.0, 2), (1, 2), (1.25, 2), (1.0, 2), (2, 2)]
+    assert bars.spent == {"maps": pytest.approx(3.4)}
+    assert capsys.readouterr().out == ""
+    monkeypatch.setattr("time.monotonic", iter([10.0, 13.4]).__next__)
+    shown = Bars(True)
+    with shown.stage("maps", "2 plants", bar=False):
+        pass
+    assert capsys.readouterr().out == "maps        2 plants              3 s\n"
+
+
+def noted(monkeypatch, path, gives=None):
+    """Replace a function by one that notes its arguments."""
+    calls = []
+
+    def stub(*given, **options):
+        calls.append((given, options))
+        return gives(*given, **options) if callable(gives) else gives
+
+    monkeypatch.setattr(f"smc_mujoco.{path}", stub)
+    return calls
+
+
+def test_a_report_is_of_its_plan_and_its_changes(tmp_path, monkeypatch):
+    found = noted(monkeypatch, "evidence.report.stages.find")
+    noted(monkeypatch, "evidence.report.page.page", "the page")
+    assert (
+        make(tmp_path, quick=True, seeds=2, threads=3, laws=["lqr", "classical"], relevant=0.1)
+        == tmp_path / "report.html"
+    )
+    ((plan, folder, threads, bars, records),) = [given for given, _ in found]
+    changes = {"seeds": 2, "relevant": 0.1, "laws": (*QUICK.laws, "lqr")}
+    assert plan == dataclasses.replace(QUICK, **changes)
+    assert (folder, threads, bars.shown, records) == (tmp_path, 3, False, None)
+    assert (tmp_path / "report.html").read_text() == "the page"
+    make(str(tmp_path), progress=True, records="there")
+    (plan, folder, threads, bars, records), _ = found[-1]
+    assert (plan, folder, threads, bars.shown, records) == (FULL, tmp_path, None, True, Path("there"))
+    make(tmp_path, plan=QUICK, quick=False)
+    assert found[-1][0][0] is QUICK
+    for wrong, said in (({"seeds": 0}, "seeds is 0"), ({"seeds": 10_001}, "10000")):
+        with pytest.raises(smc.ScenarioError, match=said):
+            make(tmp_path, **wrong)
+
+
+def names(folder):
+    """The files of a folder, without the hashes of what they depend on."""
+    return sorted(re.sub("(-[0-9a-f]{12})+", "", file.name) for file in folder.iterdir())
+
+
+class Listed(list):
+    """What a stage makes for one item, kept as JSON."""
+
+    def save(self, path):
+        path.write_text(json.dumps(self))
+
+
+# stage -> what it calls, what makes a result of that, its files, and what decides whether they are computed anew
+STAGES = {
+    "worst_cases": ("evidence.report.stages.cached_worst_case", lambda folder, *_: folder.name),
+    "all_margins": ("evidence.report.stages.margin_search.margins", lambda *_, **__: []),
+    "all_basins": ("evidence.report.stages.regions.basin", lambda *_, **__: Listed()),
+}
+SMALL = dataclasses.replace(
+    QUICK,
+    plants=("duffing", "van_der_pol"),
+    attacked=("duffing",),
+    basins=("duffing",),
+    laws=("pid", "lqr"),
+    basin_laws=("pid",),
+    compared=("delay",),
+)
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_stage_hands_on_its_plan_and_keeps_a_file_for_each_item(stage, tmp_path, monkeypatch, snapshot):
+    path, gives = STAGES[stage]
+    calls = noted(monkeypatch, path, gives)
+    if stage == "all_basins":
+        monkeypatch.setattr("smc_mujoco.analysis.region_of_attraction.Basin.save", Listed.save)
+        monkeypatch.setattr("smc_mujoco.analysis.region_of_attraction.load", lambda path: path)
+    getattr(stages, stage)(work(tmp_path, SMALL))
+    lines = []
+    for given, options in calls:
+        plain = [one.name if isinstance(one, Path) else one for one in given]
+        plain = [f"{one.law.name} on {one.plant.name}" if isinstance(one, smc.Scenario) else one for one in plain]
+        lines.append(f"{plain} { ({name: one for name, one in options.items() if name != 'report'}) }")
+    lines += names(tmp_path)
+    assert "\n".join(lines) == snapshot
+
+
+def test_accuracy_is_of_each_condition_with_the_plan_s_periods(tmp_path, monkeypatch):
+    calls = noted(monkeypatch, "evidence.report.precision.accuracy", lambda *_, **__: AccuracyTable())
+    assert precision.accuracies(work(tmp_path, SMALL)) == []
+    expected = [(SMALL.laws, "duffing", SMALL.periods, one, 1, "tuned") for one in ("constant", "coulomb")]
+    assert [given for given, _ in calls] == expected
+    assert all(options["threads"] == 3 for _, options in calls)
+    assert names(tmp_path) == [f"accuracy-duffing-{one}.json" for one in precision.CONDITIONS]
+    precision.accuracies(work(tmp_path, SMALL))
+    assert len(calls) == 2  # read from their files
+    precision.accuracies(work(tmp_path, dataclasses.replace(SMALL, accuracy_starts=2)))
+    assert len(calls) == 4
+
+
+def test_v_rises_where_its_rate_is_positive_off_the_surface():
+    x, v = np.array([0.0, 1.0]), np.array([-1.0, 0.0, 2.0])
+    rate, s = np.array([[1.0, -1.0], [0.0, 2.0], [3.0, 1e-9]]), np.array([[1.0, 1.0], [1.0, -1.0], [1e-6, 1.0]])
+    field = Field(plant="duffing", x=x, v=v, vdot=rate, s=s)
+    assert field.rises.tolist() == [[True, False], [False, True], [False, True]]
+    assert field.share == 0.5
+    assert stages.fields(dataclasses.replace(SMALL, laws=("pid",))) == ()
+    (own, _) = stages.fields(dataclasses.replace(SMALL, laws=("observer_free",)))
+    assert (own.plant, own.vdot.shape, own.x.shape, own.v.shape) == ("duffing", (121, 121), (121,), (121,))
+
+
+def test_a_curve_is_of_the_channel_that_starts_farthest_out():
+    trace = made(smc.Scenario(plant="pendulum_network", law="pid", duration=2.0, x0=(0.1, -0.4, 0.3, 0.2, 0.1)))
+    curve = films.curve(trace)
+    assert curve.law == "pid"
+    np.testing.assert_array_equal(curve.x[[0, -1]], trace.x[[0, -1], 1])
+    assert (curve.t[0], curve.t[-1]) == (0.0, 2.0)
+    assert len(curve.tb) == 0
+
+
+def test_a_film_and_its_picture_are_kept_beside_each_other(tmp_path):
+    films.save((b"film", b"picture"), tmp_path / "a.webm")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.jpg", "a.webm"]
+    assert films.load(tmp_path / "a.webm") == (b"film", b"picture")
+
+
+def test_limit_cycles_are_of_laws_behind_a_lag_and_a_law_without_prediction_is_left_out(tmp_path, monkeypatch):
+    cycle = type("Cycle", (), {"amplitude": 0.2, "frequency": 9.0, "third_harmonic": 0.04, "uncertainty": 0.1})
+
+    def predicted(scenario):
+        if scenario.law.name == "lqr":
+            raise smc.ScenarioError("no prediction")
+        return cycle
+
+    halved = [type("Change", (), {"marked": marked}) for marked in (True, False, False)]
+    runs = noted(monkeypatch, "evidence.report.oscillation.run", lambda cases, threads: [made(one) for one in cases])
+    changes = noted(monkeypatch, "evidence.report.oscillation.step_halving", halved)
+    monkeypatch.setattr(oscillation, "chattering", predicted)
+    monkeypatch.setattr(oscillation, "channel_cycle", lambda trace: (0.25, 8.0))
+    plan, reached = dataclasses.replace(SMALL, plants=("duffing",), laws=("pid", "lqr", "classical")), []
+    found = oscillation._on("duffing", plan.laws, 3, lambda done, whole: reached.append((done, whole)))
+    assert reached == [(0, 3), (1, 3), (2, 3)]
+    (cases, threads), _ = runs[0]
+    assert threads == 3
+    assert [(one.law.name, one.actuator, one.duration, one.condition) for one in cases] == [
+        (law, (smc.Lag(0.01),), 8.0, "nominal") for law in plan.laws
+    ]
+    assert changes[0][0][1:] == (0, 3)
+    one, two = found
+    assert (one.law, one.marked, two.law, two.marked) == ("pid", True, "classical", False)
+    assert dataclasses.astuple(one)[2:8] == (0.2, 9.0, 0.25, 8.0, 0.04, 0.1)
+    assert one.error == pytest.approx(-20.0)
+
+
+def test_a_report_says_what_a_condition_sets_and_where_gains_are_from(snapshot):
+    its = about.About(plan=SMALL, runs=1, failed=0, seeds=1, sources="", versions={}, spent={})
+    assert its.left_out == [one for one in FULL.conditions if one not in SMALL.conditions]
+    assert "\n".join(f"{name}: {text}" for name, text in its.conditions.items()) == snapshot
+    assert about._short(smc.Noise(position=0.01)) == "Noise(position=0.01)"
+    assert about._short("a   b\n c") == "a b c"
+    assert about._fields({}) == "nothing"
+    assert (
+        about._fields({"input_delay": 0.01, "friction": smc.Coulomb(0.3)})
+        == "input delay 0.01, friction Coulomb(level=0.3)"
+    )
+    assert about._source("duffing", "classical", "study") == "chosen by hand before any comparison"
+    its = gain_sets.tuned("duffing", "classical", "tuned")
+    said = f"shipped ({its.search}); the best of {len(its.sets)}; objective {its.objective:.4g} s²"
+    assert about._source("duffing", "classical", "tuned").partition("; at a bound: ")[0] == said
+
+
+def test_gains_of_an_audit_are_listed_once_with_their_plants():
+    def used(law, plant):
+        return type("Used", (), {"scenario": smc.Scenario(plant=plant, law=law)})
+
+    pid, classical = smc.law("pid", kp=3.0), smc.law("classical", k=2.0, c=1.5)
+    first = {"slow": {"a": used(pid, "duffing"), "b": used(classical, "duffing"), "c": used(classical, "van_der_pol")}}
+    done = type("Done", (), {"used": {"1": first, "2": {"slow": {"d": used(classical, "duffing")}, "other": {}}}})
+    found = paper.gains(done, "slow")
+    assert list(found) == [("classical", "k = 2.00, c = 1.50"), next(key for key in found if key[0] == "pid")]
+    assert found["classical", "k = 2.00, c = 1.50"] == ["Duffing", "Van der Pol"]
+    assert paper.gains(done, "other") == {}
+
+
+def test_records_of_a_folder_are_repeated_in_few_points(tmp_path, monkeypatch):
+    twin = type(
+        "Twin",
+        (),
+        {"name": "twin", "published": ("a",), "fit": lambda _, r: {"x": 90.0}, "idle": lambda _, r: {"x": 0.0}},
+    )()
+    t = np.arange(2401.0)
+    twin.set = lambda name: type("Set", (), {"fits": lambda _, many: [{"x": 50.0}]})()
+    twin.predictions = lambda many: [({"x": 2.0 * t}, {"x": t}, t)]
+    monkeypatch.setattr(rigs, "read", lambda folder: [(folder / "a.csv", twin, {})])
+    (shown,) = rigs.repeated(work(tmp_path), tmp_path)
+    assert shown.fits == {"the twin’s": {"x": 90.0}, "a": {"x": 50.0}, "do nothing": {"x": 0.0}}
+    assert (shown.name, len(shown.t), shown.t[1], shown.why) == ("a.csv", 801, 3.0, "")
+    np.testing.assert_array_equal(shown.twin["x"], 2.0 * shown.measured["x"])
+    assert rigs.repeated(work(tmp_path), None) == ()
+
+
+@pytest.mark.parametrize(
+    ("unit", "typeset"),
+    [("rad s^2", "rad·s²"), ("(rad)^2", "rad²"), ("N m/s", "N·m/s"), ("% of runs", "% of runs"), ("1", "1")],
+)
+def test_units_are_typeset_with_dots_and_powers(unit, typeset):
+    assert words.typeset(unit) == typeset
+
+
+def test_words_are_those_of_the_suite_and_unknown_names_are_words():
+    assert words.either(["rad", "1", "m", "", "rad"]) == "rad or m"
+    assert (words.unit("itae"), words.unit("itae", "duffing"), words.unit("mine")) == ("rad·s² or m·s²", "m·s²", "")
+    assert (words.metric("my_metric"), words.kind("my_kind"), words.condition("input_delay")) == (
+        "my metric", "my kind", "input delay",
+    )  # fmt: skip
+    assert (words.number(np.inf), words.number(np.nan), words.number(1234.6)) == ("never", "none", "1235")
+    assert words.interval(1.0, 0.9, 1.1) == "0.900 – 1.10"
+    assert words.interval(2.0, 1.9999, 2.0001) == words.interval(1.0, np.nan, 1.1) == ""
+    assert words.pretty("`steps` of eps != alphadot in van_der_pol under observer_free") == (
+        "steps of ε ≠ α′ in Van der Pol under observer-free"
+    )
+    assert words.escape('<b>"') == '&lt;b&gt;"'
