@@ -140,7 +140,10 @@ STUBS = {  # of each command: the functions replaced, and what they give
     "papers": {
         "evidence.audit.paper.new": [Path("mine/paper.toml"), Path("mine/claims.py")],
         "evidence.audit.paper.papers": {"small": SimpleNamespace(authors="A. B", title="C", contents="3 claims")},
-        "evidence.audit.evidence.check": {"paper": {"authors": "A. B", "title": "C"}, "counts": {"supported": 2}},
+        "evidence.audit.evidence.check": {
+            "paper": {"authors": "A. B and others", "title": "C" * 90},
+            "counts": {"supported": 2},
+        },
     },
     "report": {
         "evidence.report.report": lambda *_, **__: Path("report.html"),

@@ -1,6 +1,7 @@
 """The parts of identification on a record that a formula makes: y = a f(t) + b g(t) + x0 of each piece."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -35,22 +36,33 @@ class Curve(Replays):
         self.names, self.free, self.data, self.evaluations = ["a", "b"], np.arange(1), [None], 0
         self.low, self.high, self.first, self.tried = np.array([0.0, -50.0]), np.array([80.0, 50.0]), start, []
 
+        self.steps, self.corrections, self.closed, self.report = {}, None, False, lambda count: None
+        self.twin = SimpleNamespace(dynamics=None, columns=SimpleNamespace(state=(), x=("y",)))
+        self.replayed, self.lag = [], 0.0
+
     @property
     def start(self):
         return Point(np.array(self.first), np.zeros((3, 1)))
 
-    def predicted(self, points):
-        self.evaluations += len(points)
+    def rig(self, point):
+        plain = SimpleNamespace(realistic=self.lag > 0.0, control_period=1e-3, input_delay=0.0, friction=())
+        return SimpleNamespace(repeated=lambda part, rounded: plain)
+
+    def _part(self, k):
+        return None
+
+    def _replayed(self, rigs, points, fields):
+        """Return the formula, with an error of `lag` times the physics step."""
         self.tried += points
+        self.replayed.append(fields)
+        error = self.lag * fields.get("physics_step", 0.0)
         return [
-            [{"y": curves(T[part]) @ one.values + one.states[k]} for k, part in enumerate(self.parts)] for one in points
+            [{"y": curves(T[part]) @ one.values + one.states[k] + error * T[part]} for k, part in enumerate(self.parts)]
+            for one in points
         ]
 
     def at_rest(self, point):
         return Point(point.values, 0.0 * point.states)
-
-    def correct(self, point, halvings):
-        return False
 
 
 def block(k, rows):
@@ -188,6 +200,45 @@ def test_corrected_replays_have_steps_that_divide_the_period():
     late = smc.Scenario(plant="duffing", law="pid", input_delay=0.003, friction=smc.LuGre(0.3, 0.4, 0.01))
     assert replays._steps(late, 1)["integrator"] == "implicitfast"
     assert replays._steps(late, 1)["physics_step"] == late.resolved.physics_step / 2
+
+
+def test_replays_are_corrected_by_what_two_step_sizes_leave():
+    curve = Curve()
+    assert not curve.correct(curve.start, 1)  # an ideal machine's steps do not err
+    assert curve.short_steps == {}
+    exact, curve.lag = curve.predicted([curve.start]), 800.0
+    assert curve.correct(curve.start, 2)
+    assert [one["physics_step"] for one in curve.replayed[-3:]] == [2.5e-4, 1.25e-4, 6.25e-5]
+    (found,) = curve.predicted([curve.start])
+    for one, other in zip(found, exact[0], strict=True):
+        np.testing.assert_allclose(one["y"], other["y"], atol=1e-12)
+    assert curve.short_steps == {"integrator": "RK4", "physics_step": 6.25e-5}
+    slopes = curve.slopes(curve.start)
+    curve.replayed.clear()
+    sharp = curve.sharpened(slopes)
+    assert {one["physics_step"] for one in curve.replayed} == {6.25e-5}
+    assert sharp.residuals is slopes.residuals
+    assert curve.steps == {"integrator": "RK4", "physics_step": 2.5e-4}
+    again = curve.again(slopes, Point(TRUE, slopes.point.states))
+    assert again.by_values is slopes.by_values
+    assert again.cost < slopes.cost
+    for closed in ({"closed": True}, {"twin": SimpleNamespace(dynamics=None, columns=SimpleNamespace(state=("y",)))}):
+        other = Curve()
+        vars(other).update(closed, lag=800.0)
+        assert not other.correct(other.start, 1)
+
+
+def test_a_corrected_search_ends_when_a_halving_moves_nothing():
+    curve = Curve(noise=0.002)
+    reached = search.search(curve, 1, 0, 30)
+    ideal, moved = search.accurate(curve, reached)
+    assert ideal is reached
+    assert moved.tolist() == [0.0, 0.0]
+    curve.lag = 80.0
+    slopes, moved = search.accurate(curve, curve.slopes(reached.point))
+    assert (moved <= 0.5 * np.sqrt(np.diag(uncertainty.jackknife(slopes)))).all()
+    np.testing.assert_allclose(slopes.point.values, reached.point.values, atol=2e-4)
+    assert curve.replayed[-1]["physics_step"] == 2.5e-4  # residuals with the first step, corrected
 
 
 def test_residuals_are_shares_of_the_spread_up_to_the_worst():
