@@ -1,5 +1,6 @@
 """The claims about simulations give the verdict that their evidence asks for: stubbed runs, and a few real ones."""
 
+import itertools
 import json
 import math
 import re
@@ -19,7 +20,7 @@ from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.variants import reversed_gain, with_gains, zero_gain
 from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED, Check, verdict
 from smc_mujoco.evidence.papers.gaber import claims as measured
-from smc_mujoco.evidence.papers.gaber import lyapunov
+from smc_mujoco.evidence.papers.gaber import lyapunov, timing
 from smc_mujoco.evidence.papers.gaber.scenarios import LAWS
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.scenario import Scenario
@@ -596,3 +597,26 @@ def test_a_broken_law_loses_its_claims():
     ids = ["29", "35", "38", "45", "50", "57"]
     found = claims(only=ids, gains="study", substitute={OURS: reversed_gain})
     assert {one.id: one.verdict for one in found} == dict.fromkeys(ids, REFUTED)
+
+
+def test_the_time_of_a_law_is_the_least_of_its_rounds_on_states_that_vary(monkeypatch):
+    """A clock that ticks 3 s in the first round and 1 s from then on, and a law that is not called."""
+    ticks, seen = itertools.accumulate([0.0, *[3.0] * 3, *[1.0] * 999]), []
+    monkeypatch.setattr(timing.time, "perf_counter", lambda: next(ticks))
+    monkeypatch.setattr(timing, "_loop", lambda: lambda *given: seen.append([np.copy(one) for one in given[1:3]]))
+    laws = {name: smc.law(name) for name in (OURS, CLASSICAL)}
+    for quick, rounds in ((False, 60), (True, 20)):
+        assert timing.nanoseconds(laws, quick=quick) == {OURS: 5e4, CLASSICAL: 5e4}  # 1 s of 20,000 calls
+        assert len(seen) == 2 * rounds
+        seen.clear()
+    timing.nanoseconds(laws, quick=True)
+    sample, states = seen[0]
+    assert {name: sample[timing.AT[name]] for name in ("dt", "g", "limit", "model")} == {
+        "dt": 1e-3,
+        "g": 8.0,
+        "limit": 6.0,
+        "model": 0.0,
+    }
+    assert states.shape == (20_000, 2)
+    np.testing.assert_allclose(np.diff(states[:, 0]) / 1e-3, states[:-1, 1], atol=0.01)
+    assert states[:, 0].max() == pytest.approx(0.3, rel=1e-3)
