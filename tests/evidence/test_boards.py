@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers.words import words
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicHermiteSpline
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
@@ -368,6 +369,31 @@ def test_the_trajectory_obeys_the_equation_and_the_limits(robot):
         assert np.abs(error).max() < 2e-4
     assert np.abs(u).max() <= 6.0
     assert [*x[:1], *v[:1], *q[:1], *dq[:1], u[0], u[-1], v[-1], dq[-1]] == pytest.approx([0.0] * 8, abs=1e-8)
+
+
+@ROBOTS
+def test_the_law_is_a_feedback_along_the_cubics_of_the_trajectory_and_stays_at_its_end(robot):
+    template, rng = getattr(entries, f"{robot}_swing_up"), np.random.default_rng(2)
+    table = {key: np.array(values) for key, values in entries.read_json(entries.FOLDER / f"{robot}.json").items()}
+    nodes = float(table["step"]) * np.arange(len(table["u"]))
+    paths = [
+        CubicHermiteSpline(nodes, table[a], table[b]) for a, b in (("x", "v"), ("v", "a"), ("q", "dq"), ("dq", "ddq"))
+    ]
+    for t in (0.0, 0.0013, 1.2345, nodes[-2], nodes[-1] - 1e-4, nodes[-1] + 3.0):
+        now, h = min(t, nodes[-1]), 0.004
+        apart, turns = rng.uniform(-0.3, 0.3, 4), 2.0 * math.pi * np.array([1, 0, -2, 0])
+        x, v, q, dq = np.array([path(now) for path in paths]) + apart + turns
+        rows = [np.interp(t, nodes, table[key]) for key in ("s_x", "s_v", "s_q", "s_dq")]
+        y = SimpleNamespace(t=t, dt=h, x=x, v=v, q=q, dq=dq)
+        u, s = template.function(y, SimpleNamespace(k=0.7, phi=1.3), None)
+        assert s == pytest.approx(np.dot(rows, apart), abs=1e-9)
+        assert u == pytest.approx(np.interp(t + h / 2.0, nodes, table["u"]) - 0.7 * math.tanh(s / 1.3), abs=1e-9)
+
+
+@ROBOTS
+def test_a_published_score_of_robustness_is_the_mean_of_its_tests(robot):
+    for row in boards.ROBUSTNESS[robot]:
+        assert np.mean(row[1:-1]) / 100.0 == pytest.approx(row.score, abs=0.0011), row.name
 
 
 @ROBOTS

@@ -208,13 +208,11 @@ class Paper:
 
     def _bound(self, law: str, gains: Mapping[str, float]) -> Component:
         """Return a law with these gains, and its own for the rest."""
-        base = find("law", law, laws_known() | self.laws)
+        base, own = find("law", law, laws_known() | self.laws), {}
         if isinstance(base, Component):
-            base = base if base.template is None else base.template
-        if isinstance(base, Template):
-            made = base.bind(dict(gains))
-        else:
-            made = dataclasses.replace(base, gains={**base.gains, **gains})
+            base, own = base.template or base, base.gains
+        values = {**own, **gains}
+        made = base.bind(values) if isinstance(base, Template) else dataclasses.replace(base, gains=values)
         return made.sourced(STUDY) if gains else made
 
 

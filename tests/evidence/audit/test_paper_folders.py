@@ -122,6 +122,24 @@ def test_a_law_of_the_paper_has_the_gains_of_the_set_and_its_mutants(folder):
     assert other.numbers["own"]["size"]["value"] == 3.0
 
 
+def test_laws_plants_and_conditions_are_the_paper_s_the_suite_s_or_written_out(folder):
+    data = MINIMAL + '[plants]\nbent = { plant = "duffing", beta = 0.75 }\n[gains.paper]\nclassical = { k = 3.0 }\n'
+    code = OWN.format("soft") + "made = soft(k=5.0)\n" + SMALL
+    found = paper(folder("sets = ['paper', 'tuned', 'default']\n" + data, code))
+    gains = lambda *names: dict(found.law(*names).gains)  # noqa: E731
+    assert gains("duffing", "soft", "tuned") == gains("duffing", "soft", "paper") == {"k": 5.0}
+    assert gains("duffing", "fixed_time", "tuned") == gains("duffing", "fixed_time", "default")
+    assert gains("duffing", "classical", "tuned") != gains("duffing", "classical", "default")
+    with pytest.raises(
+        ScenarioError, match=r"the gains 'paper' of classical lack some.*write in .gains.paper. what.* c = "
+    ):
+        found.law("duffing", "classical", "paper")
+    assert (found.plant("bent").parameters["beta"], found.plant("duffing").name) == (0.75, "duffing")
+    assert found.condition("noise").name == "noise"
+    assert found.condition("far: x0=0.25").on(found.plant("bent"), 1.0)["x0"] == 0.25
+    assert found.contents == "1 of its sentences; full text read"
+
+
 def test_fields_are_the_paper_s_then_the_condition_s_the_claim_s_and_the_changes(folder):
     data = 'runs = "duration=1.0, seed=1, x0=0.1, u_max=1.0"\n' + MINIMAL + 'runs = "seed=3, u_max=3.0"\n'
     found = paper(folder(data + '[conditions]\nfar = "x0=0.2, u_max=2.0"'))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.control.component import Template
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.mutants import survivors
 from smc_mujoco.evidence.audit.paper import paper, shipped
@@ -16,6 +17,7 @@ from smc_mujoco.evidence.papers.aldana_lopez_2019.claims import BAND, classical_
 from smc_mujoco.evidence.papers.huber_2014.claims import implicit_twisting
 from smc_mujoco.evidence.papers.measures import LATE, exponent, late, late_step, settled
 from smc_mujoco.evidence.papers.perez_ventura_2017.claims import predicted
+from smc_mujoco.evidence.papers.seeber_2024.claims import flip, slopes
 from smc_mujoco.simulation.trace import Trace
 from tests.evidence.papers.test_quick_verdicts import runs_made_once
 
@@ -166,3 +168,35 @@ def test_the_observer_of_equation_60_solves_its_equation_and_predicts_a_period_a
             error = sign * root_scalar(left, bracket=(0.0, abs(b)), xtol=1e-15).root
         velocity += h * (k3 * sign + k4 * error) + h * u
         position = x - error + h * velocity
+
+
+# laws and disturbances of the papers' own
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_a_paper_s_own_laws_are_those_recorded(name, snapshot):
+    found = paper(name)
+    said = [found.contents]
+    for law, one in found.laws.items():
+        if isinstance(one, Template) and f"papers.{name}" in one.function.__module__:
+            gains = ", ".join(f"{gain} = {its.default:g}{' > 0' * its.positive}" for gain, its in one.gains.items())
+            said.append(f"{law}: {gains}; memory {one.memory}, relative degree {one.relative_degree}")
+    assert "\n".join(said) == snapshot
+
+
+def test_random_slopes_are_of_one_size_and_keep_within_the_bound():
+    d = slopes(0.125, 40.0, 3)
+    t, values = np.array(d.times), np.array(d.values)
+    assert (t[0], t[-1], values[0], len(t)) == (0.0, 40.0, 0.0, 321)
+    assert set(np.round(np.diff(values) / np.diff(t), 9)) == {-1.0, 1.0}
+    assert np.abs(values).max() == 1.0
+    assert slopes(0.125, 40.0, 3).values == d.values != slopes(0.125, 40.0, 4).values
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_triangle_has_mean_0_over_every_period_and_then_goes_on(sign):
+    d = flip(0.1, sign)
+    t, values = np.array(d.times), sign * np.array(d.values)
+    assert (len(t), t[-1]) == (42, pytest.approx(4.1))
+    np.testing.assert_allclose(np.diff(values) / 0.1, [*[-1.0, 1.0] * 20, 1.0])
+    np.testing.assert_allclose(values[1:-1] + values[:-2], 0.0, atol=1e-12)
