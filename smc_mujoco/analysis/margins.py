@@ -218,11 +218,7 @@ MARGIN_KINDS: dict[str, Kind] = {
         theory=_tolerated_force,
     ),
     "friction": Kind(
-        label="dry friction",
-        unit="{u}",
-        levels=_doubling_levels(MAX_FORCE),
-        put=with_friction,
-        theory=_tolerated_force,
+        label="dry friction", unit="{u}", levels=_doubling_levels(MAX_FORCE), put=with_friction, theory=_tolerated_force
     ),
     "mass": Kind(
         label="mass",

@@ -124,11 +124,7 @@ class Accuracy:
 
 
 def scaling(
-    parts: np.ndarray,
-    periods: Sequence[float],
-    theory: float | None,
-    floor: float,
-    reasons: Mapping[str, str],
+    parts: np.ndarray, periods: Sequence[float], theory: float | None, floor: float, reasons: Mapping[str, str]
 ) -> Scaling:
     """Return how errors depend on the control period.
 

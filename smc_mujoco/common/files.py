@@ -56,13 +56,13 @@ def ended(path: str | os.PathLike[str], ending: str) -> Path:
     return path
 
 
-def writable(path: str | os.PathLike[str]) -> None:
+def writable(*paths: str | os.PathLike[str] | None) -> None:
     """Raise ScenarioError for a file that cannot be written. Call it before a computation that takes minutes."""
-    path = Path(path)
-    if os.path.isdir(path):  # unlike Path.is_dir, False also for a name that is too long
-        raise ScenarioError(f"cannot write {path}: it is a folder, give the file in it a name")
-    with _writing(path), tempfile.TemporaryFile(dir=path.parent), contextlib.suppress(FileNotFoundError):
-        _part(path).lstat()  # raises for a name that is too long
+    for path in (Path(one) for one in paths if one is not None):
+        if os.path.isdir(path):  # unlike Path.is_dir, False also for a name that is too long
+            raise ScenarioError(f"cannot write {path}: it is a folder, give the file in it a name")
+        with _writing(path), tempfile.TemporaryFile(dir=path.parent), contextlib.suppress(FileNotFoundError):
+            _part(path).lstat()  # raises for a name that is too long
 
 
 @contextlib.contextmanager

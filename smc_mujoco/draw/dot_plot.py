@@ -70,22 +70,14 @@ def plot(
         axes = page.subplots(len(plants), len(names), squeeze=False, height_ratios=tall)
         room = 72 * width / len(names) - style.points(50)  # what the axis' numbers and the space beside it leave
         for i, plant in enumerate(plants):
-            labels = [_label(name, plant) for name in names]
-            if any(style.width(label, style.points(pages.TEXT_SIZE)) > room for label in labels):
-                labels = [label.replace(" (", "\n(").replace(" that", "\nthat") for label in labels]
-            for k, name in enumerate(names):
+            for k, (name, label) in enumerate(zip(names, _labels(names, plant, room), strict=True)):
                 _panel(axes[i, k], table, plant, name, conditions, laws, colours, marks)
-                axes[i, k].set_xlabel(labels[k])
+                axes[i, k].set_xlabel(label)
                 axes[i, k].tick_params(labelleft=k == 0)
             shipped = plants_catalogue().get(plant)
-            above = (
-                None
-                if width >= pages.NARROW
-                else 1.0 + style.points(1.7 * pages.TEXT_SIZE / 72) / style.points(tall[i])
-            )
-            axes[i, 0].set_title(
-                style.plant_name(shipped) if shipped else plant, y=above, parse_math=False
-            )  # over "never"
+            over_never = 1.0 + style.points(1.7 * pages.TEXT_SIZE / 72) / style.points(tall[i])
+            above = None if width >= pages.NARROW else over_never
+            axes[i, 0].set_title(style.plant_name(shipped) if shipped else plant, y=above, parse_math=False)
         pages.set_head(page, width, title or "Medians by condition", key, shared)
         pages.write(page, paths)
     return page
@@ -153,6 +145,14 @@ def _dot(ax: Axes, one: Interval, line: int, look: dict) -> None:
         ax.plot(one.low, line)  # nothing is seen: the axis comprises the interval
         look = {"arrowstyle": "-", "color": look["color"], "lw": style.points(1.5), "ls": ":"}
         ax.annotate("", (1.0, line), (one.low, line), ("axes fraction", "data"), "data", arrowprops=look)
+
+
+def _labels(metrics: Sequence[str], plant: str, room: float) -> list[str]:
+    """Return the labels of a row of panels, all in two lines if one is wider than `room`, in points."""
+    labels = [_label(metric, plant) for metric in metrics]
+    if any(style.width(label, style.points(pages.TEXT_SIZE)) > room for label in labels):
+        return [label.replace(" (", "\n(").replace(" that", "\nthat") for label in labels]
+    return labels
 
 
 def _label(metric: str, plant: str) -> str:

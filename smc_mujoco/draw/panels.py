@@ -300,12 +300,7 @@ def until(trace: Trace, time: float) -> Trace:
 
 
 def over_time(
-    ax: Axes,
-    panel: Panel,
-    colours: Sequence[str],
-    label: bool = True,
-    among: Sequence[Trace] = (),
-    bands: bool = True,
+    ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True, among: Sequence[Trace] = (), bands: bool = True
 ) -> list[Artist]:
     """Draw the panel with the first trace on top, set its vertical range, and return the artists of the traces.
 

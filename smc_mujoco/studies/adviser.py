@@ -30,7 +30,7 @@ runs in the screening and with the default budget of `worst_case`, over all cond
 if the worst found for it is less by more than the least relevant difference. There is no test, as that is no sample."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -108,14 +108,11 @@ def which(
       laws: the laws to compare, by name or with your own gains. Default: all that suit.
       seeds: of the finals, the number of runs of a law in a condition. Default: 24.
       duration: of a run, s. Default: 5, or 3 if quick; 8 under an adversary.
-      starts: where runs begin, see `starts`.
       out: folder for gains and runs, which another call reads.
       quick: fewer seeds and finalists, shorter runs, a third of the evaluations of a tuning.
-      threads: simulations at once; None for one per available core.
-      progress: whether to show progress bars.
       defaults: whether a law may be advised over rivals whose gains are their defaults.
-      relevant: the least relevant difference, as a share of the larger value, see `leaderboard`.
-      noise_key: as in `compare`.
+      starts, relevant, noise_key: as in `compare`.
+      threads, progress: as in `run`.
       within: the class for the need "robust". Default: that of `worst_case`.
 
     Raises:
@@ -126,19 +123,11 @@ def which(
     compared, properties = _needs(needs, machine)
     length = extent.duration if duration is None else number("duration", duration, above=0.0)
     attacked_for = DURATION if duration is None else length
-    tested = [find_condition(one) for one in _conditions(conditions, machine, length)]
-    if NO_VELOCITY in properties:
-        tested = [_without_velocity(one) for one in tested]
-    tried = [case(machine, "none", one, length, starts=starts) for one in tested]
-    for scenario in tried:  # refuses what cannot be compared before gains are searched
-        check_moving([scenario])
+    tested = _tested(conditions, machine, length, starts, NO_VELOCITY in properties)
     folder, relevant, properties = Path(out), checked_share(relevant), [n for n in properties if n != NO_VELOCITY]
     options: dict[str, Any] = {"threads": threads, "progress": progress}
     chosen = _suited(machine, properties, laws)
-    with_gains = fair_gains(machine, chosen, folder / "gains", extent.budget, starts, **options)
-    candidates = {candidate.law.name: candidate for candidate in with_gains}
-    if len(candidates) < len(with_gains):
-        raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")
+    candidates = _by_name(fair_gains(machine, chosen, folder / "gains", extent.budget, starts, **options))
 
     def contest(names: Sequence[str], numbers: range, part: str, budget: int | None = None) -> Contest:
         contestants = [candidates[name] for name in names]
@@ -147,30 +136,25 @@ def which(
         (group,) = paired_runs.groups(table, by=("plant",))
         worst = {}
         if ROBUST in compared:
-            best = [each.law for each in contestants]
-            cases = [[case(machine, law, on, attacked_for, starts=starts) for on in tested] for law in best]
+            cases = [[case(machine, c.law, on, attacked_for, starts=starts) for on in tested] for c in contestants]
             worst = _worst(cases, within, budget, 3 if quick else 1, folder / "worst" / part, **options)
         return _contest(Runs(table, group, worst), machine, compared, relevant)
 
-    names, others = list(candidates), []
-    if len(names) > extent.finalists:
-        screening = contest(names, range(extent.screening), "screening", SCREENING_BUDGET)
-        first = {rank.law for rank in screening.order[: extent.finalists]} | set(screening.specialists)
-        others = [rank.law for rank in screening.order if rank.law not in first]
-        names = [name for name in names if name in first]
-    finals = contest(names, range(extent.screening, extent.screening + seeds), "finals")
-    efforts = {scenario.efforts[0] for scenario in tried}
+    others, finals = _screened(contest, list(candidates), extent, seeds)
+    efforts = {case(machine, "none", one, length, starts=starts).efforts[0] for one in tested}
     return Advice(
         plant=machine,
         conditions=tuple(one.name for one in tested),
         needs=compared,
         wanted=tuple(PROPERTIES[name].words for name in properties),
         choices=_choices(finals, candidates),
-        others=tuple(others),
+        others=others,
         comparison=finals.comparison,
         table=finals.runs.table,
         effort=efforts.pop() if len(efforts) == 1 else "",
-        untuned=() if defaults else tuple(one.law.name for one in with_gains if one.law.source.kind == source.DEFAULT),
+        untuned=()
+        if defaults
+        else tuple(name for name, c in candidates.items() if c.law.source.kind == source.DEFAULT),
     )
 
 
@@ -198,9 +182,19 @@ def _needs(needs: str | Sequence[str], plant: Plant) -> tuple[tuple[str, ...], t
     return tuple(compared), tuple(name for name in names if name in PROPERTIES)
 
 
-def _conditions(conditions: Any, plant: Plant, duration: float) -> Sequence[str | Condition]:
-    """Return the given conditions, or the default ones that have numbers for the plant."""
-    return applicable(DEFAULT_CONDITIONS, [plant], duration) if conditions is None else listed("conditions", conditions)
+def _tested(
+    conditions: Any, plant: Plant, duration: float, starts: Starts | None, without_velocity: bool
+) -> list[Condition]:
+    """Return the given conditions, or the default ones that have numbers for the plant; refuse a plant at rest."""
+    named = (
+        applicable(DEFAULT_CONDITIONS, [plant], duration) if conditions is None else listed("conditions", conditions)
+    )
+    tested = [find_condition(one) for one in named]
+    if without_velocity:
+        tested = [_without_velocity(one) for one in tested]
+    for scenario in [case(plant, "none", one, duration, starts=starts) for one in tested]:
+        check_moving([scenario])
+    return tested
 
 
 def _without_velocity(condition: Condition) -> Condition:
@@ -238,7 +232,28 @@ def _has(law: Component | Template, properties: Sequence[str]) -> bool:
     return template is None or all(PROPERTIES[name].holds(template) for name in properties)
 
 
+def _by_name(candidates: Sequence[Candidate]) -> dict[str, Candidate]:
+    """Return name of the law -> candidate; raise ScenarioError if two laws have one name."""
+    by_name = {candidate.law.name: candidate for candidate in candidates}
+    if len(by_name) < len(candidates):
+        raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")
+    return by_name
+
+
 # the comparison
+
+
+def _screened(
+    contest: "Callable[..., Contest]", names: Sequence[str], extent: Extent, seeds: int
+) -> tuple[tuple[str, ...], "Contest"]:
+    """Return the laws that a screening leaves out, in its order, and the finals of the others."""
+    others = []
+    if len(names) > extent.finalists:
+        screening = contest(names, range(extent.screening), "screening", SCREENING_BUDGET)
+        first = {rank.law for rank in screening.order[: extent.finalists]} | set(screening.specialists)
+        others = [rank.law for rank in screening.order if rank.law not in first]
+        names = [name for name in names if name in first]
+    return tuple(others), contest(names, range(extent.screening, extent.screening + seeds), "finals")
 
 
 def _worst(

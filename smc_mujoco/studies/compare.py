@@ -241,19 +241,18 @@ def compare(
         `worst_case`.
       executor: where runs are computed, as in `study`; None for this machine.
       out: folder for gains and runs.
-      metrics: names of metrics, for which lower is better, or "settles".
+      metrics, defaults, relevant: as in `leaderboard`.
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
       budget: largest number of sets of gains that a tuning tries. Default: that of `tune`, or a third of it if quick
         and no law has gains of the package.
       quick: shorter runs and searches; by default three plants and three conditions.
-      defaults: whether a winner may be named over laws whose gains are their defaults.
-      relevant: the least relevant difference, as a share of the larger value.
       fresh: whether to remove the runs that are in the folder first.
       noise_key: as in `study`: drawn after the laws are fixed, so that none can know its noise. One run of each of
         your laws on each plant in each condition is replayed, too.
-      traces, threads, progress: as in `study`.
+      traces: as in `study`.
+      threads, progress: as in `run`.
 
     Raises:
       ScenarioError: an unknown name, or arguments that `grid`, `study` or `leaderboard` refuse.

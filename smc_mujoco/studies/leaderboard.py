@@ -21,7 +21,7 @@ import numpy as np
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import RESAMPLES, Interval, median_of, share_interval
-from smc_mujoco.analysis.paired_runs import SETTLES, Columns, Group
+from smc_mujoco.analysis.paired_runs import SETTLES, Columns, Group, Scores
 from smc_mujoco.analysis.ranking import Comparison, Limits, compare, corrected_limits, ranks, samples_of
 from smc_mujoco.analysis.relevant_difference import RELEVANT
 from smc_mujoco.analysis.step_halving import depends_on_step
@@ -87,44 +87,68 @@ def leaderboard(
         for metric, unit in units.items():
             limits, family = families[metric]
             scores = group.scores(by_row[metric])
-            if not (there := scores.blocks):
+            if not scores.blocks:
                 continue
-            floors = [paired_runs.floor(ran[k], unit) for k in there]
-            if all((scenario := ran[k]) is not None and scenario.voltage_motor for k in there):
-                unit = unit.replace("({u})", "V").replace("{u}", "V")  # noqa: PLW2901
-            comparison = compare(
-                scores.values, floors, metric == SETTLES, level, scores.outcomes, scores.sets, relevant, limits
+            comparison = _compared(scores, ran, metric, unit, level, relevant, limits)
+            boards.append(
+                _board(group, scores, ran, metric, unit, comparison, untuned, sources, family, resamples, seed)
             )
-            on = [_unit(metric, unit, ran[k]) for k in there]
-            blocks = tuple(_block(group, comparison, at, k, untuned, on[at]) for at, k in enumerate(there))
-            mixed = "{" in unit and len({block.plant for block in blocks}) > 1
-            board = Board(
-                group=group.name,
-                metric=metric,
-                unit=unit,
-                entries=_entries(comparison, scores.sets, sources, mixed, resamples, seed),
-                blocks=blocks,
-                cells=sum(block.runs for block in blocks),
-                seeds=max(block.seeds for block in blocks),
-                family=family,
-                limits=comparison.limits,
-                level=comparison.level,
-                relevant=comparison.relevant,
-                resolution=max(floors),
-                by_step=metric.startswith("chattering") and any(map(depends_on_step, filter(None, ran))),
-            )
-            boards.append(board)
     return boards
 
 
-def _family(
-    table: Columns,
-    blocks: Sequence[Group],
-    by_row: np.ndarray,
+def _compared(
+    scores: Scores,
+    ran: "Sequence[Scenario | None]",
     metric: str,
     unit: str,
     level: float,
     relevant: float,
+    limits: Limits,
+) -> Comparison:
+    """Compare the scores of laws in a metric whose unit is `unit`; `ran` has a scenario of each block of the group."""
+    floors = [paired_runs.floor(ran[k], unit) for k in scores.blocks]
+    return compare(scores.values, floors, metric == SETTLES, level, scores.outcomes, scores.sets, relevant, limits)
+
+
+def _board(
+    group: Group,
+    scores: Scores,
+    ran: "Sequence[Scenario | None]",
+    metric: str,
+    unit: str,
+    comparison: Comparison,
+    untuned: tuple[str, ...],
+    sources: Mapping[str, tuple[Source, ...]],
+    family: int,
+    resamples: int,
+    seed: int,
+) -> Board:
+    """Return the board of a comparison, whose limits are corrected for `family` comparisons."""
+    if all((scenario := ran[k]) is not None and scenario.voltage_motor for k in scores.blocks):
+        unit = unit.replace("({u})", "V").replace("{u}", "V")
+    blocks = tuple(
+        _block(group, comparison, at, k, untuned, _unit(metric, unit, ran[k])) for at, k in enumerate(scores.blocks)
+    )
+    mixed = "{" in unit and len({block.plant for block in blocks}) > 1
+    return Board(
+        group=group.name,
+        metric=metric,
+        unit=unit,
+        entries=_entries(comparison, scores.sets, sources, mixed, resamples, seed),
+        blocks=blocks,
+        cells=sum(block.runs for block in blocks),
+        seeds=max(block.seeds for block in blocks),
+        family=family,
+        limits=comparison.limits,
+        level=comparison.level,
+        relevant=comparison.relevant,
+        resolution=float(comparison.floors.max()),
+        by_step=metric.startswith("chattering") and any(map(depends_on_step, filter(None, ran))),
+    )
+
+
+def _family(
+    table: Columns, blocks: Sequence[Group], by_row: np.ndarray, metric: str, unit: str, level: float, relevant: float
 ) -> tuple[Limits, int]:
     """Return the limits of the p-values of a metric, corrected for all blocks of a table, and the number of these."""
     comparisons = []
@@ -134,19 +158,8 @@ def _family(
         except ScenarioError:  # laws that share no run: there is nothing to compare
             continue
         if scores.values:
-            floors = [paired_runs.floor(paired_runs.scenarios(table, group)[k], unit) for k in scores.blocks]
-            comparisons.append(
-                compare(
-                    scores.values,
-                    floors,
-                    metric == SETTLES,
-                    level,
-                    scores.outcomes,
-                    scores.sets,
-                    relevant,
-                    Limits(0.0, 0.0),
-                )
-            )
+            ran = paired_runs.scenarios(table, group)
+            comparisons.append(_compared(scores, ran, metric, unit, level, relevant, Limits(0.0, 0.0)))
     return corrected_limits(comparisons, level), sum(len(one.laws) > 1 for one in comparisons) or 1
 
 

@@ -13,6 +13,7 @@ import dataclasses
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError, find, printable, shown
@@ -100,29 +101,10 @@ def study(
     plants: run_key.Hashes = {}
     by_key = _by_key(scenarios, plants, lambda given: noise.keyed(given, noise_key, Path(out), resume))
     store.open(resume)
-    names = {id(scenario): name for name, scenario in by_key.items()}
-    missing = [scenario for name, scenario in by_key.items() if name not in store.where]
+    missing = {name: scenario for name, scenario in by_key.items() if name not in store.where}
     if progress and (done := len(by_key) - len(missing)):
         print(f"{done} of {len(by_key)} runs are in {printable(str(store.parts))}", file=sys.stderr)
-    with counter(len(missing), sum(s.work for s in missing), progress) as counts:
-
-        def finish(batch: Batch, results: Sequence[ResultColumns]) -> None:
-            rows = []
-            for scenario, result in zip((prepared.scenario for prepared in batch), results, strict=True):
-                known = {"hash": names[id(scenario)]}  # from before the run, because a law may change its globals
-                rows.append(run_key.row(scenario, plants) | known | result)
-            store.add(rows)
-
-        def finish_here(batch: Batch, finished: Sequence[Trace]) -> None:
-            for trace in finished if traces == "all" else ():
-                trace.save(saved_traces.path(folder, run_key.row(trace.scenario, plants)))
-            finish(batch, [executors.result_columns(trace) for trace in finished])
-
-        if where == "local":
-            executors.compute_here(executors.batches(missing, threads), threads, finish_here, counts.stepped)
-        else:
-            with executors.opened(where) as pool:
-                executors.compute_elsewhere(executors.batches(missing, 1), pool, finish, counts.stepped)
+    _compute(missing, store, plants, where, threads, progress, folder if traces == "all" else None)
     changes = {name: run_key.source(scenario) for name, scenario in by_key.items()}
     if replay:
         for name, columns in study_replays.replayed(by_key, store, Path(out), threads, progress).items():
@@ -133,10 +115,39 @@ def study(
     return table
 
 
-def _by_key(
-    scenarios: Iterable[Scenario],
+def _compute(
+    missing: Mapping[str, Scenario],
+    store: Store,
     plants: run_key.Hashes,
-    keyed: Callable[[Iterable[Scenario]], Iterable[Scenario]],
+    where: str | Executor,
+    threads: int,
+    progress: bool,
+    traces: Path | None,
+) -> None:
+    """Compute runs, given by key, store their rows as they finish, and save the traces of local ones in a folder."""
+    keys = {id(scenario): key for key, scenario in missing.items()}  # from before a run: a law may change its globals
+
+    def finish(batch: Batch, results: Sequence[ResultColumns]) -> None:
+        scenarios = [prepared.scenario for prepared in batch]
+        known = [run_key.row(scenario, plants) | {"hash": keys[id(scenario)]} for scenario in scenarios]
+        store.add([row | result for row, result in zip(known, results, strict=True)])
+
+    def finish_here(batch: Batch, finished: Sequence[Trace]) -> None:
+        if traces:
+            for trace in finished:
+                trace.save(saved_traces.path(traces, run_key.row(trace.scenario, plants)))
+        finish(batch, [executors.result_columns(trace) for trace in finished])
+
+    with counter(len(missing), sum(s.work for s in missing.values()), progress) as counts:
+        if where == "local":
+            executors.compute_here(executors.batches(missing.values(), threads), threads, finish_here, counts.stepped)
+        else:
+            with executors.opened(where) as pool:
+                executors.compute_elsewhere(executors.batches(missing.values(), 1), pool, finish, counts.stepped)
+
+
+def _by_key(
+    scenarios: Iterable[Scenario], plants: run_key.Hashes, keyed: Callable[[Iterable[Scenario]], Iterable[Scenario]]
 ) -> dict[str, Scenario]:
     """Return key -> scenario, in order and each once, after `keyed` has set their noise keys."""
     by_key: dict[str, Scenario] = {}

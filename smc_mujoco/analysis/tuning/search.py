@@ -114,10 +114,7 @@ def tune(
       seed: seed of the search, and of initial states and noise, which are the same for all candidates; below 10^9.
       objective: an Objective, "balanced", or "tracking", without a cost of the variation of u.
       threads, progress: as in `run`.
-      conditions: names or your own conditions, in place of the objective's.
-      starts: initial states, see `smc.starts`, in place of the objective's.
-      chattering: largest predicted amplitude of the limit cycle of s of the first channel, in its unit, in the first
-        condition.
+      conditions, starts, chattering: in place of the objective's, see `Objective`.
 
     Raises:
       ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales, an argument out of
@@ -149,26 +146,39 @@ def tune(
         ledger = _Ledger(goal, cases, tuple(box), bound, budget, threads, progress_bar.advance)
         searched = search_space.widened(law, box)
         ends = _search(ledger, box, searched, seed)
-    best = min(ledger.evaluations, key=lambda e: e.objective)
-    tuned = Tuned(
-        law=_with_gains(law, tuple(box), best.gains),
+    tuned = _result(ledger, ends, before, seed, scales, box, searched)
+    _warn_of_result(tuned, chatters=bool(ledger.excess(tuple(tuned.gains.values()))))
+    return tuned.sourced()
+
+
+def _result(
+    ledger: "_Ledger",
+    ends: tuple[float, ...],
+    before: float,
+    seed: int,
+    scales: dict[str, float],
+    box: Box,
+    searched: Box,
+) -> Tuned:
+    """Return the result of a search whose evaluations are in the ledger."""
+    best, case = min(ledger.evaluations, key=lambda e: e.objective), ledger.cases[0]
+    return Tuned(
+        law=_with_gains(case.law, ledger.names, best.gains),
         objective=best.objective,
         history=tuple(ledger.evaluations),
         screened=ledger.screened,
         ends=ends,
         before=before,
-        plant=plant,
-        definition=goal,
+        plant=case.plant,
+        definition=ledger.goal,
         rule=RULE,
-        budget=budget,
+        budget=ledger.budget,
         seed=seed,
         scales=scales,
         bounds=box,
         searched=searched,
         versions=versions(),
     )
-    _warn_of_result(tuned, chatters=bool(ledger.excess(best.gains)))
-    return tuned.sourced()
 
 
 def _warn_of_result(tuned: Tuned, chatters: bool) -> None:

@@ -1,6 +1,7 @@
 """smc-mujoco tune, margins, worst, accuracy, basin, chatter: one question about laws on a plant, by many runs."""
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +13,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import held_back
 
 if TYPE_CHECKING:
+    from smc_mujoco.analysis.gains_for import Design
     from smc_mujoco.control.law import Law
     from smc_mujoco.simulation.scenario import Scenario
 
@@ -58,9 +60,7 @@ def tune(
         from smc_mujoco.analysis.tuning import search
         from smc_mujoco.common.files import ended, writable
 
-    for file in (out, front):
-        if file:
-            writable(file)
+    writable(out, front)
     path, terminal = out and ended(out, ".json"), Terminal()
     tuned = search.tune(
         options.plant(plant),
@@ -205,18 +205,9 @@ def worst(
         from smc_mujoco.studies.worst_case import WorstCases, worst_case
 
     json, terminal = options.json_file(json, *files(out))
-    pairs = [text.partition("=") for text in parameter or ()]
     ranges = {"delay": delay, "mass": mass, "friction": friction, "friction_scale": friction_scale}
-    bounds = {
-        "disturbance": disturbance,
-        "slope": slope,
-        "position_noise": position_noise,
-        "velocity_noise": velocity_noise,
-        "jitter": jitter,
-        "x0": spread,
-        "parameters": {name: options.low_and_high(f"--parameter {name}", text) for name, _, text in pairs},
-        **{name: options.low_and_high(f"--{name}", text) for name, text in ranges.items() if text},
-    }
+    noise = {"position_noise": position_noise, "velocity_noise": velocity_noise, "jitter": jitter}
+    bounds = {"disturbance": disturbance, "slope": slope, "x0": spread} | noise | _ranges(ranges, parameter or ())
     set_bounds: dict[str, Any] = {name: bound for name, bound in bounds.items() if bound}
     within = Uncertainty(hold=hold, **set_bounds) if set_bounds else None
     chosen, cases = _attacked_cases(plant, law, condition, duration, gains)
@@ -228,6 +219,15 @@ def worst(
     if out:
         results.figure(out)
         terminal.wrote(*files(out))
+
+
+def _ranges(ranges: Mapping[str, str | None], parameters: Sequence[str]) -> dict[str, Any]:
+    """Return the fields of an Uncertainty from texts such as "0.7:1.3", and from those of --parameter."""
+    pairs = [text.partition("=") for text in parameters]
+    return {
+        "parameters": {name: options.low_and_high(f"--parameter {name}", text) for name, _, text in pairs},
+        **{name: options.low_and_high(f"--{name}", text) for name, text in ranges.items() if text},
+    }
 
 
 def _attacked_cases(
@@ -297,11 +297,7 @@ def accuracy(
     json, terminal = options.json_file(json, *pictures)
     machines = [options.plant(text) for text in options.names(plants)]
     chosen = known(machines[0]) if law == ["all"] else options.laws(law, gain_sets.LAWS)
-    try:
-        h = [float(text) for text in options.names(periods)]
-    except ValueError:
-        raise ScenarioError(f"--periods {periods!r} cannot be read: give numbers in s, as 0.004,0.002,0.001") from None
-    start = options.starts(x0, spread)
+    h, start = _periods(periods), options.starts(x0, spread)
     with bar("accuracy") as progress:
         table = measure(chosen, machines, h, condition, seeds, gains, duration, start, threads, progress.reached)
     terminal.print(table)
@@ -311,6 +307,14 @@ def accuracy(
     if pictures:
         table.plot(out)
         terminal.wrote(*pictures)
+
+
+def _periods(text: str) -> list[float]:
+    """Return the control periods in the option --periods, s; raise ScenarioError if they cannot be read."""
+    try:
+        return [float(period) for period in options.names(text)]
+    except ValueError:
+        raise ScenarioError(f"--periods {text!r} cannot be read: give numbers in s, as 0.004,0.002,0.001") from None
 
 
 @errors_as_sentences()
@@ -414,7 +418,6 @@ def chatter(
     """
     with held_back():
         from smc_mujoco.analysis.chattering import chattering, save, shared_assumptions
-        from smc_mujoco.analysis.gains_for import design
         from smc_mujoco.analysis.step_halving import step_halving
         from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
@@ -431,14 +434,7 @@ def chatter(
     cases = [case(options.plant(plant), law, condition, duration, gains, changes=fields) for law in chosen]
     designs = []
     if amplitude is not None or frequency is not None:
-        for one in cases:
-            try:
-                designs.append((one, design(one, amplitude, frequency, channel)))
-            except ScenarioError as error:
-                terminal.note(f"{one.law.name} is left out: {error}", "yellow", wrap=True)
-        if not designs:
-            raise ScenarioError("no law has such gains: give a larger --amplitude or --frequency")
-        cases = [dataclasses.replace(one, law=designed.law) for one, designed in designs]
+        cases, designs = _designed(cases, amplitude, frequency, channel, terminal)
     with bar("chattering") as progress:
         cycles = []
         for done, scenario in enumerate(cases):
@@ -448,7 +444,7 @@ def chatter(
         measured, changes = [channel_cycle(trace, channel) for trace in traces], step_halving(traces, channel, threads)
     terminal.print(tables.chattering(cases, channel, cycles, measured, changes))
     if designs:
-        terminal.print(tables.designs([designed for _, designed in designs], cases[0].efforts[channel]))
+        terminal.print(tables.designs(designs, cases[0].efforts[channel]))
     terminal.note("assumed: " + "; ".join(shared_assumptions(cycles)), wrap=True)
     terminal.note(f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim", wrap=True)
     if json:
@@ -458,3 +454,20 @@ def chatter(
 
         nyquist(cases, out, channel, cycles, traces, changes=changes)
         terminal.wrote(*pictures)
+
+
+def _designed(
+    cases: "Sequence[Scenario]", amplitude: float | None, frequency: float | None, channel: int, terminal: Terminal
+) -> "tuple[list[Scenario], list[Design]]":
+    """Return the cases whose laws have gains for the bounds, with these gains, and the gains; name the other laws."""
+    from smc_mujoco.analysis.gains_for import design
+
+    designs = []
+    for one in cases:
+        try:
+            designs.append((one, design(one, amplitude, frequency, channel)))
+        except ScenarioError as error:
+            terminal.note(f"{one.law.name} is left out: {error}", "yellow", wrap=True)
+    if not designs:
+        raise ScenarioError("no law has such gains: give a larger --amplitude or --frequency")
+    return [dataclasses.replace(one, law=made.law) for one, made in designs], [made for _, made in designs]

@@ -82,6 +82,9 @@ Condition = Annotated[
 Defaults = Annotated[
     bool, typer.Option("--defaults", help="Name a winner also over laws whose gains are their defaults.")
 ]
+GainValues = Annotated[
+    str, typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's defaults.")
+]
 Gains = Annotated[str, typer.Option(help="Set of gains: tuned, study, tracking or default.")]
 Joints = Annotated[
     int | None, typer.Option(help="Number of joints of a law of many joints; default that of the values of a gain.")
@@ -181,8 +184,7 @@ def json_file(json: Path | None, *others: Path | None) -> "tuple[Path | None, Te
 
     terminal = Terminal(prints="result.json" * (str(json) == "-"))
     path = terminal.printed or (json and ended(json, ".json"))
-    for file in filter(None, (*others, path)):
-        writable(file)
+    writable(*others, path)
     return path, terminal
 
 

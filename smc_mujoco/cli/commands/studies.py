@@ -154,17 +154,15 @@ def compare(
 
     terminal, pictures = Terminal(), files(figure)
     relevant = RELEVANT if relevant is None else relevant
-    for file in (*pictures, *([latex] if latex else [])):
-        writable(file)
+    writable(*pictures, latex)
+    start, key = options.starts(x0, spread), options.noise_key_of(noise_key)
     if rig is not None:
         if plants or condition or gains != "tuned" or worst or figure or latex:
             raise ScenarioError(
                 "--rig brings its own plant, parameter sets and gains: leave out the plants, --condition, --gains, "
                 "--worst, --figure and --latex"
             )
-        begin = options.starts(x0, spread)
-        key = options.noise_key_of(noise_key)
-        _compare_on_rig(rig, law, seeds, duration, begin, out, fresh, executor, threads, defaults, relevant, key)
+        _compare_on_rig(rig, law, seeds, duration, start, out, fresh, executor, threads, defaults, relevant, key)
         return
     machines = [options.plant(text) for text in options.names(plants)]
     comparison = run(
@@ -177,14 +175,14 @@ def compare(
         executor,
         out=out,
         duration=duration,
-        starts=options.starts(x0, spread),
+        starts=start,
         gains=gains,
         quick=quick,
         defaults=defaults,
         relevant=relevant,
         traces=traces,
         fresh=fresh,
-        noise_key=options.noise_key_of(noise_key),
+        noise_key=key,
         threads=threads,
     )
     terminal.print(comparison)

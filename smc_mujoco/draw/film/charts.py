@@ -31,12 +31,7 @@ class Charts:
     """
 
     def __init__(
-        self,
-        traces: Sequence[Trace],
-        names: Sequence[str],
-        colours: Sequence[str],
-        size: tuple[int, int],
-        scale: float,
+        self, traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], size: tuple[int, int], scale: float
     ):
         self.end = end(traces)
         self.dot = max(2, round(4.5 * scale))

@@ -374,14 +374,7 @@ def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
     for one in quick:
         find("set of gains in quick_sets", one, sets)
     paper = Paper(
-        name=folder.resolve().name,
-        folder=folder,
-        sets=sets,
-        quick_sets=quick,
-        allowed={},
-        claims={},
-        **texts,
-        **parts,
+        name=folder.resolve().name, folder=folder, sets=sets, quick_sets=quick, allowed={}, claims={}, **texts, **parts
     )
     functions = {key: value for key, value in vars(code).items() if inspect.isfunction(value)}
     allowed = {law: _allowed(law, one, functions, paper) for law, one in _table(data, "allowed")}

@@ -40,13 +40,7 @@ V1 = {
     "torque_smoothness": (0.2, 12.0),
     "velocity_cost": (0.2, 1000.0),
 }
-V2 = {
-    "swing_up_time": 20.0,
-    "energy": 60.0,
-    "torque_cost": 20.0,
-    "torque_smoothness": 0.1,
-    "velocity_cost": 400.0,
-}
+V2 = {"swing_up_time": 20.0, "energy": 60.0, "torque_cost": 20.0, "torque_smoothness": 0.1, "velocity_cost": 400.0}
 VERSIONS = {"v1": tuple(V1), "v2": tuple(V2)}  # -> the criteria that count
 ROBOTS = ("acrobot", "pendubot")
 

@@ -38,10 +38,7 @@ def board(
 
     terminal = Terminal()
     rows = boards.experiments(robot)
-    if figure:
-        writable(figure)
-    if film:
-        writable(ended(film, ".mp4"))
+    writable(figure, film and ended(film, ".mp4"))
     traces, results = dict(zip(rows, run(list(rows.values())), strict=True)), None
     terminal.print(tables.board(robot, boards.board(traces), rows))
     if robustness:

@@ -1,13 +1,19 @@
 """smc-mujoco certify: what is proven of a law on a plant."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import errors_as_sentences
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import held_back
+
+if TYPE_CHECKING:
+    from smc_mujoco.evidence.certificates.certificate import Certificate
+    from smc_mujoco.simulation.scenario import Scenario
+    from smc_mujoco.studies.worst_case import WorstCase
 
 METRIC = "ultimate_bound"  # largest |x| in the last fifth of a run
 
@@ -17,10 +23,7 @@ def certify(
     plant: Annotated[
         str | None,
         typer.Argument(
-            metavar="PLANT",
-            autocompletion=options.PLANTS,
-            help="A plant from `smc-mujoco list`.",
-            show_default=False,
+            metavar="PLANT", autocompletion=options.PLANTS, help="A plant from `smc-mujoco list`.", show_default=False
         ),
     ] = None,
     law: Annotated[
@@ -60,16 +63,11 @@ def certify(
     Example: smc-mujoco certify --check duffing.json
     """
     with held_back():
-        from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
-        from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import ended, write_json
         from smc_mujoco.draw.page import files
         from smc_mujoco.evidence.certificates.certificate import Certificate
-        from smc_mujoco.evidence.certificates.maker import certify as make
         from smc_mujoco.evidence.commands import tables
-        from smc_mujoco.simulation.grid import case
         from smc_mujoco.simulation.run import run
-        from smc_mujoco.studies.worst_case import worst_case
 
     pictures = files(figure)
     json, terminal = options.json_file(json, out and ended(out, ".json"), *pictures)
@@ -81,12 +79,7 @@ def certify(
         made.check()
         terminal.note(f"{check}: every statement is proven", "bold")
     elif plant:
-        scenario = case(options.plant(plant), options.law(law), condition, gains=gains)
-        within = Uncertainty(disturbance=disturbance, slope=slope) if disturbance else None
-        made = make(scenario, within)
-        if worst and within is None:
-            raise ScenarioError("--worst needs a bound to search within: give --disturbance")
-        worst_run = worst_case(scenario, METRIC, within, progress=True) if worst else None
+        scenario, made, worst_run = _certified(plant, law, condition, gains, disturbance, slope, worst)
     else:
         raise ScenarioError("give a plant, such as duffing, or --check FILE.json")
     terminal.print(tables.certificate(made))
@@ -106,3 +99,20 @@ def certify(
         shown = worst_run.scenario if worst_run else scenario
         made.figure(figure, run([shown]) if shown and shown.plant.n == 1 else ())
         terminal.wrote(*pictures)
+
+
+def _certified(
+    plant: str, law: str, condition: str, gains: str, disturbance: float | None, slope: float | None, worst: bool
+) -> "tuple[Scenario, Certificate, WorstCase | None]":
+    """Return a scenario, its certificate and, if `worst`, the worst case within the bounds."""
+    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+    from smc_mujoco.evidence.certificates.maker import certify as make
+    from smc_mujoco.simulation.grid import case
+    from smc_mujoco.studies.worst_case import worst_case
+
+    scenario = case(options.plant(plant), options.law(law), condition, gains=gains)
+    within = Uncertainty(disturbance=disturbance, slope=slope) if disturbance else None
+    made = make(scenario, within)
+    if worst and within is None:
+        raise ScenarioError("--worst needs a bound to search within: give --disturbance")
+    return scenario, made, worst_case(scenario, METRIC, within, progress=True) if worst else None

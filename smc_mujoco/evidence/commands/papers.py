@@ -1,7 +1,8 @@
 """smc-mujoco claims, papers: audits of the claims of papers."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -9,6 +10,10 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import held_back
+
+if TYPE_CHECKING:
+    from smc_mujoco.evidence.audit.paper import Paper
+    from smc_mujoco.evidence.audit.verdict import Claim
 
 
 @errors_as_sentences()
@@ -68,7 +73,6 @@ def claims(
         from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import ended, replacing, writable
         from smc_mujoco.common.progress import bar
-        from smc_mujoco.evidence.audit import mutants as testing
         from smc_mujoco.evidence.audit.audit import DEFAULT, audit, document, evaluations
         from smc_mujoco.evidence.audit.paper import paper as find_paper
         from smc_mujoco.evidence.commands import tables
@@ -82,14 +86,11 @@ def claims(
         raise ScenarioError("--evidence needs runs that the audit makes itself: leave out --table")
     if mutants and json:
         raise ScenarioError("--mutants prints sentences: leave out --json")
-    for file, ending in ((out, ""), (evidence, ".json"), (badge, ".svg")):
-        if file:
-            writable(ended(file, ending) if ending else file)
+    writable(out, evidence and ended(evidence, ".json"), badge and ended(badge, ".svg"))
     with bar("claims", evaluations(ids or None, sets, quick, about), counted=True) as drawn:
         done = audit(about, ids or None, sets, quick, threads, table=known, report=drawn.advance)
-    verdicts = done.claims
     written = [one for one in (evidence and done.save(evidence), badge and done.badge(badge)) if one]
-    text = document(verdicts)
+    text = document(done.claims)
     if out:
         with replacing(out) as file:
             file.write_text(text + "\n", encoding="utf-8")
@@ -97,20 +98,8 @@ def claims(
     if json:
         print(text)
         return
-    tables.print_claims(verdicts, terminal, full=bool(ids))
-    kept: dict[str, str] = {}
-    if mutants:
-        with bar("mutants", testing.evaluations(about, ids or None, sets, quick), counted=True) as drawn:
-            kept = testing.survivors(about, ids or None, sets, quick, threads, drawn.advance)
-        terminal.note(
-            "\n".join(
-                [f"claim {id} is {why}" for id, why in kept.items()]
-                or ["Every claim is lost by a mutant of its law, or says why it cannot be."]
-            )
-        )
-        entries = [about.claims[claim.id] for claim in verdicts]
-        for entry in [entry for entry in entries if entry.immune]:
-            terminal.note(f"claim {entry.id} cannot be lost: {entry.immune}", wrap=True)
+    tables.print_claims(done.claims, terminal, full=bool(ids))
+    kept = _kept(about, ids or None, sets, quick, threads, done.claims, terminal) if mutants else {}
     notes = [f"{terminal.seconds:.0f} s", "quick: coarser grids than the claims say" * quick]
     notes.append(f"wrote {printable(', '.join(map(str, written)))}" if written else "")
     terminal.note("; ".join(filter(None, notes)), "dim")
@@ -118,11 +107,33 @@ def claims(
         raise SystemExit(1)
 
 
+def _kept(
+    paper: "Paper",
+    ids: list[str] | None,
+    sets: list[str] | None,
+    quick: bool,
+    threads: int | None,
+    claims: "Sequence[Claim]",
+    terminal: Terminal,
+) -> dict[str, str]:
+    """Return and print the claims that no mutant loses, as `survivors`, and print those that cannot be lost."""
+    from smc_mujoco.common.progress import bar
+    from smc_mujoco.evidence.audit.mutants import evaluations, survivors
+
+    with bar("mutants", evaluations(paper, ids, sets, quick), counted=True) as drawn:
+        kept = survivors(paper, ids, sets, quick, threads, drawn.advance)
+    lines = [f"claim {id} is {why}" for id, why in kept.items()]
+    terminal.note("\n".join(lines) or "Every claim is lost by a mutant of its law, or says why it cannot be.")
+    for entry in [paper.claims[claim.id] for claim in claims]:
+        if entry.immune:
+            terminal.note(f"claim {entry.id} cannot be lost: {entry.immune}", wrap=True)
+    return kept
+
+
 @errors_as_sentences()
 def papers(
     new: Annotated[
-        Path | None,
-        typer.Option("--new", metavar="FOLDER", help="Write a template of your own paper into a folder."),
+        Path | None, typer.Option("--new", metavar="FOLDER", help="Write a template of your own paper into a folder.")
     ] = None,
     check: Annotated[
         Path | None,

@@ -42,7 +42,6 @@ def identify(
     Example: smc-mujoco identify servo_axis run.csv --set M=5,b=8 --columns x=position,u=force
     """
     with held_back():
-        from smc_mujoco.common.files import ended, writable
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.evidence.rigs.identify import identify as find
         from smc_mujoco.evidence.rigs.records import load
@@ -50,10 +49,7 @@ def identify(
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.mechanisms.plant import catalogue as plants
 
-    json, terminal = options.json_file(json)
-    for file in (figure, json):
-        if file:
-            writable(file)
+    json, terminal = options.json_file(json, figure)
     named = options.columns(columns)
     identified = find(
         as_plant(options.plant(rig)) if rig not in rigs() and (rig in plants() or ".xml" in rig) else rig,
@@ -70,7 +66,7 @@ def identify(
         terminal.note(note, wrap=True)
     terminal.note(f"{identified.evaluations} sets of values, seed {seed}, {terminal.seconds:.0f} s")
     if json:
-        terminal.wrote(identified.save(ended(json, ".json")))
+        terminal.wrote(identified.save(json))
     if figure:
         terminal.wrote(*identified.figure(figure))
 
@@ -128,9 +124,7 @@ def replay(
         from smc_mujoco.simulation.trace import Trace
 
     terminal, twin = Terminal(), find_rig(rig)
-    for path in (figure, film and ended(film, ".mp4")):
-        if path:
-            writable(path)
+    writable(figure, film and ended(film, ".mp4"))
     record = load(file, options.columns(columns))
     if isinstance(record, Trace):
         raise ScenarioError(f"{file} is a trace: give a record, with columns {', '.join(twin.needed)}")

@@ -246,11 +246,7 @@ class Rig:
         return self.repeated(self.part(record, start, duration, closed), rounded, state)
 
     def part(
-        self,
-        record: Mapping[str, Any],
-        start: float | None = None,
-        duration: float | None = None,
-        closed: bool = True,
+        self, record: Mapping[str, Any], start: float | None = None, duration: float | None = None, closed: bool = True
     ) -> "Part":
         """Return what a replay takes from a record. Arguments and errors are those of `replay`."""
         if self.dynamics is not None:

@@ -18,8 +18,7 @@ ARGUMENTS = re.compile(r"\b(gains|memory|timeout|flag)s?=$")  # of law_from_c, a
 def check_c(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A .c file with smc_law in it, or a .so.")],
     gains: Annotated[
-        str,
-        typer.Option(metavar="NAME=VALUE,...", help="The law's gains, in order, if the file does not define them."),
+        str, typer.Option(metavar="NAME=VALUE,...", help="The law's gains, in order, if the file does not define them.")
     ] = "",
     memory: Annotated[
         int | None, typer.Option(min=1, help="How many numbers its memory has; default as the file says, or 8.")
@@ -58,9 +57,7 @@ def check_c(
 @errors_as_sentences()
 def export_c(
     law: options.LawText,
-    gains: Annotated[
-        str, typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's defaults.")
-    ] = "",
+    gains: options.GainValues = "",
     numbers: Annotated[
         str, typer.Option("--type", metavar="double|float|q15", help="Type of numbers; q15 for observer_free only.")
     ] = "double",

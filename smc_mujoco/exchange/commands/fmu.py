@@ -15,9 +15,7 @@ from smc_mujoco.common.interrupts import held_back
 @errors_as_sentences()
 def export_fmu(
     law: options.LawText,
-    gains: Annotated[
-        str, typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's defaults.")
-    ] = "",
+    gains: options.GainValues = "",
     surface: Annotated[
         str | None, typer.Option(metavar="NAME|TEXT", help="A surface, as linear(c=3); default the law's own.")
     ] = None,
