@@ -33,12 +33,16 @@ CASES = [case for case in SAID if case != (smc.LuGre, "static")]  # its bound is
 MOTOR = {"inductance": 0.0, "torque_constant": 1.0, "gear": 1.0}  # even, and strong for every resistance
 
 
-def accepts(part, name, value):
-    """Whether a part takes a number, with 1 where there is no default, or else says the field, the number, the cure."""
+def made(part, **given):
+    """A part with these numbers, and 1 where there is no default."""
     required = {field.name: 1.0 for field in dataclasses.fields(part) if field.default is dataclasses.MISSING}
-    others = {"kind": "stops"} if "kind" in required else MOTOR if part is smc.DCMotor else {}
+    return part(**required | ({"kind": "stops"} if "kind" in required else {}) | given)
+
+
+def accepts(part, name, value):
+    """Whether a part takes a number, or else says the field, the number and the cure."""
     try:
-        return getattr(part(**required | others | {name: value}), name) == value
+        return getattr(made(part, **(MOTOR if part is smc.DCMotor else {}) | {name: value}), name) == value
     except smc.ScenarioError as error:
         said = str(error)
     assert said.startswith(f"{part.__name__}'s {name} is {value if value is None else f'{value:g}'}: give ")
@@ -66,3 +70,26 @@ def test_a_number_is_taken_just_where_its_docstring_says(part, name):
         assert not accepts(part, name, math.nextafter(high, math.inf))
     assert accepts(part, name, math.inf) == ("math.inf" in words)
     assert accepts(part, name, None) == ("None: " in words)
+
+
+ABOUT = (
+    "drives",
+    "in_callback",
+    "limited",
+    "delay",
+    "scale",
+    "unit",
+    "nominal",
+    "stall",
+    "stateful",
+    "bristles",
+    "forces",
+)
+
+
+def test_a_part_is_of_the_kind_that_is_recorded(snapshot):
+    parts = {part.__name__: made(part) for part in PARTS}
+    assert {
+        name: ", ".join(f"{what} {getattr(part, what)}" for what in ABOUT if hasattr(part, what))
+        for name, part in parts.items()
+    } == snapshot
