@@ -173,7 +173,7 @@ def _locked_ranges(scenario: Scenario, channel: int, assumptions: tuple[str, ...
 
 
 def cycles(loop: Loop) -> list[Wave]:
-    """Return all solutions of N L = 1 up to half the sampling frequency."""
+    """Return the solutions of N L = 1 up to half the sampling frequency, where |N| falls with the amplitude."""
     fastest = math.pi / loop.scenario.control_period
     omegas = np.geomspace(math.tau * MIN_FREQUENCY, MAX_NYQUIST_SHARE * fastest, GRID_FREQUENCIES)
     amplitudes = np.geomspace(MIN_AMPLITUDE, MAX_AMPLITUDE, GRID_AMPLITUDES)

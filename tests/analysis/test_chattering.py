@@ -1,9 +1,11 @@
 """Predicted chattering: describing functions against closed forms, limit cycles against formulas and against runs."""
 
 import dataclasses
+import importlib
 import itertools
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +13,8 @@ from helpers.words import words
 
 import smc_mujoco as smc
 from smc_mujoco import chattering, describing_function
-from smc_mujoco.analysis.chattering import Chattering, _assumptions, save
-from smc_mujoco.analysis.harmonics import Loop, play
+from smc_mujoco.analysis.chattering import Chattering, _assumptions, _stable_cycles, cycles, save, switches
+from smc_mujoco.analysis.harmonics import Loop, Wave, play
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.analysis.step_halving import StepChange
 
@@ -330,6 +332,58 @@ def test_a_file_of_predictions_has_what_was_predicted_and_measured(tmp_path, sna
     changes = StepChange(0.02, 0.2), StepChange(0.0, math.inf)
     path = save([run, run], [sure, possible], [(0.4, 19.0), (math.nan, math.nan)], changes, tmp_path / "a.json")
     assert [json.loads(path.read_text()), [bool(sure), bool(possible), [one.mark for one in changes]]] == snapshot
+
+
+class Formula:
+    """A loop whose law has a describing function in closed form: -K / (j w (1 + j w / p)^2), whose phase turns at p."""
+
+    scenario = SimpleNamespace(control_period=1e-3)
+
+    def __init__(self, law, size, turn):
+        self.law, self.size, self.turn = law, size, turn
+
+    def gain(self, amplitude, omega, max_samples=1000):
+        return complex(-self.law(amplitude))
+
+    def response(self, omega):
+        return self.size / (1j * omega * (1.0 + 1j * omega / self.turn) ** 2)
+
+    def wave(self, amplitude, omega):
+        nothing = {"third": math.nan, "s": amplitude, "u": 0.0, "rate": 0.0, "drift": 0.0}
+        return Wave(amplitude=amplitude, omega=omega, gain=self.gain(amplitude, omega), **nothing)
+
+
+def saturation(a):
+    return saturated(1.0, 1.0, a)
+
+
+def relay(a):
+    return 4.0 / (math.pi * a)
+
+
+def relay_with_a_dead_zone(a):
+    return relay(a) * math.sqrt(1.0 - (0.01 / a) ** 2) if a > 0.01 else 0.0
+
+
+@pytest.mark.parametrize(
+    ("law", "wanted"),  # N at the cycles: 2 p / K
+    [(saturation, 1.0 / 1.02), (saturation, 0.7), (saturation, 1.05), (relay, 3.0), (relay_with_a_dead_zone, 5.0)],
+)
+def test_the_cycle_of_a_closed_form_is_found_where_its_gain_falls(law, wanted):
+    turn, places = 40.0, np.geomspace(1e-3, 3.0, 200_001)
+    loop = Formula(law, 2.0 * turn / wanted, turn)
+    falls = np.flatnonzero(np.diff(np.sign([law(a) - wanted for a in places])) < 0)
+    found = cycles(loop)
+    assert [wave.amplitude for wave in found] == pytest.approx(places[falls], rel=1e-4)
+    assert [wave.omega for wave in found] == pytest.approx([turn] * len(falls), rel=1e-6)
+    assert _stable_cycles(loop, found) == found
+    assert switches(loop) == (law is relay)
+
+
+def test_what_half_a_step_changes_is_relative_and_infinite_where_one_cycle_is_lost():
+    change = importlib.import_module("smc_mujoco.analysis.step_halving")._change
+    pairs = (0.2, 0.25), (0.2, 0.15), (math.nan, math.nan), (math.nan, 0.2), (0.2, math.nan)
+    assert [change(*pair) for pair in pairs] == pytest.approx([0.25, 0.25, 0.0, math.inf, math.inf])
 
 
 @COARSELY
