@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.gains_for import _force_headroom, _largest_size
+from smc_mujoco.analysis.chattering import Chattering
+from smc_mujoco.analysis.gains_for import _best_speed, _force_headroom, _largest_size
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 
 COARSELY = pytest.mark.usefixtures("coarse_grid")
@@ -103,6 +104,35 @@ def without_units(y, gains, memory):
 )
 def test_bad_input_is_one_sentence(law, wanted, refused):
     refused(lambda: smc.gains_for(law, **({"plant": "duffing"} | wanted), **LAG))
+
+
+def predicted(frequency, amplitude):
+    return Chattering(frequency=frequency, amplitude_range=(0.0, amplitude))
+
+
+def test_the_speed_is_that_of_the_largest_forces_at_most_as_fast_as_wanted(refused):
+    """Cycles of 20 w Hz and 0.1 / w, then with a dip about w = 4, and with none below w = 0.5 or above 2."""
+
+    def steady(w):
+        return predicted(20.0 * w, 0.1 / w)
+
+    def dipping(w):
+        return predicted(20.0 * w * (0.1 if 3.9 < w < 4.1 else 1.0), 0.1 / w)
+
+    def narrow(w):
+        return steady(w) if 0.5 <= w <= 2.0 else Chattering()
+
+    speeds = {k: 10.0 ** (0.1 * k) for k in range(-10, 11)}
+    assert _best_speed(steady, None, 20.1, math.inf) == speeds[0]
+    assert _best_speed(steady, None, 200.1, math.inf) == speeds[10]
+    assert _best_speed(steady, None, 200.1, speeds[3] ** 2) == speeds[3]
+    assert _best_speed(dipping, None, 20.1, math.inf) == speeds[6]
+    assert _best_speed(narrow, None, 11.0, math.inf) == speeds[-3]
+    assert _best_speed(narrow, None, 9.0, math.inf) == speeds[-4]  # no cycle, and slower than the first with one
+    assert _best_speed(lambda w: predicted(20.0 * w, 0.1 * w**3), 1e-3, 200.1, math.inf) == speeds[-10]  # force ~ 1 / w
+    assert _best_speed(lambda w: predicted(20.0 * w, 0.1 * w**3), 1e3, 200.1, 4.0) == speeds[3]  # all 4: the fastest
+    refused(lambda: _best_speed(steady, None, 1.9, math.inf))
+    refused(lambda: _best_speed(steady, None, 9.0, 1e-3))
 
 
 def test_the_largest_size_is_where_the_amplitude_is_the_wanted_one(refused):

@@ -4,6 +4,7 @@ import dataclasses
 import importlib
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -54,6 +55,44 @@ def test_states_that_leave_early_get_the_verdict_of_a_run_to_the_end(plant, law)
     late = maps.basin_of(base(plant, law), x, v, early=False)
     assert (early.outcome == late.outcome).all()
     assert (late.decided_at == 6.0).all()
+
+
+def verdict(first, second, final, start=1.0, v=0.0, u=(0.0, 0.0), u_max=6.0, **ended):
+    """The verdict on a run that is at `start`, then in both halves of the part that counts at `first` and `second`.
+
+    X is 2 m and V 4 m/s, so that the band is 0.04 m and 0.08 m/s.
+    """
+    t = np.arange(301.0)
+    late = t >= (240 if final else 201)
+    second_half = t >= (270 if final else 251)
+    x = np.where(second_half, second, np.where(late, first, start))
+    signals = {"x": x, "v": np.where(late, v, 0.0), "u": np.where(second_half, *reversed(u)), "r": 0.0 * t}
+    scenario = SimpleNamespace(resolved=SimpleNamespace(u_max=u_max))
+    columns = {name: values[:, None] for name, values in signals.items()}
+    trace = SimpleNamespace(t=t, **columns, scenario=scenario, **{"failure": None, "diverged_at": None} | ended)
+    return maps.verdict_of(trace, np.array([-2.0, 1.0]), np.array([0.5, -4.0]), final)
+
+
+def test_a_whole_run_is_judged_by_the_band_and_by_whether_it_leaves():
+    assert [verdict(x, x, True) for x in (0.04, -0.04, 0.0401)] == [CONVERGES, CONVERGES, DOES_NOT]
+    assert [verdict(0.0401, 0.03, True), verdict(0.03, 0.0401, True)] == [UNDECIDED] * 2
+    assert [verdict(0.0, 0.0, True, v=v) for v in (0.08, 0.0801)] == [CONVERGES, DOES_NOT]
+    leaving = 0.03 * math.sqrt(1.05)
+    assert [verdict(0.03, q * leaving, True) for q in (0.9999, 1.0001)] == [CONVERGES, UNDECIDED]
+    assert [verdict(1e-4, x, True) for x in (0.00399, 0.00401)] == [CONVERGES, UNDECIDED]  # near, and no longer
+
+
+def test_an_early_verdict_needs_a_run_that_approaches_rests_or_fails():
+    approaching = 0.03 * math.sqrt(0.9)
+    assert [verdict(0.03, q * approaching, False) for q in (0.9999, 1.0001)] == [CONVERGES, None]
+    assert [verdict(1e-4, x, False) for x in (0.00399, 0.00401)] == [CONVERGES, None]
+    assert verdict(1e-4, 0.003, False, start=0.003) is None  # it began near
+    assert [verdict(0.5, 0.5 + 2.0 * q, False) for q in (0.99e-6, 1.01e-6)] == [DOES_NOT, None]
+    assert [verdict(0.5, 0.5, False, u=(1.0, 1.0 + 6.0 * q)) for q in (0.99e-6, 1.01e-6)] == [DOES_NOT, None]
+    rests = [verdict(0.5, 0.5, False, u=(2.0, 2.0 + 2.0 * q), u_max=math.inf) for q in (0.99e-6, 1.01e-6)]
+    assert rests == [DOES_NOT, None]
+    assert verdict(0.03, 0.03, False) is None  # at rest in the band
+    assert verdict(0.0, 0.0, False, failure="raised") == verdict(0.0, 0.0, True, diverged_at=3.0) == DOES_NOT
 
 
 def test_most_of_what_converges_leaves_early(weak):

@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.worst_case.search import Search
-from smc_mujoco.analysis.worst_case.strategies import loop_frequency, recorded_force
+from smc_mujoco.analysis.worst_case.strategies import RELAY_SIGNALS, loop_frequency, recorded_force
 from smc_mujoco.analysis.worst_case.uncertainty import Members, default_class, outside
 from smc_mujoco.control import gain_sets
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -160,6 +161,29 @@ def test_constants_and_relays_reach_what_another_adversary_found():
     for law, value in found.items():
         worst = smc.worst_case(scenario(law=law, duration=8.0), within=CLASSES["force"], budget=8)
         assert round(worst.value, 4) >= value
+
+
+def line(case, tried):
+    """What a case is: its strategy, where its force first changes its sign, what its relay sees, and its constants."""
+    turns = np.flatnonzero(np.diff(np.sign(case.member.force)))[:1]
+    signs = {name: f"{getattr(case.relay, name):+.0e}"[0] for name in RELAY_SIGNALS.values() if case.relay}
+    seen = [sign + name for name, sign in signs.items() if getattr(case.relay, name)]
+    relay = f"{case.relay.amplitude:g} from {case.relay.start:g} s, {case.relay.slope:g}" if case.relay else ""
+    errors = tried.member.noise[:, :1].round(3).tolist()
+    first = np.sign(case.member.force[:1])
+    return f"{case.member.kind} {turns} {first} {seen} {relay} {tried.member.shares.round(2)} {errors} {tried.origin}"
+
+
+@pytest.mark.parametrize("name", ["force", "slope", "constants", "errors"])
+def test_a_search_tries_its_strategies_in_order(name, snapshot):
+    search = Search(
+        Members([scenario(duration=0.4)], CLASSES[name]), CATALOGUE["rms_error"], 500, 1, lambda steps: None
+    )
+    strategies = search._simple, search._corners, search._at_loop_frequency, search._driven
+    batches = (batch for strategy in strategies for batch in strategy())
+    tried = [line(*pair) for batch in batches for pair in zip(batch, search.run(batch), strict=True)]
+    said = [re.sub(r"^((?:square wave|sine) )\[\d+\]", r"\1", one) for one in tried]  # of a measured frequency
+    assert said == snapshot
 
 
 def test_a_failed_run_is_the_worst():
