@@ -314,7 +314,8 @@ def _paper(findings: "Findings", metrics: Sequence[str]) -> str:
     if not of_paper:
         return ""
     lost = losses(cells(findings.scores), metrics)
-    beaten = f"; it is beaten in {len(lost)} comparisons, listed below, in half of them by a factor of " if lost else ""
+    how = f"{len(lost)} comparisons, listed below, in half of them" if len(lost) > 1 else "1 comparison, listed below,"
+    beaten = f"; it is beaten in {how} by a factor of " if lost else ""
     beaten += f"{words.number(lost[(len(lost) - 1) // 2].times)} or more" if lost else ""
     return (
         "The paper’s observer-free law leads, or is level with what leads, in "

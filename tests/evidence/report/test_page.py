@@ -3,6 +3,7 @@
 The record changes with every word, number and mark of the page. Read the difference before you record it anew.
 """
 
+import dataclasses
 import html
 import json
 import math
@@ -17,7 +18,7 @@ from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.analysis.region_of_attraction import Basin
 from smc_mujoco.analysis.scaling import Accuracy, Scaling
 from smc_mujoco.evidence.audit.verdict import Claim
-from smc_mujoco.evidence.report import page, rigs, words
+from smc_mujoco.evidence.report import answer, page, rigs, words
 from smc_mujoco.evidence.report.about import About, Gains
 from smc_mujoco.evidence.report.films import Curve, Scene
 from smc_mujoco.evidence.report.oscillation import Oscillation
@@ -353,7 +354,8 @@ def said(text):
     text = re.sub(r"<style>.*?</style>", "", text, flags=re.S)
     text = re.sub(r"<script>.*?</script>", "", PLOT.sub(drawn, text), flags=re.S)
     text = re.sub(r'<a [^>]*?href="(.*?)".*?>(.*?)</a>', r"\2 [\1]", text, flags=re.S)
-    text = re.sub(r'<(img|video) [^>]*?(?:alt|aria-label)="(.*?)".*?src="(.*?)".*?>', r"\1: \2 (\3)", text, flags=re.S)
+    text = re.sub(r'<img ([^>]*?)alt="(.*?)"(.*?)>', r"picture: \2 (\1\3)", text)
+    text = re.sub(r'<video [^>]*?aria-label="(.*?)" src="(.*?)">', r"video: \1 (\2)", text)
     text = re.sub(r"<select.*?</select>", "", text, flags=re.S)
     text = re.sub(r"--law: (#\w+)[^>]*?>", r">\1 ", text)
     text = re.sub(r"</t[dh]>", " | ", text)
@@ -369,3 +371,48 @@ def test_a_page_says_and_draws_its_findings(findings, snapshot, monkeypatch):
         go.Figure(json.loads(plot[2]))  # which refuses what plotly does not know
     text = said(whole.partition('<h3 id="definitions">')[0])
     assert re.sub(r"the package’s \d+ laws", "the package’s laws", text) == snapshot  # a new one needs no new record
+
+
+def cells(rows, metric="itae"):
+    """Scores of cells: for each cell, law -> "wins", "level" or its median, where the best one is 1."""
+    for k, cell in enumerate(rows):
+        for law, how in cell.items():
+            median = how if isinstance(how, float) else 1.0
+            yield Score(
+                plant=PLANTS[k % 2], condition=CONDITIONS[k // 2 % 2], law=law, metric=metric, median=median,
+                low=median, high=median, best=median == 1.0, beaten=median > 1.0, wins=how == "wins", lead="",
+                seeds=6, failed=0, runs=6, sample="6 starts",
+            )  # fmt: skip
+
+
+def shares(*values):
+    return [
+        Place(
+            plant="", metric="settles", law=law, mean=1.0, failed=0, best=True, median=share, wins=0, losses=0, of=4,
+            why="",
+        )
+        for law, share in zip(LAWS, values, strict=False)
+    ]  # fmt: skip
+
+
+A, B, C, D = (*LAWS, "pid")
+CASES = {  # what was found -> scores, places
+    "one law unbeaten": (cells([{A: "level", B: "level", C: 2.0}, {A: "level", C: "level", B: 3.0}]), shares(1.0, 1.0)),
+    "none unbeaten": (cells([{A: "level", B: "level", C: 2.0}, {B: 2.0, A: 4.0, C: "level"}]), shares(0.5, 0.5, 0.502)),
+    "three unbeaten": (cells([dict.fromkeys((A, B, C), "level") | {D: 2.0}]), shares(0.25, 0.75)),
+    "four unbeaten": (cells([dict.fromkeys((A, B, C, D), "level")]), ()),
+    "one wins": (cells([{A: 2.0, B: "wins"}] * 2), ()),
+    "one wins on every plant": (cells([{A: 2.0, B: "wins"}] * 2 + [{A: "wins", B: 5.0}, {A: 3.0, B: "wins"}]), ()),
+    "four win": (cells([{A: "wins", B: 2.0, C: 2.0, D: 2.0}, {A: 4.0, B: "wins", C: 2.0, D: 2.0},
+                        {A: 8.0, B: 2.0, C: "wins", D: 2.0}, {A: 16.0, B: 2.0, C: 2.0, D: "wins"}]), ()),
+}  # fmt: skip
+
+
+def test_the_answer_is_counted_from_the_scores(findings, snapshot):
+    lines = []
+    for name, (some, place) in CASES.items():
+        few = dataclasses.replace(findings, scores=tuple(some), places=tuple(place), claims=())
+        texts = answer.first(few, ["itae"]), answer.leads(few, "itae"), *answer.rest(few, ["itae"])
+        lines += [f"{name}:", *texts, answer.verdict(few, ["itae"])]
+        lines += [f"{row}" for row in answer.standings(few, "itae")]
+    assert "\n".join(lines) == snapshot

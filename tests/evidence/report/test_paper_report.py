@@ -5,6 +5,7 @@ from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import pytest
+from helpers.words import words
 from typer.testing import CliRunner
 
 from smc_mujoco.cli.main import app
@@ -13,6 +14,7 @@ from smc_mujoco.evidence.audit import evidence
 from smc_mujoco.evidence.audit.figure import DECADES, figure, place
 from smc_mujoco.evidence.audit.verdict import check
 from smc_mujoco.evidence.report.paper import report
+from tests.evidence.report.test_page import said
 
 DATA = """
 title = "A <small> paper"
@@ -41,6 +43,17 @@ function = "calm"
 plants = ["van_der_pol"]
 laws = ["classical"]
 holds_if = { "TV rate" = "< 0" }
+[[claim]]
+id = "3"
+whose = "derived"
+how = "by sec. 2"
+varies = "it is timed"
+text = "it is fast"
+where = "p. 3"
+function = "calm"
+plants = ["duffing"]
+laws = ["classical"]
+holds_if = { "TV rate" = "< 1e9" }
 """
 CODE = """
 def calm(runs):
@@ -77,23 +90,18 @@ def made(tmp_path_factory):
 
 def test_the_page_has_every_claim_its_numbers_and_gains(made):
     _, page = made
-    words = " ".join(" ".join(page.words).split())
+    text = " ".join(" ".join(page.words).split())
     for part in ("A <small> paper", "A. Nobody", "the law & its plant are calm", "nothing moves", "full text", "k = 3"):
-        assert part in words
+        assert part in text
     assert {"claim-1", "claim-2", "gains-slow", "gains-study", "verdict"} <= set(page.ids)
-    assert re.search(r"TV rate < 1.0e9", words)
-    assert "0.125" in words
+    assert re.search(r"TV rate < 1.0e9", text)
+    assert "0.125" in text
 
 
-def test_a_part_of_the_page_has_the_heading_of_what_it_holds(made):
+def test_the_page_of_an_audit_says_what_is_recorded(made, snapshot):
     home, _ = made
-    headings = re.findall(r'<h2 id="(\w+)-title">.*?</span>(.*?)</h2>', (home / "out" / "report.html").read_text())
-    assert dict(headings) == {
-        "claims": "The claims",
-        "checks": "How far from the thresholds",
-        "gains": "Gains",
-        "method": "How it was computed",
-    }
+    text = re.sub('base64,[^"]*', "", (home / "out" / "report.html").read_text())
+    assert words(said(re.sub("[0-9a-f]{16}…", "HASH", text))) == snapshot
 
 
 def test_every_link_of_the_page_leads_to_a_part_of_it_and_nothing_comes_from_outside(made):

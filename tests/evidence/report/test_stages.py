@@ -1,13 +1,16 @@
 """How a report is put together: its plan, its progress, what it keeps, and small pieces of its stages."""
 
 import dataclasses
+import io
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from helpers.sketch import made
+from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.control import gain_sets
@@ -171,6 +174,31 @@ def test_a_film_and_its_picture_are_kept_beside_each_other(tmp_path):
     films.save((b"film", b"picture"), tmp_path / "a.webm")
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.jpg", "a.webm"]
     assert films.load(tmp_path / "a.webm") == (b"film", b"picture")
+
+
+def test_a_film_has_every_frame_and_the_picture_half_a_second_in(tmp_path, monkeypatch):
+    written, reached, count = [], [], 30
+
+    def writer(path, size, **options):
+        written.append((path.name, size, options["fps"], options["codec"]))
+        while True:
+            picture = yield
+            written.append(None if picture is None else int(picture[0, 0, 0]))
+            path.write_bytes(b"webm")
+
+    trace = made(smc.Scenario(plant="duffing", law="pid", duration=1.0))
+    pictures = lambda traces, shown, names, title, size: (  # noqa: E731
+        np.full((4, 4, 3), 4 * k, np.uint8) for k in range(len(shown.times))
+    )
+    monkeypatch.setattr(films.gl, "missing", lambda: None)
+    monkeypatch.setattr("imageio_ffmpeg.write_frames", writer)
+    monkeypatch.setattr(films.pace, "clock", lambda traces, fps: SimpleNamespace(times=np.arange(count) / fps))
+    monkeypatch.setattr(films.video, "frames", pictures)
+    film, picture = films.film([trace], "title", lambda done, whole: reached.append((done, whole)))
+    assert written == [("film.webm", (960, 540), 20, "libvpx-vp9"), *range(0, 4 * count, 4)]
+    assert reached == [(k + 1, count) for k in range(count)]
+    assert film == b"webm"
+    assert abs(int(np.asarray(Image.open(io.BytesIO(picture)))[0, 0, 0]) - 40) <= 2  # frame 10 of 20 a second
 
 
 def test_limit_cycles_are_of_laws_behind_a_lag_and_a_law_without_prediction_is_left_out(tmp_path, monkeypatch):
