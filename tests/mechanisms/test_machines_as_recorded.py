@@ -13,6 +13,7 @@ import pytest
 from helpers.words import recorded
 
 from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.mechanisms.plant import catalogue, plant, write
 
 PLANTS = {name: one if one.n == one.sizes[0] else plant(name, n=12) for name, one in catalogue().items()}
@@ -44,9 +45,20 @@ def said(one):
     return [f"{name} {value}" for name, value in plain.items() if value not in ((), {}, "", False)]
 
 
+def parameters(one):
+    """The plant's parameters, each moved."""
+    return SimpleNamespace(**{name: moved(value) for name, value in one.parameters.items()})
+
+
+def equation(one):
+    """A weighted sum of f and g of all channels in one state."""
+    nominal, (x, v) = rebuild(one.nominal, lambda plain: plain), np.random.default_rng(3).uniform(-1.0, 1.0, (2, one.n))
+    return f"f and g {weighed([nominal(x, v, i, parameters(one)) for i in range(one.n)])}"
+
+
 def machine(one, how):
     """The compiled model with each parameter moved, drawn with a contact or another mechanism."""
-    spec, fields, values = one.spec(), one.fields, SimpleNamespace(**{k: moved(v) for k, v in one.parameters.items()})
+    spec, fields, values = one.spec(), one.fields, parameters(one)
     if how in one.contacts:
         one.contacts[how](spec)
     if how in one.mechanisms:
@@ -76,5 +88,5 @@ def weighed(array):
 def test_a_machine_says_and_shows_what_is_recorded(case, snapshot):
     name, how = case.split()
     one = PLANTS[name]
-    lines = [*(said(one) if how == "alone" else ()), *sizes(machine(one, how))]
+    lines = [*([*said(one), equation(one)] if how == "alone" else ()), *sizes(machine(one, how))]
     assert "\n".join(lines) == snapshot
