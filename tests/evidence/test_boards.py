@@ -236,6 +236,17 @@ def test_torque_and_motion_of_a_case_are_those_of_its_formulas(robot):
         np.testing.assert_allclose(states[k + 1], end, atol=1e-6)
 
 
+def test_a_run_beyond_a_million_radians_a_second_ends_there(machines):
+    states, torque = machines["pendubot"].simulate(Case(parameters={"b1": -5.0, "b2": -5.0}))
+    ended = int(np.argmax(~np.isfinite(states).all(axis=1)))
+    speeds = np.abs(states[:ended, 2:]).sum(axis=1)
+    assert 0 < ended < 5000
+    assert speeds.max() < 1e6
+    assert np.isinf(states[ended:]).all()
+    assert not torque[ended:].any()
+    assert not simulator.upright(states[-1])
+
+
 def test_a_level_is_survived_by_more_than_half_of_its_runs(monkeypatch):
     """A machine that ends up as often as its case says, of one level in the first test and three in the others."""
     ends = [3.4, 3.4, 0.0, 3.4, 0.0, 0.0, 3.4, 0.0]  # up, or hanging

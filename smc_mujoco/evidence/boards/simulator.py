@@ -183,7 +183,9 @@ def robustness(scenario: Scenario, report: Callable[[float, float], None] | None
 
 
 def upright(state: np.ndarray) -> bool:
-    """Return whether a state (q1, q2, q1', q2') is within WITHIN of upright and at rest."""
+    """Return whether a state (q1, q2, q1', q2') is within WITHIN of upright and at rest; inf is not."""
+    if not np.isfinite(state).all():
+        return False
     angles = [math.remainder(state[0] - math.pi, 2.0 * math.pi), math.remainder(state[1], 2.0 * math.pi)]
     return all(abs(value) < limit for value, limit in zip((*angles, *state[2:]), WITHIN, strict=True))
 

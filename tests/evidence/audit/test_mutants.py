@@ -70,6 +70,8 @@ def test_mutants_reverse_the_command_drop_it_forget_or_switch():
     assert true.u[0, 0] == -wrong.u[0, 0] < 0.0
     assert not without.u.any()
     assert set(np.unique(relay.u)) == {-6.0}
+    ends = [smc.Scenario(plant="duffing", law=laws[-1], x0=x, v0=0.0, duration=0.002) for x in (-0.5, 0.0)]
+    assert [trace.u[-1, 0] for trace in smc.run(ends)] == [6.0, 0.0]
     x = forgetful.x[:, 0]
     np.testing.assert_allclose(forgetful.u[:, 0], -3.0 * x * 1e-3, rtol=1e-12)
     assert np.abs(true.u[-1, 0]) > 10 * np.abs(forgetful.u[-1, 0])
