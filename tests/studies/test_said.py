@@ -180,10 +180,12 @@ def test_names_of_files(tmp_path):
 
 
 def test_a_result_is_read_only_where_its_seal_fits(tmp_path):
+    def save(made: str, path: Path) -> None:
+        assert path.parent.name.startswith(".a-")  # a hidden folder, which a kill may leave
+        path.write_text(made)
+
     def kept(depends: object, value: str) -> str:
-        return cache.cached(
-            tmp_path / "a.txt", depends, lambda: value, lambda made, path: path.write_text(made), Path.read_text
-        )
+        return cache.cached(tmp_path / "a.txt", depends, lambda: value, save, Path.read_text)
 
     assert (kept(1, "one"), kept(1, "two")) == ("one", "one")
     (file,) = tmp_path.iterdir()
