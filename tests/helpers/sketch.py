@@ -200,12 +200,13 @@ for _name in ("text", "line", "rectangle", "rounded_rectangle", "ellipse", "poly
     setattr(Pen, _name, _noted(_name))
 
 
-def shapes(scene: mujoco.MjvScene, first: int, singly: int) -> str:
-    """Return the geoms of a scene from one on: `singly` one by one, then the means of all others."""
+def shapes(scene: mujoco.MjvScene, singly: int) -> str:
+    """Return what a scene has beside its model's geoms: `singly` one by one, then the means of all others."""
     parts = ("type", "size", "pos", "mat", "rgba")
     rows = [
         np.concatenate([np.ravel(np.array(getattr(one, part), float)) for part in parts])
-        for one in scene.geoms[first : scene.ngeom]
+        for one in scene.geoms[: scene.ngeom]
+        if one.objtype not in (mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_SKIN)
     ]
     rest = rows[singly:]
     return "\n".join([*map(numbers, rows[:singly]), f"{len(rest)} {numbers(np.mean(rest, axis=0)) if rest else ''}"])

@@ -573,6 +573,7 @@ def test_advice_says_as_recorded(advice, snapshot):
         "left out, and properties": dataclasses.replace(traded, others=tuple("abcdefg"), wanted=("settle", "rest")),
         "one left out": dataclasses.replace(traded, others=("idle",), effort="N"),
         "better in one condition": with_cells(advice, observer_free=[1, 1, 9, 9], slow=[2, 2, 9, 3], classical=[3] * 4),
+        "two, of which one is better": with_cells(advice, observer_free=[1, 1, 2, 2], slow=[2, 2, 3, 8]),
         "tied": tied,
         "two level": with_cells(advice, observer_free=[even] * 4, slow=[1.02 * even] * 4),
         "three level": dataclasses.replace(

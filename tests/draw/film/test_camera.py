@@ -131,6 +131,22 @@ def test_joints_without_a_channel_move_as_in_the_run(trace):
     assert low == pytest.approx(motion.poses[:, 3].min() - 0.1, abs=0.2)  # the ball is in the picture
 
 
+@pytest.mark.parametrize(
+    ("place", "half", "seen"), [(3.9, 0.01, True), (4.1, 0.01, False), (0, 1.9, True), (0, 2.1, False)]
+)
+def test_fixed_things_that_are_farther_or_larger_than_four_times_what_moves_may_leave_the_picture(place, half, seen):
+    """The ball that moves is 1 m thick, and does not move away."""
+    plant = smc.plant_from(
+        f"""<mujoco><worldbody><body pos="0 0 3"><joint name="j" axis="0 1 0"/><geom size=".5"/></body>
+        <geom type="box" size="{half} .1 .1" pos="{place + 0.5 - half if place else 0} 0 3"/></worldbody>
+        <actuator><motor joint="j"/></actuator></mujoco>""",
+        ["j"],
+    )
+    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.01, x0=0.0))
+    reach = puppet.Puppet(trace.scenario).reach(trace)
+    assert bool(np.ptp(reach[:, 0]) > 1.01) is seen
+
+
 def test_a_library_plant_has_no_other_joints():
     trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
     assert puppet.motion(trace, trace.t) is None

@@ -155,7 +155,7 @@ def test_the_stage_of_two_machines_with_arrows_ghosts_and_shadows(kind, pen, sna
         rendered = []
         canvas.render = lambda area, views, render=canvas.render: rendered.append(area) or render(area, views)
         stage.render(drawn)
-        said = [sketch.shapes(canvas.renderer.scene, model.ngeom, len(stage.links[1]) + 2)]
+        said = [sketch.shapes(canvas.renderer.scene, len(stage.links[1]) + 2)]
         numbers_of = {
             "places": stage.where, "boxes": stage.boxes, "camera": stage.place, "turn": stage.turn, "sun": canvas.sun,
             "pose": stage.data.qpos, "goal": stage.goal.qpos, "casts": np.flatnonzero(canvas.casts),
