@@ -2,10 +2,14 @@
 
 import io
 import math
+from types import SimpleNamespace
+from typing import Any
 
 from rich.console import Console
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.margins import Margin
+from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.cli import tables
 from smc_mujoco.draw.film import arrows, caption
 
@@ -61,3 +65,38 @@ def test_a_line_of_blocks_has_one_for_each_value_up_to_its_width():
     low, middle, absent, high = tables.spark([-1.0, 1.0, math.inf, 3.0])
     assert (low, absent, high) == (tables.SPARKS[0], " ", tables.SPARKS[-1])
     assert low < middle < high
+
+
+def test_margins_and_cycles_are_told_with_their_limits(snapshot):
+    """Of margins that are open, of cycles that are uncertain, and of runs that depend on the step."""
+    rows = [
+        ("duffing", "pid", 0.5, 0.02, 0.25),
+        ("duffing", "lqr", 1.0, 0.0, math.inf),
+        ("furuta", "lqr", 0.0, 0.1, None),
+    ]
+    found = [
+        Margin(plant=plant, law=law, kind="delay", value=level, unit="s", resolution=step, searched=1.0, theory=theory)
+        for plant, law, level, step, theory in rows
+    ]
+    changes = StepChange(0.05, 0.02), StepChange(0.05, 0.2)
+    cycles: list[Any] = [
+        SimpleNamespace(amplitude=0.1, frequency=5.0, uncertainty=1.0, coupling=0.25, third_harmonic=0.04),
+        SimpleNamespace(
+            amplitude=math.nan, frequency=math.nan, uncertainty=math.nan, coupling=1.5, third_harmonic=1.01
+        ),
+    ]
+    design: Any = SimpleNamespace(law=smc.law("super_twisting"), disturbance=0.5)
+    shown = [tables.margins("delay", found), tables.designs([design], "N")]
+    for plant, count in (("duffing", 2), ("double_pendulum", 1)):
+        scenarios = [smc.Scenario(plant=plant, law=law) for law in ("pid", "classical")][:count]
+        measured = [(0.125, 4.5), (math.nan, math.nan)][:count]
+        shown.append(tables.chattering(scenarios, 0, cycles[:count], measured, changes[:count]))
+    assert printed(shown) == snapshot
+
+
+def test_an_overshoot_beyond_a_thousand_percent_has_no_digits():
+    assert tables._score_text("overshoot", 1000.0) == "1000"
+    assert tables._score_text("overshoot", 1000.1) == "> 1000"
+    assert tables._score_text("itae", 1000.1) == "1000"
+    assert tables._score_text("overshoot", math.inf) == "never"
+    assert tables.with_package("a line", "other") == "a line [other]"

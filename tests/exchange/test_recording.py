@@ -87,7 +87,12 @@ def test_shapes_are_those_that_mujoco_draws_and_move_with_their_bodies(run):
     ends = sorted((each.pose.position.x, each.pose.position.z) for each in upper.spheres)
     np.testing.assert_allclose(ends, [(0.0, 0.0), (0.1, -0.5)], atol=1e-9)
     assert upper.cylinders[0].size.z == pytest.approx(2.0 * model.geom_size[2, 1])
-    assert upper.cylinders[0].color.r == pytest.approx(0.5)
+    cylinder = upper.cylinders[0]
+    assert [getattr(cylinder.color, of) for of in "rgba"] == pytest.approx([0.5, 0.5, 0.5, 1.0])
+    assert [getattr(cylinder.pose.orientation, of) for of in "wxyz"] == pytest.approx(model.geom_quat[2])
+    assert [getattr(cylinder.pose.position, of) for of in "xyz"] == pytest.approx(model.geom_pos[2])
+    assert [getattr(cylinder.size, of) for of in "xy"] == pytest.approx([0.06, 0.06])
+    assert [getattr(world.cubes[0].size, of) for of in "xyz"] == pytest.approx([0.2, 0.2, 1.0])
 
 
 def test_the_scenario_is_in_the_metadata_and_a_failed_run_ends_where_it_failed(tmp_path):
