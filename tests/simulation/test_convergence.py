@@ -15,6 +15,7 @@ import dataclasses
 import math
 
 import numpy as np
+import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.metrics.conventions import scale
@@ -138,6 +139,7 @@ def converged(coarse, fine, spread):
     return change(coarse, fine) < MOST + 3 * spread / fine if spread else change(coarse, fine) < MOST
 
 
+@pytest.mark.slow
 def test_halving_the_physics_step_changes_no_score():
     chosen = brief()
     assert {key[1] for key in chosen} >= {*PARTS, *(contact for contacts in HITS.values() for contact in contacts)}
