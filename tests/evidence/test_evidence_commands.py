@@ -180,7 +180,7 @@ LINES = (
     "report --quick --out there --seeds 2 --law pid,lqr --records r --relevant 0.1",
     "report --paper gaber --law pid",
     "identify emps a.csv b.csv c.csv --columns x=position --quantities mass,offset --set mass=5 --starts 2 --seed 3",
-    "identify duffing a.csv --json found.json --figure fit",
+    "identify duffing a.csv b.csv --json found.json --figure fit",
     "identify emps a.csv --set mass=much",
     "replay emps run.csv --columns x=position",
     "replay emps run.csv --quantities driver,quanser --start 1.5 --duration 6 --figure run --film film.mp4",

@@ -58,7 +58,7 @@ def test_a_chart_has_what_was_measured_beside_the_twin(shown):
 
 def test_a_folder_without_records_of_a_rig_is_refused_before_any_run(work, tmp_path):
     (tmp_path / "a.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(smc.ScenarioError, match="has the columns of a rig: give those of one of emps t, x, u, r;"):
+    with pytest.raises(smc.ScenarioError, match="has the columns of a rig: give those of one of emps t, x, u, r; qub"):
         stages.find(TINY, work.folder / "none", None, Bars(False), tmp_path)
     assert not (work.folder / "none").exists()
     with pytest.raises(smc.ScenarioError, match="no folder at"):

@@ -1,8 +1,10 @@
 """How a report is put together: its plan, its progress, what it keeps, and small pieces of its stages."""
 
 import dataclasses
+import importlib
 import io
 import json
+import pkgutil
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,10 +15,12 @@ from helpers.sketch import made
 from PIL import Image
 
 import smc_mujoco as smc
+from smc_mujoco.common import extras
 from smc_mujoco.control import gain_sets
-from smc_mujoco.evidence.report import about, films, oscillation, paper, precision, rigs, stages, words
+from smc_mujoco.evidence.report import about, films, oscillation, paper, precision, rigs, scores, stages, words
 from smc_mujoco.evidence.report import report as make
 from smc_mujoco.evidence.report.plan import FULL, QUICK, Bars, Work
+from smc_mujoco.evidence.report.scores import Place
 from smc_mujoco.evidence.report.stages import Field
 from smc_mujoco.studies.accuracy import AccuracyTable
 
@@ -101,6 +105,65 @@ class Listed(list):
 
     def save(self, path):
         path.write_text(json.dumps(self))
+
+
+def test_a_report_needs_its_packages(tmp_path, monkeypatch):
+    asked = noted(monkeypatch, "common.extras.missing", "install it")
+    for one in (make, paper.report):
+        with pytest.raises(extras.MissingPackageError, match="install it"):
+            one("gaber" if one is paper.report else tmp_path)
+    assert [given for given, _ in asked] == [
+        ("report", "a report", "jinja2", "plotly"),
+        ("report", "a report", "jinja2"),
+    ]
+
+
+def test_a_place_over_all_plants_weighs_every_cell_the_same():
+    one = Place(
+        plant="duffing",
+        metric="settles",
+        law="pid",
+        mean=1.0,
+        failed=1,
+        best=True,
+        median=0.5,
+        wins=2,
+        losses=0,
+        of=3,
+        why="a",
+    )
+    two = one._replace(plant="van_der_pol", mean=2.0, failed=2, best=False, median=1.0, wins=1, losses=4, of=9, why="b")
+    both = scores._overall([one, two])
+    assert both == one._replace(
+        plant="", mean=1.75, failed=3, best=False, median=0.875, wins=3, losses=4, of=12, why=""
+    )
+    assert np.isnan(scores._overall([one._replace(metric="itae")]).median)
+
+
+def test_records_of_a_folder_are_read_in_the_order_of_their_names(tmp_path, monkeypatch):
+    files = [tmp_path / name for name in ("b.npz", "c.txt", "a.csv")]
+    monkeypatch.setattr(Path, "iterdir", lambda _: iter(files))
+    monkeypatch.setattr(rigs.records, "load", lambda path: dict.fromkeys("txur", path.name))
+    assert [(path.name, twin.name, record["t"]) for path, twin, record in rigs.read(tmp_path)] == [
+        ("a.csv", "emps", "a.csv"), ("b.npz", "emps", "b.npz"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("room", ["report", "certificates", "rigs"])
+def test_what_is_found_cannot_be_changed(room):
+    """Its classes are frozen, and those of reports and certificates take no argument by place."""
+    home = importlib.import_module(f"smc_mujoco.evidence.{room}")
+    modules = [importlib.import_module(one.name) for one in pkgutil.walk_packages(home.__path__, f"{home.__name__}.")]
+    kinds = {
+        one
+        for module in modules
+        for one in vars(module).values()
+        if dataclasses.is_dataclass(one) and isinstance(one, type)
+    }
+    own = [one for one in kinds if one.__module__.startswith(home.__name__)]
+    assert len(own) > 1
+    assert [one for one in own if not one.__dataclass_params__.frozen] == []
+    assert room == "rigs" or all(field.kw_only for one in own for field in dataclasses.fields(one))
 
 
 # stage -> what it calls, what makes a result of that, its files, and what decides whether they are computed anew

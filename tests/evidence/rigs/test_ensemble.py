@@ -50,6 +50,10 @@ def test_a_rig_has_laws_and_a_start_of_its_own():
     runs = ensemble.runs(qube, seeds=1, duration=0.1)
     assert {run.law.name for run in runs} == {law.name for law in qube.laws}
     assert {run.resolved.x0 for run in runs} == {(0.0, 0.1)}
+    many = ensemble.runs(PENDULUM, ["pid"])
+    assert ({run.duration for run in many}, {run.seed for run in many}) == ({10.0}, {*range(20)})
+    assert {len({run.resolved.x0 for run in many if run.condition == f"set {k}"}) for k in range(1, 6)} == {20}
+    assert all(0.24 - 1e-9 <= run.resolved.x0[0] <= 0.36 + 1e-9 for run in many)
     with pytest.raises(smc.ScenarioError, match="no laws have gains for realaigym_acrobot: give some"):
         ensemble.runs(smc.rig("realaigym_acrobot"))
 

@@ -8,6 +8,7 @@ import pytest
 from scipy.signal import butter, freqz
 
 import smc_mujoco as smc
+from smc_mujoco.evidence.rigs import identify as identification
 from smc_mujoco.evidence.rigs import inverse, records, replays, search, uncertainty
 from smc_mujoco.evidence.rigs.controllers import CONTROLLERS, cascade
 from smc_mujoco.evidence.rigs.replays import Piece, Point, Replays, Slopes
@@ -239,6 +240,30 @@ def test_a_corrected_search_ends_when_a_halving_moves_nothing():
     assert (moved <= 0.5 * np.sqrt(np.diag(uncertainty.jackknife(slopes)))).all()
     np.testing.assert_allclose(slopes.point.values, reached.point.values, atol=2e-4)
     assert curve.replayed[-1]["physics_step"] == 2.5e-4  # residuals with the first step, corrected
+
+
+def test_a_record_is_cut_into_pieces_of_its_window():
+    """3.3 s of which each second is one piece, with the scales of its motion."""
+    t = 1e-3 * np.arange(3301)
+    record = {"t": t, "x": 0.3 * np.sin(5.0 * t), "u": np.cos(3.0 * t)}
+    twin, data = identification._twin(smc.plant("servo_axis"), [record])
+    made = Replays(twin, ["M", "b"], data, False, lambda count: None)
+    assert [len(piece.measured["x"]) for piece in made.pieces] == [1101, 1101, 1101]
+    assert [piece.part.first for piece in made.pieces] == [0, 1100, 2200]
+    scales = 0.05 * np.array([np.std(0.3 * np.sin(5.0 * t)), np.std(1.5 * np.cos(5.0 * t))])
+    spread = np.linalg.norm(record["x"] - record["x"].mean())
+    for piece in made.pieces:
+        np.testing.assert_allclose(piece.scales, scales, rtol=1e-4)
+        assert piece.spread == {"x": pytest.approx(spread)}
+        assert piece.skipped == 0
+    assert made.free.tolist() == [0, 1]
+    state = made.state(Point(made.start.values, np.tile([2.0, -1.0], (3, 1))), 1)
+    np.testing.assert_allclose(state, [0.3 * np.sin(5.5), 1.5 * np.cos(5.5)] + scales * [2.0, -1.0], rtol=1e-3)
+    rest = made.at_rest(made.start)
+    np.testing.assert_allclose([made.state(rest, k)[1] for k in range(3)], 0.0, atol=1e-12)
+    assert len(Replays(twin, ["M"], data, False, lambda count: None, whole=True).pieces) == 1
+    np.testing.assert_allclose(made.start.values * made.scales, [twin.values["M"], twin.values["b"]])
+    np.testing.assert_allclose(made.low * made.scales, [1e-6, 0.0])
 
 
 def test_residuals_are_shares_of_the_spread_up_to_the_worst():

@@ -9,8 +9,9 @@ from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.evidence.rigs import records
-from smc_mujoco.evidence.rigs.identified import Identified
+from smc_mujoco.evidence.rigs.identified import Identified, _plain
 from smc_mujoco.evidence.rigs.records import Columns, checked
+from smc_mujoco.evidence.rigs.rig import Fall
 
 pytestmark = pytest.mark.quick
 
@@ -138,6 +139,10 @@ def told(changes=(), errors=(), fits=((99.0,),), before=((99.0,),)):
         fits_before=tuple(first), predictions=(), evaluations=1,
     )  # fmt: skip
     return found.notes
+
+
+def test_a_fall_is_a_text_in_a_file():
+    assert _plain({"x": Fall(8.44), "u": 1.5}) == {"x": "falls at 8.4 s", "u": 1.5}
 
 
 def scaled(**factors):
