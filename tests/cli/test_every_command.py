@@ -138,7 +138,7 @@ WORDS: dict[Any, Callable[[Any], str]] = {
     Scenario: told_scenario,
     Scene: lambda scene: f"Scene({scene.title}, camera={scene.camera}, seeds={ {s.seed for _, _, s in scene.runs()} })",
     Plant: lambda plant: f"plant {plant.name}",
-    Component: lambda one: f"{one.kind} {one.name}, gains of kind {one.source.kind}",
+    Component: lambda one: f"{one.kind} {one.name if one.source.search else one}, gains of kind {one.source.kind}",
     Path: lambda path: f"Path({path.as_posix()})",
     Mapping: lambda values: "{" + ", ".join(f"{key}: {told(one)}" for key, one in values.items()) + "}",
     (list, tuple): lambda values: f"[{', '.join([*map(told, values[:3]), *['...'] * (len(values) > 3)])}]",

@@ -182,15 +182,6 @@ def test_an_unknown_name_is_one_sentence_with_the_nearest(typed, meant, call):
     assert err == f"smc-mujoco: unknown law, surface or velocity estimator {typed!r}: did you mean {meant!r}?\n"
 
 
-def test_help_teaches(call):
-    code, out, _ = call("laws", "--help")
-    text = flat(out)
-    assert code == 0
-    for words in ("laws [OPTIONS] [NAME|FILE]", "relative degree", "Example: smc-mujoco laws super_twisting"):
-        assert words in text
-    assert "laws" in call("--help")[1]
-
-
 # sources in short
 
 

@@ -826,13 +826,6 @@ def test_json_to_a_dash_is_printed_and_all_else_goes_to_stderr(capsys):
     assert err.split("\n") == ["a table", "wrote figure.svg", ""]
 
 
-def test_json_to_a_file_leaves_tables_where_they_are(capsys):
-    path, terminal = options.json_file(Path("margins.json"))
-    assert path == Path("margins.json")
-    terminal.wrote(path)
-    assert capsys.readouterr().out == "wrote margins.json\n"
-
-
 # chatter
 
 

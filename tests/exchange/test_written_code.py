@@ -15,7 +15,7 @@ from smc_mujoco.exchange.c.javascript import to_js
 FMUS = {  # name of a snapshot -> law, options of export_fmu
     "one joint": ("super_twisting", {"surface": "integral", "velocity": "levant", "u_max": 3.0, "joint": "slide"}),
     "with its model": ("pid", {"model": "nominal", "control_period": 2e-3}),
-    "two joints": ("computed_torque_sliding", {"joints": 2, "u_max": (3.0, 5.0)}),
+    "two joints": ("hybrid_sliding", {"joints": 2, "u_max": (3.0, 5.0)}),
 }
 
 
@@ -45,7 +45,7 @@ def test_the_files_of_an_fmu_are_as_recorded(name, tmp_path, snapshot):
 
 @pytest.mark.parametrize(
     ("law", "numbers", "joints"),
-    [("super_twisting", "float", None), ("observer_free_q15", "q15", None), ("computed_torque_sliding", "double", 3)],
+    [("super_twisting", "float", None), ("observer_free_q15", "q15", None), ("passivity_based", "double", 3)],
 )
 def test_a_law_in_c_is_as_recorded(law, numbers, joints, snapshot):
     assert recorded(smc.law_to_c(law, numbers, joints)) == snapshot

@@ -20,7 +20,6 @@ from helpers.fmu import Importer  # noqa: E402
 from helpers.pages import ROOT, titled  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
-from smc_mujoco.cli import main as cli  # noqa: E402
 from smc_mujoco.control import estimator, surface  # noqa: E402
 from smc_mujoco.control.law import catalogue  # noqa: E402
 from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_PER_SPEED, RATE  # noqa: E402
@@ -461,19 +460,6 @@ def test_a_compiler_that_does_not_end_is_not_a_missing_one(tmp_path, monkeypatch
     monkeypatch.setattr(export, "COMPILING", 0.1)
     with pytest.raises(smc.ScenarioError, match=r"slow takes more than 0\.1 s to compile the FMU"):
         smc.export_fmu("pid", tmp_path / "pid.fmu")
-
-
-def test_the_command_writes_what_it_is_told(tmp_path, capsys):
-    out = tmp_path / "c.fmu"
-    words = ["--gains", "k1=5", "--velocity", "levant(L=900)", "--surface", "linear(c=2)", "--period", "0.002"]
-    with pytest.raises(SystemExit) as end:
-        cli.main(["export-fmu", "super_twisting", *words, "--u-max", "4", "--joint", "slide", "--out", str(out)])
-    assert not end.value.code
-    assert capsys.readouterr().out.startswith(f"{out}, ")
-    known = {v.name: v for v in fmpy.read_model_description(str(out)).modelVariables}
-    names = ("law.k1", "law.k2", "estimator.L", "surface.c", "u_max", "dt")
-    assert [float(known[name].start) for name in names] == [5.0, 4.4, 900.0, 2.0, 4.0, 0.002]
-    assert (known["u"].unit, "v" in known) == ("N", False)
 
 
 def test_a_mistake_in_the_command_is_one_sentence(capsys):

@@ -1,6 +1,5 @@
 """Laws of many joints as FMUs: valid by FMPy, and step by step what smc.run computes."""
 
-import re
 import subprocess
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
@@ -194,17 +193,6 @@ def test_units_are_left_out_where_joints_differ(made, folder):
     path = smc.export_fmu("unit_vector", folder / "turning.fmu", joints=2, binary=False)
     known = {v.name: v.unit for v in fmpy.read_model_description(str(path)).modelVariables}
     assert (known["x[1]"], known["u[2]"], known["M[1,2]"]) == ("rad", "N.m", "N.m.s^2/rad")
-
-
-def test_the_page_has_one_row_for_a_vector_and_for_a_matrix(made):
-    with zipfile.ZipFile(made["computed_torque_sliding"][0]) as archive:
-        page = archive.read("documentation/index.html").decode()
-    rows = [re.findall(r"<td[^>]*>(.*?)</td>", row) for row in re.findall(r"<tr>(.*?)</tr>", page)]
-    starts = {row[0]: row[3] for row in rows if row}
-    assert starts["law.k[1] to law.k[3]"] == "10, 20, 5"
-    assert starts["u_max[1] to u_max[3]"] == "60"
-    assert starts["M[1,1] to M[3,3]"] == "identity"
-    assert list(starts)[:3] == ["time", "x[1] to x[3]", "v[1] to v[3]"]
 
 
 @pytest.mark.parametrize(
