@@ -40,6 +40,7 @@ import numpy as np
 import wild
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common.errors import shown
 from smc_mujoco.simulation.state import LOGGED
 
@@ -199,7 +200,7 @@ class World:
         )
         Path("arm.xml").write_text(wild.ARM)
         Path("law.c").write_text(smc.law_to_c("classical"))
-        self.tuned = smc.tune("duffing", "classical", budget=8)
+        self.tuned = smc.tune("duffing", "classical", budget=1, objective=Objective(duration=0.2))
         self.tuned.save("tuned.json")
         self.sane = SANE | {
             "scenarios": [self.scenario],
