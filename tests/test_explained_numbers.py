@@ -40,6 +40,11 @@ def part(share: float) -> str:
     return PARTS[round(1.0 / share)]
 
 
+def under(condition: str) -> dict:
+    """The fields of a condition of the suite."""
+    return conditions.NAMED[condition].on(smc.plant("duffing"), 1.0)
+
+
 SAID = {
     margins: [
         f"at most {percent(margins.TOLERATED_ERROR)} of its scale",
@@ -100,10 +105,10 @@ SAID = {
         f"0 .. 2^{math.log2(scenario.MAX_SEED + 1):g} - 1",
     ],
     conditions: [
-        f"dry friction of {(level := conditions.NAMED['coulomb'].fields['friction'].level):g} N m or N is u_max / "
+        f"dry friction of {(level := under('coulomb')['friction'].level):g} N m or N is u_max / "
         f"{scenario.U_MAX / level:g}",
-        f"late by up to {part(conditions.NAMED['jitter'].fields['clock'].jitter / conditions.CONTROL_PERIOD)} of the",
-        f"one sample in {round(1 / conditions.NAMED['missed'].fields['clock'].missed)} does".replace("10", "ten"),
+        f"late by up to {part(under('jitter')['clock'].jitter / conditions.CONTROL_PERIOD)} of the",
+        f"one sample in {round(1 / under('missed')['clock'].missed)} does".replace("10", "ten"),
     ],
     smc.Clock: [f"0 .. {clock.MAX_MISSED:g}"],
     smc.TimeSeries.from_csv: [f"longer than {time_series.MAX_GAP_STEPS:g} median steps"],
@@ -137,7 +142,7 @@ SAID = {
 
 @pytest.mark.parametrize("place", SAID, ids=lambda place: getattr(place, "__name__", str(place).split("/")[-1])[-30:])
 def test_an_explanation_has_the_numbers_of_the_code(place):
-    text = place.read_text(encoding="utf-8") if isinstance(place, Path) else inspect.getdoc(place)
+    text = place.read_text(encoding="utf-8") if isinstance(place, Path) else inspect.getdoc(place) or ""
     text = " ".join(text.split())
     assert SAID[place]
     for sentence in SAID[place]:
