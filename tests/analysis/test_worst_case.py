@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.worst_case import strategies
 from smc_mujoco.analysis.worst_case.search import Search
 from smc_mujoco.analysis.worst_case.strategies import RELAY_SIGNALS, loop_frequency, recorded_force
 from smc_mujoco.analysis.worst_case.uncertainty import Members, default_class, outside
@@ -163,6 +164,22 @@ def test_constants_and_relays_reach_what_another_adversary_found():
         assert round(worst.value, 4) >= value
 
 
+def test_a_weighted_sum_sees_two_signals_as_equally_large(monkeypatch):
+    t = np.arange(4001) * 1e-3
+    signals = {"s": 5.0 * np.sin(3.0 * t), "rate": 2.0 * np.sin(5.0 * t), "error": 0.3 * np.cos(5.0 * t)}
+    for still in ("", "s"):
+        seen = signals | ({still: 0.0 * t} if still else {})
+        monkeypatch.setattr(strategies, "relay_signals", lambda trace, seen=seen: seen)
+        *pairs, (kind, last) = strategies.weighted_sums(None, 2.0, 0.1)
+        size = {name: signal.std() for name, signal in signals.items()}
+        assert kind == "sign of e' and s"
+        assert (last.rate * size["rate"], last.s) == pytest.approx((1.0, 1.0 / (1.0 if still else size["s"])))
+        weights = np.array([(one.rate * size["rate"], one.error * size["error"]) for _, one in pairs])
+        leads = np.array(strategies.PHASE_LEADS)
+        assert weights == pytest.approx(np.column_stack([np.cos(leads), np.sin(leads)]))
+        assert {(one.amplitude, one.slope) for _, one in (*pairs, ("", last))} == {(2.0, 0.1)}
+
+
 def line(case, tried):
     """What a case is: its strategy, where its force first changes its sign, what its relay sees, and its constants."""
     turns = np.flatnonzero(np.diff(np.sign(case.member.force)))[:1]
@@ -179,8 +196,8 @@ def test_a_search_tries_its_strategies_in_order(name, snapshot):
     search = Search(
         Members([scenario(duration=0.4)], CLASSES[name]), CATALOGUE["rms_error"], 500, 1, lambda steps: None
     )
-    strategies = search._simple, search._corners, search._at_loop_frequency, search._driven
-    batches = (batch for strategy in strategies for batch in strategy())
+    kinds = search._simple, search._corners, search._at_loop_frequency, search._driven
+    batches = (batch for strategy in kinds for batch in strategy())
     tried = [line(*pair) for batch in batches for pair in zip(batch, search.run(batch), strict=True)]
     said = [re.sub(r"^((?:square wave|sine) )\[\d+\]", r"\1", one) for one in tried]  # of a measured frequency
     assert said == snapshot

@@ -15,6 +15,12 @@ from smc_mujoco.simulation import philox, reference
 LARGEST_SEED = 2**53 - 1
 
 
+def test_every_stream_of_a_seed_gives_the_numbers_it_always_gave(snapshot):
+    """They are whole numbers over a power of two, the same on all machines: a run is repeated years later."""
+    streams = philox.MEASUREMENT, philox.PROCESS, philox.DROPOUT, philox.JITTER, philox.MISSED
+    assert [[philox.uniform(5, 1, stream, k) for k in (0, 1, 7)] for stream in streams] == snapshot
+
+
 @njit
 def draws(seed, channel, stream, n):
     """Pairs of normals of n consecutive blocks, (n, 2)."""

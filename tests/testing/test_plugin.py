@@ -122,6 +122,10 @@ def test_a_pair_of_limits_holds_from_both_sides(value, kept):
     assert found.within == kept
     assert found.limit == "1 .. 2"
     assert bound("driven chattering_amplitude", math.nan, "rad", 0.0).within  # no limit cycle
+    assert (bound("overshoot", value, "%", 2.0).within, bound("overshoot", value, "%", 1.9).within) == (
+        value <= 2.0,
+        value < 1.9,
+    )
 
 
 def test_the_frames_of_this_package_stay_out_of_a_failure(session):
@@ -423,6 +427,8 @@ def test_where_nothing_can_be_recorded_is_one_sentence(step_response, tmp_path, 
     response = step_response("duffing", "none", step=0.1, duration=0.01)
     monkeypatch.setattr(golden, "replacing", refuse)  # nothing is forbidden to root
     refused(lambda: golden.record(tmp_path / "a.json", "test", response, None, {"overshoot": 1.0}))
+    refused(lambda: golden.record(tmp_path / "a.json", "test", response, -0.1, {}))
+    refused(lambda: golden.record(tmp_path / "a.json", "test", response, None, {"overshoot": -1.0}))
     for put in (golden.record, golden.compare):
         refused(lambda put=put: put(tmp_path / "a.json", "test", 0.5, None, {}))
 
