@@ -27,7 +27,6 @@ from smc_mujoco.evidence.report.plan import QUICK, Bars
 from smc_mujoco.evidence.report.scores import Place, Score
 from smc_mujoco.simulation.run import run
 from smc_mujoco.studies.cache import cached
-from smc_mujoco.studies.worst_case import WorstCases
 
 TINY = dataclasses.replace(
     QUICK,
@@ -301,34 +300,6 @@ def sentences(findings, metrics):
     return " ".join([answer.first(findings, metrics), *leads, *answer.rest(findings, metrics)])
 
 
-def test_laws_that_are_level_share_the_lead_and_no_winner_is_named(findings):
-    found = answer.cells(scores(observer_free=1.0, classical=1.05, adaptive=2.0))
-    assert answer.leaders(found, "duffing", "nominal", "settling_time") == ["observer_free", "classical"]
-    assert answer.undecided(found, ["settling_time"]) == (1, 1)
-    text = told(findings, scores(observer_free=1.0, classical=1.05))
-    assert "no winner on settling time in any of 1 cells; none is better than Observer-free and Classical" in text
-    assert text.startswith("No law can be called the best: in every respect compared here, all laws are level.")
-    assert "wins" not in text
-
-
-def test_a_winner_is_named_where_one_law_alone_is_best_in_every_cell(findings):
-    text = told(findings, scores(observer_free=2.0, classical=1.0), scores("noise", observer_free=4.0, classical=3.0))
-    assert "Classical wins on settling time in every one of 2 cells" in text
-
-
-def test_over_several_cells_the_answer_says_who_wins_where_and_loses_where(findings):
-    cells = [scores(plant=plant, observer_free=2.0, classical=1.0) for plant in ("duffing", "van_der_pol")]
-    cells += [
-        scores("noise", plant=plant, observer_free=1.0, classical=3.0) for plant in ("duffing", "van_der_pol", "x")
-    ]
-    text = told(findings, *cells)
-    assert "no law wins on settling time in all 5 cells" in text
-    assert "Observer-free wins on every plant under noise" in text
-    assert "Observer-free wins in 3 and loses in 2" in text
-    assert "Classical wins in 2 and loses in 3; in none no law wins" in text
-    assert "nor in every condition" in text
-
-
 def test_a_win_of_a_law_that_never_settles_says_so(findings):
     settling = [*scores(adaptive=math.inf, classical=1.0), *scores("noise", adaptive=2.0, classical=1.0)]
     calm = [s for name in ("nominal", "noise", "sine") for s in scores(name, adaptive=1.0, classical=3.0)]
@@ -428,27 +399,6 @@ def test_a_law_that_seldom_settles_is_not_one_to_take(findings):
     assert picked(findings, calm, other, settling("idle", 0.39), settling("pid", 0.8)).law == "pid"
     calm = place("idle", wins=1)
     assert picked(findings, calm, other, settling("idle", 0.41), settling("pid", 0.8)).law == "idle"
-
-
-def test_the_first_screen_tells_the_worst_found_beside_the_median(text, findings):
-    attacked = answer.attacked(findings)
-    (found,) = attacked.values()
-    assert {one.nominal.law.name for one in found} == set(TINY.laws)
-    first, *_, last = found
-    assert first.value < last.value
-    said = answer.robust(attacked)
-    best = f"{words.law(first.nominal.law.name)} on Duffing {first.words} ({first.shown(first.median)} m)"
-    assert said == f"smallest rms error found (in brackets its median): {best}."
-    screen = text[text.index('class="answer"') : text.index('class="picks"')]
-    assert said in screen
-    rows = text[text.index('id="worst-cases"') :]
-    for one in found:
-        for value in (one.value, one.median):
-            assert re.search(rf'data-v="{value}"><a [^>]*>{re.escape(one.shown(value))}</a></td>', rows)
-    calm = dataclasses.replace(last, median=first.median / 2)
-    both = f"{words.law(last.nominal.law.name)} on Duffing {last.words} ({calm.shown(calm.median)} m)"
-    told = answer.robust({"duffing": WorstCases([first, calm])})
-    assert told == f"{said} First by the median alone: {both}."
 
 
 def test_the_papers_verdict_is_one_line_that_counts(findings):
