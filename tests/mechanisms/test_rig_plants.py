@@ -229,10 +229,10 @@ def test_friction_of_a_part_is_added_to_that_of_the_plant():
 
 
 @PLANTS
-def test_a_negative_dry_friction_is_refused(name):
-    key = smc.plant(name).dry[0]
-    with pytest.raises(smc.ScenarioError, match=f"{name}'s {key} is -1: give at least 0"):
-        smc.plant(name, **{key: -1.0})
+def test_a_plant_is_smooth_without_any_dry_friction(name):
+    without = dict.fromkeys(smc.plant(name).dry, 0.0)
+    assert smc.plant(name, **without).smooth
+    assert not any(smc.plant(name, **without | {key: 0.1}).smooth for key in without)
 
 
 @PLANTS
