@@ -108,7 +108,7 @@ PRINTED = [  # command lines that are run to their ends
     "worst duffing --law classical --budget 3 --duration 0.2 --gains default --out w.pdf --json w.json",
     "accuracy duffing --law classical --periods 0.004,0.002 --seeds 1 --duration 0.5 --out a.pdf --json a.json",
     "basin duffing --law classical --points 2 --duration 0.1 --out b.pdf --json b.json",
-    "chatter duffing --law classical --actuator lag:0.01 --gains default --duration 0.2 --out c.pdf --json c.json",
+    "chatter duffing --law super_twisting --actuator lag:0.01 --gains default --duration 0.2 --out c.pdf --json c.json",
     "tune duffing classical --budget 2 --condition nominal --out t.json --front f.pdf",
     "compare duffing --law classical,pid --gains default --condition nominal --seeds 1 --duration 0.1 --out c "
     "--figure f.pdf --latex f.tex",
