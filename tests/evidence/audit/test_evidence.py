@@ -180,7 +180,15 @@ def test_evidence_of_mutants_or_under_another_ending_is_refused(folder, done, tm
     assert evidence.document(audit(folder, only=["2"]))["left_out"] == ["1"]
 
 
-# badges
+# figure, badge and table
+
+
+def test_an_audit_draws_and_shows_its_claims(done, tmp_path):
+    (head,) = done.figure(tmp_path / "checks.svg", size=(9.0, 6.0)).legends
+    assert head.get_title().get_text() == "Claims of A. Nobody: Small"
+    assert (tmp_path / "checks.svg").is_file()
+    assert done.badge(tmp_path / "badge.svg").read_text(encoding="utf-8") == badge.svg("small", done.claims)
+    assert done._repr_html_() == done.claims._repr_html_()
 
 
 def test_verdicts_have_colours_of_their_own_from_green_to_red_and_answers_another():
