@@ -18,6 +18,7 @@ from smc_mujoco.draw.figure import figure, signals
 from smc_mujoco.draw.joints import joints
 from smc_mujoco.draw.nyquist import nyquist
 from smc_mujoco.draw.orders import orders
+from smc_mujoco.draw.pareto import pareto
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.simulation.trace import PLANT_DIVERGED
 
@@ -131,3 +132,39 @@ def test_maps_of_states_that_converge_early_or_late_or_not(size, snapshot):
     grid = {"x": np.array([-1.0, 0.0, 2.0]), "v": np.array([-3.0, 3.0])}
     maps = [Basin(law="classical", source="tuned", **names, **grid), Basin(law="adaptive", **names, **grid)]
     assert sketch(region.draw(maps, size=size)) == snapshot
+
+
+ONE, OTHER = (made(smc.Scenario(plant=name, law="classical", duration=0.01)) for name in ("duffing", "van_der_pol"))
+REFUSED = {  # call -> arguments, and what replaces them
+    figure: ({"traces": ONE}, [
+        {"traces": []}, {"traces": [ONE, OTHER]}, {"labels": ["a", "b"]}, {"labels": "a"},
+        {"path": ""}, {"path": "a\0"}, {"path": "a.gif"}, {"path": "a.png", "format": "svg"}, {"format": "svg"},
+        {"path": "a", "format": "gif"}, {"size": (1.9, 5.0)}, {"size": (5.0, 101.0)}, {"size": "ieee"}, {"size": 3.0},
+        {"panels": ["y"]}, {"panels": []},
+    ]),
+    signals: ({"traces": [ONE, ONE], "path": None}, [{"labels": ["a", "a"]}, {"labels": []}]),
+    joints: ({"traces": []}, [{}]),
+    amplitudes.amplitudes: ({"traces": {}}, [{}]),
+    nyquist: ({"scenarios": []}, [{}]),
+    orders: ({"rows": []}, [{}]),
+    region.draw: ({"maps": []}, [{}]),
+    pareto: ({"tunings": []}, [{}]),
+    smc.plot: ({"table": ONE}, [{}]),
+    smc.show: ({"what": ONE}, [{}]),
+    smc.still: ({"traces": ONE, "time": 0.0, "path": "a.png", "size": (320, 180)}, [
+        {"time": -0.1}, {"time": 0.02}, {"path": "a.jpg"}, {"size": (318, 180)}, {"size": (1922, 1080)},
+        {"camera": (0.0, 91.0)}, {"traces": [ONE] * 9},
+    ]),
+    smc.film: ({"traces": ONE, "path": "a.mp4"}, [{"path": "a"}, {"fps": 0.5}, {"speed": 0.005}, {"speed": 101.0}]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("call", REFUSED, ids=lambda call: call.__name__)
+def test_what_is_not_drawn_is_said_as_recorded(call, snapshot):
+    given, changes = REFUSED[call]
+    said = []
+    for change in changes:
+        with pytest.raises(smc.ScenarioError) as error:
+            call(**given | change)
+        said.append(str(error.value))
+    assert "\n".join(said) == snapshot
