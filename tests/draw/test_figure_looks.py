@@ -330,27 +330,6 @@ def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path)
     assert len(right.axes) == 0
 
 
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        ({"size": "ieee-colum"}, "unknown size 'ieee-colum': did you mean 'ieee-column'"),
-        ({"size": (5.0,)}, "give \\(width, height\\) in inches"),
-        ({"size": (5.0, 0.1)}, "each 2 to 100"),
-        ({"size": (5.0, 4.0), "fig": Figure()}, "give one of the two"),
-        ({"panels": ["x", "phases"]}, "unknown panel 'phases': did you mean 'phase'"),
-        ({"panels": []}, "panels is \\[\\]: give a panel that the plant has"),
-        ({"panels": ["reaction"]}, "give a panel that the plant has"),
-        ({"format": "pdf"}, "give path too"),
-        ({"format": 10**5000}, "give path too"),
-        ({"format": "gif", "path": "a"}, "unknown format 'gif'"),
-        ({"format": "pdf", "path": "a.svg"}, "end the name in .pdf"),
-    ],
-)
-def test_bad_arguments_are_refused(options, sentence, one):
-    with pytest.raises(smc.ScenarioError, match=sentence):
-        figure(one, **options)
-
-
 class Rows:
     """A table of made-up runs."""
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from helpers import arms
 from helpers.sketch import failed, made, sketch
+from matplotlib.figure import Figure
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.chattering import Chattering
@@ -140,7 +141,8 @@ REFUSED = {  # call -> arguments, and what replaces them
         {"traces": []}, {"traces": [ONE, OTHER]}, {"labels": ["a", "b"]}, {"labels": "a"},
         {"path": ""}, {"path": "a\0"}, {"path": "a.gif"}, {"path": "a.png", "format": "svg"}, {"format": "svg"},
         {"path": "a", "format": "gif"}, {"size": (1.9, 5.0)}, {"size": (5.0, 101.0)}, {"size": "ieee"}, {"size": 3.0},
-        {"panels": ["y"]}, {"panels": []},
+        {"panels": ["y"]}, {"panels": []}, {"size": (5.0,)}, {"size": (5.0, 4.0), "fig": Figure()},
+        {"format": 10**5000},
     ]),
     signals: ({"traces": [ONE, ONE], "path": None}, [{"labels": ["a", "a"]}, {"labels": []}]),
     joints: ({"traces": []}, [{}]),
@@ -153,7 +155,8 @@ REFUSED = {  # call -> arguments, and what replaces them
     smc.show: ({"what": ONE}, [{}]),
     smc.still: ({"traces": ONE, "time": 0.0, "path": "a.png", "size": (320, 180)}, [
         {"time": -0.1}, {"time": 0.02}, {"path": "a.jpg"}, {"size": (318, 180)}, {"size": (1922, 1080)},
-        {"camera": (0.0, 91.0)}, {"traces": [ONE] * 9},
+        {"size": (481, 270)},
+        {"camera": (0.0, 91.0)}, {"traces": [ONE] * 9}, {"traces": []},
     ]),
     smc.film: ({"traces": ONE, "path": "a.mp4"}, [{"path": "a"}, {"fps": 0.5}, {"speed": 0.005}, {"speed": 101.0}]),
 }  # fmt: skip

@@ -30,6 +30,7 @@ from smc_mujoco.studies import (
     replay,
     run_key,
     saved_traces,
+    store,
     study_replays,
     worst_case,
 )
@@ -288,3 +289,16 @@ def test_what_a_script_defines_is_sent_with_its_code(monkeypatch):
     monkeypatch.delattr(sys.modules["__main__"], "doubled")
     assert pickle.loads(sent)(3.0) == 6.0
     assert pickling.packed(math.hypot) == pickle.dumps(math.hypot)
+
+
+def test_a_part_with_scores_by_other_code_counts_as_not_done(tmp_path, monkeypatch):
+    kept = store.Store(tmp_path)
+    kept.open(resume=True)
+    kept.add([run_key.row(RUN)])
+    again = store.Store(tmp_path)
+    again.open(resume=True)
+    assert list(again.where) == [run_key.key(RUN)]
+    monkeypatch.setattr(store.fingerprint, "of", lambda thing: "other")
+    other = store.Store(tmp_path)
+    other.open(resume=True)
+    assert not other.where
