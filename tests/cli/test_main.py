@@ -279,13 +279,13 @@ def test_threads_are_as_many_as_asked_for_and_change_no_bit(call, undrawn, scene
     asked = []
 
     def noted(scenarios, threads, **options):
-        asked.append(threads)
+        asked.append((threads, options))
         return smc.run(scenarios, threads, **options)
 
     monkeypatch.setattr(show, "run", noted)
     for threads in (1, 2):
         assert call("run", scene, "--no-film", "--out", str(threads), "--threads", threads)[0] == 0
-    assert asked == [1, 2]
+    assert asked == [(1, {"progress": True}), (2, {"progress": True})]
     np.testing.assert_array_equal(smc.load("1/mine/noisy-rough.npz").x, smc.load("2/mine/noisy-rough.npz").x)
 
 
