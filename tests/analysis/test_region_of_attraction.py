@@ -28,7 +28,7 @@ def base(plant: str, law: smc.Law, duration: float = 6.0) -> smc.Scenario:
 @pytest.fixture(scope="module")
 def weak():
     """The inverted pendulum under a law that cannot lift it from everywhere."""
-    return maps.basin_of(base("inverted_pendulum", WEAK), np.linspace(-1.5, 1.5, 16), np.linspace(-4.5, 4.5, 16))
+    return maps.basin_of(base("inverted_pendulum", WEAK), np.linspace(-1.5, 1.5, 12), np.linspace(-4.5, 4.5, 12))
 
 
 @smc.law_function(gains={"far": 1.0})
