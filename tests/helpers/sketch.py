@@ -1,7 +1,6 @@
 """Where a figure or a film of made-up data draws what, for `assert sketch(page) == snapshot`.
 
-`words.looks` records what a figure of a simulated run says. Data that a formula makes are the same on all processors,
-so a record of them also has places and sizes, to three digits.
+Data that a formula makes are the same on all processors, so a record of them has places and sizes, to three digits.
 """
 
 import dataclasses
