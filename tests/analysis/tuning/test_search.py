@@ -250,7 +250,7 @@ def test_a_gain_over_another_is_searched_up_to_what_the_actuator_gives(law, refu
     assert sum(force > 6.0 * (1.0 - search_space.ROUNDING_TOLERANCE) for force in forces) > 3
     beyond = dataclasses.replace(tuned, law=dataclasses.replace(tuned.law, gains={**tuned.law.gains, "k": 1e3}))
     assert beyond.at_bound["k"] == "upper"
-    refused(lambda: compare([tuned, beyond]))
+    refused(lambda: compare([tuned, beyond]), "laws tuned beyond their actuator cannot be compared", recorded=False)
 
 
 def test_a_gain_is_divided_by_one_that_the_law_has(refused):
