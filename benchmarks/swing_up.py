@@ -27,7 +27,7 @@ from smc_mujoco.control.estimator import estimator
 from smc_mujoco.evidence.boards import entries
 from smc_mujoco.evidence.boards.scoring import V2
 from smc_mujoco.evidence.boards.simulator import Case, Machine, _slope, upright
-from smc_mujoco.mechanisms.plants.double_pendulum import LIMIT, MODEL_1_1
+from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1, TORQUE_LIMIT
 
 BEST = {"acrobot": 8, "pendubot": 4}  # start of the search, of twelve, that led to the best score
 DRIVEN = {"acrobot": 1, "pendubot": 0}
@@ -145,7 +145,7 @@ def optimised(w, driven, bend, most):
         return matrix
 
     low, high = np.full(len(w), -np.inf), np.full(len(w), np.inf)
-    low[4 * (count + 1) : -1], high[4 * (count + 1) : -1] = -LIMIT, LIMIT
+    low[4 * (count + 1) : -1], high[4 * (count + 1) : -1] = -TORQUE_LIMIT, TORQUE_LIMIT
     for at, value in ((slice(0, 4), 0.0), (slice(4 * count, 4 * count + 4), UPRIGHT), (4 * (count + 1), 0.0), (-2, 0)):
         low[at] = high[at] = value
     low[-1], high[-1] = 0.3 / count, 4.0 / count

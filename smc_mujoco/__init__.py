@@ -37,7 +37,7 @@ import re
 from pathlib import Path
 
 from smc_mujoco.common import annexes
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.version import __version__ as __version__
 from smc_mujoco.envs import registration
 
@@ -63,7 +63,7 @@ def __getattr__(name: str) -> object:
 
 def _load(name: str) -> object:
     """Return a public function, class or module."""
-    with held_back():
+    with delay_ctrl_c():
         value = annexes.module(_MODULES.get(name) or _ORIGINS[name], f"smc.{name}")
         return value if name in _MODULES else getattr(value, name)
 

@@ -23,7 +23,7 @@ import numpy as np
 from smc_mujoco.analysis import margins
 from smc_mujoco.analysis.chattering import Chattering, predict
 from smc_mujoco.analysis.tuning import search_space
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, users_frame
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, users_stacklevel
 from smc_mujoco.common.progress import bar
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, Template
@@ -130,7 +130,7 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
         warnings.warn(
             f"{base.law.name} with these gains does not hold {base.plant.name}, even without a disturbance",
             ScenarioWarning,
-            users_frame(),
+            users_stacklevel(),
         )
     law = chosen.law.sourced(source.TUNED, source.Search(rule=RULE, evaluations=predictions, converged=True))
     return Design(law=law, chattering=predicted, disturbance=tolerated.value, size=size, speed=speed)

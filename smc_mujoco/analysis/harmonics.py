@@ -25,7 +25,7 @@ from numba import njit
 
 from smc_mujoco.analysis.state_space import NONLINEAR_FLAGS, rates
 from smc_mujoco.common.errors import ScenarioError, number, whole
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.component import Component, Template
@@ -349,7 +349,7 @@ class Controller:
         out, y = np.empty((len(x), 2)), np.empty(len(FIELDS))
         (g0, g1, g2), (m0, m1, m2) = self.gains, memories
         model = np.array([models[0], of_joint])
-        with held_back():  # numba may compile it now
+        with delay_ctrl_c():  # numba may compile it now
             done = _run(self.addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out)
         if done < 0:
             raise ScenarioError("the law raised an exception in the harmonic balance")

@@ -23,7 +23,7 @@ from importlib.machinery import ModuleSpec
 from importlib.metadata import EntryPoint
 from typing import Any, Generic, TypeVar, overload
 
-from smc_mujoco.common.errors import ScenarioError, shown, unknown, users_frame, words
+from smc_mujoco.common.errors import ScenarioError, shown, unknown, users_stacklevel, words
 
 NAME = operator.attrgetter("name")
 PREFIX = "smc_mujoco."
@@ -237,7 +237,7 @@ def warn(message: str) -> None:
     """Warn of a package's entry, once in a process."""
     if message not in _warned:
         _warned.add(message)
-        warnings.warn(message, PackageWarning, users_frame())
+        warnings.warn(message, PackageWarning, users_stacklevel())
 
 
 def _warn_of_unknown_groups() -> None:

@@ -178,7 +178,7 @@ def name(what: str, value: object) -> str:
     return value
 
 
-def users_frame() -> int:
+def users_stacklevel() -> int:
     """Return the stacklevel with which a warning points to the user's line.
 
     The user's line is the nearest caller outside this package and outside `dataclasses`, whose `replace` makes

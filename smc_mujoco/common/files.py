@@ -19,7 +19,7 @@ from smc_mujoco.common.errors import ScenarioError, shown
 MAX_NAME = 60  # bytes of a name in a file's name, which most file systems limit to 255
 MAX_SIZE = 2 * 10**9  # bytes of a file that is read: chosen
 MAX_UNPACKED, MAX_RATIO, MAX_MEMBERS = 500_000_000, 20, 10_000  # of an archive: bytes, per byte packed, files; chosen
-WORDS = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}  # numbers that JSON lacks
+NON_FINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}  # numbers that JSON lacks
 
 
 def shipped(folder: str) -> Path:
@@ -187,7 +187,7 @@ def plain(data: Any) -> Any:
         return [plain(value) for value in data]
     if isinstance(data, float) and not math.isfinite(data):
         return "NaN" if math.isnan(data) else "Infinity" if data > 0 else "-Infinity"
-    if isinstance(data, str) and data.lstrip("'") in WORDS:
+    if isinstance(data, str) and data.lstrip("'") in NON_FINITE:
         return f"'{data}"
     return data
 
@@ -198,8 +198,8 @@ def _restored(data: Any) -> Any:
         return {name: _restored(value) for name, value in data.items()}
     if isinstance(data, list):
         return [_restored(value) for value in data]
-    if isinstance(data, str) and data.lstrip("'") in WORDS:
-        return data[1:] if data.startswith("'") else WORDS[data]
+    if isinstance(data, str) and data.lstrip("'") in NON_FINITE:
+        return data[1:] if data.startswith("'") else NON_FINITE[data]
     return data
 
 

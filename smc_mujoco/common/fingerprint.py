@@ -77,24 +77,24 @@ def of(thing: Any) -> str:
     """Return the hash of a function, a class with its methods, a callable object, or a tuple of these.
 
     The hash of a function or class of this package is computed once. That of another one is computed at every call,
-    until `hold` keeps it.
+    until `keep` keeps it.
 
     Raises:
       ScenarioError: it contains something that can be neither read nor pickled.
     """
     try:
-        return _held[thing] if thing in _held else _cached(thing) if ours(thing) else now(thing)
+        return _compiled_hashes[thing] if thing in _compiled_hashes else _cached(thing) if ours(thing) else now(thing)
     except TypeError:  # not hashable
         return now(thing)
 
 
-def hold(thing: Any) -> None:
+def keep(thing: Any) -> None:
     """Keep the present hash of a function or class that is compiled, because compiled code keeps its present globals.
 
     Only the first call counts. A thing that cannot be hashed is ignored.
     """
     with contextlib.suppress(ScenarioError):
-        _held.setdefault(thing, of(thing))
+        _compiled_hashes.setdefault(thing, of(thing))
 
 
 def now(thing: Any) -> str:
@@ -120,7 +120,7 @@ def variables(function: Any) -> dict[str, str]:
     return {name: now(value) for name, value in (*zip(reached[::2], reached[1::2], strict=True), *cells)}
 
 
-_held: dict[Any, str] = {}  # function or class -> its hash when it was compiled
+_compiled_hashes: dict[Any, str] = {}  # function or class -> its hash when it was compiled
 _cached = functools.cache(now)
 
 

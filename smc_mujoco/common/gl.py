@@ -22,13 +22,13 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import mujoco
 
-OFF = ("disable", "disabled", "off", "false", "0")  # values of MUJOCO_GL that turn rendering off
-DISPLAY = ("enable", "enabled", "on", "true", "1", "glfw", "glx")  # values for a backend that needs a display
+OFF_VALUES = ("disable", "disabled", "off", "false", "0")  # values of MUJOCO_GL that turn rendering off
+DISPLAY_VALUES = ("enable", "enabled", "on", "true", "1", "glfw", "glx")  # values for a backend that needs a display
 LIBRARIES = {  # backend -> groups of libraries, of each of which mujoco loads one
     "egl": (("libEGL.so.1",), ("libOpenGL.so.0", "libGL.so.1", "libGLESv2.so.2", "libGLESv1_CM.so.1")),
     "osmesa": (("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"),),
 }
-PACKAGES = "install a renderer (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri)"
+CURE = "install a renderer (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri)"
 TIMEOUT = 60.0  # s, for a probe: chosen
 # Python code that fails if a backend cannot render.
 PROBE = """
@@ -74,7 +74,7 @@ def choose_gl() -> str:
 def usable(backend: str) -> bool:
     """Return whether `import mujoco` works with this backend."""
     if backend not in LIBRARIES:
-        return backend in OFF + DISPLAY
+        return backend in OFF_VALUES + DISPLAY_VALUES
     if os.environ.get("PYOPENGL_PLATFORM", "").lower() not in ("", backend):
         return False
     return all(any(map(loads, group)) for group in LIBRARIES[backend])
@@ -95,7 +95,7 @@ def note() -> str | None:
     if chosen.wish in ("", chosen.backend):
         return None
     why = "does not load here" if chosen.wish in LIBRARIES else "is not a backend of MuJoCo"
-    then = "films are off" if chosen.backend in OFF else f"{chosen.backend} is used instead"
+    then = "films are off" if chosen.backend in OFF_VALUES else f"{chosen.backend} is used instead"
     return f"MUJOCO_GL={chosen.wish} {why}: {then}"
 
 
@@ -106,19 +106,19 @@ def missing() -> str | None:
     It renders an empty model in a child process, because a broken driver can end the process that it runs in.
     """
     chosen = choice()
-    if chosen.wish in OFF:
+    if chosen.wish in OFF_VALUES:
         return f"no film: MUJOCO_GL={chosen.wish} turns rendering off: unset it"
     found = f" (and MUJOCO_GL={chosen.wish} cannot be used)" if note() else ""
-    if chosen.backend in OFF:
+    if chosen.backend in OFF_VALUES:
         platform = os.environ.get("PYOPENGL_PLATFORM")
         if platform:
             return f"no film: PYOPENGL_PLATFORM={platform} rules out what is installed{found}: unset it"
-        return f"no film: neither libEGL with libGL nor libOSMesa is here{found}: {PACKAGES}"
+        return f"no film: neither libEGL with libGL nor libOSMesa is here{found}: {CURE}"
     error = probe(chosen.backend)
     if error is None:
         return None
     if chosen.backend in LIBRARIES:
-        return f"no film: {chosen.backend} does not render{found} ({error}): {PACKAGES}"
+        return f"no film: {chosen.backend} does not render{found} ({error}): {CURE}"
     cure = "set MUJOCO_GL=egl" if sys.platform == "linux" else "unset MUJOCO_GL"
     return f"no film: MuJoCo cannot open a window to render in ({error}): {cure}"
 

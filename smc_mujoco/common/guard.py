@@ -17,14 +17,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-MEMORY = 4 * 2**30  # bytes that a trial may have: chosen
-DISK = 10**9  # bytes of a file that a trial writes: chosen
+MAX_MEMORY = 4 * 2**30  # bytes that a trial may have: chosen
+MAX_FILE = 10**9  # bytes of a file that a trial writes: chosen
 MAX_PROGRESS = 10**7  # bytes of a report: chosen
-BLOCK = 2**16  # bytes, as many as a file system gives a file at once, or more
+BLOCK_SIZE = 2**16  # bytes, as many as a file system gives a file at once, or more
 FAULT, END = "Fault", "unloading"  # a line that begins so names a fault; the last line of a trial that passes
 ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps), by which other simulations compute too"
 # Signal -> its usual cause. The causes of other signals are reads, writes and divisions.
-SIGNALS = {int(signal.SIGABRT): "aborts", int(signal.SIGFPE): "divides, or traps floating-point exceptions"}
+CAUSES = {int(signal.SIGABRT): "aborts", int(signal.SIGFPE): "divides, or traps floating-point exceptions"}
 
 
 class Fault(Exception):
@@ -74,7 +74,7 @@ def tried(module: str, order: Mapping[str, Any], timeout: float) -> Any:
         if lines[-1] == END and code == 0:
             return json.loads(lines[-2])
         with files.no_room():  # a report that could not be written is no fault of the module
-            (folder / "block").write_bytes(bytes(BLOCK))
+            (folder / "block").write_bytes(bytes(BLOCK_SIZE))
     stages = [line for line in lines if not line.startswith(f"{FAULT} ")]
     raise Failed(stages[-1], lines[-1].removeprefix(f"{FAULT} ") if lines[-1] != stages[-1] else "", code, timeout)
 
@@ -86,7 +86,7 @@ def _ended(code: int | None, timeout: float) -> str:
     if code >= 0:
         return f"ended the process with exit code {code}: let it return"
     names = {known.value: known.name for known in signal.Signals}  # without most real-time signals
-    name, does = names.get(-code, f"signal {-code}"), SIGNALS.get(-code, "reads, writes or divides")
+    name, does = names.get(-code, f"signal {-code}"), CAUSES.get(-code, "reads, writes or divides")
     return f"died of {name} ({signal.strsignal(-code)}): fix where it {does}"
 
 
@@ -139,9 +139,10 @@ def limit() -> None:
         import resource
     except ImportError:  # Windows
         return
-    for kind, maximum in ((resource.RLIMIT_DATA, MEMORY), (resource.RLIMIT_FSIZE, DISK), (resource.RLIMIT_CORE, 0)):
+    bounds = (resource.RLIMIT_DATA, MAX_MEMORY), (resource.RLIMIT_FSIZE, MAX_FILE), (resource.RLIMIT_CORE, 0)
+    for kind, bound in bounds:
         with contextlib.suppress(OSError, ValueError):  # the system sets a lower bound already
-            resource.setrlimit(kind, (maximum, resource.getrlimit(kind)[1]))
+            resource.setrlimit(kind, (bound, resource.getrlimit(kind)[1]))
 
 
 def run(folder: Path) -> None:
@@ -155,7 +156,7 @@ def run(folder: Path) -> None:
             result = json.dumps(importlib.import_module(order["module"]).attempt(order["order"], say))
             say(f"{result}\n{END}")
         except MemoryError:
-            say(FAULT, f"takes more than {MEMORY / 2**30:g} GiB of memory: make it smaller")
+            say(FAULT, f"takes more than {MAX_MEMORY / 2**30:g} GiB of memory: make it smaller")
         except Exception as error:
             kind = "" if type(error).__name__ == FAULT else f"{type(error).__name__}: "
             say(FAULT, f"{kind}{' '.join(str(error).split())}")

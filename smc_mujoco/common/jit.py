@@ -23,7 +23,7 @@ from numba import from_dtype, njit, types
 from numba.extending import intrinsic
 
 from smc_mujoco.common.errors import printable
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.numba_internals import (
     CFunc,
     CPUCodeLibrary,
@@ -41,7 +41,7 @@ from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.common.rebuild import rebuild
 
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
-DIGEST = hashlib.sha256().digest_size
+DIGEST_SIZE = hashlib.sha256().digest_size
 # Beginnings of lines in numba's errors that say where an error was, not what it was.
 WHEREABOUTS = re.compile(
     r"Failed in|No implementation|There are|- Of which|Overload|Intrinsic|With argument|Rejected|"
@@ -207,7 +207,7 @@ def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = Fal
     if cache:
         with contextlib.suppress(RuntimeError):  # nowhere to write
             made._cache = Cache(body, *(() if cache is True else cache))
-    with held_back(), NUMBERS.given():
+    with delay_ctrl_c(), NUMBERS.given():
         _load_numba()
         made.compile()
     return made
@@ -286,7 +286,7 @@ class Sealed(IndexDataCacheFile):
             content = Path(path).read_bytes()
         except OSError:
             return False
-        return self._seal(content[:-DIGEST]) == content[-DIGEST:]
+        return self._seal(content[:-DIGEST_SIZE]) == content[-DIGEST_SIZE:]
 
     def _seal(self, content: bytes) -> bytes:
         return hashlib.sha256(repr(self._source_stamp).encode() + content).digest()

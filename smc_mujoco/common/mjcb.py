@@ -24,13 +24,13 @@ import mujoco
 CALLBACKS = ("control", "passive", "contactfilter", "sensor", "time", "act_dyn", "act_gain", "act_bias")
 
 _lock = threading.RLock()  # held while callbacks are replaced
-_free = threading.RLock()  # held briefly, so that no Python callback is installed meanwhile; its holder never waits
+_python_lock = threading.RLock()  # held while no Python callback may be installed; its holder never waits
 
 
 def _after_fork() -> None:
     """Free the locks and remove our callbacks: a child process has none of its parent's threads."""
-    global _lock, _free
-    _lock, _free = threading.RLock(), threading.RLock()
+    global _lock, _python_lock
+    _lock, _python_lock = threading.RLock(), threading.RLock()
     mujoco.set_mjcb_control(None)
     if no_clock.cache_info().currsize and mujoco.get_mjcb_time() is no_clock():  # else it is None or a user's
         mujoco.set_mjcb_time(None)
@@ -49,10 +49,10 @@ def installed(control: Any) -> Iterator[None]:
     with _lock:
         before = _callbacks()
         try:
-            _put(dict.fromkeys(CALLBACKS) | {"control": control, "time": no_clock()})
+            _install(dict.fromkeys(CALLBACKS) | {"control": control, "time": no_clock()})
             yield
         finally:
-            _put(before)
+            _install(before)
 
 
 @functools.cache
@@ -77,7 +77,7 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     Raises:
       ValueError: MuJoCo cannot compile it.
     """
-    with _free:
+    with _python_lock:
         if not any(map(_python, _callbacks().values())):
             return spec.compile()
     with installed(None):
@@ -89,9 +89,9 @@ def _callbacks() -> dict[str, Any]:
     return {name: getattr(mujoco, f"get_mjcb_{name}")() for name in CALLBACKS}
 
 
-def _put(callbacks: dict[str, Any]) -> None:
+def _install(callbacks: dict[str, Any]) -> None:
     """Install callbacks, as `_callbacks` returns them, that are not installed yet."""
-    with _free if any(map(_python, callbacks.values())) else contextlib.nullcontext():
+    with _python_lock if any(map(_python, callbacks.values())) else contextlib.nullcontext():
         for name, callback in callbacks.items():
             if getattr(mujoco, f"get_mjcb_{name}")() is not callback:
                 getattr(mujoco, f"set_mjcb_{name}")(callback)

@@ -22,46 +22,48 @@ class Names(NamedTuple):
     attributes: set[str]
 
 
-def rebuild(function: Any, finish: Callable[[Any], Any], made: dict[Callable, Any] | None = None) -> Any:
+def rebuild(function: Any, finish: Callable[[Any], Any], copies: dict[Callable, Any] | None = None) -> Any:
     """Return a copy of a function that calls copies of its compiled helpers.
 
     Args:
       function: plain Python or compiled.
       finish: function, such as numba.njit, that is called with the plain Python of each copy; its result is used.
-      made: function -> its copy, for copies that exist already. New ones are added.
+      copies: function -> its copy, for copies that exist already. New ones are added.
     """
-    return _rebuild(getattr(function, "py_func", function), finish, {} if made is None else made)
+    return _rebuild(getattr(function, "py_func", function), finish, {} if copies is None else copies)
 
 
-def _rebuild(function: Any, finish: Callable, made: dict) -> Any:
+def _rebuild(function: Any, finish: Callable, copies: dict) -> Any:
     if not isinstance(function, FunctionType):
         return finish(function)
-    if function not in made and not _calls_compiled(function):
-        made[function] = finish(function)
-    elif function not in made:
+    if function not in copies and not _calls_compiled(function):
+        copies[function] = finish(function)
+    elif function not in copies:
         space, names = dict(function.__globals__), names_in(function.__code__)
         cells = tuple(CellType() for _ in function.__closure__ or ())
-        made[function] = finish(FunctionType(function.__code__, space, function.__name__, function.__defaults__, cells))
+        copies[function] = finish(
+            FunctionType(function.__code__, space, function.__name__, function.__defaults__, cells)
+        )
         # filled in only now, because a function may call itself
-        space |= {name: _swapped(space[name], names, finish, made) for name in names.variables & space.keys()}
+        space |= {name: _swapped(space[name], names, finish, copies) for name in names.variables & space.keys()}
         for cell, old in zip(cells, function.__closure__ or (), strict=True):
-            cell.cell_contents = _swapped(old.cell_contents, names, finish, made)
-    return made[function]
+            cell.cell_contents = _swapped(old.cell_contents, names, finish, copies)
+    return copies[function]
 
 
-def _swapped(value: Any, names: Names, finish: Callable, made: dict) -> Any:
+def _swapped(value: Any, names: Names, finish: Callable, copies: dict) -> Any:
     """Return what replaces a value in a copy.
 
     That is a copy of a compiled function, a copy of a module in which compiled functions with these attributes' names
     are copied, or else the value itself.
     """
     if isinstance(value, Dispatcher):
-        return _rebuild(value.py_func, finish, made)
+        return _rebuild(value.py_func, finish, copies)
     if isinstance(value, ModuleType) and _holds(value, names.attributes):
         copy = ModuleType(value.__name__)
         for name, thing in vars(value).items():
             used = name in names.attributes
-            vars(copy)[name] = _swapped(thing, Names(set(), set()), finish, made) if used else thing
+            vars(copy)[name] = _swapped(thing, Names(set(), set()), finish, copies) if used else thing
         return copy
     return value
 

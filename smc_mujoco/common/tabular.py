@@ -23,17 +23,17 @@ PLAIN_WIDTH = 80  # characters of a line of plain text
 NAME_WIDTH, HEADING_WIDTH = 20, 8  # characters: of names before they are broken, and of headings at least
 MAX_HTML_ROWS = 40
 NO_BREAK = "\N{NO-BREAK SPACE}"
-FIT = r"too wide for a column: \resizebox{\textwidth}{!}{...}, of graphicx, or fewer metrics"
+WIDTH_HINT = r"too wide for a column: \resizebox{\textwidth}{!}{...}, of graphicx, or fewer metrics"
 # A character -> as LaTeX writes it, with any engine.
 TEX = {c: f"\\{c}" for c in "&%$#_{}"} | {c: f"${c}$" for c in "<>|"}
 TEX |= {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
 TEX |= {"–": "--", "·": r"$\cdot$", "×": r"$\times$", "±": r"$\pm$", "−": "$-$", "′": "$'$", "″": "$''$"}
 LETTERS = "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΦΨΩ"
-NAMES = (
+LETTER_NAMES = (
     "alpha beta gamma delta varepsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon varphi chi"
 )
-NAMES += " psi omega Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega"
-TEX |= {letter: f"$\\{name}$" for letter, name in zip(LETTERS, NAMES.split(), strict=True)}
+LETTER_NAMES += " psi omega Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega"
+TEX |= {letter: f"$\\{name}$" for letter, name in zip(LETTERS, LETTER_NAMES.split(), strict=True)}
 TEX |= {c: f"$_{i}$" for i, c in enumerate("₀₁₂₃₄₅₆₇₈₉")} | {c: f"$^{i}$" for i, c in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")}
 
 
@@ -157,7 +157,7 @@ class Tabular:
 
     def to_latex(self) -> str:
         """Return a tabular, which needs the package booktabs, below comments with the title and the notes."""
-        lines = [f"% {text}" for text in (self.title, *self.notes, "needs booktabs", FIT) if text]
+        lines = [f"% {text}" for text in (self.title, *self.notes, "needs booktabs", WIDTH_HINT) if text]
         lines += [f"\\begin{{tabular}}{{{'l' * self.left}{'r' * (len(self.headings) - self.left)}}}", "\\toprule"]
         lines += [_tex_line(map(tex, self.headings)), "\\midrule"]
         lines += [_tex_line(_tex_cell(_cell(cell)) for cell in row) for row in self.rows]

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, TypedDict
 import numpy as np
 
 from smc_mujoco.common import errors
-from smc_mujoco.common.errors import ScenarioError, number, shown, taken, unknown, users_frame, whole
+from smc_mujoco.common.errors import ScenarioError, number, shown, taken, unknown, users_stacklevel, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
 from smc_mujoco.control.units import Gain
@@ -318,7 +318,7 @@ class Template:
                 )
         for words in self.unmet(values) if warn else ():
             text = ", ".join(f"{name} = {gain_text(value)}" for name, value in values.items())
-            warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {text}", GainWarning, users_frame())
+            warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {text}", GainWarning, users_stacklevel())
         component = Component(
             kind=self.kind,
             name=self.name,

@@ -8,8 +8,8 @@ from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, write
 
-GRID = 41  # positions and velocities of one channel
-STATES = 500  # random states of a network
+GRID_SIZE = 41  # positions and velocities of one channel
+RANDOM_STATES = 500  # random states of a network
 SEED = 0
 
 
@@ -46,6 +46,6 @@ def deviation(plant: Plant | str, mechanism: str, reach: float | None = None) ->
 def _states(n: int, reach: float) -> np.ndarray:
     """Return states (m, 2, n) of n channels."""
     if n > 1:
-        return np.random.default_rng(SEED).uniform(-reach, reach, (STATES, 2, n))
-    line = np.linspace(-reach, reach, GRID)
+        return np.random.default_rng(SEED).uniform(-reach, reach, (RANDOM_STATES, 2, n))
+    line = np.linspace(-reach, reach, GRID_SIZE)
     return np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2, 1)

@@ -152,7 +152,7 @@ def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
         return not ok
 
     compiled = _stored(native, kind.value, names, random, series, memory, rows, sees)
-    fingerprint.hold(kind)
+    fingerprint.keep(kind)
     return compiled
 
 
@@ -194,7 +194,7 @@ def _compile_friction(function: Callable, names: tuple[str, ...]) -> Function:
 def _stored(native: Callable, function: Callable, *arguments: object) -> Function:
     """Return the C function of a user's function. It is kept on disk under its hash and these arguments."""
     compiled = Function(native, _disk_key(function, *arguments))
-    fingerprint.hold(function)
+    fingerprint.keep(function)
     return compiled
 
 

@@ -28,7 +28,7 @@ from numba import njit
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.joint_law import head_at
 from smc_mujoco.mechanisms.hardware.drives import rippled
-from smc_mujoco.mechanisms.hardware.sliding import SLOW
+from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED
 from smc_mujoco.simulation import clock, philox
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.channels import channel_at, lever
@@ -508,7 +508,7 @@ def _apply_friction(address, sim, data):
             return record.FRICTION_RAISED
         f, low, high = outputs.f, outputs.low, outputs.high
         if state.stuck == 0.0:
-            slows = abs(v) < SLOW and abs(v) <= abs(state.speed)
+            slows = abs(v) < STICKING_SPEED and abs(v) <= abs(state.speed)
             if slows or v * state.speed < 0.0:
                 state.stuck, state.stuck_at = 1.0, x
         if state.stuck != 0.0:

@@ -20,7 +20,7 @@ from smc_mujoco.common.errors import (
     one_line,
     shown,
     taken,
-    users_frame,
+    users_stacklevel,
     whole,
 )
 from smc_mujoco.common.frozen import frozen
@@ -192,7 +192,7 @@ def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Comp
             f"gains of set {gains!r} were tuned for {plant.name} with its default parameters, and this one has "
             f"{', '.join(changed)}: tune the law on it, or give the law's gains yourself",
             ScenarioWarning,
-            users_frame(),
+            users_stacklevel(),
         )
     return with_gains
 

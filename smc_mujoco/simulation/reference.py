@@ -19,7 +19,7 @@ from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.drives import rippled
-from smc_mujoco.mechanisms.hardware.sliding import SLOW, Sliding
+from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding
 from smc_mujoco.mechanisms.plant import Dynamics, Plant, Values
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import philox, trace
@@ -329,7 +329,7 @@ class Loop:
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof])
             friction, low, high = formula(v, motor, load + float(data.qfrc_constraint[dof] + d[i]))
             stuck, before = not math.isnan(self.stuck_at[i]), self.speed[i]
-            slows = abs(v) < SLOW and abs(v) <= abs(before)
+            slows = abs(v) < STICKING_SPEED and abs(v) <= abs(before)
             if not stuck and (slows or v * before < 0.0):
                 stuck, self.stuck_at[i] = True, x
             if stuck:

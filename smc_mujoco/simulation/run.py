@@ -16,7 +16,7 @@ from typing import overload
 
 import mujoco
 
-from smc_mujoco.common.errors import ScenarioError, shown, users_frame, whole
+from smc_mujoco.common.errors import ScenarioError, shown, users_stacklevel, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.simulation import callback, reference
 from smc_mujoco.simulation.batch import Report, ScenarioBatch
@@ -76,7 +76,7 @@ def stream(
     uncompiled: list[tuple[int, Prepared]] = []
     for index, prepared in enumerate(_prepared(scenarios)):
         if prepared.why_not:
-            warnings.warn(f"{prepared.why_not}; the run takes the reference loop", PlainLoopWarning, users_frame())
+            warnings.warn(f"{prepared.why_not}; the run takes the reference loop", PlainLoopWarning, users_stacklevel())
             uncompiled.append((index, prepared))
         else:
             groups.setdefault(prepared.key, []).append((index, prepared))

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, users_frame
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, users_stacklevel
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.control.component import Template, gain_text
@@ -658,7 +658,7 @@ def warn_of_degrees(s: Resolved) -> None:
                     f"{what} is {value:g} rad, {abs(value) / math.tau:.1f} turns: if it is {value:g} degrees, give "
                     f"math.radians({value:g})",
                     ScenarioWarning,
-                    users_frame(),
+                    users_stacklevel(),
                 )
                 return
 
@@ -666,7 +666,7 @@ def warn_of_degrees(s: Resolved) -> None:
 def warn_of_units(s: Resolved) -> None:
     """Warn of the first number that is probably in another unit: percent, ms or degrees."""
     for fact, cure in _other_units(s):
-        warnings.warn(f"{fact}: {cure}", ScenarioWarning, users_frame())
+        warnings.warn(f"{fact}: {cure}", ScenarioWarning, users_stacklevel())
         return
 
 
@@ -706,6 +706,6 @@ def warn_of_weak_motors(s: Resolved) -> None:
                     f"DCMotor gives at most {motor.stall:.3g} {s.plant.efforts[i]} at rest, and channel {i} of "
                     f"{s.plant.name} needs {need:.3g} to hold its start: give the motor more gear, voltage or current",
                     ScenarioWarning,
-                    users_frame(),
+                    users_stacklevel(),
                 )
                 return

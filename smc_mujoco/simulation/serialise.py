@@ -14,7 +14,7 @@ from smc_mujoco.control import serialise as components
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.surface import catalogue as surfaces
-from smc_mujoco.mechanisms.custom.plant_from import OwnModel, restored
+from smc_mujoco.mechanisms.custom.plant_from import UserModel, restored
 from smc_mujoco.mechanisms.hardware import backlash, drives, friction, servos  # noqa: F401  # whose parts a file may name
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Plant
@@ -83,7 +83,7 @@ def restore(data: dict) -> Scenario:
 
 def _plant(plant: Plant) -> dict:
     data = {"name": plant.name, "n": plant.n, "module": plant.build.__module__} | dict(plant.parameters)
-    return data | ({"mjcf": plant.build.about()} if isinstance(plant.build, OwnModel) else {})
+    return data | ({"mjcf": plant.build.about()} if isinstance(plant.build, UserModel) else {})
 
 
 def _restore_plant(data: dict) -> Plant:

@@ -34,7 +34,7 @@ from smc_mujoco.common.errors import (
     one_line,
     shown,
     taken,
-    users_frame,
+    users_stacklevel,
     whole,
 )
 from smc_mujoco.common.extras import package
@@ -331,7 +331,7 @@ def _warn_of_defaults(setups: Sequence[Setup], gains: str) -> None:
             f"no gains in set {gains!r} for {', '.join(pairs)}: these have their default gains; tune them, or give "
             "laws with gains",
             ScenarioWarning,
-            users_frame(),
+            users_stacklevel(),
         )
 
 

@@ -125,9 +125,9 @@ def wall_path(behind: float = -PATH_BEFORE) -> tuple[Waypoints, ...]:
     Args:
       behind: how far the path is behind the wall's face, m; below 0: before it.
     """
-    from smc_mujoco.mechanisms.plants.panda import WALL
+    from smc_mujoco.mechanisms.plants.panda import WALL_DISTANCE
 
-    x = WALL - PROBE + behind
+    x = WALL_DISTANCE - PROBE + behind
     points = [(x, -0.2, 0.40), (x, 0.2, 0.40), (x, 0.2, 0.55)]
     return tuple(cartesian_path(arm(), [0.4, 2.4, 3.4], points, site="tip", x0=WALL_POSE))
 

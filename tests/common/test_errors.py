@@ -142,8 +142,8 @@ def test_a_frozen_mapping_does_not_change():
 
 def test_a_warning_points_to_the_line_of_the_user():
     """The nearest caller outside the package: the frame of this test, from however deep."""
-    space = {"__name__": "smc_mujoco.deep", "users_frame": errors.users_frame}
-    exec("def level(n):\n    return users_frame() if n == 0 else level(n - 1)", space)
+    space = {"__name__": "smc_mujoco.deep", "users_stacklevel": errors.users_stacklevel}
+    exec("def level(n):\n    return users_stacklevel() if n == 0 else level(n - 1)", space)
     assert [space["level"](n) for n in range(3)] == [2, 3, 4]
 
 

@@ -25,7 +25,7 @@ def attempt(order: Mapping[str, Any], say: Callable) -> Any:
         return len([bytes(2**26) for _ in range(1000)])
     if kind == "write":
         with Path(order["file"]).open("wb") as file:
-            file.truncate(guard.DISK + 1)
+            file.truncate(guard.MAX_FILE + 1)
     if kind == "forks":
         children = []
         while len(children) < 20:
@@ -64,7 +64,7 @@ def test_a_trial_without_room_for_its_report_blames_no_module():
 
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (guard.BLOCK // 2, limits[1]))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (guard.BLOCK_SIZE // 2, limits[1]))
         with pytest.raises(smc.ScenarioError) as refused:
             guard.tried(__name__, {"kind": "exit"}, 60.0)
     finally:

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.common.registry import discover, modules, subclasses
 
@@ -38,16 +38,16 @@ def test_ctrl_c_waits_for_the_end_of_the_block(monkeypatch):
     before, reached = signal.signal(signal.SIGINT, signal.default_int_handler), False
     try:
         with pytest.raises(KeyboardInterrupt):  # noqa: PT012
-            with held_back():
+            with delay_ctrl_c():
                 signal.raise_signal(signal.SIGINT)
                 reached = True
             raise AssertionError("it came to nothing")
         assert reached
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        with held_back():
+        with delay_ctrl_c():
             pass
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        with held_back():
+        with delay_ctrl_c():
             assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)
@@ -57,7 +57,7 @@ def test_other_threads_need_no_delay():
     seen = []
 
     def work():
-        with held_back():
+        with delay_ctrl_c():
             seen.append(signal.getsignal(signal.SIGINT))
 
     thread = threading.Thread(target=work)

@@ -8,7 +8,7 @@ from helpers.models import unnamed
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.fidelity import deviation
 from smc_mujoco.mechanisms.geometry import coil
-from smc_mujoco.mechanisms.geometry.pendulum_chain import HOOK
+from smc_mujoco.mechanisms.geometry.pendulum_chain import HOOK_ARM
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.plant import catalogue, plant, write
 
@@ -96,7 +96,7 @@ def test_a_spring_between_rods_gives_kc_times_the_sine_of_the_difference(name):
     expected[:-1] += torque
     expected[1:] -= torque
     np.testing.assert_allclose(pull(model, data, x) * 0.5 * 0.5**2, expected, rtol=1e-9, atol=1e-12)
-    assert p.parameters["l"] > HOOK
+    assert p.parameters["l"] > HOOK_ARM
 
 
 @NETWORKS

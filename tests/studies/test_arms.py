@@ -26,7 +26,7 @@ def test_the_walls_path_is_as_far_from_its_face_as_it_says(task, behind):
     scenario = arms.scenario(task, LAW)
     joints = np.array([signal.values for signal in scenario.references]).T
     probe = tip_path(scenario.plant, joints)[:, 0] + arms.PROBE
-    np.testing.assert_allclose(probe, panda.WALL + behind, atol=1e-6)
+    np.testing.assert_allclose(probe, panda.WALL_DISTANCE + behind, atol=1e-6)
 
 
 def test_the_cost_is_the_tips_rms_error_times_one_plus_the_variation():

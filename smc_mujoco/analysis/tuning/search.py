@@ -50,7 +50,7 @@ from smc_mujoco.analysis.tuning.result import (
     versions,
 )
 from smc_mujoco.analysis.tuning.search_space import Box
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, users_frame, whole
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, users_stacklevel, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.control.component import Component, Template
@@ -208,7 +208,7 @@ def _refuse_broken(law: Component, traces: Sequence[Trace]) -> None:
 
 
 def _warn(words: str) -> None:
-    warnings.warn(words, ScenarioWarning, users_frame())
+    warnings.warn(words, ScenarioWarning, users_stacklevel())
 
 
 def _without_unit_warning(law: Component) -> str:

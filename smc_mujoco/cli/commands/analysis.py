@@ -10,7 +10,7 @@ import typer
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.gains_for import Design
@@ -56,7 +56,7 @@ def tune(
 
     Example: smc-mujoco tune duffing observer_free --out duffing.json
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.analysis.tuning import search
         from smc_mujoco.common.files import ended, writable
 
@@ -116,7 +116,7 @@ def margins(
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kinds delay
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.analysis.margins import KINDS, save, save_csv
         from smc_mujoco.analysis.margins import margins as search
         from smc_mujoco.cli import tables
@@ -198,7 +198,7 @@ def worst(
 
     Example: smc-mujoco worst panda --law computed_torque_sliding --gains default --parameter payload=0:2
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
         from smc_mujoco.common.files import write_json
         from smc_mujoco.draw.page import files
@@ -286,7 +286,7 @@ def accuracy(
 
     Example: smc-mujoco accuracy duffing --condition coulomb --law classical,twisting,super_twisting,observer_free
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
         from smc_mujoco.control.law import laws as known
@@ -339,7 +339,7 @@ def basin(
 
     Example: smc-mujoco basin inverted_pendulum --law classical --out classical.png
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED
         from smc_mujoco.analysis.region_of_attraction import basin as search
         from smc_mujoco.common.progress import bar
@@ -416,7 +416,7 @@ def chatter(
 
     Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --out chatter
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.analysis.chattering import chattering, save, shared_assumptions
         from smc_mujoco.analysis.step_halving import step_halving
         from smc_mujoco.cli import tables

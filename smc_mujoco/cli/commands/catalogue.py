@@ -8,7 +8,7 @@ import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 
 T = TypeVar("T")
 
@@ -19,7 +19,7 @@ def list_() -> None:
 
     The line about an entry of another installed package ends with the name of that package, in brackets.
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.cli import law_pages, tables
         from smc_mujoco.common.catalogue import Catalogue
         from smc_mujoco.mechanisms.plant import catalogue as plants
@@ -87,7 +87,7 @@ def laws(
 
     Example: smc-mujoco laws --needs continuous,two-gains
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.cli import law_pages
         from smc_mujoco.common.errors import ScenarioError
 

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Clock, Terminal, errors_as_sentences
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.step_halving import StepChange
@@ -59,7 +59,7 @@ def run(
     Example: smc-mujoco run duffing --no-film --out results --export csv,parquet
     """
     clock = Clock()
-    with clock("loading"), held_back():
+    with clock("loading"), delay_ctrl_c():
         from smc_mujoco.cli.scene import perform
         from smc_mujoco.draw.film.camera import from_text
         from smc_mujoco.simulation.trace import formats
@@ -94,7 +94,7 @@ def show(
 
     Example: smc-mujoco show videos/duffing/nominal-classical.npz --figure classical
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.analysis.step_halving import NOTE
         from smc_mujoco.cli import tables
         from smc_mujoco.simulation.trace import formats, load
@@ -181,7 +181,7 @@ def view(
     no_window = display.missing()
     if sys.platform == "linux" and not no_window:
         os.environ["MUJOCO_GL"] = "glfw"  # one library for all windows
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.draw import viewer
         from smc_mujoco.studies import scene as scenes
 

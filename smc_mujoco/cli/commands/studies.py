@@ -8,7 +8,7 @@ import typer
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError, printable
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.initial_states import Starts
@@ -65,7 +65,7 @@ def which(
 
     Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition "worn: sensor=Encoder(counts=4096)" --needs accurate
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.analysis.relevant_difference import RELEVANT
         from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
         from smc_mujoco.studies.adviser import which as advise
@@ -146,7 +146,7 @@ def compare(
 
     Example: smc-mujoco compare arm.xml:shoulder --x0 0.5 --law pid,classical --figure arm --latex arm.tex
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.analysis.relevant_difference import RELEVANT
         from smc_mujoco.common.files import writable
         from smc_mujoco.draw.page import files

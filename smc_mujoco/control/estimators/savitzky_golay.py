@@ -17,7 +17,7 @@ from smc_mujoco.control.estimator import estimator_function
 from smc_mujoco.control.units import Gain
 
 MAX_READINGS = 128  # readings in memory
-FITS = {
+CONDITIONS = {
     f"whole window and degree, and 1 <= degree < window <= {MAX_READINGS}, else the nearest": lambda g: (
         g.window == int(g.window) and g.degree == int(g.degree) and 1 <= g.degree < g.window <= MAX_READINGS
     )
@@ -27,7 +27,7 @@ FITS = {
 @estimator_function(
     gains={"window": Gain(31.0, positive=True, held=True), "degree": Gain(2.0, positive=True, held=True)},
     memory=2 + 3 * MAX_READINGS,
-    conditions=FITS,
+    conditions=CONDITIONS,
 )
 def savitzky_golay(y, gains, memory):
     N = min(max(int(gains.window), 2), MAX_READINGS)

@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image
 
 from smc_mujoco.common import errors, extras, gl
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, taken, users_frame
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, taken, users_stacklevel
 from smc_mujoco.common.files import ended, replacing
 from smc_mujoco.common.progress import bar
 from smc_mujoco.draw import states, style
@@ -238,7 +238,7 @@ def framed(
         if stage.shows():
             if view != chosen is not None:
                 fact = f"camera {chosen!r} shows nothing of {name}: the picture is from camera={view}"
-                warnings.warn(fact, ScenarioWarning, users_frame())
+                warnings.warn(fact, ScenarioWarning, users_stacklevel())
             return stage
         if not any(len(links) for links in stage.links):
             fact = "shows no part that moves: give it geoms in groups 0 to 2 that are not transparent"
@@ -247,7 +247,7 @@ def framed(
     else:
         stage = Stage(traces, colours, size, room, chosen, motions, apart)
         fact = "shows nothing from any side: give another camera, such as camera=(60, -20, 3)"
-    warnings.warn(f"the picture of {name} {fact}", ScenarioWarning, users_frame())
+    warnings.warn(f"the picture of {name} {fact}", ScenarioWarning, users_stacklevel())
     return stage
 
 

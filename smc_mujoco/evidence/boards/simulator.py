@@ -30,7 +30,7 @@ import numpy as np
 from numba import njit
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.evidence.boards.scoring import shoulder_first
@@ -224,7 +224,7 @@ class Machine:
         states, torque = np.zeros((STEPS + 1, 4)), np.zeros(STEPS)
         memories = np.zeros(self.sizes[0]), np.zeros((2, self.sizes[1]))
         functions = np.array([self.law.address, self.estimator.address])
-        with held_back():  # numba may compile it now
+        with delay_ctrl_c():  # numba may compile it now
             raised = _simulate(
                 functions, self.gains, self.filter, *memories, self.known, np.array(list(true.values())), self.driven,
                 self.limit, self.uses_model, noise, pulse, case.response, case.delay, states, torque,

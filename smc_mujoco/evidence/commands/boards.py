@@ -7,7 +7,7 @@ import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
 @errors_as_sentences()
@@ -28,7 +28,7 @@ def board(
 
     Example: smc-mujoco board acrobot --figure acrobot --film acrobot.mp4
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.cli.scene import filmed
         from smc_mujoco.common.files import ended, writable
         from smc_mujoco.common.progress import bar

@@ -8,7 +8,7 @@ import typer
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 
 if TYPE_CHECKING:
     from smc_mujoco.evidence.certificates.certificate import Certificate
@@ -62,7 +62,7 @@ def certify(
 
     Example: smc-mujoco certify --check duffing.json
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.common.files import ended, write_json
         from smc_mujoco.draw.page import files
         from smc_mujoco.evidence.certificates.certificate import Certificate

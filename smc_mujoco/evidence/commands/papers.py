@@ -9,7 +9,7 @@ import typer
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import printable
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 
 if TYPE_CHECKING:
     from smc_mujoco.evidence.audit.paper import Paper
@@ -69,7 +69,7 @@ def claims(
 
     Example: smc-mujoco claims --paper ./my_paper --evidence evidence.json --badge badge.svg
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import ended, replacing, writable
         from smc_mujoco.common.progress import bar
@@ -146,7 +146,7 @@ def papers(
 
     Example: smc-mujoco papers --new my_paper && smc-mujoco claims --paper ./my_paper
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.cli import tables
         from smc_mujoco.evidence.audit import evidence, paper
 

@@ -8,7 +8,7 @@ import typer
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import errors_as_sentences
 from smc_mujoco.common.errors import printable
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
 @errors_as_sentences()
@@ -49,7 +49,7 @@ def report(
 
     Example: smc-mujoco report --paper ./my_paper --out audit
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.evidence.report import paper as of_paper
         from smc_mujoco.evidence.report import report as make

@@ -7,7 +7,7 @@ import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
 @errors_as_sentences()
@@ -41,7 +41,7 @@ def identify(
 
     Example: smc-mujoco identify servo_axis run.csv --set M=5,b=8 --columns x=position,u=force
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.evidence.rigs.identify import identify as find
         from smc_mujoco.evidence.rigs.records import load
@@ -113,7 +113,7 @@ def replay(
 
     Example: smc-mujoco replay qube_servo run.csv --quantities driver --duration 6 --film run.mp4
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.cli.scene import filmed
         from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import ended, writable

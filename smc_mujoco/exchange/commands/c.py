@@ -9,7 +9,7 @@ import typer
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 
 ARGUMENTS = re.compile(r"\b(gains|memory|timeout|flag)s?=$")  # of law_from_c, at the end of its error sentences
 
@@ -42,7 +42,7 @@ def check_c(
 
     Example: smc-mujoco check-c my_law.c --gains lam=6,k1=3
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.control.from_text import parsed_gains
         from smc_mujoco.exchange.c.load import check
 
@@ -78,7 +78,7 @@ def export_c(
 
     Example: smc-mujoco export-c observer_free --gains lam=6,k1=3 --type float > observer_free.c
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.exchange.c.export import law_to_c
 
     with options.joints_as_option():

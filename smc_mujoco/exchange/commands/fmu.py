@@ -9,7 +9,7 @@ import typer
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
 @errors_as_sentences()
@@ -48,7 +48,7 @@ def export_fmu(
 
     Example: smc-mujoco export-fmu super_twisting --gains k1=5,k2=8 --velocity levant --u-max 6 --out controller.fmu
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.control import estimator
         from smc_mujoco.control import surface as surfaces
         from smc_mujoco.control.from_text import component
@@ -89,7 +89,7 @@ def check_fmu(
 
     Example: smc-mujoco check-fmu controller.fmu --variables x=theta,v=omega,u=torque --constants enable=1
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.exchange.fmu.load import check
 
     values = {}

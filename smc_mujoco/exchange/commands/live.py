@@ -7,7 +7,7 @@ import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
-from smc_mujoco.common.interrupts import held_back
+from smc_mujoco.common.interrupts import delay_ctrl_c
 
 PORT = 8000
 
@@ -45,7 +45,7 @@ def live(
 
     Example: smc-mujoco live duffing cart_pole --law my_law.py --serve
     """
-    with held_back():
+    with delay_ctrl_c():
         from smc_mujoco.common.progress import bar
         from smc_mujoco.exchange.live.build import PLANTS
         from smc_mujoco.exchange.live.build import live as build

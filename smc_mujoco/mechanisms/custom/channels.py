@@ -11,7 +11,7 @@ from smc_mujoco.common.errors import ScenarioError, find, number, shown, taken
 from smc_mujoco.mechanisms.custom.mjcf import pick
 
 MAX_EXCESS = 1e-3  # rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
-SIMPLE = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
+UNIT_OF_JOINT = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
 
 Range = tuple[str, float, float]  # joint, least and largest position, rad or m
 SUGGESTED = ("law", "u_max", "reference")  # fields of a Channel that are defaults of scenarios
@@ -106,7 +106,7 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
     names = [model.joint(i).name for i in range(model.njnt)]
     for joint in joints:
         kind = mujoco.mjtJoint(model.jnt_type[pick(label, "joint", joint, names)])
-        if kind not in SIMPLE:
+        if kind not in UNIT_OF_JOINT:
             raise ScenarioError(
                 f"joint {joint!r} of {label} is a {kind.name[6:].lower()} joint: give one that is a hinge or slide"
             )

@@ -32,7 +32,7 @@ DIGITS = 17  # of numbers in the XML of an MjSpec: enough for any float64
 ROUNDING = 1e-12  # relative and absolute: change of a model's numbers when it is written and read
 
 RESERVED = ("smc:", PLAY, ROTOR)  # prefixes of names of this package's parts
-NAMED = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")  # kinds of object that these parts add
+RESERVED_KINDS = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")  # kinds of object that these parts add
 # Parts of names of fields that do not affect the motion, or that MuJoCo computes.
 UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")
 # Prefix of a field's name -> kind of object it belongs to.
@@ -234,7 +234,7 @@ def _complaint(source: Source, failed: guard.Failed, timeout: float) -> Scenario
     """Return the error for a model, from its trial."""
     names = {known.value: known.name for known in signal.Signals}
     how = "" if failed.code is None else names.get(-failed.code, f"exit code {failed.code}")
-    much = f"more than {guard.MEMORY / 2**30:g} GiB of memory"
+    much = f"more than {guard.MAX_MEMORY / 2**30:g} GiB of memory"
     if how == "SIGKILL" or re.search(r"unknown exception|bad_alloc|memory|allocat", failed.fault):
         return ScenarioError(f"{source.label} takes MuJoCo {much}: make it smaller")
     if failed.fault:
@@ -321,7 +321,7 @@ def check_model(label: str, model: mujoco.MjModel) -> None:
     check_numbers(label, model)
     for name in [text.decode() for text in model.names.split(b"\0")]:
         for start in filter(name.startswith, RESERVED):
-            for kind in NAMED:
+            for kind in RESERVED_KINDS:
                 if mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), name) >= 0:
                     raise ScenarioError(
                         f"{label} has a {kind.lower()} {name!r}, and names that begin with {start!r} are "

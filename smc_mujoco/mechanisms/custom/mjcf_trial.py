@@ -11,8 +11,8 @@ from typing import Any
 
 from smc_mujoco.common.guard import FAULT
 
-MESSAGE = 4000  # bytes of MuJoCo's error message, at most
-VFS = 1024  # bytes, more than any version's mjVFS has
+MESSAGE_SIZE = 4000  # bytes of MuJoCo's error message, at most
+VFS_SIZE = 1024  # bytes, more than any version's mjVFS has
 HANDLER = ctypes.CFUNCTYPE(None, ctypes.c_char_p)
 
 
@@ -45,16 +45,16 @@ class Trial:
     def run(self, order: Mapping[str, Any]) -> None:
         """Read the model, compile it, make its data, and compute its first accelerations."""
         self.say("reading")
-        error, files = ctypes.create_string_buffer(MESSAGE), None
+        error, files = ctypes.create_string_buffer(MESSAGE_SIZE), None
         if order["path"]:
-            spec = self.library.mj_parseXML(os.fsencode(order["path"]), None, error, MESSAGE)
+            spec = self.library.mj_parseXML(os.fsencode(order["path"]), None, error, MESSAGE_SIZE)
         else:
-            files = ctypes.create_string_buffer(VFS)
+            files = ctypes.create_string_buffer(VFS_SIZE)
             self.library.mj_defaultVFS(files)
             for name, place in order["assets"].items():
                 content = Path(place).read_bytes()
                 self.library.mj_addBufferVFS(files, name.encode(), content, len(content))
-            spec = self.library.mj_parseXMLString(Path(order["text"]).read_bytes(), files, error, MESSAGE)
+            spec = self.library.mj_parseXMLString(Path(order["text"]).read_bytes(), files, error, MESSAGE_SIZE)
         if not spec:
             self.fail(error.value)
         self.say("compiling")

@@ -11,10 +11,10 @@ from smc_mujoco.mechanisms.custom.channels import Channel
 from smc_mujoco.mechanisms.custom.mjcf import pick
 from smc_mujoco.mechanisms.hardware.part import PASSIVE
 
-MOTOR = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.value)  # they drive a single joint
+ONE_JOINT = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.value)  # transmissions to one joint
 FIXED, NO_BIAS = mujoco.mjtGain.mjGAIN_FIXED.value, mujoco.mjtBias.mjBIAS_NONE.value
 NO_DYNAMICS = mujoco.mjtDyn.mjDYN_NONE.value
-GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot turn off
+MOTOR_GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot turn off
 CURE = "give smc.Channel(motor=True) for an ideal motor in its place"
 
 
@@ -36,7 +36,7 @@ def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) ->
     """Return the motor that drives a joint."""
     number, wanted = model.joint(joint).id, channel.actuator
     bounds = [tuple(map(float, model.jnt_actfrcrange[number]))] if model.jnt_actfrclimited[number] else []
-    actuators = [i for i in range(model.nactuator) if model.actuator_trntype[i] in MOTOR]
+    actuators = [i for i in range(model.nactuator) if model.actuator_trntype[i] in ONE_JOINT]
     actuators = [i for i in actuators if model.actuator_trnid[i, 0] == number]
     if channel.motor:
         if wanted is not None:
@@ -113,7 +113,7 @@ def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[float, f
     return (low, high) if low < 0.0 < high else (-math.inf, math.inf)
 
 
-def put(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
+def add_motors(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
     """Add the channels' motors, in this order, and keep the model's other actuators as passive parts."""
     replaced = {i for motor in motors for i in motor.replaced}
     for i, actuator in enumerate(list(spec.actuators)):
@@ -127,4 +127,4 @@ def put(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
         limit = motor.limit if math.isfinite(motor.limit) else 0.0
         made.gear, made.ctrllimited, made.forcelimited = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0), False, limit > 0.0
         made.ctrlrange, made.forcerange = (0.0, 0.0), (-limit, limit)
-        made.armature, made.damping, made.delay, made.nsample, made.group = 0.0, (0.0, 0.0, 0.0), 0.0, 0, GROUP
+        made.armature, made.damping, made.delay, made.nsample, made.group = 0.0, (0.0, 0.0, 0.0), 0.0, 0, MOTOR_GROUP

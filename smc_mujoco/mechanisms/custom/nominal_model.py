@@ -233,10 +233,10 @@ def unknown() -> Function:
         output[0], output[1] = np.nan, np.nan
         return 0
 
-    return _kept(native)
+    return _on_disk(native)
 
 
-def _called(name: str, more: int = 0) -> Callable:
+def _mujoco(name: str, more: int = 0) -> Callable:
     """Return a function of MuJoCo's library, for numba. It takes model, data and as many more addresses.
 
     Compiled code has its name, not its address, so that another process can load the code from the disk.
@@ -245,7 +245,7 @@ def _called(name: str, more: int = 0) -> Callable:
     return types.ExternalFunction(name, types.void(*[types.int64] * (2 + more)))
 
 
-def _kept(native: Callable) -> Function:
+def _on_disk(native: Callable) -> Function:
     """Return a C function of this file, kept on disk under a hash of the sources that it is made of."""
     sources = b"".join(Path(str(module.__file__)).read_bytes() for module in (sys.modules[__name__], jit, plant))
     return Function(native, ("nominal-model", hashlib.sha256(sources).hexdigest()))
@@ -267,9 +267,9 @@ def _stages() -> tuple[Callable, Callable]:
     M and h do not need, which is half of the time: the factors of M, collisions, lights, transmissions, actuators. The
     numbers are the same.
     """
-    position, velocity, actuation = map(_called, ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation"))
-    kinematics, centres, inertia = map(_called, ("mj_kinematics", "mj_comPos", "mj_makeM"))
-    rates, passive, newton_euler = _called("mj_comVel"), _called("mj_passive"), _called("mj_rne", 2)
+    position, velocity, actuation = map(_mujoco, ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation"))
+    kinematics, centres, inertia = map(_mujoco, ("mj_kinematics", "mj_comPos", "mj_makeM"))
+    rates, passive, newton_euler = _mujoco("mj_comVel"), _mujoco("mj_passive"), _mujoco("mj_rne", 2)
 
     @njit
     def positions(model, data, bias, alone):
@@ -300,7 +300,7 @@ def native_dynamics() -> Function:
     Its input is a record SEEN, its outputs are M (n, n), h and g, (n,) each. Without `at_rest` g is NaN.
     """
     positions, velocities = _stages()
-    full = _called("mj_fullM", 1)
+    full = _mujoco("mj_fullM", 1)
 
     def native(y, p, m, out):
         at, read = dynamics_at(p, 0), seen_at(y, 0)
@@ -331,13 +331,13 @@ def native_dynamics() -> Function:
                 forces[j] = bias[k] - passive[k] - actuator[k]
         return 0
 
-    return _kept(native)
+    return _on_disk(native)
 
 
 @functools.cache
 def native_coriolis() -> Function:
     """Return the C function of C(x, v) w, at the state of the last call of `native_dynamics`. Its input is w, (n,)."""
-    rates, newton_euler, velocity = _called("mj_comVel"), _called("mj_rne", 2), _called("mj_fwdVelocity")
+    rates, newton_euler, velocity = _mujoco("mj_comVel"), _mujoco("mj_rne", 2), _mujoco("mj_fwdVelocity")
 
     def native(y, p, m, out):
         at = dynamics_at(p, 0)
@@ -360,13 +360,13 @@ def native_coriolis() -> Function:
                 output[j] += sign * 0.25 * bias[place_at(places, j).qvel]
         return 0
 
-    return _kept(native)
+    return _on_disk(native)
 
 
 @functools.cache
 def native_jacobian() -> Function:
     """Return the C function of the tip's Jacobian, (3, n), at the state of the last call of `native_dynamics`."""
-    of_site = _called("mj_jacSite", 3)
+    of_site = _mujoco("mj_jacSite", 3)
 
     def native(y, p, m, out):
         at = dynamics_at(p, 0)
@@ -380,7 +380,7 @@ def native_jacobian() -> Function:
                 output[i, j] = moves[i, place_at(int(at.places), j).qvel]
         return 0
 
-    return _kept(native)
+    return _on_disk(native)
 
 
 @functools.cache
@@ -389,8 +389,8 @@ def native() -> Function:
 
     Its input is a record SEEN, its outputs are f and g of channel i.
     """
-    positions, velocities = map(_called, ("mj_fwdPosition", "mj_fwdVelocity"))
-    actuation, accelerations, solve = map(_called, ("mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM"), (0, 0, 3))
+    positions, velocities = map(_mujoco, ("mj_fwdPosition", "mj_fwdVelocity"))
+    actuation, accelerations, solve = map(_mujoco, ("mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM"), (0, 0, 3))
 
     def native(y, p, m, out):
         read, at = seen_at(y, 0), nominal_at(p, 0)
@@ -422,4 +422,4 @@ def native() -> Function:
         output[0], output[1] = qacc[dof], moved[dof]
         return 0
 
-    return _kept(native)
+    return _on_disk(native)

@@ -27,7 +27,7 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.channels import (
-    SIMPLE,
+    UNIT_OF_JOINT,
     Channel,
     check,
     check_ranges,
@@ -38,7 +38,7 @@ from smc_mujoco.mechanisms.custom.channels import (
     suggested,
 )
 from smc_mujoco.mechanisms.custom.mjcf import Source
-from smc_mujoco.mechanisms.custom.motors import MOTOR, Motor, motor_of, put
+from smc_mujoco.mechanisms.custom.motors import ONE_JOINT, Motor, add_motors, motor_of
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.part import ROTOR, START
 from smc_mujoco.mechanisms.plant import DIRECTLY, Field, Plant, catalogue
@@ -49,12 +49,12 @@ if TYPE_CHECKING:
 MAX_TIMEOUT = 86_400.0  # s, of a timeout
 UNNAMED = mujoco.MjSpec().modelname  # name of a model whose file gives none
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
-WITHOUT = "give a law without a model"
-CURRENT = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # dynamics of an actuator whose state changes although ctrl is 0
+WITHOUT_MODEL = "give a law without a model"
+DCMOTOR = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # dynamics of an actuator whose state changes although ctrl is 0
 
 
 @dataclasses.dataclass(frozen=True)
-class OwnModel:
+class UserModel:
     """Builder of a user's mechanism: Plant.build. It ignores n, because the channels decide it."""
 
     source: Source
@@ -68,7 +68,7 @@ class OwnModel:
         spec = self.source.read()
         while named := [*spec.tuples, *spec.sensors]:  # tuples may name sensors and motors that are deleted
             spec.delete(named[0])  # MuJoCo 4 also deletes the tuples that name it, so list them again
-        put(spec, self.motors)
+        add_motors(spec, self.motors)
         for joint in joints_of(self.channels):
             for letter, kind in (("x", mujoco.mjtSensor.mjSENS_JOINTPOS), ("v", mujoco.mjtSensor.mjSENS_JOINTVEL)):
                 spec.add_sensor(name=f"{letter}:{joint}", type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint)
@@ -103,7 +103,7 @@ def _inside(source: Source) -> dict:
 
 
 @dataclasses.dataclass(frozen=True)
-class OwnFields:
+class UserFields:
     """The fields that m and grav set: Plant.fields. They scale all masses and inertias, and gravity."""
 
     mass: float
@@ -151,10 +151,10 @@ def plant_from(
     """
     source = mjcf.source(path, assets)
     mjcf.tried(source, errors.number("timeout", timeout, above=0.0, high=MAX_TIMEOUT))
-    return own_plant(source, channels, name, keyframe, tip)
+    return user_plant(source, channels, name, keyframe, tip)
 
 
-def own_plant(
+def user_plant(
     source: Source,
     channels: Mapping[str, Channel | Mapping | None] | Iterable[str],
     name: str | None,
@@ -178,11 +178,11 @@ def own_plant(
     if tip is not None:
         mjcf.pick(label, "site", tip, [model.site(i).name for i in range(model.nsite)])
     motors = tuple(motor_of(label, model, joint, channel) for joint, channel in pairs)
-    build = OwnModel(source, keyframe, pairs, motors, tip or "")
+    build = UserModel(source, keyframe, pairs, motors, tip or "")
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
-    fields, limits = OwnFields(mass, gravity), tuple(motor.limit for motor in motors)
-    units = tuple(SIMPLE[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
+    fields, limits = UserFields(mass, gravity), tuple(motor.limit for motor in motors)
+    units = tuple(UNIT_OF_JOINT[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
     why_not, called = missing(model, joints, motors), named(label) if name is None else name
     x0, checked = starts(model, joints, pairs, keyframe)
     if not recorded:
@@ -243,15 +243,15 @@ def smooth(model: mujoco.MjModel) -> bool:
 def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...]) -> str:
     """Return why there is no nominal model of the channels, or ""."""
     if np.any(model.eq_active0):
-        return "equality constraints hold its joints together, and M^-1 knows of none: " + WITHOUT
+        return "equality constraints hold its joints together, and M^-1 knows of none: " + WITHOUT_MODEL
     if model.nplugin or model.nflex:
-        return "it has plugins or flexible bodies: " + WITHOUT
+        return "it has plugins or flexible bodies: " + WITHOUT_MODEL
     ours = [int(model.joint(joint).dofadr[0]) for joint in joints]
     idle = np.ones(model.nactuator, bool)
     idle[[actuator for motor in motors for actuator in motor.replaced]] = False
-    if np.any(model.actuator_dyntype[idle] == CURRENT):
-        return "a dcmotor among its other actuators has a current that is not measured: " + WITHOUT
-    across = model.ntendon or np.any(~np.isin(model.actuator_trntype[idle], MOTOR))  # may couple trees
+    if np.any(model.actuator_dyntype[idle] == DCMOTOR):
+        return "a dcmotor among its other actuators has a current that is not measured: " + WITHOUT_MODEL
+    across = model.ntendon or np.any(~np.isin(model.actuator_trntype[idle], ONE_JOINT))  # may couple trees
     near = range(model.nv) if across else np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[ours]))
     loose = list(dict.fromkeys(int(model.dof_jntid[dof]) for dof in near if dof not in ours))
     return unmeasured(model, loose, len(motors), len(joints) - len(motors)) if loose else ""
@@ -261,11 +261,11 @@ def unmeasured(model: mujoco.MjModel, loose: list[int], driven: int, partners: i
     """Return why there is no nominal model: these joints, by index, move with the channels and are not measured."""
     for number in loose:
         kind = mujoco.mjtJoint(model.jnt_type[number])
-        if kind not in SIMPLE:
-            return f"a {kind.name[6:].lower()} joint moves with its channels, and can be none: {WITHOUT}"
+        if kind not in UNIT_OF_JOINT:
+            return f"a {kind.name[6:].lower()} joint moves with its channels, and can be none: {WITHOUT_MODEL}"
         if not model.joint(number).name:
             return "a joint without a name moves with its channels: name it, and make it a channel or a partner"
-    moved = set(model.actuator_trnid[np.isin(model.actuator_trntype, MOTOR), 0].tolist())
+    moved = set(model.actuator_trnid[np.isin(model.actuator_trntype, ONE_JOINT), 0].tolist())
     bare = [number for number in loose if number not in moved]
     partners += len(bare)
     driven += len(loose) - len(bare)
@@ -274,14 +274,14 @@ def unmeasured(model: mujoco.MjModel, loose: list[int], driven: int, partners: i
     if partners not in (0, driven):
         return (
             f"{problem}, and of joints without an actuator there are {partners}, of driven ones {driven}, which take "
-            f"one partner each or none: {WITHOUT}"
+            f"one partner each or none: {WITHOUT_MODEL}"
         )
     cure = f"a partner with smc.Channel(partner={first!r})" if loose[0] in bare else "a channel"
-    return f"{problem}: make it {cure}, or {WITHOUT}"
+    return f"{problem}: make it {cure}, or {WITHOUT_MODEL}"
 
 
 def restored(data: Mapping, name: str) -> Plant:
-    """Return the plant that `OwnModel.about` describes."""
+    """Return the plant that `UserModel.about` describes."""
     if "text" in data:
         model = data["text"]
         assets = {name: base64.b64decode(content) for name, content in data["assets"].items()}
@@ -293,6 +293,6 @@ def restored(data: Mapping, name: str) -> Plant:
             raise ScenarioError(
                 f"its model {model}, or a file that it names, is another than in the run: put that one back"
             )
-    return own_plant(
+    return user_plant(
         mjcf.source(model, assets), data["channels"], name, data["keyframe"], data.get("tip"), recorded=True
     )

@@ -8,22 +8,22 @@ from collections.abc import Iterator
 
 import mujoco
 
-from smc_mujoco.mechanisms.hardware.contact import SOLREF_RUB, SPRINGY, bar, box, hit, rub, solid
+from smc_mujoco.mechanisms.hardware.contact import SOFT_IMPEDANCE, SOLREF_RUB, bar, box, hit, rub, solid
 from smc_mujoco.mechanisms.plant import Field, Values
 
-STOPPING = 0.5  # restitution of rubber buffers: chosen
-FRICTION = 0.1  # of the block on its bed: chosen, 1 N beside springs of 1 to 3 N and commands of 6 N
+STOP_RESTITUTION = 0.5  # of rubber buffers: chosen
+BED_FRICTION = 0.1  # of the block on its bed: chosen, 1 N beside springs of 1 to 3 N and commands of 6 N
 GRAVITY = 9.81  # m/s^2
 
-RAIL = 0.26  # m, height of the rails and of the cart
-SIDES = {"front": -0.10, "back": 0.10}  # m, y of the rails
-END = 0.20  # m, half the block's length
-LOW, MIDDLE = 0.292, 0.342  # m, heights of the block's bottom and middle
-BUFFER = 0.030  # m, radius
-DEEP = 1.0  # m, depth of a stop behind its face, enough for a blow of 100 m/s
-REACH = END + BUFFER  # m, from the cart's middle to the face of its buffers
-PIN = 0.020  # m, radius of the post
-SUNK = (1 - SPRINGY) * GRAVITY * SOLREF_RUB[0] ** 2 / 4  # m, how deep the block's four corners sink in at rest
+RAIL_Z = 0.26  # m, height of the rails and of the cart
+RAIL_Y = {"front": -0.10, "back": 0.10}  # m
+HALF_BLOCK = 0.20  # m
+BOTTOM_Z, MIDDLE_Z = 0.292, 0.342  # m, of the block
+BUFFER_RADIUS = 0.030  # m
+STOP_DEPTH = 1.0  # m, depth of a stop behind its face, enough for a blow of 100 m/s
+FACE_X = HALF_BLOCK + BUFFER_RADIUS  # m, from the cart's middle to the face of its buffers
+POST_RADIUS = 0.020  # m
+SINK_DEPTH = (1 - SOFT_IMPEDANCE) * GRAVITY * SOLREF_RUB[0] ** 2 / 4  # m, of the block's corners at rest
 
 
 def mass_fields(model: mujoco.MjModel, p: Values) -> Iterator[Field]:
@@ -38,33 +38,33 @@ def stops(spec: mujoco.MjSpec, x: float) -> None:
     machine = spec.body("machine")
     for side, sign in (("left", -1), ("right", 1)):
         buffers(spec, side, sign)
-        face = x + REACH
-        for rail, y in SIDES.items():
+        face = x + FACE_X
+        for rail, y in RAIL_Y.items():
             name = f"{side}_{rail}"
             near, far = sorted((sign * face, sign * (face + 0.02)))
             box(machine, f"{name}_pad", (near, y - 0.036, 0.300), (far, y + 0.036, 0.384), "ink")
             near, far = sorted((sign * (face + 0.02), sign * (face + 0.10)))
             box(machine, f"{name}_stop", (near, y - 0.042, 0.224), (far, y + 0.042, 0.390), "graphite")
-            near, far = sorted((sign * face, sign * (face + DEEP)))
+            near, far = sorted((sign * face, sign * (face + STOP_DEPTH)))
             solid(machine, f"{name}_solid", (near, y - 0.036, 0.300), (far, y + 0.036, 0.384))
-            hit(spec, (f"{name}_solid", f"{name}_buffer"), STOPPING)
+            hit(spec, (f"{name}_solid", f"{name}_buffer"), STOP_RESTITUTION)
 
 
 def peg(spec: mujoco.MjSpec, x: float) -> None:
     """Add a post on the front rail that the cart, coming from the right, hits when its middle is at x, m."""
-    machine, place, y = spec.body("machine"), x - REACH - PIN, SIDES["front"]
+    machine, place, y = spec.body("machine"), x - FACE_X - POST_RADIUS, RAIL_Y["front"]
     buffers(spec, "left", -1)
     box(machine, "peg_clamp", (place - 0.045, y - 0.042, 0.224), (place + 0.020, y + 0.042, 0.300), "graphite")
-    bar(machine, "peg", ((place, y, 0.29), (place, y, 0.43)), PIN, "brass", round_ends=True)
-    hit(spec, ("peg", "left_front_buffer"), STOPPING)
+    bar(machine, "peg", ((place, y, 0.29), (place, y, 0.43)), POST_RADIUS, "brass", round_ends=True)
+    hit(spec, ("peg", "left_front_buffer"), STOP_RESTITUTION)
 
 
 def buffers(spec: mujoco.MjSpec, side: str, sign: int) -> None:
     """Add two rubber buffers at one end of the cart."""
     cart = spec.body("cart")
-    for rail, y in SIDES.items():
+    for rail, y in RAIL_Y.items():
         buffer = cart.add_geom(name=f"{side}_{rail}_buffer", type=mujoco.mjtGeom.mjGEOM_SPHERE, material="ink")
-        buffer.pos, buffer.size = (sign * END, y, MIDDLE - RAIL), (BUFFER, 0, 0)
+        buffer.pos, buffer.size = (sign * HALF_BLOCK, y, MIDDLE_Z - RAIL_Z), (BUFFER_RADIUS, 0, 0)
 
 
 def bed(spec: mujoco.MjSpec, length: float) -> None:
@@ -72,10 +72,10 @@ def bed(spec: mujoco.MjSpec, length: float) -> None:
     for geom in [g for g in spec.geoms if g.name.startswith("bearing") or g.name in ("front_rail", "back_rail", "bed")]:
         spec.delete(geom)
     machine, cart = spec.body("machine"), spec.body("cart")
-    box(machine, "bed", (-length, -0.150, 0.225), (length, 0.150, LOW - 0.012), "graphite")
-    box(machine, "lining", (-length, -0.150, LOW - 0.012), (length, 0.150, LOW + SUNK), "ink")
+    box(machine, "bed", (-length, -0.150, 0.225), (length, 0.150, BOTTOM_Z - 0.012), "graphite")
+    box(machine, "lining", (-length, -0.150, BOTTOM_Z - 0.012), (length, 0.150, BOTTOM_Z + SINK_DEPTH), "ink")
     cart.add_joint(name="lift", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=(0, 0, 1), stiffness=0, damping=0)
     for key in spec.keys:
         key.qpos = [*key.qpos, 0.0]
     spec.option.gravity = (0.0, 0.0, -GRAVITY)
-    rub(spec, ("lining", "block"), FRICTION)
+    rub(spec, ("lining", "block"), BED_FRICTION)

@@ -3,7 +3,7 @@
 import numpy as np
 
 SIDES = 6  # of a cross-section
-STEPS = 12  # a turn
+STEPS_PER_TURN = 12  # of the wire
 
 
 def draw(spec, name, start, end, *, radius, turns, wire, material):
@@ -17,7 +17,7 @@ def draw(spec, name, start, end, *, radius, turns, wire, material):
       material: name of its material.
     """
     first, last, axis, up = _line(start, end)
-    s = np.linspace(0.0, 1.0, turns * STEPS + 1)
+    s = np.linspace(0.0, 1.0, turns * STEPS_PER_TURN + 1)
     turn = 2 * np.pi * turns * s[:, None]
     outward = np.cos(turn) * up + np.sin(turn) * np.cross(axis, up)
     around = 2 * np.pi * np.arange(SIDES)[:, None] / SIDES

@@ -7,9 +7,9 @@ carries the pendulums transmits nothing.
 Contact `bobs` puts the pivots side by side in the plane of motion: hanging bobs nearly touch, as in Newton's cradle.
 The torsion springs still act, with torques carried from pivot to pivot.
 
-Mechanism `springs` joins neighbouring rods by a real spring at `HOOK` from their pivots: k = kc / HOOK^2. If the pivots
-are one behind the other, its rest length is 0 and its torque kc sin(x_j - x_i). If they are side by side, its rest
-length is the pitch.
+Mechanism `springs` joins neighbouring rods by a real spring at a = `HOOK_ARM` from their pivots: k = kc / a^2. If the
+pivots are one behind the other, its rest length is 0 and its torque kc sin(x_j - x_i). If they are side by side, its
+rest length is the pitch.
 """
 
 import itertools
@@ -23,13 +23,13 @@ from smc_mujoco.mechanisms.plant import Field, model_path
 PITCH = 0.22  # m between neighbours: chosen, so that bobs of 0.13 m pass each other
 HEIGHT = 0.8  # m, the shaft above the floor, as for the single pendulum
 HUB = 0.02  # m, half the length of a hub, where a spring's wire ends
-KC = 0.5  # N m/rad: chosen for the paper study
-DRAWN = 50  # most pendulums for which springs are drawn: each has a thousand vertices
-HOOK = 0.25  # m from pivot to real spring: chosen, half a rod
+COUPLING = 0.5  # N m/rad: chosen for the paper study
+MAX_DRAWN = 50  # pendulums; springs of longer chains are not drawn, for each has a thousand vertices
+HOOK_ARM = 0.25  # m from pivot to real spring: chosen, half a rod
 
-ROW = 0.16  # m between pivots side by side: chosen, so that hanging bobs of 0.13 m leave a gap of 0.03 m
-CLACK = 0.95  # restitution of steel balls, chosen: 0.9 to 0.97 in Newton's cradles
-BEAM = (0.085, 0.125)  # m, y of the beam behind the bobs that carries the pivots side by side
+ROW_PITCH = 0.16  # m between pivots side by side: chosen, so that hanging bobs of 0.13 m leave a gap of 0.03 m
+BOB_RESTITUTION = 0.95  # of steel balls, chosen: 0.9 to 0.97 in Newton's cradles
+BEAM_Y = (0.085, 0.125)  # m, y of the beam behind the bobs that carries the pivots side by side
 
 
 def compose(single, n, x0):
@@ -51,7 +51,7 @@ def compose(single, n, x0):
             geom.material = material[geom.name.removeprefix(f"p{i}/")]
     spec.add_key(name="home", qpos=[x0[i % len(x0)] for i in range(n)])
     for i in range(n - 1):
-        spring = spec.add_tendon(name=f"coupling{i}", stiffness=KC, springlength=(0.0, 0.0))
+        spring = spec.add_tendon(name=f"coupling{i}", stiffness=COUPLING, springlength=(0.0, 0.0))
         spring.wrap_joint(f"p{i}/hinge", -1.0)
         spring.wrap_joint(f"p{i + 1}/hinge", 1.0)
         near, far = pivot(spec, i), pivot(spec, i + 1)
@@ -107,7 +107,7 @@ def pivot(spec, i):
 
 def draw_spring(spec, i, start, end, radius, turns):
     """Draw the spring between pendulums i and i + 1, from `start` to `end` in m, unless there are too many."""
-    if len(spec.keys[0].qpos) > DRAWN:
+    if len(spec.keys[0].qpos) > MAX_DRAWN:
         return
     coil.draw(
         spec,
@@ -156,9 +156,9 @@ def above(bob):
 def bobs(spec):
     """Put the pivots side by side and let neighbouring bobs hit each other."""
     n, side = len(spec.keys[0].qpos), above(spec.geom("p0/bob"))
-    width = (n - 1) * ROW
+    width = (n - 1) * ROW_PITCH
     for i in range(n):
-        spec.body(f"p{i}/pendulum").frame.pos = (i * ROW - width / 2, 0.0, HEIGHT)
+        spec.body(f"p{i}/pendulum").frame.pos = (i * ROW_PITCH - width / 2, 0.0, HEIGHT)
     for geom in [g for g in spec.body("machine").geoms if not g.name.startswith("p")]:
         spec.delete(geom)
     stand_row(spec, n, width)
@@ -167,8 +167,8 @@ def bobs(spec):
         spec.delete(skin)
     for i in range(n - 1):
         for pair in itertools.product((f"p{i}/bob", f"p{i}/rod"), (f"p{i + 1}/bob", f"p{i + 1}/rod")):
-            hit(spec, pair, CLACK, both_move=True)  # beyond 54 degrees bobs pass each other, and meet rods
-        draw_between_rods(spec, i, side * (HOOK if hooked else 0.10))
+            hit(spec, pair, BOB_RESTITUTION, both_move=True)  # beyond 54 degrees bobs pass each other, and meet rods
+        draw_between_rods(spec, i, side * (HOOK_ARM if hooked else 0.10))
 
 
 def springs(spec):
@@ -178,12 +178,12 @@ def springs(spec):
         spec.delete(item)
     for i in range(n):
         body = spec.body(f"p{i}/pendulum")
-        body.add_site(name=f"p{i}/hook", pos=(0.0, 0.0, side * HOOK))
+        body.add_site(name=f"p{i}/hook", pos=(0.0, 0.0, side * HOOK_ARM))
     for i in range(n - 1):
         spring = spec.add_tendon(name=f"coupling{i}", springlength=(0.0, 0.0), group=5, rgba=(0, 0, 0, 0))
         spring.wrap_site(f"p{i}/hook")
         spring.wrap_site(f"p{i + 1}/hook")
-        draw_between_rods(spec, i, side * HOOK)
+        draw_between_rods(spec, i, side * HOOK_ARM)
 
 
 def spring_fields(model, p):
@@ -191,7 +191,7 @@ def spring_fields(model, p):
     couplings = [model.tendon(f"coupling{i}").id for i in range(size(model) - 1)]
     pitch = model.body("p1/pendulum").pos[0] - model.body("p0/pendulum").pos[0]
     yield from pendulum_fields(model, p)
-    yield Field("tendon_stiffness", couplings, p.kc / HOOK**2)
+    yield Field("tendon_stiffness", couplings, p.kc / HOOK_ARM**2)
     yield Field("tendon_lengthspring", couplings, pitch)
 
 
@@ -204,16 +204,16 @@ def draw_between_rods(spec, i, up):
 def stand_row(spec, n, width):
     """Add a beam behind the row between two posts, and a camera that looks at the row from the front."""
     machine, end = spec.body("machine"), width / 2 + 0.20
-    box(machine, "beam", (-end, BEAM[0], HEIGHT - 0.030), (end, BEAM[1], HEIGHT + 0.030), "graphite")
+    box(machine, "beam", (-end, BEAM_Y[0], HEIGHT - 0.030), (end, BEAM_Y[1], HEIGHT + 0.030), "graphite")
     for i in range(n):
-        x = i * ROW - width / 2
-        bar(machine, f"axle{i}", ((x, -0.03, HEIGHT), (x, BEAM[0], HEIGHT)), 0.010, "steel")
+        x = i * ROW_PITCH - width / 2
+        bar(machine, f"axle{i}", ((x, -0.03, HEIGHT), (x, BEAM_Y[0], HEIGHT)), 0.010, "steel")
     for side, x in (("left", -end), ("right", end)):
-        y = sum(BEAM) / 2
+        y = sum(BEAM_Y) / 2
         bar(machine, f"{side}_foot", ((x, y, 0), (x, y, 0.028)), 0.15, "graphite")
         bar(machine, f"{side}_step", ((x, y, 0.028), (x, y, 0.040)), 0.055, "steel")
         bar(machine, f"{side}_post", ((x, y, 0.028), (x, y, HEIGHT + 0.045)), 0.024, "graphite")
-    shown = min(width, 8 * ROW)  # as the chain's camera, nine pendulums at most
+    shown = min(width, 8 * ROW_PITCH)  # as the chain's camera, nine pendulums at most
     spec.stat.center, spec.stat.extent = (0.0, 0.0, HEIGHT), 1.6 + shown
     away = 2.2 + 0.9 * shown
     camera = spec.camera("look")

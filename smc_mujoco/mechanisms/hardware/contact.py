@@ -39,17 +39,16 @@ DEPTH_OF_BOBS = 0.0015
 MAX_RESTITUTION = 0.98  # largest restitution: above, a blow could gain energy, by the integrator's error of 1e-3 of it
 MIN_RESTITUTION = 0.01  # used for smaller ones, whose dashpot is too stiff for a step of 1 ms
 MAX_FRICTION = 10.0  # chosen; rubber on rubber reaches 2
-# Constant impedances d: FIRM for blows against a fixed obstacle, SPRINGY for blows between bobs and for sliding. The
-# spring carries 1 - d of a steady load. With FIRM a body that leans on an obstacle rests within 0.1 mm; at 0.99 it
-# rattles.
-FIRM, SPRINGY = 0.95, 0.01
+# Constant impedances d: firm for blows on a fixed obstacle, soft for blows between bobs and for sliding. The spring
+# carries 1 - d of a steady load. At 0.95 a body that leans on an obstacle rests within 0.1 mm; at 0.99 it rattles.
+FIRM_IMPEDANCE, SOFT_IMPEDANCE = 0.95, 0.01
 REST_OF_SOLIMP = (0.001, 0.5, 2.0)  # no effect if d is constant
 SOLREF_RUB = (0.008, 1.0)  # s and damping ratio of the normal: 8 steps of 1 ms; with fewer the block trembles
-STICKING = 200.0  # 1/s, b: chosen; half makes the block creep twice as fast, twice makes friction vary 4 times as much
-SOLREF_SLIDE = (2.0 / (SPRINGY * STICKING), 1.0)  # s and damping ratio across the normal
-IMPRATIO = 5e3 / SPRINGY  # how much stiffer friction is than the normal
-UNTWISTED = (0.005, 0.0001, 0.0001)  # MuJoCo's torsional and rolling friction: unused by contacts of dimension 3
-SLIDING = slice(0, 2)  # of a pair's five friction coefficients
+STICKING_RATE = 200.0  # 1/s, b: chosen; half doubles the creep of the block, twice varies friction 4 times as much
+SOLREF_SLIDE = (2.0 / (SOFT_IMPEDANCE * STICKING_RATE), 1.0)  # s and damping ratio across the normal
+IMPRATIO = 5e3 / SOFT_IMPEDANCE  # how much stiffer friction is than the normal
+TURNING_FRICTION = (0.005, 0.0001, 0.0001)  # MuJoCo's torsional and rolling friction: unused by contacts of dimension 3
+SLIDING_FRICTION = slice(0, 2)  # of a pair's five friction coefficients
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,7 +88,7 @@ class Contact(Part):
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         if self.friction is not None:
-            yield Field("pair_friction", (_pairs(model, RUB), SLIDING), self.friction)
+            yield Field("pair_friction", (_pairs(model, RUB), SLIDING_FRICTION), self.friction)
         if self.restitution is not None:
             bouncing = _pairs(model, HIT)
             impedances = model.pair_solimp[bouncing, 0]
@@ -142,7 +141,7 @@ def solref(restitution: float, impedance: float) -> tuple[float, float]:
     e = max(restitution, MIN_RESTITUTION)
     zeta = max(damping_ratio(e), 1e-6)  # MuJoCo divides by it
     share = 1.0 / (impedance + (1.0 - impedance) / 3.0)
-    depth = DEPTH_OF_BOBS if impedance == SPRINGY else DEPTH
+    depth = DEPTH_OF_BOBS if impedance == SOFT_IMPEDANCE else DEPTH
     return share * depth / (math.sqrt(e) * zeta), zeta / math.sqrt(share)
 
 
@@ -151,13 +150,13 @@ def solref(restitution: float, impedance: float) -> tuple[float, float]:
 
 def hit(spec: mujoco.MjSpec, geoms: tuple[str, str], restitution: float, both_move: bool = False) -> None:
     """Let two geoms hit each other, without friction."""
-    impedance = SPRINGY if both_move else FIRM
+    impedance = SOFT_IMPEDANCE if both_move else FIRM_IMPEDANCE
     _pair(spec, HIT, geoms, solref(restitution, impedance), impedance, 0.0)
 
 
 def rub(spec: mujoco.MjSpec, geoms: tuple[str, str], friction: float) -> None:
     """Let two geoms slide on each other under a normal force."""
-    _pair(spec, RUB, geoms, SOLREF_RUB, SPRINGY, friction)
+    _pair(spec, RUB, geoms, SOLREF_RUB, SOFT_IMPEDANCE, friction)
 
 
 def _pair(
@@ -176,7 +175,7 @@ def _pair(
         geomname1=geoms[0],
         geomname2=geoms[1],
         condim=3 if sort == RUB else 1,
-        friction=(friction, friction, *UNTWISTED),
+        friction=(friction, friction, *TURNING_FRICTION),
         solref=normal,
         solreffriction=SOLREF_SLIDE,
         solimp=(impedance, impedance, *REST_OF_SOLIMP),

@@ -28,7 +28,7 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 # Where a dcmotor's numbers lie in the compiled model:
 WINDING = slice(0, 2)  # of actuator_gainprm: resistance, ohm, and torque constant, N m/A at the joint
-SUDDEN = 1e-12  # s: a winding with a shorter time constant counts as instantaneous
+MIN_WINDING_TIME = 1e-12  # s: a winding with a shorter time constant counts as instantaneous
 MIN_RESISTANCE = 1e-9  # ohm: with less, the voltage of a command is lost in rounding
 MAX_TIME_CONSTANTS = 1e9  # of a lag in a physics step: more count as this many
 SHORT_STEP = 1e-3  # time constants: the series in `winding_step` errs by less than 1e-11 below it
@@ -221,8 +221,8 @@ class DCMotor(Drive):
 
     @property
     def delay(self) -> float:
-        """L/R in s, the winding's time constant; below SUDDEN it counts as 0."""
-        return self.inductance / self.resistance if self.inductance > SUDDEN * self.resistance else 0.0
+        """L/R in s, the winding's time constant; below MIN_WINDING_TIME it counts as 0."""
+        return self.inductance / self.resistance if self.inductance > MIN_WINDING_TIME * self.resistance else 0.0
 
 
 class DriveStep(NamedTuple):

@@ -20,7 +20,7 @@ from smc_mujoco.mechanisms.hardware.part import Part, joint_ids
 from smc_mujoco.mechanisms.plant import Field
 
 # Share of a physics step by which readings are taken early, because MuJoCo compares times, which have rounding errors.
-EARLY = 0.5
+EARLY_SHARE = 0.5
 MAX_READINGS = 100_000  # under way in a delay: chosen, 6 MB per channel
 READINGS_STEP = 64  # readings in a history are a multiple of this, so that runs with other delays share a model; chosen
 
@@ -84,7 +84,7 @@ class Encoder(Part):
         """Yield the fields of delay and period of every channel's two sensors."""
         if model.nhistory:
             at = sensor_ids(model)
-            yield Field("sensor_delay", at, max(0.0, self.delay - EARLY * model.opt.timestep))
+            yield Field("sensor_delay", at, max(0.0, self.delay - EARLY_SHARE * model.opt.timestep))
             yield Field("sensor_interval", (at, 0), self.period or 0.0)
 
 
@@ -104,4 +104,4 @@ def remember(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         if model.sensor_type[sensor] != position:
             value = data.qvel[model.jnt_dofadr[joint]]
         times, values = gap * np.arange(-count, 0.0), np.full((count, 1), value)
-        mujoco.mj_initSensorHistory(model, data, sensor, times, values, -gap - EARLY * model.opt.timestep)
+        mujoco.mj_initSensorHistory(model, data, sensor, times, values, -gap - EARLY_SHARE * model.opt.timestep)

@@ -16,7 +16,7 @@ from smc_mujoco.mechanisms.plant import Field
 # Where a dcmotor's bristles lie in the compiled model.
 STIFFNESS, DAMPING = 5, 6  # of actuator_dynprm
 LEVELS = slice(3, 6)  # of actuator_biasprm: coulomb, static, stribeck
-DAMPED = 0.2  # default damping of bristles over sqrt(stiffness inertia)
+RELATIVE_DAMPING = 0.2  # default damping of bristles over sqrt(stiffness inertia)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,6 +126,6 @@ class LuGre(Friction):
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         bristles = [model.actuator(PASSIVE + model.joint(joint).name).id for joint in joint_ids(model)]
         yield Field("actuator_dynprm", (bristles, STIFFNESS), self.stiffness)
-        damping = DAMPED * np.sqrt(self.stiffness * model.dof_M0[dof_ids(model)])
+        damping = RELATIVE_DAMPING * np.sqrt(self.stiffness * model.dof_M0[dof_ids(model)])
         yield Field("actuator_dynprm", (bristles, DAMPING), damping if self.damping is None else self.damping)
         yield Field("actuator_biasprm", (bristles, LEVELS), (self.coulomb, self.static, self.stribeck))

@@ -22,7 +22,7 @@ from smc_mujoco.common.files import read_json
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.sliding import PerJoint, Sliding
 
-LOADED = ("km", "ke", "kms", "kes", "kmq", "keq")  # factors on the two torques of the gearbox
+LOAD_FACTORS = ("km", "ke", "kms", "kes", "kmq", "keq")  # factors on the two torques of the gearbox
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,7 +52,7 @@ class ServoFriction(Sliding):
       alpha: how steeply they fall, greater than 0.
     """
 
-    forces = ("kv", "kc", "kcs", *LOADED)
+    forces = ("kv", "kc", "kcs", *LOAD_FACTORS)
 
     kv: PerJoint = 0.0
     kc: PerJoint = 0.0
@@ -68,7 +68,7 @@ class ServoFriction(Sliding):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.check_numbers("kv", "kc", "kcs", *LOADED, low=0.0)
+        self.check_numbers("kv", "kc", "kcs", *LOAD_FACTORS, low=0.0)
         self.check_numbers("vs", "alpha", above=0.0)
 
     @staticmethod
@@ -109,12 +109,12 @@ def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
     motor = DCMotor(
         resistance, 0.0, k, gear=1.0, rotor_inertia=armature, voltage=VOLTAGE, current=math.inf, command=command
     )
-    numbers = {ours: fitted[theirs] for theirs, several in THEIRS.items() if theirs in fitted for ours in several}
+    numbers = {ours: fitted[theirs] for theirs, several in BAM_FIELDS.items() if theirs in fitted for ours in several}
     return Servo(motor, ServoFriction(**numbers))
 
 
 VOLTAGE = 15.0 * 0.9625  # V: the supply times the largest duty cycle; bam/dynamixel/actuator.py
-THEIRS = {  # name of a number in Rhoban/bam -> fields of ServoFriction
+BAM_FIELDS = {  # name of a number in Rhoban/bam -> fields of ServoFriction
     "friction_viscous": ("kv",),
     "friction_base": ("kc",),
     "friction_stribeck": ("kcs",),
@@ -130,5 +130,5 @@ THEIRS = {  # name of a number in Rhoban/bam -> fields of ServoFriction
     "alpha": ("alpha",),
 }
 # Servo -> model -> numbers of Rhoban/bam (Apache-2.0), params/mx64 and params/mx106: kt in N m/A, R in ohm, armature in
-# kg m^2, and the keys of THEIRS in the units of ServoFriction.
+# kg m^2, and the keys of BAM_FIELDS in the units of ServoFriction.
 SERVOS: Mapping[str, Mapping[str, Mapping[str, float]]] = read_json(Path(__file__).with_name("servos.json"))

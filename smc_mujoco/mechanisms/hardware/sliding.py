@@ -8,11 +8,11 @@ slides or sticks:
     slides:  friction = -F(v, motor, load)
     sticks:  friction = -clip(stiffness (x - x_s) + damping v, low, high), like a LuGre bristle that does not slip
 
-A joint sticks when its speed changes sign or falls below SLOW; x_s is its position at that time. It slides again when
-stiffness (x - x_s) leaves the bounds. So friction is F to the last bit while a joint slides, and a stuck joint does not
-creep, because its friction depends on its position. Under a new load a stuck joint turns by load/stiffness. Its speed
-decays as exp(-200 t/s) if it moves alone, and slower if other joints move with it. A joint that slides keeps sliding at
-the speed at which F equals the load.
+A joint sticks when its speed changes sign or is small (STICKING_SPEED); x_s is its position at that time. It slides
+again when stiffness (x - x_s) leaves the bounds. So friction is F to the last bit while a joint slides, and a stuck
+joint does not creep, because its friction depends on its position. Under a new load a stuck joint turns by
+load/stiffness. Its speed decays as exp(-200 t/s) if it moves alone, and slower if other joints move with it. A joint
+that slides keeps sliding at the speed at which F equals the load.
 
 Limit: bristles are critically damped for each joint alone. Stuck joints that move together have less damping. A sudden
 load makes them overshoot, and may tear a joint loose below the limit that holds it at rest. Rigid dry friction would
@@ -35,8 +35,8 @@ from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.mechanisms.hardware.part import PASSIVE, Friction, joints
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Plant
 
-SLOW = 1e-4  # rad/s or m/s, chosen: a joint that becomes slower than this sticks
-BRISTLE = 200.0  # rad/s, chosen: natural frequency of a stuck joint, which two steps of 1 ms resolve; critically damped
+STICKING_SPEED = 1e-4  # rad/s or m/s, chosen: a joint that becomes slower than this sticks
+BRISTLE_FREQUENCY = 200.0  # rad/s, natural, of a stuck joint, critically damped: chosen, two steps of 1 ms resolve it
 MAX_EXPONENT = 700.0  # exp of more overflows
 
 PerJoint = float | Sequence[float]  # one number for all channels, or one for each
@@ -49,8 +49,8 @@ class Sliding(Friction):
     A class states its numbers as fields. Each is one number for all channels, or a sequence with one for each channel.
 
     Attributes:
-      stiffness: of a stuck joint, N m/rad (N/m), greater than 0. None: for the natural frequency BRISTLE, with each
-        joint's inertia at the start of the run, in MuJoCo's reference position qpos0.
+      stiffness: of a stuck joint, N m/rad (N/m), greater than 0. None: for BRISTLE_FREQUENCY, with each joint's
+        inertia at the start of the run, in MuJoCo's reference position qpos0.
     """
 
     bristles = True
@@ -108,7 +108,7 @@ class Sliding(Friction):
         if not inertia > 0.0:
             raise ScenarioError(f"the inertia of joint {i} is {inertia:g}, and friction needs one above 0: give others")
         stiffness = _of(self.stiffness, i)
-        stiffness = inertia * BRISTLE**2 if stiffness is None else stiffness
+        stiffness = inertia * BRISTLE_FREQUENCY**2 if stiffness is None else stiffness
         return stiffness, 2.0 * math.sqrt(stiffness * inertia)
 
     def edit(self, spec: mujoco.MjSpec) -> None:

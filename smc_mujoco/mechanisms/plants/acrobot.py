@@ -33,5 +33,5 @@ ACROBOT = dataclasses.replace(
     nominal=nominal,
     underactuated=True,
     goal=(math.pi,),
-    limits=(both.LIMIT,),
+    limits=(both.TORQUE_LIMIT,),
 )

@@ -19,7 +19,7 @@ from smc_mujoco.mechanisms.geometry import cart
 from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
 MIN_INERTIA = 1e-13  # kg m^2, the pole's inertia about its own length, about which it never turns
-STOPS = 1.7  # m, |x| at the end stops: chosen, before the posts
+STOP_X = 1.7  # m, |x| at the end stops: chosen, before the posts
 
 
 def build(n):
@@ -51,7 +51,7 @@ def nominal(x, v, i, p):
 
 
 def stops(spec):
-    cart.stops(spec, STOPS)
+    cart.stops(spec, STOP_X)
 
 
 CART_POLE = Plant(

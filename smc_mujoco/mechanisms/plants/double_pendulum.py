@@ -25,7 +25,7 @@ from numba import njit
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
-LIMIT = 6.0  # N m, of a motor on the published boards
+TORQUE_LIMIT = 6.0  # N m, of a motor on the published boards
 L2 = 0.3  # m, length of the lower link: the equation has only where its centre of mass lies
 # kg, kg, m, m, m, kg m^2, kg m^2, kg m^2, -, N m s/rad, N m s/rad, N m, N m, m/s^2
 MODEL_1_1 = {
@@ -104,6 +104,6 @@ DOUBLE_PENDULUM = Plant(
     fields=fields,
     nominal=NominalModel(build, fields),
     lane=(0.9, 0.0, 0.0),
-    limits=(LIMIT, LIMIT),
+    limits=(TORQUE_LIMIT, TORQUE_LIMIT),
     dry=("cf1", "cf2"),
 )

@@ -16,10 +16,10 @@ from smc_mujoco.mechanisms.geometry import cart, coil
 from smc_mujoco.mechanisms.hardware.contact import bar
 from smc_mujoco.mechanisms.plant import Field, Plant, Variant, model_path
 
-ASIDE = 1.5  # m, a: chosen, so that the springs are visible and the wells have nearly the equation's shape
-HEIGHT = 0.45  # m, height of the springs above the floor, over the block and the landscape
-STOPS, POST = 1.7, 0.5  # m, |x| at the end stops and x at the post: chosen, outside x0, and between x0 and 0
-HALF = 2.07  # m, half the length of the rail between its posts
+ANCHOR_Y = 1.5  # m, a: chosen, so that the springs are visible and the wells have nearly the equation's shape
+SPRING_Z = 0.45  # m, height of the springs above the floor, over the block and the landscape
+STOP_X, PEG_X = 1.7, 0.5  # m, |x| at the end stops and x at the post: chosen, outside x0, and between x0 and 0
+HALF_RAIL = 2.07  # m, half the length of the rail between its posts
 
 
 def build(n):
@@ -43,36 +43,36 @@ def nominal(x, v, i, p):
 
 
 def on_floor(spec):
-    cart.bed(spec, HALF)
+    cart.bed(spec, HALF_RAIL)
     stops(spec)
 
 
 def stops(spec):
-    cart.stops(spec, STOPS)
+    cart.stops(spec, STOP_X)
 
 
 def peg(spec):
-    cart.peg(spec, POST)
+    cart.peg(spec, PEG_X)
 
 
 def add_springs(spec):
     machine, body = spec.body("machine"), spec.body("cart")
-    joint, up = spec.joint("slide"), HEIGHT - body.pos[2]
+    joint, up = spec.joint("slide"), SPRING_Z - body.pos[2]
     joint.stiffness = [0.0, 0.0, 0.0]
     bar(body, "spring_post", ((0, 0, 0.13), (0, 0, up + 0.03)), 0.022, "steel")
     body.add_site(name="snap", pos=(0, 0, up))
-    for side, y in (("front", -ASIDE), ("back", ASIDE)):
+    for side, y in (("front", -ANCHOR_Y), ("back", ANCHOR_Y)):
         bar(machine, f"{side}_anchor_foot", ((0, y, 0), (0, y, 0.028)), 0.13, "graphite")
-        bar(machine, f"{side}_anchor", ((0, y, 0.028), (0, y, HEIGHT + 0.03)), 0.028, "graphite")
-        machine.add_site(name=f"{side}_anchor", pos=(0, y, HEIGHT))
+        bar(machine, f"{side}_anchor", ((0, y, 0.028), (0, y, SPRING_Z + 0.03)), 0.028, "graphite")
+        machine.add_site(name=f"{side}_anchor", pos=(0, y, SPRING_Z))
         spring = spec.add_tendon(name=f"{side}_spring", group=5, rgba=(0, 0, 0, 0))
         spring.wrap_site(f"{side}_anchor")
         spring.wrap_site("snap")
         coil.draw(
             spec,
             f"{side}_coil",
-            start=("machine", (0, 0, 0), (0, y, HEIGHT)),
-            end=("cart", body.pos, (0, 0, HEIGHT)),
+            start=("machine", (0, 0, 0), (0, y, SPRING_Z)),
+            end=("cart", body.pos, (0, 0, SPRING_Z)),
             radius=0.04,
             turns=24,
             wire=0.008,
@@ -81,10 +81,10 @@ def add_springs(spec):
 
 
 def spring_fields(model, p):
-    rest = ASIDE**2 - p.alpha / p.beta if p.beta > 0.0 else 0.0
+    rest = ANCHOR_Y**2 - p.alpha / p.beta if p.beta > 0.0 else 0.0
     if rest <= 0.0:
         given = f"alpha {p.alpha:g} with beta {p.beta:g}"
-        raise ScenarioError(f"duffing has no springs for {given}: give beta > 0 and alpha < {ASIDE**2:g} beta")
+        raise ScenarioError(f"duffing has no springs for {given}: give beta > 0 and alpha < {ANCHOR_Y**2:g} beta")
     springs = [model.tendon("front_spring").id, model.tendon("back_spring").id]
     yield from body_fields(model, p)
     yield Field("tendon_stiffness", springs, p.beta * rest)

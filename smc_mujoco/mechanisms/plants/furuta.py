@@ -25,7 +25,7 @@ import mujoco
 from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
 MIN_INERTIA = 1e-13  # kg m^2, the least inertia about its length that MuJoCo takes well
-STALL = 0.042 * 10.0 / 8.4  # N m
+STALL_TORQUE = 0.042 * 10.0 / 8.4  # N m
 
 
 def build(n):
@@ -91,6 +91,6 @@ FURUTA = Plant(
     nominal=nominal,
     lane=(0.32, 0.0, 0.0),
     underactuated=True,
-    limits=(STALL,),
+    limits=(STALL_TORQUE,),
     dry=("cf", "cfq"),
 )

@@ -14,13 +14,13 @@ import mujoco
 from smc_mujoco.mechanisms.hardware.contact import bar, box, hit, solid
 from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
-DEEP = 0.4  # m, depth of stops and wall behind their faces, enough for a blow of 80 m/s
-L, BOB, ROD, AXLE = 0.5, 0.065, 0.012, 0.8  # m: the pendulum's length, radii of bob and rod, height of the hinge
+STOP_DEPTH = 0.4  # m, depth of stops and wall behind their faces, enough for a blow of 80 m/s
+LENGTH, BOB_RADIUS, ROD_RADIUS, HINGE_Z = 0.5, 0.065, 0.012, 0.8  # m
 
-FALLEN, FALL = 2.44, 0.3  # rad (140 degrees), angle of the bob on the floor, and the floor's restitution, chosen
-STOP, PAD = 1.0, 0.4  # rad, angle of the stops, and the restitution of their rubber, chosen
-WALL, CLANG = 0.7, 0.8  # rad, angle of the wall, and its restitution, chosen
-PEG, PEG_AT, PIN, CLICK = 0.2, 0.30, 0.020, 0.4  # angle, rad; m from the hinge; radius, m; restitution: chosen
+FLOOR_ANGLE, FLOOR_RESTITUTION = 2.44, 0.3  # rad (140 degrees), of the bob on the floor; chosen
+STOP_ANGLE, STOP_RESTITUTION = 1.0, 0.4  # rad; restitution of rubber; both chosen
+WALL_ANGLE, WALL_RESTITUTION = 0.7, 0.8  # rad; both chosen
+PEG_ANGLE, PEG_ARM, PEG_RADIUS, PEG_RESTITUTION = 0.2, 0.30, 0.020, 0.4  # rad; m from the hinge; m; chosen
 
 
 def build(n):
@@ -45,7 +45,7 @@ def nominal(x, v, i, p):
 
 def on_floor(spec):
     """Lower the machine so that the bob reaches the floor."""
-    machine, down = spec.body("machine"), AXLE + L * cos(FALLEN) - BOB
+    machine, down = spec.body("machine"), HINGE_Z + LENGTH * cos(FLOOR_ANGLE) - BOB_RADIUS
     machine.pos = (0.0, 0.0, -down)
     for name in ("foot", "step"):
         spec.geom(name).pos[2] += down
@@ -53,43 +53,43 @@ def on_floor(spec):
     bottom, top = 0.03 + down, column.pos[2] + column.size[1]
     column.pos[2], column.size[1] = (bottom + top) / 2, (top - bottom) / 2
     spec.stat.center[2] -= down
-    hit(spec, ("floor", "bob"), FALL)
+    hit(spec, ("floor", "bob"), FLOOR_RESTITUTION)
 
 
 def stops(spec):
     machine = spec.body("machine")
-    outer = asin(0.110 / L)  # rad, from the stopped bob to the arm that holds the pad
+    outer = asin(0.110 / LENGTH)  # rad, from the stopped bob to the arm that holds the pad
     for side, sign in (("left", -1), ("right", 1)):
-        stop = machine.add_body(name=f"{side}_stop", pos=(0, 0, AXLE), quat=turned(sign * STOP))
-        face = sorted((sign * BOB, sign * (BOB + 0.022)))
-        plate = sorted((sign * (BOB + 0.022), sign * (BOB + 0.032)))
-        box(stop, f"{side}_pad", (face[0], -0.045, L - 0.045), (face[1], 0.045, L + 0.045), "ink")
-        box(stop, f"{side}_plate", (plate[0], -0.055, L - 0.055), (plate[1], 0.055, L + 0.055), "steel")
-        bar(stop, f"{side}_finger", ((sign * 0.110, -0.02, L), (sign * 0.110, 0.12, L)), 0.018, "steel")
-        arm = machine.add_body(name=f"{side}_arm", pos=(0, 0, AXLE), quat=turned(sign * (STOP + outer)))
-        box(arm, f"{side}_beam", (-0.018, 0.080, 0.0), (0.018, 0.110, L + 0.04), "graphite")
-        deep = sorted((sign * BOB, sign * (BOB + DEEP)))
-        solid(stop, f"{side}_solid", (deep[0], -0.045, L - 0.20), (deep[1], 0.045, L + 0.10))
-        hit(spec, (f"{side}_solid", "bob"), PAD)
+        stop = machine.add_body(name=f"{side}_stop", pos=(0, 0, HINGE_Z), quat=turned(sign * STOP_ANGLE))
+        face = sorted((sign * BOB_RADIUS, sign * (BOB_RADIUS + 0.022)))
+        plate = sorted((sign * (BOB_RADIUS + 0.022), sign * (BOB_RADIUS + 0.032)))
+        box(stop, f"{side}_pad", (face[0], -0.045, LENGTH - 0.045), (face[1], 0.045, LENGTH + 0.045), "ink")
+        box(stop, f"{side}_plate", (plate[0], -0.055, LENGTH - 0.055), (plate[1], 0.055, LENGTH + 0.055), "steel")
+        bar(stop, f"{side}_finger", ((sign * 0.110, -0.02, LENGTH), (sign * 0.110, 0.12, LENGTH)), 0.018, "steel")
+        arm = machine.add_body(name=f"{side}_arm", pos=(0, 0, HINGE_Z), quat=turned(sign * (STOP_ANGLE + outer)))
+        box(arm, f"{side}_beam", (-0.018, 0.080, 0.0), (0.018, 0.110, LENGTH + 0.04), "graphite")
+        deep = sorted((sign * BOB_RADIUS, sign * (BOB_RADIUS + STOP_DEPTH)))
+        solid(stop, f"{side}_solid", (deep[0], -0.045, LENGTH - 0.20), (deep[1], 0.045, LENGTH + 0.10))
+        hit(spec, (f"{side}_solid", "bob"), STOP_RESTITUTION)
 
 
 def wall(spec):
-    machine, face = spec.body("machine"), L * sin(WALL) + BOB
+    machine, face = spec.body("machine"), LENGTH * sin(WALL_ANGLE) + BOB_RADIUS
     box(machine, "wall_foot", (face - 0.02, -0.20, 0.0), (face + 0.16, 0.20, 0.028), "graphite")
     box(machine, "wall", (face, -0.15, 0.0), (face + 0.05, 0.15, 1.36), "ivory")
     for y in (-0.11, 0.11):
         edge = "front" if y < 0 else "back"
         box(machine, f"wall_{edge}_rib", (face + 0.05, y - 0.02, 0.0), (face + 0.09, y + 0.02, 1.30), "graphite")
-    solid(machine, "wall_solid", (face, -0.15, 0.0), (face + DEEP, 0.15, 1.36))
-    hit(spec, ("wall_solid", "bob"), CLANG)
+    solid(machine, "wall_solid", (face, -0.15, 0.0), (face + STOP_DEPTH, 0.15, 1.36))
+    hit(spec, ("wall_solid", "bob"), WALL_RESTITUTION)
 
 
 def peg(spec):
-    machine, angle = spec.body("machine"), PEG - asin((ROD + PIN) / PEG_AT)
-    x, z = PEG_AT * sin(angle), AXLE + PEG_AT * cos(angle)
-    bar(machine, "peg", ((x, 0.045, z), (x, -0.055, z)), PIN, "brass", round_ends=True)
+    machine, angle = spec.body("machine"), PEG_ANGLE - asin((ROD_RADIUS + PEG_RADIUS) / PEG_ARM)
+    x, z = PEG_ARM * sin(angle), HINGE_Z + PEG_ARM * cos(angle)
+    bar(machine, "peg", ((x, 0.045, z), (x, -0.055, z)), PEG_RADIUS, "brass", round_ends=True)
     bar(machine, "peg_collar", ((x, 0.045, z), (x, 0.028, z)), 0.032, "graphite")
-    hit(spec, ("peg", "rod"), CLICK)
+    hit(spec, ("peg", "rod"), PEG_RESTITUTION)
 
 
 def turned(angle):
@@ -109,5 +109,5 @@ INVERTED_PENDULUM = Plant(
     lane=(1.3, 0.0, 0.0),
     jumps={"mild": {"mass": 2.0}, "hard": {"mass": 25.912}},
     contacts={"floor": on_floor, "stops": stops, "wall": wall, "peg": peg},
-    placed={"l": L},
+    placed={"l": LENGTH},
 )

@@ -18,8 +18,8 @@ import mujoco
 from smc_mujoco.mechanisms.geometry import cart
 from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
-HOOK = 0.095  # m, height of the hook above the load's middle
-STOPS = 1.7  # m, |x| at the end stops: chosen, before the bridge's ends
+HOOK_HEIGHT = 0.095  # m, height of the hook above the load's middle
+STOP_X = 1.7  # m, |x| at the end stops: chosen, before the bridge's ends
 
 
 def build(n):
@@ -37,7 +37,7 @@ def fields(model, p):
     yield Field("geom_pos", model.geom("rod").id, (0.0, 0.0, -p.l / 2))
     yield Field("geom_size", (model.geom("rod").id, 1), p.l / 2)
     yield Field("geom_pos", model.geom("bob").id, (0.0, 0.0, -p.l))
-    yield Field("geom_pos", model.geom("hook").id, (0.0, 0.0, HOOK - p.l))
+    yield Field("geom_pos", model.geom("hook").id, (0.0, 0.0, HOOK_HEIGHT - p.l))
 
 
 def nominal(x, v, i, p):
@@ -51,7 +51,7 @@ def nominal(x, v, i, p):
 
 
 def stops(spec):
-    cart.stops(spec, STOPS)
+    cart.stops(spec, STOP_X)
 
 
 OVERHEAD_CRANE = Plant(

@@ -51,14 +51,14 @@ from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
 JOINTS = tuple(f"joint{i}" for i in range(1, 8))
 LINKS = tuple(f"link{i}" for i in range(1, 8))
-MASS = math.fsum((4.970684, 0.646926, 3.228604, 3.587895, 1.225946, 1.666555, 0.735522))  # kg, of the links
-STEEL = 7850.0  # kg/m^3
-FLANGE = 0.107  # m, from joint 7 to the flange
-TABLE, WALL = 0.2, 0.65  # m: height of the table, and distance of the wall from the arm's first axis
-RUBBING = 0.2  # coefficient of friction between the probe and table or wall: chosen
-READY = (0.0, -math.pi / 4, 0.0, -3 * math.pi / 4, 0.0, math.pi / 2, math.pi / 4)  # rad, the maker's
-RANGES = ((-2.8973, 2.8973), (-1.7628, 1.7628), (-2.8973, 2.8973), (-3.0718, -0.0698), (-2.8973, 2.8973))
-RANGES += ((-0.0175, 3.7525), (-2.8973, 2.8973))  # rad
+LINK_MASS = math.fsum((4.970684, 0.646926, 3.228604, 3.587895, 1.225946, 1.666555, 0.735522))  # kg, of the links
+STEEL_DENSITY = 7850.0  # kg/m^3
+FLANGE_DISTANCE = 0.107  # m, from joint 7 to the flange
+TABLE_HEIGHT, WALL_DISTANCE = 0.2, 0.65  # m: height of the table, and distance of the wall from the arm's first axis
+PROBE_FRICTION = 0.2  # coefficient of friction between the probe and table or wall: chosen
+READY_POSE = (0.0, -math.pi / 4, 0.0, -3 * math.pi / 4, 0.0, math.pi / 2, math.pi / 4)  # rad, the maker's
+JOINT_RANGES = ((-2.8973, 2.8973), (-1.7628, 1.7628), (-2.8973, 2.8973), (-3.0718, -0.0698), (-2.8973, 2.8973))
+JOINT_RANGES += ((-0.0175, 3.7525), (-2.8973, 2.8973))  # rad
 # Friction of each joint, in N m, s/rad, rad/s: Gaz et al.
 FRICTION = Sigmoid(
     p1=(0.54615, 0.87224, 0.64068, 1.2794, 0.83904, 0.30301, 0.56489),
@@ -66,7 +66,7 @@ FRICTION = Sigmoid(
     p3=(0.0395, 0.0259, -0.0461, 0.0362, 0.0262, -0.0210, 0.0036),
 )
 # The second set of Gaz et al., delta: kg, centre in m, and inertia about the centre, kg m^2: xx, yy, zz, xy, xz, yz.
-DELTA = (
+SECOND_SET = (
     (2.0643e-5, (5.2e-8, 5.2e-8, -0.1750), (0.6, 0.6, 2e-6, 0.0, 0.0, 0.0)),
     (9.2017, (0.0015, -0.0578, -0.0384), (0.028, 0.0291, 0.0011, 5.565e-5, 0.0056, -2.7636e-4)),
     (1.4575, (0.1096, 0.05, -0.1), (2e-6, 2e-6, 2e-6, 0.0, 0.0, 0.0)),
@@ -83,7 +83,7 @@ def build(n):
 
 def fields(model, p):
     links, ball = [model.body(name).id for name in LINKS], model.body("payload").id
-    share, radius = p.m / MASS, math.cbrt(3.0 * p.payload / (4.0 * math.pi * STEEL))
+    share, radius = p.m / LINK_MASS, math.cbrt(3.0 * p.payload / (4.0 * math.pi * STEEL_DENSITY))
     inertia = 0.4 * p.payload * radius * radius
     masses, centres, frames, inertias = blended(model, links, p.delta)
     yield Field("body_mass", links, masses * share)
@@ -92,7 +92,7 @@ def fields(model, p):
     yield Field("body_inertia", links, inertias * share)
     yield Field("body_mass", ball, p.payload)
     yield Field("body_inertia", ball, (inertia, inertia, inertia))
-    yield Field("body_pos", ball, (0.0, 0.0, FLANGE + p.lp))
+    yield Field("body_pos", ball, (0.0, 0.0, FLANGE_DISTANCE + p.lp))
     yield Field("geom_size", (model.geom("ball").id, 0), max(radius, 0.001))
     yield Field("opt.gravity", 2, -p.grav)
 
@@ -111,7 +111,7 @@ def blended(model, links, delta):
     frames, inertias = model.body_iquat[links], model.body_inertia[links]
     if not delta:
         return masses, centres, frames, inertias
-    for i, (mass, centre, (xx, yy, zz, xy, xz, yz)) in enumerate(DELTA):
+    for i, (mass, centre, (xx, yy, zz, xy, xz, yz)) in enumerate(SECOND_SET):
         turn = np.empty(9)
         mujoco.mju_quat2Mat(turn, frames[i])
         turn = turn.reshape(3, 3)
@@ -133,27 +133,27 @@ def moments(mass, centre, inertia):
 def table(spec):
     """Add a table in front of the arm, on which the probe slides."""
     machine = spec.body("machine")
-    box(machine, "table", (0.25, -0.45, TABLE - 0.03), (0.85, 0.45, TABLE), "steel")
+    box(machine, "table", (0.25, -0.45, TABLE_HEIGHT - 0.03), (0.85, 0.45, TABLE_HEIGHT), "steel")
     for i, (x, y) in enumerate(((0.30, -0.40), (0.80, -0.40), (0.30, 0.40), (0.80, 0.40))):
-        box(machine, f"leg{i}", (x - 0.02, y - 0.02, 0.0), (x + 0.02, y + 0.02, TABLE - 0.03), "graphite")
-    rub(spec, ("probe", "table"), RUBBING)
+        box(machine, f"leg{i}", (x - 0.02, y - 0.02, 0.0), (x + 0.02, y + 0.02, TABLE_HEIGHT - 0.03), "graphite")
+    rub(spec, ("probe", "table"), PROBE_FRICTION)
 
 
 def wall(spec):
     """Add a wall in front of the arm, along which the probe slides."""
     machine = spec.body("machine")
-    box(machine, "wall", (WALL, -0.45, 0.0), (WALL + 0.05, 0.45, 0.85), "steel")
-    rub(spec, ("probe", "wall"), RUBBING)
+    box(machine, "wall", (WALL_DISTANCE, -0.45, 0.0), (WALL_DISTANCE + 0.05, 0.45, 0.85), "steel")
+    rub(spec, ("probe", "wall"), PROBE_FRICTION)
 
 
 PANDA = Plant(
     name="panda",
     label="Panda",
-    parameters={"m": MASS, "payload": 0.0, "lp": 0.04, "delta": 0.0, "grav": 9.81},  # kg, kg, m, 1, m/s^2
+    parameters={"m": LINK_MASS, "payload": 0.0, "lp": 0.04, "delta": 0.0, "grav": 9.81},  # kg, kg, m, 1, m/s^2
     mass="m",
     unit="rad",
     x0=(0.0, 0.0, 0.0, -math.pi / 2, 0.0, math.pi / 2, -math.pi / 4),
-    rest=READY,
+    rest=READY_POSE,
     n=7,
     sizes=(7, 7),
     build=build,
@@ -168,5 +168,5 @@ PANDA = Plant(
     friction=FRICTION,
     smooth=False,
     limits=(87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
-    ranges=tuple((name, low, high) for name, (low, high) in zip(JOINTS, RANGES, strict=True)),
+    ranges=tuple((name, low, high) for name, (low, high) in zip(JOINTS, JOINT_RANGES, strict=True)),
 )

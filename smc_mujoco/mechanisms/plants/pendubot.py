@@ -29,5 +29,5 @@ PENDUBOT = dataclasses.replace(
     build=build,
     nominal=nominal,
     underactuated=True,
-    limits=(both.LIMIT,),
+    limits=(both.TORQUE_LIMIT,),
 )

@@ -11,7 +11,7 @@ import mujoco
 from smc_mujoco.mechanisms.geometry import cart
 from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
-LIMIT = 35.1507 * 10.0  # N
+FORCE_LIMIT = 35.1507 * 10.0  # N
 
 
 def build(n):
@@ -40,7 +40,7 @@ SERVO_AXIS = Plant(
     fields=fields,
     nominal=nominal,
     lane=(0.0, 0.5, 0.0),
-    limits=(LIMIT,),
+    limits=(FORCE_LIMIT,),
     smooth=False,
     dry=("cf",),
 )

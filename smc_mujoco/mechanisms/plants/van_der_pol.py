@@ -15,12 +15,12 @@ from smc_mujoco.mechanisms.geometry import cart, coil
 from smc_mujoco.mechanisms.hardware.contact import bar
 from smc_mujoco.mechanisms.plant import Field, Plant, Variant, model_path
 
-ASIDE = 3.0  # m, h: chosen, so that the limit cycle stays inside the stops
-HEIGHT = 0.45  # m, height of the damper above the floor, over the block
-ENDS, EDGE = 2.57, 0.175  # m, |x| of the springs' ends on the posts and on the cart
-RELAXED = 0.35  # m, their rest length: chosen, so that both pull while |x| < 2.045 m
+ANCHOR_Y = 3.0  # m, h: chosen, so that the limit cycle stays inside the stops
+DAMPER_Z = 0.45  # m, height of the damper above the floor, over the block
+POST_END, CART_END = 2.57, 0.175  # m, |x| of the springs' ends on the posts and on the cart
+REST_LENGTH = 0.35  # m, their rest length: chosen, so that both pull while |x| < 2.045 m
 SPRINGS = (("left_spring", -1), ("right_spring", 1))
-STOPS, POST = 2.2, 0.5  # m, |x| at end stops and x at the post: chosen, outside the limit cycle, and between x0 and 0
+STOP_X, PEG_X = 2.2, 0.5  # m, |x| at end stops and x at the post: chosen, outside the limit cycle, and between x0 and 0
 
 
 def build(n):
@@ -34,8 +34,8 @@ def draw_springs(spec, height, radius):
         coil.draw(
             spec,
             name,
-            start=("machine", (0, 0, 0), (side * ENDS, 0, height)),
-            end=("cart", (0, 0, cart.RAIL), (side * EDGE, 0, height)),
+            start=("machine", (0, 0, 0), (side * POST_END, 0, height)),
+            end=("cart", (0, 0, cart.RAIL_Z), (side * CART_END, 0, height)),
             radius=radius,
             turns=20,
             wire=0.010,
@@ -56,31 +56,31 @@ def nominal(x, v, i, p):
 
 
 def on_floor(spec):
-    cart.bed(spec, ENDS)
+    cart.bed(spec, POST_END)
     for name, _ in SPRINGS:
         spec.delete(next(skin for skin in spec.skins if skin.name == name))
-    draw_springs(spec, cart.MIDDLE, 0.040)
+    draw_springs(spec, cart.MIDDLE_Z, 0.040)
     stops(spec)
 
 
 def stops(spec):
-    cart.stops(spec, STOPS)
+    cart.stops(spec, STOP_X)
 
 
 def peg(spec):
-    cart.peg(spec, POST)
+    cart.peg(spec, PEG_X)
 
 
 def add_springs(spec):
     machine, body, joint = spec.body("machine"), spec.body("cart"), spec.joint("slide")
     joint.stiffness, joint.damping = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
     for name, side in SPRINGS:
-        machine.add_site(name=f"{name}_post", pos=(side * ENDS, 0, cart.RAIL))
-        body.add_site(name=f"{name}_cart", pos=(side * EDGE, 0, 0))
-        spring = spec.add_tendon(name=name, springlength=(RELAXED, RELAXED), group=5, rgba=(0, 0, 0, 0))
+        machine.add_site(name=f"{name}_post", pos=(side * POST_END, 0, cart.RAIL_Z))
+        body.add_site(name=f"{name}_cart", pos=(side * CART_END, 0, 0))
+        spring = spec.add_tendon(name=name, springlength=(REST_LENGTH, REST_LENGTH), group=5, rgba=(0, 0, 0, 0))
         spring.wrap_site(f"{name}_post")
         spring.wrap_site(f"{name}_cart")
-    spec.site("far").pos, spec.site("near").pos = (0, ASIDE, HEIGHT), (0, 0, HEIGHT - cart.RAIL)
+    spec.site("far").pos, spec.site("near").pos = (0, ANCHOR_Y, DAMPER_Z), (0, 0, DAMPER_Z - cart.RAIL_Z)
     motor = spec.add_actuator(
         name="passive:active_damper",
         target="slide",
@@ -89,10 +89,10 @@ def add_springs(spec):
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
     )
     motor.gainprm[0] = 0.0  # takes no command
-    bar(body, "damper_post", ((0, 0, 0.13), (0, 0, HEIGHT - cart.RAIL + 0.03)), 0.022, "steel")
-    bar(machine, "damper_foot", ((0, ASIDE, 0), (0, ASIDE, 0.028)), 0.13, "graphite")
-    bar(machine, "damper_anchor", ((0, ASIDE, 0.028), (0, ASIDE, HEIGHT + 0.03)), 0.028, "graphite")
-    ends = ("machine", (0, 0, 0), (0, ASIDE, HEIGHT)), ("cart", body.pos, (0, 0, HEIGHT))
+    bar(body, "damper_post", ((0, 0, 0.13), (0, 0, DAMPER_Z - cart.RAIL_Z + 0.03)), 0.022, "steel")
+    bar(machine, "damper_foot", ((0, ANCHOR_Y, 0), (0, ANCHOR_Y, 0.028)), 0.13, "graphite")
+    bar(machine, "damper_anchor", ((0, ANCHOR_Y, 0.028), (0, ANCHOR_Y, DAMPER_Z + 0.03)), 0.028, "graphite")
+    ends = ("machine", (0, 0, 0), (0, ANCHOR_Y, DAMPER_Z)), ("cart", body.pos, (0, 0, DAMPER_Z))
     coil.tube(spec, "damper_rod", *ends, span=(0.0, 1.0), radius=0.010, material="steel")
     coil.tube(spec, "damper_barrel", *ends, span=(0.12, 0.55), radius=0.034, material="graphite")
 
@@ -101,7 +101,7 @@ def spring_fields(model, p):
     springs = [model.tendon(name).id for name, _ in SPRINGS]
     yield from cart.mass_fields(model, p)
     yield Field("tendon_stiffness", springs, 0.5 * p.k)
-    yield Field("tendon_damping", model.tendon("across").id, p.mu * (1.0 + ASIDE**2))
+    yield Field("tendon_damping", model.tendon("across").id, p.mu * (1.0 + ANCHOR_Y**2))
     yield Field("actuator_biasprm", (model.actuator("passive:active_damper").id, 2), p.mu)
 
 

@@ -283,8 +283,8 @@ def test_springs_follow_the_cart(seen):
         " array.filter((_, i) => i % 3 === 0)).map((x) => [Math.min(...x), Math.max(...x)])"
     )
     assert abs(x - smc.plant("van_der_pol").x0[0]) > 0.05
-    assert left == pytest.approx([-van_der_pol.ENDS, x - van_der_pol.EDGE], abs=0.02)
-    assert right == pytest.approx([x + van_der_pol.EDGE, van_der_pol.ENDS], abs=0.02)
+    assert left == pytest.approx([-van_der_pol.POST_END, x - van_der_pol.CART_END], abs=0.02)
+    assert right == pytest.approx([x + van_der_pol.CART_END, van_der_pol.POST_END], abs=0.02)
     seen.page.locator("#play").click()
 
 

@@ -23,7 +23,7 @@ from smc_mujoco.envs import episode, tasks
 from smc_mujoco.mechanisms.custom import channels as own_channels
 from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, prepared
-from smc_mujoco.mechanisms.custom.plant_from import OwnModel
+from smc_mujoco.mechanisms.custom.plant_from import UserModel
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import reference as plain
 from smc_mujoco.simulation import scenario as scenario_module
@@ -111,14 +111,14 @@ def arm(tmp_path):
 
 def joints_of(plant: smc.Plant, raw: mujoco.MjModel) -> list:
     """The plant's channels in the model as its file has it."""
-    assert isinstance(plant.build, OwnModel)
+    assert isinstance(plant.build, UserModel)
     names = own_channels.joints_of(plant.build.channels)
     return [raw.joint(name) for name in names]
 
 
 def read(plant: smc.Plant) -> mujoco.MjModel:
     """The model as its file has it."""
-    assert isinstance(plant.build, OwnModel)
+    assert isinstance(plant.build, UserModel)
     return mujoco.MjModel.from_xml_path(plant.build.source.path)
 
 
@@ -315,7 +315,7 @@ def test_a_mismatch_is_in_the_true_model_alone(arm):
 
 def test_u_is_the_force_on_the_joint_within_the_motor_s_limits(arm):
     plant = arm()
-    assert isinstance(plant.build, OwnModel)
+    assert isinstance(plant.build, UserModel)
     assert plant.limits == (4.0, math.inf)  # gear -4, ctrlrange -1 2: the weaker way; the other motor has none
 
     @smc.law_function
