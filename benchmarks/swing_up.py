@@ -233,8 +233,8 @@ def write(robot, seed):
     data = {"about": about, "robot": robot, "step": h} | {
         name: [round(float(value), 9) for value in column] for name, column in columns.items()
     }
-    entries.FOLDER.mkdir(exist_ok=True)
-    (entries.FOLDER / f"{robot}.json").write_text(json.dumps(data, indent=0) + "\n")
+    entries.TRAJECTORY_FOLDER.mkdir(exist_ok=True)
+    (entries.TRAJECTORY_FOLDER / f"{robot}.json").write_text(json.dumps(data, indent=0) + "\n")
     print(
         f"{robot}: {h * NODES:.3f} s, score about {score:.4f}, largest gap {gap:.1e}, |u| <= {np.abs(u).max():.2f} N m"
     )

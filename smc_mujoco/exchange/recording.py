@@ -24,8 +24,8 @@ from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.state import LOGGED
 from smc_mujoco.simulation.trace import Trace
 
-RATE = 100.0  # Hz, of poses at most: screens show 60; chosen
-GROUPS = 3  # groups of geoms that MuJoCo draws by default
+MAX_POSE_RATE = 100.0  # Hz, of poses at most: screens show 60; chosen
+DRAWN_GROUPS = 3  # groups of geoms that MuJoCo draws by default
 GEOM = mujoco.mjtGeom
 
 
@@ -76,12 +76,12 @@ def message_of(joints: Sequence[str]) -> Any:
 
 
 def posed(trace: Trace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return samples of a trace, (m,), at most RATE a second; places, (m, nbody, 3), and quaternions of the bodies."""
+    """Return samples of a trace, (m,), and places, (m, nbody, 3), and quaternions, (m, nbody, 4), of the bodies."""
     machines = shapes(trace.scenario)
     data = [mujoco.MjData(machine.model) for machine in machines]
     first = machines[0].model
     channels = first.jnt_qposadr[joint_ids(first)]
-    step = max(1, round(1.0 / (RATE * trace.scenario.control_period)))
+    step = max(1, round(1.0 / (MAX_POSE_RATE * trace.scenario.control_period)))
     samples = np.flatnonzero(np.isfinite(trace.x).all(axis=1))[::step]
     whole = puppet.poses(trace, trace.t[samples]) if first.nq > len(channels) else None
     if whole is None:
@@ -117,7 +117,7 @@ def add_shapes(message: Any, model: mujoco.MjModel) -> None:
         for geom in range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body]):
             material = model.geom_matid[geom]
             rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
-            if model.geom_group[geom] < GROUPS and rgba[3] > 0.0:
+            if model.geom_group[geom] < DRAWN_GROUPS and rgba[3] > 0.0:
                 for shape, place in primitives(entity, model, geom):
                     put(shape.color, "rgba", rgba)
                     put(shape.pose.position, "xyz", place)

@@ -14,7 +14,7 @@ import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
 from smc_mujoco.evidence import boards
 from smc_mujoco.evidence.boards import entries, simulator, standings
-from smc_mujoco.evidence.boards.scoring import VERSIONS, of_arrays
+from smc_mujoco.evidence.boards.scoring import VERSION_CRITERIA, of_arrays
 from smc_mujoco.evidence.boards.simulator import Case, Machine
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1
 
@@ -53,7 +53,7 @@ def test_published_criteria_give_their_published_score(row, version):
     That is up to 0.004, most of it by the smoothness: 0.0005 of 0.1 N m. Two rows of 29 are off by 0.0022, where 0.0037
     and 0.0033 are open; all others by less than 0.002.
     """
-    names = VERSIONS[version]
+    names = VERSION_CRITERIA[version]
     low, high = (
         boards.score(
             row._asdict() | {name: getattr(row, name) + side * 0.5 * 10.0 ** -DIGITS[name] for name in names}, version
@@ -69,7 +69,7 @@ def test_published_criteria_give_their_published_score(row, version):
 def test_unrounded_criteria_give_their_unrounded_score():
     """History SAC's run on the acrobot's board: scores.csv of its data."""
     values = (1.0000000000000007, 8.077749161960673, 1.8037118196867141, 0.009546752841345449, 88.4965605525382)
-    row = dict(zip(VERSIONS["v2"], values, strict=True))
+    row = dict(zip(VERSION_CRITERIA["v2"], values, strict=True))
     assert boards.score(row) == pytest.approx(0.6552699844147534, abs=1e-12)
 
 
@@ -366,7 +366,7 @@ def test_with_measured_velocities_the_acrobots_entry_is_less_robust_than_two_pub
 @ROBOTS
 def test_the_trajectory_obeys_the_equation_and_the_limits(robot):
     """Between nodes, the cubic of each coordinate has the accelerations of the plant's nominal model."""
-    table = entries.read_json(entries.FOLDER / f"{robot}.json")
+    table = entries.read_json(entries.TRAJECTORY_FOLDER / f"{robot}.json")
     x, v, a, q, dq, ddq, u = (np.array(table[key]) for key in ("x", "v", "a", "q", "dq", "ddq", "u"))
     plant = smc.plant(robot)
     p = type("P", (), dict(plant.parameters))
@@ -385,7 +385,9 @@ def test_the_trajectory_obeys_the_equation_and_the_limits(robot):
 @ROBOTS
 def test_the_law_is_a_feedback_along_the_cubics_of_the_trajectory_and_stays_at_its_end(robot):
     template, rng = getattr(entries, f"{robot}_swing_up"), np.random.default_rng(2)
-    table = {key: np.array(values) for key, values in entries.read_json(entries.FOLDER / f"{robot}.json").items()}
+    table = {
+        key: np.array(values) for key, values in entries.read_json(entries.TRAJECTORY_FOLDER / f"{robot}.json").items()
+    }
     nodes = float(table["step"]) * np.arange(len(table["u"]))
     paths = [
         CubicHermiteSpline(nodes, table[a], table[b]) for a, b in (("x", "v"), ("v", "a"), ("q", "dq"), ("dq", "ddq"))
@@ -412,7 +414,7 @@ def test_the_surface_is_one_of_least_quadratic_cost_at_the_top(robot):
     """At the end the law's linear part is the LQR of Q = diag(1, 1, 0.1, 0.1), R = 1."""
     from scipy.linalg import solve_continuous_are
 
-    table, plant = entries.read_json(entries.FOLDER / f"{robot}.json"), smc.plant(robot)
+    table, plant = entries.read_json(entries.TRAJECTORY_FOLDER / f"{robot}.json"), smc.plant(robot)
     p, top = type("P", (), dict(plant.parameters)), np.array([0.0, math.pi] if robot == "acrobot" else [math.pi, 0.0])
     rest, e = np.zeros(2), 1e-6
     A, b = np.zeros((4, 4)), np.zeros((4, 1))

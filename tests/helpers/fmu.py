@@ -71,7 +71,15 @@ def archived(folder: Path, sources: list[Path], name: str, system: str, about: s
     """C files as an FMU with a binary for this machine."""
     headers, library = Path(fmpy.__file__).parent / "c-code", folder / f"{name}.so"
     if not library.exists():
-        command = [*build.compiler(), *build.FLAGS, f"-I{headers}", *map(str, sources), "-o", str(library), "-lm"]
+        command = [
+            *build.compiler(),
+            *build.LIBRARY_FLAGS,
+            f"-I{headers}",
+            *map(str, sources),
+            "-o",
+            str(library),
+            "-lm",
+        ]
         subprocess.run(command, check=True)
     with zipfile.ZipFile(folder / f"{name}.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", about)

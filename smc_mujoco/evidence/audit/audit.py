@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from smc_mujoco.evidence.audit.runs import Result, Runs, Substitute, Used
     from smc_mujoco.studies.table import Table
 
-DEFAULT = "gaber"  # the paper that the suite was built for
+DEFAULT_PAPER = "gaber"  # the paper that the suite was built for
 CURE = "return measure -> number, or measure -> {case: number}"
 
 
@@ -80,7 +80,7 @@ class Audit:
 
 
 def audit(
-    paper: str | Path | Paper = DEFAULT,
+    paper: str | Path | Paper = DEFAULT_PAPER,
     only: Iterable[str | int] | None = None,
     gains: str | Sequence[str] | None = None,
     quick: bool = False,
@@ -138,7 +138,7 @@ def claims(
     substitute: Substitute | None = None,
     threads: int | None = None,
     report: Callable[[int], None] = lambda done: None,
-    paper: str | Path | Paper = DEFAULT,
+    paper: str | Path | Paper = DEFAULT_PAPER,
 ) -> Claims:
     """Return the verdicts on a paper's claims, with the numbers behind them; arguments and errors as of `audit`."""
     options: dict[str, Any] = {"table": table, "substitute": substitute, "report": report}
@@ -177,7 +177,7 @@ def evaluations(
     only: Iterable[str | int] | None = None,
     gains: str | Sequence[str] | None = None,
     quick: bool = False,
-    paper: str | Path | Paper = DEFAULT,
+    paper: str | Path | Paper = DEFAULT_PAPER,
 ) -> int:
     """Return how often `claims` reports, for a progress bar."""
     audited = as_paper(paper)

@@ -11,8 +11,8 @@ from smc_mujoco.evidence.audit.verdict import ANSWERS, NOT_TESTABLE, PARTLY, REF
 COLOURS = {SUPPORTED: "#2b7a3d", PARTLY: "#8a6100", REFUTED: "#b3322b", NOT_TESTABLE: "#6a6a6a"}  # white on each: 5:1
 COLOURS |= dict.fromkeys(ANSWERS.values(), "#3d5a80")  # of a question
 SHORT_WORDS = {PARTLY: "partly"}
-LABEL = "#444"
-HEIGHT, SIZE, MARGIN = 20, 11, 6  # px
+LABEL_COLOUR = "#444"
+HEIGHT, FONT_SIZE, MARGIN = 20, 11, 6  # px
 FONT = "Verdana,Geneva,DejaVu Sans,sans-serif"
 
 
@@ -27,12 +27,12 @@ def save(name: str, claims: Sequence[Claim], path: str | Path) -> Path:
 def svg(name: str, claims: Sequence[Claim]) -> str:
     """Return the badge: the paper's name, and a field for each verdict that some sentence of the paper has."""
     counts = totals(claims)
-    fields = [(f"claims of {name}", LABEL)]
+    fields = [(f"claims of {name}", LABEL_COLOUR)]
     fields += [(f"{count} {SHORT_WORDS.get(one, one)}", COLOURS[one]) for one, count in counts.items()]
     about = f"{fields[0][0]}: {', '.join(text for text, _ in fields[1:])}"
     boxes, texts, x = [], [], 0.0
     for text, colour in fields:
-        length = style.width(text, SIZE)  # DejaVu Sans is as wide as Verdana
+        length = style.width(text, FONT_SIZE)  # DejaVu Sans is as wide as Verdana
         wide = round(length + 2 * MARGIN)
         boxes.append(f'<rect x="{x:g}" width="{wide}" height="{HEIGHT}" fill="{colour}"/>')
         shown, middle = escape(text), x + wide / 2
@@ -49,5 +49,5 @@ def svg(name: str, claims: Sequence[Claim]) -> str:
         '<stop offset="1" stop-opacity=".1"/></linearGradient>'
         f'<clipPath id="r"><rect {size} rx="3" fill="#fff"/></clipPath>'
         f'<g clip-path="url(#r)">{"".join(boxes)}<rect {size} fill="url(#s)"/></g>'
-        f'<g fill="#fff" text-anchor="middle" font-family="{FONT}" font-size="{SIZE}">{"".join(texts)}</g></svg>\n'
+        f'<g fill="#fff" text-anchor="middle" font-family="{FONT}" font-size="{FONT_SIZE}">{"".join(texts)}</g></svg>\n'
     )

@@ -27,8 +27,8 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.run_key import condition, portable_key
 
 FORMAT = "smc-mujoco evidence 1"
-TOLD = ("id", "text", "where", "whose", "how", "read", "measured", "holds_if", "quantifier", "over")  # of a claim
-ENDINGS = (".py", ".toml", ".xml")  # of a paper's files that count
+CLAIM_FIELDS = ("id", "text", "where", "whose", "how", "read", "measured", "holds_if", "quantifier", "over")
+HASHED_SUFFIXES = (".py", ".toml", ".xml")  # of a paper's files that count
 
 
 def document(audit: Any) -> dict[str, Any]:
@@ -87,7 +87,7 @@ def check(path: str | Path) -> dict[str, Any]:
 
 def files(paper: Paper) -> dict[str, str]:
     """Return file -> hash, of the files of a paper that count; the ends of lines do not."""
-    paths = sorted(path for path in paper.folder.rglob("*") if path.suffix in ENDINGS and path.is_file())
+    paths = sorted(path for path in paper.folder.rglob("*") if path.suffix in HASHED_SUFFIXES and path.is_file())
     texts = {path.relative_to(paper.folder).as_posix(): path.read_bytes().replace(b"\r\n", b"\n") for path in paths}
     return {name: hashlib.sha256(text).hexdigest() for name, text in texts.items()}
 
@@ -95,7 +95,7 @@ def files(paper: Paper) -> dict[str, str]:
 def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
     """Return what is sealed of a claim."""
     entry = audit.paper.claims[claim.id]
-    told = {name: getattr(claim, name) for name in TOLD}
+    told = {name: getattr(claim, name) for name in CLAIM_FIELDS}
     if entry.immune:
         told["immune"] = entry.immune
     if entry.varies:

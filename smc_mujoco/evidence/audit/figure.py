@@ -21,10 +21,10 @@ from smc_mujoco.draw.page import Size
 from smc_mujoco.evidence.audit.badge import COLOURS
 from smc_mujoco.evidence.audit.verdict import MARKS, Check, Claim
 
-ROW = 26.0  # points on a full page, height of a claim's row
-DECADES = 3.0  # on each side of 1
-SPREAD = 0.5  # of a row, over which the sets of gains are spread
-TEXT = 0.36  # of the page's width, for the claims
+ROW_HEIGHT = 26.0  # points on a full page, height of a claim's row
+MAX_DECADES = 3.0  # on each side of 1
+SETS_SHARE = 0.5  # of a row, over which the sets of gains are spread
+TEXT_SHARE = 0.36  # of the page's width, for the claims
 
 
 def figure(
@@ -52,7 +52,7 @@ def figure(
     kinds = [kind for kind in COLOURS if any(claim.verdict == kind for claim in claims)]
     with style.page(width):
         handles = [Line2D([], [], color=COLOURS[kind], marker="o", ls="", label=kind) for kind in kinds]
-        whole = pages.head_height(width, handles) + style.points(ROW * (len(claims) + 2.5)) / 72
+        whole = pages.head_height(width, handles) + style.points(ROW_HEIGHT * (len(claims) + 2.5)) / 72
         page = pages.blank(width, height or whole, fig)
         ax = page.subplots()
         for row, claim in enumerate(claims):
@@ -60,15 +60,15 @@ def figure(
                 ax.axhspan(row - 0.5, row + 0.5, color=style.RULE, alpha=0.25, lw=0)
             draw(ax, row, claim)
         ax.axvline(0.0, color=style.INK, lw=style.points(1.2))
-        ax.set(xlim=(-1.08 * DECADES, 1.08 * DECADES), ylim=(len(claims) - 0.5, -0.5))
+        ax.set(xlim=(-1.08 * MAX_DECADES, 1.08 * MAX_DECADES), ylim=(len(claims) - 0.5, -0.5))
         sets = list(claims[0].verdicts)
         order = f"; from above, gains {', '.join(sets)}" if len(sets) > 1 else ""
         words = f"measured / asked: left of 1 it holds, and is filled{order}"
-        letters, room = style.points(9.5), TEXT * 72 * width
+        letters, room = style.points(9.5), TEXT_SHARE * 72 * width
         ax.set_xlabel(style.wrapped(words, 2 * room, letters, lines=2), fontsize=letters)
         narrow = width < pages.NARROW
-        ends = {-DECADES: f"≤ {10**-DECADES:g}", DECADES: f"≥ {10**DECADES:g}"}
-        ticks = [float(k) for k in range(-round(DECADES), round(DECADES) + 1) if not narrow or k % 2 == 0]
+        ends = {-MAX_DECADES: f"≤ {10**-MAX_DECADES:g}", MAX_DECADES: f"≥ {10**MAX_DECADES:g}"}
+        ticks = [float(k) for k in range(-round(MAX_DECADES), round(MAX_DECADES) + 1) if not narrow or k % 2 == 0]
         ax.set_xticks(ticks, [ends.get(k, f"{10.0**k:g}") for k in ticks])
         names = [style.cropped(f"{MARKS[one.verdict]} {one.id}  {one.text}", room, letters) for one in claims]
         ax.set_yticks(range(len(claims)), names, fontsize=letters)
@@ -87,19 +87,19 @@ def draw(ax: Axes, row: int, claim: Claim) -> None:
     colour, sets = COLOURS[claim.verdict], list(claim.verdicts)
     dot = {"marker": "o", "ls": "", "ms": style.points(5.5), "mec": colour, "mew": style.points(1.1), "clip_on": False}
     for k, name in enumerate(sets):
-        y = row + SPREAD * ((k + 0.5) / len(sets) - 0.5)
+        y = row + SETS_SHARE * ((k + 0.5) / len(sets) - 0.5)
         for one in claim.checks(name):
             ax.plot(place(one), y, mfc=colour if one.holds else "none", **dot)
 
 
 def place(check: Check) -> float:
-    """Return the place of a check: log10 of the multiple of what is asked, at most DECADES from 0."""
+    """Return the place of a check: log10 of the multiple of what is asked, at most MAX_DECADES from 0."""
     over, under = (check.value, check.limit) if check.relation in ("<", "<=") else (check.limit, check.value)
-    edge = -DECADES if check.holds else DECADES
+    edge = -MAX_DECADES if check.holds else MAX_DECADES
     if math.isnan(over) or math.isnan(under) or under <= 0.0 or over < 0.0 or math.isinf(under):
         return edge
     if over == 0.0 or math.isinf(over):
         return edge
     decades = math.log10(over / under)
     decades = min(decades, 0.0) if check.holds else max(decades, 0.0)
-    return min(max(decades, -DECADES), DECADES)
+    return min(max(decades, -MAX_DECADES), MAX_DECADES)

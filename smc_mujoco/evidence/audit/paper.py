@@ -49,16 +49,16 @@ from smc_mujoco.simulation.conditions import DURATION, Condition, condition, fin
 from smc_mujoco.simulation.conditions import NAMED as CONDITIONS
 from smc_mujoco.simulation.scenario import Scenario
 
-FILE, CODE = "paper.toml", "claims.py"
-SHIPPED = "smc_mujoco.evidence.papers"
+PAPER_FILE, CODE_FILE = "paper.toml", "claims.py"
+SHIPPED_PACKAGE = "smc_mujoco.evidence.papers"
 QUANTIFIERS = {"universal": UNIVERSAL, "existential": EXISTENTIAL, "named": NAMED}
-NOTHING: Mapping[str, Any] = frozen({})
-TEXTS = ("title", "authors", "source", "read", "access", "note", "runs")  # of a paper
-READ = ("full text", "abstract", "textbook", "second hand", "nothing")  # what of a paper was read
+NO_FIELDS: Mapping[str, Any] = frozen({})
+TEXT_FIELDS = ("title", "authors", "source", "read", "access", "note", "runs")  # of a paper
+READ_PARTS = ("full text", "abstract", "textbook", "second hand", "nothing")  # what of a paper was read
 KINDS_OF_CLAIM = {PAPER: "of its sentences", DERIVED: "derived", OURS: "beside it"}
-OVER = ("all", "some")  # of the gains that a paper allows
-SETS = (*gain_sets.SETS, "default")  # of the suite
-OF_CLAIM = {  # field of a claim -> its type and what to write; the first six are needed
+GAIN_QUANTIFIERS = ("all", "some")  # of the gains that a paper allows
+SUITE_SETS = (*gain_sets.SETS, "default")  # of the suite
+CLAIM_FIELDS = {  # field of a claim -> its type and what to write; the first six are needed
     "id": (str, "a text"),
     "text": (str, "a text"),
     "whose": (str, '"paper" for a sentence of the paper, "derived" for what follows from one, "ours" for a question'),
@@ -66,7 +66,7 @@ OF_CLAIM = {  # field of a claim -> its type and what to write; the first six ar
     "function": (str, "the name of a function"),
     "holds_if": (dict | str, 'a table, as { "settling time, s" = "< 2" }'),
     "how": (str, "a text: how it is derived, or why it is asked"),
-    "read": (str, f"one of {', '.join(READ)}"),
+    "read": (str, f"one of {', '.join(READ_PARTS)}"),
     "over": (str, '"all" or "some" of the gains in [allowed.LAW]'),
     "words": (str, "a text: holds_if in words"),
     "measured": (str, "a text"),
@@ -84,7 +84,7 @@ OF_CLAIM = {  # field of a claim -> its type and what to write; the first six ar
     "runs": (str, 'fields of a scenario, as "duration=5.0"'),
     "values": (dict, "a table of numbers"),
 }
-NEEDED = tuple(OF_CLAIM)[:6]
+REQUIRED_FIELDS = tuple(CLAIM_FIELDS)[:6]
 
 
 class Allowed(NamedTuple):
@@ -125,8 +125,8 @@ class Entry(Statement):
     plants: tuple[str, ...] = ()
     laws: tuple[str, ...] = ()
     conditions: tuple[str, ...] = ()
-    fields: Mapping[str, Any] = NOTHING
-    values: Mapping[str, Any] = NOTHING
+    fields: Mapping[str, Any] = NO_FIELDS
+    values: Mapping[str, Any] = NO_FIELDS
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -136,7 +136,7 @@ class Paper:
     Attributes:
       name: of its folder.
       title, authors, source: as one cites it.
-      read: what was read of it, one of READ.
+      read: what was read of it, one of READ_PARTS.
       access: where, and what could not be read.
       note: what a reader of the audit should know.
       sets: set of gains -> plant ("" for all) -> law -> gain -> value; None for a set of the suite.
@@ -218,8 +218,8 @@ class Paper:
 
 def shipped() -> dict[str, Path]:
     """Return name -> folder of every paper that ships, in alphabetical order."""
-    home = Path(str(importlib.import_module(SHIPPED).__file__)).parent
-    return {path.parent.name: path.parent for path in sorted(home.glob(f"*/{FILE}"))}
+    home = Path(str(importlib.import_module(SHIPPED_PACKAGE).__file__)).parent
+    return {path.parent.name: path.parent for path in sorted(home.glob(f"*/{PAPER_FILE}"))}
 
 
 class Home(NamedTuple):
@@ -232,7 +232,7 @@ class Home(NamedTuple):
 @functools.cache
 def catalogue() -> Catalogue[Home]:
     """Return where every paper is that ships, or comes with another package, by name."""
-    of_suite = {name: Home(folder, f"{SHIPPED}.{name}") for name, folder in shipped().items()}
+    of_suite = {name: Home(folder, f"{SHIPPED_PACKAGE}.{name}") for name, folder in shipped().items()}
     return Catalogue(of_suite, added("smc_mujoco.papers", _of_package))
 
 
@@ -257,7 +257,7 @@ def paper(which: str | Path) -> Paper:
     if not os.path.isdir(folder):
         if isinstance(which, str) and not set("/\\.") & set(which):
             raise unknown("paper", which, known)
-        raise ScenarioError(f"no folder {str(which)!r} with a {FILE}: give one, or a name of {', '.join(known)}")
+        raise ScenarioError(f"no folder {str(which)!r} with a {PAPER_FILE}: give one, or a name of {', '.join(known)}")
     return _read(folder, _package(folder))
 
 
@@ -283,7 +283,7 @@ def new(folder: Path) -> list[Path]:
     """Copy the template, a paper that runs, to a folder, and return the files."""
     if os.path.exists(folder) and (not folder.is_dir() or any(folder.iterdir())):
         raise ScenarioError(f"{folder} is there already: give the name of a new folder")
-    written = [folder / FILE, folder / CODE]
+    written = [folder / PAPER_FILE, folder / CODE_FILE]
     for file in written:
         with replacing(file) as part:
             part.write_text((Path(__file__).parent / "template" / file.name).read_text(encoding="utf-8"), "utf-8")
@@ -304,28 +304,28 @@ def _package(folder: Path) -> str:
 def _read(folder: Path, package: str) -> Paper:
     """Return the paper in a folder, whose code is imported under a package's name."""
     cure = "make one with `smc-mujoco papers --new FOLDER`"
-    with reading(folder / FILE, "paper", cure) as file:
+    with reading(folder / PAPER_FILE, "paper", cure) as file:
         text = file.read_text(encoding="utf-8")
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(f"{folder / FILE} is no TOML: {error}") from None
+        raise ScenarioError(f"{folder / PAPER_FILE} is no TOML: {error}") from None
     code = _module(folder, package)
     try:
         return _checked(folder, data, code)
     except ScenarioError as error:
-        raise ScenarioError(f"{folder / FILE}: {error}") from None
+        raise ScenarioError(f"{folder / PAPER_FILE}: {error}") from None
 
 
 def _module(folder: Path, package: str) -> ModuleType:
     """Return the module claims.py with a paper's functions."""
-    if not (folder / CODE).is_file():
-        raise ScenarioError(f"no {CODE} in {folder}: write one, with a function for each claim of {FILE}")
+    if not (folder / CODE_FILE).is_file():
+        raise ScenarioError(f"no {CODE_FILE} in {folder}: write one, with a function for each claim of {PAPER_FILE}")
     before, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # a user's folder stays as it is
     try:
         return importlib.import_module(f"{package}.claims")
     except ScenarioError as error:
-        raise ScenarioError(f"{folder / CODE}: {error}") from None
+        raise ScenarioError(f"{folder / CODE_FILE}: {error}") from None
     except SyntaxError as error:
         raise ScenarioError(f"{error.filename}, line {error.lineno}: {error.msg}") from None
     except (Exception, SystemExit) as error:  # whatever the user's module raises
@@ -342,7 +342,7 @@ def _said(error: BaseException) -> str:
 def _place(error: BaseException, folder: Path) -> str:
     """Return the file and line of a paper's folder at which an exception was raised."""
     frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).is_relative_to(folder.resolve())]
-    return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else str(folder / CODE)
+    return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else str(folder / CODE_FILE)
 
 
 def failed(paper: Paper, entry: Entry, error: BaseException) -> ScenarioError:
@@ -355,14 +355,15 @@ def failed(paper: Paper, entry: Entry, error: BaseException) -> ScenarioError:
 
 def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
     """Return the paper in a file's data."""
+    known = (*TEXT_FIELDS, "sets", "quick_sets", "plants", "conditions", "gains", "allowed", "claim")
     for field in data:
-        if field not in (known := (*TEXTS, "sets", "quick_sets", "plants", "conditions", "gains", "allowed", "claim")):
+        if field not in known:
             raise unknown("field", field, known)
-    texts = {field: _text(_typed(field, data.get(field, ""), str, "a text")) for field in TEXTS}
-    for field in TEXTS[:3]:
+    texts = {field: _text(_typed(field, data.get(field, ""), str, "a text")) for field in TEXT_FIELDS}
+    for field in TEXT_FIELDS[:3]:
         if not texts[field].strip():
             raise ScenarioError(f"no {field}: write one, as in the template of `smc-mujoco papers --new FOLDER`")
-    _one_of("read", texts["read"], READ)
+    _one_of("read", texts["read"], READ_PARTS)
     parts: dict[str, Any] = {
         "fields": _fields("runs", texts.pop("runs")),
         "plants": {key: _plant(key, one, folder) for key, one in _table(data, "plants")},
@@ -398,18 +399,18 @@ def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
 def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Paper) -> Entry:
     """Return a claim from its table."""
     for field in data:
-        find("field", field, OF_CLAIM)
-    for field in NEEDED:
+        find("field", field, CLAIM_FIELDS)
+    for field in REQUIRED_FIELDS:
         if field not in data:
             what = "threshold" if field == "holds_if" else field
-            raise ScenarioError(f"it has no {what}: write {field}, {OF_CLAIM[field][1]}")
-    values = {field: _text(_typed(field, one, *OF_CLAIM[field])) for field, one in data.items()}
+            raise ScenarioError(f"it has no {what}: write {field}, {CLAIM_FIELDS[field][1]}")
+    values = {field: _text(_typed(field, one, *CLAIM_FIELDS[field])) for field, one in data.items()}
     values.setdefault("read", paper.read)
     names: dict[str, Any] = {field: _names(field, values.pop(field, [])) for field in ("plants", "laws", "conditions")}
-    function = find(f"function of {CODE}", values.pop("function"), functions)
+    function = find(f"function of {CODE_FILE}", values.pop("function"), functions)
     condition = values.pop("holds_if")
     if not condition:
-        raise ScenarioError(f"it has no threshold: write holds_if, {OF_CLAIM['holds_if'][1]}")
+        raise ScenarioError(f"it has no threshold: write holds_if, {CLAIM_FIELDS['holds_if'][1]}")
     thresholds = () if isinstance(condition, str) else tuple(_thresholds(condition))
     texts: dict[str, Any] = {"measured": _text((inspect.getdoc(function) or "").partition("\n\n")[0]).rstrip(".")}
     fields = _fields("runs", values.pop("runs", ""))
@@ -431,13 +432,13 @@ def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Pa
 def _check_source(entry: Entry, paper: Paper) -> None:
     """Raise ScenarioError unless a claim says whose it is, from something that was read, and over which gains."""
     _one_of("whose", entry.whose, WHOSE)
-    _one_of("read", entry.read, READ)
+    _one_of("read", entry.read, READ_PARTS)
     if entry.whose == DERIVED and not entry.how:
         raise ScenarioError("it is derived, and does not say how: write how, a text")
     if entry.whose != OURS and entry.read == "nothing":
         raise ScenarioError(f'nothing of the paper was read, and it is {entry.whose!r}: write whose = "ours"')
     if entry.over:
-        _one_of("over", entry.over, OVER)
+        _one_of("over", entry.over, GAIN_QUANTIFIERS)
         if not entry.laws or entry.laws[0] not in paper.allowed:
             law = entry.laws[0] if entry.laws else "LAW"
             raise ScenarioError(f"it is about {entry.over} gains, and there is no table [allowed.{law}]: write one")
@@ -449,7 +450,7 @@ def _allowed(law: str, data: object, functions: Mapping[str, Callable], paper: P
     find("law in allowed", law, laws_known() | paper.laws)
     margins = table.pop("margins", None)
     if margins is not None:
-        margins = find(f"function of {CODE} in allowed.{law}", margins, functions)
+        margins = find(f"function of {CODE_FILE} in allowed.{law}", margins, functions)
     bounds = {}
     for gain, ends in table.items():
         find(f"gain of {law} in allowed", gain, paper._bound(law, {}).gains)
@@ -494,13 +495,13 @@ def _sets(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return set of gains -> plant -> law -> gains; None for a set of the suite."""
     tables = dict(_table(data, "gains"))
     for key in tables:
-        if key in SETS:
+        if key in SUITE_SETS:
             raise ScenarioError(f"gains.{key} is a set of the suite: give yours another name, such as gains.paper")
     listed = _names("sets", data.get("sets", list(tables) or ["default"]))
     sets: dict[str, Any] = {}
     for key in listed or ["default"]:
         if key not in tables:
-            find("set of gains in sets", key, dict.fromkeys((*tables, *SETS)))
+            find("set of gains in sets", key, dict.fromkeys((*tables, *SUITE_SETS)))
             sets[key] = None
             continue
         of_set: dict[str, dict[str, Any]] = {}
@@ -556,7 +557,9 @@ def _laws(code: ModuleType) -> Iterator[tuple[str, Template | Component]]:
         if isinstance(value, Template | Component) and value.kind == "law":
             known = laws_known().get(value.name)
             if known and known.function is not value.function:
-                raise ScenarioError(f"law {value.name!r} of {CODE} has the name of a law of the library: rename it")
+                raise ScenarioError(
+                    f"law {value.name!r} of {CODE_FILE} has the name of a law of the library: rename it"
+                )
             yield value.name, value
 
 

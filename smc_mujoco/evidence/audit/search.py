@@ -21,8 +21,8 @@ from smc_mujoco.evidence.audit.verdict import Beside, Check, Evidence
 
 SPREAD_SETS, NEAR_SETS = 6, 3  # sets of gains tried over the whole bounds, and around the best of them
 QUICK_SPREAD_SETS, QUICK_NEAR_SETS = 2, 0  # in a quick audit
-SHRINK = 0.25  # share of the bounds, on a logarithmic scale, around the best
-DRAWS = 2000  # points drawn for gains that meet the conditions of the theorem
+NEAR_BOUNDS_SHARE = 0.25  # share of the bounds, on a logarithmic scale, around the best
+DRAWN_POINTS = 2000  # points drawn for gains that meet the conditions of the theorem
 
 Gains = dict[str, float]
 Bounds = Mapping[str, tuple[float, float]]
@@ -102,7 +102,7 @@ class Theorem:
         from scipy.stats import qmc
 
         low, high = np.log(list(bounds.values())).T
-        drawn = qmc.Halton(len(bounds), scramble=False).random(DRAWS)[1:]
+        drawn = qmc.Halton(len(bounds), scramble=False).random(DRAWN_POINTS)[1:]
         sets = (dict(zip(bounds, np.exp(low + (high - low) * one).tolist(), strict=True)) for one in drawn)
         met = (gains for gains in sets if self.smallest(gains) > 0.0)
         first = next(met, None)
@@ -114,7 +114,7 @@ class Theorem:
         """Return narrower bounds around gains, within those of the paper."""
         narrow = {}
         for gain, (low, high) in self.allowed.bounds.items():
-            reach = (high / low) ** (SHRINK / 2.0)
+            reach = (high / low) ** (NEAR_BOUNDS_SHARE / 2.0)
             narrow[gain] = max(low, gains[gain] / reach), min(high, gains[gain] * reach)
         return narrow
 

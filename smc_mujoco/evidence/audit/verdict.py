@@ -30,14 +30,14 @@ MARKS |= dict(zip(ANSWERS.values(), "■◧□–", strict=True))
 PAPER, DERIVED, OURS = WHOSE = ("paper", "derived", "ours")  # whose a claim is
 WHOSE_WORDS = {PAPER: "the paper's", DERIVED: "derived", OURS: "a question"}
 
-APART = ", distance from "  # in the name of a check of a range: the number's name before it, the range after it
+DISTANCE_WORDS = ", distance from "  # in a range check's name, between number and range
 UNIVERSAL, NAMED, EXISTENTIAL = "universal", "of what it names", "existential"  # quantifiers
 
-NUMBER = r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|inf)\s*"
-LIMIT = re.compile(rf"\s*(<=|>=|<|>){NUMBER}")
-WITHIN = re.compile(rf"{NUMBER}(?:\+-|±){NUMBER}")
-BETWEEN = re.compile(rf"{NUMBER}to{NUMBER}")
-FORMS = 'write it as "< 1", "<= 1", "> 1", ">= 1", "2 +- 0.1" or "2 to 15"'
+NUMBER_PATTERN = r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|inf)\s*"
+LIMIT_PATTERN = re.compile(rf"\s*(<=|>=|<|>){NUMBER_PATTERN}")
+TOLERANCE_PATTERN = re.compile(rf"{NUMBER_PATTERN}(?:\+-|±){NUMBER_PATTERN}")
+RANGE_PATTERN = re.compile(rf"{NUMBER_PATTERN}to{NUMBER_PATTERN}")
+CURE = 'write it as "< 1", "<= 1", "> 1", ">= 1", "2 +- 0.1" or "2 to 15"'
 RELATIONS: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
     "<=": operator.le,
@@ -133,14 +133,14 @@ class Threshold(NamedTuple):
     def read(cls, measure: str, text: object, sentence: str = "") -> "Threshold":
         """Return the threshold in a text."""
         words = text if isinstance(text, str) else ""
-        if match := LIMIT.fullmatch(words):
+        if match := LIMIT_PATTERN.fullmatch(words):
             return cls(measure, words, match[1], float(match[2]), sentence=sentence)
-        if match := WITHIN.fullmatch(words):
+        if match := TOLERANCE_PATTERN.fullmatch(words):
             middle, width = map(float, match.groups())
             return cls(measure, words, "<=", width, middle, middle, sentence)
-        match = BETWEEN.fullmatch(words)
+        match = RANGE_PATTERN.fullmatch(words)
         if not match or float(match[1]) >= float(match[2]):
-            raise ScenarioError(f"the threshold of {measure!r} is {shown(text)}: {FORMS}")
+            raise ScenarioError(f"the threshold of {measure!r} is {shown(text)}: {CURE}")
         return cls(measure, words, "<=", 0.0, float(match[1]), float(match[2]), sentence)
 
     def __str__(self) -> str:
@@ -150,7 +150,7 @@ class Threshold(NamedTuple):
     def distance(self, value: float) -> float:
         """Return how far a number is from the range; NaN for NaN."""
         if self.low is None or self.high is None:
-            raise ScenarioError(f"the threshold of {self.measure!r} is {self.text!r}, which has no range: {FORMS}")
+            raise ScenarioError(f"the threshold of {self.measure!r} is {self.text!r}, which has no range: {CURE}")
         return math.nan if math.isnan(value) else max(self.low - value, value - self.high, 0.0)
 
     def evidence(self, values: Mapping[str, float]) -> Iterator[Check | Beside]:
@@ -164,7 +164,7 @@ class Threshold(NamedTuple):
                 yield check(what, value, self.relation, self.limit, self.sentence)
                 continue
             of = f"{self.low:g}" if self.low == self.high else f"{self.low:g} to {self.high:g}"
-            yield check(f"{what}{APART}{of}", self.distance(value), self.relation, self.limit, self.sentence)
+            yield check(f"{what}{DISTANCE_WORDS}{of}", self.distance(value), self.relation, self.limit, self.sentence)
             yield Beside(what, value)
 
 
@@ -182,7 +182,7 @@ class Statement:
       quantifier: UNIVERSAL, EXISTENTIAL, or NAMED: about the plants and conditions that it names, and no others.
       whose: PAPER, a sentence of the paper; DERIVED from one; or OURS, a question beside it.
       how: how it was derived, or why it is asked.
-      read: what was read of the place where it stands, one of `paper.READ`.
+      read: what was read of the place where it stands, one of `paper.READ_PARTS`.
       over: "all" or "some" gains that the paper allows; "" if the paper's gains are known, or none matter.
       instead: what the author may claim instead, where the claim does not hold: a theorem or a measured bound.
       shown_by: the command that shows it.
@@ -238,7 +238,7 @@ class Claim(Statement):
         """Return the decisive check in a line, that of a range by the number itself; the note without checks."""
         if not (one := self.decisive(gains)):
             return self.note
-        what, apart, middle = one.what.partition(APART)
+        what, apart, middle = one.what.partition(DISTANCE_WORDS)
         if not apart or what not in self.beside.get(gains, {}):
             return str(one)
         width = f" +- {one.limit:g}" if one.limit else ""

@@ -34,14 +34,14 @@ from smc_mujoco.control.law import Law, law_function
 from smc_mujoco.control.units import FORCE, Gain
 from smc_mujoco.simulation.scenario import Scenario
 
-FOLDER = Path(__file__).parent / "trajectories"
+TRAJECTORY_FOLDER = Path(__file__).parent / "trajectories"
 PERIOD, DURATION = 2e-3, 10.0  # s, of the boards
-WINDOW = 5  # readings of the velocity's filter
-STRAIGHT = 6e6  # N m, a phi for which tanh(s / phi) is s / phi to 1e-10
+FILTER_READINGS = 5  # readings of the velocity's filter
+LINEAR_PHI = 6e6  # N m, a phi for which tanh(s / phi) is s / phi to 1e-10
 FEEDBACKS: Mapping[str, Mapping[str, float]] = {  # feedback along the trajectory -> k and phi, N m
     "Riccati": {"k": 9.0, "phi": 6.0},  # the entry
-    "linear": {"k": 1.5 * STRAIGHT, "phi": STRAIGHT},  # the entry's slope at s = 0
-    "clipped": {"k": STRAIGHT, "phi": STRAIGHT},  # u = u* - s: the Riccati gain itself
+    "linear": {"k": 1.5 * LINEAR_PHI, "phi": LINEAR_PHI},  # the entry's slope at s = 0
+    "clipped": {"k": LINEAR_PHI, "phi": LINEAR_PHI},  # u = u* - s: the Riccati gain itself
     "sliding": {"k": 9.0, "phi": 0.06},  # a hundredth of the entry's layer: the law switches on s = 0
 }
 
@@ -59,7 +59,7 @@ def entry(robot: str, feedback: str = "Riccati", **fields: Any) -> Scenario:
     """
     law = find("robot of the boards", robot, {"acrobot": acrobot_swing_up, "pendubot": pendubot_swing_up})
     gains = find("feedback of the entry", feedback, FEEDBACKS)
-    made = on_board(robot, law(**gains), velocity=estimator("savitzky_golay", window=WINDOW, degree=2))
+    made = on_board(robot, law(**gains), velocity=estimator("savitzky_golay", window=FILTER_READINGS, degree=2))
     return dataclasses.replace(made, **fields)
 
 
@@ -94,7 +94,7 @@ def nearest(angle):
 
 def _along(robot: str) -> Template:
     """Return the law along the trajectory of a robot; (x, v) are the driven joint's, (q, dq) the free one's."""
-    table = read_json(FOLDER / f"{robot}.json")
+    table = read_json(TRAJECTORY_FOLDER / f"{robot}.json")
     STEP, LAST = float(table["step"]), len(table["u"]) - 1
     X, V, A, Q, DQ, DDQ, U, SX, SV, SQ, SDQ = (
         np.array(table[name]) for name in ("x", "v", "a", "q", "dq", "ddq", "u", "s_x", "s_v", "s_q", "s_dq")

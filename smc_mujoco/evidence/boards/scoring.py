@@ -29,7 +29,7 @@ from smc_mujoco.evidence.boards.published import Row
 from smc_mujoco.mechanisms.plants.double_pendulum import L2
 from smc_mujoco.simulation.trace import Trace
 
-HEIGHT = 0.9  # of the length of both links, which the tip must exceed
+MIN_TIP_HEIGHT = 0.9  # of the length of both links, which the tip must exceed
 # Criterion -> weight and norm in version 1, norm in version 2.
 V1 = {
     "swing_up_time": (0.2, 10.0),
@@ -41,7 +41,7 @@ V1 = {
     "velocity_cost": (0.2, 1000.0),
 }
 V2 = {"swing_up_time": 20.0, "energy": 60.0, "torque_cost": 20.0, "torque_smoothness": 0.1, "velocity_cost": 400.0}
-VERSIONS = {"v1": tuple(V1), "v2": tuple(V2)}  # -> the criteria that count
+VERSION_CRITERIA = {"v1": tuple(V1), "v2": tuple(V2)}  # -> the criteria that count
 ROBOTS = ("acrobot", "pendubot")
 
 
@@ -93,7 +93,7 @@ def of_arrays(t: np.ndarray, q: np.ndarray, v: np.ndarray, u: np.ndarray, robot:
     """
     driven = shoulder_first(robot).index(0)
     tip = -l1 * np.cos(q[:, 0]) - L2 * np.cos(q[:, 0] + q[:, 1])
-    low = np.flatnonzero(tip[1:-1] <= HEIGHT * (l1 + L2)) + 1  # as published: without the first sample and the last
+    low = np.flatnonzero(tip[1:-1] <= MIN_TIP_HEIGHT * (l1 + L2)) + 1  # as published: first and last left out
     first = low[-1] + 1 if len(low) else 1
     step, torque = np.diff(t), np.abs(u[:-1])
     return Criteria(
@@ -113,7 +113,7 @@ def score(of: Trace | Mapping[str, Any] | Criteria | Row, version: str = "v2") -
     Raises:
       ScenarioError: an unknown version, a criterion that is missing, or another plant.
     """
-    wanted = find("version of the boards", version, VERSIONS)
+    wanted = find("version of the boards", version, VERSION_CRITERIA)
     measured = criteria(of) if isinstance(of, Trace) else of
     values = dict(measured) if isinstance(measured, Mapping) else measured._asdict()
     for name in wanted:

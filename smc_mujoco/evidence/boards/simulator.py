@@ -42,12 +42,12 @@ from smc_mujoco.studies.noise_key import draw_key, has_user_code
 
 SEED = 20240  # of all random numbers; chosen before any run
 STEP, STEPS = 2e-3, 5000  # s; number of
-WITHIN = (0.35, 0.35, 1.0, 1.0)  # rad, rad, rad/s, rad/s, of upright and at rest
+UPRIGHT_TOLERANCES = (0.35, 0.35, 1.0, 1.0)  # rad, rad, rad/s, rad/s, of upright and at rest
 LEVELS, REPEATS, PROFILES, PULSES = 21, 10, 50, 3
 MIN_PULSE_GAP, PULSE_WIDTH, PULSE_AMPLITUDE = 1.0, (0.05, 0.1), (0.5, 5.0)  # s between pulses, s, N m
-SCALED = {"m1r1": "r1", "I1": "I1", "m2r2": "r2", "m2": "m2", "I2": "I2"}  # what is scaled -> the parameter
-FIELDS = len(Measurement._fields)
-T, DT, LIMIT, USES, X, V, E, DE, Q, DQ, F, G, FQ, GQ = (  # places in a measurement
+SCALED_PARAMETERS = {"m1r1": "r1", "I1": "I1", "m2r2": "r2", "m2": "m2", "I2": "I2"}  # what is scaled -> the parameter
+MEASUREMENT_SIZE = len(Measurement._fields)
+T, DT, LIMIT, USES_MODEL, X, V, E, DE, Q, DQ, F, G, FQ, GQ = (  # places in a measurement
     Measurement._fields.index(name)
     for name in ("t", "dt", "limit", "model", "x", "v", "e", "de", "q", "dq", "f", "g", "fq", "gq")
 )
@@ -120,7 +120,7 @@ def cases(key: int = 0) -> list[Case]:
 
     for value in np.linspace(0.0, 1e-4, LEVELS):
         model("Ir", float(value), Ir=float(value))
-    for name, parameter in SCALED.items():
+    for name, parameter in SCALED_PARAMETERS.items():
         for factor in map(float, ramp):
             changed = {parameter: factor * MODEL_1_1[parameter]}
             model(name, factor, **changed)
@@ -183,11 +183,11 @@ def robustness(scenario: Scenario, report: Callable[[float, float], None] | None
 
 
 def upright(state: np.ndarray) -> bool:
-    """Return whether a state (q1, q2, q1', q2') is within WITHIN of upright and at rest; inf is not."""
+    """Return whether a state (q1, q2, q1', q2') is within UPRIGHT_TOLERANCES of rest upright; inf is not."""
     if not np.isfinite(state).all():
         return False
     angles = [math.remainder(state[0] - math.pi, 2.0 * math.pi), math.remainder(state[1], 2.0 * math.pi)]
-    return all(abs(value) < limit for value, limit in zip((*angles, *state[2:]), WITHIN, strict=True))
+    return all(abs(value) < limit for value, limit in zip((*angles, *state[2:]), UPRIGHT_TOLERANCES, strict=True))
 
 
 class Machine:
@@ -258,7 +258,7 @@ def _simulate(
     """Run a case; states and torque are written. Return whether the law or its estimator raised an exception."""
     at = (true[0], true[1], true[2], true[3], true[4], true[5], true[6], true[7], true[8], true[9], true[10],
           true[11], true[12], true[13])  # fmt: skip
-    y, reading, estimate, control = np.zeros(FIELDS), np.zeros(3), np.zeros(2), np.zeros(2)
+    y, reading, estimate, control = np.zeros(MEASUREMENT_SIZE), np.zeros(3), np.zeros(2), np.zeros(2)
     x, last, free = (0.0, 0.0, 0.0, 0.0), 0.0, 1 - driven
     position, velocity = np.zeros(2), np.zeros(2)
     for k in range(len(torque)):
@@ -274,7 +274,7 @@ def _simulate(
             known[5], known[6], known[7], known[8], known[9], known[10], known[13],
         )  # fmt: skip
         f, fq, g = (f1, f2, W11) if driven == 0 else (f2, f1, W22)
-        y[T], y[DT], y[LIMIT], y[USES] = k * STEP, STEP, limit, uses_model
+        y[T], y[DT], y[LIMIT], y[USES_MODEL] = k * STEP, STEP, limit, uses_model
         y[X], y[V], y[E], y[DE] = position[driven], velocity[driven], position[driven], velocity[driven]
         y[Q], y[DQ], y[F], y[G], y[FQ], y[GQ] = position[free], velocity[free], f, g, fq, W12
         if call(functions[0], y.ctypes.data, gains.ctypes.data, memory.ctypes.data, control.ctypes.data) != 0:

@@ -15,22 +15,22 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 NAME = "trajectory + Riccati"  # of this package's entry
-MEASURED = "*"  # ends the name of a row with measured velocities
+MEASURED_MARK = "*"  # ends the name of a row with measured velocities
 KEY = (
     "trajectory + ...: this package's optimised trajectory under a feedback. Riccati: the entry, 9 tanh(s / 6 N m); "
     "linear: its slope, 1.5 s; clipped: s, the Riccati gain itself; sliding: 9 tanh(s / 0.06 N m), which switches. All "
     "are clipped at 6 N m. *: measured velocities, as in published rows; else velocities from a filter of 5 positions"
 )
 # Fields of a Scenario that are an entry's own. The rules fix all others.
-DESIGN = ("law", "model", "surface", "velocity", "reference", "feedforward", "seed", "noise_key", "condition")
-WORDS = {
+DESIGN_FIELDS = ("law", "model", "surface", "velocity", "reference", "feedforward", "seed", "noise_key", "condition")
+CRITERION_WORDS = {
     "swing_up_time": "time",
     "energy": "energy",
     "torque_cost": "torque cost",
     "torque_smoothness": "variation of the torque",
     "velocity_cost": "velocity cost",
 }
-TESTS = {
+TEST_WORDS = {
     "model": "other models",
     "velocity_noise": "velocity noise",
     "torque_noise": "torque noise",
@@ -47,7 +47,7 @@ def experiments(robot: str) -> dict[str, Scenario]:
       ScenarioError: another robot than pendubot and acrobot.
     """
     rows = {f"trajectory + {feedback}": entry(robot, feedback) for feedback in FEEDBACKS}
-    measured = {name + MEASURED: dataclasses.replace(each, velocity="measured") for name, each in rows.items()}
+    measured = {name + MEASURED_MARK: dataclasses.replace(each, velocity="measured") for name, each in rows.items()}
     return rows | measured
 
 
@@ -104,9 +104,9 @@ def robustness_board(
 
 
 def _ruled(scenario: Scenario) -> dict[str, object]:
-    """Return name -> value of all that the rules fix: the plant's parameters, and the fields that are not in DESIGN."""
+    """Return name -> value of all that the rules fix: the plant's parameters, and the fields not in DESIGN_FIELDS."""
     resolved = scenario.resolved
-    fields = [field.name for field in dataclasses.fields(Scenario) if field.name not in (*DESIGN, "u_max")]
+    fields = [field.name for field in dataclasses.fields(Scenario) if field.name not in (*DESIGN_FIELDS, "u_max")]
     return {**scenario.plant.parameters, **{name: getattr(resolved, name) for name in ("limits", *fields)}}
 
 
@@ -125,7 +125,7 @@ def verdict(robot: str, trace: Trace, robustness: Robustness | None, name: str =
     others = SIMULATION[robot]["v2"]
     worse = [
         words
-        for field, words in WORDS.items()
+        for field, words in CRITERION_WORDS.items()
         if getattr(rows[place - 1], field) > min(getattr(row, field) for row in others)
     ]
     text += f"; others have less {joined(worse)}" if worse else "; no other is better in any criterion"
@@ -136,7 +136,7 @@ def verdict(robot: str, trace: Trace, robustness: Robustness | None, name: str =
     text += f". In robustness it is number {place} of {len(rows)}, with {rows[place - 1].score:.3f}"
     worse = [
         f"{words} ({best.name}: {getattr(best, field):g} against {robustness.percent[field]:.3g} %)"
-        for field, words in TESTS.items()
+        for field, words in TEST_WORDS.items()
         if getattr(best := max(ROBUSTNESS[robot], key=lambda row: getattr(row, field)), field)
         > round(robustness.percent[field], 1)
     ]
@@ -158,7 +158,7 @@ def comparison(traces: Mapping[str, Trace], results: Mapping[str, Robustness] | 
     )
     if results is None:
         return text
-    rows = robustness_board(robot, results[NAME + MEASURED])
+    rows = robustness_board(robot, results[NAME + MEASURED_MARK])
     place = next(i for i, row in enumerate(rows, 1) if row.name == NAME)
     return text + (
         f". With measured velocities, as in the published rows, its robustness is {rows[place - 1].score:.3f}: number "

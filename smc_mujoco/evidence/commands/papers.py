@@ -73,13 +73,13 @@ def claims(
         from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import ended, replacing, writable
         from smc_mujoco.common.progress import bar
-        from smc_mujoco.evidence.audit.audit import DEFAULT, audit, document, evaluations
+        from smc_mujoco.evidence.audit.audit import DEFAULT_PAPER, audit, document, evaluations
         from smc_mujoco.evidence.audit.paper import paper as find_paper
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.studies.table import Table
 
     terminal = Terminal()
-    about = find_paper(paper or DEFAULT)
+    about = find_paper(paper or DEFAULT_PAPER)
     sets = None if gains is None else options.names(gains)
     known = None if table is None else Table.read(table)
     if evidence and known:

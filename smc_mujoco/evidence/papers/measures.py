@@ -7,12 +7,12 @@ import numpy as np
 from smc_mujoco.metrics.limit_cycle import limit_cycle
 from smc_mujoco.simulation.trace import Trace
 
-LATE = 3000  # samples at the end of a run: as many for every control period, as their maximum grows with the number
+END_SAMPLES = 3000  # for every control period, as their maximum grows with their number
 
 
 def late(signal: np.ndarray) -> float:
     """Return the largest magnitude of a signal, (samples, channels), at the end of its run."""
-    return float(np.abs(signal[-LATE:]).max())
+    return float(np.abs(signal[-END_SAMPLES:]).max())
 
 
 def late_step(signal: np.ndarray) -> float:

@@ -19,7 +19,7 @@ from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.plan import FULL, Plan
 from smc_mujoco.studies.table import Table
 
-SHOWN = ("plotly", "pyarrow", "scipy")  # packages whose versions are shown beside those that each run records
+SHOWN_PACKAGES = ("plotly", "pyarrow", "scipy")  # packages whose versions are shown beside those that each run records
 
 
 class Gains(NamedTuple):
@@ -89,7 +89,7 @@ def about(plan: Plan, table: Table, spent: Mapping[str, float], no_film: str | N
         failed=sum(failure is not None for failure in table.column("failure")),
         seeds=len(set(table.column("seed").tolist())),
         sources=in_words(paired_runs.sources(table)),
-        versions=json.loads(table.column("versions")[0]) | {name: version(name) for name in SHOWN},
+        versions=json.loads(table.column("versions")[0]) | {name: version(name) for name in SHOWN_PACKAGES},
         spent=dict(spent),
         no_film=no_film,
     )

@@ -20,7 +20,7 @@ from smc_mujoco.studies.worst_case import WorstCase, WorstCases
 if TYPE_CHECKING:
     from smc_mujoco.evidence.report.stages import Findings
 
-NAMED = 3  # laws in a sentence
+MAX_NAMED_LAWS = 3  # laws in a sentence
 
 Cells = dict[tuple[str, str, str], list[Score]]  # (plant, condition, metric) -> a score for each law
 
@@ -139,7 +139,7 @@ def undecided(by_cell: Cells, metrics: Sequence[str]) -> tuple[int, int]:
     return winners.count(None), len(winners)
 
 
-def losses(by_cell: Cells, metrics: Sequence[str], law: str = words.PAPER) -> list[Loss]:
+def losses(by_cell: Cells, metrics: Sequence[str], law: str = words.PAPER_LAW) -> list[Loss]:
     """Return the cells in which another law is better than this one, worst first."""
     lost: list[Loss] = []
     for (plant, condition, metric), scores in by_cell.items():
@@ -218,7 +218,7 @@ def _both(one: WorstCase) -> str:
 
 def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
     """Return the paper's verdict in one line: how its law does, and how many of its claims hold."""
-    of_paper = [row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER]
+    of_paper = [row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER_LAW]
     parts = []
     if of_paper:
         of, lost, alone = (sum(getattr(row, name) for row in of_paper) for name in ("of", "lost", "alone"))
@@ -251,7 +251,7 @@ def leads(findings: "Findings", metric: str) -> str:
         return f"{words.law(top.law)} wins on {what} in every one of {top.of} cells."
     if not top.alone:
         level = [words.law(row.law) for row in standing if row.best == row.of]
-        unbeaten = f"; none is better than {joined(level)} in any" if 0 < len(level) <= NAMED else ""
+        unbeaten = f"; none is better than {joined(level)} in any" if 0 < len(level) <= MAX_NAMED_LAWS else ""
         return f"no winner on {what} in any of {top.of} cells{unbeaten}."
     plants = [
         f"{words.law(law)} wins on every plant under {joined(names)}"
@@ -267,7 +267,7 @@ def leads(findings: "Findings", metric: str) -> str:
         f"{words.law(row.law)} wins in {row.alone}"
         + f" (never settling in {unsettled[row.law]} of them)" * bool(unsettled[row.law])
         + f" and loses in {row.lost or 'none'}"
-        for row in standing[:NAMED]
+        for row in standing[:MAX_NAMED_LAWS]
         if row.alone
     ]
     nobody = top.of - sum(row.alone for row in standing)
@@ -310,7 +310,7 @@ def _settled(findings: "Findings") -> str:
 
 
 def _paper(findings: "Findings", metrics: Sequence[str]) -> str:
-    of_paper = {metric: row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER}
+    of_paper = {metric: row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER_LAW}
     if not of_paper:
         return ""
     lost = losses(cells(findings.scores), metrics)

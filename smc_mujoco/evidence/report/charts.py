@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from smc_mujoco.evidence.report.stages import Front
     from smc_mujoco.studies.accuracy import AccuracyTable
 
-KEYS = 5  # laws in a line of a legend
+KEYS_PER_LINE = 5  # laws in a line of a legend
 # Of logarithmic axes; plotly writes powers a quarter larger than the size says.
-POWERS: dict[str, Any] = {"type": "log", "exponentformat": "power", "tickfont": {"size": 9}}
+LOG_AXIS: dict[str, Any] = {"type": "log", "exponentformat": "power", "tickfont": {"size": 9}}
 
 
 def _named(law: str) -> str:
@@ -53,7 +53,7 @@ def forest(scores: Sequence[Score], metrics: Sequence[str], plants: Sequence[str
         x: dict[str, Any] = {"type": "linear", "range": [low, high], "nticks": 4}
         if logarithmic:
             ticks = max(1, math.ceil(math.log10(high / low) / 4))  # decades between ticks that leave at most four
-            x |= POWERS | {"range": [math.log10(low), math.log10(high)], "dtick": ticks}
+            x |= LOG_AXIS | {"range": [math.log10(low), math.log10(high)], "dtick": ticks}
         layout |= panel.axes(x, law_axis(laws, k % len(plants) == 0))
     return figure(data, layout, 84 + (32 + 16 * len(laws)) * len(metrics), (172, 14, 58, 34))
 
@@ -95,8 +95,8 @@ def fronts(drawn: "Sequence[Front]") -> Figure:
         data += [trace | panel.trace for front in on_plant for trace in _front(front)]
         across = _span([v for f in on_plant for v in (*f.variation, f.chosen[1])], 1e-3)
         up = _span([v for f in on_plant for v in (*f.tracking, f.chosen[0])], None)
-        x = POWERS | {"title": {"text": "variation, 1/s"}, "range": across, "tickangle": 0}
-        y = POWERS | {"dtick": 1, "range": up}
+        x = LOG_AXIS | {"title": {"text": "variation, 1/s"}, "range": across, "tickangle": 0}
+        y = LOG_AXIS | {"dtick": 1, "range": up}
         y |= {"title": {"text": "tracking, s²"}} if panel is grid[0] else {}
         layout |= panel.axes(x | {"dtick": max(1, math.ceil((across[1] - across[0]) / 4))}, y)
     for law in laws:  # an entry of the legend, which switches all curves of the law
@@ -104,7 +104,7 @@ def fronts(drawn: "Sequence[Front]") -> Figure:
         key = {"type": "scatter", "mode": "lines+markers", "x": [None], "y": [None], "name": _named(law)}
         key |= {"legendgroup": law, "line": {"color": colour, "width": 2}, "marker": {"size": 8, "color": colour}}
         data.append(key)
-    legend = 21 * math.ceil(len(laws) / KEYS)  # px that it takes above the panels
+    legend = 21 * math.ceil(len(laws) / KEYS_PER_LINE)  # px that it takes above the panels
     layout["legend"] = {"y": 1 + 52 / 264}
     return figure(data, layout, 380 + legend, (60, 12, 62 + legend, 54), showlegend=True)
 
@@ -191,8 +191,8 @@ def accuracies(table: "AccuracyTable") -> Figure:
         low, high = min(errors, default=1.0), max(errors, default=1.0)
         span = [math.log10(low) - 0.2, math.log10(high) + 0.2]
         x = {"type": "log", "title": {"text": "control period, ms"}, "tickvals": [1e3 * h for h in rows[0].periods]}
-        layout |= panel.axes(x, POWERS | {"range": span, "dtick": 1})
-    legend = 21 * math.ceil(len(laws) / KEYS)  # px that it takes above the panels
+        layout |= panel.axes(x, LOG_AXIS | {"range": span, "dtick": 1})
+    legend = 21 * math.ceil(len(laws) / KEYS_PER_LINE)  # px that it takes above the panels
     layout["legend"] = {"y": 1 + 28 / 264}
     return figure(data, layout, 380 + legend, (60, 12, 62 + legend, 54), showlegend=True)
 
@@ -256,7 +256,7 @@ def record(shown: "Repeated") -> Figure:
         layout |= panel.axes(below | ({} if panel is grid[0] else {"matches": "x"}), {})
         for label, values, line in (
             ("measured", shown.measured[name], {"color": style.MUTED, "width": 2.4}),
-            ("twin", shown.twin[name], {"color": words.colour(words.PAPER), "width": 1.2}),
+            ("twin", shown.twin[name], {"color": words.colour(words.PAPER_LAW), "width": 1.2}),
         ):
             trace = {"type": "scatter", "mode": "lines", "x": rounded(shown.t), "y": rounded(values), "line": line}
             hover = f"<b>{label}</b> %{{y:.4g}} at %{{x:.3f}} s<extra></extra>"

@@ -23,8 +23,8 @@ from smc_mujoco.simulation.trace import Trace
 SIZE, FPS = (960, 540), 20  # px; 1/s
 # Chosen: letters stay clean at 100 to 200 kB for 5 s.
 VP9 = ["-crf", "34", "-b:v", "0", "-deadline", "good", "-cpu-used", "4", "-row-mt", "1", "-g", "60"]
-BANDS = 250  # windows of a band across the run
-POSTER = 0.5  # s
+BAND_WINDOWS = 250  # windows of a band across the run
+POSTER_TIME = 0.5  # s
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -72,7 +72,7 @@ def curve(trace: Trace) -> Curve:
     t, x, u = whole.t, whole.x[:, i], whole.u[:, i]
     width = decimate.window(trace)
     tu, line = decimate.line(t, u, width)
-    band = decimate.columns(t, u[:, None], BANDS) if decimate.chattering_parts(u, width) else None
+    band = decimate.columns(t, u[:, None], BAND_WINDOWS) if decimate.chattering_parts(u, width) else None
     tb, low, high = (band.t, band.low[:, 0], band.high[:, 0]) if band else (np.empty(0),) * 3
     tx, x = decimate.line(t, x, 0)
     return Curve(law=trace.scenario.law.name, t=tx, x=x, tu=tu, u=line, tb=tb[: len(low)], low=low, high=high)
@@ -104,7 +104,7 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whol
             with sigint_blocked():
                 writer.send(None)
             for k, picture in enumerate(video.frames(traces, shown, None, title, SIZE)):
-                if k == min(int(np.searchsorted(shown.times, POSTER)), count - 1):
+                if k == min(int(np.searchsorted(shown.times, POSTER_TIME)), count - 1):
                     Image.fromarray(picture).save(poster, "JPEG", quality=80, optimize=True)
                 writer.send(np.ascontiguousarray(picture))
                 report(k + 1, count)

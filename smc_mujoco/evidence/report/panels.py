@@ -15,7 +15,7 @@ from smc_mujoco.evidence.report.words import style
 
 Figure = dict[str, Any]
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
-WIDE, DECADES = 50.0, 5  # an axis with a wider span than this is logarithmic, and shows at most so many decades
+LOG_SPAN, MAX_DECADES = 50.0, 5  # an axis of a wider span is logarithmic, and shows at most so many decades
 AXIS = {
     "gridcolor": style.GRID,
     "showline": True,
@@ -130,13 +130,13 @@ def packed(values: np.ndarray) -> dict[str, str]:
 def scale(values: Sequence[float], logarithmic: bool | None = None) -> tuple[bool, float, float]:
     """Return whether an axis for these values is logarithmic, and its ends; values beyond get room at the upper end.
 
-    With None it is logarithmic where values span more than WIDE, and shows DECADES at most.
+    With None it is logarithmic where values span more than LOG_SPAN, and shows at most MAX_DECADES.
     """
     finite = [v for v in values if math.isfinite(v)]
     top = max([0.0, *finite]) or 1.0
-    above = [v for v in finite if v > top * 10.0**-DECADES]
+    above = [v for v in finite if v > top * 10.0**-MAX_DECADES]
     if logarithmic is None:
-        logarithmic = min(finite, default=top) < top / WIDE and len(above) > 1
+        logarithmic = min(finite, default=top) < top / LOG_SPAN and len(above) > 1
     if logarithmic and above:
         return True, min(above) / 2, top * 2.5
     return False, 0.0, 1.15 * top

@@ -21,7 +21,7 @@ from smc_mujoco.studies.board import Board
 from smc_mujoco.studies.leaderboard import leaderboard
 from smc_mujoco.studies.study import study
 
-POINTS = 1200  # of a curve; chosen
+MAX_CURVE_POINTS = 1200  # of a curve; chosen
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -97,7 +97,7 @@ def machines(work: Work) -> tuple[Machine, ...]:
         runs = ensemble.runs(twin, seeds=plan.seeds, duration=plan.duration)
         with work.bars.stage("rigs", f"{len(runs)} runs", bar=False):
             table = study(runs, work.folder / "rigs" / name, threads=work.threads, progress=work.bars.shown)
-        twins.append(Machine(rig=twin, boards=tuple(leaderboard(table, words.HEADLINE, relevant=plan.relevant))))
+        twins.append(Machine(rig=twin, boards=tuple(leaderboard(table, words.MAIN_METRICS, relevant=plan.relevant))))
     return tuple(twins)
 
 
@@ -114,7 +114,7 @@ def repeated(work: Work, folder: Path | None) -> tuple[Repeated, ...]:
         except ScenarioError as error:
             return Repeated(rig=twin, name=path.name, why=str(error))
         fits["do nothing"] = twin.idle(record)
-        step = -(-len(t) // POINTS)
+        step = -(-len(t) // MAX_CURVE_POINTS)
         thin = [{name: values[::step] for name, values in columns.items()} for columns in (measured, predicted)]
         return Repeated(rig=twin, name=path.name, fits=fits, t=t[::step], measured=thin[0], twin=thin[1])
 

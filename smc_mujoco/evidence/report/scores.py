@@ -81,14 +81,14 @@ def scores(table: "Table", relevant: float = RELEVANT) -> tuple[Score, ...]:
     columns = [table.column(name).tolist() for name in ("plant", "condition", "law", "failure")]
     failed = Counter(tuple(cell) for *cell, failure in zip(*columns, strict=True) if failure is not None)
     order = list(dict.fromkeys(columns[2]))
-    boards = leaderboard(table, words.COLUMNS, by=("plant",), relevant=relevant)
+    boards = leaderboard(table, words.TABLE_METRICS, by=("plant",), relevant=relevant)
     blocks = {(block.plant, block.condition, board.metric): block for board in boards for block in board.blocks}
-    by_row = {metric: paired_runs.values(table, metric) for metric in words.COLUMNS}
+    by_row = {metric: paired_runs.values(table, metric) for metric in words.TABLE_METRICS}
     rows = []
     for group in paired_runs.groups(table, by=("plant", "condition")):
         ((plant, condition),) = group.blocks
         (ran,) = paired_runs.scenarios(table, group)
-        for metric in words.COLUMNS:
+        for metric in words.TABLE_METRICS:
             by_law = group.scores(by_row[metric])
             for law in sorted(by_law.values, key=order.index):
                 block = blocks[plant, condition, metric]
@@ -119,7 +119,7 @@ def scores(table: "Table", relevant: float = RELEVANT) -> tuple[Score, ...]:
 
 def places(table: "Table", relevant: float = RELEVANT) -> tuple[Place, ...]:
     """Return every law's place in each metric that the overview ranks, by plant and over all plants."""
-    boards = leaderboard(table, words.RANKED, by=("plant",), relevant=relevant)
+    boards = leaderboard(table, words.RANKED_METRICS, by=("plant",), relevant=relevant)
     in_blocks = [place for board in boards for place in _places(board)]
     by_law: dict[tuple[str, str], list[Place]] = {}
     for place in in_blocks:

@@ -38,7 +38,7 @@ from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import DURATION, WorstCase, cached_worst_case
 
 FIELD_POINTS = 121  # of a map of V', along each axis
-ON_SURFACE = 1e-6  # |s| up to this is s = 0, as in the claim on V'
+SURFACE_TOLERANCE = 1e-6  # |s| up to this is s = 0, as in the claim on V'
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -65,7 +65,7 @@ class Field:
     @property
     def rises(self) -> np.ndarray:
         """Where V' is positive off s = 0, bool."""
-        return (self.vdot > 0) & (np.abs(self.s) > ON_SURFACE)
+        return (self.vdot > 0) & (np.abs(self.s) > SURFACE_TOLERANCE)
 
     @property
     def share(self) -> float:
@@ -272,8 +272,8 @@ def all_scenes(work: Work) -> tuple[films.Scene, ...]:
 def fields(plan: Plan) -> tuple[Field, ...]:
     """Return V' of the paper's law on the state plane of every plant."""
     planes = []
-    for name in plan.plants if words.PAPER in plan.laws else ():
-        plant, law = find_plant(name), sets.law(name, words.PAPER, GAINS)
+    for name in plan.plants if words.PAPER_LAW in plan.laws else ():
+        plant, law = find_plant(name), sets.law(name, words.PAPER_LAW, GAINS)
         lam, k1 = law.gains["lam"], law.gains["k1"]
         x, v = lyapunov.plane(plant, k1, FIELD_POINTS)
         rate, s = lyapunov.vdot(plant, lam, k1, x, v), lyapunov.surface(plant, lam, k1, x, v)

@@ -19,11 +19,11 @@ from smc_mujoco.evidence.audit.verdict import MARKS
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
-PAPER = "observer_free"  # the law that the suite was built to test
+PAPER_LAW = "observer_free"  # the law that the suite was built to test
 # What the overview compares; the tables' columns.
-HEADLINE = ("settling_time", "itae", "ultimate_bound", "tv_rate")
-COLUMNS = ("settling_time", "overshoot", "itae", "ultimate_bound", "steady_error", "max_u", "tv_rate")
-RANKED = ("settles", *HEADLINE)  # columns of the ranking by plant
+MAIN_METRICS = ("settling_time", "itae", "ultimate_bound", "tv_rate")
+TABLE_METRICS = ("settling_time", "overshoot", "itae", "ultimate_bound", "steady_error", "max_u", "tv_rate")
+RANKED_METRICS = ("settles", *MAIN_METRICS)  # columns of the ranking by plant
 # Mathematical signs and proper names for the audit's ASCII.
 SIGNS = {"<=": "≤", ">=": "≥", "!=": "≠", "^2": "²", "alphadot": "α′", "alpha": "α", "lambda": "λ", "eps": "ε"}
 SIGNS |= {"Vdot": "V′", "xdot": "x′"}

@@ -19,32 +19,31 @@ from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.law import Measurement
 
-HERE = Path(__file__).parent
-HEADER = HERE / "smc_law.h"
-INPUTS = len(Measurement._fields)  # numbers in a measurement
+FOLDER = Path(__file__).parent
+HEADER = FOLDER / "smc_law.h"
+MEASUREMENT_SIZE = len(Measurement._fields)  # numbers in a measurement
 # How a measurement is stored, for glue.c and replay.c.
-LAYOUT = f"-DSMC_INPUTS={INPUTS}", f"-DSMC_VECTORS={joint_law.ARRAYS.index('M')}"
+LAYOUT_FLAGS = f"-DSMC_INPUTS={MEASUREMENT_SIZE}", f"-DSMC_VECTORS={joint_law.ARRAYS.index('M')}"
 PROTOTYPE = "int {}(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
 # The same arithmetic as compiled Python: no fused multiply-add.
-FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
+LIBRARY_FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
 # A library uses its own functions and data even if the C library has the same names, such as remove, y0, timezone.
-OWN_NAMES = ("-Wl,-Bsymbolic",) if sys.platform not in ("darwin", "win32") else ()
+SYMBOLIC_FLAGS = ("-Wl,-Bsymbolic",) if sys.platform not in ("darwin", "win32") else ()
 # For a trial: an access beyond an array or undefined behaviour ends the process with a report.
-SANITIZERS = ("-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-WARNINGS = ("-Wall", "-Wextra")
+SANITIZER_FLAGS = ("-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+WARNING_FLAGS = ("-Wall", "-Wextra")
 # Compiler warnings that are errors here.
-STRICT = tuple(
+STRICT_FLAGS = tuple(
     f"-Werror={name}" for name in ("incompatible-pointer-types", "implicit-function-declaration", "int-conversion")
 )
 ERROR = re.compile(r"^(?P<file>[^:\n]+):(?:(?P<line>\d+):)?(?:\d+:)? (?:fatal )?error: (?P<what>.*)$", re.MULTILINE)
-NO_ROOM = re.compile(  # what compilers and linkers say
+NO_ROOM_WORDS = re.compile(  # what compilers and linkers say
     "No space left on device|Disk quota exceeded|File too large|File size limit exceeded|Cannot create temporary file"
 )
 WARNING = re.compile(r"^[^:\n]+:\d+:(?:\d+:)? warning: .*$", re.MULTILINE)
 # Lines of `nm -f sysv`, without the number that the compiler appends to a static variable's name.
 FUNCTION = re.compile(r"^(\S+) *\|([0-9a-f]+)\| +T +\| +FUNC\|", re.MULTILINE)
 DATA = re.compile(r"^(\S+?)(?:\.\d+)? *\|([0-9a-f]+)\| +[bBdDuV] +\| +OBJECT\|([0-9a-f]+)\|", re.MULTILINE)
-
 
 _count = itertools.count()
 
@@ -88,7 +87,7 @@ def run_compiler(command: Sequence[str], timeout: float) -> subprocess.Completed
       TimedOut, OSError: as `process.timed`.
     """
     done = timed(command, timeout)
-    if done.returncode and (why := NO_ROOM.search(done.stderr)):
+    if done.returncode and (why := NO_ROOM_WORDS.search(done.stderr)):
         raise without_room(why[0])
     return done
 
@@ -100,10 +99,12 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
         raise ScenarioError(
             f"cannot include {shown(str(source))} in C: give a path without quotation marks and backslashes"
         )
-    macros = [f'-DSMC_SOURCE="{path}"', f"-DSMC_SYMBOL={symbol}", *LAYOUT, "-I", str(HERE)]
-    files = [str(HERE / "glue.c"), "-o", str(target)]
+    macros = [f'-DSMC_SOURCE="{path}"', f"-DSMC_SYMBOL={symbol}", *LAYOUT_FLAGS, "-I", str(FOLDER)]
+    files = [str(FOLDER / "glue.c"), "-o", str(target)]
     try:
-        done = run_compiler([*command, *FLAGS, *OWN_NAMES, *STRICT, *macros, *files, *flags, "-lm"], timeout)
+        done = run_compiler(
+            [*command, *LIBRARY_FLAGS, *SYMBOLIC_FLAGS, *STRICT_FLAGS, *macros, *files, *flags, "-lm"], timeout
+        )
     except TimedOut:
         raise ScenarioError(
             f"{source.name} takes {command[0]} more than {timeout:g} s to compile: make it shorter, or give timeout="
@@ -121,7 +122,7 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
 def replayer(command: tuple[str, ...]) -> Path | None:
     """Return `replay.c`, compiled with a compiler's sanitizers; None if these do not work."""
     target = fresh(".exe")
-    line = [*command, *SANITIZERS, *LAYOUT, str(HERE / "replay.c"), "-o", str(target), "-ldl"]
+    line = [*command, *SANITIZER_FLAGS, *LAYOUT_FLAGS, str(FOLDER / "replay.c"), "-o", str(target), "-ldl"]
     try:
         if run_compiler(line, 60.0).returncode or timed([str(target)], 60.0).returncode:
             return None

@@ -23,8 +23,8 @@ from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.c.translate import JOINTS, MATH, SLOTS, Untranslatable, plain, rows, translate
 
-BYTES = {"double": 8, "float": 4, "q15": 8}  # of a number of memory, by type of numbers
-Q15 = "observer_free_q15"
+NUMBER_BYTES = {"double": 8, "float": 4, "q15": 8}  # of a number of memory, by type of numbers
+Q15_LAW = "observer_free_q15"
 MAX_JOINTS = 100
 SIZE_FLAGS = ("-std=c99", "-Os", "-ffp-contract=off")  # with which the size of the code is measured
 
@@ -41,8 +41,8 @@ def law_to_c(law: Component | Template | str, numbers: str = "double", joints: i
       ScenarioError: no such law or type of numbers, no number of joints, or the law uses Python without translation,
         which is quoted.
     """
-    if numbers not in BYTES:
-        raise unknown("type of numbers", numbers, BYTES)
+    if numbers not in NUMBER_BYTES:
+        raise unknown("type of numbers", numbers, NUMBER_BYTES)
     law = writable(law)
     joints = number_of_joints(law, joints)
     if numbers == "q15":
@@ -119,10 +119,10 @@ def gain_names(component: Component) -> list[str]:
 def _in_q15(law: Component) -> Component:
     """Return the fixed-point law with the gains of a law, which must be the paper's or fixed-point itself."""
     if law.name == "observer_free" and law.function is catalogue()["observer_free"].function:
-        law = catalogue()[Q15].bind(law.gains, warn=True)
-    if law.function is not catalogue()[Q15].function:
+        law = catalogue()[Q15_LAW].bind(law.gains, warn=True)
+    if law.function is not catalogue()[Q15_LAW].function:
         raise ScenarioError(
-            f"law {law.name!r} has no Q15 form: give observer_free or {Q15}, or write double or float numbers"
+            f"law {law.name!r} has no Q15 form: give observer_free or {Q15_LAW}, or write double or float numbers"
         )
     return law
 
@@ -138,7 +138,7 @@ def _fixed_point(law: Component) -> str:
         "LAM": word(gains["lam"], gains["u_range"]),
         "TABLE": rows([str(n) for n in q15.TABLE]),
     }
-    text = (build.HERE / "q15.c").read_text(encoding="utf-8").rstrip()
+    text = (build.FOLDER / "q15.c").read_text(encoding="utf-8").rstrip()
     return re.sub(r"@(\w+)@", lambda match: str(words[match[1]]), text)
 
 
@@ -184,8 +184,8 @@ def _head(law: Component, numbers: str, slots: int, joints: int, code: str, size
     facts = {
         "gains": f"{gains}; gains[] in this order" + f", {joints} numbers each" * bool(joints),
         "numbers": {"q15": "words of 16 bits, sums of 32, and double where they meet the plant"}.get(numbers, numbers),
-        "state": f"{slots * BYTES[numbers]} bytes a {each}, memory[{slots * max(joints, 1)}]; no static data but "
-        "constants, no malloc",
+        "state": f"{slots * NUMBER_BYTES[numbers]} bytes a {each}, memory[{slots * max(joints, 1)}]; no static data "
+        "but constants, no malloc",
         **({"reads": ", ".join(dict.fromkeys(re.findall(r"->(?!plant)(\w+)", code)))} if joints else {}),
         **({"code": size} if size else {}),
         "licence": "use without restriction, without warranty",

@@ -12,20 +12,20 @@ from smc_mujoco.common.jit import AtAddress
 from smc_mujoco.control.component import Component
 from smc_mujoco.exchange.c.translate import MATH, Untranslatable, plain, translate
 
-TYPE = r"(?:const )?(?:smc_real|int(?:16|32)_t)"
+TYPE_PATTERN = r"(?:const )?(?:smc_real|int(?:16|32)_t)"
 # Words that JavaScript reserves or gives a meaning, and C does not.
 NOT_IN_C = """arguments await catch class debugger delete eval export extends finally function import in instanceof
 interface let new null of package private protected public super this throw try undefined var with yield Math NaN
 Infinity"""
-OTHER_NAMES = {"fabs": "abs"}  # of a function of C's math.h, in JavaScript's Math
+RENAMED_FUNCTIONS = {"fabs": "abs"}  # of a function of C's math.h, in JavaScript's Math
 # Functions of math.h that JavaScript does not have.
 WRITTEN_OUT = {
     "copysign": "const copysign = (a, b) => (b < 0 || Object.is(b, -0) ? -Math.abs(a) : Math.abs(a));",
     "fmod": "const fmod = (a, b) => a % b;",
 }
 RESERVED = set(NOT_IN_C.split())
-MATHEMATICAL = set(MATH) - set(WRITTEN_OUT)
-WORD = re.compile(r"(?<![\w.>$])[A-Za-z_]\w*")
+MATH_FUNCTIONS = set(MATH) - set(WRITTEN_OUT)
+WORD_PATTERN = re.compile(r"(?<![\w.>$])[A-Za-z_]\w*")
 
 
 def to_js(component: Component) -> str:
@@ -54,18 +54,18 @@ def to_js(component: Component) -> str:
 
 def _rewritten(code: str) -> str:
     """Return the functions and constant arrays of some C in JavaScript."""
-    code = _arrays(WORD.sub(_word, code))
+    code = _arrays(WORD_PATTERN.sub(_word, code))
     code = re.sub(r"^ *\(void\)[\w$]+;\n", "", code, flags=re.MULTILINE)
     code = re.sub(r"\n\{\n(.*?)\n\}(?=\n|$)", _body, code, flags=re.DOTALL)
     code = re.sub(r"^(?:static )?(?:void|int|smc_real|int32_t) ([\w$]+)\(([^)]*)\)", _head, code, flags=re.MULTILINE)
     code = re.sub(r"^( *)([\w$]+)\(([^;]*?),?\s*(&[^;]*)\);", _call, code, flags=re.MULTILINE)
     code = code.replace("(int32_t)", "~~").replace("(smc_real)", "").replace("y->", "y.")
-    return re.sub(rf"(?<=[\s(]){TYPE} (?=[\w$]+ = )", "let ", code)
+    return re.sub(rf"(?<=[\s(]){TYPE_PATTERN} (?=[\w$]+ = )", "let ", code)
 
 
 def _arrays(code: str) -> str:
     """Rewrite constant arrays."""
-    pattern = rf"^static {TYPE} ([\w$]+)\[\d+\] = \{{\n(.*?)\n\}};"
+    pattern = rf"^static {TYPE_PATTERN} ([\w$]+)\[\d+\] = \{{\n(.*?)\n\}};"
     return re.sub(pattern, r"const \1 = [\n\2\n];", code, flags=re.DOTALL | re.MULTILINE)
 
 
@@ -96,6 +96,6 @@ def _word(match: re.Match[str]) -> str:
     word = match[0]
     if word in {"NAN", "INFINITY"}:
         return {"NAN": "NaN", "INFINITY": "Infinity"}[word]
-    if word in MATHEMATICAL and match.string[match.end() : match.end() + 1] == "(":
-        return f"Math.{OTHER_NAMES.get(word, word)}"
+    if word in MATH_FUNCTIONS and match.string[match.end() : match.end() + 1] == "(":
+        return f"Math.{RENAMED_FUNCTIONS.get(word, word)}"
     return f"{word}$" if word in RESERVED else word

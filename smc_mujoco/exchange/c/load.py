@@ -34,7 +34,7 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.units import Gain
 from smc_mujoco.exchange.c import build, sandbox
 
-LIBRARIES = (".so", ".dylib")
+LIBRARY_SUFFIXES = (".so", ".dylib")
 MAX_TIMEOUT = 86_400.0  # s
 DEFAULT_MEMORY = 8
 
@@ -87,7 +87,7 @@ class CLaw(AtAddress):
         out = sandbox.doubles([math.nan] * count)
         code = self._function(sandbox.doubles(y), sandbox.doubles(gains), memory.ctypes.data_as(sandbox.DOUBLES), out)
         if self._arithmetic is not None and self._arithmetic.changed():
-            code = sandbox.ALTERED
+            code = sandbox.ALTERED_ARITHMETIC
         if code != 0:
             what, _ = sandbox.FAULTS.get(code, (f"returned {code}", ""))
             raise ArithmeticError(f"{self.symbol} {what.format(self.sizes[1])}")
@@ -137,11 +137,11 @@ def _unpickled(file: str, symbol: str, code: bytes, sizes: tuple[int, int], name
 def _trampoline(address: int, arithmetic: Arithmetic) -> Function:
     """Return a function of the callback's type that calls a C function which returns an int.
 
-    It restores the arithmetic of its thread, and returns ALTERED if the C function has changed it.
+    It restores the arithmetic of its thread, and returns ALTERED_ARITHMETIC if the C function has changed it.
     """
     numbers, environment = ctypes.addressof(arithmetic.numbers), ctypes.addressof(arithmetic.environment)
     restore = ctypes.cast(arithmetic.library.fesetenv, ctypes.c_void_p).value or 0
-    results, altered, compute = arithmetic.results, sandbox.ALTERED, njit(computed, error_model="numpy")
+    results, altered, compute = arithmetic.results, sandbox.ALTERED_ARITHMETIC, njit(computed, error_model="numpy")
 
     def native(y: Any, g: Any, m: Any, out: Any):
         output = carray(pointer(out), (2,))
@@ -236,7 +236,7 @@ def check(
 
     Arguments and errors are those of `law_from_c`.
     """
-    library = _library(source, symbol, (*build.WARNINGS, *flags) if source.suffix == ".c" else flags, timeout)
+    library = _library(source, symbol, (*build.WARNING_FLAGS, *flags) if source.suffix == ".c" else flags, timeout)
     about = _about(library, gains, memory, None, None)
     yield from library.warnings
     yield from _try(library, about)
@@ -259,7 +259,7 @@ def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: flo
         raise ScenarioError(f"symbol is {shown(symbol)}: give the name of a C function")
     if isinstance(flags, str) or not isinstance(flags, Sequence) or not all(isinstance(flag, str) for flag in flags):
         raise ScenarioError(f"flags is {shown(flags)}: give several, such as ['-DUNIT_TEST']")
-    if path.suffix not in (".c", *LIBRARIES):
+    if path.suffix not in (".c", *LIBRARY_SUFFIXES):
         raise ScenarioError(f"cannot take a law from {shown(str(path))}: give a .c file, or a shared library, .so")
     if not os.path.isfile(path):
         raise ScenarioError(f"there is no file {path}: give the path of a .c file or of a .so")

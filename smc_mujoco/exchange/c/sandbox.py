@@ -18,30 +18,33 @@ from typing import Any, NamedTuple
 from smc_mujoco.common.guard import ALTERS, Arithmetic, Failed, Fault, tried
 
 STEPS, LONG_STEPS = 500, 10_000  # samples of 1 ms per run, and in the longest run
-LATER_STEPS, GROWTH = 200, 1.06  # samples after those, and the ratio of successive times: up to 15 hours
+LATER_STEPS, TIME_RATIO = 200, 1.06  # samples after those, and the ratio of successive times: up to 15 hours
 MAX_POSITION = 3.0  # a stop for the double integrator, because a law need not stabilise it
-GUARD, GUARDS = -7.25, 512  # a value that no law writes by chance, and its number on either side of an array
-COUPLING = 0.1  # elements of M off its diagonal
-MORE_GAINS = 16  # additional gains, which detect a law that reads them
-BEYOND = 2**40  # code of glue.c: a law of floats wrote beyond its memory; one more: beyond out
-ALTERED = BEYOND + 2  # code of glue.c: a law changed the arithmetic of its thread
+GUARD_VALUE, GUARD_COUNT = -7.25, 512  # a value that no law writes by chance, and its number on either side of an array
+MASS_COUPLING = 0.1  # elements of M off its diagonal
+EXTRA_GAINS = 16  # additional gains, which detect a law that reads them
+OVERRUN = 2**40  # code of glue.c: a law of floats wrote beyond its memory; one more: beyond out
+ALTERED_ARITHMETIC = OVERRUN + 2  # code of glue.c: a law changed the arithmetic of its thread
 FAULTS = {  # code -> fault, formatted with the size of memory, and cure
-    BEYOND: ("writes beyond the {} numbers of its memory", "say more in smc_law_memory, or give memory="),
-    BEYOND + 1: ("writes beyond the numbers of out", "write only u and s, which are out[0] and out[1] for one channel"),
-    BEYOND + 4: ("changes its measurement", "keep what changes in memory"),
-    BEYOND + 3: ("asks for the Jacobian of a tip, and there is none", "give the plant a tip, and the law the model"),
-    ALTERED: (ALTERS, "let it restore that, and leave out -Ofast and -ffast-math"),
+    OVERRUN: ("writes beyond the {} numbers of its memory", "say more in smc_law_memory, or give memory="),
+    OVERRUN + 1: (
+        "writes beyond the numbers of out",
+        "write only u and s, which are out[0] and out[1] for one channel",
+    ),
+    OVERRUN + 4: ("changes its measurement", "keep what changes in memory"),
+    OVERRUN + 3: ("asks for the Jacobian of a tip, and there is none", "give the plant a tip, and the law the model"),
+    ALTERED_ARITHMETIC: (ALTERS, "let it restore that, and leave out -Ofast and -ffast-math"),
 }
-SHARED = "which all channels and simulations share, on several threads"
-NUMBERS = ("smc_law_memory", "smc_law_real", "smc_law_degree", "smc_law_modelled", "smc_mujoco_joints")
-TEXTS = ("smc_law_gains", "smc_law_shared")
+SHARED_WORDS = "which all channels and simulations share, on several threads"
+INT_NAMES = ("smc_law_memory", "smc_law_real", "smc_law_degree", "smc_law_modelled", "smc_mujoco_joints")
+TEXT_NAMES = ("smc_law_gains", "smc_law_shared")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 ON_REQUEST = ctypes.CFUNCTYPE(ctypes.c_int64, *[DOUBLES] * 4)  # C(x, v) w, or the Jacobian of the tip
 
 # Output of the sanitizers: undefined behaviour; a bad access, and the stack frames it happened in.
-UNDEFINED = re.compile(r"^(?P<file>.+?):(?P<line>\d+):\d+: runtime error: (?P<what>.*)$", re.MULTILINE)
-ACCESS = re.compile(r"AddressSanitizer: (?P<what>[\w-]+).*(?:\n(?P<size>(?:READ|WRITE) of size \d+))?")
-FRAME = re.compile(r"^ +#\d+ .* in \S+ (?P<file>.+?):(?P<line>\d+)(?::\d+)?$", re.MULTILINE)
+UNDEFINED_LINE = re.compile(r"^(?P<file>.+?):(?P<line>\d+):\d+: runtime error: (?P<what>.*)$", re.MULTILINE)
+ACCESS_LINE = re.compile(r"AddressSanitizer: (?P<what>[\w-]+).*(?:\n(?P<size>(?:READ|WRITE) of size \d+))?")
+FRAME_LINE = re.compile(r"^ +#\d+ .* in \S+ (?P<file>.+?):(?P<line>\d+)(?::\d+)?$", re.MULTILINE)
 
 
 class Library(NamedTuple):
@@ -133,7 +136,7 @@ def _sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
     if (program := build.replayer(tuple(compiler))) is None:
         return f"{compiler[0]} has none that work here"
     try:
-        file, _ = build.library(library.path, library.symbol, (*library.flags, *build.SANITIZERS), library.timeout)
+        file, _ = build.library(library.path, library.symbol, (*library.flags, *build.SANITIZER_FLAGS), library.timeout)
     except ScenarioError:
         return f"{compiler[0]} has none with these flags"
     try:
@@ -144,11 +147,11 @@ def _sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
     if done.returncode == 0:
         return ""
     what, places = "it does not end as without sanitizers", []
-    if report := UNDEFINED.search(done.stderr):
+    if report := UNDEFINED_LINE.search(done.stderr):
         what, places = report["what"], [report]
-    elif report := ACCESS.search(done.stderr):
+    elif report := ACCESS_LINE.search(done.stderr):
         what = ", ".join(filter(None, report.group("what", "size")))
-        places = [frame for frame in FRAME.finditer(done.stderr) if Path(frame["file"]).exists()]
+        places = [frame for frame in FRAME_LINE.finditer(done.stderr) if Path(frame["file"]).exists()]
     name = Path(places[0]["file"]).name if places else library.path.name
     where = f"line {places[0]['line']}" if places else library.symbol
     raise ScenarioError(f"{name} makes an error in {where}: {what}; fix it")
@@ -169,11 +172,11 @@ def entry(path: str, symbol: str):
 def facts(library) -> dict[str, str | int]:
     """Return the constants of smc_law.h that a library defines, and whether it contains the glue."""
     constants: dict[str, str | int] = {"glue": hasattr(library, "smc_mujoco_entry")}
-    for name in TEXTS:
+    for name in TEXT_NAMES:
         if hasattr(library, name):
             text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(library, name)))
             constants[name] = text.decode(errors="replace")
-    return constants | {name: ctypes.c_int.in_dll(library, name).value for name in NUMBERS if hasattr(library, name)}
+    return constants | {name: ctypes.c_int.in_dll(library, name).value for name in INT_NAMES if hasattr(library, name)}
 
 
 def set_up(library) -> int:
@@ -243,16 +246,16 @@ def stored(head, requests: Requests, arrays) -> list[float]:
 class Fenced:
     """An array between guards, which a law must not write."""
 
-    def __init__(self, values, guard: float = GUARD):
-        edge = [guard] * GUARDS
+    def __init__(self, values, guard: float = GUARD_VALUE):
+        edge = [guard] * GUARD_COUNT
         self.whole = doubles([*edge, *values, *edge])
-        self.own = (ctypes.c_double * len(values)).from_buffer(self.whole, 8 * GUARDS)
+        self.own = (ctypes.c_double * len(values)).from_buffer(self.whole, 8 * GUARD_COUNT)
         self.before = self.guards()
 
     def guards(self) -> bytes:
         """Return the bytes of the guards."""
         whole = bytes(self.whole)
-        return whole[: 8 * GUARDS] + whole[-8 * GUARDS :]
+        return whole[: 8 * GUARD_COUNT] + whole[-8 * GUARD_COUNT :]
 
     def crossed(self) -> bool:
         """Return whether a guard has changed."""
@@ -300,7 +303,7 @@ class Trial:
         """Make a run with measurement noise and a sine as reference. After `steps` the time grows geometrically."""
         xs, vs, dt, memory = [x0 - 0.1 * i for i in range(self.each)], [0.0] * self.each, 1e-3, self.state()
         for k in range(steps + LATER_STEPS):
-            t, seen = dt * (k if k < steps else steps * GROWTH ** (k - steps)), []
+            t, seen = dt * (k if k < steps else steps * TIME_RATIO ** (k - steps)), []
             r, dr, ddr = 0.1 * math.sin(t), 0.1 * math.cos(t), -0.1 * math.sin(t)
             for x, v in zip(xs, vs, strict=True):
                 e, de = x + self.random.gauss(0.0, 1e-3) - r, v + self.random.gauss(0.0, 1e-2) - dr
@@ -320,7 +323,7 @@ class Trial:
             if k % 50 == 0:
                 self.check_static_data()
                 if repr(self.law_at(y, self.state(before))) != repr((code, us, ss)):
-                    raise Fault(f"gave two answers to one measurement, as from state {SHARED}: keep it in memory")
+                    raise Fault(f"gave two answers to one measurement, as from state {SHARED_WORDS}: keep it in memory")
             for i, u in enumerate(us):
                 vs[i] += dt * min(max(u, -6.0), 6.0)
                 xs[i] += dt * vs[i]
@@ -331,7 +334,7 @@ class Trial:
         """Return the numbers of a measurement in their order, from those of each channel. Those left out are 0."""
         if not self.joints:
             return [seen[0].get(name, 0.0) for name in self.fields]
-        M = [1.0 if i == j else COUPLING for i in range(self.joints) for j in range(self.joints)]
+        M = [1.0 if i == j else MASS_COUPLING for i in range(self.joints) for j in range(self.joints)]
         known = {"M": M, "h": [0.0] * self.joints, "g": [0.0] * self.joints}
         arrays = [known.get(name) or [one.get(name, 0.0) for one in seen] for name in self.fields]
         return stored([seen[0].get(name, 0.0) for name in ("t", "dt", "model")], self.requests, arrays)
@@ -356,11 +359,11 @@ class Trial:
         y_before = bytes(self.y.whole)
         code = self.law(self.y.own, self.gains.own, memory.own, self.out.own)
         if memory.crossed():
-            code = BEYOND
+            code = OVERRUN
         elif self.out.crossed():
-            code = BEYOND + 1
+            code = OVERRUN + 1
         elif self.arithmetic.changed():
-            code = ALTERED
+            code = ALTERED_ARITHMETIC
         if code in FAULTS:
             what, cure = FAULTS[code]
             raise Fault(f"{what.format(self.size)}: {cure}")
@@ -377,13 +380,13 @@ class Trial:
         changed = [name for name, now in self.static_data().items() if now != self.data_before[name]]
         if changed:
             cure = "keep state in memory, and fill tables in smc_setup"
-            raise Fault(f"changes static data ({changed[0]}), {SHARED}: {cure}")
+            raise Fault(f"changes static data ({changed[0]}), {SHARED_WORDS}: {cure}")
 
     def check_gains(self, y: list[float], before: bytes) -> None:
         """Raise Fault if u becomes finite when additional gains are finite."""
         count, out = len(self.gains.own) // self.each, Fenced([math.nan] * (2 * self.each))
-        more = Fenced([*self.gains.own, *[1.0] * (MORE_GAINS * self.each)])
-        set_sizes(self.library, count + MORE_GAINS, self.size)
+        more = Fenced([*self.gains.own, *[1.0] * (EXTRA_GAINS * self.each)])
+        set_sizes(self.library, count + EXTRA_GAINS, self.size)
         code = self.law(Fenced(y).own, more.own, self.state(before).own, out.own)
         set_sizes(self.library, count, self.size)
         if code == 0 and all(map(math.isfinite, out.own)):
@@ -398,7 +401,7 @@ def attempt(order: Mapping[str, Any], say: Callable) -> dict[str, str | int]:
 
     def done(step: str) -> None:
         if arithmetic.changed():
-            raise Fault(f"{step} {ALTERS}: {FAULTS[ALTERED][1]}")
+            raise Fault(f"{step} {ALTERS}: {FAULTS[ALTERED_ARITHMETIC][1]}")
 
     say("loading")
     try:

@@ -31,32 +31,32 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
 
+PARSING_LOCK = threading.Lock()
 # Kinds of numbers from narrow to wide. `single` is numpy.float32 in Python; `real` is smc_real in the file.
-PARSING = threading.Lock()
 KINDS = ("bool", "int", "single", "real")
 WHOLE_KINDS = ("bool", "int")
 TYPES = {"bool": "int32_t", "int": "int32_t", "single": "float", "real": "smc_real"}
 # The arguments of a component. They are pointers, not numbers.
 ARGUMENTS = {"y": "const smc_measurement *", "gains": "const smc_real *", "memory": "smc_real *"}
-SEEN = {"estimator": "smc_reading"}  # structs of y, where they differ from a measurement
-READS = {"law": Measurement._fields, "surface": Measurement._fields, "estimator": Reading._fields}  # the fields of y
+STRUCTS = {"estimator": "smc_reading"}  # structs of y, where they differ from a measurement
+CHANNEL_FIELDS = {"law": Measurement._fields, "surface": Measurement._fields, "estimator": Reading._fields}  # of y
 
 # Laws of many joints: dimensions that are macros in the file, fields of the measurement -> their dimensions, and what
 # the caller of the law provides.
 JOINTS, SLOTS = "SMC_JOINTS", "SMC_LAW_MEMORY"
-FIELDS = dict.fromkeys(joint_law.ARRAYS, f"[{JOINTS}]") | dict.fromkeys(("t", "dt", "model"), "")
-FIELDS["M"] = f"[{JOINTS}][{JOINTS}]"
-ON_REQUEST = {joint_law.coriolis: ("coriolis", (JOINTS,)), joint_law.jacobian: ("jacobian", ("3", JOINTS))}
+JOINT_FIELDS = dict.fromkeys(joint_law.ARRAYS, f"[{JOINTS}]") | dict.fromkeys(("t", "dt", "model"), "")
+JOINT_FIELDS["M"] = f"[{JOINTS}][{JOINTS}]"
+REQUESTED_ARRAYS = {joint_law.coriolis: ("coriolis", (JOINTS,)), joint_law.jacobian: ("jacobian", ("3", JOINTS))}
 ROW, COLUMN = "\x00", "\x01"  # stand for the indices in the text of an array's element
 TOKEN = re.compile("\x02(\\d+)\x03")  # stands for a call in an expression, which may move before its loop
-ALONE = re.compile("(?<!\\w)\\((\x02\\d+\x03)\\)")  # the same in parentheses
+LONE_TOKEN = re.compile("(?<!\\w)\\((\x02\\d+\x03)\\)")  # the same in parentheses
 
 # Precedence of C's operators. An operand of lower precedence is put in parentheses.
 ATOM, UNARY, PRODUCT, SUM, LOOSE = 5, 4, 3, 2, 1
 OPERATORS: dict[type, tuple[str, int]] = {
     ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT), ast.Div: ("/", PRODUCT),
 }  # fmt: skip
-BITS: dict[type, str] = {ast.LShift: "<<", ast.RShift: ">>", ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^"}
+BIT_OPERATORS: dict[type, str] = {ast.LShift: "<<", ast.RShift: ">>", ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^"}
 COMPARISONS: dict[type, str] = {
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
 }  # fmt: skip
@@ -69,14 +69,14 @@ ROUNDING = {math.floor: "floor", math.ceil: "ceil", math.trunc: "trunc"}  # inte
 MATH = {"pow", *ROUNDING.values(), *MATH_NAMES.split()}
 CASTS = {float: "real", np.float64: "real", np.float32: "single", int: "int"}
 # Functions of numpy with elements -> the same in C.
-OF_MATH = ("sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "fabs")
-OF_MATH_RENAMED = {"arctan": "atan", "arctan2": "atan2", "arcsin": "asin", "arccos": "acos", "hypot": "hypot"}
-ELEMENTWISE = {getattr(np, name): name for name in OF_MATH} | {getattr(np, n): c for n, c in OF_MATH_RENAMED.items()}
+NUMPY_NAMES = ("sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "fabs")
+NUMPY_RENAMED = {"arctan": "atan", "arctan2": "atan2", "arcsin": "asin", "arccos": "acos", "hypot": "hypot"}
+ELEMENTWISE = {getattr(np, name): name for name in NUMPY_NAMES} | {getattr(np, n): c for n, c in NUMPY_RENAMED.items()}
 ELEMENTWISE |= {np.abs: "fabs", abs: "fabs"}
-HELPED = {np.minimum: "lesser", np.maximum: "greater", np.sign: "sign"}
-FILLED = {np.zeros: 0.0, np.empty: 0.0, np.ones: 1.0}
-NEW = {*FILLED, np.full, np.array, np.where}  # functions that return a new array
-SHARED = "which shares its numbers with another name: write .copy() behind it"
+HELPER_NAMES = {np.minimum: "lesser", np.maximum: "greater", np.sign: "sign"}
+FILL_VALUES = {np.zeros: 0.0, np.empty: 0.0, np.ones: 1.0}
+ARRAY_MAKERS = {*FILL_VALUES, np.full, np.array, np.where}  # functions that return a new array
+SHARED_WORDS = "which shares its numbers with another name: write .copy() behind it"
 
 # Python's min, max, abs, % and indices of integers, and numpy's functions as numba compiles them, where NaN stays NaN:
 # functions that the C file defines if it uses them.
@@ -104,13 +104,13 @@ POWERS = {  # multiplied in numba's order: by repeated squaring, from the lowest
 KEYWORDS = """auto break case char const continue default do double else enum extern float for goto if inline int long
 register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while"""
 # Other reserved names: functions and macros of C's headers, keywords of later standards and of compilers.
-OTHERS = """_Bool _Complex _Imaginary alignas alignof asm bool constexpr false linux nullptr static_assert thread_local
-true typeof unix main abort abs exit free index labs rindex NAN INFINITY HUGE_VAL cbrt drem erf erfc exp2 exp10 fdim
-finite fma fmax fmin fpclassify frexp gamma ilogb isfinite isgreater isgreaterequal isinf isless islessequal
+OTHER_RESERVED_NAMES = """_Bool _Complex _Imaginary alignas alignof asm bool constexpr false linux nullptr static_assert
+thread_local true typeof unix main abort abs exit free index labs rindex NAN INFINITY HUGE_VAL cbrt drem erf erfc exp2
+exp10 fdim finite fma fmax fmin fpclassify frexp gamma ilogb isfinite isgreater isgreaterequal isinf isless islessequal
 islessgreater isnan isnormal isunordered j0 j1 jn ldexp lgamma llrint llround logb lrint lround modf nan nearbyint
 nextafter nexttoward pow10 remainder remquo rint round scalb scalbln scalbn signbit signgam significand tgamma y0 y1
 yn"""
-RESERVED = {*KEYWORDS.split(), *OTHERS.split(), *MATH, "out"}
+RESERVED = {*KEYWORDS.split(), *OTHER_RESERVED_NAMES.split(), *MATH, "out"}
 
 
 class Untranslatable(ScenarioError):
@@ -317,7 +317,7 @@ class Function:
 
     def head(self, name: str) -> str:
         """Return the declaration without a semicolon. Arrays are pointers."""
-        pointers = ARGUMENTS | {"y": f"const {SEEN.get(self.program.component.kind, 'smc_measurement')} *"}
+        pointers = ARGUMENTS | {"y": f"const {STRUCTS.get(self.program.component.kind, 'smc_measurement')} *"}
         arguments = []
         for parameter in self.parameters:
             kind = self.kinds[parameter]
@@ -663,7 +663,7 @@ class Function:
                 self.move(f"const {TYPES[call.kind]} {names[match[1]]} = {call.text};", node)
             return names[match[1]]
 
-        text = ALONE.sub("\\1", value.text)  # a name needs no parentheses
+        text = LONE_TOKEN.sub("\\1", value.text)  # a name needs no parentheses
         return Value(TOKEN.sub(moved, text), value.kind + shapes[0], value.level)
 
     def outside(self, method: Callable[..., Any], *arguments: Any) -> Any:
@@ -767,9 +767,10 @@ class Function:
         owner, name, joints = self.outside(self.value, node.value), node.attr, self.program.joints
         if owner.kind == "y":
             kind = self.program.component.kind
-            known(name, "reading" if kind == "estimator" else "measurement", FIELDS if joints else READS[kind])
-            if joints and FIELDS[name]:
-                return array_at(f"{owner.text}->{name}", f"real{FIELDS[name]}")
+            fields = JOINT_FIELDS if joints else CHANNEL_FIELDS[kind]
+            known(name, "reading" if kind == "estimator" else "measurement", fields)
+            if joints and JOINT_FIELDS[name]:
+                return array_at(f"{owner.text}->{name}", f"real{JOINT_FIELDS[name]}")
             return Value(f"{owner.text}->{name}", "real")
         if owner.kind == "gains":
             known(name, "gain", self.program.gains)
@@ -878,10 +879,10 @@ class Function:
             raise refuse(node, "the operator @")
         left, right = self.numeric(node.left), self.numeric(node.right)
         whole = left.kind in WHOLE_KINDS and right.kind in WHOLE_KINDS
-        if type(node.op) in BITS:
+        if type(node.op) in BIT_OPERATORS:
             if not whole:
                 raise refuse(node, "a bit operation on real numbers")
-            return Value(f"{left.within(ATOM)} {BITS[type(node.op)]} {right.within(ATOM)}", "int", LOOSE)
+            return Value(f"{left.within(ATOM)} {BIT_OPERATORS[type(node.op)]} {right.within(ATOM)}", "int", LOOSE)
         if isinstance(node.op, ast.Mod) and whole:
             return Value(f"{self.program.helper('modulo', 'int')}({left.text}, {right.text})", "int")
         if type(node.op) not in OPERATORS:
@@ -936,14 +937,14 @@ class Function:
         if isinstance(node.func, ast.Attribute) and node.func.attr == "copy" and not node.args:
             return self.outside(self.value, node.func.value)._replace(pointer="")
         function = self.callee(node)
-        if function in ELEMENTWISE or function in HELPED or function is np.where:
+        if function in ELEMENTWISE or function in HELPER_NAMES or function is np.where:
             return self.elementwise(lambda one: self.of_elements(function, one), node)
-        if function is len or function is np.full or function in FILLED:
+        if function is len or function is np.full or function in FILL_VALUES:
             method = self.sized
         elif function is np.array:
             method = self.listed
         else:
-            method = self.requested if function in ON_REQUEST else self.called
+            method = self.requested if function in REQUESTED_ARRAYS else self.called
         return self.outside(method, function, node)
 
     def called(self, function: Any, node: ast.Call) -> Value:
@@ -1003,15 +1004,17 @@ class Function:
                 raise refuse(node, "where without two values")
             test, yes, no = values
             return Value(f"{test.within(SUM)} ? {yes.within(SUM)} : {no.within(SUM)}", wider(yes.kind, no.kind), LOOSE)
-        if function in HELPED:
-            return Value(f"{self.program.helper(HELPED[function], kind)}({', '.join(v.text for v in values)})", kind)
+        if function in HELPER_NAMES:
+            return Value(
+                f"{self.program.helper(HELPER_NAMES[function], kind)}({', '.join(v.text for v in values)})", kind
+            )
         if function in (abs, np.abs) and values[0].kind in WHOLE_KINDS:
             return Value(f"{self.program.helper('absolute', 'int')}({values[0].text})", "int")
         return self.math(ELEMENTWISE[function], values)
 
     def requested(self, function: Any, node: ast.Call) -> Value:
         """Translate coriolis and jacobian, which the caller of the law provides."""
-        name, dimensions = ON_REQUEST[function]
+        name, dimensions = REQUESTED_ARRAYS[function]
         y, *rest = [self.argument(a) for a in node.args]
         array = self.temporary("real" + "".join(f"[{n}]" for n in dimensions))
         arguments = [f"{y.text}->plant", *(one.text for one in rest)]
@@ -1041,7 +1044,7 @@ class Function:
         if function is np.full:
             value = self.numeric(node.args[1])
             return value._replace(kind=value.kind + dimensions)
-        return literal(FILLED[function], self.program.single, node)._replace(kind=f"real{dimensions}")
+        return literal(FILL_VALUES[function], self.program.single, node)._replace(kind=f"real{dimensions}")
 
     def dimensions(self, node: ast.expr) -> list[str]:
         """Return the dimensions that an expression gives: a number, len(array), a variable, or a tuple of these."""
@@ -1080,7 +1083,7 @@ class Function:
             if isinstance(target, ast.Name | ast.Tuple) and (
                 shares & changed or (shares and names_in([target]) & changed)
             ):
-                raise refuse(value, f"an array, {SHARED},")
+                raise refuse(value, f"an array, {SHARED_WORDS},")
 
     def shared(self, node: ast.expr) -> set[str]:
         """Return the names of arrays with which the value of an expression may share its numbers."""
@@ -1103,7 +1106,7 @@ class Function:
 
 def syntax(text: str, mode: Literal["exec", "eval"] = "exec") -> Any:
     """Return the syntax tree of a text. Before Python 3.11.8 two threads must not build one at once (gh-106905)."""
-    with PARSING:
+    with PARSING_LOCK:
         return ast.parse(text, mode=mode)
 
 
@@ -1167,7 +1170,7 @@ def refuse(node: ast.AST | None, what: str) -> Untranslatable:
 
 def shared_arguments(function: Any) -> set[int]:
     """Return the places of the arguments that a function may return, in whole or in part."""
-    if not isinstance(getattr(function, "py_func", function), FunctionType) or function in NEW:
+    if not isinstance(getattr(function, "py_func", function), FunctionType) or function in ARRAY_MAKERS:
         return set()
     written, tree = parsed(function)
     names = [a.arg for a in tree.args.args]

@@ -11,7 +11,7 @@ from smc_mujoco.cli.terminal import errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
-ARGUMENTS = re.compile(r"\b(gains|memory|timeout|flag)s?=$")  # of law_from_c, at the end of its error sentences
+ARGUMENT_AT_END = re.compile(r"\b(gains|memory|timeout|flag)s?=$")  # of law_from_c, at the end of its error sentences
 
 
 @errors_as_sentences()
@@ -51,7 +51,7 @@ def check_c(
         for line in check(file, values, memory, symbol, flag or (), timeout):
             print(line)
     except ScenarioError as error:
-        raise ScenarioError(ARGUMENTS.sub(r"--\1", str(error))) from None
+        raise ScenarioError(ARGUMENT_AT_END.sub(r"--\1", str(error))) from None
 
 
 @errors_as_sentences()

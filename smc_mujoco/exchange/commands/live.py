@@ -9,7 +9,7 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
-PORT = 8000
+DEFAULT_PORT = 8000
 
 
 @errors_as_sentences()
@@ -28,7 +28,7 @@ def live(
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("live"),
     serve: Annotated[bool, typer.Option(help="Whether to serve the page on this machine, until Ctrl-C.")] = False,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of --serve; 0 takes a free one.")] = PORT,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of --serve; 0 takes a free one.")] = DEFAULT_PORT,
 ) -> None:
     """Build a web page in which MuJoCo runs: choose laws, move sliders, push the machine, compare two laws.
 
@@ -47,12 +47,12 @@ def live(
     """
     with delay_ctrl_c():
         from smc_mujoco.common.progress import bar
-        from smc_mujoco.exchange.live.build import PLANTS
+        from smc_mujoco.exchange.live.build import DEFAULT_PLANTS
         from smc_mujoco.exchange.live.build import live as build
 
     terminal = Terminal()
     with bar("the live page", shown=terminal.is_terminal):
-        page = build(plants or PLANTS, law or (), out)
+        page = build(plants or DEFAULT_PLANTS, law or (), out)
     terminal.wrote(page)
     if serve:
         _serve(page.parent, port, terminal)

@@ -38,17 +38,17 @@ from smc_mujoco.exchange.c import export
 from smc_mujoco.exchange.c.translate import JOINTS, plain
 from smc_mujoco.simulation.controller import MAX_CONTROL
 
-UNBOUNDED = sys.float_info.max  # stands for infinity, because not every importer reads INF
+MAX_DOUBLE = sys.float_info.max  # stands for infinity, because not every importer reads INF
 
 # Input -> its unit and description, in the order of the variables: of every FMU, and of one channel or of many joints.
-MEASURED: dict[str, tuple[Unit | None, str]] = {
+COMMON_INPUTS: dict[str, tuple[Unit | None, str]] = {
     "x": (POSITION, "measured position"),
     "v": (SPEED, "measured velocity"),
     "r": (POSITION, "reference"),
     "dr": (SPEED, "first derivative of the reference"),
     "ddr": (ACCELERATION, "second derivative of the reference"),
 }
-OF_CHANNEL: dict[str, tuple[Unit | None, str]] = {
+CHANNEL_INPUTS: dict[str, tuple[Unit | None, str]] = {
     "f": (ACCELERATION, "nominal f of x'' = f + g u, at the measured x and v"),
     "g": (INPUT_GAIN, "nominal g of x'' = f + g u, at the measured x and v"),
     "q": (None, "measured position of the joint without actuator that this one moves"),
@@ -56,22 +56,20 @@ OF_CHANNEL: dict[str, tuple[Unit | None, str]] = {
     "fq": (None, "nominal fq of q'' = fq + gq u"),
     "gq": (None, "nominal gq of q'' = fq + gq u"),
 }
-OF_JOINTS: dict[str, tuple[Unit | None, str]] = {
+JOINT_INPUTS: dict[str, tuple[Unit | None, str]] = {
     "h": (FORCE, "nominal h of M x'' + h = u, at the measured x and v"),
     "g": (FORCE, "nominal gravity and springs, at the measured x"),
     "M": (INERTIA, "nominal mass matrix of M x'' + h = u, at the measured x"),
     "C": (FORCE_PER_SPEED, "nominal matrix of Coriolis forces C v, M' - 2 C skew-symmetric"),
     "J": (None, "nominal Jacobian of the tip, in the world: its velocity is J v"),
 }
-MODEL = {"f", "g", "fq", "gq", "M", "h"}  # inputs of the nominal model; C and J are what coriolis and jacobian need
-ALWAYS = ("x", "r", "dr")  # inputs of every FMU
+MODEL_INPUTS = {"f", "g", "fq", "gq", "M", "h"}  # of the nominal model; C and J are what coriolis and jacobian need
+REQUIRED_INPUTS = ("x", "r", "dr")  # inputs of every FMU
 OUTPUTS = ("u", "s")
 SYMBOLS = (  # names that the linker sees
     "smc_law", "smc_surface", "smc_estimator", "smc_controller", "smc_variables", "smc_law_gains", "smc_law_memory",
     "smc_law_real", "smc_law_degree", "smc_law_modelled", "smc_law_shared",
 )  # fmt: skip
-
-
 # In C, the rest of a function that returns where there is no model.
 UNREACHED = re.compile(r"(if \(\w+->model == 0\.0\) \{\s*return [^;]*;\s*\}).*?^\}", re.MULTILINE | re.DOTALL)
 
@@ -139,10 +137,10 @@ class Controller:
 
 def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> list[Variable]:
     """Return the variables in the order of their value references. `code` is `controller.code()`."""
-    places, of_model = controller.places, OF_JOINTS if controller.joints else OF_CHANNEL
+    places, of_model = controller.places, JOINT_INPUTS if controller.joints else CHANNEL_INPUTS
     wanted = inputs(controller, code)
     listed = [Variable("time", "SMC_CLOCK", "time", TIME)]
-    for name, (unit, words) in {**MEASURED, **of_model}.items():
+    for name, (unit, words) in {**COMMON_INPUTS, **of_model}.items():
         starts = _starts(name, controller) if name in wanted else {}
         listed += [Variable(f"{name}{place}", "SMC_INPUT", words, unit, start) for place, start in starts.items()]
     computed = [("u", "command, within u_max", FORCE), ("s", "sliding variable", None)]
@@ -182,13 +180,13 @@ def _starts(name: str, controller: Controller) -> dict[str, float]:
 def inputs(controller: Controller, code: Mapping[str, tuple[int, str]]) -> set[str]:
     """Return the names of the inputs that the components read, without indices."""
     reached = code.values() if controller.modelled else [(n, UNREACHED.sub(r"\1", text)) for n, text in code.values()]
-    read, wanted = reads(reached), {*ALWAYS}
+    read, wanted = reads(reached), {*REQUIRED_INPUTS}
     if controller.estimator is None or "v" in reads([code["estimator"]]):
         wanted.add("v")
     if read & {"a", "ddr"}:  # a is ddr if no estimator gives it
         wanted.add("ddr")
     if controller.modelled:
-        wanted |= read & MODEL
+        wanted |= read & MODEL_INPUTS
         wanted |= {name for name, needs in (("C", "coriolis"), ("J", "jacobian")) if needs in read}
     return wanted | (read & {"q", "dq"})
 
@@ -200,7 +198,7 @@ def reads(code: Iterable[tuple[int, str]]) -> set[str]:
 
 def bounded(name: str, bound: float) -> Variable:
     """Return the parameter that bounds the magnitude of a command."""
-    start = bound if math.isfinite(bound) else UNBOUNDED
+    start = bound if math.isfinite(bound) else MAX_DOUBLE
     return Variable(name, "SMC_PARAMETER", "bound on the magnitude of u", FORCE, start, 0.0, True)
 
 
@@ -211,7 +209,7 @@ def parameter(kind: str, part: Component, name: str, value: float, index: str = 
     positive = bool(gain and gain.positive)
     minimum = 0.0 if gain and (gain.positive or gain.nonnegative) else -math.inf
     limits = ", greater than 0" if positive else ", at least 0" if minimum == 0.0 else ""
-    finite = value if math.isfinite(value) else math.copysign(UNBOUNDED, value)
+    finite = value if math.isfinite(value) else math.copysign(MAX_DOUBLE, value)
     words = f"gain {name} of the {kind} {part.name}{limits}"
     return Variable(f"{kind}.{plain(name)}{index}", "SMC_PARAMETER", words, unit, finite, minimum, positive)
 
@@ -329,7 +327,7 @@ def body(listed: Sequence[Variable], controller: Controller, code: Mapping[str, 
     j, each, other = ("[j]", "[j]", "[SMC_JOINTS + j]") if many else ("", "[0]", "[1]")
 
     def value(name: str, absent: str = "0.0") -> str:
-        if name in MEASURED | OF_CHANNEL | OF_JOINTS and name not in wanted:
+        if name in COMMON_INPUTS | CHANNEL_INPUTS | JOINT_INPUTS and name not in wanted:
             return absent
         return f"value[{place(name + controller.places[0])}{' + j' * bool(many)}]"
 

@@ -8,15 +8,15 @@ from collections.abc import Iterable, Sequence
 
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.units import Unit
-from smc_mujoco.exchange.fmu.controller import OUTPUTS, UNBOUNDED, Controller, Variable
+from smc_mujoco.exchange.fmu.controller import MAX_DOUBLE, OUTPUTS, Controller, Variable
 
 # Kind of joint -> units of force and position: name, exponents of the base units.
-JOINTS = {
+JOINT_UNITS = {
     "hinge": (("N.m", {"kg": 1, "m": 2, "s": -2}), ("rad", {"rad": 1})),
     "slide": (("N", {"kg": 1, "m": 1, "s": -2}), ("m", {"m": 1})),
 }
 # Kind of variable -> causality, variability, initial.
-ROLES = {
+VARIABLE_ROLES = {
     "SMC_CLOCK": ("independent", "continuous", None),
     "SMC_INPUT": ("input", "discrete", None),
     "SMC_COMPUTED": ("local", "discrete", "calculated"),
@@ -24,7 +24,7 @@ ROLES = {
     "SMC_CONSTANT": ("local", "constant", "exact"),
     "SMC_STATE": ("local", "discrete", "exact"),
 }
-PAGE = """<!DOCTYPE html>
+PAGE_HTML = """<!DOCTYPE html>
 <html lang="en">
 <head><meta charset="utf-8"><title>{name}</title></head>
 <body style="font-family: sans-serif; max-width: 50em; margin: 2em auto; line-height: 1.4">
@@ -46,7 +46,7 @@ Gains can be changed while it runs. The sources need a C99 compiler and nothing 
 
 def unit_name(unit: Unit, joint: str) -> str:
     """Return the name of a unit in FMI, such as N.m.s/rad."""
-    (force, _), (position, _) = JOINTS[joint]
+    (force, _), (position, _) = JOINT_UNITS[joint]
     powers = {force: unit.force, position: unit.position, "s": unit.time}
     above = [_power(name, n) for name, n in powers.items() if n > 0.0]
     below = [_power(f"({name})" if "." in name else name, -n) for name, n in powers.items() if n < 0.0]
@@ -60,7 +60,7 @@ def _power(name: str, n: float) -> str:
 
 def base_units(unit: Unit, joint: str) -> dict[str, int] | None:
     """Return SI base unit -> its exponent in a unit; None if an exponent is not whole."""
-    (_, force), (_, position) = JOINTS[joint]
+    (_, force), (_, position) = JOINT_UNITS[joint]
     powers: dict[str, float] = {}
     for parts, n in ((force, unit.force), (position, unit.position), ({"s": 1}, unit.time)):
         for name, each in parts.items():
@@ -131,7 +131,7 @@ def _units(listed: Iterable[Variable]) -> list[Unit]:
 
 def _variable(reference: int, one: Variable, joint: str) -> xml.Element:
     """Return the element of a variable."""
-    causality, variability, initial = ROLES[one.kind]
+    causality, variability, initial = VARIABLE_ROLES[one.kind]
     about = {"name": one.name, "valueReference": str(reference), "description": one.description}
     about |= {"causality": "output" if is_output(one) else causality, "variability": variability}
     if initial is not None:
@@ -179,13 +179,15 @@ def page(listed: Iterable[Variable], controller: Controller, joint: str) -> str:
         one, *others = elements
         if one.kind == "SMC_STATE":
             continue
-        role = "output" if is_output(one) else ROLES[one.kind][0]
+        role = "output" if is_output(one) else VARIABLE_ROLES[one.kind][0]
         unit = unit_name(one.unit, joint) if one.unit is not None and any(one.unit) else ""
-        starts = ["unbounded" if each.start == UNBOUNDED else f"{each.start:g}" for each in (one, *others)]
+        starts = ["unbounded" if each.start == MAX_DOUBLE else f"{each.start:g}" for each in (one, *others)]
         start = "identity" if name == "M" else ", ".join(starts[: 1 if len(set(starts)) == 1 else None])
         start = "" if one.kind in ("SMC_CLOCK", "SMC_COMPUTED") else start
         cells = (f"{one.name} to {others[-1].name}" if others else one.name, role, unit, start, one.description)
         rows.append("<tr>" + "".join(f"<td style='padding-right: 1em'>{html.escape(c)}</td>" for c in cells) + "</tr>")
     about = html.escape(summary(controller))
     title = html.escape(controller.law.name)
-    return PAGE.format(name=title, summary=about, period=controller.period, rows="\n".join(rows), version=__version__)
+    return PAGE_HTML.format(
+        name=title, summary=about, period=controller.period, rows="\n".join(rows), version=__version__
+    )

@@ -33,11 +33,11 @@ from smc_mujoco.exchange.fmu.controller import Controller
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.scenario import Scenario, check_surface
 
-HERE, MIXED = Path(__file__).parent, "mixed"  # kind of joints of which some turn and some slide: without units
-HEADERS = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")  # of the standard
+FOLDER, MIXED_JOINTS = Path(__file__).parent, "mixed"  # kind of joints of which some turn and some slide: without units
+FMI_HEADERS = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")  # of the standard
+COMPILE_TIMEOUT = 120.0  # s
 # Only the symbols of FMI, and no paths of the build, so that the same law gives the same bytes.
-COMPILING = 120.0  # s, that a compiler may take
-HIDDEN = ("-std=c99", "-fvisibility=hidden", "-s")
+BINARY_FLAGS = ("-std=c99", "-fvisibility=hidden", "-s")
 SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 MACHINES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64", "i686": "x86"}
 
@@ -91,7 +91,7 @@ def export_fmu(
             "joints": joints,
         }
         joint = "hinge" if joint is None else joint
-        find("joint", joint, description.JOINTS)
+        find("joint", joint, description.JOINT_UNITS)
     controller = _controller(law, **about)
     identifier = _identifier(controller.law.name)
     target = ended(path if path is not None else f"{identifier}.fmu", ".fmu")
@@ -121,7 +121,7 @@ def _of_scenario(scenario: Scenario, given: Mapping[str, Any]) -> tuple[Law, dic
         "model": s.model,
         "joints": s.plant.n if s.law.joint else None,
     }
-    return s.law, about, MIXED if s.law.joint and s.plant.mixed else "slide" if s.plant.unit == "m" else "hinge"
+    return s.law, about, MIXED_JOINTS if s.law.joint and s.plant.mixed else "slide" if s.plant.unit == "m" else "hinge"
 
 
 def _controller(
@@ -175,7 +175,7 @@ def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str
     """Return path in the archive -> text, for all files but the binary."""
     code = controller.code()
     listed = inside.variables(controller, code)
-    if joint == MIXED:
+    if joint == MIXED_JOINTS:
         joint = "hinge"  # of which no unit is left but powers of the second
         listed = [
             one if one.unit and not (one.unit.force or one.unit.position) else one._replace(unit=None) for one in listed
@@ -186,14 +186,14 @@ def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str
     for kind, (slots, text) in code.items():
         if kind != "law":
             files[f"{kind}.c"] = inside.component_file(controller.parts[kind], slots, text)
-    files = {"fmu.c": (HERE / "fmu.c").read_text(encoding="utf-8"), **files}
+    files = {"fmu.c": (FOLDER / "fmu.c").read_text(encoding="utf-8"), **files}
     content = "\0".join([*files.values(), inside.header(listed, controller, identifier, ""), joint])
     token = f"{{{uuid.UUID(bytes=hashlib.sha256(content.encode()).digest()[:16])}}}"
     compiled = list(files)
     files["controller.h"] = inside.header(listed, controller, identifier, token)
-    files["smc_fmu.h"] = (HERE / "smc_fmu.h").read_text(encoding="utf-8")
+    files["smc_fmu.h"] = (FOLDER / "smc_fmu.h").read_text(encoding="utf-8")
     files[build.HEADER.name] = build.HEADER.read_text(encoding="utf-8")
-    files |= {name: (HERE / "headers" / name).read_text(encoding="utf-8") for name in HEADERS}
+    files |= {name: (FOLDER / "headers" / name).read_text(encoding="utf-8") for name in FMI_HEADERS}
     return {
         "modelDescription.xml": description.model_description(listed, controller, identifier, token, joint),
         "documentation/index.html": description.page(listed, controller, joint),
@@ -219,12 +219,12 @@ def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
                 (folder / name).write_text(text, encoding="utf-8")
         compiled = [str(folder / name) for name in sources if name.endswith(".c")]
         try:
-            line = [*command, *build.FLAGS, *HIDDEN, *compiled, "-o", str(target), "-lm"]
-            done = build.run_compiler(line, COMPILING)
+            line = [*command, *build.LIBRARY_FLAGS, *BINARY_FLAGS, *compiled, "-o", str(target), "-lm"]
+            done = build.run_compiler(line, COMPILE_TIMEOUT)
         except TimedOut:
             raise ScenarioError(
-                f"{command[0]} takes more than {COMPILING:g} s to compile the FMU: set another compiler in CC, or "
-                "leave the binary out (binary=False, --no-binary)"
+                f"{command[0]} takes more than {COMPILE_TIMEOUT:g} s to compile the FMU: set another compiler in CC, "
+                "or leave the binary out (binary=False, --no-binary)"
             ) from None
         except OSError:
             raise ScenarioError(

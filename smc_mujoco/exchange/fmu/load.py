@@ -34,11 +34,11 @@ from smc_mujoco.control.law import Measurement, law_function
 from smc_mujoco.control.units import Gain
 from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.fmu import slave
-from smc_mujoco.exchange.fmu.controller import OUTPUTS, UNBOUNDED
-from smc_mujoco.exchange.fmu.slave import HELD, REAL, Slave
+from smc_mujoco.exchange.fmu.controller import MAX_DOUBLE, OUTPUTS
+from smc_mujoco.exchange.fmu.slave import CONSTANT_TYPES, REAL_TYPES, Slave
 
 # Our name -> names of an FMU's variables with that meaning; case is ignored.
-NAMES = {
+VARIABLE_NAMES = {
     "x": ("x", "position", "pos", "q", "phi", "theta", "angle", "y", "measurement", "feedback"),
     "v": ("v", "velocity", "vel", "speed", "omega", "dx", "xdot", "x_dot", "dq", "qdot", "w"),
     "r": ("r", "ref", "reference", "setpoint", "x_ref", "xref", "xd", "x_d", "desired", "u_s"),
@@ -49,7 +49,7 @@ NAMES = {
     "u": ("u", "control", "command", "torque", "tau", "force", "u_c", "manipulated"),
     "s": ("s", "sigma", "sliding", "sliding_variable"),
 }
-INPUTS = tuple(n for n in Measurement._fields if n not in ("has_surface", "s", "v_eq"))
+INPUT_FIELDS = tuple(n for n in Measurement._fields if n not in ("has_surface", "s", "v_eq"))
 PERIOD_TOLERANCE = 1e-6  # relative difference below which two periods are equal
 MAX_TIMEOUT = 86_400.0  # s: a day
 CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
@@ -116,7 +116,7 @@ class FmuLaw(Uncompiled):
 
     def fixed(self, gains: Iterable[float]) -> dict[str, float]:
         """Return the FMU's name -> the value of each constant and parameter."""
-        values = (max(-UNBOUNDED, min(float(gain), UNBOUNDED)) for gain in gains)
+        values = (max(-MAX_DOUBLE, min(float(gain), MAX_DOUBLE)) for gain in gains)
         return dict(self.constants) | dict(zip(self.parameters, values, strict=False))
 
     def _begin(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> int:
@@ -333,15 +333,15 @@ def _meanings(
             raise ScenarioError(f"{what} is {shown(value)}: give a dict, such as variables={{'x': 'theta'}}")
     ins, outs = ([n for n, v in known.items() if v.causality == side] for side in ("input", "output"))
     for ours, theirs in chosen.items():
-        if ours not in (*INPUTS, *OUTPUTS):
-            raise unknown("meaning of a variable", ours, (*INPUTS, *OUTPUTS))
+        if ours not in (*INPUT_FIELDS, *OUTPUTS):
+            raise unknown("meaning of a variable", ours, (*INPUT_FIELDS, *OUTPUTS))
         side, theirs_known = ("output", outs) if ours in OUTPUTS else ("input", ins)
         errors.find(f"{side} of {file}", theirs, dict.fromkeys(theirs_known, ""))
     for theirs in constants:
         errors.find(f"input of {file}", theirs, dict.fromkeys(ins, ""))
     taken = {*chosen.values(), *constants}
-    inputs = {ours: theirs for ours, theirs in chosen.items() if ours in INPUTS}
-    inputs |= _by_name([n for n in ins if n not in taken], [n for n in INPUTS if n not in chosen])
+    inputs = {ours: theirs for ours, theirs in chosen.items() if ours in INPUT_FIELDS}
+    inputs |= _by_name([n for n in ins if n not in taken], [n for n in INPUT_FIELDS if n not in chosen])
     if joints := [n for n in ins if n.endswith("[2]") and n not in taken]:
         raise ScenarioError(
             f"{file} has inputs of many joints, such as {joints[0]!r}: give an FMU of one channel, or the law in C; "
@@ -360,11 +360,11 @@ def _meanings(
             f"say which it is, as in variables={{'u': {free!r}}} (--variables u={free})"
         )
     outputs.setdefault("u", outs[0])
-    real = dict.fromkeys((*inputs.values(), *outputs.values()), REAL)
-    for theirs, types in {**dict.fromkeys(constants, HELD), **real}.items():
+    real = dict.fromkeys((*inputs.values(), *outputs.values()), REAL_TYPES)
+    for theirs, types in {**dict.fromkeys(constants, CONSTANT_TYPES), **real}.items():
         if known[theirs].type not in types or known[theirs].dimensions:
             need = "real number: a law measures and returns real numbers"
-            need = need if types is REAL else "number: export it without this input"
+            need = need if types is REAL_TYPES else "number: export it without this input"
             raise ScenarioError(f"{theirs!r} of {file} is not one {need}")
     return inputs, {ours: outputs[ours] for ours in OUTPUTS if ours in outputs}
 
@@ -373,7 +373,7 @@ def _without_meaning(file: str, strange: Sequence[str], known: Mapping[str, Any]
     """Return the error for inputs of an FMU that are nothing a law measures. Only real ones can be given a meaning."""
     some, names = len(strange) > 1, ", ".join(map(repr, strange))
     what = f"inputs {names} of {file} mean" if some else f"input {names} of {file} means"
-    real = [name for name in strange if known[name].type in REAL][:1]
+    real = [name for name in strange if known[name].type in REAL_TYPES][:1]
     meaning = [
         f"say what {'they are' if some else 'it is'}, variables={{'x': {n!r}}} (--variables x={n}), or" for n in real
     ]
@@ -383,11 +383,11 @@ def _without_meaning(file: str, strange: Sequence[str], known: Mapping[str, Any]
 
 
 def _by_name(theirs: Iterable[str], ours: Iterable[str]) -> dict[str, str]:
-    """Return our name -> the FMU's, for its variables whose name, after the last dot, is ours or one of NAMES."""
+    """Return our name -> the FMU's, for its variables whose name, after the last dot, is ours or in VARIABLE_NAMES."""
     words = {name.rsplit(".", 1)[-1].casefold(): name for name in theirs}
     meanings = {}
     for name in ours:
-        word = next((word for word in (name, *NAMES.get(name, ())) if word in words), None)
+        word = next((word for word in (name, *VARIABLE_NAMES.get(name, ())) if word in words), None)
         if word is not None:
             meanings[name] = words.pop(word)
     return meanings
@@ -397,7 +397,7 @@ def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
     """Return name of a gain -> the FMU's name and the Gain, for its real parameters."""
     gains: dict[str, tuple[str, Gain]] = {}
     for variable in variables:
-        if variable.causality != "parameter" or variable.type not in REAL or variable.dimensions:
+        if variable.causality != "parameter" or variable.type not in REAL_TYPES or variable.dimensions:
             continue
         try:
             start = float(variable.start)
@@ -407,7 +407,7 @@ def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
         ours += "_" * keyword.iskeyword(ours)
         if not ours.isidentifier() or ours.startswith("_") or ours in gains or math.isnan(start):
             continue
-        start = math.copysign(math.inf, start) if abs(start) >= UNBOUNDED else start
+        start = math.copysign(math.inf, start) if abs(start) >= MAX_DOUBLE else start
         lower = math.nan if variable.min is None else float(variable.min)
         gains[ours] = variable.name, Gain(start, nonnegative=lower == 0.0)
     return gains

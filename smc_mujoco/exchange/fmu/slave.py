@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 from smc_mujoco.common.guard import ALTERS, Arithmetic, Fault
 
-REAL = ("Real", "Float64", "Float32")  # types of variables that are real numbers, as in the names of FMPy's functions
-WHOLE = ("Integer", "Enumeration", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)))
-HELD = (*REAL, *WHOLE, "Boolean")  # types of inputs that may keep one value
-STEPS, PERIOD = 500, 1e-3  # of a trial: number of steps, and their length if the FMU names none, s; chosen
+REAL_TYPES = ("Real", "Float64", "Float32")  # types of real numbers, as in the names of FMPy's functions
+WHOLE_TYPES = ("Integer", "Enumeration", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)))
+CONSTANT_TYPES = (*REAL_TYPES, *WHOLE_TYPES, "Boolean")  # types of inputs that may keep one value
+TRIAL_STEPS, TRIAL_PERIOD = 500, 1e-3  # of a trial: number of steps, and their length if the FMU names none, s; chosen
 MAX_POSITION = 3.0  # where the double integrator of a trial stops, because a law need not stabilise it; chosen
 MAX_COMMAND = 6.0  # bound on u in a trial; chosen
 
@@ -123,7 +123,7 @@ class Slave:
 
 def _of_type(kind: str, value: float) -> float:
     """Return a value as a variable of a type has it: a whole number, a truth value, or as it is."""
-    return round(value) if kind in WHOLE else value != 0.0 if kind == "Boolean" else value
+    return round(value) if kind in WHOLE_TYPES else value != 0.0 if kind == "Boolean" else value
 
 
 def attempt(order: Mapping[str, Any], say: Callable) -> None:
@@ -142,8 +142,8 @@ def attempt(order: Mapping[str, Any], say: Callable) -> None:
 def _run(order: Mapping[str, Any], say: Callable) -> None:
     say("instantiation")
     slave = Slave(order["folder"], list(order["inputs"].values()), order["outputs"], order["fixed"])
-    length, x, v = order["step"] or PERIOD, 0.5, 0.0
-    for k in range(STEPS):
+    length, x, v = order["step"] or TRIAL_PERIOD, 0.5, 0.0
+    for k in range(TRIAL_STEPS):
         say(f"the step from t = {k * length:g} s")
         r, dr = 0.1 * math.sin(k * length), 0.1 * math.cos(k * length)
         seen = {"t": k * length, "dt": length, "x": x, "v": v, "r": r, "dr": dr, "ddr": -r, "e": x - r, "de": v - dr}

@@ -21,13 +21,13 @@ from smc_mujoco.exchange.live import npm
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.grid import listed_laws
 
-PAGE = Path(__file__).parent / "page"
-PLANTS = ("inverted_pendulum", "duffing", "van_der_pol")  # the paper's three plants with one joint
-FACTS = "facts.json"  # a folder with this file is a live page, which may be replaced
+PAGE_FOLDER = Path(__file__).parent / "page"
+DEFAULT_PLANTS = ("inverted_pendulum", "duffing", "van_der_pol")  # the paper's three plants with one joint
+FACTS_FILE = "facts.json"  # a folder with this file is a live page, which may be replaced
 
 
 def live(
-    plants: Sequence[str | Plant] = PLANTS,
+    plants: Sequence[str | Plant] = DEFAULT_PLANTS,
     laws: Sequence[Component | Template | str] = (),
     out: str | os.PathLike[str] = "live",
 ) -> Path:
@@ -49,7 +49,7 @@ def live(
       ScenarioError: a plant or law that the page cannot have, no npm, or a folder with other files in it.
     """
     names = [plants] if isinstance(plants, str | Plant) else taken("plants", plants)
-    chosen = known.checked(names or PLANTS)
+    chosen = known.checked(names or DEFAULT_PLANTS)
     users = [_own(law) for law in (listed_laws(laws) if laws else ())]
     functions = {("law", law.name): to_js(law) for law in users}
     offered = list(users)
@@ -61,10 +61,10 @@ def live(
     page = known.facts(chosen, offered, users)
     folder = _writable(Path(out))
     vendor = npm.fetched()
-    shutil.copytree(PAGE, folder, dirs_exist_ok=True)
+    shutil.copytree(PAGE_FOLDER, folder, dirs_exist_ok=True)
     shutil.copytree(vendor, folder / "vendor", dirs_exist_ok=True)
     (folder / "components.js").write_text(_script(functions), encoding="utf-8")
-    (folder / FACTS).write_text(json.dumps(plain(page), separators=(",", ":")), encoding="utf-8")
+    (folder / FACTS_FILE).write_text(json.dumps(plain(page), separators=(",", ":")), encoding="utf-8")
     return folder / "index.html"
 
 
@@ -99,7 +99,7 @@ def _writable(folder: Path) -> Path:
     """Return the folder if it is new, empty or a live page; refuse others."""
     try:
         folder.stat()
-        other = not folder.is_dir() or (any(folder.iterdir()) and not (folder / FACTS).is_file())
+        other = not folder.is_dir() or (any(folder.iterdir()) and not (folder / FACTS_FILE).is_file())
     except FileNotFoundError:
         other = False
     except (OSError, ValueError) as error:  # a name that no folder can have

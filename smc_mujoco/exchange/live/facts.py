@@ -34,10 +34,10 @@ from smc_mujoco.simulation import controller
 from smc_mujoco.simulation import scenario as defaults
 from smc_mujoco.simulation.conditions import SENSOR_NOISE, SINE
 
-MODEL = frozenset({"f", "g", "fq", "gq"})  # fields of the measurement that need the nominal mechanism
-FACTOR = 10.0  # a slider reaches from gain / FACTOR to gain * FACTOR where tuning has no range for the gain: chosen
-ACRONYM = 3  # letters of a name, at most, that is written in capitals, such as PID
-START = ("observer_free", "classical")  # laws with which the page opens: the paper's, and classical sliding mode
+MODEL_FIELDS = frozenset({"f", "g", "fq", "gq"})  # fields of the measurement that need the nominal mechanism
+SLIDER_FACTOR = 10.0  # of a gain, up and down, on a slider where tuning has no range: chosen
+MAX_ACRONYM_LETTERS = 3  # letters of a name, at most, that is written in capitals, such as PID
+OPENING_LAWS = ("observer_free", "classical")  # laws with which the page opens: the paper's, and classical sliding mode
 
 
 def plants() -> list[str]:
@@ -104,7 +104,7 @@ def _component(one: Component) -> dict[str, Any]:
     parts = entry(one.template) if one.template is not None and one.template.doc else None
     name = one.name.rstrip("_")
     return {
-        "label": name.upper() if len(name) <= ACRONYM else style.in_words(name),
+        "label": name.upper() if len(name) <= MAX_ACRONYM_LETTERS else style.in_words(name),
         "formula": parts.formula if parts and parts.formula != one.name else "",
         "source": parts.source if parts else "",
         "order": list(one.gains),
@@ -122,7 +122,7 @@ def _law(law: Component) -> dict[str, Any]:
         "colour_dark": style.lighter(style.law_colour(law)),
         "family": law.template.family if law.template is not None else "",
         "requires_model": law.requires_model,
-        "reads_model": bool(read & MODEL),
+        "reads_model": bool(read & MODEL_FIELDS),
         "takes_surface": "has_surface" in read and law.relative_degree == 1,
     }
 
@@ -165,8 +165,8 @@ def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], users: Sequen
 
 
 def _opening(users: Sequence[str], offered: Sequence[str]) -> list[str]:
-    """Return the names of at most two laws with which the page opens: the user's, then START, then the first ones."""
-    names = [*users, *(name for name in START if name in offered), *(name for name in offered if name != "none")]
+    """Return the names of at most two laws with which the page opens: the user's, OPENING_LAWS, the first."""
+    names = [*users, *(name for name in OPENING_LAWS if name in offered), *(name for name in offered if name != "none")]
     return list(dict.fromkeys(names))[:2]
 
 
@@ -289,5 +289,5 @@ def _ranges(one: Component, plant: Plant, values: Mapping[str, float]) -> dict[s
         if name in known:
             ranges[name] = [min(known[name][0], value), max(known[name][1], value)]
         elif 0.0 < value < math.inf and not (one.template and one.template.gains[name].held):
-            ranges[name] = [value / FACTOR, value * FACTOR]
+            ranges[name] = [value / SLIDER_FACTOR, value * SLIDER_FACTOR]
     return ranges

@@ -17,44 +17,44 @@ from smc_mujoco.common import extras
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.process import TimedOut, timed
 
-PINNED = Path(__file__).parent / "packages"
+PACKAGE_FOLDER = Path(__file__).parent / "packages"
 # File of a package -> its name in vendor/.
-FILES = {
+VENDOR_FILES = {
     "@mujoco/mujoco/mujoco.js": "mujoco.js",
     "@mujoco/mujoco/mujoco.wasm": "mujoco.wasm",
     "three/build/three.module.js": "three.module.js",
     "three/build/three.core.js": "three.core.js",
 }
-LICENCES = "licences.txt"
-FLAGS = (
+LICENCES_FILE = "licences.txt"
+NPM_FLAGS = (
     "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error",
     "--fetch-retries=2", "--fetch-retry-mintimeout=1000", "--fetch-retry-maxtimeout=5000",  # ms
 )  # fmt: skip
-TIMEOUT = 600.0  # s
+NPM_TIMEOUT = 600.0  # s
 
 
 def cached() -> Path:
     """Return the folder of the cache for the pinned versions. It may not exist yet."""
-    pins = hashlib.sha256((PINNED / "package-lock.json").read_bytes()).hexdigest()[:16]
+    pins = hashlib.sha256((PACKAGE_FOLDER / "package-lock.json").read_bytes()).hexdigest()[:16]
     home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or Path.home() / ".cache"
     return Path(home) / "smc_mujoco" / f"live-{pins}"
 
 
 def fetched() -> Path:
-    """Return a folder with FILES and their licences. Fetch them if they are not in the cache."""
+    """Return a folder with VENDOR_FILES and their licences. Fetch them if they are not in the cache."""
     target = cached()
     if target.is_dir():
         return target
     command = npm()
     with _scratch(target.parent) as name:
         scratch, made = Path(name), Path(name) / "vendor"
-        for file in PINNED.iterdir():
+        for file in PACKAGE_FOLDER.iterdir():
             shutil.copy(file, scratch)
         _install(command, scratch)
         made.mkdir()
-        for source, ours in FILES.items():
+        for source, ours in VENDOR_FILES.items():
             shutil.copy(scratch / "node_modules" / source, made / ours)
-        (made / LICENCES).write_text(_licences(scratch / "node_modules"), encoding="utf-8")
+        (made / LICENCES_FILE).write_text(_licences(scratch / "node_modules"), encoding="utf-8")
         try:
             made.replace(target)
         except OSError:  # another process was faster
@@ -90,7 +90,7 @@ def npm() -> list[str]:
 def _install(command: list[str], folder: Path) -> None:
     """Install the pinned packages into a folder."""
     try:
-        done = timed([*command, "ci", *FLAGS], TIMEOUT, cwd=folder)
+        done = timed([*command, "ci", *NPM_FLAGS], NPM_TIMEOUT, cwd=folder)
     except TimedOut:
         raise ScenarioError("npm did not fetch the live page's packages within 10 minutes: try again later") from None
     if done.returncode:

@@ -10,7 +10,7 @@ import pytest
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.audit import evidence, template
 from smc_mujoco.evidence.audit.audit import claims
-from smc_mujoco.evidence.audit.paper import CODE, FILE, new, paper
+from smc_mujoco.evidence.audit.paper import CODE_FILE, PAPER_FILE, new, paper
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.variants import with_gains
 from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Beside, Check, Threshold
@@ -42,7 +42,7 @@ def folder(tmp_path):
         home = tmp_path / "mine"
         shutil.rmtree(home, ignore_errors=True)
         home.mkdir()
-        for name, text in ((FILE, data), (CODE, code)):
+        for name, text in ((PAPER_FILE, data), (CODE_FILE, code)):
             if text is not None:
                 (home / name).write_text(text)
         return home
@@ -88,7 +88,7 @@ def test_each_case_has_its_check():
 
 def test_the_template_runs_and_the_wrong_sign_loses_its_claims(tmp_path):
     written = new(tmp_path / "levant")
-    assert [path.name for path in written] == [FILE, CODE]
+    assert [path.name for path in written] == [PAPER_FILE, CODE_FILE]
     found = paper(tmp_path / "levant")
     assert (found.name, list(found.claims), list(found.sets)) == ("levant", ["1", "2"], ["paper"])
     first, second = claims(paper=found)

@@ -611,7 +611,7 @@ def test_the_time_of_a_law_is_the_least_of_its_rounds_on_states_that_vary(monkey
         seen.clear()
     timing.nanoseconds(laws, quick=True)
     sample, states = seen[0]
-    assert {name: sample[timing.AT[name]] for name in ("dt", "g", "limit", "model")} == {
+    assert {name: sample[timing.FIELD_INDEX[name]] for name in ("dt", "g", "limit", "model")} == {
         "dt": 1e-3,
         "g": 8.0,
         "limit": 6.0,

@@ -15,7 +15,7 @@ from smc_mujoco.evidence.audit.paper import paper, shipped
 from smc_mujoco.evidence.papers.acary_2012.claims import observed_twisting_60
 from smc_mujoco.evidence.papers.aldana_lopez_2019.claims import BAND, classical_bound, least_bound
 from smc_mujoco.evidence.papers.huber_2014.claims import implicit_twisting
-from smc_mujoco.evidence.papers.measures import LATE, exponent, late, late_step, settled
+from smc_mujoco.evidence.papers.measures import END_SAMPLES, exponent, late, late_step, settled
 from smc_mujoco.evidence.papers.perez_ventura_2017.claims import predicted
 from smc_mujoco.evidence.papers.seeber_2024.claims import flip, slopes
 from smc_mujoco.simulation.trace import Trace
@@ -85,7 +85,7 @@ def test_a_signal_is_settled_from_where_it_stays_within_a_band(signal, time):
 
 
 def test_late_values_are_those_of_the_last_samples():
-    signal = np.concatenate([np.full(10, 9.0), np.arange(LATE + 2) % 3]).reshape(-1, 1)
+    signal = np.concatenate([np.full(10, 9.0), np.arange(END_SAMPLES + 2) % 3]).reshape(-1, 1)
     assert (late(signal), late_step(signal)) == (2.0, 2.0)
     assert math.isnan(late(np.full((5, 1), math.nan)))
 

@@ -69,7 +69,7 @@ def scores():
 
 def places():
     for i, plant in enumerate((*PLANTS[:2], "")):
-        for k, metric in enumerate(words.RANKED):
+        for k, metric in enumerate(words.RANKED_METRICS):
             for m, law in enumerate(LAWS):
                 median = (m + 1) * (i + 1) * 0.31 * 10.0 ** (k - 3) if plant else NONE
                 wins, losses = ((2, 0), (0, 1), (1, 2))[(i * k + m) % 3]

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from smc_mujoco.cli.main import app
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.audit import evidence
-from smc_mujoco.evidence.audit.figure import DECADES, figure, place
+from smc_mujoco.evidence.audit.figure import MAX_DECADES, figure, place
 from smc_mujoco.evidence.audit.verdict import check
 from smc_mujoco.evidence.report.paper import report
 from tests.evidence.report.test_page import said
@@ -130,9 +130,9 @@ def test_the_command_refuses_what_is_of_the_study(made):
     ("value", "relation", "limit", "expected"),
     [
         (0.1, "<", 1.0, -1.0), (10.0, "<", 1.0, 1.0), (100.0, ">", 1.0, -2.0), (0.1, ">=", 1.0, 1.0),
-        (1e-9, "<", 1.0, -DECADES), (1e9, "<=", 1.0, DECADES), (0.0, "<=", 0.0, -DECADES), (1e-9, "<=", 0.0, DECADES),
-        (float("nan"), "<", 1.0, DECADES), (float("inf"), ">", 1.0, -DECADES), (-1.0, "<", 1.0, -DECADES),
-        (1.0, "<", 1.0, 0.0),
+        (1e-9, "<", 1.0, -MAX_DECADES), (1e9, "<=", 1.0, MAX_DECADES), (0.0, "<=", 0.0, -MAX_DECADES),
+        (1e-9, "<=", 0.0, MAX_DECADES), (float("nan"), "<", 1.0, MAX_DECADES), (float("inf"), ">", 1.0, -MAX_DECADES),
+        (-1.0, "<", 1.0, -MAX_DECADES), (1.0, "<", 1.0, 0.0),
     ],
 )  # fmt: skip
 def test_a_check_is_left_of_1_where_it_holds(value, relation, limit, expected):

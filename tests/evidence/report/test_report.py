@@ -169,7 +169,7 @@ def test_the_leaderboard_has_the_numbers_of_the_scores(reader, findings):
     assert len(rows) == len(known) == 6
     for its, cells in rows:
         scores = known[its["data-plant"], its["data-condition"], its["data-law"]]
-        for metric, (attributes, shown) in zip(words.COLUMNS, cells[3:], strict=True):
+        for metric, (attributes, shown) in zip(words.TABLE_METRICS, cells[3:], strict=True):
             assert float(attributes["data-v"]) == scores[metric].median
             assert shown.startswith(words.number(scores[metric].median))
 
@@ -239,7 +239,7 @@ def test_thirteen_laws_have_colours_and_short_names_of_their_own(monkeypatch):
 
 
 def forest_of(findings):
-    return charts.forest(findings.scores, words.HEADLINE, findings.plants, findings.laws)
+    return charts.forest(findings.scores, words.MAIN_METRICS, findings.plants, findings.laws)
 
 
 def test_a_page_of_thirteen_laws_has_a_line_for_each(findings):
@@ -248,7 +248,7 @@ def test_a_page_of_thirteen_laws_has_a_line_for_each(findings):
     place = tuple(p._replace(law=law) for law in THIRTEEN for p in findings.places if p.law == "classical")
     shown = dataclasses.replace(findings, scores=many, places=place)
     forest, here = forest_of(shown), forest_of(findings)
-    per_law = (forest["layout"]["height"] - here["layout"]["height"]) / (13 - 3) / len(words.HEADLINE)
+    per_law = (forest["layout"]["height"] - here["layout"]["height"]) / (13 - 3) / len(words.MAIN_METRICS)
     assert per_law >= 15  # px: a line of text
     text = page.page(shown)
     assert all(words.law(law) in text for law in THIRTEEN)
@@ -592,14 +592,14 @@ def column(page, table, k):
 def test_clicking_a_header_sorts_and_clicking_again_sorts_the_other_way(seen):
     page = seen.page
     page.select_option('select[data-table="leaderboard"][data-column="condition"]', "")
-    head = page.locator("#leaderboard th").nth(3 + words.COLUMNS.index("itae"))
+    head = page.locator("#leaderboard th").nth(3 + words.TABLE_METRICS.index("itae"))
     head.locator("button").click()
-    up = [float(v) for v in column(page, "leaderboard", 3 + words.COLUMNS.index("itae"))]
+    up = [float(v) for v in column(page, "leaderboard", 3 + words.TABLE_METRICS.index("itae"))]
     assert up == sorted(up)
     assert len(set(up)) > 1
     assert head.get_attribute("aria-sort") == "ascending"
     head.locator("button").click()
-    assert [float(v) for v in column(page, "leaderboard", 3 + words.COLUMNS.index("itae"))] == up[::-1]
+    assert [float(v) for v in column(page, "leaderboard", 3 + words.TABLE_METRICS.index("itae"))] == up[::-1]
     page.locator("#leaderboard th button").nth(2).click()
     laws = column(page, "leaderboard", 2)
     assert laws == sorted(laws)

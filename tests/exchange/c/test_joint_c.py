@@ -290,7 +290,7 @@ def test_a_mistake_in_the_scenario_is_one_sentence(compiled, tmp_path):
     assert "asks for the Jacobian of a tip, and there is none" in str(trace.failure)
     (path := tmp_path / "mine.c").write_text(smc.law_to_c("unit_vector", joints=2))
     library = tmp_path / "mine.so"
-    subprocess.run([*build.compiler(), *build.FLAGS, str(path), "-o", str(library), "-lm"], check=True)
+    subprocess.run([*build.compiler(), *build.LIBRARY_FLAGS, str(path), "-o", str(library), "-lm"], check=True)
     with pytest.raises(smc.ScenarioError, match=r"mine\.so is a library with a law of many joints: give its \.c file"):
         smc.law_from_c(library)
 

@@ -162,7 +162,7 @@ def test_a_shared_library_is_taken_as_it_is_and_again_after_a_new_build(file, tm
     traces = []
     for gain in (1.0, 2.0):
         source = file(law(f"out[0] = -{gain} * gains[0] * y->e;").replace("smc_law(", "firmware_step("), "built.c")
-        line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-o", str(target)]
+        line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-o", str(target)]
         subprocess.run(line, check=True)
         mine = smc.law_from_c(target, symbol="firmware_step", gains={"k": 0.5}, isolate=True)
         traces.append(smc.run(scenario(mine, noise=None)))
@@ -174,7 +174,7 @@ def test_two_laws_of_one_library_are_two(file, tmp_path):
     target, text = tmp_path / "laws.so", law("out[0] = -y->e;")
     second = text.partition("int ")[2].replace("smc_law(", "other(").replace("-y->e", "-2 * y->e")
     source = file(text + "int " + second)
-    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-o", str(target)]
+    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-o", str(target)]
     subprocess.run(line, check=True)
     one, other = (scenario(smc.law_from_c(target, symbol=name, name="mine")()) for name in ("smc_law", "other"))
     assert one != other
@@ -199,7 +199,7 @@ def test_a_library_s_int_is_read_as_an_int(file, tmp_path):
     text = "long long smc_law(const double *y, const double *gains, double *memory, double *out)\n"
     text += "{ (void)memory; out[0] = out[1] = -y[4]; return (long long)gains[0] << 32; }"  # the int in it is 0
     source = file(text)
-    line = [*build.compiler(), "-O2", "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-o", str(target)]
+    line = [*build.compiler(), "-O2", "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-o", str(target)]
     subprocess.run(line, check=True)
     assert smc.run(scenario(smc.law_from_c(target, gains={"k": 3.0}))).failure is None
 
@@ -460,7 +460,7 @@ def test_what_would_harm_other_runs_is_not_loaded(file, more, words):
 
 def test_a_library_that_changes_the_rounding_is_found_too(file, tmp_path):
     source = file(law("out[0] = y->e; if (y->t > 0.1) fesetround(FE_DOWNWARD);", "#include <fenv.h>"))
-    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-lm", "-o", tmp_path / "a.so"]
+    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-lm", "-o", tmp_path / "a.so"]
     subprocess.run(line, check=True)
     with pytest.raises(smc.ScenarioError, match=re.escape(f"a.so: smc_law {ALTERS}")):
         smc.law_from_c(tmp_path / "a.so", isolate=True)
@@ -551,7 +551,7 @@ def test_a_law_that_fails_ends_its_run_with_a_reason_and_harms_no_other(file):
 
 def test_a_law_that_says_no_s_ends_its_run(file, tmp_path):
     silent = file(law("out[0] = 0.0;").replace("    out[1] = y->e;\n", ""))
-    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(silent), "-o", str(tmp_path / "a.so")]
+    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(silent), "-o", str(tmp_path / "a.so")]
     subprocess.run(line, check=True)
     for source in (silent, tmp_path / "a.so"):
         trace = smc.run(scenario(smc.law_from_c(source)))
@@ -621,7 +621,7 @@ def test_what_is_no_library_or_of_single_precision_is_refused(file, tmp_path):
     with pytest.raises(smc.ScenarioError, match=r"junk.so cannot be loaded \(junk.so: file too short\)"):
         smc.law_from_c(file("junk", "junk.so"))
     source = file("#define SMC_REAL float\n" + MINE + "const int smc_law_real = sizeof(smc_real);\n")
-    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.HERE), str(source), "-o", str(tmp_path / "a.so")]
+    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-o", str(tmp_path / "a.so")]
     subprocess.run(line, check=True)
     with pytest.raises(smc.ScenarioError, match=r"a\.so is a library of single precision: give its \.c file"):
         smc.law_from_c(tmp_path / "a.so")
@@ -639,7 +639,7 @@ def test_the_header_has_the_numbers_of_the_measurement_in_their_order():
     one, many = re.findall(r"typedef struct \{(.*?)\}", HEADER, re.DOTALL)
     assert tuple(re.findall(r"smc_real (\w+);", one)) == Measurement._fields
     assert tuple(re.findall(r"smc_real (\w+)\[", many)) == joint_law.ARRAYS
-    assert len(Measurement._fields) == build.INPUTS
+    assert len(Measurement._fields) == build.MEASUREMENT_SIZE
 
 
 def test_check_c_names_its_own_options(call, file):

@@ -64,7 +64,7 @@ def combined(folder):
     """Combination -> its FMU, compiled in a third of the time without optimisation, and its trace."""
     scenarios = [scenario(*one) for one in COMBINED]
     with ThreadPoolExecutor(2) as pool, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(build, "FLAGS", ("-O0", *build.FLAGS[1:]))
+        patch.setattr(build, "LIBRARY_FLAGS", ("-O0", *build.LIBRARY_FLAGS[1:]))
         paths = pool.map(lambda i: smc.export_fmu(scenarios[i], folder / f"{i}.fmu"), range(len(scenarios)))
         return dict(zip(COMBINED, zip(list(paths), smc.run(scenarios), strict=True), strict=True))
 
@@ -386,7 +386,7 @@ def test_the_page_s_file_for_a_c_caller_block_gives_the_bits_of_a_run(folder):
     (folder / "super_twisting.c").write_text(smc.law_to_c(law))
     (folder / "controller.c").write_text(titled(ROOT / "docs" / "simulink.md")["controller.c"])
     library = folder / "controller.so"
-    flags = [*build.FLAGS, "-Wall", "-Wextra", "-Werror"]
+    flags = [*build.LIBRARY_FLAGS, "-Wall", "-Wextra", "-Werror"]
     subprocess.run([*build.compiler(), *flags, str(folder / "controller.c"), "-o", str(library), "-lm"], check=True)
     block = ctypes.CDLL(str(library))
     block.controller.argtypes = [ctypes.c_double] * 5 + [ctypes.POINTER(ctypes.c_double)] * 2
@@ -457,7 +457,7 @@ def test_a_compiler_that_does_not_end_is_not_a_missing_one(tmp_path, monkeypatch
     slow.write_text("#!/bin/sh\nexec sleep 60\n")
     slow.chmod(0o755)
     monkeypatch.setenv("CC", str(slow))
-    monkeypatch.setattr(export, "COMPILING", 0.1)
+    monkeypatch.setattr(export, "COMPILE_TIMEOUT", 0.1)
     with pytest.raises(smc.ScenarioError, match=r"slow takes more than 0\.1 s to compile the FMU"):
         smc.export_fmu("pid", tmp_path / "pid.fmu")
 

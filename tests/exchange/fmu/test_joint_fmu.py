@@ -48,7 +48,7 @@ def made(folder):
     """Law -> its FMU, compiled in a third of the time without optimisation, and its trace."""
     scenarios = [scenario(name) for name in CASES]
     with ThreadPoolExecutor(2) as pool, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(build, "FLAGS", ("-O0", *build.FLAGS[1:]))
+        patch.setattr(build, "LIBRARY_FLAGS", ("-O0", *build.LIBRARY_FLAGS[1:]))
         paths = list(pool.map(lambda s: smc.export_fmu(s, folder / f"{s.law.name}.fmu"), scenarios))
         return dict(zip(CASES, zip(paths, smc.run(scenarios), strict=True), strict=True))
 

@@ -83,7 +83,7 @@ def test_every_plant_of_the_page_has_laws_and_an_opening(vendor, tmp_path, snaps
     page = smc.live(build.known.plants(), laws=[mine], out=tmp_path / "page")
     found = facts(page)
     assert {"inverted_pendulum", "cart_pole", "furuta"} <= set(found["plants"])
-    assert set(build.PLANTS) == {name for name in smc.paper.PLANTS if smc.plant(name).n == 1}
+    assert set(build.DEFAULT_PLANTS) == {name for name in smc.paper.PLANTS if smc.plant(name).n == 1}
     for plant in found["plants"].values():
         assert (plant["start"][0], len(set(plant["start"]))) == ("mine", 2)  # beside a law that suits the plant
         assert set(plant["start"]) <= set(plant["laws"]) <= set(found["laws"])
@@ -179,8 +179,8 @@ def test_the_name_of_a_library_law_and_a_non_law_are_refused(vendor, tmp_path):
 
 
 def test_the_packages_are_pinned_by_version_and_hash_and_name_no_host():
-    asked = json.loads((npm.PINNED / "package.json").read_text())["dependencies"]
-    text = (npm.PINNED / "package-lock.json").read_text()
+    asked = json.loads((npm.PACKAGE_FOLDER / "package.json").read_text())["dependencies"]
+    text = (npm.PACKAGE_FOLDER / "package-lock.json").read_text()
     locked = json.loads(text)["packages"]
     assert "://" not in text
     assert {f"node_modules/{name}" for name in asked} == set(locked) - {""}
@@ -230,7 +230,7 @@ def test_what_npm_fetches_is_kept_with_its_licences_and_fetched_once(tmp_path, m
 
     def install(command, timeout, cwd):
         orders.append((command, timeout, sorted(path.name for path in cwd.iterdir() if path.is_file())))
-        for name in (*npm.FILES, "three/LICENSE"):
+        for name in (*npm.VENDOR_FILES, "three/LICENSE"):
             file = cwd / "node_modules" / name
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(f"text of {name}")
@@ -243,11 +243,11 @@ def test_what_npm_fetches_is_kept_with_its_licences_and_fetched_once(tmp_path, m
     assert npm.fetched() == folder == npm.cached()
     assert (folder.parent, len(orders)) == (tmp_path / "smc_mujoco", 1)
     ((command, timeout, files),) = orders
-    assert (command[:2], command[2:], timeout) == (["npm", "ci"], list(npm.FLAGS), 600.0)
+    assert (command[:2], command[2:], timeout) == (["npm", "ci"], list(npm.NPM_FLAGS), 600.0)
     assert files == ["package-lock.json", "package.json"]
     texts = {file.name: file.read_text() for file in folder.iterdir()}
     licences = texts.pop("licences.txt")
-    assert texts == {ours: f"text of {name}" for name, ours in npm.FILES.items()}
+    assert texts == {ours: f"text of {name}" for name, ours in npm.VENDOR_FILES.items()}
     assert licences.startswith("mujoco.js, mujoco.wasm: MuJoCo, Copyright DeepMind Technologies Limited, Apache-2.0\n")
     assert licences.endswith("\nthree.module.js, three.core.js: three.js, MIT\n\ntext of three/LICENSE")
     assert [file.name for file in folder.parent.iterdir()] == [folder.name]

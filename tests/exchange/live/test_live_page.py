@@ -19,7 +19,7 @@ from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.draw import style
-from smc_mujoco.exchange.live.build import PLANTS
+from smc_mujoco.exchange.live.build import DEFAULT_PLANTS
 from smc_mujoco.mechanisms.plants import van_der_pol
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -245,7 +245,7 @@ def test_surface_estimator_and_encoder_are_choices_that_the_link_holds(seen, pag
 
 def test_a_link_with_nonsense_opens_the_page(seen):
     seen.open("plant=toString&a=classical&a.c=much&a.k=Infinity&delay=1e9&b=<script>")
-    assert seen.page.input_value("#plant") == PLANTS[0]
+    assert seen.page.input_value("#plant") == DEFAULT_PLANTS[0]
     assert seen.chosen("input_delay") == 0.05  # the slider's end
     assert seen.law_gain("k") == seen.page.evaluate("live.facts.plants.inverted_pendulum.ranges.classical.k[1]")
     assert seen.page.inner_text("#status") == (
@@ -321,7 +321,7 @@ ARROWS = """[-1, 1].flatMap((u) => [{ width: 3, height: 1 }, { width: 1, height:
 }))"""
 
 
-@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("plant", DEFAULT_PLANTS)
 def test_a_picture_of_what_moves_is_the_whole_picture(seen, plant):
     """Without a GPU only the part of the picture in which something moves is drawn."""
     seen.open(f"plant={plant}")
@@ -354,7 +354,7 @@ def test_two_laws_have_the_colours_of_the_figures(seen, page):
 
 
 def test_every_plant_and_law_can_be_chosen(seen, page):
-    for plant in PLANTS:
+    for plant in DEFAULT_PLANTS:
         page.select_option("#plant", plant)
         page.wait_for_function("live.running()[0].simulation.time > 0")
         assert coloured(page, style.law_colour("observer_free")) > 100, f"{plant} is not in the picture"

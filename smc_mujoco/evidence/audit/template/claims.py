@@ -12,7 +12,7 @@ checked, the others stand beside. `runs` makes each run once, and has:
 
 import numpy as np
 
-LAST = 0.2  # share of a run that counts as its end
+END_SHARE = 0.2  # share of a run that counts as its end
 
 
 def rejects(runs):
@@ -30,6 +30,6 @@ def second_order(runs):
     periods = runs.values["periods"]
     (plant,), (law,), (condition,) = runs.plants, runs.laws, runs.conditions
     traces = runs.traces(runs.scenario(plant, law, condition, control_period=period) for period in periods)
-    largest = [float(np.abs(trace.s[-int(LAST * len(trace.s)) :]).max()) for trace in traces]
+    largest = [float(np.abs(trace.s[-int(END_SHARE * len(trace.s)) :]).max()) for trace in traces]
     exponent = np.polyfit(np.log(periods), np.log(largest), 1)[0]
     return {"exponent": exponent, "largest |s|": dict(zip(map(str, periods), largest, strict=True))}

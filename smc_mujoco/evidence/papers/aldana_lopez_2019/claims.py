@@ -6,10 +6,10 @@ from smc_mujoco.control.law import law_function
 from smc_mujoco.evidence.papers.measures import settled
 
 BAND = 1e-6  # m/s, of |s|: it counts as reached
-SWITCHING = 1e-3  # m/s, the band with a switching gain, which chatters in k dt
-FAR, BEYOND = 5000.0, 0.02  # m/s, a start that stands for infinity; share of the time that may lie beyond it
+SWITCHING_BAND = 1e-3  # m/s, the band with a switching gain, which chatters in k dt
+FAR_START, MAX_SHARE_BEYOND = 5000.0, 0.02  # m/s, stands for infinity; share of the time beyond it
 MIN_KP = 0.3  # least k p: below it a sample of 10 us takes s across the band
-LONGER = 1.5  # least bounds that a run lasts
+RUN_BOUNDS = 1.5  # least bounds that a run lasts
 
 
 @law_function(
@@ -35,10 +35,10 @@ def general_margins(gains):
     conditions = {"k p < 1": 1.0 - k * p, "k q > 1": k * q - 1.0}
     if min(conditions.values()) <= 0.0:
         return conditions
-    beyond = FAR ** (1.0 - k * q) / (B**k * (k * q - 1.0)) / gamma(gains)
-    steep = (A * FAR**p + B * FAR**q) ** k * 1e-5 / FAR
+    beyond = FAR_START ** (1.0 - k * q) / (B**k * (k * q - 1.0)) / gamma(gains)
+    steep = (A * FAR_START**p + B * FAR_START**q) ** k * 1e-5 / FAR_START
     return conditions | {
-        "time beyond the start < 2 %": BEYOND - beyond,
+        "time beyond the start < 2 %": MAX_SHARE_BEYOND - beyond,
         "k p >= 0.3, for the band": k * p - MIN_KP,
         "first step < 1 % of the start": 0.01 - steep,
     }
@@ -60,7 +60,7 @@ def classical_bound(law):
 def times(runs, cells, band=BAND):
     """Return name -> settling time of s, from name -> plant, law and start."""
     scenarios = {
-        name: runs.scenario(plant, law.name, *runs.conditions, law=law, v0=v0, duration=LONGER * least_bound(law))
+        name: runs.scenario(plant, law.name, *runs.conditions, law=law, v0=v0, duration=RUN_BOUNDS * least_bound(law))
         for name, (plant, law, v0) in cells.items()
     }
     return {name: settled(trace, trace.s, band) for name, trace in runs.traced(scenarios).items()}
@@ -99,13 +99,13 @@ def disturbed(runs):
     """Time from which |s| stays within 1 mm/s under d = 0.5 sin 5t, with k = 0.6, over the least bound."""
     law = runs.law(runs.plant, *runs.laws, k=runs.values["k"])
     cells = {f"from {start:g} m/s": (runs.plant, law, start) for start in runs.values["starts"]}
-    measured = times(runs, cells, SWITCHING)
+    measured = times(runs, cells, SWITCHING_BAND)
     return {"time / least bound": {name: time / least_bound(law) for name, time in measured.items()}}
 
 
 def general(runs):
     """Time from which |s| stays within 1e-6 m/s, from 5000 m/s, over gamma."""
     law = runs.law(runs.plant, *runs.laws)
-    scenario = runs.scenario(runs.plant, law.name, law=law, v0=runs.values["start"], duration=LONGER * gamma(law.gains))
-    (trace,) = runs.traces([scenario])
+    run = runs.scenario(runs.plant, law.name, law=law, v0=runs.values["start"], duration=RUN_BOUNDS * gamma(law.gains))
+    (trace,) = runs.traces([run])
     return {"time from far / gamma": settled(trace, trace.s, BAND) / gamma(law.gains)}

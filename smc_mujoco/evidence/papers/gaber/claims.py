@@ -35,12 +35,12 @@ OURS, CLASSICAL, ADAPTIVE, HOSMC = LAWS  # the paper's law, and those that it co
 RIVALS = LAWS[1:]
 UNCLAMPED = "super_twisting_unclamped"  # as published; in the first gains its integral is clamped
 CONDITIONED = "conditioned_super_twisting"  # not the paper's: without the wind-up of the plain one
-OF_SCALE = 0.005  # share of a scale; chosen
-LONG_RUN, PERIOD = 40.0, 5e-3  # s; s, of control and physics: runs near rest, where the smooth law asks no more
-COARSE = 8  # control periods between which a quick search ends, chosen; it tries none shorter, with a quick integrator
+RELEVANT_SCALE_SHARE = 0.005  # share of a scale; chosen
+LONG_RUN, LONG_PERIOD = 40.0, 5e-3  # s; s, of control and physics, enough for a smooth law near rest
+QUICK_RESOLUTION = 8  # control periods, of a quick search of delays, which tries none shorter; chosen
 MIN_LAMBDA = 1e-3  # N m s or N s: the lambda that stands for "any lambda > 0"
-INNER, ROUNDS, QUICK_ROUNDS = 8, 3, 2  # 8 values at once divide a range by 9: three times, and it is known to 1.2 %
-SMALL_START = 1e-3  # of x0
+INNER_VALUES, ROUNDS, QUICK_ROUNDS = 8, 3, 2  # 8 values divide a range by 9, three rounds to 1.2 %
+SMALL_START_SHARE = 1e-3  # of x0
 
 # what several claims share
 
@@ -53,8 +53,8 @@ def scale(scenario):
 def long_run(runs, plant, lam, position, rate=0.0):
     """Return a run of 40 s with another lambda, from position times x0 with every channel at rate times |x0| per s."""
     x0, law = find_plant(plant).x0, with_gains(runs.law(plant, OURS), lam=lam)
-    start = {"x0": [position * x for x in x0], "v0": rate * max(map(abs, x0))}
-    return runs.scenario(plant, OURS, law=law, duration=LONG_RUN, control_period=PERIOD, physics_step=PERIOD, **start)
+    start = {"x0": [position * x for x in x0], "v0": rate * max(map(abs, x0)), "duration": LONG_RUN}
+    return runs.scenario(plant, OURS, law=law, control_period=LONG_PERIOD, physics_step=LONG_PERIOD, **start)
 
 
 def command_bound(runs, plant):
@@ -70,7 +70,7 @@ def comes_to_rest(runs, grid):
 
 def larger_than(value, of=0.0):
     """Return the least value that is relevantly larger: by 3 % of the larger one, and by 0.5 % of a scale."""
-    return max(value / (1.0 - RELEVANT), value + OF_SCALE * of)
+    return max(value / (1.0 - RELEVANT), value + RELEVANT_SCALE_SHARE * of)
 
 
 def times(runs, plant, *laws):
@@ -120,7 +120,7 @@ def largest_delays(runs, plants, laws, within=TOLERATED_ERROR):
     A run tolerates a delay if its ultimate bound is at most `within` of |x0|. The search is that of `margins`, down to
     one control period. Its runs are the audit's own, so that mutants of laws are searched as well.
     """
-    apart, integrator = (COARSE, "implicitfast") if runs.quick else (1, "RK4")
+    apart, integrator = (QUICK_RESOLUTION, "implicitfast") if runs.quick else (1, "RK4")
     levels = [0, *(periods for delay in DELAYS if (periods := round(delay / CONTROL_PERIOD)) >= apart)]
 
     def tolerated(tried):
@@ -157,7 +157,7 @@ def smallest_stable(runs):
     ends = dying(runs, dict.fromkeys(runs.plants, (MIN_LAMBDA, U_MAX)))
     low, high = dict.fromkeys(runs.plants, MIN_LAMBDA), dict.fromkeys(runs.plants, U_MAX)
     for _ in range(QUICK_ROUNDS if runs.quick else ROUNDS):
-        tried = {plant: np.geomspace(low[plant], high[plant], INNER + 2).tolist() for plant in runs.plants}
+        tried = {plant: np.geomspace(low[plant], high[plant], INNER_VALUES + 2).tolist() for plant in runs.plants}
         inner = dying(runs, {plant: lams[1:-1] for plant, lams in tried.items()})
         for plant, lams in tried.items():
             last = max((i for i, stable in enumerate([False, *inner[plant]]) if not stable), default=0)
@@ -170,7 +170,7 @@ def smallest_stable(runs):
 
 def dying(runs, lams):
     """Return plant -> whether a small start dies out, for each lambda; k1 is the set's."""
-    grid = [long_run(runs, plant, lam, SMALL_START) for plant, some in lams.items() for lam in some]
+    grid = [long_run(runs, plant, lam, SMALL_START_SHARE) for plant, some in lams.items() for lam in some]
     traces = iter(runs.traces(grid))
     return {plant: [dies_out(next(traces)) for _ in some] for plant, some in lams.items()}
 
@@ -187,10 +187,10 @@ def dies_out(trace):
 # the abstract
 
 FILTERS = {f"filter of {ms} ms": estimator("filtered_difference", tau=ms * 1e-3) for ms in (5, 20)}
-QUICK_IDEAL = 3  # conditions
-QUICK_DISTURBED = ("noise", "sine", "heavy")
-QUICK_LARGEST = 50  # pendulums
-SHORT = 3.0  # s, of a network's run: several times what the networks of the study take to settle
+QUICK_IDEAL_COUNT = 3  # conditions
+QUICK_CONDITIONS = ("noise", "sine", "heavy")
+QUICK_MAX_SIZE = 50  # pendulums
+SHORT_RUN = 3.0  # s, of a network's run: several times what the networks of the study take to settle
 
 
 def observer_free(runs):
@@ -214,7 +214,7 @@ def reduces_chattering(runs):
 
 def bounded(runs):
     """Claim 4: bounded control."""
-    names = runs.conditions[:QUICK_IDEAL] if runs.quick else runs.conditions
+    names = runs.conditions[:QUICK_IDEAL_COUNT] if runs.quick else runs.conditions
     grid = [runs.scenario(plant, OURS, name) for plant in runs.plants for name in names]
     grid += [runs.scenario(plant, OURS, u_max=math.inf) for plant in runs.plants]
     scores = runs.scores(grid)
@@ -227,17 +227,19 @@ def bounded(runs):
 
 def robust(runs):
     """Claim 5: robust to noise, disturbance, parameter variation."""
-    names = QUICK_DISTURBED if runs.quick else runs.conditions
+    names = QUICK_CONDITIONS if runs.quick else runs.conditions
     pairs = [(plant, name) for plant in runs.plants for name in names]
     return comes_to_rest(runs, {f"{plant}, {name}": runs.scenario(plant, OURS, name) for plant, name in pairs})
 
 
 def scalable(runs):
     """Claim 7: scalable."""
-    sizes, ratios = [n for n in runs.values["sizes"] if n <= QUICK_LARGEST or not runs.quick], {}
+    sizes, ratios = [n for n in runs.values["sizes"] if n <= QUICK_MAX_SIZE or not runs.quick], {}
     for plant in runs.plants:
         networks = [find_plant(plant, n=n) for n in sizes]
-        grid = [runs.scenario(plant, OURS, plant=one, duration=SHORT, integrator="implicitfast") for one in networks]
+        grid = [
+            runs.scenario(plant, OURS, plant=one, duration=SHORT_RUN, integrator="implicitfast") for one in networks
+        ]
         time_of_two, *times = (scores["settling_time"] for scores in runs.scores(grid))
         ratios |= {f"{plant}, N = {n}": ratio(time, time_of_two) for n, time in zip(sizes[1:], times, strict=True)}
     return {"settling time / that of N = 2": ratios}
@@ -249,7 +251,7 @@ MEASURES = (  # sentence, name, metric, condition
     ("smoothness", "TV rate", "tv_rate", "nominal"),
     ("robustness", "steady error under d", "steady_error", "constant"),
 )
-GENERAL = (CLASSICAL, ADAPTIVE, HOSMC, CONDITIONED, "boundary_layer")
+GENERAL_LAWS = (CLASSICAL, ADAPTIVE, HOSMC, CONDITIONED, "boundary_layer")
 
 
 def compensates(runs):
@@ -314,8 +316,8 @@ def synchronises(runs):
 
 def simple(runs):
     """Claim 14: low complexity."""
-    spent = nanoseconds({name: runs.mutated(find_law(name)) for name in (OURS, *GENERAL)}, quick=runs.quick)
-    others = {f"that of {name}": ratio(spent[OURS], spent[name]) for name in GENERAL}
+    spent = nanoseconds({name: runs.mutated(find_law(name)) for name in (OURS, *GENERAL_LAWS)}, quick=runs.quick)
+    others = {f"that of {name}": ratio(spent[OURS], spent[name]) for name in GENERAL_LAWS}
     return {"time per sample / that of the fastest other law": max(others.values()), "time per sample, over": others}
 
 
@@ -323,7 +325,7 @@ def simple(runs):
 
 LAG = 0.05  # s, chosen: an actuator's
 # The differentiator's theorem allows every bound above the largest jerk, g u_max / LAG. Shares of that jerk; chosen.
-SHARES = (1.05, 1.5)
+JERK_SHARES = (1.05, 1.5)
 
 
 def higher_degree(runs):
@@ -331,7 +333,7 @@ def higher_degree(runs):
     third, grid = runs.mutated(find_law("observer_free_third")), {}
     for name in runs.plants:
         jerk = lyapunov.input_gain(find_plant(name)) * U_MAX / LAG
-        velocities = [estimator("levant", L=share * jerk) for share in SHARES]
+        velocities = [estimator("levant", L=share * jerk) for share in JERK_SHARES]
         tried = [runs.scenario(name, OURS, law=third, actuator=Lag(LAG), velocity=one) for one in velocities]
         bounds = [scores["ultimate_bound"] for scores in runs.scores(tried)]
         grid[name] = tried[bounds.index(min(bounds))]
@@ -360,8 +362,8 @@ def with_estimators(runs):
 
 # the stability analysis
 
-ON_SURFACE = 1e-6  # |s| at and below which the claim says nothing
-RISE = 1e-12  # of the run's largest V: less is rounding
+SURFACE_TOLERANCE = 1e-6  # |s| at and below which the claim says nothing
+MIN_RISE_SHARE = 1e-12  # of the run's largest V: less is rounding
 
 
 def decreases(runs):
@@ -369,9 +371,9 @@ def decreases(runs):
     share, worst = {}, {}
     for name in runs.plants:
         plant, gains = find_plant(name), runs.law(name, OURS).gains
-        x, v = lyapunov.plane(plant, gains["k1"], points=51 if runs.quick else lyapunov.POINTS)
+        x, v = lyapunov.plane(plant, gains["k1"], points=51 if runs.quick else lyapunov.GRID_POINTS)
         states = plant, gains["lam"], gains["k1"], x, v
-        rate = np.where(np.abs(lyapunov.surface(*states)) > ON_SURFACE, lyapunov.vdot(*states), -np.inf)
+        rate = np.where(np.abs(lyapunov.surface(*states)) > SURFACE_TOLERANCE, lyapunov.vdot(*states), -np.inf)
         at = np.unravel_index(np.argmax(rate), rate.shape)
         share[name], worst[name] = np.mean(rate > 0.0), (rate[at], x[at], v[at])
     names = ("largest Vdot", "largest Vdot, at x", "largest Vdot, at v")
@@ -386,7 +388,7 @@ def never_rises(runs):
         plant, gains = trace.scenario.plant, trace.scenario.law.gains
         s = trace.v + gains["k1"] * trace.x - trace.u / lyapunov.input_gain(plant)  # alpha - u / g, u of the actuator
         height = s**2 / 2.0
-        rising[plant.name] = np.mean(np.diff(height, axis=0) > RISE * height.max())
+        rising[plant.name] = np.mean(np.diff(height, axis=0) > MIN_RISE_SHARE * height.max())
     return {"fraction of samples where V rises": rising}
 
 
@@ -600,9 +602,9 @@ def fluctuation(trace):
 
 # practice: cheap tanh, saturation, exponential convergence, parameter jumps, delays
 
-NEAR, FAR = 0.01, (1.0, 2.0)  # of x0, chosen: where tanh is its argument; where the study starts, and beyond
+NEAR_FACTOR, FAR_FACTORS = 0.01, (1.0, 2.0)  # of x0, chosen: tanh is linear; the study starts, and beyond
 MIN_BOUND = 1e-9  # N m or N: an actuator's bound if lambda is 0
-SERIES, FIXED = "observer_free_series", "observer_free_q15"
+SERIES_LAW, FIXED_POINT_LAW = "observer_free_series", "observer_free_q15"
 
 
 @law_function(gains={"lam": 6.0, "k1": 2.5}, positive=("lam",))
@@ -614,12 +616,12 @@ def observer_free_series(y, gains, memory):
 
 
 # Ways to compute tanh: law's name -> its gains beside lam and k1.
-CHEAP = {
+CHEAP_TANH_GAINS = {
     "observer_free_table": {"size": 64.0},  # 65 entries
     "observer_free_taylor": {"terms": 4.0},  # to order 7, its argument reduced
-    SERIES: {},
+    SERIES_LAW: {},
     "observer_free_single": {},
-    FIXED: {},
+    FIXED_POINT_LAW: {},
 }
 
 
@@ -629,22 +631,22 @@ def cheap_tanh(runs):
     for plant in runs.plants:
         nominal = runs.scenario(plant, OURS)
         reference, *traces = runs.traces([nominal, *(replace(nominal, law=law) for law in cheap(runs, nominal.law))])
-        for name, trace in zip(CHEAP, traces, strict=True):
+        for name, trace in zip(CHEAP_TANH_GAINS, traces, strict=True):
             time, apart = math.inf if trace.failure else settling_time(trace), deviation(trace, reference)
             both = [
                 runs.check("deviation", f"{plant}, {name}: deviation, over |x0|", apart, sentence=name),
                 runs.check("settling time", f"{plant}, {name}: settling time, s", time, nominal.duration, name),
             ]
-            evidence += [Beside(one.what, one.value) for one in both] if name == FIXED else both
+            evidence += [Beside(one.what, one.value) for one in both] if name == FIXED_POINT_LAW else both
     return evidence
 
 
 def cheap(runs, exact):
-    """Yield the laws of CHEAP with lam and k1 of the exact law, or their mutants where the audit has them."""
-    for name, more in CHEAP.items():
-        template = observer_free_series if name == SERIES else catalogue()[name]
+    """Yield the laws of CHEAP_TANH_GAINS with lam and k1 of the exact law, or their mutants in this audit."""
+    for name, more in CHEAP_TANH_GAINS.items():
+        template = observer_free_series if name == SERIES_LAW else catalogue()[name]
         gains = {gain: exact.gains[gain] for gain in ("lam", "k1")} | more
-        if name == FIXED:  # a word must hold lambda: its range is the next power of 2
+        if name == FIXED_POINT_LAW:  # a word must hold lambda: its range is the next power of 2
             gains["u_range"] = max(template.defaults["u_range"], 2.0 ** math.frexp(gains["lam"])[1])
         yield runs.mutated(with_gains(template(), **gains))
 
@@ -663,9 +665,9 @@ def exponential(runs):
     apart = {}
     for plant in runs.plants:
         start = runs.scenario(plant, OURS).resolved.x0
-        away = [runs.scenario(plant, OURS, x0=tuple(factor * x for x in start)) for factor in (NEAR, *FAR)]
+        away = [runs.scenario(plant, OURS, x0=tuple(k * x for x in start)) for k in (NEAR_FACTOR, *FAR_FACTORS)]
         near, *rates = map(decay_rate, runs.traces(away))
-        for factor, rate in zip(FAR, rates, strict=True):
+        for factor, rate in zip(FAR_FACTORS, rates, strict=True):
             apart[f"{plant}, from {factor:g} x0"] = abs(ratio(rate, near) - 1.0)
     return {"decay rate apart from that near 0, share of that": apart}
 
@@ -723,21 +725,21 @@ def delay_tolerant(runs):
 # input" compares the largest |u| that the law asks for, before the actuator's bound: at a constant distance of 100 |x0|
 # against 10 |x0|, and after 2 s against 1 s; the larger growth counts. A cell holds if our mark is the paper's.
 
-COLUMNS = {"classical": CLASSICAL, "HOSMC": HOSMC, "adaptive": ADAPTIVE, "proposed": OURS}
-MARKS = {  # the paper's rows: property -> a mark a column
+TABLE_COLUMNS = {"classical": CLASSICAL, "HOSMC": HOSMC, "adaptive": ADAPTIVE, "proposed": OURS}
+TABLE_MARKS = {  # the paper's rows: property -> a mark a column
     "no chattering": "-+++",
     "observer-free": "+--+",
     "bounded input": "-+++",
     "delay-tolerant": "-+-+",
     "smoothness": "---+",
 }
-ESTIMATED = ("a", "q", "dq")  # of a Measurement: acceleration, and a joint that moves along
-OPPOSITE = {"<": ">=", "<=": ">", ">": "<="}
+ESTIMATED_FIELDS = ("a", "q", "dq")  # of a Measurement: acceleration, and a joint that moves along
+OPPOSITE_RELATIONS = {"<": ">=", "<=": ">", ">": "<="}
 # Cells that hold for any runs: of the law that is the reference, of laws without estimates, of tanh.
-CERTAIN = {(name, "classical") for name in ("no chattering", "delay-tolerant", "observer-free")}
-CERTAIN |= {("observer-free", "adaptive"), ("observer-free", "proposed"), ("bounded input", "proposed")}
+CERTAIN_CELLS = {(name, "classical") for name in ("no chattering", "delay-tolerant", "observer-free")}
+CERTAIN_CELLS |= {("observer-free", "adaptive"), ("observer-free", "proposed"), ("bounded input", "proposed")}
 HOLD_DURATION = 1.0  # s, chosen
-PROBES = 50  # chosen
+PROBE_SAMPLES = 50  # chosen
 
 
 def table_one(runs):
@@ -755,13 +757,13 @@ def table_one(runs):
     }
     evidence = []
     for name, (unit, value) in properties.items():
-        for (column, law), mark in zip(COLUMNS.items(), MARKS[name], strict=True):
-            sure = ", cannot fail" if (name, column) in CERTAIN else ""
+        for (column, law), mark in zip(TABLE_COLUMNS.items(), TABLE_MARKS[name], strict=True):
+            sure = ", cannot fail" if (name, column) in CERTAIN_CELLS else ""
             cell = f"{name}: {column}"
             what = f"{cell} (paper: {'+' if mark == '+' else '--'}), {unit}{sure}"
             plus = runs.check(name, what, value(law), sentence=cell)
             evidence.append(plus if mark == "+" else opposite(plus))
-    for column, law in COLUMNS.items():
+    for column, law in TABLE_COLUMNS.items():
         if runs.values["strict"] <= steps[law] < runs.thresholds["smoothness"].limit:
             what = f"smoothness: {column}, at a limit of {runs.values['strict']:g} the mark would be --"
             evidence.append(Beside(what, steps[law]))
@@ -770,7 +772,7 @@ def table_one(runs):
 
 def opposite(plus):
     """Return the check of a cell in which the paper has a minus."""
-    return check(plus.what, plus.value, OPPOSITE[plus.relation], plus.limit, plus.sentence)
+    return check(plus.what, plus.value, OPPOSITE_RELATIONS[plus.relation], plus.limit, plus.sentence)
 
 
 def worst_ratio(runs, law, metric, other, reference):
@@ -799,9 +801,9 @@ def growth(runs, law):
 def estimated(runs, law):
     """Return how many signals, beside position and velocity, change what a law does."""
     bound = runs.law(runs.plants[0], law)
-    x, v, other = np.random.default_rng(0).normal(size=(3, PROBES))
+    x, v, other = np.random.default_rng(0).normal(size=(3, PROBE_SAMPLES))
     plain = commanded(bound, x, v)
-    return float(sum(np.any(commanded(bound, x, v, **{name: other}) != plain) for name in ESTIMATED))
+    return float(sum(np.any(commanded(bound, x, v, **{name: other}) != plain) for name in ESTIMATED_FIELDS))
 
 
 def commanded(law, x, v=None, **signals):

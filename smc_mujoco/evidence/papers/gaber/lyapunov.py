@@ -24,8 +24,8 @@ import numpy as np
 
 from smc_mujoco.mechanisms.plant import Plant
 
-POINTS = 201  # of a grid along each axis: odd, so that it has the origin
-REACH = 2.0  # times the largest |x0|, chosen: the states from which the study starts lie well within
+GRID_POINTS = 201  # of a grid along each axis: odd, so that it has the origin
+GRID_REACH = 2.0  # times the largest |x0|, chosen: the states from which the study starts lie well within
 
 
 def surface(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -55,9 +55,9 @@ def vdot(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> n
     return s * (1.0 + lam / g * (1.0 - bend**2)) * (f - lam * g * bend + k1 * v)
 
 
-def plane(plant: Plant, k1: float, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
-    """Return a grid of states: x up to REACH times the largest |x0|, v up to k1 times that; alpha = 0 is a diagonal."""
-    reach = REACH * max(map(abs, plant.x0))
+def plane(plant: Plant, k1: float, points: int = GRID_POINTS) -> tuple[np.ndarray, np.ndarray]:
+    """Return a grid of states: x up to GRID_REACH |x0|, v up to k1 times that. A diagonal is alpha = 0."""
+    reach = GRID_REACH * max(map(abs, plant.x0))
     x = np.linspace(-reach, reach, points)
     grid = np.meshgrid(x, k1 * x)
     return grid[0], grid[1]

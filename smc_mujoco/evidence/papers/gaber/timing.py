@@ -19,8 +19,8 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.simulation import cfunctions
 
 CALLS, ROUNDS, QUICK_ROUNDS = 20_000, 60, 20
-AT = {name: i for i, name in enumerate(Measurement._fields)}
-SEEN = {"dt": 1e-3, "g": 8.0, "limit": 6.0}  # what a pendulum's sample holds besides the state; no model
+FIELD_INDEX = {name: i for i, name in enumerate(Measurement._fields)}
+FIXED_FIELDS = {"dt": 1e-3, "g": 8.0, "limit": 6.0}  # what a pendulum's sample holds besides the state; no model
 
 
 def nanoseconds(laws: Mapping[str, Component], quick: bool = False) -> dict[str, float]:
@@ -33,9 +33,9 @@ def nanoseconds(laws: Mapping[str, Component], quick: bool = False) -> dict[str,
     shortest, loop = dict.fromkeys(laws, np.inf), _loop()
     for _ in range(QUICK_ROUNDS if quick else ROUNDS):
         for name, law in laws.items():
-            seen, gains = np.zeros(len(AT)), np.array([*law.gains.values(), 0.0])
-            for field, value in SEEN.items():
-                seen[AT[field]] = value
+            seen, gains = np.zeros(len(FIELD_INDEX)), np.array([*law.gains.values(), 0.0])
+            for field, value in FIXED_FIELDS.items():
+                seen[FIELD_INDEX[field]] = value
             arrays = seen, gains, np.zeros(law.memory), np.zeros(2)
             addresses = np.array([a.ctypes.data for a in arrays])
             start = time.perf_counter()
@@ -49,7 +49,7 @@ def _loop() -> Callable:
     """Return a compiled loop that calls a law once per state."""
     from numba import njit
 
-    e, de = AT["e"], AT["de"]
+    e, de = FIELD_INDEX["e"], FIELD_INDEX["de"]
 
     @njit
     def loop(function, seen, states, addresses):
@@ -57,5 +57,5 @@ def _loop() -> Callable:
             seen[e], seen[de] = states[k, 0], states[k, 1]
             call(function, addresses[0], addresses[1], addresses[2], addresses[3])
 
-    loop(0, np.zeros(len(AT)), np.zeros((0, 2)), np.zeros(4, np.int64))  # compiles, and calls nothing
+    loop(0, np.zeros(len(FIELD_INDEX)), np.zeros((0, 2)), np.zeros(4, np.int64))  # compiles, and calls nothing
     return loop

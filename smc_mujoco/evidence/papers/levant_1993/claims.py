@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from smc_mujoco.evidence.papers.measures import LATE, exponent, late, late_step, settled
+from smc_mujoco.evidence.papers.measures import END_SAMPLES, exponent, late, late_step, settled
 
 FORCE = 2.0  # N: d, and what the plants add to it within 0.6 of the origin
 SLOPE = 6.0  # N/s, of that
@@ -31,7 +31,7 @@ def sweep(runs):
     plants, starts = (runs.plants[:1], starts[:1]) if runs.quick else (runs.plants, starts)
     scenarios = [
         runs.scenario(
-            plant, law, condition, x0=x0, control_period=period, duration=runs.values["settled"] + LATE * period
+            plant, law, condition, x0=x0, control_period=period, duration=runs.values["settled"] + END_SAMPLES * period
         )
         for plant in plants
         for period in periods

@@ -3,9 +3,9 @@
 import numpy as np
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.papers.measures import LATE, exponent, late, settled
+from smc_mujoco.evidence.papers.measures import END_SAMPLES, exponent, late, settled
 
-END = 0.1  # share of a run that counts as its end
+END_SHARE = 0.1  # share of a run that counts as its end
 
 
 def precision(runs):
@@ -13,7 +13,7 @@ def precision(runs):
     (plant,), (law,), (condition,), values = runs.plants, runs.laws, runs.conditions, runs.values
     traces = runs.traces(
         runs.scenario(
-            plant, law, condition, x0=x0, control_period=h, physics_step=h, duration=values["settled"] + LATE * h
+            plant, law, condition, x0=x0, control_period=h, physics_step=h, duration=values["settled"] + END_SAMPLES * h
         )
         for h in values["periods"]
         for x0 in values["starts"][: 1 if runs.quick else None]
@@ -37,7 +37,7 @@ def noise(runs):
             x0=0.02,
             control_period=h,
             physics_step=h,
-            duration=values["settled"] + LATE * h,
+            duration=values["settled"] + END_SAMPLES * h,
             noise=smc.Noise(position=size),
             seed=seed,
         )
@@ -61,7 +61,7 @@ def finite_time(runs):
 
 def end(trace):
     """Return the largest |x| at the end of a run; inf if it failed."""
-    value = float(np.abs(trace.x[-int(END * len(trace.x)) :]).max())
+    value = float(np.abs(trace.x[-int(END_SHARE * len(trace.x)) :]).max())
     return value if np.isfinite(value) else float("inf")
 
 
@@ -76,7 +76,7 @@ def standard_chatters(runs):
     """Largest step of u of the last tenth of 12 s over 2 k, and half the range of the force behind the lag over k."""
     steps, forces = {}, {}
     for (plant, *_), trace in runs.traced(runs.grid()).items():
-        last, k = slice(-int(END * len(trace.t)), -1), trace.scenario.law.gains["k"]
+        last, k = slice(-int(END_SHARE * len(trace.t)), -1), trace.scenario.law.gains["k"]
         steps[plant] = float(np.abs(np.diff(trace.u[last], axis=0)).max()) / (2.0 * k)
         forces[plant] = float(np.ptp(trace.force[last])) / (2.0 * k)
     return {"largest step of u / 2 k": steps, "amplitude of the force / k": forces}

@@ -5,13 +5,13 @@ import numpy as np
 import smc_mujoco as smc
 from smc_mujoco.evidence.papers.measures import settled
 
-JUMP = 1.9  # h (k_max + D) / eps: at 2 a step from one end of the set reaches the other
-PERIOD, FORCE = 5e-4, 13.0  # s, of a quick audit; N, the largest d with what a spring adds
+MAX_STEP_RATIO = 1.9  # h (k_max + D) / eps: at 2 a step from one end of the set reaches the other
+QUICK_PERIOD, FORCE = 5e-4, 13.0  # s, of a quick audit; N, the largest d with what a spring adds
 
 
 def margins(gains):
     """What the sampling leaves of the largest disturbance, N: 2 sqrt(eps/h) - 1 - D."""
-    return {"D < 2 sqrt(eps/h) - 1, N": 2.0 * (gains["eps"] / PERIOD) ** 0.5 - 1.0 - FORCE}
+    return {"D < 2 sqrt(eps/h) - 1, N": 2.0 * (gains["eps"] / QUICK_PERIOD) ** 0.5 - 1.0 - FORCE}
 
 
 def sampled(runs):
@@ -42,7 +42,7 @@ def limit(runs):
         grid = {}
         for h in periods:
             size = share * (2.0 * (eps / h) ** 0.5 - 1.0)
-            adapted, d = runs.law(plant, law, k_max=JUMP * eps / h - size), smc.Sine(size, 2.0)
+            adapted, d = runs.law(plant, law, k_max=MAX_STEP_RATIO * eps / h - size), smc.Sine(size, 2.0)
             name = f"{1e3 * h:g} ms, D = {size:.3g} N"
             grid[name] = runs.scenario(plant, law, law=adapted, control_period=h, disturbance=d)
         shares = {name: half(trace.s) / eps for name, trace in runs.traced(grid).items()}

@@ -7,10 +7,10 @@ import numpy as np
 import smc_mujoco as smc
 from smc_mujoco.evidence.papers.measures import cycle, exponent
 
-HALF = 2.0 * math.gamma(1.25) / (math.sqrt(math.pi) * math.gamma(1.75))  # c: first harmonic of [sin]^(1/2)
-MARGIN = 1.1  # M over the bound of the disturbance
-FINE = 50  # samples in the ATC
-QUICK = 1  # the shortest ATCs that a quick audit leaves out
+FIRST_HARMONIC = 2.0 * math.gamma(1.25) / (math.sqrt(math.pi) * math.gamma(1.75))  # c, of [sin]^(1/2)
+RELAY_GAIN_RATIO = 1.1  # M over the bound of the disturbance
+SAMPLES_PER_ATC = 50  # samples in the ATC
+QUICK_LAG = 1  # index of the first ATC of a quick audit
 
 
 def super_twisting_margins(gains):
@@ -21,7 +21,7 @@ def super_twisting_margins(gains):
 def behind(runs, law, lag, **changes):
     """Return the scenario of a law behind two lags, long enough for its cycle."""
     (plant,) = runs.plants
-    fields = {"duration": 2.0 + 60.0 * lag, "control_period": lag / FINE}
+    fields = {"duration": 2.0 + 60.0 * lag, "control_period": lag / SAMPLES_PER_ATC}
     return runs.scenario(plant, law.name, law=law, actuator=(smc.Lag(lag), smc.Lag(lag)), **(fields | changes))
 
 
@@ -33,18 +33,18 @@ def super_twisting(runs, slope):
 
 def relay(runs, bound):
     """Return the classical law for |d| <= bound."""
-    return runs.law(runs.plants[0], "classical", k=MARGIN * bound)
+    return runs.law(runs.plants[0], "classical", k=RELAY_GAIN_RATIO * bound)
 
 
 def predicted(k1, k2, lag):
     """Return amplitude and frequency, Hz, of super-twisting by harmonic balance."""
-    a, b = HALF * k1, 16.0 * k2 / math.pi
+    a, b = FIRST_HARMONIC * k1, 16.0 * k2 / math.pi
     return lag**2 * (a * a + b) ** 2 / (4.0 * a * a), a / (lag * math.sqrt(a * a + b)) / math.tau
 
 
 def compared(runs, law, expected):
     """Return measured amplitude and frequency over those expected of a lag, and the exponent of the amplitude."""
-    lags = runs.values["lags"][QUICK if runs.quick else 0 :]
+    lags = runs.values["lags"][QUICK_LAG if runs.quick else 0 :]
     cycles = {lag: cycle(trace) for lag, trace in runs.traced({lag: behind(runs, law, lag) for lag in lags}).items()}
     return {
         "amplitude / predicted": {f"{1e3 * lag:g} ms": a / expected(lag)[0] for lag, (a, _) in cycles.items()},
@@ -79,7 +79,7 @@ def some_disturbance(runs):
     STA has the gains for L = D omega, as its theory asks for; bounds D of 0.5 and 2, ATCs of 1 and 10 ms.
     """
     cases = [
-        (bound, lag) for bound in runs.values["bounds"] for lag in runs.values["lags"][QUICK if runs.quick else 0 :]
+        (bound, lag) for bound in runs.values["bounds"] for lag in runs.values["lags"][QUICK_LAG if runs.quick else 0 :]
     ]
     scenarios = []
     for bound, lag in cases:
@@ -98,7 +98,7 @@ def some_disturbance(runs):
 
 def small_lags(runs):
     """Half the range of s, and the mean square of s', under d = sin t, L = 1, at ATCs of 1 to 10 ms."""
-    bound, lags = runs.values["bound"], runs.values["lags"][QUICK if runs.quick else 0 :]
+    bound, lags = runs.values["bound"], runs.values["lags"][QUICK_LAG if runs.quick else 0 :]
     d = smc.Sine(bound, 1.0)
     laws = (super_twisting(runs, bound), relay(runs, bound))
     scenarios = [behind(runs, law, lag, disturbance=d, duration=8.0) for lag in lags for law in laws]
@@ -114,7 +114,7 @@ def crossover(runs):
     """Amplitudes of s at the ATC where the two predictions are equal, at half and at twice of it, without d."""
     bound, slope = runs.values["bound"], runs.values["slope"]
     twisting, sign = super_twisting(runs, slope), relay(runs, bound)
-    equal = (2.0 * MARGIN * bound / math.pi) / predicted(1.5 * math.sqrt(slope), 1.1 * slope, 1.0)[0]
+    equal = (2.0 * RELAY_GAIN_RATIO * bound / math.pi) / predicted(1.5 * math.sqrt(slope), 1.1 * slope, 1.0)[0]
     lags = [equal, equal / 2.0, equal * 2.0]
     scenarios = [behind(runs, law, lag, duration=2.0 + 150.0 * lag) for lag in lags for law in (twisting, sign)]
     amplitudes = [cycle(trace)[0] for trace in runs.traces(scenarios)]
@@ -128,7 +128,7 @@ def crossover(runs):
 def redesigned(runs):
     """Amplitude of s at k1 = sqrt(16 k2 / pi) / c, and at half and twice of that, at an ATC of 5 ms."""
     k2 = runs.values["k2"]
-    best = math.sqrt(16.0 * k2 / math.pi) / HALF
+    best = math.sqrt(16.0 * k2 / math.pi) / FIRST_HARMONIC
     laws = [runs.law(runs.plants[0], "super_twisting", k1=factor * best, k2=k2) for factor in (1.0, 0.5, 2.0)]
     scenarios = [behind(runs, law, runs.values["lag"]) for law in laws]
     as_designed, half, twice = (cycle(trace)[0] for trace in runs.traces(scenarios))

@@ -8,8 +8,8 @@ import numpy as np
 import smc_mujoco as smc
 
 L = 1.0  # N/s, bound on the slope of d
-LARGEST = 1.0  # N, of |d|
-RISE = 40  # periods of the triangle before its slope flips
+MAX_DISTURBANCE = 1.0  # N, of |d|
+TRIANGLE_PERIODS = 40  # periods of the triangle before its slope flips
 
 
 def margins(gains):
@@ -22,15 +22,15 @@ def slopes(period, duration, seed):
     count = round(duration / period)
     values, steps = [0.0], np.random.default_rng(seed).choice((-1.0, 1.0), count) * L * period
     for step in steps:
-        values.append(values[-1] + (step if abs(values[-1] + step) <= LARGEST else -step))
+        values.append(values[-1] + (step if abs(values[-1] + step) <= MAX_DISTURBANCE else -step))
     return smc.TimeSeries((np.arange(count + 1) * period).tolist(), values)
 
 
 def flip(period, sign):
-    """Return a triangle of slopes L and -L, of mean 0 over every period, that goes on with one slope after RISE."""
-    corners = sign * 0.5 * L * period * (-1.0) ** np.arange(RISE + 1)  # the last one is sign L T / 2
+    """Return a triangle of slopes L and -L with mean 0 over a period, that keeps one slope after TRIANGLE_PERIODS."""
+    corners = sign * 0.5 * L * period * (-1.0) ** np.arange(TRIANGLE_PERIODS + 1)  # the last one is sign L T / 2
     last = corners[-1] + sign * L * period
-    return smc.TimeSeries((np.arange(RISE + 2) * period).tolist(), [*corners.tolist(), last])
+    return smc.TimeSeries((np.arange(TRIANGLE_PERIODS + 2) * period).tolist(), [*corners.tolist(), last])
 
 
 def late(trace):
@@ -62,7 +62,7 @@ def flipped(runs, law, condition, sign):
     """Return the scenario of a law under a triangle whose slope goes on, from rest."""
     (period,) = {runs.scenario(runs.plant, law, condition).control_period}
     return runs.scenario(
-        runs.plant, law, condition, duration=(RISE + 1) * period, v0=0.0, disturbance=flip(period, sign)
+        runs.plant, law, condition, duration=(TRIANGLE_PERIODS + 1) * period, v0=0.0, disturbance=flip(period, sign)
     )
 
 

@@ -8,7 +8,7 @@ from smc_mujoco.control.laws.adaptive_super_twisting import adaptive_super_twist
 from smc_mujoco.evidence.papers.measures import exponent, settled
 
 adapted = njit(adaptive_super_twisting.function)
-LAYERS = 5.0  # layers mu that count as the order of mu
+BAND_IN_LAYERS = 5.0  # layers mu that count as the order of mu
 
 
 @law_function(
@@ -42,7 +42,7 @@ def established(runs):
     (plant,), (law,), (condition,), starts = runs.plants, runs.laws, runs.conditions, runs.values["starts"]
     grid = {f"from {start:g} m/s": runs.scenario(plant, law, condition, v0=start) for start in starts}
     times = {
-        name: settled(trace, trace.v, LAYERS * trace.scenario.law.gains["mu"])
+        name: settled(trace, trace.v, BAND_IN_LAYERS * trace.scenario.law.gains["mu"])
         for name, trace in runs.traced(grid).items()
     }
     return {"time from which |s| <= 5 mu, s": times}
