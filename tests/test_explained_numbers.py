@@ -140,7 +140,11 @@ SAID = {
 }
 
 
-@pytest.mark.parametrize("place", SAID, ids=lambda place: getattr(place, "__name__", str(place).split("/")[-1])[-30:])
+def named(place) -> str:
+    return place.name if isinstance(place, Path) else getattr(place, "fget", place).__name__[-30:]
+
+
+@pytest.mark.parametrize("place", SAID, ids=named)
 def test_an_explanation_has_the_numbers_of_the_code(place):
     text = place.read_text(encoding="utf-8") if isinstance(place, Path) else inspect.getdoc(place) or ""
     text = " ".join(text.split())
