@@ -52,7 +52,7 @@ class Added(Generic[T_co]):
     """An entry of another package, which is loaded at its first use.
 
     Attributes:
-      make: returns the entry from its entry point, and raises any exception.
+      make: returns the entry from its entry point, and may raise any exception.
     """
 
     point: EntryPoint
@@ -118,12 +118,13 @@ class Catalogue(Mapping[str, T_co]):
 
     def __getitem__(self, name: str) -> T_co:
         if name in self.own:
-            for one in self.added.get(name, ()):
-                warn(f"{one} has the name of an entry of the library, which is used instead: give it another name")
+            for entry in self.added.get(name, ()):
+                warn(f"{entry} has the name of an entry of the library, which is used instead: give it another name")
             return self.own[name]
         first, *others = self.added[name]
         if others:
-            kind, packages = KINDS[first.point.group][0], " and ".join(repr(one.package) for one in (first, *others))
+            kind = KINDS[first.point.group][0]
+            packages = " and ".join(repr(entry.package) for entry in (first, *others))
             raise ScenarioError(f"{kind} {name!r} is in the packages {packages}: uninstall one of them, or rename it")
         return first.value
 
@@ -168,7 +169,7 @@ class Catalogue(Mapping[str, T_co]):
 
     def taken(self, name: str) -> bool:
         """Return whether an entry has this name. An entry whose module is being imported does not count."""
-        return name in self.own or any(not _being_imported(one.point.module) for one in self.added.get(name, ()))
+        return name in self.own or any(not _being_imported(entry.point.module) for entry in self.added.get(name, ()))
 
     def package(self, name: str) -> str:
         """Return the name of the package that an entry is from, or "" if it is the library's."""
@@ -195,8 +196,8 @@ def imported(kind: type[T], fits: Callable[[T], bool]) -> Callable[[EntryPoint],
         entry = point.load()
         if not isinstance(entry, kind) or not fits(entry):
             raise ScenarioError(f"it is {shown(entry)}: give {KINDS[point.group][1]}")
-        if (own := NAME(entry)) != point.name:
-            raise ScenarioError(f"its own name is {own!r}: give the entry point the same name")
+        if (its_name := NAME(entry)) != point.name:
+            raise ScenarioError(f"its own name is {its_name!r}: give the entry point the same name")
         return entry
 
     return make
@@ -210,11 +211,11 @@ def source(point: EntryPoint) -> ModuleSpec:
     """
     if point.attr:
         raise ScenarioError(f"it is {point.attr!r} in a module: give {KINDS[point.group][1]}")
-    if (found := importlib.util.find_spec(point.module)) is None:
+    if (spec := importlib.util.find_spec(point.module)) is None:
         raise ScenarioError(f"there is no module {point.module}: fix, update or uninstall that package")
-    if (own := point.module.rpartition(".")[2]) != point.name:
-        raise ScenarioError(f"its own name is {own!r}: give the entry point the same name")
-    return found
+    if (its_name := point.module.rpartition(".")[2]) != point.name:
+        raise ScenarioError(f"its own name is {its_name!r}: give the entry point the same name")
+    return spec
 
 
 @functools.cache
@@ -222,7 +223,7 @@ def _points() -> dict[str, list[EntryPoint]]:
     """Return group -> the entry points of all installed packages. It reads their metadata, and imports nothing."""
     known = importlib.metadata.entry_points()
     groups = [group for group in known.groups if group.startswith(PREFIX)]
-    return {group: sorted(known.select(group=group), key=lambda one: (one.name, one.value)) for group in groups}
+    return {group: sorted(known.select(group=group), key=lambda point: (point.name, point.value)) for group in groups}
 
 
 def points(group: str) -> list[EntryPoint]:

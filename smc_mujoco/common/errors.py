@@ -59,7 +59,7 @@ def _brief(value: object) -> str:
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
     """Return the error for a name that is not in `known`. It suggests the nearest name, or lists all."""
-    names = sorted(known, key=lambda one: (int(one) if one.isdecimal() else -1, one))  # claims have numbers
+    names = sorted(known, key=lambda text: (int(text) if text.isdecimal() else -1, text))  # claims have numbers
     near = _nearest(name, names) if isinstance(name, str) else []
     listed = one_line(", ".join(names), MAX_LISTED)
     hint = (
@@ -76,8 +76,8 @@ def _nearest(name: str, names: list[str]) -> list[str]:
     """Return the names that an abbreviation may mean, else the nearest in spelling, else the first that contains it."""
     plain = {known.casefold(): known for known in names}
     wanted = name.casefold()
-    if name.isupper() and (found := [known for known in names if _abbreviates(wanted, known.split("_"))]):
-        return found
+    if name.isupper() and (abbreviated := [known for known in names if _abbreviates(wanted, known.split("_"))]):
+        return abbreviated
     close = difflib.get_close_matches(wanted, list(plain), n=1)
     return [plain[near] for near in close or [known for known in plain if wanted and wanted in known]][:1]
 
@@ -145,8 +145,8 @@ def _real(value: Any) -> Any:
     """Return a real number, also from an array without axes; None for all else, also for flags and durations."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
-    number = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_ | np.timedelta64)
-    return value if number else None
+    is_real = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_ | np.timedelta64)
+    return value if is_real else None
 
 
 def taken(what: str, values: Iterable[T]) -> list[T]:

@@ -58,7 +58,7 @@ def ended(path: str | os.PathLike[str], ending: str) -> Path:
 
 def writable(*paths: str | os.PathLike[str] | None) -> None:
     """Raise ScenarioError for a file that cannot be written. Call it before a computation that takes minutes."""
-    for path in (Path(one) for one in paths if one is not None):
+    for path in (Path(given) for given in paths if given is not None):
         if os.path.isdir(path):  # unlike Path.is_dir, False also for a name that is too long
             raise ScenarioError(f"cannot write {path}: it is a folder, give the file in it a name")
         with _writing(path), tempfile.TemporaryFile(dir=path.parent), contextlib.suppress(FileNotFoundError):
@@ -163,7 +163,7 @@ def csv_rows(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
 
     Where the first line has semicolons, they separate the cells, and a comma in a cell is a decimal point.
     """
-    with reading(path, "CSV file", "give one of cells between commas or semicolons, a CSV file") as file:
+    with reading(path, "CSV file", "give a CSV file, with commas or semicolons between cells") as file:
         with file.open(newline="", encoding="utf-8-sig") as text:
             semicolons = ";" in re.sub('"[^"]*"', "", text.readline())
             text.seek(0)

@@ -110,7 +110,7 @@ def now(thing: Any) -> str:
 
 
 def variables(function: Any) -> dict[str, str]:
-    """Return name -> hash of each variable outside a function that it reads; {} for machine code."""
+    """Return name -> hash of each variable that a function reads from outside itself; {} for machine code."""
     function = _as_written(function)
     if not isinstance(function, FunctionType):
         return {}
@@ -216,8 +216,8 @@ def _reached(space: Mapping[str, Any], names: set[str], attributes: set[str], kn
     for name in sorted(names & space.keys()):
         value = space[name]
         parts += [name, value]
-        own = isinstance(value, ModuleType) and value.__name__.split(".")[0] not in VERSIONED
-        if own and id(value) not in known:
+        unversioned = isinstance(value, ModuleType) and value.__name__.split(".")[0] not in VERSIONED
+        if unversioned and id(value) not in known:
             known.add(id(value))
             parts += _reached(vars(value), attributes, attributes, known)
     return parts

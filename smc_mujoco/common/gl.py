@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 OFF_VALUES = ("disable", "disabled", "off", "false", "0")  # values of MUJOCO_GL that turn rendering off
 DISPLAY_VALUES = ("enable", "enabled", "on", "true", "1", "glfw", "glx")  # values for a backend that needs a display
-LIBRARIES = {  # backend -> groups of libraries, of each of which mujoco loads one
+LIBRARIES = {  # backend -> groups of libraries; mujoco loads one of each group
     "egl": (("libEGL.so.1",), ("libOpenGL.so.0", "libGL.so.1", "libGLESv2.so.2", "libGLESv1_CM.so.1")),
     "osmesa": (("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"),),
 }
@@ -108,17 +108,17 @@ def missing() -> str | None:
     chosen = choice()
     if chosen.wish in OFF_VALUES:
         return f"no film: MUJOCO_GL={chosen.wish} turns rendering off: unset it"
-    found = f" (and MUJOCO_GL={chosen.wish} cannot be used)" if note() else ""
+    unusable = f" (and MUJOCO_GL={chosen.wish} cannot be used)" if note() else ""
     if chosen.backend in OFF_VALUES:
         platform = os.environ.get("PYOPENGL_PLATFORM")
         if platform:
-            return f"no film: PYOPENGL_PLATFORM={platform} rules out what is installed{found}: unset it"
-        return f"no film: neither libEGL with libGL nor libOSMesa is here{found}: {CURE}"
+            return f"no film: PYOPENGL_PLATFORM={platform} rules out what is installed{unusable}: unset it"
+        return f"no film: neither libEGL with libGL nor libOSMesa is here{unusable}: {CURE}"
     error = probe(chosen.backend)
     if error is None:
         return None
     if chosen.backend in LIBRARIES:
-        return f"no film: {chosen.backend} does not render{found} ({error}): {CURE}"
+        return f"no film: {chosen.backend} does not render{unusable} ({error}): {CURE}"
     cure = "set MUJOCO_GL=egl" if sys.platform == "linux" else "unset MUJOCO_GL"
     return f"no film: MuJoCo cannot open a window to render in ({error}): {cure}"
 
@@ -166,19 +166,19 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
     if sys.platform != "linux":
         return mujoco.Renderer(model, height, width)
     backend = choice().backend
-    theirs = sys.modules[mujoco.Renderer.__module__].gl_context
+    module = sys.modules[mujoco.Renderer.__module__].gl_context
     with _LOCK:
-        before = getattr(theirs, "GLContext", None)  # absent if MUJOCO_GL turned rendering off
+        before = getattr(module, "GLContext", None)  # absent if MUJOCO_GL turned rendering off
         try:
-            theirs.GLContext = importlib.import_module(
+            module.GLContext = importlib.import_module(
                 f"mujoco.{backend if backend in LIBRARIES else 'glfw'}"
             ).GLContext
             made = mujoco.Renderer(model, height, width)
         finally:
             if before is not None:
-                theirs.GLContext = before
-            elif hasattr(theirs, "GLContext"):
-                del theirs.GLContext
+                module.GLContext = before
+            elif hasattr(module, "GLContext"):
+                del module.GLContext
     _RENDERERS.add(made)
     atexit.unregister(_close_all)
     atexit.register(_close_all)  # registered after MuJoCo's function that ends EGL, so that it runs before that one

@@ -20,7 +20,7 @@ from typing import Any
 MAX_MEMORY = 4 * 2**30  # bytes that a trial may have: chosen
 MAX_FILE = 10**9  # bytes of a file that a trial writes: chosen
 MAX_PROGRESS = 10**7  # bytes of a report: chosen
-BLOCK_SIZE = 2**16  # bytes, as many as a file system gives a file at once, or more
+BLOCK_SIZE = 2**16  # bytes; no file system gives a file more at once
 FAULT, END = "Fault", "unloading"  # a line that begins so names a fault; the last line of a trial that passes
 ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps), by which other simulations compute too"
 # Signal -> its usual cause. The causes of other signals are reads, writes and divisions.
@@ -61,9 +61,9 @@ def tried(module: str, order: Mapping[str, Any], timeout: float) -> Any:
     from smc_mujoco.common import files, process
 
     with files.scratch() as folder:
-        words = {"module": module, "order": order, "path": [os.path.abspath(place) for place in sys.path]}
+        task = {"module": module, "order": order, "path": [os.path.abspath(place) for place in sys.path]}
         with files.no_room():
-            (folder / "order").write_text(json.dumps(words), encoding="utf-8")
+            (folder / "order").write_text(json.dumps(task), encoding="utf-8")
         try:
             code = process.timed([sys.executable, "-P", __file__, str(folder)], timeout, output=False).returncode
         except process.TimedOut:
@@ -118,16 +118,16 @@ class Arithmetic:
 
 
 def computed(numbers: Any) -> tuple[float, ...]:
-    """Return results that differ between the directions of rounding, and where small numbers are flushed to 0.
+    """Return results that differ between the directions of rounding, and where subnormal numbers are flushed to 0.
 
-    The nearest number to 1/3 is below it, and that to 1/10 above. None is small itself: where small numbers are read
-    as 0, they equal it.
+    The float64 nearest to 1/3 is below it, and that to 1/10 above. No result is subnormal itself, because a thread
+    that reads subnormal numbers as 0 would take it for 0.
 
     Args:
       numbers: those of Arithmetic, in memory, so that no compiler computes with them beforehand.
     """
-    three, ten, least, big = numbers[0], numbers[1], numbers[2], numbers[3]
-    return 1.0 / three, 1.0 / ten, least / ten * big
+    three, ten, tiny, big = numbers[0], numbers[1], numbers[2], numbers[3]
+    return 1.0 / three, 1.0 / ten, tiny / ten * big
 
 
 # the process of a trial

@@ -91,10 +91,10 @@ def panel(t: np.ndarray, curves: Sequence[np.ndarray], heading: str, reference: 
       heading: the quantity with its unit.
       reference: (K,), drawn dashed; None for none.
     """
-    every = [curve for curve in (*curves, *([] if reference is None else [reference])) if np.isfinite(curve).any()]
-    if not every or len(t) < 2:
+    drawn = [curve for curve in (*curves, *([] if reference is None else [reference])) if np.isfinite(curve).any()]
+    if not drawn or len(t) < 2:
         return Html("")
-    low, high = min(float(np.nanmin(c)) for c in every), max(float(np.nanmax(c)) for c in every)
+    low, high = min(float(np.nanmin(c)) for c in drawn), max(float(np.nanmax(c)) for c in drawn)
     span = (high - low) or abs(high) or 1.0
     left, right, top, bottom = _MARGINS
     x = left + (t - t[0]) / (t[-1] - t[0]) * (WIDTH - left - right)
@@ -106,7 +106,7 @@ def panel(t: np.ndarray, curves: Sequence[np.ndarray], heading: str, reference: 
         lines += _lines(x, y, 'stroke-width="1" stroke-dasharray="4 3" opacity="0.6"')
     end = HEIGHT - bottom
     letters = 'fill="currentColor" font-size="10" font-family="sans-serif"'
-    words = [
+    labels = [
         f'<text x="{left}" y="11" {letters} font-weight="bold">{text(heading)}</text>',
         f'<text x="{left - 4}" y="{top + 8}" {letters} text-anchor="end">{high:.3g}</text>',
         f'<text x="{left - 4}" y="{end}" {letters} text-anchor="end">{low:.3g}</text>'
@@ -118,7 +118,7 @@ def panel(t: np.ndarray, curves: Sequence[np.ndarray], heading: str, reference: 
     axes = f'<path d="M{left} {top}V{end}H{WIDTH - right}" fill="none" stroke="currentColor" opacity="0.4"/>'
     return Html(
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" '
-        f'role="img"><title>{text(heading)}</title>{axes}{"".join(lines)}{"".join(words)}</svg>'
+        f'role="img"><title>{text(heading)}</title>{axes}{"".join(lines)}{"".join(labels)}</svg>'
     )
 
 

@@ -85,7 +85,7 @@ class Numbers:
             finally:
                 FunctionIdentity._unique_ids = theirs
 
-    def missing(self, symbol: str) -> bool:
+    def foreign(self, symbol: str) -> bool:
         """Return whether a symbol has a number that is not of this count."""
         return any(int(number) < self.FIRST for number in re.findall(r"B\d+v(\d+)", symbol))
 
@@ -257,8 +257,8 @@ def _complete(library: CPUCodeLibrary) -> bool:
     one of numba's own numbers.
     """
     module = library._final_module
-    linked = any(one.name.startswith(RuntimeLinker.PREFIX) for one in module.global_variables)
-    return not linked and not any(NUMBERS.missing(one.name) for one in module.functions if not one.is_declaration)
+    linked = any(variable.name.startswith(RuntimeLinker.PREFIX) for variable in module.global_variables)
+    return not linked and not any(NUMBERS.foreign(f.name) for f in module.functions if not f.is_declaration)
 
 
 class Sealed(IndexDataCacheFile):

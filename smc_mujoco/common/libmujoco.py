@@ -16,10 +16,10 @@ def path() -> Path:
       ScenarioError: it is not in the folder of the package mujoco.
     """
     folder = Path(mujoco.__file__).parent
-    names = [path for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll") for path in folder.glob(pattern)]
-    if not names:
+    files = [path for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll") for path in folder.glob(pattern)]
+    if not files:
         raise ScenarioError(f"no MuJoCo library in {folder}: reinstall mujoco")
-    return names[0]
+    return files[0]
 
 
 def plugins() -> list[Path]:

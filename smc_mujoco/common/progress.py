@@ -29,11 +29,11 @@ class Bar:
 
 @contextlib.contextmanager
 def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool = False) -> Iterator[Bar]:
-    """Show a bar while the block lasts; where stderr is no terminal, such as a file, a line each ten seconds.
+    """Show a bar while the block lasts. If stderr is no terminal, print a line each ten seconds instead.
 
     Args:
       what: the text beside it.
-      whole: the work; None if `reached` sets it.
+      whole: the whole work; None if `reached` sets it.
       shown: False for a Bar that shows nothing.
       counted: whether to show "3/60" instead of a percentage.
     """
@@ -158,7 +158,7 @@ def summed(report: Report, done: float, whole: float) -> Callable[[float], None]
 
 
 class Counter:
-    """Count of a study's simulated steps. Its text, beside a bar, has the same in runs, and the runs a second."""
+    """Count of a study's simulated steps. Its text, shown beside a bar, has the runs done and the runs a second."""
 
     def __init__(self, runs: int, steps: int, bar: Bar):
         self.total, self.all_steps, self.bar = runs, steps, bar

@@ -54,8 +54,8 @@ def _rebuild(function: Any, finish: Callable, copies: dict) -> Any:
 def _swapped(value: Any, names: Names, finish: Callable, copies: dict) -> Any:
     """Return what replaces a value in a copy.
 
-    That is a copy of a compiled function, a copy of a module in which compiled functions with these attributes' names
-    are copied, or else the value itself.
+    For a compiled function it is its copy; for a module, a copy of it with copies of the compiled functions among the
+    attributes in `names`; else the value itself.
     """
     if isinstance(value, Dispatcher):
         return _rebuild(value.py_func, finish, copies)

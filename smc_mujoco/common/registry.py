@@ -29,7 +29,7 @@ def catalogue_of(
     """Return the objects of a kind in a package's modules, and those of other packages in a group of entry points.
 
     Args:
-      package: in which this package's own objects are, such as "smc_mujoco.control.laws".
+      package: whose modules define the library's objects, such as "smc_mujoco.control.laws".
       kind: their class.
       group: of the entry points of other packages, such as "smc_mujoco.laws".
       fits: what else must hold for an object of another package.
@@ -38,7 +38,7 @@ def catalogue_of(
 
 
 def subclasses(base: type[T]) -> list[type[T]]:
-    """Return every class derived from a base, also users' own. A class comes before those derived from it."""
+    """Return every class derived from a base, users' too. A class comes before those derived from it."""
     below = base.__subclasses__()
     for kind in below:
         below.extend(kind.__subclasses__())

@@ -12,10 +12,9 @@ from smc_mujoco.common.files import reading
 def execute(path: Path) -> dict:
     """Return what a user's script defines. It can import modules beside it.
 
-    Any other exception of the script is passed on as it is.
-
     Raises:
-      ScenarioError: the file is no Python, or the script raises one. It says where.
+      ScenarioError: the file is no Python, or the script raises a ScenarioError. The message says where.
+      Exception: any other one that the script raises, as it is.
     """
     with reading(path, "Python file", "fix it") as file:
         compile(file.read_bytes(), str(path), "exec", dont_inherit=True)

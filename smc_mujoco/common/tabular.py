@@ -44,7 +44,7 @@ class Cell(NamedTuple):
       text: the first line.
       below: further lines.
       strong: whether it is marked: bold, and with a star where letters have no weight.
-      colour: of the text in a terminal, as rich names it; "" for its own.
+      colour: of the text in a terminal, as rich names it; "" for the default.
       alarm: a last line, such as how many runs failed.
     """
 
@@ -105,10 +105,10 @@ class Tabular:
         numbers = range(self.left, len(self.headings))
         columns, narrow = [self._column(i) for i in numbers], [self._column(i, narrow=True) for i in numbers]
         while sum(_widest(column) + 1 for column in [*names, *columns]) - 1 > width:
-            gains = [_widest(wide) - _widest(other) for wide, other in zip(columns, narrow, strict=True)]
-            if max(gains, default=0) <= 0:
+            savings = [_widest(wide) - _widest(other) for wide, other in zip(columns, narrow, strict=True)]
+            if max(savings, default=0) <= 0:
                 break
-            at = gains.index(max(gains))
+            at = savings.index(max(savings))
             columns[at] = narrow[at]
         return [*names, *columns]
 
@@ -187,7 +187,7 @@ class Tables:
         return "<br>".join(table._repr_html_() for table in self.tables)
 
     def to_latex(self) -> str:
-        """Return a LaTeX tabular for each table, below comments that say what it is of; needs booktabs."""
+        """Return a LaTeX tabular for each table, below comments that say what it shows; needs booktabs."""
         return "\n".join(table.to_latex() for table in self.tables if table.rows)
 
 
@@ -227,8 +227,8 @@ def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
     """Return the columns of each part of a table that fits into a width; each part begins with the names."""
     left = list(range(names))
     parts = [left]
-    for i, own in enumerate(widths[names:], names):
-        if len(parts[-1]) > names and sum(widths[k] + 1 for k in parts[-1]) + own > width:
+    for i, column_width in enumerate(widths[names:], names):
+        if len(parts[-1]) > names and sum(widths[k] + 1 for k in parts[-1]) + column_width > width:
             parts.append(left)
         parts[-1] = [*parts[-1], i]
     return parts
@@ -253,7 +253,7 @@ def _tex_cell(cell: Cell) -> str:
 
 
 def tex(text: str) -> str:
-    """Return text with LaTeX's own characters escaped, and powers, Greek letters and dashes as LaTeX writes them."""
+    """Return text with LaTeX's special characters escaped, and powers, Greek letters and dashes in its notation."""
     return re.sub(
-        r"\^(-?\d+)|(.)", lambda found: TEX.get(found[2], found[2]) if found[2] else f"$^{{{found[1]}}}$", text
+        r"\^(-?\d+)|(.)", lambda match: TEX.get(match[2], match[2]) if match[2] else f"$^{{{match[1]}}}$", text
     )

@@ -28,28 +28,28 @@ from smc_mujoco.metrics.conventions import SETTLING_BAND, scale
 from smc_mujoco.simulation.signals import PerChannel
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 
-COLUMNS = 360  # of a panel
+COLUMNS = 360  # of pixels of a panel: traces of more samples are drawn as means and ranges
 LAST_SAMPLES = 60  # control samples in the close-up of u
-MIN_CLOSE_UP = 0.02  # height of the close-up, as a share of the largest |u|: hides round-off; chosen
+MIN_CLOSE_UP = 0.02  # least height of the close-up, of the largest |u|, so that it hides round-off; chosen
 MAX_LIGHT = 9  # channels of a network that are drawn one by one
-LASTING = 0.98  # quantile of |reaction|, or of what an arrow shows: larger values are short peaks; chosen
+LASTING_QUANTILE = 0.98  # quantile of |reaction|, or of what an arrow shows: larger values are short peaks; chosen
 MAX_RESTS = 12  # marked in a phase portrait
-SPACING = 1 / 200  # of points in a phase portrait, as a share of its diagonal
+POINT_SPACING = 1 / 200  # of points in a phase portrait, as a share of its diagonal
 MAX_SMALL = 12  # channels that each have small panels
-MAX_STRIP = 3  # groups of channels, from which on a film has no panel of the error
+CROWDED_STRIP = 3  # groups of channels: a film of so many or more has no panel of the error
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
-LEAVING = 0.6  # points, width of a curve that leaves its panel
-COINCIDENT = 0.02  # of a panel's height, about the width of a line: curves no farther apart are dashed in turn
-MOSTLY = 0.99  # of the samples of curves that coincide, so that controls that switch a sample apart do; chosen
-DASH = 5.0  # widths of a line
+LEAVING_LINE = 0.6  # points, width of a curve that leaves its panel
+COINCIDENT_DISTANCE = 0.02  # of a panel's height, about the width of a line: curves no farther apart are dashed in turn
+COINCIDENT_SHARE = 0.99  # of the samples of coinciding curves, so that controls that switch a sample apart do; chosen
+DASH_LENGTH = 5.0  # widths of a line
 MIN_WIDE_BAND, MAX_BANDS = 0.2, 1  # mean height of a wide band, of a panel's; more of them need a row each; chosen
-VISIBLE = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
+VISIBLE_CHATTERING = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
 MAX_SMALL_AXIS = 0.03  # of a unit: axes with smaller values show thousandths, such as mm; chosen
-FLAT = 0.02  # of a panel's height: x that stays within it rests; chosen
-ZOOM = 1.3, 0.5  # of the time until all rest: what panels over time show, if that is less than this part of the run
-ROUNDING, DECADES = 1e-9, 20.0  # rad or m: smaller errors are drawn at it; least ratio of a logarithmic axis, chosen
-JUMP = 2.0  # a reference jumps where its rate is more than this many times the 99 % quantile; chosen
-QUANTITY_OF_UNIT = {  # quantity -> the one that has its unit
+REST_BAND = 0.02  # of a panel's height: an x that stays within it rests; chosen
+ZOOM, MAX_ZOOMED = 1.3, 0.5  # of the time until all rest, which panels show if it is less than that part of the run
+MIN_ERROR, MIN_RATIO = 1e-9, 20.0  # rad or m: smaller errors are drawn at it; least ratio of a logarithmic axis, chosen
+JUMP_RATIO = 2.0  # a reference jumps where its rate is more than this many times the 99 % quantile; chosen
+QUANTITY_OF_UNIT = {  # quantity -> another one of the same unit
     **dict.fromkeys(("spread", "e", "worst", "joint", "settling"), "x"),
     **dict.fromkeys(("largest", "applied"), "u"),
     **dict.fromkeys(("reaction", "d"), "force"),
@@ -57,7 +57,7 @@ QUANTITY_OF_UNIT = {  # quantity -> the one that has its unit
 WORDS = {"force": "delivered", "reaction": "reaction", "spread": "max − min x"}  # quantity -> its words, no letter
 KINDS = {"v": "velocity", "u": "control", "s": "sliding variable", "e": "error", "d": "disturbance"}
 KINDS["applied"] = "control"
-OF_ARMS = {  # quantities of several joints, one number a sample -> what an axis says
+LABELS_OF_ARMS = {  # quantities of several joints, one number a sample -> what an axis says
     "tip": "tip off its path (mm)",
     "contact": "force of contact (N)",
     "worst": "largest error of a joint",
@@ -65,11 +65,11 @@ OF_ARMS = {  # quantities of several joints, one number a sample -> what an axis
     "settling": "|x − r|",
     "largest": "largest |u| of a joint",
 }
-THOUSANDTHS = ("worst", "joint")  # of arms, in thousandths of the group's unit
-SINGLE = ("spread", *OF_ARMS)  # one number a sample, whatever the number of channels
+IN_THOUSANDTHS = ("worst", "joint")  # of arms, in thousandths of the group's unit
+SINGLE = ("spread", *LABELS_OF_ARMS)  # one number a sample, whatever the number of channels
 UNBANDED = ("x", "e", *SINGLE)  # drawn sample by sample, without a mean over time
-FAR_OFF = 8.0  # times the values of every other run: such a run leaves the panel instead of flattening them; chosen
-UNDIVERGED = 0.8  # of a run whose plant diverged: the part that sets the range of a panel if no run lasts; chosen
+FAR_OFF_RATIO = 8.0  # times the values of every other run: such a run leaves the panel, not to flatten them; chosen
+UNDIVERGED_SHARE = 0.8  # of a run whose plant diverged: its first part sets a panel's range if no run lasts; chosen
 MARGIN = 0.08  # of a panel's height, above and below its curves
 
 REFERENCE, BACKLASH = "reference", "backlash"  # ids of a reference's lines, and of a gear's play
@@ -107,7 +107,7 @@ class Panel(NamedTuple):
     def thousandths(self) -> bool:
         """Whether its axis shows thousandths of the unit, as all its values are small."""
         largest = max(map(abs, span(self.traces, self.quantity)))
-        return 0.0 < largest < MAX_SMALL_AXIS and not self.unitless and self.quantity not in OF_ARMS
+        return 0.0 < largest < MAX_SMALL_AXIS and not self.unitless and self.quantity not in LABELS_OF_ARMS
 
     @property
     def unitless(self) -> bool:
@@ -121,7 +121,7 @@ class Panel(NamedTuple):
         """The unit of the vertical axis in brackets; "" where the words have it, or where it depends on the law."""
         if self.quantity in ("tip", "contact") or self.unitless:
             return ""
-        small = self.thousandths or self.quantity in THOUSANDTHS
+        small = self.thousandths or self.quantity in IN_THOUSANDTHS
         return f" ({'m' * small}{style.units(self.group)[QUANTITY_OF_UNIT.get(self.quantity, self.quantity)]})"
 
     @property
@@ -129,8 +129,8 @@ class Panel(NamedTuple):
         """The label of the vertical axis, with its unit. A joint of a robot has its name in it."""
         name, group, plant = self.quantity, self.group, self.traces[0].scenario.plant
         joint = joint_names(plant)[group.channels[0]]
-        if name in OF_ARMS:
-            return f"{joint}, " * (self.channel is not None) + OF_ARMS[name] + self.unit
+        if name in LABELS_OF_ARMS:
+            return f"{joint}, " * (self.channel is not None) + LABELS_OF_ARMS[name] + self.unit
         letter = WORDS.get(name, name) if group.driven else {"x": "q", "v": "q′"}.get(name, WORDS.get(name, name))
         if len(group.channels) == 1 and (plant.direct or self.channel is not None):
             return f"{joint} {letter}{self.unit}"
@@ -204,7 +204,7 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
             return [one, Panel("contact", first, traces)]
         return [one, *(Panel("worst", *each) for each in driven)]
     if all(len(group.channels) == 1 for group, _ in groups):
-        settling = [Panel("settling", *driven[0])] * (len(groups) < MAX_STRIP)
+        settling = [Panel("settling", *driven[0])] * (len(groups) < CROWDED_STRIP)
         return [*(Panel("x", *each) for each in groups), *settling, *(Panel("u", *each) for each in driven)]
     if not plant.direct:
         return [Panel(name, *each) for each in driven for name in ("spread", "settling")]
@@ -258,7 +258,7 @@ def mean_window(traces: Sequence[Trace]) -> float | None:
     times = []
     for trace in traces:
         if any(
-            smoothed(trace) and np.abs(smooth(u, window(trace)) - u).max() > VISIBLE * (high - low)
+            smoothed(trace) and np.abs(smooth(u, window(trace)) - u).max() > VISIBLE_CHATTERING * (high - low)
             for u in trace.u.T[light(trace.u.shape[1])]
         ):
             times.append(window(trace) * trace.scenario.control_period)
@@ -266,10 +266,10 @@ def mean_window(traces: Sequence[Trace]) -> float | None:
 
 
 def peaks(y: np.ndarray, width: int) -> np.ndarray:
-    """Return the largest of y (K+1,) within `width` samples around each, or ROUNDING if that is more."""
+    """Return the largest of y (K+1,) within `width` samples around each, or MIN_ERROR if that is more."""
     from scipy.ndimage import maximum_filter1d
 
-    return np.maximum(maximum_filter1d(y, width, mode="nearest"), ROUNDING)
+    return np.maximum(maximum_filter1d(y, width, mode="nearest"), MIN_ERROR)
 
 
 def peak_window(traces: Sequence[Trace]) -> float:
@@ -286,11 +286,11 @@ def horizon(traces: Sequence[Trace]) -> float:
     for group, parts in style.split(traces).items():
         low, high = span(parts, "x")
         for trace in parts:
-            moved = np.abs(trace.x - trace.x[-1]).max(axis=1) > FLAT * (high - low)
+            moved = np.abs(trace.x - trace.x[-1]).max(axis=1) > REST_BAND * (high - low)
             acted = (trace.d != 0.0).any(axis=1) | (trace.r != trace.r[-1]).any(axis=1)
             last = max(last, *trace.t[moved | (acted & group.driven)][-1:], trace.diverged_at or 0.0)
         last = max([last, *(trace.scenario.jump.time for trace in parts if trace.scenario.jump)])
-    return ZOOM[0] * last if 0.0 < ZOOM[0] * last < ZOOM[1] * whole else whole
+    return ZOOM * last if 0.0 < ZOOM * last < MAX_ZOOMED * whole else whole
 
 
 def until(trace: Trace, time: float) -> Trace:
@@ -322,8 +322,8 @@ def over_time(
     if name in ("x", "e"):
         target(ax, panel)
     lines = [curve(trace, mean, name) for trace, mean in zip(panel.traces, means, strict=True)]
-    away = far_off(panel.traces, name)
-    widths = [style.points(LEAVING if k == away else LINE) for k in range(len(lines))]
+    far = far_off(panel.traces, name)
+    widths = [style.points(LEAVING_LINE if k == far else LINE) for k in range(len(lines))]
     drawn = list(zip(panel.traces, colours, means, lines, alike(panel, lines), widths, strict=True))
     for trace, colour, mean, path, dash, width in reversed(drawn):
         y, steps = QUANTITIES[name](trace), "default" if smoothed(trace) or name != "u" else "steps-post"
@@ -367,14 +367,14 @@ def alike(panel: Panel, lines: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[
 
 def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], limits: tuple[float, float]) -> list[Any]:
     """Return a style for each line: solid, or dashed in turn for lines that coincide, so that all are visible."""
-    near = COINCIDENT * (limits[1] - limits[0])
+    near = COINCIDENT_DISTANCE * (limits[1] - limits[0])
     groups: list[list[int]] = []
     for i, (t, y) in enumerate(lines):
         for group in groups:
             at, first = lines[group[0]]
             if min(len(t), len(at)) > 1 and t[-1] == at[-1]:
                 apart = np.abs(np.interp(at, t, y) - first)
-                if np.quantile(apart, MOSTLY) <= near:
+                if np.quantile(apart, COINCIDENT_SHARE) <= near:
                     group.append(i)
                     break
         else:
@@ -382,7 +382,7 @@ def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], limits: tuple[float, 
     styles: list[Any] = ["-"] * len(lines)
     for group in groups:
         for k, i in enumerate(group if len(group) > 1 else ()):
-            styles[i] = (DASH * k, (DASH, DASH * (len(group) - 1)))
+            styles[i] = (DASH_LENGTH * k, (DASH_LENGTH, DASH_LENGTH * (len(group) - 1)))
     return styles
 
 
@@ -390,7 +390,7 @@ def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = T
     """Fit the vertical range to lasting reactions. Mark short impacts outside the range, and print their size."""
     sizes = [np.abs(trace.reaction[np.isfinite(trace.reaction)]) for trace in panel.traces]
     peak = max(size.max(initial=0.0) for size in sizes)
-    levels = [float(np.quantile(size, LASTING)) for size in sizes if size.size]
+    levels = [float(np.quantile(size, LASTING_QUANTILE)) for size in sizes if size.size]
     usual = max(*levels, *map(abs, span(panel.traces, "u")))
     if not peak > 2.0 * usual > 0.0:
         return
@@ -526,7 +526,7 @@ def orbit(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
     r = reference(trace)
     r = r[np.isfinite(r)]
     dr = np.gradient(r, trace.scenario.control_period) if len(r) > 1 else np.zeros(len(r))
-    smooth = np.abs(dr) <= JUMP * np.quantile(np.abs(dr), 0.99) if len(r) else []
+    smooth = np.abs(dr) <= JUMP_RATIO * np.quantile(np.abs(dr), 0.99) if len(r) else []
     return r[smooth], dr[smooth]
 
 
@@ -579,7 +579,7 @@ def light(n: int) -> np.ndarray:
 def thinned(x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return a curve with points evenly apart on paper."""
     step = np.hypot(np.diff(x) / (np.ptp(x) or 1.0), np.diff(v) / (np.ptp(v) or 1.0))
-    place = np.floor(np.concatenate([[0.0], np.cumsum(step)]) / SPACING)
+    place = np.floor(np.concatenate([[0.0], np.cumsum(step)]) / POINT_SPACING)
     keep = np.append(np.flatnonzero(np.diff(place, prepend=-1.0)), len(x) - 1)
     keep = keep[:: max(1, len(keep) // 4000)]
     return x[keep], v[keep]
@@ -591,7 +591,7 @@ def lasting(traces: Sequence[Trace], name: str) -> dict[int, np.ndarray]:
     lasted = {k: y for k, y in values.items() if traces[k].diverged_at is None}
     if not lasted:
         lasted = {
-            k: y[: max(1, int(UNDIVERGED * len(y)))] if traces[k].plant_diverged else y for k, y in values.items()
+            k: y[: max(1, int(UNDIVERGED_SHARE * len(y)))] if traces[k].plant_diverged else y for k, y in values.items()
         }
     return {k: y for k, y in lasted.items() if np.isfinite(y).all()}
 
@@ -600,13 +600,13 @@ def far_off(traces: Sequence[Trace], name: str) -> int | None:
     """Return the index of the run that would flatten all others in a panel of an arm, or None."""
     sizes = (
         {k: float(np.abs(y).max()) for k, y in lasting(traces, name).items()}
-        if name in OF_ARMS and name != "settling"
+        if name in LABELS_OF_ARMS and name != "settling"
         else {}
     )
     if len(sizes) < 2:
         return None
     *_, second, largest = sorted(sizes, key=lambda k: sizes[k])
-    return largest if sizes[largest] > FAR_OFF * sizes[second] > 0.0 else None
+    return largest if sizes[largest] > FAR_OFF_RATIO * sizes[second] > 0.0 else None
 
 
 def outside(panel: Panel, names: Sequence[str]) -> tuple[str, str]:
@@ -634,7 +634,7 @@ def limits(traces: Sequence[Trace], name: str) -> tuple[float, float]:
     if name == "e":
         low, high = min(low, 0.0), max(high, 0.0)
     if name == "settling":
-        high = max(high, DECADES * ROUNDING)
-        return min(max(low, ROUNDING), high / DECADES) / 1.5, high * 1.5
+        high = max(high, MIN_RATIO * MIN_ERROR)
+        return min(max(low, MIN_ERROR), high / MIN_RATIO) / 1.5, high * 1.5
     air = MARGIN * (high - low) or 1.0
     return low - air, high + air

@@ -17,7 +17,7 @@ from smc_mujoco.mechanisms.hardware.part import initial_pose
 from smc_mujoco.mechanisms.plant import Plant
 
 TOLERANCE = 1e-9  # m and rad, of the tip
-MAX_STEPS = 200  # steps
+MAX_STEPS = 200  # to a point
 MAX_MOVE = 0.3  # rad or m, of a step
 
 
@@ -38,14 +38,14 @@ class Tip:
         kind, name = ("site", self.site) if self.site is not None else ("body", self.body)
         count = self.model.nsite if kind == "site" else self.model.nbody
         names = [getattr(self.model, kind)(i).name for i in range(count)]
-        self.id = find(f"{kind} of {self.plant.name}", name, {one: i for i, one in enumerate(names) if one})
+        self.id = find(f"{kind} of {self.plant.name}", name, {known: i for i, known in enumerate(names) if known})
         ids = [self.model.joint(joint).id for joint in self.joints]
         self.qpos, self.dofs = self.model.jnt_qposadr[ids], self.model.jnt_dofadr[ids]
         limited = self.model.jnt_limited[ids].astype(bool)
         self.low = np.where(limited, self.model.jnt_range[ids, 0], -np.inf)
         self.high = np.where(limited, self.model.jnt_range[ids, 1], np.inf)
         if self.orientation is not None:
-            turn = np.array([number("orientation", one) for one in self.orientation])
+            turn = np.array([number("orientation", part) for part in self.orientation])
             if turn.shape != (4,) or not np.linalg.norm(turn):
                 raise ScenarioError(f"orientation is {self.orientation}: give a quaternion (w, x, y, z)")
             self.turn = turn / np.linalg.norm(turn)
@@ -58,7 +58,7 @@ class Tip:
         return (self.data.site_xpos if self.site is not None else self.data.xpos)[self.id].copy()
 
     def error(self, x: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return how far the tip is from a point and its orientation, (3,) or (6,), and its Jacobian, (3 or 6, n)."""
+        """Return the way to a point, m, and the orientation, rad, (3,) or (6,), and the Jacobian, (3 or 6, n)."""
         away = point - self.place(x)
         moves, turns = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
         jacobian = mujoco.mj_jacSite if self.site is not None else mujoco.mj_jacBody
@@ -74,7 +74,7 @@ class Tip:
 
 
 def solve(tip: Tip, points: np.ndarray, start: Sequence[float]) -> np.ndarray:
-    """Return joint positions, (N, n), at which the tip is at points, (N, 3), m. Each search begins at the last."""
+    """Return joint positions, (N, n), with the tip at points, (N, 3), m. Each search starts where the last ended."""
     x, path, away = np.array(start, float), [], np.zeros(3)
     for i, point in enumerate(points):
         for _ in range(MAX_STEPS):
@@ -86,12 +86,12 @@ def solve(tip: Tip, points: np.ndarray, start: Sequence[float]) -> np.ndarray:
             move *= min(1.0, MAX_MOVE / float(np.abs(move).max() + 1e-300))
             x = np.clip(x + move, tip.low, tip.high)
         else:
-            there = ", ".join(f"{each:.4g}" for each in point)
+            there = ", ".join(f"{value:.4g}" for value in point)
             sizes = zip(np.split(away, [3]) if len(away) > 3 else [away], ("m", "rad"), strict=False)
-            stays = " and ".join(f"{np.linalg.norm(part):.3g} {unit}" for part, unit in sizes)
+            distances = " and ".join(f"{np.linalg.norm(part):.3g} {unit}" for part, unit in sizes)
             raise ScenarioError(
                 f"the tip of {tip.plant.name} does not reach ({there}) m, point {i} of {len(points)} on its path: it "
-                f"stays {stays} away; give points within reach, or another x0"
+                f"stays {distances} away; give points within reach, or another x0"
             )
         path.append(x)
     return np.array(path)

@@ -23,7 +23,7 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.registry import catalogue_of
 
-DIRECTLY = "smc:direct"  # a text in a user's model: disturbances act on its joints, not on bodies
+DIRECTLY = "smc:direct"  # name of a text in models on whose joints, not bodies, disturbances act
 EFFORT = {"rad": "N m", "m": "N"}  # unit of a force, from that of x
 MAX_PARAMETER = 1e15  # SI units; no parameter of a mechanism is larger
 
@@ -90,13 +90,13 @@ class Plant:
       sizes: smallest and largest n that `smc.plant(name, n=...)` takes.
       build: n -> MjSpec of the ideal mechanism with the default parameters.
       fields: (model, parameters) -> the model fields which the parameters set.
-      nominal: the plant's own f and g.
+      nominal: f and g of the plant's equation.
       lane: offset in metres between machines that stand side by side in a film, (3,).
       contacts: kind of contact -> edit of the MjSpec that adds its obstacles and contact pairs.
       mechanisms: name -> Variant, which realises the equation, or a part of it, by other means.
       underactuated: whether it has channels without an actuator, which come after those with one.
       goal: where its free joints should come to rest, (free,), rad or m; empty: at 0.
-      placed: parameter -> its value in the geometry of the contacts, which another value would not fit.
+      placed: parameter -> the only value that fits the geometry of the contacts.
       direct: whether disturbances act on its joints, not on the bodies that they carry.
       smooth: whether its model has no limits, contacts, dry friction and equality constraints.
       uncertain: parameter -> lowest and highest value that a user may have, as factors or, of those in `added`, numbers
@@ -242,8 +242,8 @@ class Plant:
                 raise ScenarioError(f"factor {factor:g} on {self.name}'s {key}: give a number greater than 0")
             values[name] = values[name] + factor if name in self.added else values[name] * factor
         for name, value in values.items():
-            low = (value <= 0.0 and name in self.positive) or (value < 0.0 and name in self.added)
-            if not abs(value) <= MAX_PARAMETER or low:
+            too_low = (value <= 0.0 and name in self.positive) or (value < 0.0 and name in self.added)
+            if not abs(value) <= MAX_PARAMETER or too_low:
                 raise ScenarioError(f"{self.name}'s true {name} becomes {value:g}: give other factors")
         return Values(**values)
 

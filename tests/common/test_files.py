@@ -319,7 +319,7 @@ def test_files_at_and_beyond_their_bounds(tmp_path, monkeypatch):
 
 
 def test_what_cannot_be_written_or_found_is_one_sentence(tmp_path):
-    cells, beside = "give one of cells between commas or semicolons, a CSV file", Path(files.__file__).parents[1]
+    cells, beside = "give a CSV file, with commas or semicolons between cells", Path(files.__file__).parents[1]
     refusals = {
         lambda: files.ended("a.txt", ".json"): "cannot save to 'a.txt': end the name in .json",
         lambda: files.ended("a\0.json", ".json"): r"cannot save to 'a\x00.json': end the name in .json",

@@ -312,7 +312,7 @@ def test_the_error_is_the_largest_within_its_window_on_a_logarithmic_axis(one):
     for time, value in zip(t[::17], y[::17], strict=True):
         near = np.abs(one.t - time) <= half + one.scenario.control_period
         assert value <= e[near].max() + 1e-12
-        assert value >= e[np.abs(one.t - time) <= half - one.scenario.control_period].max(initial=panels.ROUNDING)
+        assert value >= e[np.abs(one.t - time) <= half - one.scenario.control_period].max(initial=panels.MIN_ERROR)
 
 
 def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path):

@@ -152,7 +152,7 @@ def _sizes(traces: Sequence[Trace], name: str) -> Sizes:
     """Return the sizes of a quantity in runs that last; brief is at most a share 1 - LASTING of a channel's time."""
     peak = max(map(abs, panels.span(traces, name)))
     runs = panels.lasting(traces, name).values()
-    usual = max((float(np.quantile(np.abs(y), panels.LASTING, axis=0).max()) for y in runs), default=0.0)
+    usual = max((float(np.quantile(np.abs(y), panels.LASTING_QUANTILE, axis=0).max()) for y in runs), default=0.0)
     return Sizes(peak, usual if peak > 2.0 * usual > 0.0 else peak)
 
 

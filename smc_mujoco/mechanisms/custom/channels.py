@@ -49,7 +49,7 @@ class Channel:
         return dataclasses.replace(self, **dict.fromkeys(SUGGESTED))
 
 
-Pairs = tuple[tuple[str, Channel], ...]  # a joint and its Channel, each
+Pairs = tuple[tuple[str, Channel], ...]  # each a joint and its Channel
 
 
 def coerce(channels: object) -> Pairs:
@@ -81,18 +81,18 @@ def channel(joint: object, value: object) -> Channel:
         raise ScenarioError(f"motor of channel {joint!r} is {shown(made.motor)}: give True or False")
     if made.partner is None and made.partner_x0 is not None:
         raise ScenarioError(f"channel {joint!r} has a partner_x0 and no partner: give smc.Channel(partner=...) too")
-    starts = {
+    numbers = {
         name: number(f"{name} of channel {joint!r}", getattr(made, name), low=-1e6, high=1e6)
         for name in ("x0", "partner_x0")
         if getattr(made, name) is not None
     }
     if made.u_max is not None:
-        starts["u_max"] = number(f"u_max of channel {joint!r}", made.u_max, above=0.0, infinite=True)
-    return dataclasses.replace(made, **starts)
+        numbers["u_max"] = number(f"u_max of channel {joint!r}", made.u_max, above=0.0, infinite=True)
+    return dataclasses.replace(made, **numbers)
 
 
 def suggested(channels: Pairs) -> dict[str, tuple]:
-    """Return field -> what each channel suggests to scenarios, None where nothing; only fields that one suggests."""
+    """Return field -> what each channel suggests to scenarios, None for nothing; without fields that none suggests."""
     fields = {name: tuple(getattr(channel, name) for _, channel in channels) for name in SUGGESTED}
     bare = [joint for joint, channel in channels if channel.law is None]
     if 0 < len(bare) < len(channels):
@@ -131,7 +131,7 @@ def starts(
     chosen = {joint: channel.x0 for joint, channel in channels if channel.x0 is not None}
     chosen |= {c.partner: c.partner_x0 for _, c in channels if c.partner is not None and c.partner_x0 is not None}
     x0 = {joint: float(qpos[model.joint(joint).qposadr[0]]) for joint in joints} | chosen
-    return x0, [one for one in ranges(model, joints) if keyframe is not None or one[0] in chosen]
+    return x0, [row for row in ranges(model, joints) if keyframe is not None or row[0] in chosen]
 
 
 def check_ranges(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> None:

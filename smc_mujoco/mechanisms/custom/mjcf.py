@@ -123,7 +123,7 @@ def _of_text(text: str, assets: Mapping[str, bytes]) -> Source:
         raise ScenarioError(f"assets is {shown(assets)}: give names of files with their contents, as bytes")
     given = {PurePosixPath(name).name for name in assets}
     texts = [text, *(content for name, content in assets.items() if name.lower().endswith(XML))]
-    for name in _files(element for one in texts for element in _elements(one)):
+    for name in _files(element for content in texts for element in _elements(content)):
         if PurePosixPath(name).name not in given:
             raise ScenarioError(
                 f"the model names the file {shown(name)}, and a text has no folder to find it in: give "
@@ -188,8 +188,8 @@ def _full_precision_xml(spec: mujoco.MjSpec) -> str:
 def _difference(model: mujoco.MjModel, again: mujoco.MjModel) -> str:
     """Return the first field in which two models differ by more than rounding, or ""."""
     for name in fields(model):
-        one, other = getattr(model, name), getattr(again, name)
-        if one.shape != other.shape or not np.allclose(one, other, rtol=ROUNDING, atol=ROUNDING, equal_nan=True):
+        a, b = getattr(model, name), getattr(again, name)
+        if a.shape != b.shape or not np.allclose(a, b, rtol=ROUNDING, atol=ROUNDING, equal_nan=True):
             return name
     return ""
 
@@ -233,18 +233,18 @@ def tried(source: Source, timeout: float) -> None:
 def _complaint(source: Source, failed: guard.Failed, timeout: float) -> ScenarioError:
     """Return the error for a model, from its trial."""
     names = {known.value: known.name for known in signal.Signals}
-    how = "" if failed.code is None else names.get(-failed.code, f"exit code {failed.code}")
-    much = f"more than {guard.MAX_MEMORY / 2**30:g} GiB of memory"
-    if how == "SIGKILL" or re.search(r"unknown exception|bad_alloc|memory|allocat", failed.fault):
-        return ScenarioError(f"{source.label} takes MuJoCo {much}: make it smaller")
+    cause = "" if failed.code is None else names.get(-failed.code, f"exit code {failed.code}")
+    too_much = f"more than {guard.MAX_MEMORY / 2**30:g} GiB of memory"
+    if cause == "SIGKILL" or re.search(r"unknown exception|bad_alloc|memory|allocat", failed.fault):
+        return ScenarioError(f"{source.label} takes MuJoCo {too_much}: make it smaller")
     if failed.fault:
         return broken(source.path or source.label, failed.fault)
     if failed.code is None:
         return ScenarioError(
             f"{source.label} takes MuJoCo more than {timeout:g} s to compile: make it smaller, or give timeout="
         )
-    hint = much if how == "SIGABRT" else "a model that attaches itself"
-    return ScenarioError(f"{source.label} ends MuJoCo with {how}, as does {hint}: fix the model")
+    hint = too_much if cause == "SIGABRT" else "a model that attaches itself"
+    return ScenarioError(f"{source.label} ends MuJoCo with {cause}, as does {hint}: fix the model")
 
 
 def broken(where: str, error: str) -> ScenarioError:

@@ -34,10 +34,10 @@ class Motor(NamedTuple):
 
 def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) -> Motor:
     """Return the motor that drives a joint."""
-    number, wanted = model.joint(joint).id, channel.actuator
-    bounds = [tuple(map(float, model.jnt_actfrcrange[number]))] if model.jnt_actfrclimited[number] else []
+    joint_id, wanted = model.joint(joint).id, channel.actuator
+    bounds = [tuple(map(float, model.jnt_actfrcrange[joint_id]))] if model.jnt_actfrclimited[joint_id] else []
     actuators = [i for i in range(model.nactuator) if model.actuator_trntype[i] in ONE_JOINT]
-    actuators = [i for i in actuators if model.actuator_trnid[i, 0] == number]
+    actuators = [i for i in actuators if model.actuator_trnid[i, 0] == joint_id]
     if channel.motor:
         if wanted is not None:
             raise ScenarioError(f"channel {joint!r} has motor=True and actuator {shown(wanted)}: give one of the two")

@@ -54,7 +54,7 @@ _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.
 NOMINAL = floats(
     ("n", "driven", "nv", "model", "data", "qpos", "qvel", "ctrl", "acceleration", "places", "x", "v", "unit", "moved")
 )
-# The same of M, h and g; then whether h is of passive forces alone, the tip's site or -1, whether to compute g.
+# The same for M, h and g; then whether h is of passive forces alone, the tip's site or -1, whether to compute g.
 DYNAMICS = floats(
     ("n", "nv", "model", "data", "qpos", "qvel", "bias", "passive", "actuator", "places", "dense", "v", "moves",
      "alone", "site", "at_rest")

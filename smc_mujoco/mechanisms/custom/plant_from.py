@@ -183,12 +183,12 @@ def user_plant(
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields, limits = UserFields(mass, gravity), tuple(motor.limit for motor in motors)
     units = tuple(UNIT_OF_JOINT[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
-    why_not, called = missing(model, joints, motors), named(label) if name is None else name
+    why_not, plant_name = missing(model, joints, motors), named(label) if name is None else name
     x0, checked = starts(model, joints, pairs, keyframe)
     if not recorded:
-        check_ranges(called, checked, [x0[joint] for joint, _, _ in checked])
+        check_ranges(plant_name, checked, [x0[joint] for joint, _, _ in checked])
     return Plant(
-        name=called,
+        name=plant_name,
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
         mass="m",
         unit=units[0],
@@ -208,7 +208,7 @@ def user_plant(
         ranges=ranges(model, joints),
         tip=tip or "",
         suggested=scenarios,
-        label=title if called == named(label) and title != UNNAMED else "",
+        label=title if plant_name == named(label) and title != UNNAMED else "",
     )
 
 
@@ -243,17 +243,17 @@ def smooth(model: mujoco.MjModel) -> bool:
 def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...]) -> str:
     """Return why there is no nominal model of the channels, or ""."""
     if np.any(model.eq_active0):
-        return "equality constraints hold its joints together, and M^-1 knows of none: " + WITHOUT_MODEL
+        return "equality constraints hold its joints together, and a nominal model has none: " + WITHOUT_MODEL
     if model.nplugin or model.nflex:
         return "it has plugins or flexible bodies: " + WITHOUT_MODEL
-    ours = [int(model.joint(joint).dofadr[0]) for joint in joints]
+    channel_dofs = [int(model.joint(joint).dofadr[0]) for joint in joints]
     idle = np.ones(model.nactuator, bool)
     idle[[actuator for motor in motors for actuator in motor.replaced]] = False
     if np.any(model.actuator_dyntype[idle] == DCMOTOR):
         return "a dcmotor among its other actuators has a current that is not measured: " + WITHOUT_MODEL
     across = model.ntendon or np.any(~np.isin(model.actuator_trntype[idle], ONE_JOINT))  # may couple trees
-    near = range(model.nv) if across else np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[ours]))
-    loose = list(dict.fromkeys(int(model.dof_jntid[dof]) for dof in near if dof not in ours))
+    near = range(model.nv) if across else np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[channel_dofs]))
+    loose = list(dict.fromkeys(int(model.dof_jntid[dof]) for dof in near if dof not in channel_dofs))
     return unmeasured(model, loose, len(motors), len(joints) - len(motors)) if loose else ""
 
 

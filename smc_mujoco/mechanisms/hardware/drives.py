@@ -331,18 +331,18 @@ def _wound(made: DriveStep, motor: DCMotor, a: float, step: float, rk4: bool) ->
     one that gives its end. So both are exact, unless the supply's bound cuts the lag's output within the step.
     """
     b = step / motor.delay
-    own, left = winding_step(b, rk4), math.exp(-b)
+    winding, left = winding_step(b, rk4), math.exp(-b)
     passed = 0.0 if a == math.inf else _passed(a, b)
     emf = motor.constant / motor.scale
     return made._replace(
-        force_first=(made.force_first - passed / b) / own.drag,
-        force_second=1.0 - own.drag,
+        force_first=(made.force_first - passed / b) / winding.drag,
+        force_second=1.0 - winding.drag,
         second_first=passed / -math.expm1(-b),
         second_left=left,
         voltage=motor.voltage / motor.scale,
-        drag=own.drag * emf,
-        force_drag=(own.drag - own.share) * emf,
-        second_drag=(-math.expm1(-b) - own.drag) * emf,
+        drag=winding.drag * emf,
+        force_drag=(winding.drag - winding.share) * emf,
+        second_drag=(-math.expm1(-b) - winding.drag) * emf,
     )
 
 
@@ -350,7 +350,7 @@ class WindingStep(NamedTuple):
     """Effect of the speed on a winding in a physics step, in which it changes linearly.
 
     Attributes:
-      drag: of the speed at the start in the mean torque, if it stayed; and of its change in the torque at the end.
+      drag: weight of a constant speed in the mean torque, and of the speed's change in the torque at the end.
       share: what MuJoCo gets of the drag of a motor without inductance, so that the speed's change in the step has its
         effect on the mean torque.
     """
@@ -376,6 +376,6 @@ def _mean(a: float) -> float:
 
 
 def _passed(a: float, b: float) -> float:
-    """Return what a second lag has at the end of a step of a first lag's 1 at its start, of a and b time constants."""
+    """Return the second lag's output after a step of a and b time constants, from 1 in the first lag at its start."""
     apart = abs(b - a)
     return b * math.exp(-min(a, b)) * (_mean(apart) if apart else 1.0)

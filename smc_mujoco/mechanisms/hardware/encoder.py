@@ -1,12 +1,12 @@
 """Sensors: an encoder between the mechanism and the controller.
 
-Of a channel's position x the controller reads, j counting the readings,
+The controller reads a channel's position x as
 
     x_j = q round((x(t_j) + noise + bias) / q),    q = 2 pi / counts rad  or  1 / counts m,
 
-every `period`, each `delay` later. If a reading is lost, the one before it stays. MuJoCo's sensors have the period and
-the delay; the callback rounds and drops readings. An encoder measures no velocity: by default the controller
-differentiates the positions.
+every `period`, each `delay` later; j counts the readings. If one is lost, the one before it stays. MuJoCo's sensors
+have the period and the delay; the callback rounds and drops readings. An encoder measures no velocity: by default the
+controller differentiates the positions.
 """
 
 import dataclasses
@@ -32,7 +32,7 @@ class Encoder(Part):
     Attributes:
       counts: per revolution of a hinge, or per metre of a slide; math.inf for no quantisation.
       bias: zero error, added to every reading, rad or m.
-      dropout: probability that a reading is lost, 0 .. 1; the first never is.
+      dropout: probability that a reading is lost, 0 .. 1; the first is never lost.
       period: s between readings, greater than 0, a whole number of physics steps. None: one at every control sample.
       delay: s until a reading arrives, 0 or more, a whole number of physics steps. Until the first arrives, the
         controller reads x0.
@@ -55,7 +55,7 @@ class Encoder(Part):
         self.check_numbers("delay", low=0.0, high=math.inf)
 
     def quantum(self, hinge: bool) -> float:
-        """One count in rad of a hinge, or m of a slide; 0 without quantisation."""
+        """Return one count, rad of a hinge or m of a slide; 0 without quantisation."""
         return 0.0 if self.counts == math.inf else (2.0 * math.pi if hinge else 1.0) / self.counts
 
     def readings(self, step: float) -> int:
@@ -98,10 +98,10 @@ def remember(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     """Fill the histories with the present readings, so that a delayed sensor starts with the initial state."""
     for sensor in sensor_ids(model):
         count = int(model.sensor_history[sensor, 0])
-        gap = float(model.sensor_interval[sensor, 0]) or model.opt.timestep
+        interval = float(model.sensor_interval[sensor, 0]) or model.opt.timestep
         joint, position = model.sensor_objid[sensor], mujoco.mjtSensor.mjSENS_JOINTPOS
         value = data.qpos[model.jnt_qposadr[joint]]
         if model.sensor_type[sensor] != position:
             value = data.qvel[model.jnt_dofadr[joint]]
-        times, values = gap * np.arange(-count, 0.0), np.full((count, 1), value)
-        mujoco.mj_initSensorHistory(model, data, sensor, times, values, -gap - EARLY_SHARE * model.opt.timestep)
+        times, values = interval * np.arange(-count, 0.0), np.full((count, 1), value)
+        mujoco.mj_initSensorHistory(model, data, sensor, times, values, -interval - EARLY_SHARE * model.opt.timestep)

@@ -75,14 +75,14 @@ class ServoFriction(Sliding):
     def value(v, motor, load, p):
         near = math.exp(-(abs(v / p.vs) ** p.alpha))
         dry = p.kc + abs(p.km * motor - p.ke * load)
-        more = p.kcs + abs(p.kms * motor - p.kes * load)
+        additions = p.kcs + abs(p.kms * motor - p.kes * load)
         if not motor * load > 0.0:  # one torque drives, the other resists
             if abs(motor) > abs(load):
-                more += p.keq * load * load
+                additions += p.keq * load * load
             elif abs(motor) < abs(load):
-                more += p.kmq * motor * motor
-        limit = dry + more
-        return math.copysign(dry + near * more, v) + p.kv * v, -limit, limit
+                additions += p.kmq * motor * motor
+        limit = dry + additions
+        return math.copysign(dry + near * additions, v) + p.kv * v, -limit, limit
 
 
 class Servo(NamedTuple):

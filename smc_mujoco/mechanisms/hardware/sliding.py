@@ -82,7 +82,7 @@ class Sliding(Friction):
     def _number(self, name: str, value: Any, **limits: Any) -> Any:
         """Return the value of a field, a number within limits or a tuple of them."""
         if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
-            return tuple(number(f"{name}[{i}]", one, **limits) for i, one in enumerate(value))
+            return tuple(number(f"{name}[{i}]", item, **limits) for i, item in enumerate(value))
         return number(name, value, **limits)
 
     def check(self, plant: Plant) -> None:
@@ -97,7 +97,7 @@ class Sliding(Friction):
 
     def parameters(self, i: int) -> tuple[float, ...]:
         """Return the numbers of channel i that `value` reads as p; NaN for None."""
-        return tuple(math.nan if (one := _of(getattr(self, name), i)) is None else one for name in self.names)
+        return tuple(math.nan if (x := _of(getattr(self, name), i)) is None else x for name in self.names)
 
     def bristle(self, i: int, inertia: float) -> tuple[float, float]:
         """Return stiffness and critical damping of channel i when it sticks.

@@ -42,12 +42,12 @@ def fields(model, p):
 
 def nominal(x, v, i, p):
     lever, inertia = p.m * p.l * cos(x[1]), p.m * p.l * p.l * 4.0 / 3.0
-    whole = (p.M + p.m) * inertia - lever * lever
+    determinant = (p.M + p.m) * inertia - lever * lever
     along = p.m * p.l * sin(x[1]) * v[1] * v[1] - p.b * v[0]
     about = p.m * p.grav * p.l * sin(x[1]) - p.bq * v[1]
     if i == 0:
-        return (inertia * along - lever * about) / whole, inertia / whole
-    return ((p.M + p.m) * about - lever * along) / whole, -lever / whole
+        return (inertia * along - lever * about) / determinant, inertia / determinant
+    return ((p.M + p.m) * about - lever * along) / determinant, -lever / determinant
 
 
 def stops(spec):

@@ -11,7 +11,7 @@ upper one. Seen from the front, both are counter-clockwise; (pi, 0) is upright. 
 d1 of the shoulder acts on the upper link, d2 of the elbow on the lower link. d2 turns the shoulder, too, so that
 d = (d1 + d2, d2). `pendubot` drives only the shoulder, `acrobot` only the elbow. I1 and I2 are about the joints, Ir is
 a motor's rotor before its gear, B = (b1, b2) and F = (cf1, cf2). A motor gives at most 6 N m. Each channel's nominal f
-has the other's command; it is MuJoCo's own, without the dry friction.
+has the effect of the other's command. MuJoCo computes it, without the dry friction.
 Source: dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), design C.1: model 1.1, the default here, is model 1.0
 without friction and rotors. `MODEL_1_0` has these. Its published dry friction is cf arctan(100 q'), which reaches
 cf pi/2 at speed: F here.
@@ -87,8 +87,8 @@ def accelerations(q1, q2, v1, v2, m1, m2, l1, r1, r2, I1, I2, Ir, gear, b1, b2, 
     h, outer = a * sin(q2), m2 * r2 * grav * sin(q1 + q2)
     F1 = h * (2.0 * v1 + v2) * v2 - (m1 * r1 + m2 * l1) * grav * sin(q1) - outer - b1 * v1
     F2 = -h * v1 * v1 - outer - b2 * v2
-    whole = M11 * M22 - M12 * M12
-    W11, W12, W22 = M22 / whole, -M12 / whole, M11 / whole
+    determinant = M11 * M22 - M12 * M12
+    W11, W12, W22 = M22 / determinant, -M12 / determinant, M11 / determinant
     return W11 * F1 + W12 * F2, W12 * F1 + W22 * F2, W11, W12, W22
 
 

@@ -37,7 +37,7 @@ def fields(model, p):
     dofs = [model.joint(name).dofadr[0] for name in ("arm", "hinge")]
     yield Field("body_mass", pendulum, p.m)
     yield Field("body_inertia", arm, (p.J, p.J, p.J - MIN_INERTIA))
-    # with the arm's, as if it had none about its length
+    # together with the arm's inertia: as if the pendulum had none about its length
     yield Field("body_inertia", pendulum, (p.Jc + MIN_INERTIA, p.Jc, MIN_INERTIA))
     yield Field("body_ipos", pendulum, (0.0, 0.0, p.l))
     yield Field("body_pos", pendulum, (0.0, -p.L, 0.0))
@@ -57,10 +57,10 @@ def nominal(x, v, i, p):
     along = p.m * p.L * p.l * s * v[1] * v[1] - 2.0 * Jp * s * c * v[0] * v[1] - p.b * v[0]
     along += weight * (p.L * w - p.l * s * out)
     about = Jp * s * c * v[0] * v[0] + weight * p.l * (tz * s + w * c) - p.bq * v[1]
-    whole = around * Jp - lever * lever
+    determinant = around * Jp - lever * lever
     if i == 0:
-        return (Jp * along - lever * about) / whole, Jp / whole
-    return (around * about - lever * along) / whole, -lever / whole
+        return (Jp * along - lever * about) / determinant, Jp / determinant
+    return (around * about - lever * along) / determinant, -lever / determinant
 
 
 FURUTA = Plant(
