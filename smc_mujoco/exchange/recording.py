@@ -1,6 +1,6 @@
 """A trace as an .mcap file: the moving machine, and its signals as curves, for Foxglove and Rerun.
 
-Messages are protobuf, which both read; of JSON, Rerun 0.41 shows nothing. Foxglove's own kinds have the machine:
+Messages are protobuf, which both read; Rerun 0.41 shows nothing of JSON. The machine is in Foxglove's own kinds:
 FrameTransforms the pose of every body in the world, SceneUpdate the shapes that move with the bodies, which Rerun does
 not draw. Each of x, v, u, applied, s, d, r, force and reaction is a topic, whose messages have a number for each joint.
 The scenario is JSON in the file's metadata.
@@ -61,7 +61,7 @@ def write(trace: Trace, file: Path) -> None:
 
 
 def message_of(joints: Sequence[str]) -> Any:
-    """Return a protobuf message with a number for each joint. Letters that protobuf has not in names become _."""
+    """Return a protobuf message with a number for each joint. Letters that its names cannot have become _."""
     from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
     file = descriptor_pb2.FileDescriptorProto(name="smc_mujoco/joints.proto", package="smc_mujoco", syntax="proto3")
@@ -104,10 +104,10 @@ def frames(model: mujoco.MjModel) -> list[str]:
 def add_poses(message: Any, names: Sequence[str], places: np.ndarray, turns: np.ndarray, time: int) -> None:
     """Add the pose of each body in the world to a FrameTransforms; `time` in ns."""
     for name, place, turn in list(zip(names, places, turns, strict=True))[1:]:
-        one = message.transforms.add(parent_frame_id=names[0], child_frame_id=name)
-        one.timestamp.FromNanoseconds(time)
-        put(one.translation, "xyz", place)
-        put(one.rotation, "wxyz", turn)
+        transform = message.transforms.add(parent_frame_id=names[0], child_frame_id=name)
+        transform.timestamp.FromNanoseconds(time)
+        put(transform.translation, "xyz", place)
+        put(transform.rotation, "wxyz", turn)
 
 
 def add_shapes(message: Any, model: mujoco.MjModel) -> None:

@@ -1,8 +1,8 @@
 """The audit of a paper: its claims, each a function of runs, and the verdicts on them.
 
-    found = audit("gaber", only=["3"])             # one claim, under every set of gains of the paper
-    found.claims[0].verdict
-    found.save("evidence.json")                    # claim -> runs -> numbers -> threshold -> verdict
+    result = audit("gaber", only=["3"])            # one claim, under every set of gains of the paper
+    result.claims[0].verdict
+    result.save("evidence.json")                   # claim -> runs -> numbers -> threshold -> verdict
 
 Thresholds are fixed in the paper's file before any run, and are not moved. How verdicts follow from checks: `verdict`.
 """
@@ -192,7 +192,7 @@ def document(claims: Sequence[Claim]) -> str:
 def measure(entry: Entry, runs: Runs) -> Evidence:
     """Return the checks of a claim under one set of gains, and the numbers beside them.
 
-    Of a claim about all or some of the gains that the paper allows, those at the gains that decide.
+    For a claim about all or some of the allowed gains they are those at the gains that decide.
     """
     if entry.over:
         from smc_mujoco.evidence.audit import search
@@ -208,19 +208,19 @@ def _measured(entry: Entry, runs: Runs) -> list[Check | Beside]:
     except (Exception, SystemExit) as error:  # whatever a user's function raises
         raise failed(runs.paper, entry, error) from error
     try:
-        return list(_evidence(entry, returned, runs.asked))
+        return list(_evidence(entry, returned, runs.checked))
     except ScenarioError as error:
         raise failed(runs.paper, entry, error) from None
 
 
-def _evidence(entry: Entry, returned: Any, met: Collection[str]) -> Iterator[Check | Beside]:
-    """Yield the checks of what a claim's function returned; `met` are measures whose thresholds it has asked for."""
+def _evidence(entry: Entry, returned: Any, checked: Collection[str]) -> Iterator[Check | Beside]:
+    """Yield the checks of what a claim's function returned; `checked`: measures whose thresholds it used."""
     if not isinstance(returned, Mapping):
         checks = isinstance(returned, Sequence) and all(isinstance(one, Check | Beside) for one in returned)
         if not checks:
             raise ScenarioError(f"it returns {shown(returned)}: {CURE}")
         for threshold in entry.thresholds:
-            if threshold.measure not in met:
+            if threshold.measure not in checked:
                 cure = "return numbers, or checks from runs.check"
                 raise ScenarioError(f"it returns checks, and none for {threshold.measure!r} of holds_if: {cure}")
         yield from returned

@@ -28,20 +28,20 @@ def svg(name: str, claims: Sequence[Claim]) -> str:
     """Return the badge: the paper's name, and a field for each verdict that some sentence of the paper has."""
     counts = totals(claims)
     fields = [(f"claims of {name}", LABEL_COLOUR)]
-    fields += [(f"{count} {SHORT_WORDS.get(one, one)}", COLOURS[one]) for one, count in counts.items()]
+    fields += [(f"{count} {SHORT_WORDS.get(verdict, verdict)}", COLOURS[verdict]) for verdict, count in counts.items()]
     about = f"{fields[0][0]}: {', '.join(text for text, _ in fields[1:])}"
     boxes, texts, x = [], [], 0.0
     for text, colour in fields:
-        length = style.width(text, FONT_SIZE)  # DejaVu Sans is as wide as Verdana
-        wide = round(length + 2 * MARGIN)
-        boxes.append(f'<rect x="{x:g}" width="{wide}" height="{HEIGHT}" fill="{colour}"/>')
-        shown, middle = escape(text), x + wide / 2
+        length = style.width(text, FONT_SIZE)  # DejaVu Sans is as field_width as Verdana
+        field_width = round(length + 2 * MARGIN)
+        boxes.append(f'<rect x="{x:g}" width="{field_width}" height="{HEIGHT}" fill="{colour}"/>')
+        shown, middle = escape(text), x + field_width / 2
         place = f'textLength="{length:.0f}" lengthAdjust="spacingAndGlyphs"'
         texts.append(
             f'<text x="{middle:g}" y="15" fill="#010101" fill-opacity=".3" aria-hidden="true" {place}>{shown}</text>'
         )
         texts.append(f'<text x="{middle:g}" y="14" {place}>{shown}</text>')
-        x += wide
+        x += field_width
     size, about = f'width="{x:g}" height="{HEIGHT}"', escape(about)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" {size} role="img" aria-label="{about}"><title>{about}</title>'

@@ -38,11 +38,11 @@ def document(audit: Any) -> dict[str, Any]:
     names: dict[str, str] = {}  # key of a run -> its name in the file
     runs: dict[str, Any] = {}
     for used in (runs for sets in audit.used.values() for runs in sets.values()):
-        for key, one in used.items():
-            name = names[key] = names.get(key) or portable_key(one.scenario)
+        for key, run in used.items():
+            name = names[key] = names.get(key) or portable_key(run.scenario)
             if name not in runs:
-                runs[name] = _run(one.scenario)
-            runs[name] |= _results(one)
+                runs[name] = _run(run.scenario)
+            runs[name] |= _results(run)
     sealed = [claim for claim in audit.claims if not audit.paper.claims[claim.id].varies]
     data = {
         "format": FORMAT,
@@ -95,18 +95,18 @@ def files(paper: Paper) -> dict[str, str]:
 def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
     """Return what is sealed of a claim."""
     entry = audit.paper.claims[claim.id]
-    told = {name: getattr(claim, name) for name in CLAIM_FIELDS}
+    sealed = {name: getattr(claim, name) for name in CLAIM_FIELDS}
     if entry.immune:
-        told["immune"] = entry.immune
+        sealed["immune"] = entry.immune
     if entry.varies:
-        return told | {"not_sealed": f"its numbers differ from audit to audit: {entry.varies}"}
+        return sealed | {"not_sealed": f"its numbers differ from audit to audit: {entry.varies}"}
     runs = {name: sorted({names[key] for key in used}) for name, used in audit.used[claim.id].items()}
     judged = {name: getattr(claim, name) for name in ("numbers", "beside", "verdicts", "verdict", "flips", "note")}
-    return told | {"runs": runs} | judged
+    return sealed | {"runs": runs} | judged
 
 
 def _run(scenario: Scenario) -> dict[str, Any]:
-    """Return what a reader wants to know of a run; its name is a hash of all that is."""
+    """Return a short description of a run. Its name is a hash of the whole scenario."""
     plant, suite = scenario.plant, plants().get(scenario.plant.name)
     changed = {
         name: value for name, value in plant.parameters.items() if not suite or suite.parameters.get(name) != value

@@ -70,7 +70,7 @@ def figure(
         ends = {-MAX_DECADES: f"≤ {10**-MAX_DECADES:g}", MAX_DECADES: f"≥ {10**MAX_DECADES:g}"}
         ticks = [float(k) for k in range(-round(MAX_DECADES), round(MAX_DECADES) + 1) if not narrow or k % 2 == 0]
         ax.set_xticks(ticks, [ends.get(k, f"{10.0**k:g}") for k in ticks])
-        names = [style.cropped(f"{MARKS[one.verdict]} {one.id}  {one.text}", room, letters) for one in claims]
+        names = [style.cropped(f"{MARKS[claim.verdict]} {claim.id}  {claim.text}", room, letters) for claim in claims]
         ax.set_yticks(range(len(claims)), names, fontsize=letters)
         for label, claim in zip(ax.get_yticklabels(), claims, strict=True):
             label.set_color(COLOURS[claim.verdict])
@@ -88,8 +88,8 @@ def draw(ax: Axes, row: int, claim: Claim) -> None:
     dot = {"marker": "o", "ls": "", "ms": style.points(5.5), "mec": colour, "mew": style.points(1.1), "clip_on": False}
     for k, name in enumerate(sets):
         y = row + SETS_SHARE * ((k + 0.5) / len(sets) - 0.5)
-        for one in claim.checks(name):
-            ax.plot(place(one), y, mfc=colour if one.holds else "none", **dot)
+        for check in claim.checks(name):
+            ax.plot(place(check), y, mfc=colour if check.holds else "none", **dot)
 
 
 def place(check: Check) -> float:

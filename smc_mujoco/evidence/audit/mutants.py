@@ -48,7 +48,7 @@ def survivors(
     """
     audited = as_paper(paper)
     tested = {entry.id: entry for entry in wanted(audited, only) if not entry.immune}
-    left = dict(tested)
+    kept = dict(tested)
     names = sets(audited, gains, quick)
 
     def measured(entries: Iterable[Entry], law: str, mutant: str) -> Iterator[tuple[str, str, Evidence | None]]:
@@ -66,16 +66,16 @@ def survivors(
                     yield entry.id, name, None
                 report(1)
 
-    intact = {(id, name): evidence for id, name, evidence in measured(left.values(), "", "")}
-    holding = {id: any(any(sentences(intact[id, name] or [], left[id].quantifier)) for name in names) for id in left}
+    intact = {(id, name): evidence for id, name, evidence in measured(kept.values(), "", "")}
+    holding = {id: any(any(sentences(intact[id, name] or [], kept[id].quantifier)) for name in names) for id in kept}
     for mutant in MUTANTS:
-        report((len(tested) - len(left)) * len(names))
-        for law in sorted({first_law(entry) for entry in left.values()}):
-            about = [entry for entry in left.values() if first_law(entry) == law]
+        report((len(tested) - len(kept)) * len(names))
+        for law in sorted({first_law(entry) for entry in kept.values()}):
+            about = [entry for entry in kept.values() if first_law(entry) == law]
             for id, name, evidence in measured(about, law, mutant):
-                if id in left and lost(left[id], intact[id, name] or [], evidence, holding[id]):
-                    del left[id]
-    return {id: KEPT if holding[id] else BLIND for id in left}
+                if id in kept and lost(kept[id], intact[id, name] or [], evidence, holding[id]):
+                    del kept[id]
+    return {id: KEPT if holding[id] else BLIND for id in kept}
 
 
 def evaluations(
@@ -103,4 +103,4 @@ def lost(entry: Entry, intact: Evidence, mutant: Evidence | None, holding: bool)
         return True
     if holding:
         return sum(sentences(mutant, entry.quantifier)) < sum(sentences(intact, entry.quantifier))
-    return [repr(one.value) for one in mutant] != [repr(one.value) for one in intact]  # repr: NaN equals NaN
+    return [repr(item.value) for item in mutant] != [repr(item.value) for item in intact]  # repr: NaN equals NaN

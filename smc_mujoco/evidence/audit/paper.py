@@ -185,7 +185,7 @@ class Paper:
         return find_condition(text)
 
     def law(self, plant: str, law: str, gains: str) -> Component:
-        """Return a law with the gains that a set has for a plant. A law of the paper's folder has its own for the rest.
+        """Return a law with the gains that a set has for a plant. A law of the paper's folder keeps its defaults.
 
         Raises:
           ScenarioError: an unknown law, set or gain, or a set that lacks gains of a law of the library.
@@ -207,11 +207,11 @@ class Paper:
         return made
 
     def _bound(self, law: str, gains: Mapping[str, float]) -> Component:
-        """Return a law with these gains, and its own for the rest."""
-        base, own = find("law", law, laws_known() | self.laws), {}
+        """Return a law with these gains, and its defaults for the rest."""
+        base, defaults = find("law", law, laws_known() | self.laws), {}
         if isinstance(base, Component):
-            base, own = base.template or base, base.gains
-        values = {**own, **gains}
+            base, defaults = base.template or base, base.gains
+        values = {**defaults, **gains}
         made = base.bind(values) if isinstance(base, Template) else dataclasses.replace(base, gains=values)
         return made.sourced(STUDY) if gains else made
 
@@ -223,7 +223,7 @@ def shipped() -> dict[str, Path]:
 
 
 class Home(NamedTuple):
-    """Where a paper is: its folder, and the name of the package that this folder is."""
+    """Where a paper is: its folder, and the name under which the folder is imported."""
 
     folder: Path
     package: str
@@ -294,7 +294,7 @@ def _package(folder: Path) -> str:
     """Make a package of a user's folder, so that its modules can be imported, and return its name."""
     package = ModuleType("paper_" + re.sub(r"\W", "_", folder.resolve().name))
     package.__path__ = [str(folder.resolve())]
-    for known in [one for one in sys.modules if one.partition(".")[0] == package.__name__]:
+    for known in [module for module in sys.modules if module.partition(".")[0] == package.__name__]:
         del sys.modules[known]
     sys.modules[package.__name__] = package
     importlib.invalidate_caches()
@@ -404,7 +404,7 @@ def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Pa
         if field not in data:
             what = "threshold" if field == "holds_if" else field
             raise ScenarioError(f"it has no {what}: write {field}, {CLAIM_FIELDS[field][1]}")
-    values = {field: _text(_typed(field, one, *CLAIM_FIELDS[field])) for field, one in data.items()}
+    values = {field: _text(_typed(field, value, *CLAIM_FIELDS[field])) for field, value in data.items()}
     values.setdefault("read", paper.read)
     names: dict[str, Any] = {field: _names(field, values.pop(field, [])) for field in ("plants", "laws", "conditions")}
     function = find(f"function of {CODE_FILE}", values.pop("function"), functions)
@@ -482,13 +482,13 @@ def _check_names(entry: Entry, paper: Paper) -> None:
 
 def _thresholds(conditions: Mapping[str, Any]) -> Iterator[Threshold]:
     """Yield the thresholds in a table: measure -> text, or {asked, sentence}."""
-    for measure, one in conditions.items():
-        if isinstance(one, dict):
-            for field in one:
+    for measure, threshold in conditions.items():
+        if isinstance(threshold, dict):
+            for field in threshold:
                 find(f"field of the threshold of {measure!r}", field, dict.fromkeys(("asked", "sentence")))
-            yield Threshold.read(measure, one.get("asked"), str(one.get("sentence", "")))
+            yield Threshold.read(measure, threshold.get("asked"), str(threshold.get("sentence", "")))
         else:
-            yield Threshold.read(measure, one)
+            yield Threshold.read(measure, threshold)
 
 
 def _sets(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -506,11 +506,11 @@ def _sets(data: Mapping[str, Any]) -> dict[str, Any]:
             continue
         of_set: dict[str, dict[str, Any]] = {}
         for law_or_plant, values in _typed(f"gains.{key}", tables[key], dict, "a table").items():
-            one = _typed(f"gains.{key}.{law_or_plant}", values, dict, "a table of gains")
-            if one and all(isinstance(value, dict) for value in one.values()):
-                of_set[law_or_plant] = one
+            table = _typed(f"gains.{key}.{law_or_plant}", values, dict, "a table of gains")
+            if table and all(isinstance(value, dict) for value in table.values()):
+                of_set[law_or_plant] = table
             else:
-                of_set.setdefault("", {})[law_or_plant] = one
+                of_set.setdefault("", {})[law_or_plant] = table
         for law in {law for laws in of_set.values() for law in laws}:
             name(f"a law in gains.{key}", law)
         sets[key] = of_set
@@ -571,8 +571,8 @@ def _table(data: Mapping[str, Any], field: str) -> Iterator[tuple[str, Any]]:
 def _names(field: str, value: object) -> tuple[str, ...]:
     """Return a list of names."""
     items = _typed(field, value, list, 'a list of names, as ["duffing"]')
-    for one in items:
-        name(f"an item of {field}", one)
+    for item in items:
+        name(f"an item of {field}", item)
     return tuple(items)
 
 

@@ -55,7 +55,7 @@ class Result(NamedTuple):
 
 
 class Used(NamedTuple):
-    """A run that a claim has used: its scenario, and a hash of its scores or of its trace, whatever was taken."""
+    """A run that a claim has used: its scenario, and hashes of the scores and of the trace that it read."""
 
     scenario: Scenario
     scores: str = ""
@@ -68,10 +68,10 @@ class Runs:
     Attributes:
       paper: whose plants, laws, conditions and gains they have.
       gains: the set, one of the paper's.
-      quick: whether a claim is to look at less: coarser grids, shorter runs.
+      quick: whether a claim measures less: coarser grids, shorter runs.
       threads: simulations at once.
       used: key -> run that the claim has used.
-      asked: measures whose thresholds the claim's function has asked for, see `check`.
+      checked: measures whose thresholds the claim's function has asked for, see `check`.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class Runs:
     ):
         self.paper, self.gains, self.quick, self.threads = paper, gains, quick, threads
         self.used: dict[str, Used] = {}
-        self.asked: set[str] = set()
+        self.checked: set[str] = set()
         self._entry: Entry | None = None
         self._searched: dict[str, dict[str, float]] = {}  # law -> gains in place of the set's
         self._substitute = substitute or {}
@@ -97,7 +97,7 @@ class Runs:
     def of(self, entry: Entry) -> "Runs":
         """Return these runs as a claim sees them: with its names and fields, and none used yet."""
         runs = copy.copy(self)
-        runs._entry, runs.used, runs.asked = entry, {}, set()
+        runs._entry, runs.used, runs.checked = entry, {}, set()
         return runs
 
     def at(self, law: str, gains: Mapping[str, float], quick: bool) -> "Runs":
@@ -135,7 +135,7 @@ class Runs:
     @property
     def thresholds(self) -> dict[str, Threshold]:
         """The claim's thresholds, by measure."""
-        return {one.measure: one for one in (self._entry.thresholds if self._entry else ())}
+        return {threshold.measure: threshold for threshold in (self._entry.thresholds if self._entry else ())}
 
     @property
     def values(self) -> Mapping[str, Any]:
@@ -154,7 +154,7 @@ class Runs:
           sentence: of the claim that it is about; default: that of the threshold.
         """
         threshold = find("threshold", measure, self.thresholds)
-        self.asked.add(measure)
+        self.checked.add(measure)
         return check(what, value, threshold.relation, threshold.limit * times, sentence or threshold.sentence)
 
     def law(self, plant: str, name: str, **gains: float) -> Component:
@@ -174,8 +174,8 @@ class Runs:
     ) -> Scenario:
         """Return the scenario of a plant under a law in a condition, with some of its fields changed.
 
-        The fields are the paper's, the condition's, the claim's and then the changes. A change of `plant` gives it
-        other parameters or another size; the gains stay those of its name.
+        The fields are the paper's, the condition's, the claim's and then the changes. A change of `plant` may have
+        other parameters or another size; the gains stay those of the named plant.
         """
         paper, entry = self.paper, self._entry
         machine = paper.plant(plant)

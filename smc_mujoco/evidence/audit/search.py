@@ -1,9 +1,9 @@
 """A search over the gains that a paper allows, for a claim about all of them or about some.
 
 What is said of all gains is refuted by one, and what is said of some is supported by one: the search stops there. It
-tries the gains of the set first, then points spread over the bounds, then points around the best of them; these points
-as a quick audit measures the claim, and the one that decides in full. There is no chance in it, so that a second audit
-comes to the same gains.
+tries the gains of the set first, then points spread over the bounds, then points around the best of them. It measures
+these points as a quick audit does, and the one that decides in full. Nothing is random, so a second audit comes to the
+same gains.
 """
 
 import dataclasses
@@ -38,8 +38,8 @@ class Tried(NamedTuple):
     @classmethod
     def of(cls, gains: Gains, evidence: Evidence) -> "Tried":
         """Return what a claim gave with these gains: first whether all its checks hold, then the least slack."""
-        checks = [one for one in evidence if isinstance(one, Check)]
-        rank = all(one.holds for one in checks), min((one.slack for one in checks), default=math.inf)
+        checks = [check for check in evidence if isinstance(check, Check)]
+        rank = all(check.holds for check in checks), min((check.slack for check in checks), default=math.inf)
         return cls(gains, evidence, rank)
 
 
@@ -50,8 +50,8 @@ def decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence]) -> E
     """
     if entry.over == "all" or len(entry.plants) == 1:
         return _decisive(entry, runs, measure, "")
-    each = [(one, dataclasses.replace(entry, plants=(one,))) for one in entry.plants]
-    return [check for plant, alone in each for check in _decisive(alone, runs.on(plant), measure, f"{plant}: ")]
+    entries = {plant: dataclasses.replace(entry, plants=(plant,)) for plant in entry.plants}
+    return [check for p, claim in entries.items() for check in _decisive(claim, runs.on(p), measure, f"{p}: ")]
 
 
 def _decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], prefix: str) -> Evidence:
@@ -63,22 +63,22 @@ def _decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], pre
 
     def decides(gains: Gains, quick: bool) -> bool:
         """Try gains, and return whether they decide: a counter-example to "all", or an example of "some"."""
-        one = Tried.of(gains, measure(runs.at(law, gains, quick or runs.quick)))
-        (quickly if quick else in_full).append(one)
-        return one.rank[0] != (entry.over == "all")
+        tried = Tried.of(gains, measure(runs.at(law, gains, quick or runs.quick)))
+        (quickly if quick else in_full).append(tried)
+        return tried.rank[0] != (entry.over == "all")
 
     def search() -> None:
         spread, near = (QUICK_SPREAD_SETS, QUICK_NEAR_SETS) if runs.quick else (SPREAD_SETS, NEAR_SETS)
         if any(decides(gains, True) for gains in theorem.points(theorem.allowed.bounds, spread)):
             return
-        centre = best(quickly, key=lambda one: one.rank).gains
+        centre = best(quickly, key=lambda tried: tried.rank).gains
         any(decides(gains, True) for gains in theorem.points(theorem.around(centre), near))
 
     start = {gain: theorem.rest[gain] for gain in theorem.allowed.bounds}
     if theorem.smallest(start) <= 0.0 or not decides(start, False):
         search()
-        decides(best(quickly, key=lambda one: one.rank).gains, False)
-    last = best(in_full, key=lambda one: one.rank)
+        decides(best(quickly, key=lambda tried: tried.rank).gains, False)
+    last = best(in_full, key=lambda tried: tried.rank)
     beside = [Beside(f"{prefix}decided at {gain}", value) for gain, value in last.gains.items()]
     beside += [Beside(f"{prefix}margin of {name}", value) for name, value in theorem.margins(last.gains).items()]
     return [*last.evidence, *beside, Beside(f"{prefix}sets of gains tried", len(quickly) + 1)]
@@ -103,7 +103,7 @@ class Theorem:
 
         low, high = np.log(list(bounds.values())).T
         drawn = qmc.Halton(len(bounds), scramble=False).random(DRAWN_POINTS)[1:]
-        sets = (dict(zip(bounds, np.exp(low + (high - low) * one).tolist(), strict=True)) for one in drawn)
+        sets = (dict(zip(bounds, np.exp(low + (high - low) * point).tolist(), strict=True)) for point in drawn)
         met = (gains for gains in sets if self.smallest(gains) > 0.0)
         first = next(met, None)
         if first is None:

@@ -47,7 +47,7 @@ RELATIONS: dict[str, Callable[[float, float], bool]] = {
 
 
 class Check(NamedTuple):
-    """A measured number against its limit: `value relation limit`. `sentence`: which of the claim's it is about."""
+    """A measured number against its limit: `value relation limit`. `sentence`: which one of the claim's."""
 
     what: str
     value: float
@@ -71,7 +71,7 @@ class Check(NamedTuple):
 
 
 class Beside(NamedTuple):
-    """A number that decides nothing: what theory says, or how a law does that the paper does not have."""
+    """A number without a threshold, such as a prediction, or the score of a law that the paper lacks."""
 
     what: str
     value: float
@@ -116,7 +116,7 @@ class Threshold(NamedTuple):
     Attributes:
       measure: the name of the number.
       text: the threshold as it was written.
-      relation, limit: what is asked of the number itself, or of its distance from the range.
+      relation, limit: required of the number itself, or of its distance from the range.
       low, high: the range; equal for "2 +- 0.1". None for a limit.
       sentence: which of the claim's sentences it is about.
     """
@@ -232,24 +232,24 @@ class Claim(Statement):
 
     def decisive(self, gains: str) -> Check | None:
         """Return the check that fails by most, else the one nearest to its limit; None without checks."""
-        return min(self.checks(gains), key=lambda one: (one.holds, one.slack), default=None)
+        return min(self.checks(gains), key=lambda check: (check.holds, check.slack), default=None)
 
     def decided(self, gains: str) -> str:
         """Return the decisive check in a line, that of a range by the number itself; the note without checks."""
-        if not (one := self.decisive(gains)):
+        if not (check := self.decisive(gains)):
             return self.note
-        what, apart, middle = one.what.partition(DISTANCE_WORDS)
+        what, apart, middle = check.what.partition(DISTANCE_WORDS)
         if not apart or what not in self.beside.get(gains, {}):
-            return str(one)
-        width = f" +- {one.limit:g}" if one.limit else ""
+            return str(check)
+        width = f" +- {check.limit:g}" if check.limit else ""
         return f"{what} = {measured(self.beside[gains][what], what)} ({middle}{width} asked)"
 
     def _repr_html_(self) -> str:
         lines = []
         for name in self.verdicts:
-            for one in self.checks(name):
-                value, limit = (measured(size, one.what) for size in (one.value, one.limit))
-                lines.append((name, "✓" if one.holds else "✗", one.what, value, f"{one.relation} {limit}"))
+            for check in self.checks(name):
+                value, limit = (measured(size, check.what) for size in (check.value, check.limit))
+                lines.append((name, "✓" if check.holds else "✗", check.what, value, f"{check.relation} {limit}"))
         about = f"{self.id}: {self.text} ({self.where}): {self.verdict}{', flips with the gains' * self.flips}"
         note = ". ".join(filter(None, (self.source, self.measured, f"It holds if: {self.holds_if}", self.note)))
         return html.table(("gains", "", "measured", "value", "asked"), lines, about, note, range(3, 5), max_rows=24)
@@ -314,11 +314,11 @@ def combined(
     kinds = set(verdicts.values())
     if len(kinds) == 1:
         return kinds.pop(), False, ""
-    each = ", ".join(f"{(answers or {}).get(kind, kind)} with {name} gains" for name, kind in verdicts.items())
+    by_set = ", ".join(f"{(answers or {}).get(kind, kind)} with {name} gains" for name, kind in verdicts.items())
     decisive = {UNIVERSAL: REFUTED, EXISTENTIAL: SUPPORTED}.get(quantifier)
     if decisive in kinds:
-        return str(decisive), True, f"The claim is {quantifier}, so that one set of gains decides: {each}."
-    return PARTLY, True, f"The verdict depends on the gains: {each}."
+        return str(decisive), True, f"The claim is {quantifier}, so that one set of gains decides: {by_set}."
+    return PARTLY, True, f"The verdict depends on the gains: {by_set}."
 
 
 def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
@@ -327,7 +327,7 @@ def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     answers = ANSWERS if statement.whose == OURS else None
     overall, flips, sentence = combined(verdicts, statement.quantifier, answers)
     if answers:
-        overall, verdicts = answers[overall], {name: answers[one] for name, one in verdicts.items()}
+        overall, verdicts = answers[overall], {name: answers[kind] for name, kind in verdicts.items()}
     shared = {field.name: getattr(statement, field.name) for field in dataclasses.fields(Statement)}
     return Claim(
         **shared | {"note": " ".join(filter(None, (statement.note, sentence)))},

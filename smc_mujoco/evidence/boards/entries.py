@@ -3,13 +3,13 @@
     s = b' P (z - z*) / R,    u = u* - k tanh(s / phi)
 
 z = (q1, q2, q1', q2') is the state, z*(t) and u*(t) a trajectory from hanging to upright, b(t) the input vector of the
-motion linearised along it, and P(t) the solution of its Riccati equation -P' = A'P + P A - P b b'P / R + Q, which ends
-in that of the upright equilibrium. After the trajectory all of them stay as they are there, and the same law balances.
+motion linearised along it, and P(t) the solution of its Riccati equation -P' = A'P + P A - P b b'P / R + Q, whose end
+is that of the upright equilibrium. After the trajectory all of them keep their last values, and the law balances.
 
 The entry's feedback is 1.5 s near the trajectory and bends where |s| nears phi; u = u* - s is the linear-quadratic
 regulator. `FEEDBACKS` has three others, as control experiments. docs/boards.md tells what they say about the entry.
 
-`trajectories/` has z*, u*, z*'' and b'P/R of each robot, and how they were found; benchmarks/swing_up.py finds them
+`trajectories/` has z*, u*, z*'' and b'P/R of each robot, and how they were computed; benchmarks/swing_up.py does it
 again. The entry's velocities are those of a Savitzky-Golay filter of 5 positions; the published entries use measured
 ones, so every feedback has a row with each.
 Sources: R. E. Kalman, Contributions to the theory of optimal control, Boletin de la Sociedad Matematica Mexicana 5:102,

@@ -113,10 +113,10 @@ class Robustness:
 
 def cases(key: int = 0) -> list[Case]:
     """Return every run of the test, in order, with the pulses of a noise key. Runs of one level stand together."""
-    ramp, made = np.linspace(0.75, 1.25, LEVELS), list[Case]()
+    ramp, listed = np.linspace(0.75, 1.25, LEVELS), list[Case]()
 
     def model(name: str, value: float, **parameters: float) -> None:
-        made.append(Case(test="model", name=name, value=value, parameters=parameters))
+        listed.append(Case(test="model", name=name, value=value, parameters=parameters))
 
     for value in np.linspace(0.0, 1e-4, LEVELS):
         model("Ir", float(value), Ir=float(value))
@@ -131,16 +131,16 @@ def cases(key: int = 0) -> list[Case]:
         for level, value in enumerate(map(float, np.linspace(0.0, largest, LEVELS))):
             for repeat in range(REPEATS):
                 noise: dict[str, Any] = {test: value}
-                made.append(Case(test=test, name=test, value=value, seed=level * REPEATS + repeat, **noise))
+                listed.append(Case(test=test, name=test, value=value, seed=level * REPEATS + repeat, **noise))
     for value in map(float, np.linspace(0.1, 2.0, LEVELS)):
-        made.append(Case(test="torque_response", name="torque_response", value=value, response=value))
-    for late in range(LEVELS):
-        made.append(Case(test="delay", name="delay", value=late * STEP, delay=late))
+        listed.append(Case(test="torque_response", name="torque_response", value=value, response=value))
+    for periods in range(LEVELS):
+        listed.append(Case(test="delay", name="delay", value=periods * STEP, delay=periods))
     rng = np.random.default_rng([SEED, key])
     for profile in range(PROFILES):
         pulses = _pulses(rng)
-        made.append(Case(test="perturbations", name="perturbations", value=float(profile), pulses=pulses))
-    return made
+        listed.append(Case(test="perturbations", name="perturbations", value=float(profile), pulses=pulses))
+    return listed
 
 
 def _pulses(rng: np.random.Generator) -> tuple[tuple[float, float, float], ...]:
@@ -256,10 +256,10 @@ def _simulate(
     states, torque,
 ):  # fmt: skip
     """Run a case; states and torque are written. Return whether the law or its estimator raised an exception."""
-    at = (true[0], true[1], true[2], true[3], true[4], true[5], true[6], true[7], true[8], true[9], true[10],
-          true[11], true[12], true[13])  # fmt: skip
+    parameters = (true[0], true[1], true[2], true[3], true[4], true[5], true[6], true[7], true[8], true[9], true[10],
+                  true[11], true[12], true[13])  # fmt: skip
     y, reading, estimate, control = np.zeros(MEASUREMENT_SIZE), np.zeros(3), np.zeros(2), np.zeros(2)
-    x, last, free = (0.0, 0.0, 0.0, 0.0), 0.0, 1 - driven
+    x, motor, free = (0.0, 0.0, 0.0, 0.0), 0.0, 1 - driven
     position, velocity = np.zeros(2), np.zeros(2)
     for k in range(len(torque)):
         seen = states[max(0, k - delay)]
@@ -279,16 +279,16 @@ def _simulate(
         y[Q], y[DQ], y[F], y[G], y[FQ], y[GQ] = position[free], velocity[free], f, g, fq, W12
         if call(functions[0], y.ctypes.data, gains.ctypes.data, memory.ctypes.data, control.ctypes.data) != 0:
             return True
-        last += response * (min(max(control[0], -limit), limit) - last)
-        last = min(max(last + noise[k, 2], -limit), limit)
-        u = last + pulse[k]
+        motor += response * (min(max(control[0], -limit), limit) - motor)
+        motor = min(max(motor + noise[k, 2], -limit), limit)
+        u = motor + pulse[k]
         u1, u2 = (u, 0.0) if driven == 0 else (0.0, u)
-        k1 = _slope(x, u1, u2, at)
-        k2 = _slope(_moved(x, k1, STEP / 2), u1, u2, at)
-        k3 = _slope(_moved(x, k2, STEP / 2), u1, u2, at)
-        k4 = _slope(_moved(x, k3, STEP), u1, u2, at)
+        k1 = _slope(x, u1, u2, parameters)
+        k2 = _slope(_moved(x, k1, STEP / 2), u1, u2, parameters)
+        k3 = _slope(_moved(x, k2, STEP / 2), u1, u2, parameters)
+        k4 = _slope(_moved(x, k3, STEP), u1, u2, parameters)
         x = _moved(_moved(_moved(_moved(x, k1, STEP / 6), k2, STEP / 3), k3, STEP / 3), k4, STEP / 6)
-        torque[k] = last
+        torque[k] = motor
         states[k + 1, 0], states[k + 1, 1], states[k + 1, 2], states[k + 1, 3] = x
         if not abs(x[2]) + abs(x[3]) < 1e6:
             states[k + 1 :] = math.inf

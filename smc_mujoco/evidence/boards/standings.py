@@ -47,7 +47,7 @@ def experiments(robot: str) -> dict[str, Scenario]:
       ScenarioError: another robot than pendubot and acrobot.
     """
     rows = {f"trajectory + {feedback}": entry(robot, feedback) for feedback in FEEDBACKS}
-    measured = {name + MEASURED_MARK: dataclasses.replace(each, velocity="measured") for name, each in rows.items()}
+    measured = {name + MEASURED_MARK: dataclasses.replace(run, velocity="measured") for name, run in rows.items()}
     return rows | measured
 
 
@@ -65,7 +65,7 @@ def board(runs: Trace | Mapping[str, Trace], name: str = NAME) -> tuple[Row, ...
     traces = runs if isinstance(runs, Mapping) else {name: runs}
     robot = next(iter(traces.values())).scenario.plant.name
     shoulder_first(robot)
-    rows = [_row(_new_name(each, SIMULATION[robot]["v2"]), trace, robot) for each, trace in traces.items()]
+    rows = [_row(_new_name(label, SIMULATION[robot]["v2"]), trace, robot) for label, trace in traces.items()]
     return tuple(sorted((*SIMULATION[robot]["v2"], *rows), key=lambda row: -row.score))
 
 
@@ -97,8 +97,8 @@ def robustness_board(
     shoulder_first(robot)
     named = results if isinstance(results, Mapping) else {name: results}
     rows = [
-        RobustnessRow(name=_new_name(each, ROBUSTNESS[robot]), score=result.score, **result.percent)
-        for each, result in named.items()
+        RobustnessRow(name=_new_name(label, ROBUSTNESS[robot]), score=result.score, **result.percent)
+        for label, result in named.items()
     ]
     return tuple(sorted((*ROBUSTNESS[robot], *rows), key=lambda row: -row.score))
 

@@ -44,8 +44,8 @@ def board(
     if robustness:
         with bar(f"robustness of {robot}") as drawn:
             results = {
-                name: boards.robustness(each, lambda done, all, i=i: drawn.reached(i * all + done, len(rows) * all))
-                for i, (name, each) in enumerate(rows.items())
+                name: boards.robustness(scenario, lambda done, all, i=i: drawn.reached(i * all + done, len(rows) * all))
+                for i, (name, scenario) in enumerate(rows.items())
             }
         terminal.print(tables.board(robot, boards.robustness_board(robot, results), rows))
     trace = traces[boards.NAME]

@@ -89,7 +89,7 @@ def claims(
     writable(out, evidence and ended(evidence, ".json"), badge and ended(badge, ".svg"))
     with bar("claims", evaluations(ids or None, sets, quick, about), counted=True) as drawn:
         done = audit(about, ids or None, sets, quick, threads, table=known, report=drawn.advance)
-    written = [one for one in (evidence and done.save(evidence), badge and done.badge(badge)) if one]
+    written = [path for path in (evidence and done.save(evidence), badge and done.badge(badge)) if path]
     text = document(done.claims)
     if out:
         with replacing(out) as file:

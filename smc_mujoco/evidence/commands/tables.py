@@ -57,10 +57,10 @@ def certificate(made: Certificate) -> Table:
     columns = [Column("condition", no_wrap=True), Column("holds"), Column("margin", justify="right"), Column("")]
     table = titled(f"{made.law} on {made.plant}", Column("theorem", no_wrap=True), *columns, pad_edge=False)
     seen = ""
-    for one in made.conditions:
-        theorem, seen = one.theorem if one.theorem != seen else "", one.theorem
-        mark = Text("yes", style="blue") if one.holds else Text("no", style="red")
-        table.add_row(theorem, one.name, mark, f"{number(one.margin)} {one.unit}".strip(), one.words)
+    for row in made.conditions:
+        theorem, seen = row.theorem if row.theorem != seen else "", row.theorem
+        mark = Text("yes", style="blue") if row.holds else Text("no", style="red")
+        table.add_row(theorem, row.name, mark, f"{number(row.margin)} {row.unit}".strip(), row.words)
     return table
 
 
@@ -121,10 +121,10 @@ def _print_claim(claim: Claim, console: Console) -> None:
         columns = Column(no_wrap=True), "", Column(justify="right", no_wrap=True), Column(no_wrap=True)
         title = Text(f"{name} gains: {verdict}", style=COLOURS[verdict])
         table = plain(*columns, title=title, title_justify="left")
-        for one in claim.checks(name):
-            mark = Text("✓", COLOURS[verdicts.SUPPORTED]) if one.holds else Text("✗", COLOURS[verdicts.REFUTED])
-            limit = f"{one.relation} {verdicts.measured(one.limit, one.what)}"
-            table.add_row(mark, Text(one.what), verdicts.measured(one.value, one.what), limit)
+        for check in claim.checks(name):
+            mark = Text("✓", COLOURS[verdicts.SUPPORTED]) if check.holds else Text("✗", COLOURS[verdicts.REFUTED])
+            limit = f"{check.relation} {verdicts.measured(check.limit, check.what)}"
+            table.add_row(mark, Text(check.what), verdicts.measured(check.value, check.what), limit)
         for what, value in claim.beside[name].items():
             table.add_row("", Text(what, style="dim"), Text(verdicts.measured(value, what), style="dim"), "")
         console.print(Padding(table, (0, 0, 1, 2)))

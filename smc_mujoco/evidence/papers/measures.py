@@ -23,7 +23,7 @@ def late_step(signal: np.ndarray) -> float:
 def exponent(levels: Sequence[float], errors: Iterable[float]) -> float:
     """Return p of errors ~ levels^p by least squares of the logarithms; NaN for errors that are 0 or not finite.
 
-    Errors are in the order of the levels, as many at each; they are averaged by their logarithm.
+    Errors are in the order of the levels, as many at each. Their logarithms are averaged.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         logs = np.log(np.reshape(list(errors), (len(levels), -1))).mean(axis=1)

@@ -65,9 +65,9 @@ class About:
         """Condition -> the Scenario fields that it sets, in words."""
         texts = {}
         for name in self.plan.conditions:
-            each = {words.plant(p): _fields(scenarios.fields(name, p, self.plan.duration)) for p in self.plan.plants}
-            same = len(set(each.values())) == 1
-            texts[name] = next(iter(each.values())) if same else "; ".join(f"{p}: {text}" for p, text in each.items())
+            fields = {words.plant(p): _fields(scenarios.fields(name, p, self.plan.duration)) for p in self.plan.plants}
+            same = len(set(fields.values())) == 1
+            texts[name] = next(iter(fields.values())) if same else "; ".join(f"{p}: {t}" for p, t in fields.items())
         return texts
 
     @functools.cached_property

@@ -66,15 +66,15 @@ class Pick(NamedTuple):
 class Loss(NamedTuple):
     """A cell in which another law is better than the paper's.
 
-    `own`, `rival`: medians of the paper's law and of the best law. `times`: own over rival; where the rival's is less
-    than the least difference that counts, own over that difference, a lower bound (`rounded`). `settles`: whether the
-    best law settles there: a law that hardly acts may be calm, and never arrive.
+    `median`, `rival`: medians of the paper's law and of the best law. `times`: their ratio; where the rival's is less
+    than the least difference that counts, the ratio to that difference, a lower bound (`rounded`). `settles`: whether
+    the best law settles there: a law that hardly acts may be calm, and never arrive.
     """
 
     metric: str
     plant: str
     condition: str
-    own: float
+    median: float
     rival: float
     law: str
     times: float
@@ -153,7 +153,7 @@ def losses(by_cell: Cells, metrics: Sequence[str], law: str = words.PAPER_LAW) -
                 metric=metric,
                 plant=plant,
                 condition=condition,
-                own=score.median,
+                median=score.median,
                 rival=best.median,
                 law=best.law,
                 times=score.median / max(best.median, resolution),
@@ -174,8 +174,8 @@ def pick(findings: "Findings", metric: str, plant: str = "") -> Pick | None:
     """Return the law that is beaten in the fewest conditions; "" for all plants.
 
     Of several such laws it is the one with the fewest runs that fail, then by mean rank. If no law is beaten anywhere,
-    none is named. Laws that settle in less than half as many runs as the law that settles in the most are left out: to
-    do nothing would be calm. None for a metric without numbers.
+    none is named. Laws that settle in less than half as many runs as the law that settles in the most are left out: a
+    law that does nothing is calm. None for a metric without numbers.
     """
     here = [place for place in findings.places if place.plant == plant]
     settled = {place.law: place.median for place in here if place.metric == SETTLES}
@@ -193,8 +193,8 @@ def pick(findings: "Findings", metric: str, plant: str = "") -> Pick | None:
 
 def attacked(findings: "Findings") -> dict[str, WorstCases]:
     """Return plant -> the worst cases found there, the least bad law first."""
-    plants = dict.fromkeys(one.nominal.plant.name for one in findings.worst)
-    return {plant: WorstCases(one for one in findings.worst if one.nominal.plant.name == plant) for plant in plants}
+    plants = dict.fromkeys(case.nominal.plant.name for case in findings.worst)
+    return {plant: WorstCases(case for case in findings.worst if case.nominal.plant.name == plant) for plant in plants}
 
 
 # sentences
@@ -203,17 +203,17 @@ def attacked(findings: "Findings") -> dict[str, WorstCases]:
 def robust(attacked: Mapping[str, WorstCases]) -> str:
     """Return which law has the smallest error in the worst case on each plant, and where it is not first by median."""
     first = [rows[0] for rows in attacked.values()]
-    lowest = [min(rows, key=lambda one: one.median) for rows in attacked.values()]
-    others = [one for one in lowest if one not in first]
+    lowest = [min(rows, key=lambda case: case.median) for rows in attacked.values()]
+    others = [case for case in lowest if case not in first]
     text = f"smallest rms error found (in brackets its median): {'; '.join(map(_both, first))}."
     return text + f" First by the median alone: {'; '.join(map(_both, others))}." * bool(others)
 
 
-def _both(one: WorstCase) -> str:
+def _both(case: WorstCase) -> str:
     """Return law, plant, worst found and median."""
-    median = f"{one.shown(one.median)} {one.unit * (one.median < math.inf)}".strip()
-    law, plant = words.law(one.nominal.law.name), words.plant(one.nominal.plant.name)
-    return f"{law} on {plant} {one.words} ({median})"
+    median = f"{case.shown(case.median)} {case.unit * (case.median < math.inf)}".strip()
+    law, plant = words.law(case.nominal.law.name), words.plant(case.nominal.plant.name)
+    return f"{law} on {plant} {case.words} ({median})"
 
 
 def verdict(findings: "Findings", metrics: Sequence[str]) -> str:

@@ -207,7 +207,7 @@ def _accuracy(row: "Accuracy", named: bool) -> list[dict[str, Any]]:
     traces = [common | line | {"y": rounded(row.e.largest), "name": name, "showlegend": named, "hovertemplate": hover}]
     if row.e.theory is not None and not math.isnan(row.e.order):
         middle = len(h) // 2
-        bound = [row.e.largest[middle] * (one / h[middle]) ** row.e.theory for one in h]
+        bound = [row.e.largest[middle] * (ms / h[middle]) ** row.e.theory for ms in h]
         dashed = {"mode": "lines", "line": {"color": colour, "width": 1, "dash": "dash"}, "hoverinfo": "skip"}
         traces.append(common | dashed | {"y": rounded(bound), "showlegend": False})
     return traces
@@ -217,7 +217,7 @@ def curves(scene: Scene) -> Figure:
     """Draw x and u of every law over time. Where u chatters, a band is its range and the line its running mean."""
     left, right = panels(1, 2, (0.075, 0))
     extremes = [np.concatenate([c.u, c.low, c.high]) for c in scene.curves]
-    bound = 1.08 * (max((float(np.abs(each).max()) for each in extremes if each.size), default=0.0) or scene.u_max)
+    bound = 1.08 * (max((float(np.abs(u).max()) for u in extremes if u.size), default=0.0) or scene.u_max)
     time, zero = {"title": {"text": "t, s"}}, {"zeroline": True, "zerolinecolor": style.RULE}
     angle, force = ("angle", "N·m") if scene.unit == "rad" else ("position", "N")
     layout: dict[str, Any] = left.axes(time, zero)

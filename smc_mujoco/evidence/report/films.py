@@ -121,7 +121,7 @@ def missing() -> str | None:
 
 
 def save(made: tuple[bytes, bytes], path: Path) -> None:
-    """Write a film and, before it, its picture beside it."""
+    """Write the picture of a film, then the film beside it."""
     film, poster = made
     for data, file in ((poster, path.with_suffix(".jpg")), (film, path)):
         with replacing(file) as part:

@@ -55,11 +55,11 @@ def oscillations(work: Work) -> tuple[Oscillation, ...]:
             work.folder / f"chattering-{plant}.json",
             [plan.laws, LAG, DURATION, GAINS],
             lambda: _on(plant, plan.laws, work.threads, report),
-            lambda rows, path: write_json(path, [dataclasses.asdict(one) for one in rows]),
+            lambda rows, path: write_json(path, [dataclasses.asdict(row) for row in rows]),
             lambda path: [Oscillation(**entry) for entry in read_json(path)],
         )
 
-    return tuple(one for rows in work.each("chattering", "plants", plan.plants, compute) for one in rows)
+    return tuple(row for rows in work.each("chattering", "plants", plan.plants, compute) for row in rows)
 
 
 def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) -> list[Oscillation]:
@@ -92,13 +92,13 @@ def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) 
 
 def sentence(rows: tuple[Oscillation, ...]) -> str:
     """Return in a sentence how many limit cycles were predicted, how many were found, and how large the error is."""
-    both = [one for one in rows if not math.isnan(one.error)]
-    calm = sum(math.isnan(one.amplitude) and math.isnan(one.measured_amplitude) for one in rows)
+    both = [row for row in rows if not math.isnan(row.error)]
+    calm = sum(math.isnan(row.amplitude) and math.isnan(row.measured_amplitude) for row in rows)
     text = f"Of {len(rows)} pairs of plant and law {len(both)} are predicted to oscillate and do; {calm} do neither"
     if wrong := len(rows) - len(both) - calm:
         text += f"; for {wrong} prediction and run disagree"
     if not both:
         return f"{text}."
-    errors = [abs(one.error) for one in both]
+    errors = [abs(row.error) for row in both]
     median, largest = statistics.median(errors), max(errors)
     return f"{text}. The median error of the predicted amplitude is {median:.2g} %, the largest {largest:.0f} %."

@@ -127,9 +127,9 @@ def checks(sets: Sequence[str], claim: Claim) -> list[SimpleNamespace]:
     """
     rows = []
     its_checks = pivot((c.what, name, c) for name in sets if name in claim.numbers for c in claim.checks(name))
-    for what, its in its_checks.items():
-        limits = {f"{words.pretty(check.relation)} {words.number(check.limit)}" for check in its.values()}
-        rows.append(SimpleNamespace(what=what, checks=its, must=limits.pop() if len(limits) == 1 else ""))
+    for what, by_set in its_checks.items():
+        limits = {f"{words.pretty(check.relation)} {words.number(check.limit)}" for check in by_set.values()}
+        rows.append(SimpleNamespace(what=what, checks=by_set, must=limits.pop() if len(limits) == 1 else ""))
     return sorted(rows, key=lambda row: all(check.holds for check in row.checks.values()))
 
 

@@ -98,8 +98,8 @@ def gains(done: Audit, name: str) -> dict[tuple[str, str], list[str]]:
     """Return (law, its gains in words) -> the plants on which runs under a set of gains had them."""
     plants: dict[tuple[str, str], list[str]] = {}
     for sets in done.used.values():
-        for one in sets.get(name, {}).values():
-            law, plant = one.scenario.law, words.plant(one.scenario.plant.name)
+        for run in sets.get(name, {}).values():
+            law, plant = run.scenario.law, words.plant(run.scenario.plant.name)
             values = ", ".join(f"{gain} = {number(value)}" for gain, value in law.gains.items())
             on = plants.setdefault((law.name, values), [])
             if plant not in on:

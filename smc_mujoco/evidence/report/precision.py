@@ -42,7 +42,7 @@ def sentences(table: AccuracyTable) -> Iterator[str]:
     """Yield a sentence for each plant and condition: how many laws have the promised order."""
     for title, rows in table.groups.items():
         promised = [row.s for row in rows if row.s.theory is not None]
-        kept = sum(one.as_promised for one in promised)
+        kept = sum(order.as_promised for order in promised)
         plant, _, condition = title.partition(", ")
         yield (
             f"{words.plant(plant)}, {condition}: the order of s is within {ORDER_BAND:g} of theory’s for {kept} of "

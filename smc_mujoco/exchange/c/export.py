@@ -180,11 +180,11 @@ def _head(law: Component, numbers: str, slots: int, joints: int, code: str, size
     ours = template is not None and template.function is law.function
     doc = template.doc if template is not None and ours else inspect.cleandoc(law.function.__doc__ or "")
     gains = ", ".join(f"{name} = {gain_text(value)}" for name, value in law.gains.items()) or "none"
-    many, each = (f" of {joints} joints", "joint") if joints else ("", "channel")
+    many, unit = (f" of {joints} joints", "joint") if joints else ("", "channel")
     facts = {
         "gains": f"{gains}; gains[] in this order" + f", {joints} numbers each" * bool(joints),
         "numbers": {"q15": "words of 16 bits, sums of 32, and double where they meet the plant"}.get(numbers, numbers),
-        "state": f"{slots * NUMBER_BYTES[numbers]} bytes a {each}, memory[{slots * max(joints, 1)}]; no static data "
+        "state": f"{slots * NUMBER_BYTES[numbers]} bytes a {unit}, memory[{slots * max(joints, 1)}]; no static data "
         "but constants, no malloc",
         **({"reads": ", ".join(dict.fromkeys(re.findall(r"->(?!plant)(\w+)", code)))} if joints else {}),
         **({"code": size} if size else {}),

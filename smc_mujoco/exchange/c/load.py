@@ -42,7 +42,7 @@ DEFAULT_MEMORY = 8
 class CLaw(AtAddress):
     """A law in C: called by its address in the callback, and through ctypes in the reference loop.
 
-    Two laws are equal if their machine code is, and so file, headers, flags and compiler.
+    Two laws are equal if their machine code is: from the same file, headers, flags and compiler.
 
     Attributes:
       joints: for how many joints it is; 0 for a law of one channel.
@@ -78,8 +78,8 @@ class CLaw(AtAddress):
             self.joints, lambda w: y.dynamics.coriolis(np.array(w)).tolist(), lambda: y.dynamics.jacobian().ravel()
         )
         numbers = sandbox.stored(y[:3], requests, [np.ravel(getattr(y, name)).tolist() for name in ARRAYS])
-        each = [n for g in gains for n in np.broadcast_to(g, self.joints).tolist()]
-        out = self._out(numbers, each, memory, 2 * len(y.x))
+        numbers_of_gains = [n for g in gains for n in np.broadcast_to(g, self.joints).tolist()]
+        out = self._out(numbers, numbers_of_gains, memory, 2 * len(y.x))
         return np.array(out[: self.joints]), np.array(out[self.joints :])
 
     def _out(self, y: Sequence[float], gains: Sequence[float], memory: np.ndarray, count: int) -> list[float]:
@@ -304,8 +304,8 @@ def _about(
         errors.find(f"gain of {file}", name, stated)
     for name, gain in named.items():
         if isinstance(gain.default, tuple) and len(gain.default) != joints:
-            each = f", or {joints}" * bool(joints)
-            raise ScenarioError(f"gain {name} of {file} is {gain_text(gain.default)}: give it one number{each}")
+            choice = f", or {joints}" * bool(joints)
+            raise ScenarioError(f"gain {name} of {file} is {gain_text(gain.default)}: give it one number{choice}")
     for name in filter(None, facts.get("smc_law_shared", "").split(",")):
         gain = errors.find(f"shared gain of {file}", name, named)
         if isinstance(gain.default, tuple):

@@ -96,13 +96,13 @@ def call(
     from smc_mujoco.control.component import gain_at
     from smc_mujoco.exchange.c import build
 
-    calls, unseen, name, each = build.fresh(".calls"), [], library.path.name, max(1, joints)
+    calls, unseen, name, channels = build.fresh(".calls"), [], library.path.name, max(1, joints)
     anchor, data = build.static_data(library.file, library.symbol)
     if not data:
         unseen.append(f"{name}: static data that it changes is not seen, as nm shows no names of it")
-    numbers = [gain_at(gain, i) for gain in gains for i in range(each)]
-    order = {"fields": fields, "gains": numbers, "memory": memory, "modelled": modelled, "joints": joints, "each": each}
-    _run(library, order | {"calls": str(calls), "anchor": anchor, "data": data})
+    numbers = [gain_at(gain, i) for gain in gains for i in range(channels)]
+    order = {"fields": fields, "gains": numbers, "memory": memory, "modelled": modelled, "joints": joints}
+    _run(library, order | {"channels": channels, "calls": str(calls), "anchor": anchor, "data": data})
     if why := _sanitize(library, calls, len(gains), memory):
         unseen.append(f"{name} is tried without address and undefined-behaviour sanitizers: {why}")
     calls.unlink()
@@ -249,7 +249,7 @@ class Fenced:
     def __init__(self, values, guard: float = GUARD_VALUE):
         edge = [guard] * GUARD_COUNT
         self.whole = doubles([*edge, *values, *edge])
-        self.own = (ctypes.c_double * len(values)).from_buffer(self.whole, 8 * GUARD_COUNT)
+        self.values = (ctypes.c_double * len(values)).from_buffer(self.whole, 8 * GUARD_COUNT)
         self.before = self.guards()
 
     def guards(self) -> bytes:
@@ -267,7 +267,7 @@ class Trial:
 
     Args:
       law, library: as returned by `entry`.
-      order: fields, memory, modelled and joints as in `call`; "each", the number of channels; "gains", each gain's
+      order: fields, memory, modelled and joints as in `call`; "channels", their number; "gains", each gain's
         number for each channel; "data" and "anchor", the static data and the law's address in the file.
       calls: an open file for the gains and the measurement of each call, which `replay.c` reads.
     """
@@ -275,15 +275,15 @@ class Trial:
     def __init__(self, law, library, order, calls):
         self.law, self.library, self.calls = law, library, calls
         self.fields, self.size, self.modelled = order["fields"], order["memory"], order["modelled"]
-        self.joints, self.each = order["joints"], order["each"]
-        self.requests = Requests(self.joints, lambda w: [0.1 * one for one in w], self.jacobian)
+        self.joints, self.channels = order["joints"], order["channels"]
+        self.requests = Requests(self.joints, lambda w: [0.1 * element for element in w], self.jacobian)
         base = ctypes.cast(law, ctypes.c_void_p).value - order["anchor"]
         self.data = [(name, base + place, size) for name, place, size in order["data"]]
         self.data_before = self.static_data()
-        self.y, self.out = Fenced(self.measurement([{}] * self.each)), Fenced([0.0] * (2 * self.each))
+        self.y, self.out = Fenced(self.measurement([{}] * self.channels)), Fenced([0.0] * (2 * self.channels))
         self.gains = Fenced(order["gains"], math.nan)  # u is NaN if the law reads more gains than it has
         self.gains_before = bytes(self.gains.whole)
-        calls.write(bytes(self.gains.own))
+        calls.write(bytes(self.gains.values))
         self.random, self.arithmetic = random.Random(0), Arithmetic()
 
     def all(self) -> None:
@@ -296,29 +296,29 @@ class Trial:
         for e in (-1e6, -1e3, 0.0, 1e3, 1e6):
             for de in (-1e6, 0.0, 1e6):
                 far = {"dt": 1e-3, "x": e, "v": de, "e": e, "de": de, "g": 1.0, "limit": 6.0, "model": 1.0}
-                self.call(self.measurement([far] * self.each), self.state())
+                self.call(self.measurement([far] * self.channels), self.state())
         self.check_static_data()
 
     def run(self, model: float, surfaced: float, x0: float, steps: int) -> None:
         """Make a run with measurement noise and a sine as reference. After `steps` the time grows geometrically."""
-        xs, vs, dt, memory = [x0 - 0.1 * i for i in range(self.each)], [0.0] * self.each, 1e-3, self.state()
+        xs, vs, dt, memory = [x0 - 0.1 * i for i in range(self.channels)], [0.0] * self.channels, 1e-3, self.state()
         for k in range(steps + LATER_STEPS):
             t, seen = dt * (k if k < steps else steps * TIME_RATIO ** (k - steps)), []
             r, dr, ddr = 0.1 * math.sin(t), 0.1 * math.cos(t), -0.1 * math.sin(t)
             for x, v in zip(xs, vs, strict=True):
                 e, de = x + self.random.gauss(0.0, 1e-3) - r, v + self.random.gauss(0.0, 1e-2) - dr
-                one = {"t": t, "dt": dt, "x": e + r, "v": de + dr, "e": e, "de": de, "r": r, "dr": dr, "ddr": ddr}
-                one |= {"g": 1.0, "a": ddr, "limit": 6.0, "model": model, "q": 0.1 * e, "gq": 1.0}
+                channel = {"t": t, "dt": dt, "x": e + r, "v": de + dr, "e": e, "de": de, "r": r, "dr": dr, "ddr": ddr}
+                channel |= {"g": 1.0, "a": ddr, "limit": 6.0, "model": model, "q": 0.1 * e, "gq": 1.0}
                 if surfaced:
-                    one |= {"has_surface": 1.0, "s": de + 2.0 * e, "v_eq": -2.0 * de}
-                seen.append(one)
-            y, before = self.measurement(seen), bytes(memory.own)
+                    channel |= {"has_surface": 1.0, "s": de + 2.0 * e, "v_eq": -2.0 * de}
+                seen.append(channel)
+            y, before = self.measurement(seen), bytes(memory.values)
             code, us, ss = self.call(y, memory)
-            for i, (one, u, s) in enumerate(zip(seen, us, ss, strict=True)):
+            for i, (channel, u, s) in enumerate(zip(seen, us, ss, strict=True)):
                 if code != 0 or not (math.isfinite(u) and math.isfinite(s)):
                     self.check_gains(y, before)
                     what, joint = code or f"u = {u}, s = {s}", f" of joint {i}" * bool(self.joints and not code)
-                    where = f"t = {t:g}, e = {one['e']:g}, de = {one['de']:g}"
+                    where = f"t = {t:g}, e = {channel['e']:g}, de = {channel['de']:g}"
                     raise Fault(f"returned {what}{joint} at {where}: fix it, or the gains")
             if k % 50 == 0:
                 self.check_static_data()
@@ -336,7 +336,7 @@ class Trial:
             return [seen[0].get(name, 0.0) for name in self.fields]
         M = [1.0 if i == j else MASS_COUPLING for i in range(self.joints) for j in range(self.joints)]
         known = {"M": M, "h": [0.0] * self.joints, "g": [0.0] * self.joints}
-        arrays = [known.get(name) or [one.get(name, 0.0) for one in seen] for name in self.fields]
+        arrays = [known.get(name) or [channel.get(name, 0.0) for channel in seen] for name in self.fields]
         return stored([seen[0].get(name, 0.0) for name in ("t", "dt", "model")], self.requests, arrays)
 
     def jacobian(self) -> list[float]:
@@ -345,7 +345,7 @@ class Trial:
 
     def state(self, saved: bytes = b"") -> Fenced:
         """Return a memory of zeros, or with saved content."""
-        count = self.size * self.each
+        count = self.size * self.channels
         return Fenced(struct.unpack(f"{count}d", saved) if saved else [0.0] * count)
 
     def call(self, y: list[float], memory: Fenced) -> tuple[int, list[float], list[float]]:
@@ -355,9 +355,9 @@ class Trial:
 
     def law_at(self, y: list[float], memory: Fenced) -> tuple[int, list[float], list[float]]:
         """Return the law's code, u and s. Raise Fault if it writes anything but memory and out."""
-        self.y.own[:], self.out.own[:] = y, [math.nan] * len(self.out.own)
+        self.y.values[:], self.out.values[:] = y, [math.nan] * len(self.out.values)
         y_before = bytes(self.y.whole)
-        code = self.law(self.y.own, self.gains.own, memory.own, self.out.own)
+        code = self.law(self.y.values, self.gains.values, memory.values, self.out.values)
         if memory.crossed():
             code = OVERRUN
         elif self.out.crossed():
@@ -369,7 +369,7 @@ class Trial:
             raise Fault(f"{what.format(self.size)}: {cure}")
         if bytes(self.gains.whole) != self.gains_before or bytes(self.y.whole) != y_before:
             raise Fault("changes its gains or its measurement: keep what changes in memory")
-        return code, self.out.own[: self.each], self.out.own[self.each :]
+        return code, self.out.values[: self.channels], self.out.values[self.channels :]
 
     def static_data(self) -> dict[str, bytes]:
         """Return the current content of the static data."""
@@ -384,12 +384,12 @@ class Trial:
 
     def check_gains(self, y: list[float], before: bytes) -> None:
         """Raise Fault if u becomes finite when additional gains are finite."""
-        count, out = len(self.gains.own) // self.each, Fenced([math.nan] * (2 * self.each))
-        more = Fenced([*self.gains.own, *[1.0] * (EXTRA_GAINS * self.each)])
+        count, out = len(self.gains.values) // self.channels, Fenced([math.nan] * (2 * self.channels))
+        more = Fenced([*self.gains.values, *[1.0] * (EXTRA_GAINS * self.channels)])
         set_sizes(self.library, count + EXTRA_GAINS, self.size)
-        code = self.law(Fenced(y).own, more.own, self.state(before).own, out.own)
+        code = self.law(Fenced(y).values, more.values, self.state(before).values, out.values)
         set_sizes(self.library, count, self.size)
-        if code == 0 and all(map(math.isfinite, out.own)):
+        if code == 0 and all(map(math.isfinite, out.values)):
             raise Fault(
                 f"reads more gains than the {count} that have names: name them in smc_law_gains, or give gains="
             )
@@ -415,7 +415,7 @@ def attempt(order: Mapping[str, Any], say: Callable) -> dict[str, str | int]:
     done("smc_setup")
     if trial := order["trial"]:
         say(symbol)
-        set_sizes(library, len(trial["gains"]) // trial["each"], trial["memory"])
+        set_sizes(library, len(trial["gains"]) // trial["channels"], trial["memory"])
         with Path(trial["calls"]).open("wb") as calls:
             try:
                 Trial(law, library, trial, calls).all()

@@ -205,7 +205,7 @@ def bounded(name: str, bound: float) -> Variable:
 def parameter(kind: str, part: Component, name: str, value: float, index: str = "") -> Variable:
     """Return a gain of a component, or its element for one joint, such as "[1]", as a parameter."""
     gain = part.template.gains[name] if part.template and name in part.template.gains else None
-    unit = gain.unit_at({key: gain_at(one, 0) for key, one in part.gains.items()}) if gain else None
+    unit = gain.unit_at({key: gain_at(number, 0) for key, number in part.gains.items()}) if gain else None
     positive = bool(gain and gain.positive)
     minimum = 0.0 if gain and (gain.positive or gain.nonnegative) else -math.inf
     limits = ", greater than 0" if positive else ", at least 0" if minimum == 0.0 else ""
@@ -230,7 +230,7 @@ def header(listed: Sequence[Variable], controller: Controller, identifier: str, 
       identifier: name of the model in C.
       token: the instantiation token.
     """
-    memory = next((i for i, one in enumerate(listed) if one.kind == "SMC_STATE"), len(listed))
+    memory = next((i for i, variable in enumerate(listed) if variable.kind == "SMC_STATE"), len(listed))
     lines = [
         "/* controller.h: sizes of this controller, and the indices of its variables. */",
         "#ifndef SMC_CONTROLLER_H",
@@ -246,7 +246,7 @@ def header(listed: Sequence[Variable], controller: Controller, identifier: str, 
         f"#define SMC_DT {controller.period!r} /* s */",
         f"#define SMC_TIME {place('time')}",
         "enum {",
-        *(f"    {place(one.name)}," for one in listed),
+        *(f"    {place(variable.name)}," for variable in listed),
         "    SMC_VARIABLES,",
         f"    SMC_MEMORY = {memory} /* the first variable that outlives a sample */",
         "};",
@@ -273,10 +273,7 @@ def source(listed: Sequence[Variable], helpers: Iterable[str], body: Iterable[st
         "#include <stddef.h>",
         "",
         "const smc_variable smc_variables[] = {",
-        *(
-            f'    {{"{one.name}", {one.kind}, {one.start!r}, {_c_number(one.minimum)}, {int(one.positive)}}},'
-            for one in listed
-        ),
+        *(f'    {{"{v.name}", {v.kind}, {v.start!r}, {_c_number(v.minimum)}, {int(v.positive)}}},' for v in listed),
         "};",
         "",
         "/* Returns a gain or a bound. The largest double means that there is none. */",
@@ -324,7 +321,7 @@ def helpers(controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iter
 def body(listed: Sequence[Variable], controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterator[str]:
     """Yield the statements of smc_controller, without indentation. What is of each joint is in a loop over j."""
     wanted, many = inputs(controller, code), controller.joints
-    j, each, other = ("[j]", "[j]", "[SMC_JOINTS + j]") if many else ("", "[0]", "[1]")
+    j, u, s = ("[j]", "[j]", "[SMC_JOINTS + j]") if many else ("", "[0]", "[1]")
 
     def value(name: str, absent: str = "0.0") -> str:
         if name in COMMON_INPUTS | CHANNEL_INPUTS | JOINT_INPUTS and name not in wanted:
@@ -352,9 +349,9 @@ def body(listed: Sequence[Variable], controller: Controller, code: Mapping[str, 
     yield from _call("law", "&y", "law_memory")
     yield from for_each(
         [
-            f"const double u = fmin(fmax(out{each}, -y.limit{j}), y.limit{j}), s = out{other};",
+            f"const double u = fmin(fmax(out{u}, -y.limit{j}), y.limit{j}), s = out{s};",
             f"{value('u')} = u, {value('s')} = s;",
-            f"if (!(isfinite(out{each}) && isfinite(s) && fabs(u) < {MAX_CONTROL!r})) return SMC_NOT_FINITE;",
+            f"if (!(isfinite(out{u}) && isfinite(s) && fabs(u) < {MAX_CONTROL!r})) return SMC_NOT_FINITE;",
         ]
     )
     yield "return 0;"

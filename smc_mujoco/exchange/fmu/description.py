@@ -63,8 +63,8 @@ def base_units(unit: Unit, joint: str) -> dict[str, int] | None:
     (_, force), (_, position) = JOINT_UNITS[joint]
     powers: dict[str, float] = {}
     for parts, n in ((force, unit.force), (position, unit.position), ({"s": 1}, unit.time)):
-        for name, each in parts.items():
-            powers[name] = powers.get(name, 0.0) + n * each
+        for name, exponent in parts.items():
+            powers[name] = powers.get(name, 0.0) + n * exponent
     if any(n != int(n) for n in powers.values()):
         return None
     return {name: int(n) for name, n in powers.items() if n}
@@ -110,18 +110,18 @@ def model_description(
     xml.SubElement(categories, "Category", name="error", description="why a call failed")
     xml.SubElement(root, "DefaultExperiment", startTime="0.0", stopTime="10.0", stepSize=repr(controller.period))
     variables, structure = xml.SubElement(root, "ModelVariables"), xml.SubElement(root, "ModelStructure")
-    for reference, one in enumerate(listed):
-        variables.append(_variable(reference, one, joint))
-    outputs = [str(reference) for reference, one in enumerate(listed) if is_output(one)]
+    for reference, variable in enumerate(listed):
+        variables.append(_variable(reference, variable, joint))
+    outputs = [str(reference) for reference, variable in enumerate(listed) if is_output(variable)]
     for element in ("Output", "InitialUnknown"):
         for reference in outputs:
             xml.SubElement(structure, element, valueReference=reference)
     return written(root)
 
 
-def is_output(one: Variable) -> bool:
+def is_output(variable: Variable) -> bool:
     """Return whether a variable is u or s, or an element of these."""
-    return one.name.partition("[")[0] in OUTPUTS
+    return variable.name.partition("[")[0] in OUTPUTS
 
 
 def _units(listed: Iterable[Variable]) -> list[Unit]:
@@ -129,19 +129,19 @@ def _units(listed: Iterable[Variable]) -> list[Unit]:
     return list(dict.fromkeys(one.unit for one in listed if one.unit is not None and any(one.unit)))
 
 
-def _variable(reference: int, one: Variable, joint: str) -> xml.Element:
+def _variable(reference: int, variable: Variable, joint: str) -> xml.Element:
     """Return the element of a variable."""
-    causality, variability, initial = VARIABLE_ROLES[one.kind]
-    about = {"name": one.name, "valueReference": str(reference), "description": one.description}
-    about |= {"causality": "output" if is_output(one) else causality, "variability": variability}
+    causality, variability, initial = VARIABLE_ROLES[variable.kind]
+    about = {"name": variable.name, "valueReference": str(reference), "description": variable.description}
+    about |= {"causality": "output" if is_output(variable) else causality, "variability": variability}
     if initial is not None:
         about["initial"] = initial
-    if one.unit is not None and any(one.unit):
-        about["unit"] = unit_name(one.unit, joint)
-    if math.isfinite(one.minimum):
-        about["min"] = repr(one.minimum)
-    if one.kind not in ("SMC_CLOCK", "SMC_COMPUTED"):
-        about["start"] = repr(one.start)
+    if variable.unit is not None and any(variable.unit):
+        about["unit"] = unit_name(variable.unit, joint)
+    if math.isfinite(variable.minimum):
+        about["min"] = repr(variable.minimum)
+    if variable.kind not in ("SMC_CLOCK", "SMC_COMPUTED"):
+        about["start"] = repr(variable.start)
     return xml.Element("Float64", about)
 
 
@@ -176,15 +176,15 @@ def page(listed: Iterable[Variable], controller: Controller, joint: str) -> str:
     """Return documentation/index.html. The elements of a vector or a matrix share a row."""
     rows = []
     for name, elements in itertools.groupby(listed, lambda variable: variable.name.partition("[")[0]):
-        one, *others = elements
-        if one.kind == "SMC_STATE":
+        first, *others = elements
+        if first.kind == "SMC_STATE":
             continue
-        role = "output" if is_output(one) else VARIABLE_ROLES[one.kind][0]
-        unit = unit_name(one.unit, joint) if one.unit is not None and any(one.unit) else ""
-        starts = ["unbounded" if each.start == MAX_DOUBLE else f"{each.start:g}" for each in (one, *others)]
+        role = "output" if is_output(first) else VARIABLE_ROLES[first.kind][0]
+        unit = unit_name(first.unit, joint) if first.unit is not None and any(first.unit) else ""
+        starts = ["unbounded" if element.start == MAX_DOUBLE else f"{element.start:g}" for element in (first, *others)]
         start = "identity" if name == "M" else ", ".join(starts[: 1 if len(set(starts)) == 1 else None])
-        start = "" if one.kind in ("SMC_CLOCK", "SMC_COMPUTED") else start
-        cells = (f"{one.name} to {others[-1].name}" if others else one.name, role, unit, start, one.description)
+        start = "" if first.kind in ("SMC_CLOCK", "SMC_COMPUTED") else start
+        cells = (f"{first.name} to {others[-1].name}" if others else first.name, role, unit, start, first.description)
         rows.append("<tr>" + "".join(f"<td style='padding-right: 1em'>{html.escape(c)}</td>" for c in cells) + "</tr>")
     about = html.escape(summary(controller))
     title = html.escape(controller.law.name)

@@ -158,11 +158,11 @@ def _controller(
 
 def _bounds(u_max: float | Sequence[float], joints: int) -> tuple[float, ...]:
     """Return the bound on |u| of each joint, from one for all or one for each."""
-    each = list(u_max) if joints and isinstance(u_max, Sequence | np.ndarray) else [u_max] * max(1, joints)
-    if len(each) != max(1, joints):
-        raise ScenarioError(f"u_max has {len(each)} values for {joints} joints: give one, or {joints}")
-    names = [f"u_max[{i}]" for i in range(joints)] if joints and each[0] is not u_max else ["u_max"] * len(each)
-    return tuple(number(name, one, above=0.0, infinite=True) for name, one in zip(names, each, strict=True))
+    bounds = list(u_max) if joints and isinstance(u_max, Sequence | np.ndarray) else [u_max] * max(1, joints)
+    if len(bounds) != max(1, joints):
+        raise ScenarioError(f"u_max has {len(bounds)} values for {joints} joints: give one, or {joints}")
+    names = [f"u_max[{i}]" for i in range(joints)] if joints and bounds[0] is not u_max else ["u_max"] * len(bounds)
+    return tuple(number(name, one, above=0.0, infinite=True) for name, one in zip(names, bounds, strict=True))
 
 
 def _identifier(name: str) -> str:

@@ -304,7 +304,7 @@ def _description(file: Path, digest: str) -> Any:
         )
     here = fmpy.platform if str(about.fmiVersion).startswith("2") else fmpy.platform_tuple
     binaries = folder / "binaries" / here
-    if not any(one.stem == about.coSimulation.modelIdentifier for one in binaries.glob("*")):
+    if not any(binary.stem == about.coSimulation.modelIdentifier for binary in binaries.glob("*")):
         if binaries.exists():
             raise ScenarioError(f"{file.name} has no binary of its modelIdentifier in {binaries.name}: export it again")
         places = sorted(each.name for each in (folder / "binaries").glob("*")) if (folder / "binaries").exists() else []

@@ -50,14 +50,14 @@ def live(
     """
     names = [plants] if isinstance(plants, str | Plant) else taken("plants", plants)
     chosen = known.checked(names or DEFAULT_PLANTS)
-    users = [_own(law) for law in (listed_laws(laws) if laws else ())]
+    users = [_user_law(law) for law in (listed_laws(laws) if laws else ())]
     functions = {("law", law.name): to_js(law) for law in users}
     offered = list(users)
-    for one in _library(chosen):
+    for component in _library(chosen):
         with contextlib.suppress(ScenarioError):  # raised for one that has no translation, such as a law in C
-            if (one.kind, one.name) not in functions:
-                functions[one.kind, one.name] = to_js(one)
-                offered.append(one)
+            if (component.kind, component.name) not in functions:
+                functions[component.kind, component.name] = to_js(component)
+                offered.append(component)
     page = known.facts(chosen, offered, users)
     folder = _writable(Path(out))
     vendor = npm.fetched()
@@ -87,7 +87,7 @@ def _script(functions: Mapping[tuple[str, str], str]) -> str:
     return "".join(lines)
 
 
-def _own(law: object) -> Component:
+def _user_law(law: object) -> Component:
     """Return a user's law, with its default gains if it is a template."""
     made = find_law(law) if isinstance(law, str) else law() if isinstance(law, Template) else law
     if not isinstance(made, Component) or made.kind != "law":

@@ -99,17 +99,17 @@ def facts(chosen: Sequence[Plant], offered: Sequence[Component], users: Sequence
     }
 
 
-def _component(one: Component) -> dict[str, Any]:
+def _component(component: Component) -> dict[str, Any]:
     """Return the facts about a law, surface or estimator that the page shows and the engine needs."""
-    parts = entry(one.template) if one.template is not None and one.template.doc else None
-    name = one.name.rstrip("_")
+    parts = entry(component.template) if component.template is not None and component.template.doc else None
+    name = component.name.rstrip("_")
     return {
         "label": name.upper() if len(name) <= MAX_ACRONYM_LETTERS else style.in_words(name),
-        "formula": parts.formula if parts and parts.formula != one.name else "",
+        "formula": parts.formula if parts and parts.formula != component.name else "",
         "source": parts.source if parts else "",
-        "order": list(one.gains),
-        "gains": dict(one.gains),
-        "memory": one.memory,
+        "order": list(component.gains),
+        "gains": dict(component.gains),
+        "memory": component.memory,
     }
 
 
@@ -277,17 +277,17 @@ def _gains(law: Component, plant: Plant, users: bool) -> dict[str, float]:
     return values
 
 
-def _ranges(one: Component, plant: Plant, values: Mapping[str, float]) -> dict[str, list[float]]:
+def _ranges(component: Component, plant: Plant, values: Mapping[str, float]) -> dict[str, list[float]]:
     """Return gain -> least and largest value of its slider, for gains to be chosen: no exponent or initial value."""
     known: Mapping[str, tuple[float, float]] = {}
     with contextlib.suppress(ScenarioError):
-        scales = search_space.scales(plant, defaults.default_u_max(plant), with_model=one.requires_model)
-        if one.kind != "estimator":  # the gains of an estimator follow from noise and sampling, not from the plant
-            known = search_space.box(one, scales)
+        scales = search_space.scales(plant, defaults.default_u_max(plant), with_model=component.requires_model)
+        if component.kind != "estimator":  # an estimator's gains follow from noise and sampling, not from the plant
+            known = search_space.box(component, scales)
     ranges = {}
     for name, value in values.items():
         if name in known:
             ranges[name] = [min(known[name][0], value), max(known[name][1], value)]
-        elif 0.0 < value < math.inf and not (one.template and one.template.gains[name].held):
+        elif 0.0 < value < math.inf and not (component.template and component.template.gains[name].held):
             ranges[name] = [value / SLIDER_FACTOR, value * SLIDER_FACTOR]
     return ranges

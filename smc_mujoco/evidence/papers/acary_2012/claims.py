@@ -118,7 +118,7 @@ def means(trace):
     return (d.amplitude * (np.cos(angle) - np.cos(angle + d.omega * h)) / (d.omega * h))[:, None]
 
 
-def each(runs, measure):
+def by_condition(runs, measure):
     """Return condition -> measure of its trace; with the law's name if there are several."""
     traces = runs.traced(runs.grid())
     names = {cell: cell[2] if len(runs.laws) == 1 else f"{cell[1]}, {cell[2]}" for cell in traces}
@@ -127,15 +127,15 @@ def each(runs, measure):
 
 def inside(runs):
     """Largest |u| over a, and the total variation of u without a disturbance."""
-    shares = each(runs, lambda one: largest(one.u) / one.scenario.law.gains["a"])
+    shares = by_condition(runs, lambda trace: largest(trace.u) / trace.scenario.law.gains["a"])
     (rest,) = runs.traces([runs.scenario(runs.plant, runs.laws[0])])
     return {"largest |u| / a": shares, "variation of u without d, N": variation_of(rest.u)}
 
 
 def rejection(runs):
     """Largest |x| over what the disturbance adds to x in a control period."""
-    share = each(
-        runs, lambda one: largest(one.v) / (one.scenario.control_period * one.scenario.disturbance[0].amplitude)
+    share = by_condition(
+        runs, lambda run: largest(run.v) / (run.scenario.control_period * run.scenario.disturbance[0].amplitude)
     )
     return {"largest |x| / (h largest |d|)": share}
 
@@ -146,12 +146,12 @@ def multiplier(runs):
     def late(trace):
         return largest((trace.u[1:] + means(trace)[:-1])[:-1]) / trace.scenario.disturbance[0].amplitude
 
-    return {"largest |u + mean d of the period before| / largest |d|": each(runs, late)}
+    return {"largest |u + mean d of the period before| / largest |d|": by_condition(runs, late)}
 
 
 def variation(runs):
     """Total variation of u over that of the mean of d over a period."""
-    ratios = each(runs, lambda one: variation_of(one.u) / variation_of(means(one)))
+    ratios = by_condition(runs, lambda trace: variation_of(trace.u) / variation_of(means(trace)))
     return {"variation of u / variation of the mean of d": ratios}
 
 
@@ -190,8 +190,8 @@ def with_a_model(runs):
     """Exponents of the largest |s_x| and |x| of the last half in the control period, 3 ms to 0.1 s."""
     traces = at_periods(runs, runs.conditions[0])
     return {
-        "exponent of the largest |s_x| in h": exponent([*traces], [largest(one.s) for one in traces.values()]),
-        "exponent of the largest |x| in h": exponent([*traces], [largest(one.x) for one in traces.values()]),
+        "exponent of the largest |s_x| in h": exponent([*traces], [largest(trace.s) for trace in traces.values()]),
+        "exponent of the largest |x| in h": exponent([*traces], [largest(trace.x) for trace in traces.values()]),
     }
 
 
@@ -209,8 +209,8 @@ def rests(runs):
     """Largest |x| and |u| of the last half without a disturbance, at 10 and 100 ms."""
     traces = at_periods(runs, "nominal")
     return {
-        "largest |x| at the end, m": {f"{h:g} s": largest(one.x) for h, one in traces.items()},
-        "largest |u| at the end, N": {f"{h:g} s": largest(one.u) for h, one in traces.items()},
+        "largest |x| at the end, m": {f"{h:g} s": largest(trace.x) for h, trace in traces.items()},
+        "largest |u| at the end, N": {f"{h:g} s": largest(trace.u) for h, trace in traces.items()},
     }
 
 

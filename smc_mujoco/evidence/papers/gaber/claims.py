@@ -2,9 +2,8 @@
 
 Settling time, overshoot and ripple are those of `metrics`. Overshoot is what goes beyond the origin, in percent of
 |x0|, whether the paper calls it overshoot or undershoot; if less is better, it is inf of a run that does not settle.
-"Larger" and "slower" mean by more than the least relevant difference. The paper says neither which
-way up the network's pendulums are nor how strongly they are coupled: a claim on it is supported if it holds on both
-networks of the study.
+"Larger" and "slower" mean by more than the least relevant difference. The paper says neither which way up the network's
+pendulums are nor how strongly they are coupled: a claim on it is supported if it holds on both networks of the study.
 """
 
 import math
@@ -65,7 +64,7 @@ def command_bound(runs, plant):
 def comes_to_rest(runs, grid):
     """Return the ultimate bound of every named scenario, over |x0|."""
     scores = zip(grid.items(), runs.scores(grid.values()), strict=True)
-    return {"ultimate bound / |x0|": {name: each["ultimate_bound"] / scale(run) for (name, run), each in scores}}
+    return {"ultimate bound / |x0|": {name: score["ultimate_bound"] / scale(run) for (name, run), score in scores}}
 
 
 def larger_than(value, of=0.0):
@@ -152,7 +151,7 @@ def smallest_lam(runs, plant):
 def smallest_stable(runs):
     """Return plant -> the smallest lambda found stable between MIN_LAMBDA and U_MAX; inf if U_MAX is not.
 
-    A start near the origin is to die out. A range is divided by eight values at once, three times.
+    Stable means that a start near the origin dies out. Each round divides the range by eight values.
     """
     ends = dying(runs, dict.fromkeys(runs.plants, (MIN_LAMBDA, U_MAX)))
     low, high = dict.fromkeys(runs.plants, MIN_LAMBDA), dict.fromkeys(runs.plants, U_MAX)
@@ -196,8 +195,8 @@ SHORT_RUN = 3.0  # s, of a network's run: several times what the networks of the
 def observer_free(runs):
     """Claim 1: observer-free."""
     velocities = ("measured", *FILTERS.values())
-    grid = [runs.scenario(plant, OURS, *runs.conditions, velocity=one) for plant in runs.plants for one in velocities]
-    times = np.reshape([each["settling_time"] for each in runs.scores(grid)], (len(runs.plants), -1)).tolist()
+    grid = [runs.scenario(plant, OURS, *runs.conditions, velocity=v) for plant in runs.plants for v in velocities]
+    times = np.reshape([score["settling_time"] for score in runs.scores(grid)], (len(runs.plants), -1)).tolist()
     what = "|settling time / with true xdot - 1|"
     return [  # NaN if neither settles: noise may keep both out of the band
         runs.check("settling time", f"{plant}, {name}: {what}", abs(ratio(time, true) - 1.0), sentence=name)
@@ -218,7 +217,7 @@ def bounded(runs):
     grid = [runs.scenario(plant, OURS, name) for plant in runs.plants for name in names]
     grid += [runs.scenario(plant, OURS, u_max=math.inf) for plant in runs.plants]
     scores = runs.scores(grid)
-    largest = max(ratio(each["max_u"], run.law.gains["lam"]) for run, each in zip(grid, scores, strict=True))
+    largest = max(ratio(score["max_u"], run.law.gains["lam"]) for run, score in zip(grid, scores, strict=True))
     every = [ratio(run.scores["max_u"], run.gains["lam"]) for run in runs.results() if run.law == OURS]
     cases = {"five plants in the ideal conditions, and without a bound": largest}
     cases |= {"every run of this law": max(every, default=largest)}
@@ -237,9 +236,7 @@ def scalable(runs):
     sizes, ratios = [n for n in runs.values["sizes"] if n <= QUICK_MAX_SIZE or not runs.quick], {}
     for plant in runs.plants:
         networks = [find_plant(plant, n=n) for n in sizes]
-        grid = [
-            runs.scenario(plant, OURS, plant=one, duration=SHORT_RUN, integrator="implicitfast") for one in networks
-        ]
+        grid = [runs.scenario(plant, OURS, plant=p, duration=SHORT_RUN, integrator="implicitfast") for p in networks]
         time_of_two, *times = (scores["settling_time"] for scores in runs.scores(grid))
         ratios |= {f"{plant}, N = {n}": ratio(time, time_of_two) for n, time in zip(sizes[1:], times, strict=True)}
     return {"settling time / that of N = 2": ratios}
@@ -277,7 +274,7 @@ def never_chatters(runs):
             runs.scenario(plant, OURS, control_period=period * 1e-3, input_delay=delay * 1e-3)
             for period, delay in cells
         )
-        rates = [ratio(each["tv_rate"], command_bound(runs, plant)) for each in scores]
+        rates = [ratio(score["tv_rate"], command_bound(runs, plant)) for score in scores]
         rate[plant], at[plant] = max(zip(rates, cells, strict=True))
         lam, k1 = (runs.law(plant, OURS).gains[gain] for gain in ("lam", "k1"))
         limit[plant] = 1e3 * linear_theory.critical_delay(find_plant(plant), lam, k1, control_period=1e-3)
@@ -307,7 +304,7 @@ def synchronises(runs):
     checks = []
     for plant in runs.plants:
         scores = runs.scores(runs.scenario(plant, OURS, condition) for condition in runs.conditions)
-        joined, alone = (each["spread_settling_time"] for each in scores)
+        joined, alone = (score["spread_settling_time"] for score in scores)
         checks.append(runs.check("settling time, s", f"{plant}: settling time of the spread, s", joined))
         what = f"{plant}: the same without coupling, s, against that with it"
         checks.append(runs.check("without coupling", what, alone, joined))
@@ -338,7 +335,7 @@ def higher_degree(runs):
         bounds = [scores["ultimate_bound"] for scores in runs.scores(tried)]
         grid[name] = tried[bounds.index(min(bounds))]
     scores = zip(grid.items(), runs.scores(grid.values()), strict=True)
-    settled = {name: each["settling_time"] / scenario.duration for (name, scenario), each in scores}
+    settled = {name: score["settling_time"] / scenario.duration for (name, scenario), score in scores}
     return {"settling time / duration of the run": settled} | comes_to_rest(runs, grid)
 
 
@@ -484,8 +481,8 @@ def fast_and_minimal(runs):
 
 def similar(runs):
     """Claim 36: Duffing: adaptive and HOSMC similar."""
-    each = alike(runs, runs.plant, HOSMC, ADAPTIVE)
-    return [*(alike(runs, runs.plant, law, OURS) for law in (ADAPTIVE, HOSMC)), Beside(each.what, each.value)]
+    between = alike(runs, runs.plant, HOSMC, ADAPTIVE)
+    return [*(alike(runs, runs.plant, law, OURS) for law in (ADAPTIVE, HOSMC)), Beside(between.what, between.value)]
 
 
 def classical_deviates(runs):
@@ -508,7 +505,7 @@ def distortion(runs):
     for plant in runs.plants:
         coupled = [find_plant(plant, kc=kc) for kc in runs.values["couplings"]]  # the same gains in all
         scores = runs.scores(runs.scenario(plant, law, plant=one) for law in (CLASSICAL, OURS) for one in coupled)
-        over = [each["overshoot"] for each in scores]
+        over = [score["overshoot"] for score in scores]
         what, classical, ours = f"{plant}: overshoot of", "overshoot of classical", "overshoot of the paper's law"
         checks += [
             slower(runs, plant, CLASSICAL),
@@ -758,9 +755,9 @@ def table_one(runs):
     evidence = []
     for name, (unit, value) in properties.items():
         for (column, law), mark in zip(TABLE_COLUMNS.items(), TABLE_MARKS[name], strict=True):
-            sure = ", cannot fail" if (name, column) in CERTAIN_CELLS else ""
+            certain = ", cannot fail" if (name, column) in CERTAIN_CELLS else ""
             cell = f"{name}: {column}"
-            what = f"{cell} (paper: {'+' if mark == '+' else '--'}), {unit}{sure}"
+            what = f"{cell} (paper: {'+' if mark == '+' else '--'}), {unit}{certain}"
             plus = runs.check(name, what, value(law), sentence=cell)
             evidence.append(plus if mark == "+" else opposite(plus))
     for column, law in TABLE_COLUMNS.items():
@@ -808,12 +805,8 @@ def estimated(runs, law):
 
 def commanded(law, x, v=None, **signals):
     """Return what a law commands, sample by sample, in open loop: the signals do not depend on its command."""
-    function, gains, memory = (
-        rebuild(law.function, lambda same: same),
-        SimpleNamespace(**law.gains),
-        np.zeros(law.memory),
-    )
-    v = np.zeros_like(x) if v is None else v
+    function, gains = rebuild(law.function, lambda same: same), SimpleNamespace(**law.gains)
+    memory, v = np.zeros(law.memory), np.zeros_like(x) if v is None else v
     seen, u = {"x": x, "e": x, "v": v, "de": v} | signals, np.empty(len(x))
     rest = dict.fromkeys(("x", "v", "e", "de", "r", "dr", "ddr", "f"), 0.0) | {"g": 1.0, "dt": CONTROL_PERIOD}
     for k in range(len(x)):

@@ -27,9 +27,8 @@ def nanoseconds(laws: Mapping[str, Component], quick: bool = False) -> dict[str,
     """Return the least time per call of each law, ns."""
     t = np.arange(CALLS) * 1e-3
     states = np.column_stack([0.3 * np.sin(7 * t), 2.1 * np.cos(7 * t)])
-    functions = {
-        name: cfunctions.compile_component(law) for name, law in laws.items()
-    }  # kept alive while their addresses are used
+    # kept alive while their addresses are used
+    functions = {name: cfunctions.compile_component(law) for name, law in laws.items()}
     shortest, loop = dict.fromkeys(laws, np.inf), _loop()
     for _ in range(QUICK_ROUNDS if quick else ROUNDS):
         for name, law in laws.items():

@@ -44,14 +44,14 @@ def sweep(runs):
 def accuracy_of_s(runs):
     """Exponent of the largest |s| of the last 3000 samples as a function of the control period, 0.5 to 4 ms."""
     periods = runs.values["periods"]
-    exponents = {plant: exponent(periods, [late(one.s) for one in traces]) for plant, traces in sweep(runs).items()}
+    exponents = {plant: exponent(periods, [late(run.s) for run in traces]) for plant, traces in sweep(runs).items()}
     return {"exponent of the largest |s| in the period": exponents}
 
 
 def continuity(runs):
     """Exponent of the largest step of u from sample to sample, of the last 3000, as a function of the period."""
     periods = runs.values["periods"]
-    steps = {plant: exponent(periods, [late_step(one.u) for one in traces]) for plant, traces in sweep(runs).items()}
+    steps = {plant: exponent(periods, [late_step(run.u) for run in traces]) for plant, traces in sweep(runs).items()}
     return {"exponent of the largest step of u in the period": steps}
 
 

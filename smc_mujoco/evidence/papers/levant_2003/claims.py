@@ -18,7 +18,7 @@ def precision(runs):
         for h in values["periods"]
         for x0 in values["starts"][: 1 if runs.quick else None]
     )
-    return {"exponent of the largest |e| in the period": exponent(values["periods"], [late(one.x) for one in traces])}
+    return {"exponent of the largest |e| in the period": exponent(values["periods"], [late(run.x) for run in traces])}
 
 
 def noise(runs):
@@ -45,9 +45,9 @@ def noise(runs):
         for seed in values["seeds"][: 1 if runs.quick else None]
     )
     return {
-        "exponent of |e| in the noise": exponent(eps, [late(one.x) for one in traces]),
-        "exponent of |e'| in the noise": exponent(eps, [late(one.v) for one in traces]),
-        "exponent of |e''| in the noise": exponent(eps, [late(one.force + one.d) for one in traces]),
+        "exponent of |e| in the noise": exponent(eps, [late(trace.x) for trace in traces]),
+        "exponent of |e'| in the noise": exponent(eps, [late(trace.v) for trace in traces]),
+        "exponent of |e''| in the noise": exponent(eps, [late(trace.force + trace.d) for trace in traces]),
     }
 
 
@@ -86,4 +86,4 @@ def chattering(runs):
     """Largest |x| of the last tenth under the nested law over that under the classical law, behind the same lag."""
     ends = {cell[:2]: end(trace) for cell, trace in runs.traced(runs.grid()).items()}
     nested, classical = runs.laws
-    return {"largest |x|, nested / classical": {one: ends[one, nested] / ends[one, classical] for one in runs.plants}}
+    return {"largest |x|, nested / classical": {p: ends[p, nested] / ends[p, classical] for p in runs.plants}}

@@ -75,14 +75,14 @@ def attained(runs):
     """|x| over L T^2 a period after a triangle of mean 0 over every period goes on with its slope."""
     cells = itertools.product(runs.laws, runs.conditions)
     traces = runs.traced({f"{law}, {condition}": flipped(runs, law, condition, 1.0) for law, condition in cells})
-    return {"largest |x| after the slope flips / (L T^2)": {name: last(one) for name, one in traces.items()}}
+    return {"largest |x| after the slope flips / (L T^2)": {name: last(trace) for name, trace in traces.items()}}
 
 
 def best_possible(runs):
     """The larger |x| over L T^2 of two runs under disturbances that a sampled law cannot tell apart, for seven laws."""
     (condition,) = runs.conditions
     cells = [(law, sign) for law in runs.laws for sign in (1.0, -1.0)]
-    ends = [last(one) for one in runs.traces(flipped(runs, law, condition, sign) for law, sign in cells)]
+    ends = [last(trace) for trace in runs.traces(flipped(runs, law, condition, sign) for law, sign in cells)]
     worse = np.reshape(ends, (-1, 2)).max(axis=1)
     return {"worse of the two |x| / (L T^2)": dict(zip(runs.laws, worse.tolist(), strict=True))}
 
@@ -104,7 +104,7 @@ def no_windup(runs):
         runs.scenario(runs.plant, law, v0=runs.values["start"], u_max=runs.values["u_max"], disturbance=d)
         for law in runs.laws
     )
-    beyond = [max(-float(one.v[:-1].min()), 0.0) for one in (ours, plain)]
+    beyond = [max(-float(trace.v[:-1].min()), 0.0) for trace in (ours, plain)]
     return {
         "overshoot / that of the law without conditioning": beyond[0] / beyond[1] if beyond[1] else math.inf,
         "largest |x| of the last half / (L T^2)": late(ours),
