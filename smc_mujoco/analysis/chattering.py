@@ -25,7 +25,7 @@ import numpy as np
 from smc_mujoco.analysis.harmonics import Loop, Wave
 from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.files import ended, write_json
+from smc_mujoco.common.files import with_ending, write_json
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
@@ -446,4 +446,4 @@ def save(
         | {"half_step_changes": vars(change), "marked": change.marked}
         for one, cycle, (amplitude, frequency), change in zip(scenarios, cycles, measured, changes, strict=True)
     ]
-    return write_json(ended(path, ".json"), rows)
+    return write_json(with_ending(path, ".json"), rows)

@@ -15,7 +15,7 @@ import numpy as np
 
 from smc_mujoco.analysis.ranking import first_of_kind
 from smc_mujoco.analysis.relevant_difference import without_rounding
-from smc_mujoco.common.errors import ScenarioError, shown, taken, unknown
+from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.control.source import Source, restore
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.channel_groups import groups as channel_groups
@@ -141,7 +141,7 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
     Raises:
       ScenarioError: no runs, an unknown group, two runs in a cell, or runs of a cell that differ in more than the law.
     """
-    by = taken("by", by)
+    by = items_of("by", by)
     for name in by:
         if name not in GROUPS:
             raise unknown("group of a leaderboard", name, GROUPS)

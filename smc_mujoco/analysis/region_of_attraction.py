@@ -36,8 +36,8 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, shown, taken, whole
-from smc_mujoco.common.files import ended, read_json, reading, write_json
+from smc_mujoco.common.errors import ScenarioError, items_of, shown, whole
+from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
@@ -96,7 +96,7 @@ class Basin:
         """Write a .json file that `load` reads back."""
         fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         data = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in fields.items()}
-        return write_json(ended(path, ".json"), data, indent=None)
+        return write_json(with_ending(path, ".json"), data, indent=None)
 
 
 def basin(
@@ -134,7 +134,7 @@ def basin(
     reach = POSITION_REACH[base.plant.unit](base.plant)
     if not reach and (x is None or v is None):
         raise ScenarioError(f"{base.plant.name} starts at 0, which tells no reach: give positions x and velocities v")
-    if len(counts := taken("points", points)) != 2:
+    if len(counts := items_of("points", points)) != 2:
         raise ScenarioError(f"points is {shown(points)}: give two numbers of points, in x and v")
     nx, nv = (whole(f"points in {axis}", n, 2, 1000) for axis, n in zip("xv", counts, strict=True))
     xs = np.linspace(-reach, reach, nx) if x is None else x

@@ -149,7 +149,7 @@ def _real(value: Any) -> Any:
     return value if is_real else None
 
 
-def taken(what: str, values: Iterable[T]) -> list[T]:
+def items_of(what: str, values: Iterable[T]) -> list[T]:
     """Return the items of a user's list, or raise ScenarioError naming `what` if there are more than MAX_ITEMS."""
     try:
         items = iter(values)

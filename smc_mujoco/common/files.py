@@ -48,7 +48,7 @@ def slug(name: str, max_bytes: int = MAX_NAME) -> str:
     return part
 
 
-def ended(path: str | os.PathLike[str], ending: str) -> Path:
+def with_ending(path: str | os.PathLike[str], ending: str) -> Path:
     """Return the path if its name ends in `ending`, such as ".json"; raise ScenarioError otherwise."""
     path = Path(path)
     if path.suffix != ending or "\0" in path.name:

@@ -41,9 +41,8 @@ def _rebuild(function: Any, finish: Callable, copies: dict) -> Any:
     elif function not in copies:
         space, names = dict(function.__globals__), names_in(function.__code__)
         cells = tuple(CellType() for _ in function.__closure__ or ())
-        copies[function] = finish(
-            FunctionType(function.__code__, space, function.__name__, function.__defaults__, cells)
-        )
+        copy = FunctionType(function.__code__, space, function.__name__, function.__defaults__, cells)
+        copies[function] = finish(copy)
         # filled in only now, because a function may call itself
         space |= {name: _swapped(space[name], names, finish, copies) for name in names.variables & space.keys()}
         for cell, old in zip(cells, function.__closure__ or (), strict=True):

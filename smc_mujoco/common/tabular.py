@@ -29,10 +29,8 @@ TEX = {c: f"\\{c}" for c in "&%$#_{}"} | {c: f"${c}$" for c in "<>|"}
 TEX |= {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
 TEX |= {"–": "--", "·": r"$\cdot$", "×": r"$\times$", "±": r"$\pm$", "−": "$-$", "′": "$'$", "″": "$''$"}
 LETTERS = "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΦΨΩ"
-LETTER_NAMES = (
-    "alpha beta gamma delta varepsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon varphi chi"
-)
-LETTER_NAMES += " psi omega Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega"
+LETTER_NAMES = "alpha beta gamma delta varepsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon"
+LETTER_NAMES += " varphi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega"
 TEX |= {letter: f"$\\{name}$" for letter, name in zip(LETTERS, LETTER_NAMES.split(), strict=True)}
 TEX |= {c: f"$_{i}$" for i, c in enumerate("₀₁₂₃₄₅₆₇₈₉")} | {c: f"$^{i}$" for i, c in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")}
 

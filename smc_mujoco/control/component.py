@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, TypedDict
 import numpy as np
 
 from smc_mujoco.common import errors
-from smc_mujoco.common.errors import ScenarioError, number, shown, taken, unknown, users_stacklevel, whole
+from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown, users_stacklevel, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
 from smc_mujoco.control.units import Gain
@@ -196,7 +196,7 @@ def gain_text(value: GainValue) -> str:
 def _checked_gain(name: str, value: object, **limits: Any) -> GainValue:
     """Return a gain, one number or a tuple of one for each channel, checked as `number` checks it."""
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
-        listed = value.tolist() if isinstance(value, np.ndarray) else taken(name, value)
+        listed = value.tolist() if isinstance(value, np.ndarray) else items_of(name, value)
         if not isinstance(listed, Sequence) or not listed:
             raise ScenarioError(f"{name} is {shown(value)}: give a number, or one for each driven channel")
         return tuple(number(f"{name}[{i}]", one, **limits) for i, one in enumerate(listed))

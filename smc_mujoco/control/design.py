@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, shown, taken
+from smc_mujoco.common.errors import ScenarioError, items_of, shown
 from smc_mujoco.control.law import Law, law
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
@@ -56,6 +56,6 @@ def lqr(of: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1.0)
       ScenarioError: a weight out of range, or a joint without an actuator.
     """
     a1, a2, b = linearised(as_plant(of))
-    if len(weights := taken("q", q)) != 2:
+    if len(weights := items_of("q", q)) != 2:
         raise ScenarioError(f"q is {shown(q)}: give two weights, of error and rate")
     return law("lqr", q1=weights[0], q2=weights[1], r=r, a1=a1, a2=a2, b=b)

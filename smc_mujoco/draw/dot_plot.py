@@ -12,7 +12,7 @@ from matplotlib.ticker import NullFormatter
 
 from smc_mujoco.analysis.bootstrap import Interval, median_interval, share_interval
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns, sources, values
-from smc_mujoco.common.errors import ScenarioError, shown, taken, unknown
+from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style
@@ -53,7 +53,7 @@ def plot(
         raise ScenarioError(f"table is {shown(table)}: smc.figure draws traces, and this draws the table of a study")
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
-    names = taken("metrics", metrics)
+    names = items_of("metrics", metrics)
     for name in names:
         if name != SETTLES and name not in CATALOGUE:
             raise unknown("metric", name, [SETTLES, *CATALOGUE])

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from smc_mujoco.common.errors import ScenarioError, find, taken
+from smc_mujoco.common.errors import ScenarioError, find, items_of
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style
@@ -81,7 +81,7 @@ def figure(
     if panels is None:
         chosen = _default(traces, width)
     else:
-        chosen = [find("panel", name, PANEL_NAMES) for name in taken("panels", panels)]
+        chosen = [find("panel", name, PANEL_NAMES) for name in items_of("panels", panels)]
     with style.page(width):
         page = _composed_page(traces, names, colours, chosen, (width, height), title, fig)
         pages.write(page, paths)

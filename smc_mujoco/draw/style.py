@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, shown, taken
+from smc_mujoco.common.errors import ScenarioError, items_of, shown
 from smc_mujoco.control import estimator as estimators
 from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
@@ -389,7 +389,7 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     """Return the traces as a list; refuse those that cannot share axes."""
     if hasattr(traces, "column"):
         raise ScenarioError(f"traces is {shown(traces)}: smc.plot draws a table, and this draws traces of smc.run")
-    traces = [traces] if isinstance(traces, Trace) else taken("traces", traces)
+    traces = [traces] if isinstance(traces, Trace) else items_of("traces", traces)
     if not traces:
         raise ScenarioError("no traces to draw: give at least one, from smc.run(...) or smc.load(...)")
     plants = sorted({trace.scenario.plant.name for trace in traces})

@@ -18,7 +18,7 @@ import numpy as np
 
 from smc_mujoco.control.law import Law, catalogue
 from smc_mujoco.mechanisms.hardware.part import driven
-from smc_mujoco.mechanisms.plant import field_array, ready
+from smc_mujoco.mechanisms.plant import compiled_for_runs, field_array
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.reference import Loop
@@ -197,7 +197,7 @@ def model_with_sliders(scenario: Scenario) -> mujoco.MjModel:
             ctrllimited=True,
             ctrlrange=slider_range(gain),
         )
-    return ready(spec, 0)
+    return compiled_for_runs(spec, 0)
 
 
 def slider_gains(law: Law) -> dict[str, float]:

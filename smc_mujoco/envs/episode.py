@@ -19,7 +19,7 @@ from smc_mujoco.envs.tasks import TASKS, Pair, rest, reward, starts, tasks
 from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.mechanisms.named import as_plant
-from smc_mujoco.mechanisms.plant import Plant, ready
+from smc_mujoco.mechanisms.plant import Plant, compiled_for_runs
 from smc_mujoco.simulation import callback, coerce
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.channels import channels
@@ -297,7 +297,7 @@ def _compiled(scenario: Resolved, edit: Callable[[mujoco.MjSpec], None]) -> mujo
     """Return the model of a scenario. `edit` changes its mechanism before."""
     spec = models.spec(scenario)
     edit(spec)
-    model = ready(spec, 0 if scenario.formula_friction is None else callback.USERDATA)
+    model = compiled_for_runs(spec, 0 if scenario.formula_friction is None else callback.USERDATA)
     model.opt.timestep = scenario.physics_step
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenario.integrator.upper()}")
     return models.with_values(model, scenario)

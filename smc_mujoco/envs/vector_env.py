@@ -20,7 +20,7 @@ from smc_mujoco.envs.episode import Setting, bounded
 from smc_mujoco.envs.gymnasium_env import TimeLimited, action_space, observation_space
 from smc_mujoco.envs.tasks import Pair, reward
 from smc_mujoco.mechanisms.custom.plant_from import smooth
-from smc_mujoco.mechanisms.plant import DIRECTLY, Plant
+from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Plant
 from smc_mujoco.simulation import callback  # also imports mujoco.batch without a callback
 from smc_mujoco.simulation.model import without_scenery
 from smc_mujoco.simulation.run import cores
@@ -242,7 +242,7 @@ def remove_scenery(spec: mujoco.MjSpec) -> None:
 
     A user's model keeps its scenery and bodies, because a fixed part may be a floor, or carry a tendon.
     """
-    if not any(text.name == DIRECTLY for text in spec.texts):
+    if not any(text.name == DIRECT_TEXT for text in spec.texts):
         without_scenery(spec)
         spec.compiler.fusestatic = True
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR.value

@@ -23,7 +23,7 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.registry import catalogue_of
 
-DIRECTLY = "smc:direct"  # name of a text in models on whose joints, not bodies, disturbances act
+DIRECT_TEXT = "smc:direct"  # name of a text in models on whose joints, not bodies, disturbances act
 EFFORT = {"rad": "N m", "m": "N"}  # unit of a force, from that of x
 MAX_PARAMETER = 1e15  # SI units; no parameter of a mechanism is larger
 
@@ -219,7 +219,7 @@ class Plant:
           factors: parameter name -> factor on its value (the true plant's mismatch).
           nuserdata: length of mjData.userdata.
         """
-        model = ready(self.spec(), whole("nuserdata", nuserdata, 0, MAX_ITEMS))
+        model = compiled_for_runs(self.spec(), whole("nuserdata", nuserdata, 0, MAX_ITEMS))
         write(model, self.fields(model, self.values(factors or {})))
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model
@@ -255,7 +255,7 @@ def _on_stage(build: Callable[[int], mujoco.MjSpec], n: int) -> bool:
     return None not in (spec.body("machine"), spec.geom("floor"), spec.material("floor"), spec.material("accent"))
 
 
-def ready(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
+def compiled_for_runs(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
     """Compile a spec for runs with userdata of that length."""
     spec.nuserdata = nuserdata
     # otherwise MuJoCo would reset a diverging run to the initial state and continue

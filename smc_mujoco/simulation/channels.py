@@ -7,7 +7,7 @@ from numba import njit
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import record_at
 from smc_mujoco.mechanisms.hardware.part import PASSIVE, drive_ids, joint_ids
-from smc_mujoco.mechanisms.plant import DIRECTLY
+from smc_mujoco.mechanisms.plant import DIRECT_TEXT
 
 # Indices of a channel in arrays of mjData, -1 if there is none:
 #   qpos, qvel, ctrl: in the arrays of these names; x_sensor and v_sensor: in sensordata; force: in actuator_force
@@ -64,7 +64,7 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
     hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
     if not hinge and model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_SLIDE:
         raise ScenarioError(f"{name} is not on a hinge or slide joint: give it one")
-    direct = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, DIRECTLY) >= 0
+    direct = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, DIRECT_TEXT) >= 0
     axis = np.array([0.0, 0.0, 1.0]) if direct else data.xaxis[joint].round(12)  # a direct channel may have any axis
     if np.count_nonzero(axis) != 1:
         raise ScenarioError(f"the joint of {name} has axis {axis}: align it with a world axis")

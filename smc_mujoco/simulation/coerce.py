@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number, shown, taken, unknown, whole
+from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown, whole
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import Estimator
@@ -136,7 +136,7 @@ def state(name: str, value: float | Sequence[float] | None, s: Any) -> tuple[flo
         raise ScenarioError(f"{name} is {shown(value)}: give one number, or a list of one for each channel")
     value = value.tolist() if isinstance(value, np.ndarray) else value
     is_sequence = isinstance(value, Iterable) and not isinstance(value, str | bytes)
-    values, n = taken(name, value) if is_sequence else [value], s.plant.n  # pyright: ignore[reportArgumentType]
+    values, n = items_of(name, value) if is_sequence else [value], s.plant.n  # pyright: ignore[reportArgumentType]
     if len(values) not in (1, n):
         raise ScenarioError(f"{name} has {len(values)} values for {n} channels: give one number or {n}")
     values = values if len(values) == n else values * n

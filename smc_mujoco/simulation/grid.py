@@ -17,9 +17,9 @@ from smc_mujoco.common.errors import (
     MAX_ITEMS,
     ScenarioError,
     ScenarioWarning,
+    items_of,
     one_line,
     shown,
-    taken,
     users_stacklevel,
     whole,
 )
@@ -207,6 +207,6 @@ def listed(what: str, values: object) -> list:
     """Return one or several values as a list."""
     if isinstance(values, str | Plant | Component | Template | Condition):
         return [values]
-    if isinstance(values, bytes | Mapping) or not isinstance(values, Iterable) or not (items := taken(what, values)):
+    if isinstance(values, bytes | Mapping) or not isinstance(values, Iterable) or not (items := items_of(what, values)):
         raise ScenarioError(f"{what} is {shown(values)}: give several, such as a list")
     return items

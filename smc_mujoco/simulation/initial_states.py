@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, taken, users_stacklevel
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, items_of, number, users_stacklevel
 from smc_mujoco.simulation.scenario import Scenario
 
 SPREAD = 0.2  # of x0, to either side; chosen
@@ -81,6 +81,6 @@ def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by
             ScenarioWarning,
             users_stacklevel(),
         )
-    items = taken("x0", x0) if isinstance(x0, Sequence) and not isinstance(x0, str) else [x0]
+    items = items_of("x0", x0) if isinstance(x0, Sequence) and not isinstance(x0, str) else [x0]
     middle = None if x0 is None else tuple(number("x0", item) for item in items)
     return Starts(x0=middle, spread=spread, by=number("by", by, low=0.0))

@@ -18,7 +18,7 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.mechanisms.hardware import encoder
 from smc_mujoco.mechanisms.hardware.part import ROTOR, Part, initial_pose, joint_ids
-from smc_mujoco.mechanisms.plant import field_array, ready
+from smc_mujoco.mechanisms.plant import compiled_for_runs, field_array
 from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -135,7 +135,7 @@ def compile_model(scenario: Scenario, nuserdata: int = 0, scenery: bool = True) 
         without_scenery(edited)
     for texture in edited.textures:
         texture.width, texture.height = 1, 6  # a skybox has six sides
-    model = ready(edited, nuserdata)
+    model = compiled_for_runs(edited, nuserdata)
     model.opt.timestep = resolved.physics_step
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{resolved.integrator.upper()}")
     return model

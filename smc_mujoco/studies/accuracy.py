@@ -30,15 +30,15 @@ from smc_mujoco.common.errors import (
     ScenarioError,
     ScenarioWarning,
     find,
+    items_of,
     number,
     one_line,
     shown,
-    taken,
     users_stacklevel,
     whole,
 )
 from smc_mujoco.common.extras import package
-from smc_mujoco.common.files import ended, read_json, reading, write_json
+from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import joined
@@ -117,7 +117,7 @@ class AccuracyTable(Tables, list[Accuracy]):
 
     def save(self, path: str | os.PathLike) -> Path:
         """Write a .json file that `load` reads."""
-        return write_json(ended(path, ".json"), [dataclasses.asdict(row) for row in self])
+        return write_json(with_ending(path, ".json"), [dataclasses.asdict(row) for row in self])
 
 
 def load(path: str | os.PathLike) -> AccuracyTable:
@@ -225,7 +225,7 @@ def _longest_first(periods: Sequence[float]) -> tuple[float, ...]:
     Raises:
       ScenarioError: fewer than two, two that are equal, or one that is no period.
     """
-    numbers = [number("a period", h, above=0.0, low=MIN_TIME) for h in taken("periods", periods)]
+    numbers = [number("a period", h, above=0.0, low=MIN_TIME) for h in items_of("periods", periods)]
     if len(numbers) < 2 or len(set(numbers)) < len(numbers):
         raise ScenarioError(f"periods is {shown(periods)}: give two or more different ones in s, such as {PERIODS}")
     return tuple(sorted(numbers, reverse=True))

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.relevant_difference import RELEVANT, checked_share
 from smc_mujoco.analysis.tuning import search
-from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, taken, whole
+from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown, whole
 from smc_mujoco.common.errors import number as checked
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
@@ -294,7 +294,7 @@ def compare(
 
 def _check_names(metrics: Sequence[str], gains: str, out: object) -> None:
     """Raise ScenarioError for an unknown metric or set of gains, or for what is no path of a folder."""
-    for name in taken("metrics", metrics):
+    for name in items_of("metrics", metrics):
         find("metric", name, dict.fromkeys((SETTLES, *CATALOGUE)))
     find("set of gains", gains, dict.fromkeys((*gain_sets.SETS, "default")))
     if not isinstance(out, str | os.PathLike):

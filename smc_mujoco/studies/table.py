@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, find, shown, taken
+from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import MAX_RATIO, MAX_UNPACKED, from_json, reading, replacing, to_json
 from smc_mujoco.common.html import table as html_table
@@ -202,7 +202,7 @@ class Table:
         for name, wanted in (("plant", plant), ("law", law), ("condition", condition)):
             if wanted is not None:
                 several = isinstance(wanted, Iterable) and not isinstance(wanted, str)
-                names = taken(name, wanted) if several else [wanted]
+                names = items_of(name, wanted) if several else [wanted]
                 known = dict.fromkeys(self.column(name).tolist())
                 for one in names:
                     find(f"{name} of this table", one, known)

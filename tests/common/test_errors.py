@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from smc_mujoco.common import annexes, errors, extras, guard, libmujoco
-from smc_mujoco.common.errors import ScenarioError, find, name, number, one_line, shown, taken, unknown, whole
+from smc_mujoco.common.errors import ScenarioError, find, items_of, name, number, one_line, shown, unknown, whole
 from smc_mujoco.common.frozen import frozen
 
 pytestmark = pytest.mark.quick
@@ -44,7 +44,7 @@ TAKEN = [  # call, what it returns
     (lambda: whole("n", np.int64(5), 2, 5), 5),
     (lambda: name("label", "a" * 100), "a" * 100),
     (lambda: find("law", "lqr", {"lqr": 3}), 3),
-    (lambda: taken("runs", iter("ab")), ["a", "b"]),
+    (lambda: items_of("runs", iter("ab")), ["a", "b"]),
     (lambda: shown("x" * 58), "'" + "x" * 58 + "'"),
     (lambda: shown("x" * 59), "'" + "x" * 56 + "..."),
     (lambda: shown([0] * 70), "[" + "0, " * 18 + "0,..."),
@@ -81,9 +81,9 @@ REFUSED = [  # call, what the sentence says
     (lambda: name("label", "a\n"), r"label is 'a\n': give a name of printable characters"),
     (lambda: name("label", 3), "label is 3: give a name of printable characters"),
     (lambda: name("label", "a" * 101), f"label is '{'a' * 56}..., 101 characters: give at most 100"),
-    (lambda: taken("runs", range(10**6 + 1)), "runs has more than 1,000,000 items: give fewer"),
-    (lambda: taken("runs", 3), "runs is 3: give a list"),
-    (lambda: taken("runs", Silent()), "runs is <Silent>: give a list"),
+    (lambda: items_of("runs", range(10**6 + 1)), "runs has more than 1,000,000 items: give fewer"),
+    (lambda: items_of("runs", 3), "runs is 3: give a list"),
+    (lambda: items_of("runs", Silent()), "runs is <Silent>: give a list"),
     (lambda: find("law", "lqrr", dict.fromkeys(LAWS)), "unknown law 'lqrr': did you mean 'lqr'?"),
     (lambda: find("law", 3, dict.fromkeys(LAWS)), "unknown law 3: choose from lqr, super_twisting, terminal"),
     (lambda: frozen([("a", 1)]), "[('a', 1)] is no mapping: give a dict"),

@@ -321,8 +321,8 @@ def test_files_at_and_beyond_their_bounds(tmp_path, monkeypatch):
 def test_what_cannot_be_written_or_found_is_one_sentence(tmp_path):
     cells, beside = "give a CSV file, with commas or semicolons between cells", Path(files.__file__).parents[1]
     refusals = {
-        lambda: files.ended("a.txt", ".json"): "cannot save to 'a.txt': end the name in .json",
-        lambda: files.ended("a\0.json", ".json"): r"cannot save to 'a\x00.json': end the name in .json",
+        lambda: files.with_ending("a.txt", ".json"): "cannot save to 'a.txt': end the name in .json",
+        lambda: files.with_ending("a\0.json", ".json"): r"cannot save to 'a\x00.json': end the name in .json",
         lambda: writable(tmp_path): f"cannot write {tmp_path}: it is a folder, give the file in it a name",
         lambda: writable("a\0"): r"cannot write 'a\x00': give a name without \0",
         lambda: files.shipped("nope"): f"no folder 'nope' in {beside} or beside it: reinstall smc-mujoco",
@@ -333,7 +333,7 @@ def test_what_cannot_be_written_or_found_is_one_sentence(tmp_path):
         with pytest.raises(smc.ScenarioError) as refused:
             call()
         assert str(refused.value) == sentence
-    assert files.ended("b/a.json", ".json") == Path("b/a.json")
+    assert files.with_ending("b/a.json", ".json") == Path("b/a.json")
     (tmp_path / "old").write_text("old")
     writable(tmp_path / "old")
     writable(tmp_path / "new" / "a")

@@ -21,7 +21,7 @@ from smc_mujoco.analysis.tuning.search_space import (
     without_unit,
 )
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.files import ended, read_json, reading, write_json
+from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control import source
@@ -219,7 +219,7 @@ class Tuned(Tables):
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write a .json file that `load` reads back."""
-        path = ended(path, ".json")
+        path = with_ending(path, ".json")
         scenario = self.definition.scenarios(self.plant, self.law, self.seed)[0]
         data = {name: getattr(self, name) for name in SAVED_FIELDS} | {
             "definition": self.definition.describe(),

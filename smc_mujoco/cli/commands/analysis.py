@@ -58,10 +58,10 @@ def tune(
     """
     with delay_ctrl_c():
         from smc_mujoco.analysis.tuning import search
-        from smc_mujoco.common.files import ended, writable
+        from smc_mujoco.common.files import with_ending, writable
 
     writable(out, front)
-    path, terminal = out and ended(out, ".json"), Terminal()
+    path, terminal = out and with_ending(out, ".json"), Terminal()
     tuned = search.tune(
         options.plant(plant),
         law,
@@ -120,12 +120,12 @@ def margins(
         from smc_mujoco.analysis.margins import KINDS, save, save_csv
         from smc_mujoco.analysis.margins import margins as search
         from smc_mujoco.cli import tables
-        from smc_mujoco.common.files import ended
+        from smc_mujoco.common.files import with_ending
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
         from smc_mujoco.simulation.conditions import PLANTS
 
-    json, terminal = options.json_file(json, out and ended(out, ".csv"))
+    json, terminal = options.json_file(json, out and with_ending(out, ".csv"))
     machines = [options.plant(text) for text in options.names(plants, QUICK_MARGINS["plants"] if quick else PLANTS)]
     chosen = options.laws(law, QUICK_MARGINS["laws"] if quick else gain_sets.LAWS)
     kind = options.names(kinds, QUICK_MARGINS["kinds"] if quick else KINDS)

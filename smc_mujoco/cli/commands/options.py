@@ -180,10 +180,10 @@ def json_file(json: Path | None, *others: Path | None) -> "tuple[Path | None, Te
       others: files that the command writes besides. All are checked now, before minutes are spent.
     """
     from smc_mujoco.cli.terminal import Terminal
-    from smc_mujoco.common.files import ended, writable
+    from smc_mujoco.common.files import with_ending, writable
 
     terminal = Terminal(prints="result.json" * (str(json) == "-"))
-    path = terminal.printed or (json and ended(json, ".json"))
+    path = terminal.printed or (json and with_ending(json, ".json"))
     writable(*others, path)
     return path, terminal
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number, shown, taken
+from smc_mujoco.common.errors import ScenarioError, items_of, number, shown
 
 FOVY = 9.0  # degrees, chosen: a long lens, so that no machine looks larger than its neighbours
 USUAL_FOVY = 45.0  # degrees, MuJoCo's default
@@ -28,7 +28,7 @@ def checked(chosen: Camera | None) -> Camera | None:
     """Return the chosen camera; a name of a camera is checked where the model is at hand."""
     if chosen is None or isinstance(chosen, str):
         return chosen
-    parts = taken("camera", chosen)
+    parts = items_of("camera", chosen)
     if len(parts) not in (2, 3):
         raise ScenarioError(
             f"camera is {shown(chosen)}: give the name of a camera of the model, or (azimuth, elevation) in degrees, "

@@ -15,8 +15,8 @@ import numpy as np
 from PIL import Image
 
 from smc_mujoco.common import errors, extras, gl
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, taken, users_stacklevel
-from smc_mujoco.common.files import ended, replacing
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, items_of, number, users_stacklevel
+from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.common.progress import bar
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import finite, windows
@@ -69,7 +69,7 @@ def film(
     Raises:
       ScenarioError: nothing to show, a size that is odd or too small or large, or no OpenGL to render with.
     """
-    path = ended(path, ".mp4")
+    path = with_ending(path, ".mp4")
     shown = pace.clock(traces, fps, speed)
     pictures = frames(traces, shown, labels, title, size, camera)
     with replacing(path) as part, contextlib.closing(pictures), reporting(report, len(shown.times)) as done:
@@ -108,8 +108,8 @@ def clip(
     camera: Camera | None = None,
 ) -> Path:
     """Write an animated .webp of the time `span`, s, which web pages show as an image. Other arguments: as `film`."""
-    path = ended(path, ".webp")
-    if len(ends := taken("span", span)) != 2:
+    path = with_ending(path, ".webp")
+    if len(ends := items_of("span", span)) != 2:
         raise ScenarioError(f"span is {errors.shown(span)}: give two times, in s")
     start, stop = (number("span", end) for end in ends)
     shown = pace.clock(traces, fps, speed).part(start, stop)
@@ -137,7 +137,7 @@ def still(
     camera: Camera | None = None,
 ) -> Path:
     """Write the frame at `time` in s, within the runs, as a .png. Other arguments: as `film`."""
-    path = ended(path, ".png")
+    path = with_ending(path, ".png")
     end = max(float(trace.t[-1]) for trace in style.same_plant(traces))
     now = Clock(np.array([number("time", time, low=0.0, high=end + 1e-9)]), np.ones(1))
     with contextlib.closing(frames(traces, now, labels, title, size, camera)) as pictures, replacing(path) as part:
@@ -147,7 +147,7 @@ def still(
 
 def _checked_size(size: Iterable[int]) -> tuple[int, int]:
     """Return width and height of a film; refuse odd ones, and those out of range."""
-    sides = taken("size", size)
+    sides = items_of("size", size)
     fit = [
         isinstance(side, int | np.integer) and low <= side <= high and side % 2 == 0
         for side, low, high in zip(sides, MIN_SIZE, MAX_SIZE, strict=False)

@@ -14,8 +14,8 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from smc_mujoco.common.errors import ScenarioError, find, shown, taken, unknown
-from smc_mujoco.common.files import ended, to_json, write_json
+from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, unknown
+from smc_mujoco.common.files import to_json, with_ending, write_json
 from smc_mujoco.common.version import __version__
 from smc_mujoco.evidence.audit.paper import Entry, Paper, failed
 from smc_mujoco.evidence.audit.paper import paper as find_paper
@@ -61,7 +61,7 @@ class Audit:
         """
         from smc_mujoco.evidence.audit import evidence
 
-        return write_json(ended(path, ".json"), evidence.document(self))
+        return write_json(with_ending(path, ".json"), evidence.document(self))
 
     def badge(self, path: str | Path) -> Path:
         """Write a badge, an .svg file with the number of claims by verdict."""
@@ -155,7 +155,7 @@ def wanted(paper: Paper, only: Iterable[str | int] | None) -> list[Entry]:
     known = paper.claims
     if only is None:
         return list(known.values())
-    ids = {str(id) if isinstance(id, int) else id if isinstance(id, str) else shown(id) for id in taken("only", only)}
+    ids = {str(i) if isinstance(i, int) else i if isinstance(i, str) else shown(i) for i in items_of("only", only)}
     for id in sorted(ids - set(known)):
         raise unknown("claim", id, known)
     return [entry for entry in known.values() if entry.id in ids]
@@ -165,7 +165,7 @@ def sets(paper: Paper, gains: str | Sequence[str] | None, quick: bool) -> list[s
     """Return the sets of gains that `claims` takes for these arguments; refuse an unknown one."""
     if gains is None:
         return list(paper.quick_sets if quick else paper.sets)
-    names = [gains] if isinstance(gains, str) else taken("gains", gains)
+    names = [gains] if isinstance(gains, str) else items_of("gains", gains)
     for name in names:
         find("set of gains", name, paper.sets)
     if not names:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from smc_mujoco.common.files import ended, replacing
+from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.draw import style
 from smc_mujoco.evidence.audit.verdict import ANSWERS, NOT_TESTABLE, PARTLY, REFUTED, SUPPORTED, Claim, totals
 
@@ -18,7 +18,7 @@ FONT = "Verdana,Geneva,DejaVu Sans,sans-serif"
 
 def save(name: str, claims: Sequence[Claim], path: str | Path) -> Path:
     """Write the badge of a paper to an .svg file, and return its path."""
-    path = ended(path, ".svg")
+    path = with_ending(path, ".svg")
     with replacing(path) as file:
         file.write_text(svg(name, claims), encoding="utf-8")
     return path

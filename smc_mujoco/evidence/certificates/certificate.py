@@ -14,7 +14,7 @@ import numpy as np
 from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.extras import extra
-from smc_mujoco.common.files import ended, read_json, reading, to_json, write_json
+from smc_mujoco.common.files import read_json, reading, to_json, with_ending, write_json
 from smc_mujoco.common.text import number
 from smc_mujoco.evidence.certificates import loops
 from smc_mujoco.mechanisms.plant import EFFORT
@@ -258,7 +258,7 @@ class Certificate:
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write a .json file that `Certificate.load` and the checker read."""
-        return write_json(ended(path, ".json"), self.data, indent=None)
+        return write_json(with_ending(path, ".json"), self.data, indent=None)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> "Certificate":

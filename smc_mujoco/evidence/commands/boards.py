@@ -30,7 +30,7 @@ def board(
     """
     with delay_ctrl_c():
         from smc_mujoco.cli.scene import filmed
-        from smc_mujoco.common.files import ended, writable
+        from smc_mujoco.common.files import with_ending, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.evidence import boards
         from smc_mujoco.evidence.commands import tables
@@ -38,7 +38,7 @@ def board(
 
     terminal = Terminal()
     rows = boards.experiments(robot)
-    writable(figure, film and ended(film, ".mp4"))
+    writable(figure, film and with_ending(film, ".mp4"))
     traces, results = dict(zip(rows, run(list(rows.values())), strict=True)), None
     terminal.print(tables.board(robot, boards.board(traces), rows))
     if robustness:

@@ -63,14 +63,14 @@ def certify(
     Example: smc-mujoco certify --check duffing.json
     """
     with delay_ctrl_c():
-        from smc_mujoco.common.files import ended, write_json
+        from smc_mujoco.common.files import with_ending, write_json
         from smc_mujoco.draw.page import files
         from smc_mujoco.evidence.certificates.certificate import Certificate
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.simulation.run import run
 
     pictures = files(figure)
-    json, terminal = options.json_file(json, out and ended(out, ".json"), *pictures)
+    json, terminal = options.json_file(json, out and with_ending(out, ".json"), *pictures)
     scenario = worst_run = None
     if check:
         if plant:

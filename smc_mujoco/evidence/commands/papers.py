@@ -71,7 +71,7 @@ def claims(
     """
     with delay_ctrl_c():
         from smc_mujoco.common.errors import ScenarioError
-        from smc_mujoco.common.files import ended, replacing, writable
+        from smc_mujoco.common.files import replacing, with_ending, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.evidence.audit.audit import DEFAULT_PAPER, audit, document, evaluations
         from smc_mujoco.evidence.audit.paper import paper as find_paper
@@ -86,7 +86,7 @@ def claims(
         raise ScenarioError("--evidence needs runs that the audit makes itself: leave out --table")
     if mutants and json:
         raise ScenarioError("--mutants prints sentences: leave out --json")
-    writable(out, evidence and ended(evidence, ".json"), badge and ended(badge, ".svg"))
+    writable(out, evidence and with_ending(evidence, ".json"), badge and with_ending(badge, ".svg"))
     with bar("claims", evaluations(ids or None, sets, quick, about), counted=True) as drawn:
         done = audit(about, ids or None, sets, quick, threads, table=known, report=drawn.advance)
     written = [path for path in (evidence and done.save(evidence), badge and done.badge(badge)) if path]

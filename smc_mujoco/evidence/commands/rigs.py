@@ -116,7 +116,7 @@ def replay(
     with delay_ctrl_c():
         from smc_mujoco.cli.scene import filmed
         from smc_mujoco.common.errors import ScenarioError
-        from smc_mujoco.common.files import ended, writable
+        from smc_mujoco.common.files import with_ending, writable
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.evidence.rigs.records import load
         from smc_mujoco.evidence.rigs.rig import rig as find_rig
@@ -124,7 +124,7 @@ def replay(
         from smc_mujoco.simulation.trace import Trace
 
     terminal, twin = Terminal(), find_rig(rig)
-    writable(figure, film and ended(film, ".mp4"))
+    writable(figure, film and with_ending(film, ".mp4"))
     record = load(file, options.columns(columns))
     if isinstance(record, Trace):
         raise ScenarioError(f"{file} is a trace: give a record, with columns {', '.join(twin.needed)}")

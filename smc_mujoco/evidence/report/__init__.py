@@ -48,7 +48,7 @@ def report(
     """
     from smc_mujoco.analysis.relevant_difference import checked_share
     from smc_mujoco.common import extras
-    from smc_mujoco.common.errors import taken, whole
+    from smc_mujoco.common.errors import items_of, whole
     from smc_mujoco.common.files import replacing
     from smc_mujoco.evidence.report import page, stages
     from smc_mujoco.evidence.report.plan import FULL, QUICK, Bars
@@ -61,7 +61,7 @@ def report(
     if relevant is not None:
         plan = dataclasses.replace(plan, relevant=checked_share(relevant))
     if laws:
-        plan = dataclasses.replace(plan, laws=tuple(dict.fromkeys((*plan.laws, *taken("laws", laws)))))
+        plan = dataclasses.replace(plan, laws=tuple(dict.fromkeys((*plan.laws, *items_of("laws", laws)))))
     folder = Path(out)
     html = page.page(stages.find(plan, folder, threads, Bars(progress), None if records is None else Path(records)))
     with replacing(folder / "report.html") as part:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
-from smc_mujoco.common.files import ended, no_room, replacing, scratch
+from smc_mujoco.common.files import no_room, replacing, scratch, with_ending
 from smc_mujoco.common.process import TimedOut
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator
@@ -94,7 +94,7 @@ def export_fmu(
         find("joint", joint, description.JOINT_UNITS)
     controller = _controller(law, **about)
     identifier = _identifier(controller.law.name)
-    target = ended(path if path is not None else f"{identifier}.fmu", ".fmu")
+    target = with_ending(path if path is not None else f"{identifier}.fmu", ".fmu")
     files = _files(controller, identifier, joint)
     if binary:
         files |= _binary(files, identifier)

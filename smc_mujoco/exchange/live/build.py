@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from smc_mujoco.common.errors import ScenarioError, shown, taken
+from smc_mujoco.common.errors import ScenarioError, items_of, shown
 from smc_mujoco.common.files import plain
 from smc_mujoco.control import estimator, surface
 from smc_mujoco.control.component import Component, Template
@@ -48,7 +48,7 @@ def live(
     Raises:
       ScenarioError: a plant or law that the page cannot have, no npm, or a folder with other files in it.
     """
-    names = [plants] if isinstance(plants, str | Plant) else taken("plants", plants)
+    names = [plants] if isinstance(plants, str | Plant) else items_of("plants", plants)
     chosen = known.checked(names or DEFAULT_PLANTS)
     users = [_user_law(law) for law in (listed_laws(laws) if laws else ())]
     functions = {("law", law.name): to_js(law) for law in users}

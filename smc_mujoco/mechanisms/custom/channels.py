@@ -7,7 +7,7 @@ from typing import Any
 
 import mujoco
 
-from smc_mujoco.common.errors import ScenarioError, find, number, shown, taken
+from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
 from smc_mujoco.mechanisms.custom.mjcf import pick
 
 MAX_EXCESS = 1e-3  # rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
@@ -57,7 +57,7 @@ def coerce(channels: object) -> Pairs:
     if isinstance(channels, str | set | frozenset) or not isinstance(channels, Iterable):  # sets have no order
         raise ScenarioError(f"channels is {shown(channels)}: give joints' names in order, such as ['elbow', 'wrist']")
     named = isinstance(channels, Mapping)
-    pairs = list(channels.items()) if named else [(joint, None) for joint in taken("channels", channels)]
+    pairs = list(channels.items()) if named else [(joint, None) for joint in items_of("channels", channels)]
     if not pairs:
         raise ScenarioError("channels is empty: give at least one joint's name")
     return tuple((joint, channel(joint, value)) for joint, value in pairs)

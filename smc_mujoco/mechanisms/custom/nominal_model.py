@@ -45,7 +45,7 @@ from smc_mujoco.common.jit import Function, floats, pointer, record_at
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.mechanisms import plant
 from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
-from smc_mujoco.mechanisms.plant import SEEN, Dynamics, Field, Native, Values, ready, write
+from smc_mujoco.mechanisms.plant import SEEN, Dynamics, Field, Native, Values, compiled_for_runs, write
 
 _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
 # Parameters of the C functions: numbers of channels, of driven ones and of degrees of freedom; addresses of model and
@@ -209,7 +209,7 @@ def prepared(
     nominal: NominalModel, parameters: Mapping[str, float]
 ) -> tuple[mujoco.MjModel, Places, mujoco.MjData, list[mujoco.MjData]]:
     """Return the model with nominal parameters, its channels' indices, an MjData for Python, and the pool."""
-    model = ready(nominal.build(0), 0)
+    model = compiled_for_runs(nominal.build(0), 0)
     model.opt.disableflags |= _DISABLED
     model.opt.enableflags &= ~_SLEEP
     if passive_alone(model) and not model.opt.density and not model.opt.viscosity:

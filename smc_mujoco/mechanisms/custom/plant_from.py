@@ -41,7 +41,7 @@ from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.motors import ONE_JOINT, Motor, add_motors, motor_of
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.part import ROTOR, START
-from smc_mujoco.mechanisms.plant import DIRECTLY, Field, Plant, catalogue
+from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field, Plant, catalogue
 
 if TYPE_CHECKING:
     from dm_control.mjcf import RootElement
@@ -77,7 +77,7 @@ class UserModel:
                 spec.delete(key)
             else:
                 key.name, key.ctrl, key.act = START, [], []
-        spec.add_text(name=DIRECTLY, data="disturbances act on the joints")
+        spec.add_text(name=DIRECT_TEXT, data="disturbances act on the joints")
         spec.option.disableflags &= ~SENSORS
         return spec
 

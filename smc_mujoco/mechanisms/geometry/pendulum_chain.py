@@ -34,17 +34,17 @@ BEAM_Y = (0.085, 0.125)  # m, y of the beam behind the bobs that carries the piv
 
 def compose(single, n, x0):
     """Return the MjSpec of n pendulums taken from the model file `single`, at x0 (recycled) in keyframe `home`."""
-    unit = mujoco.MjSpec.from_file(str(model_path(single)))
+    source = mujoco.MjSpec.from_file(str(model_path(single)))
     spec = mujoco.MjSpec.from_file(str(model_path("common/theme.xml")))
-    spec.modelname = f"{n}_{unit.modelname}s"
-    spec.compiler.degree = unit.compiler.degree
+    spec.modelname = f"{n}_{source.modelname}s"
+    spec.compiler.degree = source.compiler.degree
     spec.copy_during_attach = True
-    spec.option = unit.option
+    spec.option = source.option
     machine = stand(spec, n)
 
-    pendulum = unit.body("pendulum")
+    pendulum = source.body("pendulum")
     pendulum.pos = (0.0, 0.0, 0.0)
-    material = strip(unit, pendulum)
+    material = strip(source, pendulum)
     for i in range(n):
         copy = machine.add_frame(pos=(0.0, i * PITCH, HEIGHT)).attach_body(pendulum, f"p{i}/", "")
         for geom in copy.geoms:
@@ -59,17 +59,17 @@ def compose(single, n, x0):
     return spec
 
 
-def strip(unit, pendulum):
-    """Delete everything but the pendulum from `unit`, and return geom name -> the material it had.
+def strip(source, pendulum):
+    """Delete everything but the pendulum from `source`, and return geom name -> the material it had.
 
     An attached body brings its file's assets and keyframes, so a thousand copies would bring a thousand floors.
     """
     material = {geom.name: geom.material for geom in pendulum.geoms}
     for geom in pendulum.geoms:
         geom.material = ""
-    scenery = [geom for geom in unit.geoms if geom.name not in material]
-    for item in [*scenery, *unit.cameras, *unit.lights, *unit.materials, *unit.textures, *unit.keys]:
-        unit.delete(item)
+    scenery = [geom for geom in source.geoms if geom.name not in material]
+    for item in [*scenery, *source.cameras, *source.lights, *source.materials, *source.textures, *source.keys]:
+        source.delete(item)
     return material
 
 
@@ -80,11 +80,11 @@ def stand(spec, n):
     spec.stat.center = (0.0, shown / 2, HEIGHT)
     spec.stat.extent = 1.2 + shown
     spec.stat.meansize = 0.1
-    away = 1.6 + 0.9 * shown
+    distance = 1.6 + 0.9 * shown
     machine = spec.worldbody.add_body(name="machine")
     machine.add_camera(
         name="look",
-        pos=(0.62 * away, shown / 2 - 0.74 * away, 0.62 + 0.26 * away),
+        pos=(0.62 * distance, shown / 2 - 0.74 * distance, 0.62 + 0.26 * distance),
         xyaxes=(0.767, 0.642, 0.0, -0.167, 0.199, 0.966),
     )
     rods = {"shaft": ((0.0, -PITCH, HEIGHT), (0.0, length + PITCH, HEIGHT), 0.008, "steel")}
@@ -215,7 +215,7 @@ def stand_row(spec, n, width):
         bar(machine, f"{side}_post", ((x, y, 0.028), (x, y, HEIGHT + 0.045)), 0.024, "graphite")
     shown = min(width, 8 * ROW_PITCH)  # as the chain's camera, nine pendulums at most
     spec.stat.center, spec.stat.extent = (0.0, 0.0, HEIGHT), 1.6 + shown
-    away = 2.2 + 0.9 * shown
+    distance = 2.2 + 0.9 * shown
     camera = spec.camera("look")
-    camera.pos = (-0.245 * away, -0.953 * away, HEIGHT - 0.05 + 0.176 * away)
+    camera.pos = (-0.245 * distance, -0.953 * distance, HEIGHT - 0.05 + 0.176 * distance)
     camera.alt.xyaxes = (0.969, -0.248, 0.0, 0.046, 0.181, 0.982)

@@ -9,29 +9,29 @@ q1, from hanging. (0, pi) is upright. Dry friction is left out of the nominal f 
 import dataclasses
 import math
 
-from smc_mujoco.mechanisms.plants import double_pendulum as both
+from smc_mujoco.mechanisms.plants import double_pendulum as double
 
 
 def build(n):
-    spec = both.build(n)
+    spec = double.build(n)
     spec.delete(spec.actuator("u1"))
     return spec
 
 
 def nominal(x, v, i, p):
-    f1, f2, _, g1, g2 = both.accelerations(
+    f1, f2, _, g1, g2 = double.accelerations(
         x[1], x[0], v[1], v[0], p.m1, p.m2, p.l1, p.r1, p.r2, p.I1, p.I2, p.Ir, p.gear, p.b1, p.b2, p.grav
     )
     return (f2, g2) if i == 0 else (f1, g1)
 
 
 ACROBOT = dataclasses.replace(
-    both.DOUBLE_PENDULUM,
+    double.DOUBLE_PENDULUM,
     name="acrobot",
     x0=(0.5, 1.0),
     build=build,
     nominal=nominal,
     underactuated=True,
     goal=(math.pi,),
-    limits=(both.TORQUE_LIMIT,),
+    limits=(double.TORQUE_LIMIT,),
 )

@@ -7,27 +7,27 @@ left out of the nominal f and g.
 
 import dataclasses
 
-from smc_mujoco.mechanisms.plants import double_pendulum as both
+from smc_mujoco.mechanisms.plants import double_pendulum as double
 
 
 def build(n):
-    spec = both.build(n)
+    spec = double.build(n)
     spec.delete(spec.actuator("u2"))
     return spec
 
 
 def nominal(x, v, i, p):
-    f1, f2, g1, g2, _ = both.accelerations(
+    f1, f2, g1, g2, _ = double.accelerations(
         x[0], x[1], v[0], v[1], p.m1, p.m2, p.l1, p.r1, p.r2, p.I1, p.I2, p.Ir, p.gear, p.b1, p.b2, p.grav
     )
     return (f1, g1) if i == 0 else (f2, g2)
 
 
 PENDUBOT = dataclasses.replace(
-    both.DOUBLE_PENDULUM,
+    double.DOUBLE_PENDULUM,
     name="pendubot",
     build=build,
     nominal=nominal,
     underactuated=True,
-    limits=(both.TORQUE_LIMIT,),
+    limits=(double.TORQUE_LIMIT,),
 )
