@@ -22,7 +22,7 @@ except ImportError:
 
 FORMAT = "smc-certificate/1"
 LEAVES_OUT = {"sampling", "delay", "noise", "dry friction", "contact", "drive", "other parameters", "rounding"}
-TIGHT, DEPTH = 3e-4, 6  # share by which a margin may be below the true one; halvings of a box in both directions
+MARGIN_TOLERANCE, MAX_HALVINGS = 3e-4, 6  # share below the true margin; halvings of a box in both directions
 
 
 class Refused(Exception):
@@ -150,7 +150,7 @@ def restoring(told, e, f):
     last = arb(boxes[-1][0])  # beyond it x (B + C x^2) <= 0, and sigma has grown
     falls = e.C <= 0 and e.B + e.C * last**2 <= 0 and 0 < m <= 1 and (1 - m) * sigma(f, c * last) >= abs(e.A)
     need(falls, f"x beyond {last}")
-    return need(best - m <= TIGHT * abs(m).max(arb(0.1)), "a tight margin")
+    return need(best - m <= MARGIN_TOLERANCE * abs(m).max(arb(0.1)), "a tight margin")
 
 
 def levels(doc, part, e, f):
@@ -186,7 +186,7 @@ def levels(doc, part, e, f):
     return {"actuator": f.room, "start": arb(outer) - at}
 
 
-def falls(e, f, d0, box, corners, depth=DEPTH):
+def falls(e, f, d0, box, corners, depth=MAX_HALVINGS):
     """Return whether W' < 0 in a box for every |d| <= d0, in quarters of it where that is not certain."""
     (x0, x1, s0, s1), (w00, w10, w01, w11) = map(arb, box), map(arb, corners)
     x, s, edge = hull(x0, x1), hull(s0, s1), x1 - x0

@@ -15,9 +15,9 @@ from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation.trace import Trace
 
-SIZE = (11.0, 5.6)  # inches
-ZOOM = 2.5  # the second panel shows so many bounds: chosen
-POINTS = 801  # of the plane in each direction
+FIGURE_SIZE = (11.0, 5.6)  # inches
+ZOOM_BOUNDS = 2.5  # the second panel shows so many bounds: chosen
+AXIS_POINTS = 801  # of the plane in each direction
 LEVELS = 7  # lines between the inner and the outer level, or of V: chosen
 
 
@@ -30,12 +30,12 @@ def draw(certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike
     if part is None and not certificate.stable:
         raise ScenarioError(f"the certificate of {certificate.law} on {certificate.plant} has no region to draw")
     paths = pages.files(path)
-    with style.page(SIZE[0]):
+    with style.page(FIGURE_SIZE[0]):
         bounded = part is not None and not certificate.rests
-        page = pages.blank(SIZE[0] if bounded else 0.62 * SIZE[0], SIZE[1], None)
+        page = pages.blank(FIGURE_SIZE[0] if bounded else 0.62 * FIGURE_SIZE[0], FIGURE_SIZE[1], None)
         axes = page.subplots(1, 2 if bounded else 1, squeeze=False).ravel()
         x, v = _plane(certificate, part, traces)
-        for ax, zoom in zip(axes, (1.0, ZOOM * (part["bound"] if part else 0.0) / x[-1]), strict=False):
+        for ax, zoom in zip(axes, (1.0, ZOOM_BOUNDS * (part["bound"] if part else 0.0) / x[-1]), strict=False):
             _panel(ax, certificate, part, x * zoom, v * zoom ** (0.5 if zoom < 1.0 else 1.0), traces)
         unit, d0 = data["unit"], data["disturbance"]
         under = f"|d| ≤ {d0:g} {EFFORT[unit]}" if d0 else "no disturbance"
@@ -76,7 +76,7 @@ def _plane(certificate: Any, part: Any, traces: Sequence[Trace]) -> tuple[np.nda
         far_v = max(far_v, np.abs(S - certificate.surface * X)[inside].max())
     elif not ends:
         far_x, far_v = 2.0, 6.0
-    return np.linspace(-1.08 * far_x, 1.08 * far_x, POINTS), np.linspace(-1.08 * far_v, 1.08 * far_v, POINTS)
+    return np.linspace(-1.08 * far_x, 1.08 * far_x, AXIS_POINTS), np.linspace(-1.08 * far_v, 1.08 * far_v, AXIS_POINTS)
 
 
 def _region(ax: Any, certificate: Any, part: Any, X: np.ndarray, V: np.ndarray) -> None:

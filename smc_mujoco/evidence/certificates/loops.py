@@ -13,7 +13,7 @@ import numpy as np
 
 Function = Callable[[np.ndarray], np.ndarray]
 # The plant's parameters -> M, and A, B, C, E, F of phi = A sin x + B x + C x^3 and D = E + F x^2.
-SINGLE: dict[str, Callable[[Any], tuple[float, ...]]] = {
+ONE_JOINT_TERMS: dict[str, Callable[[Any], tuple[float, ...]]] = {
     "inverted_pendulum": lambda p: (p.m * p.l**2, p.m * p.grav * p.l, 0.0, 0.0, p.b, 0.0),
     "pendulum_network": lambda p: (p.m * p.l**2, -p.m * p.grav * p.l, 0.0, 0.0, p.b, 0.0),
     "inverted_pendulum_network": lambda p: (p.m * p.l**2, p.m * p.grav * p.l, 0.0, 0.0, p.b, 0.0),
@@ -58,7 +58,7 @@ class Loop:
 def loop_of(data: Mapping[str, Any]) -> tuple[Loop, list[float], SimpleNamespace]:
     """Return the loop of a certificate's data, A, B, C, E, F of its plant, and the law's name and gains."""
     law = SimpleNamespace(name=data["law"]["name"], **data["law"]["gains"])
-    M, *terms = SINGLE[data["plant"]["name"]](SimpleNamespace(**data["plant"]["parameters"]))
+    M, *terms = ONE_JOINT_TERMS[data["plant"]["name"]](SimpleNamespace(**data["plant"]["parameters"]))
     return _loop(M, terms, law, data["u_max"], data["disturbance"]), terms, law
 
 

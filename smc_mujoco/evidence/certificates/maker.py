@@ -29,10 +29,10 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, Pulse, Sine, Step
 
 GRID_REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 3.0 * max(map(abs, plant.x0))}  # in x: chosen
-TIGHT = 1e-4  # share by which a margin is stated below the true one
-BOXES = (64, 256, 1024, 4096)  # tried in turn
-ROUNDED = 0.98  # factor on the largest set that a condition allows: chosen
-HALVINGS = 40  # of a set's size, in search of the largest
+MARGIN_SHARE = 1e-4  # share by which a margin is stated below the true one
+BOX_COUNTS = (64, 256, 1024, 4096)  # tried in turn
+SET_FACTOR = 0.98  # factor on the largest set that a condition allows: chosen
+SIZE_HALVINGS = 40  # of a set's size, in search of the largest
 LAWS = ("observer_free", "boundary_layer", "lqr", "pid", "classical", "terminal", "super_twisting")
 Judge = Callable[[str, dict], dict[str, Any] | None]  # theorem, its data -> its margins, None where it is refused
 PLANTS = ("inverted_pendulum", "duffing", "van_der_pol", "pendulum_network", "inverted_pendulum_network")
@@ -224,8 +224,8 @@ def _restoring(loop: Loop, terms: list[float]) -> Iterator[dict]:
         at = float(x[share.argmin()]) if share.min() < 0.0 else _far(loop)
         yield _condition("restoring", _share(loop, at), at=at)
         return
-    margin = smallest - TIGHT * max(abs(smallest), 0.1) * (smallest < 1.0)
-    for count in BOXES:
+    margin = smallest - MARGIN_SHARE * max(abs(smallest), 0.1) * (smallest < 1.0)
+    for count in BOX_COUNTS:
         edges = [float(f"{edge:.9g}") for edge in tail * np.linspace(0.0, 1.0, count + 1) ** 2]
         yield _condition("restoring", margin, boxes=[*map(list, itertools.pairwise(edges)), [edges[-1], None]])
 
@@ -245,10 +245,10 @@ def _share(loop: Loop, x: float) -> float:
 def _reaching(lean: float, reach: float, judge: Judge) -> dict:
     """Return the largest set |x| <= X, |s| <= lean X where s = 0 is surely reached; X = 0 if there is none."""
     low, high = 0.0, reach
-    for _ in range(HALVINGS):
+    for _ in range(SIZE_HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if judge("reaching", {"X": middle, "S": lean * middle}) else (low, middle)
-    return _judged("reaching", {"X": ROUNDED * low, "S": ROUNDED * lean * low}, judge)
+    return _judged("reaching", {"X": SET_FACTOR * low, "S": SET_FACTOR * lean * low}, judge)
 
 
 def _start(scenario: Scenario, loop: Loop) -> tuple[float, float]:
@@ -290,10 +290,10 @@ def _super_twisting(document: dict, loop: Loop, law: SimpleNamespace, judge: Jud
         if P is None:
             continue
         low, high = 1e-12, 1e6
-        for _ in range(HALVINGS):
+        for _ in range(SIZE_HALVINGS):
             middle = math.sqrt(low * high)
             low, high = (middle, high) if holds(_ellipse(P, L, middle, loop.c)) else (low, middle)
-        data = _ellipse(P, L, ROUNDED * low, loop.c)
+        data = _ellipse(P, L, SET_FACTOR * low, loop.c)
         if holds(data) and (best is None or best["X"] < data["X"]):
             best = data
     if best is None:

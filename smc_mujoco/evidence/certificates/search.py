@@ -23,15 +23,15 @@ from smc_mujoco.evidence.certificates.loops import Loop
 
 Proven = Callable[[tuple[float, ...], tuple[float, ...]], bool]
 Attracts = Callable[[np.ndarray], bool]
-CELLS, FINE = 110, 8.0  # on each side of 0, in x and in s, and in half a target: chosen
-SWEEPS, SETTLED = 500, 1e-9  # of a solution
-SMOOTHINGS = (2, 8, 24)  # of W, which blunt its edges: chosen
-PACE = 3.0  # 1/s, largest velocity of the grid over its largest position: chosen, as of a map of `basin`
-SLACK = 0.01  # least fall in a cell, as a share of the range of W' in it: chosen
-LEAST = 0.02  # range of levels that is worth a certificate: chosen
-RAMP = 0.5  # of the target's size, over which the cost of time rises from 0 to 1: chosen
-SAMPLES = 5  # of a cell, in both directions
-SCALES = (1.0, 1.05, 1.1, 1.2, 1.35)  # of the target around the linear loop's worst case: chosen
+CELLS, TARGET_CELLS = 110, 8.0  # on each side of 0, in x and in s, and in half a target: chosen
+SWEEPS, SWEEP_TOLERANCE = 500, 1e-9  # of a solution
+SMOOTHING_COUNTS = (2, 8, 24)  # of W, which blunt its edges: chosen
+SPEED_RATIO = 3.0  # 1/s, largest velocity of the grid over its largest position: chosen, as of a map of `basin`
+MIN_FALL_SHARE = 0.01  # least fall in a cell, as a share of the range of W' in it: chosen
+MIN_RANGE = 0.02  # range of levels that is worth a certificate: chosen
+RAMP_SHARE = 0.5  # of the target's size, over which the cost of time rises from 0 to 1: chosen
+CELL_SAMPLES = 5  # of a cell, in both directions
+TARGET_SCALES = (1.0, 1.05, 1.1, 1.2, 1.35)  # of the target around the linear loop's worst case: chosen
 
 
 def rest(loop: Loop, reach: float) -> float:
@@ -128,23 +128,23 @@ def levels(
     if P is None and (target is None or not min(target)):
         return None
     small = np.array(target) if P is None else np.sqrt(np.diag(np.linalg.inv(P)))
-    x, s = axis(reach, small[0] / FINE), axis((loop.c + PACE) * reach, small[1] / FINE)
+    x, s = axis(reach, small[0] / TARGET_CELLS), axis((loop.c + SPEED_RATIO) * reach, small[1] / TARGET_CELLS)
     X, S = np.meshgrid(x, s, indexing="ij")
     size = np.maximum(np.abs(X) / small[0], np.abs(S) / small[1])
     if P is not None:
         size = np.sqrt(P[0, 0] * X * X + 2.0 * P[0, 1] * X * S + P[1, 1] * S * S)
     tried = []
-    for scale in SCALES if loop.d0 and P is not None else (0.5,):
-        W = times(loop, x, s, np.clip((size / scale - 1.0) / RAMP, 0.0, 1.0))
-        for count in SMOOTHINGS:
+    for scale in TARGET_SCALES if loop.d0 and P is not None else (0.5,):
+        W = times(loop, x, s, np.clip((size / scale - 1.0) / RAMP_SHARE, 0.0, 1.0))
+        for count in SMOOTHING_COUNTS:
             smooth = np.round(_smooth(W, count, loop.switches), 7)
             grid = _Grid(loop, x, s, smooth, size if P is None or not loop.d0 else None)
             tried.append((grid, grid.window()))
-    for grid, window in sorted(tried, key=lambda one: one[0].worth(one[1], start)):
+    for grid, window in sorted(tried, key=lambda pair: pair[0].worth(pair[1], start)):
         if window and grid.bound(window) and (window := grid.surely(window, proven)):
-            told = None if loop.d0 or P is None else (float(P[0, 0]), float(P[0, 1]), float(P[1, 1]))
+            inner_form = None if loop.d0 or P is None else (float(P[0, 0]), float(P[0, 1]), float(P[1, 1]))
             inner, outer = (float(f"{level:.6f}") for level in (window[0] + 2e-6, window[1] - 2e-6))
-            return Levels(x=grid.x, s=s, W=grid.W, inner=inner, outer=outer, bound=grid.bound(window), P=told)
+            return Levels(x=grid.x, s=s, W=grid.W, inner=inner, outer=outer, bound=grid.bound(window), P=inner_form)
     return None
 
 
@@ -158,7 +158,7 @@ class _Grid:
         self.corners = np.stack([self.W[:-1, :-1], self.W[1:, :-1], self.W[:-1, 1:], self.W[1:, 1:]])
         self.low, self.high = self.corners.min(0), self.corners.max(0)
         lowest, highest = falls(loop, self.x, s, self.corners)
-        self.bad = highest >= -SLACK * (highest - lowest) - 1e-7
+        self.bad = highest >= -MIN_FALL_SHARE * (highest - lowest) - 1e-7
         self.sure = np.zeros_like(self.bad)
         self.border = min(self.W[-1].min(), self.W[:, 0].min(), self.W[:, -1].min())
         self.limit = 1.0
@@ -170,12 +170,12 @@ class _Grid:
     def window(self) -> tuple[float, float] | None:
         """Return the widest range of levels that no cell spoils, or None."""
         spans = sorted([*zip(self.low[self.bad], self.high[self.bad], strict=True), (self.border, 2.0)])
-        covered, widest = 0.0, (0.0, LEAST)
+        covered, widest = 0.0, (0.0, MIN_RANGE)
         for low, high in spans:
             if covered < self.limit - 1e-5 and low - covered > widest[1] - widest[0]:
                 widest = covered, low
             covered = max(covered, high)
-        return widest if widest[0] > 0.0 or widest[1] > LEAST else None
+        return widest if widest[0] > 0.0 or widest[1] > MIN_RANGE else None
 
     def bound(self, window: tuple[float, float] | None) -> float:
         """Return the largest |x| of the cells that reach the inner level."""
@@ -239,7 +239,7 @@ def times(loop: Loop, x: np.ndarray, s: np.ndarray, cost: np.ndarray) -> np.ndar
     W, cells, shares = np.where(cost > 0.0, 1.0, 0.0), np.array(cells), np.array(shares)
     decay = np.exp(-step * cost)
     for _ in range(SWEEPS):
-        if _sweep(W, cost > 0.0, cells, shares, decay) < SETTLED:
+        if _sweep(W, cost > 0.0, cells, shares, decay) < SWEEP_TOLERANCE:
             break
     return W
 
@@ -284,8 +284,8 @@ def falls(loop: Loop, x: np.ndarray, s: np.ndarray, corners: np.ndarray) -> tupl
     """Return the least and the largest W' at samples of each cell under the worst d, two arrays of (n, 2 n)."""
     hx, hs, values = np.diff(x)[:, None], np.diff(s)[None, :], []
     w00, w10, w01, w11 = corners
-    for a in np.linspace(0.0, 1.0, SAMPLES):
-        for b in np.linspace(0.0, 1.0, SAMPLES):
+    for a in np.linspace(0.0, 1.0, CELL_SAMPLES):
+        for b in np.linspace(0.0, 1.0, CELL_SAMPLES):
             X, S = x[:-1, None] + a * hx, s[None, :-1] + b * hs
             Wx = ((1.0 - b) * (w10 - w00) + b * (w11 - w01)) / hx
             Ws = ((1.0 - a) * (w01 - w00) + a * (w11 - w10)) / hs

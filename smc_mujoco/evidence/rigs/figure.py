@@ -12,7 +12,7 @@ from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.evidence.rigs.records import Record
 
-ROW = 2.6  # inches, height of a column's panels
+ROW_HEIGHT = 2.6  # inches, height of a column's panels
 
 
 def residual_figure(
@@ -40,7 +40,7 @@ def residual_figure(
         handles = [
             Line2D([], [], color=colour, label=twin) for twin, colour in ({"measured": style.INK} | colours).items()
         ]
-        height = pages.head_height(style.FULL_WIDTH, handles) + ROW * len(measured)
+        height = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(measured)
         page = pages.blank(style.FULL_WIDTH, height)
         axes = page.subplots(len(measured), 2, squeeze=False, sharex=True, width_ratios=(3, 2))
         for k, ((left, right), (name, values)) in enumerate(zip(axes, measured.items(), strict=True)):

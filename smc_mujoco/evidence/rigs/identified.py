@@ -13,10 +13,10 @@ from smc_mujoco.evidence.rigs.records import Record, percent
 from smc_mujoco.evidence.rigs.rig import Fall, Rig
 from smc_mujoco.evidence.rigs.uncertainty import MAX_CORRELATION
 
-POOR = 80.0  # percent: a fit below this may mean that the search ended in the wrong place; chosen
-FAR = 5.0  # factor between a quantity before and after, beyond which a column may be in another unit; chosen
-COMMON = 0.1  # relative difference up to which such factors count as the same; chosen
-LOSS = 0.1  # percent, by which the fit of a whole record may fall without a note; chosen
+POOR_FIT = 80.0  # percent: a fit below this may mean that the search ended in the wrong place; chosen
+UNIT_FACTOR = 5.0  # factor between a quantity before and after, beyond which a column may be in another unit; chosen
+FACTOR_TOLERANCE = 0.1  # relative difference up to which such factors count as the same; chosen
+MAX_FIT_LOSS = 0.1  # percent, by which the fit of a whole record may fall without a note; chosen
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Identified:
             elif self.errors[name] > abs(value):
                 sentences.append(f"{name} may as well be 0 ({value:.3g} ± {self.errors[name]:.2g})")
         sentences += self._scale_notes() + self._loss_notes()
-        if (worst := min(min(fit.values()) for fit in self.fits)) < POOR:
+        if (worst := min(min(fit.values()) for fit in self.fits)) < POOR_FIT:
             poor = f"the twin {worst}" if isinstance(worst, Fall) else f"the worst fit is {worst:.0f} %"
             sentences.append(
                 f"{poor}: the model lacks something, a column is wrong or in another unit, or "
@@ -74,11 +74,11 @@ class Identified:
         before = {name: self.before.quantities[name] for name in self.values}
         positive = {name: each.value for name, each in before.items() if each.least >= 0.0 and each.value > 0.0}
         factors = {name: self.values[name] / value for name, value in positive.items()}
-        far = {name: factor for name, factor in factors.items() if not 1.0 / FAR < factor < FAR}
+        far = {name: factor for name, factor in factors.items() if not 1.0 / UNIT_FACTOR < factor < UNIT_FACTOR}
         if not far:
             return []
         middle = float(np.median(list(far.values())))
-        if len(far) > 1 and all(abs(factor / middle - 1.0) < COMMON for factor in far.values()):
+        if len(far) > 1 and all(abs(factor / middle - 1.0) < FACTOR_TOLERANCE for factor in far.values()):
             return [
                 f"{joined(list(far))} are {middle:.3g} times what they were before: look at the unit of the command"
             ]
@@ -89,7 +89,7 @@ class Identified:
         """Sentences on whole records that the values before repeat better."""
         sentences = []
         for i, (fit, before) in enumerate(zip(self.fits, self.fits_before, strict=True)):
-            if min(fit.values()) < min(before.values()) - LOSS:
+            if min(fit.values()) < min(before.values()) - MAX_FIT_LOSS:
                 sentences.append(
                     f"record {i + 1}, repeated as a whole, fits by {percent(fit)} and by {percent(before)} with the "
                     "values before, though its pieces fit better: errors add up over the record, or the model lacks "

@@ -17,10 +17,10 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.evidence.rigs import search
-from smc_mujoco.evidence.rigs.identified import POOR, Identified
+from smc_mujoco.evidence.rigs.identified import POOR_FIT, Identified
 from smc_mujoco.evidence.rigs.records import Columns
 from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes, cost
-from smc_mujoco.evidence.rigs.rig import FAR_BETTER, Quantity, Rig, Source
+from smc_mujoco.evidence.rigs.rig import RADIANS_GAIN, Quantity, Rig, Source
 from smc_mujoco.evidence.rigs.rig import rig as find_rig
 from smc_mujoco.evidence.rigs.uncertainty import statistics
 from smc_mujoco.mechanisms.hardware.part import column_ends
@@ -29,7 +29,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 # Fields of a run's scenario that a rig made from its plant takes over.
-OF_RUN = ("control_period", "friction", "contact", "actuator", "sensor", "u_max", "input_delay", "velocity", "model")
+SETTINGS = ("control_period", "friction", "contact", "actuator", "sensor", "u_max", "input_delay", "velocity", "model")
 # Frictions and inertias of the library's plants, which are 0 or more.
 FRICTIONS, INERTIAS = frozenset(("b", "bq", "b1", "b2", "cf", "cfq", "cf1", "cf2", "delta")), frozenset(("J", "Jc"))
 
@@ -121,11 +121,11 @@ def _solved(
 def _refuse_swapped(twin: Rig, names: list[str], data: Sequence[Mapping[str, Any]], reached: Slopes) -> None:
     """Raise ScenarioError if records of one joint fit badly as they are, and well with position and command swapped."""
     (x, *others), u = twin.columns.x, twin.columns.u
-    if others or twin.columns.state or twin.dynamics is not None or reached.fit >= POOR:
+    if others or twin.columns.state or twin.dynamics is not None or reached.fit >= POOR_FIT:
         return
     swapped = Replays(twin, names, [dict(record) | {x: record[u], u: record[x]} for record in data], False, _ignore)
     fit = search.search(swapped, 4, 0, search.ROUGH_STEPS).fit
-    if fit > max(FAR_BETTER, reached.fit + FAR_BETTER):
+    if fit > max(RADIANS_GAIN, reached.fit + RADIANS_GAIN):
         raise ScenarioError(
             f"the columns {x} and {u} of the record of {twin.name} look swapped, as its pieces fit by {fit:.0f} % with "
             f"them exchanged and by {reached.fit:.0f} % as they are: name the position {x} and the command {u}"
@@ -175,7 +175,7 @@ def _of_plant(plant: Plant, base: Scenario | None) -> Rig:
     """Return a rig whose quantities are a plant's parameters, with the parts of a run's scenario `base`."""
     own = {}
     if base is not None:
-        own = {name: getattr(base, name) for name in OF_RUN if getattr(base, name) is not None}
+        own = {name: getattr(base, name) for name in SETTINGS if getattr(base, name) is not None}
     lower = dict.fromkeys(plant.parameters, -np.inf)
     lower |= dict.fromkeys((FRICTIONS | INERTIAS | {*plant.dry, *plant.added}) & set(plant.parameters), 0.0)
     lower |= dict.fromkeys(plant.positive, 1e-6)

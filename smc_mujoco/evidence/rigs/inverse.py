@@ -14,11 +14,11 @@ from smc_mujoco.evidence.rigs.records import Columns, Record, step_of
 from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Plant
 
-WINDOW, ORDER = 0.04, 3  # s, and degree, of the cubic about each sample; chosen
-PERIOD = 0.01  # s, between the samples that are compared; chosen: the cubics leave nothing above 30 Hz
+CUBIC_WINDOW, CUBIC_DEGREE = 0.04, 3  # s, and degree, of the cubic about each sample; chosen
+COMPARED_PERIOD = 0.01  # s, between the samples that are compared; chosen: the cubics leave nothing above 30 Hz
 # Hz, and number of poles, of the low-pass filter. Chosen: three times the fastest public exciting motions, 1.6 Hz.
 CUTOFF, POLES = 5.0, 4
-END = 0.1  # s, left out at both ends, where the filter knows only one side; chosen
+END_DURATION = 0.1  # s, left out at both ends, where the filter knows only one side; chosen
 MIN_DURATION, MAX_STEP = 1.0, 0.05  # s: of a record, and between its samples; chosen
 
 
@@ -36,15 +36,15 @@ class Filter:
                 f"the record lasts {t[-1] - t[0]:.3g} s, with a sample every {self.step:.3g} s: for its torques give "
                 f"at least {MIN_DURATION:g} s, with a sample every {MAX_STEP:g} s or more often"
             )
-        self.stride = max(1, round(PERIOD / self.step))
+        self.stride = max(1, round(COMPARED_PERIOD / self.step))
         self.poles = butter(POLES, CUTOFF, fs=1.0 / (self.stride * self.step), output="sos")
 
     def cubic(self, name: str, derivative: int = 0) -> np.ndarray:
         """Return a column or its derivative, (N,), at the samples that are compared, from cubics about each of them."""
         from scipy.signal import savgol_filter
 
-        samples = 2 * max(2, round(WINDOW / self.step / 2)) + 1
-        smooth = savgol_filter(self.data[name], samples, ORDER, deriv=derivative, delta=self.step)
+        samples = 2 * max(2, round(CUBIC_WINDOW / self.step / 2)) + 1
+        smooth = savgol_filter(self.data[name], samples, CUBIC_DEGREE, deriv=derivative, delta=self.step)
         return np.asarray(smooth)[:: self.stride]
 
     def low(self, values: np.ndarray) -> np.ndarray:
@@ -55,7 +55,7 @@ class Filter:
 
     def inner(self, values: np.ndarray) -> np.ndarray:
         """Return values (N,) without the ends."""
-        cut = round(END / (self.stride * self.step))
+        cut = round(END_DURATION / (self.stride * self.step))
         return values[cut : len(values) - cut]
 
 

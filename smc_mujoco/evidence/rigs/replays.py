@@ -28,12 +28,12 @@ from smc_mujoco.evidence.rigs.rig import Part, Quantity, Rig
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 
-DIFFERENCE = 2e-3  # of a quantity's scale, for central differences; chosen: dry friction makes shorter ones rough
+DIFFERENCE_STEP = 2e-3  # of a quantity's scale, for central differences; chosen: dry friction makes shorter ones rough
 STATE_SCALE = 0.05  # scale of a state at the start, relative to the standard deviation of its column or rate; chosen
-LARGEST_STEP = 2.5e-4  # s, of RK4 in corrected replays; chosen
+MAX_STEP = 2.5e-4  # s, of RK4 in corrected replays; chosen
 SLOPE_HALVINGS = 2  # of that step, for slopes: with dry friction they err by 5 % then, and by up to 45 % before; chosen
 WORST = 1.0  # largest residual of a sample, relative to the norm of the record; that of a run that fails
-DEPENDENT = 1e-6  # ratio of singular values below which states at the start have no effect of their own
+SINGULAR_RATIO = 1e-6  # ratio of singular values below which states at the start have no effect of their own
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,14 +83,14 @@ class Slopes:
     def freed(self, rows: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return rows of each piece, (N,) or (N, p), without the part that states at its start can cause."""
         return [
-            each - S @ np.linalg.lstsq(S, each, rcond=DEPENDENT)[0]
+            each - S @ np.linalg.lstsq(S, each, rcond=SINGULAR_RATIO)[0]
             for S, each in zip(self.by_states, rows, strict=True)
         ]
 
     def moves(self, step: np.ndarray) -> np.ndarray:
         """Return the moves of each piece's states, (pieces, s), that suit a step of the quantities (p,) best."""
         pieces = zip(self.residuals, self.by_values, self.by_states, strict=True)
-        return np.array([-np.linalg.lstsq(S, r + J @ step, rcond=DEPENDENT)[0] for r, J, S in pieces])
+        return np.array([-np.linalg.lstsq(S, r + J @ step, rcond=SINGULAR_RATIO)[0] for r, J, S in pieces])
 
     def stepped(self, step: np.ndarray) -> "Slopes":
         """Return the slopes after a small step of the quantities (p,), with residuals that follow from derivatives.
@@ -223,7 +223,7 @@ class Replays:
         """Correct all replays by what shorter steps change at a point. Return whether steps err at all.
 
         Args:
-          halvings: of LARGEST_STEP, 1 or more.
+          halvings: of MAX_STEP, 1 or more.
         """
         if self.closed or self.twin.columns.state or self.twin.dynamics is not None:
             return False  # simulated runs have the errors of the scenario's own steps, too
@@ -290,13 +290,13 @@ class Replays:
         moved = []
         for sign in (1.0, -1.0):
             for e in np.eye(p):
-                values = np.clip(point.values + sign * DIFFERENCE * e, self.low, self.high)
+                values = np.clip(point.values + sign * DIFFERENCE_STEP * e, self.low, self.high)
                 moved.append(Point(values, point.states))
             for e in np.eye(s):
-                moved.append(Point(point.values, point.states + sign * DIFFERENCE * e))
+                moved.append(Point(point.values, point.states + sign * DIFFERENCE_STEP * e))
         residuals, *rows = self.residuals([point, *moved])
         ahead, back = rows[: p + s], rows[p + s :]
-        gaps = [moved[j].values[j] - moved[p + s + j].values[j] for j in range(p)] + [2.0 * DIFFERENCE] * s
+        gaps = [moved[j].values[j] - moved[p + s + j].values[j] for j in range(p)] + [2.0 * DIFFERENCE_STEP] * s
         columns = [
             np.column_stack([(ahead[j][k] - back[j][k]) / gap for j, gap in enumerate(gaps)])
             for k in range(len(self.pieces))
@@ -341,7 +341,7 @@ def _steps(scenario: Scenario, halvings: int) -> dict[str, Any]:
     RK4 has errors of first order only where dry friction changes its direction. It cannot integrate friction that has a
     state.
     """
-    integrator, step = "RK4", scenario.control_period / math.ceil(scenario.control_period / LARGEST_STEP - 1e-9)
+    integrator, step = "RK4", scenario.control_period / math.ceil(scenario.control_period / MAX_STEP - 1e-9)
     if scenario.input_delay or any(part.stateful for part in scenario.friction):
         integrator, step = scenario.resolved.integrator, scenario.resolved.physics_step
     return {"integrator": integrator, "physics_step": step / 2**halvings}

@@ -31,9 +31,9 @@ from smc_mujoco.simulation.trace import Trace
 
 Values = SimpleNamespace  # quantities by name
 Source = Mapping[str, Any] | Trace  # a record as columns by name, or as a simulated run
-FAR_BETTER = 50.0  # percent: if radians improve a fit by this, and beyond this, its angles are in degrees; chosen
-UNSCORED = -1e3  # percent: fit of a replay that fails in an open loop
-LOST = 2.0  # ranges of a measured joint, beyond which the twin of a closed loop has fallen; chosen
+RADIANS_GAIN = 50.0  # percent: if radians improve a fit by this, and beyond this, its angles are in degrees; chosen
+FAILED_FIT = -1e3  # percent: fit of a replay that fails in an open loop
+FALL_RANGES = 2.0  # ranges of a measured joint, beyond which the twin of a closed loop has fallen; chosen
 
 
 @dataclasses.dataclass(frozen=True)
@@ -412,7 +412,7 @@ class Rig:
           record: column -> values.
           fit: of the record as it is. A record that fits well is not simulated again.
         """
-        if min(fit.values()) >= 100.0 - FAR_BETTER or "rad" not in self.scenario("none").plant.units:
+        if min(fit.values()) >= 100.0 - RADIANS_GAIN or "rad" not in self.scenario("none").plant.units:
             return
         joints, references = self.columns.x, (self.columns.reference, *self.columns.others)
         each = [(x, *references[i : i + 1]) for i, x in enumerate(joints)]
@@ -421,7 +421,7 @@ class Rig:
         suspects = [names for names in dict.fromkeys(there) if names]
         others = self.fits([records.in_radians(record, self.columns, names) for names in suspects])
         best = max(range(len(suspects)), key=lambda i: min(others[i].values()))
-        if min(others[best].values()) > max(FAR_BETTER, min(fit.values()) + FAR_BETTER):
+        if min(others[best].values()) > max(RADIANS_GAIN, min(fit.values()) + RADIANS_GAIN):
             which = "angles" if best == 0 else f"values of {' and '.join(suspects[best])}"
             raise ScenarioError(
                 f"the {which} of the record of {self.name} look like degrees, as it fits by "
@@ -535,15 +535,15 @@ def percentages(predicted: Record, measured: Record) -> dict[str, float]:
         y = measured[name]
         with np.errstate(all="ignore"):
             share = float(np.linalg.norm(y - values) / np.linalg.norm(y - y.mean()))
-        percent[name] = 100.0 * (1.0 - share) if np.isfinite(share) else UNSCORED
+        percent[name] = 100.0 * (1.0 - share) if np.isfinite(share) else FAILED_FIT
     return percent
 
 
 def fallen(predicted: Record, measured: Record, t: np.ndarray) -> Fall | None:
-    """Return the fall of a twin whose joints leave the measured ones by more than LOST of their ranges; else None."""
+    """Return the fall of a twin whose joints leave the measured ones by over FALL_RANGES ranges; else None."""
     for name, values in predicted.items():
         error, span = np.nan_to_num(np.abs(values - measured[name]), nan=np.inf), np.ptp(measured[name])
-        if error.max() > LOST * span > 0.0:
+        if error.max() > FALL_RANGES * span > 0.0:
             return Fall(float(t[np.argmax(error > span)]))
     return None
 

@@ -1,8 +1,8 @@
 """The search of identification: starts by torques and over decades, and damped Gauss-Newton steps from the best.
 
 Where the joints have the recorded command as their force, a first least squares compares that force with the inverse
-dynamics of the measured motion. It is nearly linear in masses and frictions, so any values may start it; but the noise
-of accelerations biases it, so it is only a start itself.
+dynamics of the measured motion. It is nearly linear in masses and frictions, so any values may start it. The noise
+of accelerations biases it, so its result is only a start.
 
 Quantities that cannot be negative, as masses and frictions, differ between machines by powers of ten. So further starts
 are drawn evenly in their logarithms, and no step changes such a quantity by more than a factor of ten.
@@ -17,19 +17,19 @@ from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes, cost
 from smc_mujoco.evidence.rigs.rig import Values
 from smc_mujoco.evidence.rigs.uncertainty import jackknife
 
-DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
+START_DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
 CANDIDATES = 8  # further starts that are drawn for each one that is refined; chosen
 DAMPINGS = (0.0, 1e-2, 1.0, 1e3)  # of the steps that are tried at once, relative to the curvature; chosen
 SHARES = (0.3, 1.0)  # of its linear move that a state at the start of a piece makes in trials; chosen
-FARTHEST = 100.0  # scales of a state at the start, by which it may differ from the measured one; chosen
-FACTOR = 10.0  # by which a step may change a quantity that cannot be negative; chosen
-NEGLIGIBLE = 1e-4  # of its scale: below it such a quantity may become 0; chosen
-ENDING = 1e-5  # relative change of the cost at which the search ends; chosen
+MAX_STATE = 100.0  # scales of a state at the start, by which it may differ from the measured one; chosen
+MAX_FACTOR = 10.0  # by which a step may change a quantity that cannot be negative; chosen
+NEGLIGIBLE_VALUE = 1e-4  # of its scale: below it such a quantity may become 0; chosen
+COST_TOLERANCE = 1e-5  # relative change of the cost at which the search ends; chosen
 ROUGH_STEPS = 8  # steps from each start before the best is chosen; chosen
 CORRECTED_STEPS = 3  # steps after the first halving of the physics step; chosen
-MOST_HALVINGS = 5  # of the physics step in corrected replays; chosen
+MAX_HALVINGS = 5  # of the physics step in corrected replays; chosen
 NEGLIGIBLE_MOVE = 0.5  # of a standard error, by which a halving may move a quantity; chosen
-GOOD = 97.0  # percent: fit of the pieces beyond which a start needs no rival; chosen
+GOOD_FIT = 97.0  # percent: fit of the pieces beyond which a start needs no rival; chosen
 
 
 def search(replays: Replays, starts: int, seed: int, most: int) -> Slopes:
@@ -41,12 +41,12 @@ def search(replays: Replays, starts: int, seed: int, most: int) -> Slopes:
       most: largest number of steps from the best start.
     """
     reached = [refine(replays, replays.start, min(most, ROUGH_STEPS))]
-    if reached[0].fit < GOOD and (point := _by_torques(replays)):
+    if reached[0].fit < GOOD_FIT and (point := _by_torques(replays)):
         reached.append(refine(replays, point, min(most, ROUGH_STEPS)))
-    if reached[-1].fit < GOOD and starts > 1:
+    if reached[-1].fit < GOOD_FIT and starts > 1:
         for point in _random(replays, starts - 1, seed):
             reached.append(refine(replays, point, min(most, ROUGH_STEPS)))
-            if reached[-1].fit > GOOD:
+            if reached[-1].fit > GOOD_FIT:
                 break
     return refine(replays, min(reached, key=lambda slopes: slopes.cost).point, most)
 
@@ -59,18 +59,18 @@ def _by_torques(replays: Replays) -> Point | None:
     data = [twin.checked(record) for record in replays.data]
     direct = replays.pieces[0].part is not None and twin.scenario("none").actuator == ()
     columns = dataclasses.replace(twin.columns, torque=tuple(f"torque of {name}" for name in twin.columns.x))
-    if not direct or not all(inverse.long_enough(each, columns) for each in data):
+    if not direct or not all(inverse.long_enough(record, columns) for record in data):
         return None
-    for each in data:
-        u = each[twin.columns.u]
-        each.update(zip(columns.torque, (u, *(0.0 * u for _ in columns.torque[1:])), strict=True))
-    measured = [inverse.measured(each, columns) for each in data]
+    for record in data:
+        u = record[twin.columns.u]
+        record.update(zip(columns.torque, (u, *(0.0 * u for _ in columns.torque[1:])), strict=True))
+    measured = [inverse.measured(record, columns) for record in data]
 
     def differences(values: np.ndarray) -> np.ndarray:
         fields = twin.machine(Values(**twin.values | replays.values(Point(values, start.states))))
-        pairs = zip((inverse.torques(fields["plant"], each, columns) for each in data), measured, strict=True)
-        each = [ours[name] - theirs[name] for ours, theirs in pairs for name in columns.torque]
-        return np.nan_to_num(np.concatenate(each))
+        pairs = zip((inverse.torques(fields["plant"], record, columns) for record in data), measured, strict=True)
+        gaps = [ours[name] - theirs[name] for ours, theirs in pairs for name in columns.torque]
+        return np.nan_to_num(np.concatenate(gaps))
 
     inside = np.clip(start.values, replays.low, replays.high)
     solved = least_squares(differences, inside, bounds=(replays.low, replays.high), x_scale="jac")
@@ -83,7 +83,7 @@ def _random(replays: Replays, count: int, seed: int) -> list[Point]:
     magnitudes = np.maximum(np.abs(start.values), 1.0)
     drawn = []
     for _ in range(CANDIDATES * count):
-        factors = 10.0 ** rng.uniform(-DECADES, DECADES, len(magnitudes))
+        factors = 10.0 ** rng.uniform(-START_DECADES, START_DECADES, len(magnitudes))
         signs = np.where(replays.low < 0.0, rng.choice((-1.0, 1.0), len(magnitudes)), 1.0)
         drawn.append(Point(np.clip(signs * factors * magnitudes, replays.low, replays.high), start.states))
     costs = [cost(rows) for rows in replays.residuals(drawn)]
@@ -99,14 +99,14 @@ def better(replays: Replays, *points: Point) -> Point:
 def accurate(replays: Replays, slopes: Slopes) -> tuple[Slopes, np.ndarray]:
     """Return what a search reaches when its replays are corrected, and how far the last halving moved it, (p,).
 
-    The step is halved until that is a small part of the standard errors. Residuals are corrected at each point, as the
-    moments at which dry friction changes its direction move; the derivatives stay those of the first step.
+    The step is halved until that is a small part of the standard errors. Residuals are corrected at each point, because
+    the moments at which dry friction changes its direction move. The derivatives stay those of the first step.
     """
     moved = np.zeros(len(replays.names))
     if not replays.correct(slopes.point, 1):
         return slopes, moved
     slopes = replays.sharpened(refine(replays, slopes.point, CORRECTED_STEPS))
-    for halvings in range(2, MOST_HALVINGS + 1):
+    for halvings in range(2, MAX_HALVINGS + 1):
         before = slopes
         replays.correct(before.point, halvings)
         slopes = replays.again(before, before.point)
@@ -135,7 +135,7 @@ def refine(replays: Replays, point: Point, most: int) -> Slopes:
         after = replays.slopes(chosen)
         gain = best.cost - after.cost
         best = after
-        if gain < ENDING * best.cost:
+        if gain < COST_TOLERANCE * best.cost:
             break
     return best
 
@@ -147,13 +147,13 @@ def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
     """
     groups = [_variants(replays, slopes, _moved(replays, slopes, damping)) for damping in DAMPINGS]
     trials, size = [point for group in groups for point in group], len(groups[0])
-    costs = np.array([[cost([rows]) for rows in one] for one in replays.residuals(trials)])
+    costs = np.array([[cost([rows]) for rows in pieces] for pieces in replays.residuals(trials)])
     reached = []
     for i, group in enumerate(groups):
         of_length = costs[i * size : (i + 1) * size]
         states = [group[variant].states[k] for k, variant in enumerate(of_length.argmin(axis=0))]
         reached.append((Point(group[0].values, np.array(states)), float(of_length.min(axis=0).sum())))
-    return min(reached, key=lambda each: each[1])
+    return min(reached, key=lambda pair: pair[1])
 
 
 def _variants(replays: Replays, slopes: Slopes, values: np.ndarray) -> list[Point]:
@@ -162,7 +162,7 @@ def _variants(replays: Replays, slopes: Slopes, values: np.ndarray) -> list[Poin
     Dry friction makes a kink in the cost at velocity 0, which no step crosses from another velocity. So rest is tried.
     """
     moves = slopes.moves(values - slopes.point.values)
-    moved = [Point(values, np.clip(slopes.point.states + share * moves, -FARTHEST, FARTHEST)) for share in SHARES]
+    moved = [Point(values, np.clip(slopes.point.states + share * moves, -MAX_STATE, MAX_STATE)) for share in SHARES]
     return [*moved, replays.at_rest(moved[-1])] if len(replays.free) else moved[-1:]
 
 
@@ -177,6 +177,6 @@ def _moved(replays: Replays, slopes: Slopes, damping: float) -> np.ndarray:
     step = np.zeros(len(values))
     step[inside] = np.linalg.lstsq(A[np.ix_(inside, inside)], descent[inside], rcond=1e-14)[0]
     moved = values + step
-    positive = (low >= 0.0) & (values > NEGLIGIBLE)
-    moved = np.where(positive, np.clip(moved, values / FACTOR, values * FACTOR), moved)
+    positive = (low >= 0.0) & (values > NEGLIGIBLE_VALUE)
+    moved = np.where(positive, np.clip(moved, values / MAX_FACTOR, values * MAX_FACTOR), moved)
     return np.clip(moved, low, high)

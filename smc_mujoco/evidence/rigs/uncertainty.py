@@ -25,8 +25,8 @@ REPEATS = 24  # simulated repetitions of the records of a closed loop, for stand
 # Of the jackknife, chosen: blocks of time in all pieces together, and the length of a block in correlation times of the
 # residuals.
 BLOCKS, CORRELATION_TIMES = (60, 400), 10.0
-TINY = 1e-300  # no residual at all
-DEPENDENT = 1e-6  # ratio of the slopes' singular values below which quantities cannot be told apart; chosen
+MIN_POWER = 1e-300  # no residual at all
+SINGULAR_RATIO = 1e-6  # ratio of the slopes' singular values below which quantities cannot be told apart; chosen
 
 
 def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[dict[str, float], np.ndarray]:
@@ -42,7 +42,7 @@ def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[
         if size == 0.0:
             raise ScenarioError(f"nothing in the records depends on {name}: leave it out, or give other records")
     _, singular, rows = np.linalg.svd(J / sizes, full_matrices=False)
-    if singular[-1] < DEPENDENT * singular[0]:
+    if singular[-1] < SINGULAR_RATIO * singular[0]:
         raise _alike(twin.name, (names[i] for i in np.argsort(-np.abs(rows[-1]))[:2]))
     covariance = jackknife(slopes)
     deviation = np.sqrt(np.diag(covariance))
@@ -80,14 +80,14 @@ def jackknife(slopes: Slopes) -> np.ndarray:
     pieces = list(zip(slopes.residuals, slopes.by_values, slopes.by_states, strict=True))
     parts = -(-_blocks(slopes) // len(pieces))
     normal = [_normal(*piece) for piece in pieces]
-    A, g = (np.sum([one[i] for one in normal], axis=0) for i in range(2))
+    A, g = (np.sum([sums[i] for sums in normal], axis=0) for i in range(2))
     moves = []
-    for (r, J, S), (own_A, own_g) in zip(pieces, normal, strict=True):
+    for (r, J, S), (piece_A, piece_g) in zip(pieces, normal, strict=True):
         block = np.arange(len(r)) * parts // len(r)
         for b in range(parts):
             rest = block != b
             left_A, left_g = _normal(r[rest], J[rest], S[rest])
-            moves.append(np.linalg.lstsq(A - own_A + left_A, g - own_g + left_g, rcond=None)[0])
+            moves.append(np.linalg.lstsq(A - piece_A + left_A, g - piece_g + left_g, rcond=None)[0])
     moved = np.array(moves) - np.linalg.lstsq(A, g, rcond=None)[0]
     return (len(moved) - 1) / len(moved) * moved.T @ moved
 
@@ -101,16 +101,16 @@ def _blocks(slopes: Slopes) -> int:
     for r in slopes.residuals:
         rows = r.reshape(-1, slopes.columns)
         power = np.abs(np.fft.rfft(rows, 2 * len(rows), axis=0)) ** 2
-        for each in np.fft.irfft(power, axis=0)[: len(rows)].T:
-            end = int(np.argmax(each < 0.0)) or len(each)
-            times.append(1.0 + 2.0 * float(each[1:end].sum() / max(each[0], TINY)))
+        for correlation in np.fft.irfft(power, axis=0)[: len(rows)].T:
+            end = int(np.argmax(correlation < 0.0)) or len(correlation)
+            times.append(1.0 + 2.0 * float(correlation[1:end].sum() / max(correlation[0], MIN_POWER)))
     samples = sum(map(len, slopes.residuals)) / slopes.columns
     return int(np.clip(samples / (CORRELATION_TIMES * np.median(times)), *BLOCKS))
 
 
 def _normal(r: np.ndarray, J: np.ndarray, S: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return J'J and J'r of a piece, (p, p) and (p,), of the part of J that no states S at its start can cause."""
-    J = J - S @ np.linalg.lstsq(S, J, rcond=DEPENDENT)[0]
+    """Return J'J and J'r of a piece, (p, p) and (p,), with J less what states S at its start can cause."""
+    J = J - S @ np.linalg.lstsq(S, J, rcond=SINGULAR_RATIO)[0]
     return J.T @ J, J.T @ r
 
 
@@ -132,7 +132,7 @@ def _fed_back(replays: Replays, point: Point, J: np.ndarray) -> np.ndarray:
         {name: values[pieces[k % len(pieces)].skipped :] for name, values in rig.predicted(trace).items()}
         for k, trace in enumerate(run(calm + noisy))
     ]
-    rows = [replays.relative(pieces[k % len(pieces)], each) for k, each in enumerate(predicted)]
+    rows = [replays.relative(pieces[k % len(pieces)], values) for k, values in enumerate(predicted)]
     size = len(pieces)
     expected = np.concatenate(rows[:size])
     changes = [np.concatenate(rows[size * i : size * (i + 1)]) - expected for i in range(1, REPEATS + 1)]

@@ -74,7 +74,7 @@ def test_the_set_of_a_switching_law_is_a_strip_and_of_a_stable_loop_everything()
 
 @pytest.mark.parametrize("name", ["fails and falls", "without d", "a switching law"])
 def test_the_plane_of_a_certificate_is_drawn_as_recorded(name, snapshot, monkeypatch):
-    monkeypatch.setattr("smc_mujoco.evidence.certificates.figure.POINTS", 81)
+    monkeypatch.setattr("smc_mujoco.evidence.certificates.figure.AXIS_POINTS", 81)
     made = SAID[name]
     run = trace_of(smc.Scenario(plant=made.plant, law="pid", duration=0.2))
     assert sketch(made.figure(traces=[run] if made.bound else [])) == snapshot

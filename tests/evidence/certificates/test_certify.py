@@ -101,11 +101,11 @@ def test_hanging_pendulums_need_more_than_their_weight_to_be_stable_from_everywh
         assert (margins(made)["restoring"] < 0.0) is not stable
 
 
-@pytest.mark.parametrize("plant", loops.SINGLE)
+@pytest.mark.parametrize("plant", loops.ONE_JOINT_TERMS)
 def test_the_equations_of_maker_and_checker_are_those_of_the_plant(plant):
     made, rng = smc.plant(plant), np.random.default_rng(1)
     e = checker.equation({"name": plant, "n": made.n, "parameters": dict(made.parameters), "mechanism": "equation"})
-    M, A, B, C, E, F = loops.SINGLE[plant](made.values({}))
+    M, A, B, C, E, F = loops.ONE_JOINT_TERMS[plant](made.values({}))
     for x, v in rng.uniform(-3.0, 3.0, (20, 2)):
         f, g = made.nominal(np.full(made.n, x), np.full(made.n, v), 0, made.values({}))
         force = A * math.sin(x) + B * x + C * x**3 - (E + F * x * x) * v

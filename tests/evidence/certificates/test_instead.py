@@ -15,7 +15,7 @@ import smc_mujoco as smc
 from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.audit.paper import paper
-from smc_mujoco.evidence.certificates.loops import SINGLE
+from smc_mujoco.evidence.certificates.loops import ONE_JOINT_TERMS
 
 CLAIMS = paper("gaber").claims
 PAGE = (ROOT / "docs" / "what_the_author_may_claim.md").read_text(encoding="utf-8")
@@ -61,7 +61,7 @@ def test_numbers_of_the_page_are_those_of_certificates():
 def test_comparisons_of_sentences_hold_with_the_tuned_gains():
     def loop(plant, law):
         component, found = gain_sets.law(plant, law), smc.plant(plant)
-        return SINGLE[plant](SimpleNamespace(**found.parameters)), SimpleNamespace(**component.gains)
+        return ONE_JOINT_TERMS[plant](SimpleNamespace(**found.parameters)), SimpleNamespace(**component.gains)
 
     (_, weight, *_), classical = loop("inverted_pendulum", "classical")
     assert "weaker than the" in CLAIMS["28"].instead

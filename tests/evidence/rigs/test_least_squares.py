@@ -124,7 +124,7 @@ def test_a_search_reaches_least_squares_and_tries_no_rival_of_a_good_start(monke
     exact = np.linalg.lstsq(-rows, y, rcond=None)[0]
     np.testing.assert_allclose(found.point.values, exact[:2], rtol=1e-6)
     np.testing.assert_allclose(found.point.states.ravel(), exact[2:], atol=1e-6)
-    assert found.fit > search.GOOD
+    assert found.fit > search.GOOD_FIT
     assert curve.evaluations < 80
     none = search.refine(curve, curve.start, 0)
     assert none.point is not found.point

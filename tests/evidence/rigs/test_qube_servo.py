@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.rigs.machines.qube_servo import PERIOD, PITCH, START, zero
+from smc_mujoco.evidence.rigs.machines.qube_servo import PERIOD, PITCH, START_TIME, zero
 from smc_mujoco.evidence.rigs.rig import Values
 
 DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
@@ -66,7 +66,7 @@ def test_parts_of_records_have_the_brushes_of_the_whole_but_for_those_that_the_d
     values, off = Values(**RIG.values), []
     for record in (RIG.checked(dict(np.load(path))) for path in sorted(DATA.glob("qube-*.npz"))):
         whole = zero(values, record)["brush"]
-        ends = np.linspace(round(START / PERIOD), len(record["t"]), parts + 1).astype(int)
+        ends = np.linspace(round(START_TIME / PERIOD), len(record["t"]), parts + 1).astype(int)
         for first, last in itertools.pairwise(ends):
             part = {name: column[first - ends[0] : last] for name, column in record.items()}
             off += [(found - whole + PITCH / 2) % PITCH - PITCH / 2 for found in zero(values, part).values()]

@@ -13,7 +13,7 @@ from smc_mujoco.mechanisms.plant import plant
 DRIVER = "BlueRiverTech/quanser-openai-driver (MIT)"
 QUBE_3 = "Quanser's qube3_rotpen_param.m and user manual (no licence stated)"
 IP02 = "Quanser, IP02 linear servo, user manual (no licence stated)"
-LONG = "Quanser's setup_sp_configuration.m, pendulum LONG_24IN (no licence stated)"
+LONG_SOURCE = "Quanser's setup_sp_configuration.m, pendulum LONG_24IN (no licence stated)"
 SRV02 = "Quanser, SRV02 rotary servo and pendulum, user manuals (no licence stated)"
 
 
@@ -115,9 +115,9 @@ IP02_CART = Rig(
     | {
         "cart_mass": Quantity(0.57, "kg", f"{IP02}; 0.94 with its weight", 0.01),
         "cart_damping": Quantity(5.4, "N s/m", f"{IP02}; 4.3 without its weight", 0.0),
-        "pole_mass": Quantity(0.23, "kg", LONG, 1e-3),
-        "pole_half_length": Quantity(0.3302, "m", f"{LONG}, pivot to centre of gravity", 1e-3),
-        "pole_damping": Quantity(2.4e-3, "N m s/rad", LONG, 0.0),
+        "pole_mass": Quantity(0.23, "kg", LONG_SOURCE, 1e-3),
+        "pole_half_length": Quantity(0.3302, "m", f"{LONG_SOURCE}, pivot to centre of gravity", 1e-3),
+        "pole_damping": Quantity(2.4e-3, "N m s/rad", LONG_SOURCE, 0.0),
         "counts": Quantity(4096.0, "1/turn", f"{IP02}, of the pendulum", 2.0),
     },
     machine=linear,

@@ -17,17 +17,17 @@ from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import plant
 
-START = 2.0  # s: before, the pendulum is caught
+START_TIME = 2.0  # s: before, the pendulum is caught
 BARS = 9  # of the commutator; its two brushes bridge two bars at 18 places a turn
 PITCH = math.tau / BARS  # rad
-ANGLES = 80  # that are tried in a pitch, 0.5 degrees apart; chosen
-SAMPLES = 31  # of the cubics for the balance of the arm, 60 ms; chosen
-SLOW = 0.05  # rad/s, at which dry friction is at its limit in that balance; chosen
-SURE = 0.95  # probability of the angles within a sixteenth of a pitch, below which a brush's is not known; chosen
+ANGLE_COUNT = 80  # that are tried in a pitch, 0.5 degrees apart; chosen
+CUBIC_SAMPLES = 31  # of the cubics for the balance of the arm, 60 ms; chosen
+FRICTION_SPEED = 0.05  # rad/s, at which dry friction is at its limit in that balance; chosen
+MIN_PROBABILITY = 0.95  # of the angles within a sixteenth of a pitch: below it a brush's is not known; chosen
 PERIOD, STEP = 2e-3, 5e-4  # s; the fit is the same to 0.3 % at half the step
-FOUND = "identified here from eight records by least squares in closed loop, after a wide search with two of them"
-RIPPLE = "identified here from eight records in open loop, by the likelihood of a Kalman filter"
-USED = "06, 18, 30 and 42, four of the eight that identified the twin: medians"
+ORIGIN = "identified here from eight records by least squares in closed loop, after a wide search with two of them"
+RIPPLE_ORIGIN = "identified here from eight records in open loop, by the likelihood of a Kalman filter"
+USED_RECORDS = "06, 18, 30 and 42, four of the eight that identified the twin: medians"
 PUBLISHED = "Quanser, QUBE-Servo 2, as in BlueRiverTech/quanser-openai-driver (MIT)"
 DRIVER = {
     "pendulum_length": 0.129, "arm_length": 0.085, "arm_inertia": 4e-6 + 0.095 * 0.085**2 / 12, "arm_damping": 5e-5,
@@ -67,11 +67,11 @@ def zero(q, record: Record) -> dict[str, float]:
 
     As the motion is measured, the arm's balance gives the torque that an even motor lacks. Its terms go through the
     same cubics, and what inertia and friction explain does not count. Each angle of a brush explains a part of the
-    rest. The angle is known if those nearby have the probability SURE, of all angles and of an even motor. That is too
+    rest. The angle is known if those nearby have MIN_PROBABILITY, of all angles and of an even motor. That is too
     sure of short records: of 12 angles from quarters of the public ones 4 are wrong.
     """
-    theta, alpha, u = (record[name][round(START / PERIOD) :] for name in ("theta", "alpha", "plant_input"))
-    if not q.ripple or len(u) < SAMPLES or not np.ptp(u):
+    theta, alpha, u = (record[name][round(START_TIME / PERIOD) :] for name in ("theta", "alpha", "plant_input"))
+    if not q.ripple or len(u) < CUBIC_SAMPLES or not np.ptp(u):
         return {}
     x, v, a = (_cubics(theta, order) for order in range(3))
     pendulum, speed, acceleration = (_cubics(alpha, order) for order in range(3))
@@ -79,15 +79,15 @@ def zero(q, record: Record) -> dict[str, float]:
     torque = q.torque_per_volt * (np.roll(u, 1) - q.back_emf * v)  # held after a delay of 1 ms
     inertia = q.arm_inertia + q.pendulum_mass * q.arm_length**2
     lacks = inertia * a + pull * (np.cos(pendulum) * acceleration - np.sin(pendulum) * speed**2) - _cubics(torque)
-    smooth, _ = np.linalg.qr(np.column_stack([np.ones(len(x)), x, v, np.tanh(v / SLOW), a, acceleration]))
-    angles = PITCH * np.arange(1, ANGLES + 1) / ANGLES
+    smooth, _ = np.linalg.qr(np.column_stack([np.ones(len(x)), x, v, np.tanh(v / FRICTION_SPEED), a, acceleration]))
+    angles = PITCH * np.arange(1, ANGLE_COUNT + 1) / ANGLE_COUNT
     gaps = np.array([lacks, *(lacks - _cubics(ripples(q, x - angle) * torque) for angle in angles)])
     gaps -= gaps @ smooth @ smooth.T
     left = np.log(np.linalg.norm(gaps, axis=1))
     even, *likely = np.exp((left.min() - left) * _independent(gaps[0]))
-    best, reach = int(np.argmax(likely)), ANGLES // 16
+    best, reach = int(np.argmax(likely)), ANGLE_COUNT // 16
     nearby = np.sum(np.roll(likely, reach - best)[: 2 * reach + 1])
-    return {"brush": float(angles[best])} if nearby > SURE * (even + np.sum(likely)) else {}
+    return {"brush": float(angles[best])} if nearby > MIN_PROBABILITY * (even + np.sum(likely)) else {}
 
 
 def _independent(values: np.ndarray) -> float:
@@ -103,7 +103,7 @@ def _cubics(values: np.ndarray, derivative: int = 0) -> np.ndarray:
     """Return a column or its derivative, (K,), from cubics through the samples about each."""
     from scipy.signal import savgol_filter
 
-    return np.asarray(savgol_filter(values, SAMPLES, 3, deriv=derivative, delta=PERIOD))
+    return np.asarray(savgol_filter(values, CUBIC_SAMPLES, 3, deriv=derivative, delta=PERIOD))
 
 
 def commands(record: Record, first: int) -> np.ndarray:
@@ -158,21 +158,21 @@ QUBE_SERVO = Rig(
     label="QUBE-Servo with rotary pendulum, identified from public records",
     quantities={
         "pendulum_mass": Quantity(0.024, "kg", PUBLISHED, 1e-4),
-        "pendulum_length": Quantity(0.116104, "m", FOUND, 0.01, 1.0),
-        "arm_length": Quantity(0.0815281, "m", FOUND, 0.01, 1.0),
-        "arm_inertia": Quantity(0.000127545, "kg m^2", FOUND, 1e-6, 1e-2),
+        "pendulum_length": Quantity(0.116104, "m", ORIGIN, 0.01, 1.0),
+        "arm_length": Quantity(0.0815281, "m", ORIGIN, 0.01, 1.0),
+        "arm_inertia": Quantity(0.000127545, "kg m^2", ORIGIN, 1e-6, 1e-2),
         "arm_damping": Quantity(0.0, "N m s/rad", "part of back_emf: records cannot separate the two", 0.0, 1.0),
-        "arm_friction": Quantity(0.000267993, "N m", FOUND, 0.0, 0.1),
-        "pendulum_damping": Quantity(1.76875e-6, "N m s/rad", FOUND, 0.0, 0.1),
-        "torque_per_volt": Quantity(TORQUE_PER_VOLT, "N m/V", FOUND, 1e-4, 1.0),
-        "back_emf": Quantity(0.0551037, "V s/rad", FOUND, 1e-4, 1.0),
-        "slope_x": Quantity(-0.0065777, "", FOUND, -0.2, 0.2),
-        "slope_y": Quantity(0.0074647, "", FOUND, -0.2, 0.2),
-        "encoder_offset": Quantity(-0.00286933, "rad", FOUND, -0.1, 0.1),
-        "ripple": Quantity(0.112, "", RIPPLE, 0.0, 1.0),
-        "bridge": Quantity(0.0169, "rad", RIPPLE, 1e-3, 0.3),
-        "bridge_2": Quantity(0.0079, "rad", RIPPLE, 1e-3, 0.3),
-        "brush_gap": Quantity(0.322, "rad", RIPPLE, 0.0, PITCH),
+        "arm_friction": Quantity(0.000267993, "N m", ORIGIN, 0.0, 0.1),
+        "pendulum_damping": Quantity(1.76875e-6, "N m s/rad", ORIGIN, 0.0, 0.1),
+        "torque_per_volt": Quantity(TORQUE_PER_VOLT, "N m/V", ORIGIN, 1e-4, 1.0),
+        "back_emf": Quantity(0.0551037, "V s/rad", ORIGIN, 1e-4, 1.0),
+        "slope_x": Quantity(-0.0065777, "", ORIGIN, -0.2, 0.2),
+        "slope_y": Quantity(0.0074647, "", ORIGIN, -0.2, 0.2),
+        "encoder_offset": Quantity(-0.00286933, "rad", ORIGIN, -0.1, 0.1),
+        "ripple": Quantity(0.112, "", RIPPLE_ORIGIN, 0.0, 1.0),
+        "bridge": Quantity(0.0169, "rad", RIPPLE_ORIGIN, 1e-3, 0.3),
+        "bridge_2": Quantity(0.0079, "rad", RIPPLE_ORIGIN, 1e-3, 0.3),
+        "brush_gap": Quantity(0.322, "rad", RIPPLE_ORIGIN, 0.0, PITCH),
         "brush": Quantity(
             0.0, "rad", "part of each record, see `zero`; 0: not known, so the torque is even", 0.0, PITCH
         ),
@@ -183,7 +183,7 @@ QUBE_SERVO = Rig(
     columns=Columns(x=("theta", "alpha"), u="plant_input", reference="target_theta", others=("target_alpha",)),
     commands=commands,
     zero=zero,
-    start=START,
+    start=START_TIME,
     score_from=4.0,
     window=0.25,
     free=NAMES,
@@ -209,12 +209,12 @@ QUBE_SERVO = Rig(
     ),
     x0=(0.0, 0.1),
     reached=(
-        Reached("identified", USED, {"theta": 95.4, "alpha": 94.0, "u": 88.4}),
-        Reached("driver_damped", USED, {"theta": 75.4, "alpha": 57.4, "u": 47.3}),
-        Reached("driver", USED, {"theta": 73.1, "alpha": 50.9, "u": 41.9}),
-        Reached("quanser", USED, dict.fromkeys(("theta", "alpha", "u"), -math.inf)),
+        Reached("identified", USED_RECORDS, {"theta": 95.4, "alpha": 94.0, "u": 88.4}),
+        Reached("driver_damped", USED_RECORDS, {"theta": 75.4, "alpha": 57.4, "u": 47.3}),
+        Reached("driver", USED_RECORDS, {"theta": 73.1, "alpha": 50.9, "u": 41.9}),
+        Reached("quanser", USED_RECORDS, dict.fromkeys(("theta", "alpha", "u"), -math.inf)),
         Reached("identified", "11, not used for identification", {"theta": 93.4, "alpha": 85.5, "u": 82.2}),
-        Reached("do nothing", USED, {"theta": 35.9, "alpha": 2.3, "u": -5.3}),
+        Reached("do nothing", USED_RECORDS, {"theta": 35.9, "alpha": 2.3, "u": -5.3}),
     ),
     about=(
         "Records: decargroup/closed_loop_koopman (MIT, 2023). Identified on eight records; 11 was not used. "

@@ -13,8 +13,8 @@ from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0, MODEL_1_1
 
 SOURCE = "dfki-ric-underactuated-lab/double_pendulum (BSD-3), design C.1"
-FOUND = "identified here from the public sys-id records 03 and 13"
-UNUSED = "sys-id 01, 05 and 07, not used for identification: rms of the torques' residual"
+ORIGIN = "identified here from the public sys-id records 03 and 13"
+UNUSED_RECORDS = "sys-id 01, 05 and 07, not used for identification: rms of the torques' residual"
 UNITS = {
     "m1": "kg", "m2": "kg", "l1": "m", "r1": "m", "r2": "m", "I1": "kg m^2", "I2": "kg m^2", "Ir": "kg m^2",
     "gear": "", "b1": "N m s/rad", "b2": "N m s/rad", "cf1": "N m", "cf2": "N m", "grav": "m/s^2",
@@ -38,7 +38,7 @@ SETS = {
 def quantities():
     """Return name -> Quantity: identified numbers, else those of model 1.0, and the boards' limit of torque."""
     measured = {
-        name: Quantity(IDENTIFIED.get(name, value), UNITS[name], FOUND if name in IDENTIFIED else SOURCE, 0.0)
+        name: Quantity(IDENTIFIED.get(name, value), UNITS[name], ORIGIN if name in IDENTIFIED else SOURCE, 0.0)
         for name, value in MODEL_1_0.items()
     }
     return measured | {"torque_limit": Quantity(6.0, "N m", f"{SOURCE}: the boards' limit", 0.0, 12.0)}
@@ -70,11 +70,11 @@ COMMON = {
         {key: value for key, value in SETS[f"model_{number}_0"].items() if key != "source"} for number in (1, 2, 3)
     ),
     "reached": (
-        Reached("identified", UNUSED, {"shoulder": 0.132, "elbow": 0.073}, "N m"),
-        Reached("model_1_0", UNUSED, {"shoulder": 0.147, "elbow": 0.088}, "N m"),
-        Reached("model_2_0", UNUSED, {"shoulder": 0.144, "elbow": 0.091}, "N m"),
-        Reached("model_3_0", UNUSED, {"shoulder": 0.197, "elbow": 0.094}, "N m"),
-        Reached("do nothing", UNUSED, {"shoulder": 0.348, "elbow": 0.313}, "N m"),
+        Reached("identified", UNUSED_RECORDS, {"shoulder": 0.132, "elbow": 0.073}, "N m"),
+        Reached("model_1_0", UNUSED_RECORDS, {"shoulder": 0.147, "elbow": 0.088}, "N m"),
+        Reached("model_2_0", UNUSED_RECORDS, {"shoulder": 0.144, "elbow": 0.091}, "N m"),
+        Reached("model_3_0", UNUSED_RECORDS, {"shoulder": 0.197, "elbow": 0.094}, "N m"),
+        Reached("do nothing", UNUSED_RECORDS, {"shoulder": 0.348, "elbow": 0.313}, "N m"),
     ),
     "about": "Records: sys-id motions and board runs of design C.1. Masses are kept, because torques determine only "
     "moments.",

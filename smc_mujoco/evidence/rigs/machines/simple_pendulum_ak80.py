@@ -16,7 +16,7 @@ from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import plant
 
 SOURCE = "dfki-ric-underactuated-lab/torque_limited_simple_pendulum (BSD-3)"
-FOUND = f"between the values found in runs of {SOURCE}"
+ORIGIN = f"between the values found in runs of {SOURCE}"
 
 
 def machine(q):
@@ -46,10 +46,10 @@ SIMPLE_PENDULUM = Rig(
     name="simple_pendulum_ak80",
     label="Torque-limited simple pendulum with an AK80-6 motor",
     quantities={
-        "inertia": Quantity(0.1635, "kg m^2", FOUND, 1e-3, 10.0),
-        "mass_moment": Quantity(0.33, "kg m", FOUND, 1e-3, 10.0),
+        "inertia": Quantity(0.1635, "kg m^2", ORIGIN, 1e-3, 10.0),
+        "mass_moment": Quantity(0.33, "kg m", ORIGIN, 1e-3, 10.0),
         "viscous": Quantity(0.0, "N m s/rad", "part of coulomb in the published values", 0.0, 10.0),
-        "coulomb": Quantity(0.21, "N m", FOUND, 0.0, 10.0),
+        "coulomb": Quantity(0.21, "N m", ORIGIN, 0.0, 10.0),
         "torque_limit": Quantity(12.0, "N m", f"AK80-6, in {SOURCE}", 0.1, 100.0),
     },
     machine=machine,
