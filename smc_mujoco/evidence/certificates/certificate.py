@@ -80,8 +80,8 @@ class Certificate:
 
     def _repr_html_(self) -> str:
         rows = [
-            (one.theorem, one.name, "yes" if one.holds else "no", f"{number(one.margin)} {one.unit}", one.words)
-            for one in self.conditions
+            (row.theorem, row.name, "yes" if row.holds else "no", f"{number(row.margin)} {row.unit}", row.words)
+            for row in self.conditions
         ]
         return html.table(("theorem", "condition", "holds", "margin", ""), rows, note=". ".join(self.sentences))
 
@@ -136,12 +136,12 @@ class Certificate:
         x, F = self.data["unit"], EFFORT[self.data["unit"]]
         made = []
         for part in self.data["parts"]:
-            for one in part["conditions"]:
-                unit, asks, fails = CONDITIONS[one["name"]]
+            for row in part["conditions"]:
+                unit, asks, fails = CONDITIONS[row["name"]]
                 unit = unit.replace("x", x).replace("F", F)
                 made.append(
                     Condition(
-                        part["theorem"], one["name"], one["margin"], unit, asks if one["margin"] >= 0.0 else fails
+                        part["theorem"], row["name"], row["margin"], unit, asks if row["margin"] >= 0.0 else fails
                     )
                 )
         return tuple(made)
@@ -161,7 +161,7 @@ class Certificate:
         """Return what a theorem says of this plant, or which of its conditions fail, by how much."""
         theorem, x, d0 = part["theorem"], self.data["unit"], self.data["disturbance"]
         under = f"under every |d| <= {d0:g} {EFFORT[x]}" if d0 else "without d"
-        failing = [one for one in self.conditions if one.theorem == theorem and not one.holds]
+        failing = [row for row in self.conditions if row.theorem == theorem and not row.holds]
         if theorem == "level sets":
             wide = f"starts up to |x| = {number(self._widest(part))} {x} at rest"
             ends = "come to rest" if self.rests else f"end in |x| <= {number(part['bound'])} {x}"
@@ -169,11 +169,11 @@ class Certificate:
             return f"proven by level sets: {wide} {ends} {under}{outside}"
         if failing:
             why = ", ".join(
-                f"{one.name} {number(one.margin)} {one.unit}".strip() + f" ({one.words})" for one in failing
+                f"{row.name} {number(row.margin)} {row.unit}".strip() + f" ({row.words})" for row in failing
             )
             return f"not proven by {theorem}: {why}"
         if theorem == "saturated PD":
-            near = ", exponentially in the end" * any(one.name == "local" for one in self.conditions)
+            near = ", exponentially in the end" * any(row.name == "local" for row in self.conditions)
             return f"proven by saturated PD: without d every start comes to rest at 0{near}"
         if theorem == "reaching":
             where = f"|x| <= {number(part['X'])} {x}"
@@ -202,9 +202,9 @@ class Certificate:
         """
         x, v = np.asarray(x, float), np.asarray(v, float)
         if part is None:
-            each = [self.contains(x, v, one) for one in self.data["parts"] if one["theorem"] != "saturated PD"]
+            regions = [self.contains(x, v, other) for other in self.data["parts"] if other["theorem"] != "saturated PD"]
             everywhere = np.full(x.shape, self.stable and not self.data["disturbance"])
-            return functools.reduce(np.logical_or, each, everywhere)
+            return functools.reduce(np.logical_or, regions, everywhere)
         if part["theorem"] == "level sets":
             return self.level(x, v) <= part["outer"]
         if part["theorem"] == "reaching" and part["holds"] and part["S"]:
@@ -233,7 +233,7 @@ class Certificate:
 
     def _part(self, theorem: str, holding: bool = False) -> Mapping[str, Any] | None:
         return next(
-            (one for one in self.data["parts"] if one["theorem"] == theorem and (one["holds"] or not holding)), None
+            (part for part in self.data["parts"] if part["theorem"] == theorem and (part["holds"] or not holding)), None
         )
 
     def check(self) -> None:

@@ -198,7 +198,7 @@ def falls(e, f, d0, box, corners, depth=MAX_HALVINGS):
     w[1] = [(a + b) / 2 for a, b in zip(w[0], w[2], strict=True)]
     X, S, quarters = (x0, (x0 + x1) / 2, x1), (s0, (s0 + s1) / 2, s1), ((0, 0), (0, 1), (1, 0), (1, 1))
     parts = (((*X[i : i + 2], *S[j : j + 2]), (*w[i][j : j + 2], *w[i + 1][j : j + 2])) for i, j in quarters)
-    return depth > 0 and all(falls(e, f, d0, one, (a, c, b, d), depth - 1) for one, (a, b, c, d) in parts)
+    return depth > 0 and all(falls(e, f, d0, quarter, (a, c, b, d), depth - 1) for quarter, (a, b, c, d) in parts)
 
 
 def quadratic(P, e, f, corners):

@@ -67,7 +67,7 @@ def _panel(ax: Any, certificate: Any, part: Any, x: np.ndarray, v: np.ndarray, t
 
 def _plane(certificate: Any, part: Any, traces: Sequence[Trace]) -> tuple[np.ndarray, np.ndarray]:
     """Return positions and velocities around the region, or around the runs."""
-    ends = [(np.abs(one.x).max(), np.abs(one.v).max()) for one in traces if np.isfinite(one.x).all()]
+    ends = [(np.abs(trace.x).max(), np.abs(trace.v).max()) for trace in traces if np.isfinite(trace.x).all()]
     far_x, far_v = np.max([(1e-3, 1e-3), *ends], axis=0)
     if part is not None:
         X, S = np.meshgrid(np.array(part["x"]), np.array(part["s"]), indexing="ij")

@@ -186,7 +186,7 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
 
 
 def _part(theorem: str, conditions: list[dict], **data: Any) -> dict:
-    holds = all(one["margin"] >= 0.0 for one in conditions)
+    holds = all(condition["margin"] >= 0.0 for condition in conditions)
     return {"theorem": theorem, "holds": holds, "conditions": conditions} | data
 
 
@@ -207,7 +207,7 @@ def _saturated(document: dict, loop: Loop, terms: list[float], judge: Judge) -> 
     V["springs"] = document["plant"]["parameters"].get("kc", 0.0) / 2.0
     for told in _restoring(loop, terms):
         if margins := judge("saturated PD", {"V": V, "conditions": [None, told]}):
-            conditions = [_condition(*one) if one[0] != told["name"] else told for one in margins.items()]
+            conditions = [_condition(*pair) if pair[0] != told["name"] else told for pair in margins.items()]
             return _part("saturated PD", conditions, V=V)
     raise ScenarioError("found no boxes that prove that the law is stronger than the plant: give other gains")
 

@@ -72,7 +72,7 @@ class Identified:
     def _scale_notes(self) -> list[str]:
         """Sentences on quantities that cannot be negative and are far from their values before."""
         before = {name: self.before.quantities[name] for name in self.values}
-        positive = {name: each.value for name, each in before.items() if each.least >= 0.0 and each.value > 0.0}
+        positive = {name: q.value for name, q in before.items() if q.least >= 0.0 and q.value > 0.0}
         factors = {name: self.values[name] / value for name, value in positive.items()}
         far = {name: factor for name, factor in factors.items() if not 1.0 / UNIT_FACTOR < factor < UNIT_FACTOR}
         if not far:
@@ -82,8 +82,8 @@ class Identified:
             return [
                 f"{joined(list(far))} are {middle:.3g} times what they were before: look at the unit of the command"
             ]
-        each = [f"{name} is {factor:.3g} times its value before" for name, factor in far.items()]
-        return [f"{joined(each)}: look at the units of the columns, unless the values before were only a guess"]
+        changes = [f"{name} is {factor:.3g} times its value before" for name, factor in far.items()]
+        return [f"{joined(changes)}: look at the units of the columns, unless the values before were only a guess"]
 
     def _loss_notes(self) -> list[str]:
         """Sentences on whole records that the values before repeat better."""

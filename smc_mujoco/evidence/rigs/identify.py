@@ -151,10 +151,10 @@ def _starting_states(
     whole_records.steps = replays.short_steps
     firsts = [next(k for k, piece in enumerate(replays.pieces) if piece.record == i) for i in range(len(data))]
     candidates = [whole_records.start, Point(np.zeros(0), point.states[firsts])]
-    for each in tuple(candidates):
-        slopes = whole_records.slopes(each)
-        candidates.append(Point(each.values, each.states + slopes.moves(np.zeros(0))))
-    costs = np.array([[cost([rows]) for rows in one] for one in whole_records.residuals(candidates)])
+    for candidate in tuple(candidates):
+        slopes = whole_records.slopes(candidate)
+        candidates.append(Point(candidate.values, candidate.states + slopes.moves(np.zeros(0))))
+    costs = np.array([[cost([rows]) for rows in pieces] for pieces in whole_records.residuals(candidates)])
     best = costs.argmin(axis=0)
     return [whole_records.state(candidates[best[i]], i) for i in range(len(data))]
 
@@ -163,7 +163,7 @@ def _twin(of: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapp
     """Return the rig to identify, and its records as columns."""
     if isinstance(of, str):
         of = find_rig(of)
-    traces = [one for one in many if isinstance(one, Trace)]
+    traces = [record for record in many if isinstance(record, Trace)]
     if isinstance(of, Plant):
         of = _of_plant(of, traces[0].scenario if traces else None)
     if not isinstance(of, Rig):
@@ -173,9 +173,9 @@ def _twin(of: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapp
 
 def _of_plant(plant: Plant, base: Scenario | None) -> Rig:
     """Return a rig whose quantities are a plant's parameters, with the parts of a run's scenario `base`."""
-    own = {}
+    settings = {}
     if base is not None:
-        own = {name: getattr(base, name) for name in SETTINGS if getattr(base, name) is not None}
+        settings = {name: getattr(base, name) for name in SETTINGS if getattr(base, name) is not None}
     lower = dict.fromkeys(plant.parameters, -np.inf)
     lower |= dict.fromkeys((FRICTIONS | INERTIAS | {*plant.dry, *plant.added}) & set(plant.parameters), 0.0)
     lower |= dict.fromkeys(plant.positive, 1e-6)
@@ -187,7 +187,7 @@ def _of_plant(plant: Plant, base: Scenario | None) -> Rig:
             name: Quantity(value, "", "nominal value of the plant", lower[name])
             for name, value in plant.parameters.items()
         },
-        machine=lambda q: own | {"plant": dataclasses.replace(plant, parameters=vars(q))},
+        machine=lambda q: settings | {"plant": dataclasses.replace(plant, parameters=vars(q))},
         columns=Columns(x=tuple(f"x{end}" for end in ends), u=f"u{ends[0]}", reference=f"r{ends[0]}"),
         free=tuple(name for name, value in plant.parameters.items() if value and name != "grav"),
     )

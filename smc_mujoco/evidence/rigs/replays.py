@@ -83,8 +83,8 @@ class Slopes:
     def freed(self, rows: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return rows of each piece, (N,) or (N, p), without the part that states at its start can cause."""
         return [
-            each - S @ np.linalg.lstsq(S, each, rcond=SINGULAR_RATIO)[0]
-            for S, each in zip(self.by_states, rows, strict=True)
+            row - S @ np.linalg.lstsq(S, row, rcond=SINGULAR_RATIO)[0]
+            for S, row in zip(self.by_states, rows, strict=True)
         ]
 
     def moves(self, step: np.ndarray) -> np.ndarray:
@@ -120,7 +120,7 @@ class Slopes:
 
 def cost(rows: Sequence[np.ndarray]) -> float:
     """Return the sum of squares."""
-    return float(sum(np.sum(each**2) for each in rows))
+    return float(sum(np.sum(residuals**2) for residuals in rows))
 
 
 class Replays:
@@ -165,7 +165,7 @@ class Replays:
     def values(self, point: Point) -> dict[str, float]:
         """Return the quantities at a point, cut to their ranges."""
         known = [self.twin.quantities[name] for name in self.names]
-        cut = np.clip(point.values * self.scales, [each.least for each in known], [each.most for each in known])
+        cut = np.clip(point.values * self.scales, [q.least for q in known], [q.most for q in known])
         return dict(zip(self.names, cut.tolist(), strict=True))
 
     def rig(self, point: Point) -> Rig:
@@ -318,7 +318,7 @@ class Replays:
         ends = np.linspace(first, last, count + 1).round().astype(int)
         names = [*twin.columns.x, *([twin.columns.u] if self.closed else [])]
         rates = [records.rate(data[name], period) for name in twin.columns.x]
-        varied = np.array([each.std() or 1.0 for each in (*(data[name] for name in twin.columns.x), *rates)])
+        varied = np.array([column.std() or 1.0 for column in (*(data[name] for name in twin.columns.x), *rates)])
         pieces = []
         for first, last in itertools.pairwise(ends):
             duration = None if count == 1 else float(period * (last - first))

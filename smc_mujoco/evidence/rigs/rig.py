@@ -199,7 +199,7 @@ class Rig:
 
     def members(self) -> dict[str, "Rig"]:
         """Return name -> the rig with one of its parameter sets: "set 1" for its own, then those of the ensemble."""
-        sets = {f"set {i + 2}": self.with_values(each, "ensemble") for i, each in enumerate(self.ensemble)}
+        sets = {f"set {i + 2}": self.with_values(values, "ensemble") for i, values in enumerate(self.ensemble)}
         return {"set 1": self} | sets
 
     def scenario(self, law: Law | str | None = None, **fields: Any) -> Scenario:
@@ -362,9 +362,9 @@ class Rig:
         Raises:
           ScenarioError: traces of several laws or of another plant, or traces and columns.
         """
-        traces = [one for one in many if isinstance(one, Trace)]
+        traces = [record for record in many if isinstance(record, Trace)]
         if not traces:
-            return self, [one for one in many if not isinstance(one, Trace)]
+            return self, [record for record in many if not isinstance(record, Trace)]
         if len(traces) < len(many) or len({trace.scenario.law for trace in traces}) > 1:
             raise ScenarioError("records are traces of one law, or columns: give one kind at a time")
         plant = self.machine(Values(**self.values))["plant"].name
@@ -415,8 +415,8 @@ class Rig:
         if min(fit.values()) >= 100.0 - RADIANS_GAIN or "rad" not in self.scenario("none").plant.units:
             return
         joints, references = self.columns.x, (self.columns.reference, *self.columns.others)
-        each = [(x, *references[i : i + 1]) for i, x in enumerate(joints)]
-        sets = (self.columns.angles, *((name,) for name in (*joints, *references)), *each, references)
+        pairs = [(x, *references[i : i + 1]) for i, x in enumerate(joints)]
+        sets = (self.columns.angles, *((name,) for name in (*joints, *references)), *pairs, references)
         there = [tuple(name for name in names if name in record) for names in sets]
         suspects = [names for names in dict.fromkeys(there) if names]
         others = self.fits([records.in_radians(record, self.columns, names) for names in suspects])
@@ -443,7 +443,7 @@ class Rig:
           changes: fields of the replays that differ, such as their physics step.
         """  # fmt: skip
         predictions = self.predictions(many, rounded, states, **changes)
-        fits = [percentages(*each[:2]) for each in predictions]
+        fits = [percentages(*prediction[:2]) for prediction in predictions]
         if self.controller is not None:
             for fit, (predicted, measured, t) in zip(fits, predictions, strict=True):
                 if (fall := fallen({name: predicted[name] for name in self.columns.x}, measured, t)) is not None:
