@@ -76,7 +76,7 @@ def message_of(joints: Sequence[str]) -> Any:
 
 
 def posed(trace: Trace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return samples of a trace, (m,), and places, (m, nbody, 3), and quaternions, (m, nbody, 4), of the bodies."""
+    """Return samples, (m,), MAX_POSE_RATE a second, and the bodies' places, (m, nbody, 3), and quaternions."""
     machines = shapes(trace.scenario)
     data = [mujoco.MjData(machine.model) for machine in machines]
     first = machines[0].model

@@ -47,7 +47,7 @@ RELATIONS: dict[str, Callable[[float, float], bool]] = {
 
 
 class Check(NamedTuple):
-    """A measured number against its limit: `value relation limit`. `sentence`: which one of the claim's."""
+    """A measured number against its limit: `value relation limit`. It is about one sentence of a claim."""
 
     what: str
     value: float

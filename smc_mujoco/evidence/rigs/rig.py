@@ -540,7 +540,7 @@ def percentages(predicted: Record, measured: Record) -> dict[str, float]:
 
 
 def fallen(predicted: Record, measured: Record, t: np.ndarray) -> Fall | None:
-    """Return the fall of a twin whose joints leave the measured ones by over FALL_RANGES ranges; else None."""
+    """Return the fall of a twin whose joints leave the measured ones by FALL_RANGES ranges; else None."""
     for name, values in predicted.items():
         error, span = np.nan_to_num(np.abs(values - measured[name]), nan=np.inf), np.ptp(measured[name])
         if error.max() > FALL_RANGES * span > 0.0:

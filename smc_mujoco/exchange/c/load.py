@@ -42,7 +42,7 @@ DEFAULT_MEMORY = 8
 class CLaw(AtAddress):
     """A law in C: called by its address in the callback, and through ctypes in the reference loop.
 
-    Two laws are equal if their machine code is: from the same file, headers, flags and compiler.
+    Two laws are equal if their machine code is. It follows from file, headers, flags and compiler.
 
     Attributes:
       joints: for how many joints it is; 0 for a law of one channel.

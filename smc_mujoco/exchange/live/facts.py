@@ -165,7 +165,7 @@ def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], users: Sequen
 
 
 def _opening(users: Sequence[str], offered: Sequence[str]) -> list[str]:
-    """Return the names of at most two laws with which the page opens: the user's, OPENING_LAWS, the first."""
+    """Return the names of at most two laws with which the page opens: the user's, OPENING_LAWS, then others."""
     names = [*users, *(name for name in OPENING_LAWS if name in offered), *(name for name in offered if name != "none")]
     return list(dict.fromkeys(names))[:2]
 
