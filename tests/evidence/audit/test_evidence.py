@@ -145,6 +145,12 @@ def test_a_run_has_one_name_with_all_versions_and_under_all_names_of_its_conditi
     assert portable_key(dataclasses.replace(scenario, seed=1)) != name
 
 
+def test_a_run_tells_the_parameters_and_the_size_that_differ_from_the_suite_s():
+    plants = smc.plant("pendulum_network"), smc.plant("pendulum_network", n=3), smc.plant("duffing", beta=0.75)
+    runs = [evidence._run(smc.Scenario(plant=plant, law="none")) for plant in plants]
+    assert [run["parameters"] for run in runs] == [{}, {"n": 3}, {"beta": 0.75}]
+
+
 def test_a_claim_has_its_own_runs_alone(done):
     assert [len(done.used[id]["slow"]) for id in ("1", "2")] == [2, 0]
 

@@ -1,0 +1,55 @@
+"""The signed-rank test against an enumeration of all signs, and its interval against the test."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.stats import rankdata
+
+from smc_mujoco.analysis import signed_rank
+from smc_mujoco.analysis.signed_rank import interval, p_values
+
+pytestmark = pytest.mark.quick
+
+NAN = np.nan
+SAMPLES = [
+    [0.1, 0.3, 0.2, 0.4],
+    [1.0, 1.0, -2.0, 3.0, 3.0, 3.0, -0.5],  # ties share their ranks
+    [0.0, 0.0, 1.0, -1.0, 2.0],  # a difference of 0 counts as negative
+    [NAN, 0.7, -0.2, NAN, 0.2, 0.9],
+    [np.inf, 2.0, -1.0, np.inf],
+]
+
+
+def share_of_signs(differences) -> float:
+    """The share of all choices of signs with a rank sum as large as that of these differences."""
+    known = np.array([d for d in differences if not np.isnan(d)])
+    ranks = rankdata(np.minimum(np.abs(known), 1e300))
+    sums = [np.dot(ranks, signs) for signs in itertools.product((0.0, 1.0), repeat=len(ranks))]
+    return float(np.mean(np.array(sums) >= ranks[known > 0].sum() - 1e-9))
+
+
+@pytest.mark.parametrize("differences", SAMPLES, ids=len)
+def test_a_p_value_is_the_share_of_signs_with_as_large_a_rank_sum(differences):
+    assert p_values(differences) == pytest.approx(share_of_signs(differences), abs=1e-12)
+
+
+@pytest.mark.parametrize("error", [0.025, 0.1])
+def test_an_interval_has_the_centres_that_the_test_does_not_reject(error):
+    differences = np.random.default_rng(5).standard_normal(9) ** 3
+    centre = interval(differences, error)
+    assert centre.low < centre.value < centre.high
+    for end, side in ((centre.low, 1.0), (centre.high, -1.0)):
+        outside, inside = (p_values(side * (differences - end) + shift)[0] for shift in (1e-9, -1e-9))
+        assert outside <= error < inside
+
+
+def test_more_samples_than_are_enumerated_have_the_normal_approximation(monkeypatch):
+    differences = np.random.default_rng(6).standard_normal(61) + 0.2
+    approximate = p_values(differences)
+    monkeypatch.setattr(signed_rank, "MAX_EXACT", 61)
+    assert 0.0 < abs(approximate - p_values(differences)) < 1e-3
+
+
+def test_four_samples_reject_no_centre_at_five_percent():
+    assert interval([0.1, 0.3, 0.2, 0.4], 0.05)[1:] == (-np.inf, np.inf)
