@@ -71,6 +71,10 @@ def _writing(path: Path) -> Iterator[None]:
     if "\0" in str(path):
         raise ScenarioError(f"cannot write {shown(str(path))}: give a name without \\0")
     try:
+        os.fsencode(path)
+    except UnicodeEncodeError:
+        raise ScenarioError(f"cannot write {shown(str(path))}: give a name that UTF-8 can encode") from None
+    try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield
     except OSError as error:

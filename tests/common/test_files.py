@@ -325,6 +325,7 @@ def test_what_cannot_be_written_or_found_is_one_sentence(tmp_path):
         lambda: files.with_ending("a\0.json", ".json"): r"cannot save to 'a\x00.json': end the name in .json",
         lambda: writable(tmp_path): f"cannot write {tmp_path}: it is a folder, give the file in it a name",
         lambda: writable("a\0"): r"cannot write 'a\x00': give a name without \0",
+        lambda: writable("\ud800/a"): r"cannot write '\ud800/a': give a name that UTF-8 can encode",
         lambda: files.shipped("nope"): f"no folder 'nope' in {beside} or beside it: reinstall smc-mujoco",
         lambda: files.csv_rows(tmp_path / "no"): f"no CSV file at {tmp_path / 'no'}: {cells}",
         lambda: files.csv_rows(3): f"cannot read 3: {cells}",  # pyright: ignore[reportArgumentType]
