@@ -17,8 +17,6 @@ from smc_mujoco.draw import viewer as live
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.trace import ARRAYS, from_log
 
-pytestmark = pytest.mark.quick
-
 FRAME = 1.0 / 60.0
 DUFFING = smc.Scenario(plant="duffing", law=smc.law("observer_free", lam=6.0, k1=3.0), duration=0.4)
 HARD = smc.Scenario(
