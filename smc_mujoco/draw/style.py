@@ -124,7 +124,8 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
     colours: list[str] = []
     for law in laws:
         wanted, library = law_colour(law), _template(law)[1] in known_laws().own
-        clear = all(distance(wanted, other) > MIN_DISTANCE * (2 - library) for other in colours)
+        apart = MIN_DISTANCE if library else 2.0 * MIN_DISTANCE
+        clear = all(distance(wanted, other) > apart for other in colours)
         used = [*colours, PAPER, DISTURBANCE, REACTION, FAILED]
         free = () if clear else [colour for colour in _grid(len(colours)) if colour not in used]
         colours.append(wanted if clear else _farthest(free, used)[0])

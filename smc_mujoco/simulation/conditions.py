@@ -267,9 +267,8 @@ def _as_text(value: Any, defaults: bool = True) -> str:
     if isinstance(value, Component):
         return f"{value.name}({', '.join(f'{gain}={number!r}' for gain, number in value.gains.items())})"
     if isinstance(value, Part | Signal | Noise | Jump | Clock):
-        fields = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if f.init}
-        default = {f.name: f.default for f in dataclasses.fields(value) if not defaults}
-        texts = [f"{name}={_as_text(own, defaults)}" for name, own in fields.items() if own != default.get(name, ...)]
+        written = [f for f in dataclasses.fields(value) if f.init and (defaults or getattr(value, f.name) != f.default)]
+        texts = [f"{f.name}={_as_text(getattr(value, f.name), defaults)}" for f in written]
         return f"{type(value).__name__}({', '.join(texts)})"
     if isinstance(value, tuple):
         return f"({', '.join(_as_text(one, defaults) for one in value)},)"

@@ -123,7 +123,10 @@ def which(
     compared, properties = _needs(needs, machine)
     length = extent.duration if duration is None else number("duration", duration, above=0.0)
     attacked_for = DURATION if duration is None else length
-    tested = _tested(conditions, machine, length, starts, NO_VELOCITY in properties)
+    tested = _conditions(conditions, machine, length, NO_VELOCITY in properties)
+    tried = [case(machine, "none", one, length, starts=starts) for one in tested]
+    for scenario in tried:  # refuses what cannot be compared before gains are searched
+        check_moving([scenario])
     folder, relevant, properties = Path(out), checked_share(relevant), [n for n in properties if n != NO_VELOCITY]
     options: dict[str, Any] = {"threads": threads, "progress": progress}
     chosen = _suited(machine, properties, laws)
@@ -141,7 +144,7 @@ def which(
         return _contest(Runs(table, group, worst), machine, compared, relevant)
 
     others, finals = _screened(contest, list(candidates), extent, seeds)
-    efforts = {case(machine, "none", one, length, starts=starts).efforts[0] for one in tested}
+    efforts = {scenario.efforts[0] for scenario in tried}
     return Advice(
         plant=machine,
         conditions=tuple(one.name for one in tested),
@@ -182,19 +185,11 @@ def _needs(needs: str | Sequence[str], plant: Plant) -> tuple[tuple[str, ...], t
     return tuple(compared), tuple(name for name in names if name in PROPERTIES)
 
 
-def _tested(
-    conditions: Any, plant: Plant, duration: float, starts: Starts | None, without_velocity: bool
-) -> list[Condition]:
-    """Return the given conditions, or the default ones that have numbers for the plant; refuse a plant at rest."""
-    named = (
-        applicable(DEFAULT_CONDITIONS, [plant], duration) if conditions is None else listed("conditions", conditions)
-    )
-    tested = [find_condition(one) for one in named]
-    if without_velocity:
-        tested = [_without_velocity(one) for one in tested]
-    for scenario in [case(plant, "none", one, duration, starts=starts) for one in tested]:
-        check_moving([scenario])
-    return tested
+def _conditions(given: Any, plant: Plant, duration: float, without_velocity: bool) -> list[Condition]:
+    """Return the given conditions, or the default ones that have numbers for the plant."""
+    names = applicable(DEFAULT_CONDITIONS, [plant], duration) if given is None else listed("conditions", given)
+    tested = [find_condition(name) for name in names]
+    return [_without_velocity(condition) for condition in tested] if without_velocity else tested
 
 
 def _without_velocity(condition: Condition) -> Condition:

@@ -226,7 +226,7 @@ def _ranges(ranges: Mapping[str, str | None], parameters: Sequence[str]) -> dict
     pairs = [text.partition("=") for text in parameters]
     return {
         "parameters": {name: options.low_and_high(f"--parameter {name}", text) for name, _, text in pairs},
-        **{name: options.low_and_high(f"--{name}", text) for name, text in ranges.items() if text},
+        **{name: options.low_and_high(f"--{name.replace('_', '-')}", text) for name, text in ranges.items() if text},
     }
 
 

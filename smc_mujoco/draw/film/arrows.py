@@ -149,7 +149,10 @@ class Sizes(NamedTuple):
 
 
 def _sizes(traces: Sequence[Trace], name: str) -> Sizes:
-    """Return the sizes of a quantity in runs that last; brief is at most a share 1 - LASTING of a channel's time."""
+    """Return the sizes of a quantity in runs that last.
+
+    A brief value takes at most 1 - LASTING_QUANTILE of the time.
+    """
     peak = max(map(abs, panels.span(traces, name)))
     runs = panels.lasting(traces, name).values()
     usual = max((float(np.quantile(np.abs(y), panels.LASTING_QUANTILE, axis=0).max()) for y in runs), default=0.0)

@@ -32,7 +32,7 @@ def svg(name: str, claims: Sequence[Claim]) -> str:
     about = f"{fields[0][0]}: {', '.join(text for text, _ in fields[1:])}"
     boxes, texts, x = [], [], 0.0
     for text, colour in fields:
-        length = style.width(text, FONT_SIZE)  # DejaVu Sans is as field_width as Verdana
+        length = style.width(text, FONT_SIZE)  # DejaVu Sans is as wide as Verdana
         field_width = round(length + 2 * MARGIN)
         boxes.append(f'<rect x="{x:g}" width="{field_width}" height="{HEIGHT}" fill="{colour}"/>')
         shown, middle = escape(text), x + field_width / 2

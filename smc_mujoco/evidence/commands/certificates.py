@@ -112,7 +112,7 @@ def _certified(
 
     scenario = case(options.plant(plant), options.law(law), condition, gains=gains)
     within = Uncertainty(disturbance=disturbance, slope=slope) if disturbance else None
-    made = make(scenario, within)
     if worst and within is None:
         raise ScenarioError("--worst needs a bound to search within: give --disturbance")
+    made = make(scenario, within)
     return scenario, made, worst_case(scenario, METRIC, within, progress=True) if worst else None
