@@ -1,6 +1,5 @@
 """What is printed or drawn, without its numbers, for `assert words(...) == snapshot`.
 
-A snapshot holds everything that one page, figure or command says at once; `pytest --snapshot-update` records it anew.
 Numbers have tests of their own, and their last digits differ between processors.
 """
 
@@ -14,15 +13,15 @@ SPACE = re.compile(r"[ \t─━-]{2,}")  # widths of columns depend on numbers
 
 
 def recorded(file: str, names: Iterable[str]) -> list[str]:
-    """Return those names that the snapshots of a test file have as cases, so that a new one needs no recording at once.
+    """Return those names that a test file's snapshots have as cases or at the start of a line; all while recording.
 
-    All of them while recording.
+    So what is new needs no recording at once.
     """
     record = Path(file).parent / "__snapshots__" / f"{Path(file).stem}.ambr"
     if "--snapshot-update" in sys.argv or not record.exists():
         return list(names)
     text = record.read_text(encoding="utf-8")
-    return [name for name in names if f"[{name}]\n" in text]
+    return [name for name in names if re.search(rf"(^  |\[){re.escape(name)}(\(|\]$)", text, re.MULTILINE)]
 
 
 def words(text: str) -> str:
