@@ -5,6 +5,7 @@ import importlib
 import inspect
 import itertools
 import json
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import NoneType
@@ -146,19 +147,13 @@ WORDS: dict[Any, Callable[[Any], str]] = {
 }
 
 
-def _same(a: object, b: object) -> bool:
-    return type(a) is type(b) and a == b
-
-
 def called(function: Callable, arguments: tuple, named: dict[str, Any]) -> str:
-    """Return a call in words, an argument on each line, in the order and with the defaults of the function."""
+    """Return a call in words: a line for each argument that is not as the function's default."""
     signature = inspect.signature(function)
     bound = signature.bind(*arguments, **named).arguments
-    lines = [f"{function.__name__}("]
-    for name, parameter in signature.parameters.items():
-        as_default = name not in bound or _same(bound[name], parameter.default)
-        lines.append(f"  {name}: {told(bound.get(name, parameter.default))}{' (the default)' * as_default}")
-    return "\n".join([*lines, ")"])
+    defaults = {name: one.default for name, one in signature.parameters.items()}
+    given = {name: one for name, one in bound.items() if type(one) is not type(defaults[name]) or one != defaults[name]}
+    return "\n".join([f"  {function.__name__}", *(f"    {name}: {told(one)}" for name, one in given.items())])
 
 
 def stub(path: str, last: bool, calls: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -185,14 +180,18 @@ def folder(tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("folder")
-@pytest.mark.parametrize("line", CALLS, ids=lambda line: line[:50])
-def test_every_option_reaches_the_function_that_does_the_work(line, monkeypatch, snapshot):
-    calls: list[str] = []
-    for path, following in itertools.zip_longest(CALLS[line], CALLS[line][1:]):
-        stub(path, following is None, calls, monkeypatch)
-    with pytest.raises(Reached):
-        main.main(line.split())
-    assert "\n".join(calls) == snapshot
+@pytest.mark.parametrize("command", dict.fromkeys(line.partition(" ")[0] for line in CALLS))
+def test_every_option_reaches_the_function_that_does_the_work(command, snapshot):
+    said = []
+    for line, paths in CALLS.items():
+        if line.split()[0] == command:
+            said.append(line)
+            with pytest.MonkeyPatch.context() as patch:
+                for path, following in itertools.zip_longest(paths, paths[1:]):
+                    stub(path, following is None, said, patch)
+                with pytest.raises(Reached):
+                    main.main(line.split())
+    assert "\n".join(said) == snapshot
 
 
 def parameters(command: Callable) -> dict[str, tuple[inspect.Parameter, Any]]:
@@ -219,7 +218,7 @@ def about(name: str, parameter: inspect.Parameter, info: Any) -> str:
         "help": info.help,
     }
     shown = [f"{fact} {value}" for fact, value in facts.items() if value is not None]
-    return f"  {name}: {'; '.join(shown)}{'' if info.show_default else '; the default is not shown'}"
+    return f"{name}: {'; '.join(shown)}{'' if info.show_default else '; the default is not shown'}"
 
 
 def test_the_calls_above_have_every_option_of_their_commands():
@@ -230,11 +229,24 @@ def test_the_calls_above_have_every_option_of_their_commands():
         assert [one for one in options if not one & (words | beside)] == [], name
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_what_a_command_says_of_itself_is_as_recorded(name, snapshot):
-    group, command = COMMANDS[name]
-    lines = [about(names, *facts) for names, facts in parameters(command).items()]
-    assert "\n".join([f"{name} ({group})", inspect.cleandoc(command.__doc__ or ""), *lines]) == snapshot
+@pytest.mark.parametrize("name", COMMANDS.keys() - {"list"})
+def test_the_examples_of_a_command_have_options_that_it_takes(name):
+    command = COMMANDS[name][1]
+    taken = {one for names in parameters(command) for one in names.split("/")}
+    examples = re.findall(r"Example: smc-mujoco (\S+)(.*?)(?: && .*| > .*)?\n", f"{command.__doc__}\n")
+    assert examples
+    assert {called for called, _ in examples} == {name}
+    assert {word for _, words in examples for word in words.split() if word.startswith("--")} <= taken
+
+
+def test_options_are_as_recorded(snapshot):
+    """What several commands have and say alike is recorded once, with their names."""
+    said: dict[str, list[str]] = {}
+    for name, (_, command) in COMMANDS.items():
+        for names, facts in parameters(command).items():
+            said.setdefault(about(names, *facts), []).append(name)
+    assert [f"{line} ({', '.join(names)})" for line, names in sorted(said.items())] == snapshot
+    assert {group: [*commands] for group, commands in main.GROUPS.items()} == snapshot
 
 
 # what is printed and written
