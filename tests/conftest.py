@@ -41,6 +41,11 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
     parser.addoption("--quick", action="store_true", help="only the first case of each test, in files marked quick")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Take no record of a case for unused where only first cases run: syrupy tells tests apart, not their cases."""
+    config.option.disable_unused_snapshots |= config.getoption("quick")
+
+
 def pytest_collection() -> None:
     """Collect tests without a garbage collector: what they make stays."""
     gc.disable()
@@ -60,7 +65,6 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return "pytest.mark.quick" not in collection_path.read_text(encoding="utf-8") or None
 
 
-@pytest.hookimpl(trylast=True)  # snapshots of what is left out here are not unused: syrupy has seen all items
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Keep the first case of each quick test that is not slow, where quick tests are asked for."""
     if not config.getoption("quick"):
