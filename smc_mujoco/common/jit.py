@@ -42,6 +42,7 @@ from smc_mujoco.common.rebuild import rebuild
 
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
 DIGEST_SIZE = hashlib.sha256().digest_size
+MAX_FILES_OF_A_NAME = 64  # in the cache: functions of one name, such as laws that are written from numbers
 # Beginnings of lines in numba's errors that say where an error was, not what it was.
 WHEREABOUTS = re.compile(
     r"Failed in|No implementation|There are|- Of which|Overload|Intrinsic|With argument|Rejected|"
@@ -230,13 +231,19 @@ def _load_numba() -> None:
 
 
 class Cache(FunctionCache):
-    """Cache of a compiled function on disk. A damaged file counts as missing; a full disk is not an error."""
+    """Cache of a compiled function on disk. A damaged file counts as missing; a full disk is not an error.
+
+    Functions of one name have a file each, of which the last MAX_FILES_OF_A_NAME are kept.
+    """
 
     def __init__(self, body: Callable, name: str = "", content: str = ""):
         super().__init__(body)
         locator, base, self.content = self._impl.locator, self._impl.filename_base, content
+        digest = hashlib.sha256(content.encode()).hexdigest()[:16]
+        of_name = f"{name[:80]}-{{}}-{base}"  # a file's name has 255 bytes at most
+        self.files_of_name = of_name.format("?" * len(digest))
         stamp = content or locator.get_source_stamp()
-        self._cache_file = Sealed(locator.get_cache_path(), f"{name}-{base}" if name else base, stamp)
+        self._cache_file = Sealed(locator.get_cache_path(), of_name.format(digest) if name else base, stamp)
 
     def _index_key(self, sig: Any, codegen: Any) -> tuple:
         """Return the key of an overload. Numba's own key hashes a closure without the functions in it."""
@@ -247,6 +254,14 @@ class Cache(FunctionCache):
         with contextlib.suppress(OSError):
             if not data.library.has_dynamic_globals and _complete(data.library):
                 super().save_overload(sig, data)
+                self._remove_oldest()
+
+    def _remove_oldest(self) -> None:
+        """Remove files of other functions of this name, those written first, beyond MAX_FILES_OF_A_NAME."""
+        written = sorted(Path(self.cache_path).glob(f"{self.files_of_name}.nbi"), key=lambda path: path.stat().st_mtime)
+        for index in written[:-MAX_FILES_OF_A_NAME]:
+            for path in (index, *index.parent.glob(f"{index.stem}.*.nbc")):
+                path.unlink()
 
 
 def _complete(library: CPUCodeLibrary) -> bool:

@@ -15,7 +15,7 @@ from numba import njit
 from numba.extending import overload
 
 import smc_mujoco as smc
-from smc_mujoco.common import fingerprint
+from smc_mujoco.common import fingerprint, jit
 from smc_mujoco.common.jit import NUMBERS
 from smc_mujoco.common.numba_internals import FunctionIdentity
 from smc_mujoco.control.law import Measurement
@@ -70,7 +70,7 @@ def test_another_kind_other_gains_or_another_memory_are_compiled_again():
 
 
 def test_a_law_that_has_changed_is_not_taken_for_the_one_before():
-    """By its own text, by a number of its module, and by a helper's: the file has one name."""
+    """By its own text, by a number of its module, and by a helper's: the laws have one name."""
     scaled = "factor * gains.k"
     helper = "@njit\ndef helper(x):\n    return {} * x"
 
@@ -105,13 +105,26 @@ def test_what_numba_compiles_in_place_of_a_function_tells_laws_apart():
     assert [force(overloaded(number)) for number in (6.0, 7.0)] == [18.0, 21.0]
 
 
-def test_code_of_another_law_under_the_index_of_this_one_is_not_run(cache):
-    """Two processes write files of one name at the same time: the one's index, the other's code."""
+def test_laws_of_one_name_are_all_kept_and_of_very_many_the_last(monkeypatch):
+    """Laws that are written from numbers have one name, such as linear controllers, and so have the laws of scripts."""
+    laws = [mine(f"{factor} * gains.k") for factor in (1.0, 2.0, 3.0)]
+    assert [hits(law) for law in laws + laws] == [0, 0, 0, 1, 1, 1]
+    monkeypatch.setattr(jit, "MAX_FILES_OF_A_NAME", 2)
+    assert [hits(mine(f"{factor} * gains.k")) for factor in (4.0, 3.0, 4.0, 1.0)] == [0, 1, 1, 0]
+
+
+def test_a_law_with_a_very_long_name_is_kept():
+    law = mine()
+    law.__qualname__ = "name" * 60  # with what is added, more than the 255 bytes of a file's name
+    assert [hits(law) for _ in range(2)] == [0, 1]
+
+
+def test_code_of_another_law_under_the_name_of_this_one_is_not_run(cache):
     force(mine("gains.k"))
-    (index,) = cache.rglob("*.nbi")
-    first = index.read_bytes()
+    (ours,) = cache.rglob("*.nbc")
     assert force(mine("2.0 * gains.k")) == 6.0
-    index.write_bytes(first)
+    (theirs,) = {*cache.rglob("*.nbc")} - {ours}
+    ours.write_bytes(theirs.read_bytes())
     assert hits(mine("gains.k")) == 0
     assert force(mine("gains.k")) == 3.0
 
