@@ -97,18 +97,23 @@ def text(template):
     said += [f"{template.finite_time} = 0 after a finite time"] if template.finite_time else []
     said += [f"order of {what} {template.order(what, component.gains):.7g}" for what in template.accuracy]
     said += [f"admits {what} below {bound(g):.7g}" for what, bound in template.admits.items()]
+    said += [f"degree {template.relative_degree}", f"memory {template.memory}", f"for {template.plants or 'all'}"]
     lines = [", ".join(filter(None, said)), *(f"asks for {words}" for words in template.conditions)]
-    lines.append(f"degree {template.relative_degree}, memory {template.memory}, for {template.plants or 'all'}")
+    gains = []
     for name, gain in template.gains.items():
         unit = gain.unit_at(component.gains)
         marks = [flag for flag in ("positive", "nonnegative", "held", "shared") if getattr(gain, flag)]
         marks += [f"over {gain.over}"] if gain.over else []
         size = "no unit" if unit is None else "F^{:.4g} X^{:.4g} T^{:.4g}".format(*unit)
-        lines.append(", ".join([f"{name} = {gain_text(gain.default)}", size, *marks]))
+        gains.append(", ".join([f"{name} = {gain_text(gain.default)}", size, *marks]))
+    lines.append("; ".join(gains))
     if template.rest:
         numbers = [*template.rest.linear(g), *template.rest.force(g, np.array([-0.2, 0.05, 3.0]))]
         lines.append(f"at rest {', '.join(f'{number:.7g}' for number in numbers)}")
-    return "\n".join([*lines, *(f"{way}: {computed(component, inputs)}" for way, inputs in ways(template).items())])
+    sums: dict[str, list[str]] = {}  # of the ways that compute the same
+    for way, inputs in ways(template).items():
+        sums.setdefault(computed(component, inputs), []).append(way)
+    return "\n".join([*lines, *(f"{' and '.join(names)}: {numbers}" for numbers, names in sums.items())])
 
 
 @pytest.mark.parametrize("name", recorded(__file__, TEMPLATES))
