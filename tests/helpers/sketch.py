@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from matplotlib import colors
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.collections import Collection
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.legend import Legend
@@ -59,29 +60,41 @@ def sketch(page: Figure | SubFigure) -> str:
     for legend in page.legends:
         lines += _legend(legend)
     for axes in page.axes:
-        lines += ["", *_axes(axes)]
+        lines += _axes(axes)
     return "\n".join(lines)
 
 
 def _axes(axes: Axes) -> list[str]:
-    """Return what axes show, and those within them."""
-    gone = "" if axes.get_visible() else " hidden"
-    lines = [f"axes{gone}, aspect {axes.get_aspect()}{', bare' * (not axes.get_frame_on())}"]
-    for name, axis, scale in (("x", axes.xaxis, axes.get_xscale()), ("y", axes.yaxis, axes.get_yscale())):
-        grid = [line.get_visible() for line in axis.get_gridlines()[:1]]
-        ticks = [(one.label1.get_visible(), one.tick1line.get_markersize()) for one in axis.get_major_ticks()[:1]]
-        kind = type(axis.get_major_formatter()).__name__
-        kind += f" {[text.get_text() for text in axis.get_ticklabels()]}" if kind == "FuncFormatter" else ""
-        lines.append(f"{name} {scale} {numbers(axis.get_view_interval())} grid {grid} ticks {ticks} {kind}")
-    titles = [axes._left_title, axes.title, axes._right_title, axes.xaxis.label, axes.yaxis.label]
-    lines += [_text(text) for text in (*titles, *axes.texts) if text.get_text()]
-    lines += [_line(line) for line in axes.lines]
+    """Return what axes show, and those within them; of lines of one look, their data together."""
+    lines = [f"axes {axes.get_aspect()}{', bare' * (not axes.get_frame_on())}{', hidden' * (not axes.get_visible())}"]
+    lines[0] += f"; x {_axis(axes.xaxis)}; y {_axis(axes.yaxis)}"
+    titles = [axes._left_title, axes.title, axes._right_title]
+    lines += [f"{text}" for text in map(_text, (*titles, *axes.texts)) if not text.startswith("''")]
+    looks: dict[str, list[Line2D]] = {}
+    for line in axes.lines:
+        looks.setdefault(f"{_look(line)} layer {number(line.get_zorder())}", []).append(line)
+    for look, alike in looks.items():
+        data = [_data(np.concatenate([np.asarray(line.get_data()[k], float) for line in alike])) for k in range(2)]
+        lines.append(f"{f'{len(alike)} ' * (len(alike) > 1)}{look}: {' '.join(data)}")
     for patch in axes.patches:
         box = patch.get_path().transformed(patch.get_patch_transform()).get_extents()
         lines.append(f"{type(patch).__name__} {numbers(box.extents)} {_face(patch)}")
     lines += [_collection(one) for one in axes.collections]
     lines += [part for legend in filter(None, [axes.get_legend()]) for part in _legend(legend)]
     return [*lines, *(f"  {part}" for child in axes.child_axes for part in _axes(child))]
+
+
+def _axis(axis: Axis) -> str:
+    """Return an axis's scale, ends and label, and its grid, ticks and their texts where they are not as usual."""
+    grid = [line.get_visible() for line in axis.get_gridlines()[:1]]
+    ticks = [(one.label1.get_visible(), one.tick1line.get_markersize()) for one in axis.get_major_ticks()[:1]]
+    kind = type(axis.get_major_formatter()).__name__
+    kind += f" {[text.get_text() for text in axis.get_ticklabels()]}" if kind == "FuncFormatter" else ""
+    unusual = _unless([True], grid=grid) + _unless([(True, 3.5)], ticks=ticks) + _unless("ScalarFormatter", by=kind)
+    label = _text(axis.label).replace("(0.5, 0) ", "").replace("(0, 0.5) ", "")
+    label = label.replace(" center top", "").replace(" center bottom", "")  # the usual places
+    told = f" {label}" if axis.label.get_text() else ""
+    return f"{axis.get_scale()} {numbers(axis.get_view_interval())}{told}{unusual}"
 
 
 def _unless(usual: object, **given: object) -> str:
@@ -104,25 +117,20 @@ def _text(text: Text) -> str:
     box = f" box {_face(text.get_bbox_patch())}" if text.get_bbox_patch() else ""
     arrow = getattr(text, "arrow_patch", None)
     line = f" line {arrow.get_linestyle()} {number(arrow.get_linewidth())}" if arrow else ""
-    math = _unless(False, math=text.get_parse_math())
+    math = _unless(True, math=text.get_parse_math())
     return f"{text.get_text()!r} {numbers(place)} {look} {text.get_ha()} {text.get_va()}{math}{box}{line}"
 
 
-def _line(line: Line2D) -> str:
-    """Return the look of a line and its data, or their number, ends, ranges and means."""
+def _look(line: Line2D) -> str:
+    """Return the look of a line, with its label."""
     look = f"line {colors.to_hex(line.get_color())} {number(line.get_linewidth())}"
     look += _unless((0, None), dashed=line._unscaled_dash_pattern) + _unless("default", drawn=line.get_drawstyle())
     if line.get_marker() not in ("None", None):
         fill, edge = (colors.to_hex(one) if one != "none" else one for one in (line.get_mfc(), line.get_mec()))
         look += f" mark {line.get_marker()} {number(line.get_ms())} {fill} {edge} {number(line.get_mew())}"
     label = "_" if str(line.get_label()).startswith("_") else line.get_label()
-    look += (
-        _unless(None, alpha=line.get_alpha(), id=line.get_gid())
-        + _unless("_", label=label)
-        + _unless(True, clip=line.get_clip_on())
-    )
-    x, y = (np.asarray(part, float) for part in line.get_data())
-    return f"{look} layer {number(line.get_zorder())}: {_data(x)} {_data(y)}"
+    look += _unless(None, alpha=line.get_alpha(), id=line.get_gid()) + _unless(True, clip=line.get_clip_on())
+    return look + _unless("_", label=label)
 
 
 def _data(values: np.ndarray) -> str:
@@ -148,9 +156,9 @@ def _legend(legend: Legend) -> list[str]:
     """Return a legend's title and entries, with the samples of these."""
     lines = [f"legend {legend._ncols} columns, frame {legend.get_frame_on()}: {_text(legend.get_title())}"]
     for handle, text in zip(legend.legend_handles, legend.get_texts(), strict=True):
-        sample = _line(handle).partition(" layer ")[0] if isinstance(handle, Line2D) else _face(handle)
+        sample = _look(handle).partition(" label ")[0] if isinstance(handle, Line2D) else _face(handle)
         lines.append(
-            f"  {text.get_text()!r} {number(text.get_size())}{_unless(False, math=text.get_parse_math())}: {sample}"
+            f"  {text.get_text()!r} {number(text.get_size())}{_unless(True, math=text.get_parse_math())}: {sample}"
         )
     return lines
 
