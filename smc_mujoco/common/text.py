@@ -24,3 +24,8 @@ def joined(parts: Iterable[str]) -> str:
     """Return "a, b and c"; "" for no parts."""
     *others, last = list(parts) or [""]
     return f"{', '.join(others)} and {last}" if others else last
+
+
+def every(count: int) -> str:
+    """Return "both" of two things, "all 3" of three."""
+    return "both" if count == 2 else f"all {count}"

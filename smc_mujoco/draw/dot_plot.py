@@ -74,10 +74,9 @@ def plot(
                 _panel(axes[i, k], table, plant, name, conditions, laws, colours, marks)
                 axes[i, k].set_xlabel(label)
                 axes[i, k].tick_params(labelleft=k == 0)
-            shipped = plants_catalogue().get(plant)
             over_never = 1.0 + style.points(1.7 * pages.TEXT_SIZE / 72) / style.points(tall[i])
             above = None if width >= pages.NARROW else over_never
-            axes[i, 0].set_title(style.plant_name(shipped) if shipped else plant, y=above, parse_math=False)
+            axes[i, 0].set_title(style.plant_name(plant), y=above, parse_math=False)
         pages.set_head(page, width, title or "Medians by condition", key, shared)
         pages.write(page, paths)
     return page

@@ -44,7 +44,8 @@ def orders(
     """
     groups: dict[str, list[Accuracy]] = {}
     for row in rows:
-        groups.setdefault(f"{row.plant.replace('_', ' ')}, {row.condition.replace('_', ' ')}", []).append(row)
+        plant = style.plant_name(row.plant, short=True)
+        groups.setdefault(f"{plant}, {row.condition.replace('_', ' ')}", []).append(row)
     if not groups:
         raise ScenarioError("no accuracy to draw: give at least one row")
     paths = pages.files(path, format)

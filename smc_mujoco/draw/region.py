@@ -58,7 +58,7 @@ def draw_map(ax, region: Basin) -> None:
     ax.plot(0.0, 0.0, "+", color=style.PAPER, markersize=style.points(11), markeredgewidth=style.points(1.6))
     ax.grid(visible=False)
     gains = f"\ngains: {region.source}" * (region.source != NONE)
-    ax.set_title(f"{style.law_name(region.law)} on {region.plant.replace('_', ' ')}{gains}")
+    ax.set_title(f"{style.law_name(region.law)} on {style.plant_name(region.plant, short=True)}{gains}")
     ax.set_xlabel(f"initial position ({region.unit})")
     ax.set_ylabel(f"initial velocity ({region.unit}/s)")
     marks = [

@@ -23,7 +23,7 @@ from smc_mujoco.control import estimator as estimators
 from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import known_laws
-from smc_mujoco.mechanisms.plant import EFFORT, Plant
+from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
 from smc_mujoco.metrics.channel_groups import Group, group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation.conditions import CONDITION_FIELDS
@@ -391,6 +391,8 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     if hasattr(traces, "column"):
         raise ScenarioError(f"traces is {shown(traces)}: smc.plot draws a table, and this draws traces of smc.run")
     traces = [traces] if isinstance(traces, Trace) else items_of("traces", traces)
+    for other in (one for one in traces if not isinstance(one, Trace)):
+        raise ScenarioError(f"traces has {shown(other)}, which is no trace: give those of smc.run or smc.load")
     if not traces:
         raise ScenarioError("no traces to draw: give at least one, from smc.run(...) or smc.load(...)")
     plants = sorted({trace.scenario.plant.name for trace in traces})
@@ -418,9 +420,12 @@ def units(group: Group) -> dict[str, str]:
     return {"x": x, "v": f"{x}/s", "u": u, "s": f"{x}/s", "force": force}
 
 
-def plant_name(plant: Plant) -> str:
+def plant_name(plant: Plant | str, short: bool = False) -> str:
     """Return the plant's label: its own, or its name in words. A user's model keeps the user's name."""
-    return plant.label or (plant.name if plant.own else in_words(plant.name))
+    if isinstance(plant, str):
+        known = catalogue().get(plant)
+        return plant_name(known, short) if known else plant
+    return (short and plant.short) or plant.label or (plant.name if plant.own else in_words(plant.name))
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

@@ -17,7 +17,7 @@ from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import joined, number
+from smc_mujoco.common.text import every, joined, number
 from smc_mujoco.control.source import Source, in_words, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.plant import catalogue
@@ -223,7 +223,7 @@ class Board(Tables):
         if self.winner:
             leads = [block.lead for block in self.blocks if block.lead]
             closest = min(leads, key=_closeness, default=None)
-            several = f" in all {len(self.blocks)} {self.kind}" * (len(self.blocks) > 1)
+            several = f" in {every(len(self.blocks))} {self.kind}" * (len(self.blocks) > 1)
             how = f": {'at least ' * (len(leads) > 1)}{closest.words}" if closest else ""
             return f"{self.winner} wins{several}{how}{self._gains([self.winner])}"
         results = {}
@@ -233,7 +233,7 @@ class Board(Tables):
                 results[law] = f"{law} wins under {_listed(wins)}" + f", loses under {_listed(losses)}" * any(losses)
         if results:
             words = "; ".join(results.values()) + self._gains(results)
-            return f"no winner in all {len(self.blocks)} {self.kind}: {words}"
+            return f"no winner in {every(len(self.blocks))} {self.kind}: {words}"
         if self.why:
             return f"no winner: {self.why}"
         if len(self.best) == len(self.entries):

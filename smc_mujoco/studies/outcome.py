@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.relevant_difference import exceeds
 from smc_mujoco.common.errors import ScenarioError, find, shown
-from smc_mujoco.common.text import joined, number
+from smc_mujoco.common.text import every, joined, number
 from smc_mujoco.metrics.catalogue import CATALOGUE, scores, settling_time
 from smc_mujoco.simulation.trace import Trace
 
@@ -211,7 +211,7 @@ class Outcome:
             if len(self.traces) == 1:
                 parts.append(several + sized)
             elif len(winners) == 1:
-                parts.append(f"{several} {_everywhere(len(where))}{sized}")
+                parts.append(f"{several} in {every(len(where))} conditions{sized}")
             else:
                 parts.append(f"{several} ({', '.join(where)})")
         return ", ".join(parts)
@@ -235,22 +235,17 @@ def _one_condition(yes: Sequence[str], no: Sequence[str], singular: str, plural:
 def _share(names: Sequence[str], tried: Sequence[str]) -> str:
     """Return some of the conditions tried in words: "in all 3 conditions", "in all but 50 ms", "in none"."""
     if len(names) == len(tried):
-        return _everywhere(len(tried))
+        return f"in {every(len(tried))} conditions"
     if not names:
         return "in none"
     missing = [name for name in tried if name not in names]
     return f"in all but {joined(missing)}" if len(missing) < len(names) else f"only in {joined(names)}"
 
 
-def _everywhere(conditions: int) -> str:
-    """Return in words that something is so in all conditions."""
-    return "in both conditions" if conditions == 2 else f"in all {conditions} conditions"
-
-
 def _all(some: Sequence[str], labels: Sequence[str]) -> str:
     """Return labels in a row, or "both" or "all 3" if these are all of several."""
     if len(some) == len(labels) > 1:
-        return "both" if len(some) == 2 else f"all {len(some)}"
+        return every(len(some))
     return joined(some)
 
 

@@ -473,13 +473,13 @@ def test_over_several_conditions_only_what_holds_in_each_is_told():
         "c wins under c1, loses under c0, c2, for these gains"
     )
     assert leaderboard(stand({"a": blocks(1, 2), "b": blocks(2, 4)}), ["itae"])[0].result == (
-        "a wins in all 2 conditions: at least 50 % less than b (50 to 50 %), ahead in 20 of 20 runs, for these gains"
+        "a wins in both conditions: at least 50 % less than b (50 to 50 %), ahead in 20 of 20 runs, for these gains"
     )
     text = " ".join(printed([board]).split())
     assert "too few" not in text
     assert "b wins under c2, loses under c0, c1;" in text
     level = leaderboard(stand({"a": blocks(1, 2), "b": blocks(1.01, 4)}), ["itae"])[0]
-    assert level.result == "no winner in all 2 conditions: a wins under c1, for these gains"
+    assert level.result == "no winner in both conditions: a wins under c1, for these gains"
     first = leaderboard(stand({"a": blocks(1, 2), "b": blocks(1.01, 4), "c": blocks(4, 2.01)}), ["itae"])[0]
     assert first.result == "no winner, undefeated: a"
     assert "undefeated: a" in " ".join(printed([first]).split())
@@ -535,7 +535,7 @@ def test_a_board_for_each_plant_and_metric_with_medians_shares_and_winners():
     assert itae.entries[1].interval.median == np.median(each)
     assert [block.medians["b"] for block in itae.blocks] == each
     assert (itae.winner, itae.cells, itae.seeds) == ("a", 40, 20)
-    start = "ITAE on duffing under nominal and noise: a wins in all 2 conditions: at least 50 % less than b"
+    start = "ITAE on duffing under nominal and noise: a wins in both conditions: at least 50 % less than b"
     assert itae.verdict.startswith(start)
     assert itae.unit == "{x} s^2"
     settles = picked(boards, "settles", plant="duffing")
@@ -786,7 +786,7 @@ def test_one_condition_without_randomness_is_one_sample_beside_others():
     assert board.cells == 21
     text = " ".join(printed([board]).split())
     assert "20 seeds, 1 distinct run" in text
-    assert board.result == "no winner in all 2 conditions: a wins under c0, for these gains"
+    assert board.result == "no winner in both conditions: a wins under c0, for these gains"
 
 
 def test_seeds_that_change_rounding_alone_are_one_sample():

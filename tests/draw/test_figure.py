@@ -201,6 +201,8 @@ def test_a_slide_and_a_hinge_that_are_driven_share_no_panel(tmp_path):
 def test_refuses_what_shares_no_axes(pair, tmp_path):
     with pytest.raises(smc.ScenarioError, match="no traces"):
         figure([], tmp_path / "a")
+    with pytest.raises(smc.ScenarioError, match="traces has 3, which is no trace"):
+        figure([pair[0], 3], tmp_path / "a")
     with pytest.raises(smc.ScenarioError, match="share no axes"):
         figure([pair[0], runs("van_der_pol", duration=0.1)[0]], tmp_path / "a")
     with pytest.raises(smc.ScenarioError, match="one string a trace"):

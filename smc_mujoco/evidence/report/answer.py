@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.relevant_difference import ROUNDING
-from smc_mujoco.common.text import joined
+from smc_mujoco.common.text import every, joined
 from smc_mujoco.evidence.audit.verdict import totals
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.scores import Place, Score
@@ -58,7 +58,7 @@ class Pick(NamedTuple):
         if not self.law:
             return f"all {len(self.level)} laws level in {'each of ' * (self.of > 1)}{self.of}"
         if self.wins == self.of:
-            return f"wins in all {self.of}"
+            return "wins" + f" in {every(self.of)}" * (self.of > 1)
         unbeaten = f"unbeaten in {self.of - self.losses or 'none'} of {self.of}"
         return f"{unbeaten}, wins in {self.wins}" if self.wins else unbeaten
 
@@ -272,7 +272,8 @@ def leads(findings: "Findings", metric: str) -> str:
     ]
     nobody = top.of - sum(row.alone for row in standing)
     return (
-        f"no law wins on {what} in all {top.of} cells. {'; '.join(plants) + '. ' if plants else ''}{'; '.join(wins)}; "
+        f"no law wins on {what} in {every(top.of)} cells. "
+        f"{'; '.join(plants) + '. ' if plants else ''}{'; '.join(wins)}; "
         f"in {nobody or 'none'} no law wins."
     )
 

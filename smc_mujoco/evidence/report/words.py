@@ -51,8 +51,7 @@ def colour(name: str) -> str:
 
 def plant(name: str) -> str:
     """Return a plant's short name."""
-    known = plants().get(name)
-    return (known and known.short) or style.in_words(name)
+    return style.plant_name(name, short=True)
 
 
 def condition(name: str) -> str:
