@@ -30,7 +30,7 @@ CONDITIONS = {
     "coupling": ("F/x", "the coupling is a spring that pulls together", "the coupling can push apart"),
     "local": ("F/x", "sigma'(0) c > phi'(0)", "the law is too soft near 0"),
     "start": ("", "the scenario's start lies in the region", "the start lies outside of it"),
-    "reaching": ("F", "k > |phi + (M c - D) v| + d0", "d and the plant together exceed k"),
+    "reaching": ("F", "k > |phi + (M c - D) v| + d0", "k does not exceed d and the plant together"),
     "integral": ("F/s", "k2 > d'", "the integral is slower than d"),
     "slope": ("F/s", "|delta'| <= L", "what the integral must follow is too fast"),
 }
@@ -40,6 +40,11 @@ THEOREMS = {  # theorem -> what it says
     "reaching": "s = 0 is reached and kept, and x decays on it",
     "super-twisting": "a quadratic form of (√|s| sgn s, w + δ) falls until s = s' = 0 (Moreno and Osorio 2012)",
 }
+
+
+def holds(name: str, margin: float) -> bool:
+    """Return whether a condition holds with a margin. At 0 all do but "reaching", which asks for more."""
+    return margin > 0.0 or (margin == 0.0 and name != "reaching")
 
 
 class Condition(NamedTuple):
@@ -60,8 +65,8 @@ class Condition(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether the margin is not negative."""
-        return self.margin >= 0.0
+        """Whether the condition holds with this margin."""
+        return holds(self.name, self.margin)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,7 +112,7 @@ class Certificate:
 
     @property
     def holds(self) -> bool:
-        """Whether the scenario's own start surely comes to rest or into the bound."""
+        """Whether the scenario's own start surely comes to rest or into the bound, but for what `leaves_out` names."""
         return self.bound is not None
 
     @property
@@ -139,23 +144,22 @@ class Certificate:
             for row in part["conditions"]:
                 unit, asks, fails = CONDITIONS[row["name"]]
                 unit = unit.replace("x", x).replace("F", F)
-                made.append(
-                    Condition(
-                        part["theorem"], row["name"], row["margin"], unit, asks if row["margin"] >= 0.0 else fails
-                    )
-                )
+                words = asks if holds(row["name"], row["margin"]) else fails
+                made.append(Condition(part["theorem"], row["name"], row["margin"], unit, words))
         return tuple(made)
 
     @property
     def leaves_out(self) -> Mapping[str, str]:
-        """What no theorem here is about -> what the scenario has of it, in words."""
+        """What no theorem here is about -> what the scenario has of it, in words; "" for nothing."""
         return dict(self.data["leaves_out"])
 
     @property
     def sentences(self) -> tuple[str, ...]:
         """What is proven and what is not, a sentence for each theorem; then what no theorem is about."""
-        left_out = "; ".join(f"{name} ({what})" if what else name for name, what in self.leaves_out.items())
-        return *(self._sentence(part) for part in self.data["parts"]), f"no theorem here is about {left_out}"
+        here = "; ".join(f"{name} ({what})" for name, what in self.leaves_out.items() if what)
+        absent = ", ".join(name for name, what in self.leaves_out.items() if not what)
+        left_out = f"no theorem here is about {here}" + f"; nor about what is not here: {absent}" * bool(absent)
+        return *(self._sentence(part) for part in self.data["parts"]), left_out
 
     def _sentence(self, part: Mapping[str, Any]) -> str:
         """Return what a theorem says of this plant, or which of its conditions fail, by how much."""

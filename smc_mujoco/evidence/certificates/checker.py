@@ -51,7 +51,7 @@ def margins(part, derived):
     need([one["name"] for one in part["conditions"]] == list(derived), f"the conditions of {part['theorem']}")
     for name in (name for name, value in derived.items() if value is not None):
         equal(told[name], derived[name], f"the margin of {name}")
-    need(part["holds"] is all(margin >= 0 for margin in told.values()), f"whether {part['theorem']} holds")
+    need(part["holds"] is all(m > 0 or (m == 0 and k != "reaching") for k, m in told.items()), "whether it holds")
 
 
 def equation(plant):
@@ -219,8 +219,7 @@ def reaching(doc, part, e, f):
 
     Then x' = -c x. On a terminal surface the same is checked at s = 0, where x = 0 after X^(1 - p) / (b (1 - p)).
     """
-    d0, X, S = arb(doc["disturbance"]), arb(part["X"]), arb(part["S"])
-    g, terminal = f.g, doc["law"]["name"] != "classical"
+    g, terminal, (d0, X, S) = f.g, "b" in vars(f.g), map(arb, (doc["disturbance"], part["X"], part["S"]))
     need(e.n == 1 and X >= 0 and (S == 0 if terminal else bool(S >= 0 and f.c * X >= S)), "|s| <= c X")
 
     def push(a, b, s):
@@ -231,8 +230,9 @@ def reaching(doc, part, e, f):
         return abs(phi(e, x) + D * v + (g.b * g.p * vs).min(g.bound) - e.M * g.b * g.p * vs) + d0
 
     edges, strips = [X * i / 64 for i in range(65)], [hull(S * j / 8, S * (j + 1) / 8) for j in range(-8, 8)]
-    need(X == 0 or all(push(a, b, s) < g.k for a, b in pairwise(edges) for s in strips), "reaching")
-    return {"reaching": g.k - push(X, X, -S), "actuator": f.room}
+    least = min((g.k - push(a, b, s)).lower() for a, b in pairwise(edges) for s in strips)
+    need(bool(X > 0) is bool(least > 0), "reaching")
+    return {"reaching": least, "actuator": f.room}
 
 
 def super_twisting(doc, part, e, f):
@@ -274,8 +274,8 @@ def check(doc):
         need(doc["format"] == FORMAT and doc["seal"] == seal(doc) and set(doc["leaves_out"]) >= LEAVES_OUT, "the seal")
         e, f = equation(doc["plant"]), feedback(doc["law"], doc["u_max"])
         strong = f.kind is None or ((f.K is None or f.K > 0) and (f.a is None or f.a > 0))
-        unit = "rad" if "pendulum" in doc["plant"]["name"] else "m"
-        need(e.M > 0 and f.c > 0 and strong and doc["disturbance"] >= 0 and doc["unit"] == unit, "plant, law and unit")
+        unit, least = "rad" if "pendulum" in doc["plant"]["name"] else "m", min(doc["disturbance"], doc["slope"] or 0)
+        need(e.M > 0 and f.c > 0 and strong and least >= 0 and doc["unit"] == unit, "plant, law, bounds and unit")
         theorems, known = [part["theorem"] for part in doc["parts"]], list(THEOREMS)[slice(*f.theorems)]
         need(0 < len(theorems) == len(set(theorems)) and set(theorems) <= set(known), "a theorem of this law")
         for part in doc["parts"]:

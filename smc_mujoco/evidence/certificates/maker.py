@@ -23,7 +23,7 @@ from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.extras import extra
 from smc_mujoco.evidence.certificates import search
-from smc_mujoco.evidence.certificates.certificate import Certificate, finite
+from smc_mujoco.evidence.certificates.certificate import Certificate, finite, holds
 from smc_mujoco.evidence.certificates.loops import Loop, loop_of
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, Pulse, Sine, Step
@@ -83,20 +83,22 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
 
 
 def left_out(scenario: Scenario) -> dict[str, str]:
-    """Return what the theorems leave out -> what this scenario has of it, in words."""
+    """Return what the theorems leave out -> what this scenario has of it, in words; "" for nothing."""
     s = scenario.resolved
+    late, missed, estimator = 1e3 * s.clock.jitter, 100.0 * s.clock.missed, s.velocity.name
+    clock = [f"the law acts every {1e3 * s.control_period:g} ms"]
+    clock += [f"up to {late:g} ms late"] * bool(late) + [f"{missed:g} % missed"] * bool(missed)
     sizes = {"position": s.noise.position, "velocity": s.noise.velocity}
     noise = [f"{name} {value:g}" for name, value in sizes.items() if value] + ["chosen errors"] * any(s.noise.errors)
+    noise += [f"velocity {estimator}"] * (estimator != "measured") + [str(s.sensor)] * bool(s.sensor)
     return {
-        "sampling": f"the law acts every {1e3 * s.control_period:g} ms",
-        "delay": f"{1e3 * s.input_delay:g} ms" if s.input_delay else "none here",
-        "noise": ", ".join([*noise, f"velocity {s.velocity.name}" if s.velocity else "", str(s.sensor or "")]).strip(
-            ", "
-        ),
-        "dry friction": ", ".join(str(part) for part in s.friction) or "none here",
-        "contact": s.contact.kind,
-        "drive": ", ".join(str(part) for part in s.actuator) or "none here",
-        "other parameters": f"a jump {s.jump}" if s.jump else "none here",
+        "sampling": ", ".join(clock),
+        "delay": f"{1e3 * s.input_delay:g} ms" if s.input_delay else "",
+        "noise": ", ".join(noise),
+        "dry friction": ", ".join(str(part) for part in s.friction),
+        "contact": "" if s.contact.kind == "none" else s.contact.kind,
+        "drive": ", ".join(str(part) for part in s.actuator),
+        "other parameters": f"a jump {s.jump}" if s.jump else "",
         "rounding": f"{s.integrator} in steps of {1e3 * s.physics_step:g} ms",
     }
 
@@ -186,8 +188,8 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
 
 
 def _part(theorem: str, conditions: list[dict], **data: Any) -> dict:
-    holds = all(condition["margin"] >= 0.0 for condition in conditions)
-    return {"theorem": theorem, "holds": holds, "conditions": conditions} | data
+    proven = all(holds(condition["name"], condition["margin"]) for condition in conditions)
+    return {"theorem": theorem, "holds": proven, "conditions": conditions} | data
 
 
 def _condition(name: str, margin: Any, **data: Any) -> dict:
@@ -281,7 +283,7 @@ def _super_twisting(document: dict, loop: Loop, law: SimpleNamespace, judge: Jud
         cure = "give one, as in smc.Uncertainty(disturbance=1.0, slope=2.0)"
         raise ScenarioError(f"super_twisting needs a bound of d': {cure}")
 
-    def holds(data: dict) -> bool:
+    def proven(data: dict) -> bool:
         margins = judge("super-twisting", data)
         return margins is not None and min(map(float, margins.values())) > 0.0
 
@@ -292,9 +294,9 @@ def _super_twisting(document: dict, loop: Loop, law: SimpleNamespace, judge: Jud
         low, high = 1e-12, 1e6
         for _ in range(SIZE_HALVINGS):
             middle = math.sqrt(low * high)
-            low, high = (middle, high) if holds(_ellipse(P, L, middle, loop.c)) else (low, middle)
+            low, high = (middle, high) if proven(_ellipse(P, L, middle, loop.c)) else (low, middle)
         data = _ellipse(P, L, SET_FACTOR * low, loop.c)
-        if holds(data) and (best is None or best["X"] < data["X"]):
+        if proven(data) and (best is None or best["X"] < data["X"]):
             best = data
     if best is None:
         raise ScenarioError(

@@ -143,9 +143,14 @@ def levels(
     for grid, window in sorted(tried, key=lambda pair: pair[0].worth(pair[1], start)):
         if window and grid.bound(window) and (window := grid.surely(window, proven)):
             inner_form = None if loop.d0 or P is None else (float(P[0, 0]), float(P[0, 1]), float(P[1, 1]))
-            inner, outer = (float(f"{level:.6f}") for level in (window[0] + 2e-6, window[1] - 2e-6))
-            return Levels(x=grid.x, s=s, W=grid.W, inner=inner, outer=outer, bound=grid.bound(window), P=inner_form)
+            inner, outer, bound = _inner(window), float(f"{window[1] - 2e-6:.6f}"), grid.bound(window)
+            return Levels(x=grid.x, s=s, W=grid.W, inner=inner, outer=outer, bound=bound, P=inner_form)
     return None
+
+
+def _inner(window: tuple[float, float]) -> float:
+    """Return the inner level of a range of levels."""
+    return float(f"{window[0] + 2e-6:.6f}")
 
 
 class _Grid:
@@ -159,6 +164,8 @@ class _Grid:
         self.low, self.high = self.corners.min(0), self.corners.max(0)
         lowest, highest = falls(loop, self.x, s, self.corners)
         self.bad = highest >= -MIN_FALL_SHARE * (highest - lowest) - 1e-7
+        if loop.switches:  # where s stays 0, x decays, and W must fall with it
+            self.bad[:, n - 1 : n + 1] |= (np.diff(self.W[:, n]) <= 0.0)[:, None]
         self.sure = np.zeros_like(self.bad)
         self.border = min(self.W[-1].min(), self.W[:, 0].min(), self.W[:, -1].min())
         self.limit = 1.0
@@ -181,7 +188,7 @@ class _Grid:
         """Return the largest |x| of the cells that reach the inner level."""
         if window is None:
             return np.inf
-        return float(np.broadcast_to(self.x[1:, None], self.low.shape)[self.low <= window[0] + 3e-6].max(initial=0.0))
+        return float(np.broadcast_to(self.x[1:, None], self.low.shape)[self.low <= _inner(window)].max(initial=0.0))
 
     def worth(self, window: tuple[float, float] | None, start: tuple[float, float]) -> tuple[bool, float]:
         """Return a key that is smaller for better levels."""

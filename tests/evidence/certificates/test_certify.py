@@ -137,6 +137,32 @@ def test_classical_comes_to_rest_from_a_set_under_a_disturbance():
     assert near.bound == 0.0
 
 
+def test_a_law_as_strong_as_the_disturbance_reaches_nothing():
+    within = smc.Uncertainty(disturbance=1.0)
+    for law in (smc.law("classical", k=1.0), smc.law("terminal", k=1.0, bound=4.0)):
+        made = smc.certify(smc.Scenario(plant="duffing", law=law), within)
+        assert made.sentences[1].startswith("not proven by reaching: reaching 0 N (k does not exceed")
+
+
+def test_the_margin_of_a_set_is_that_of_its_weakest_place():
+    """The weight is largest at pi/2, within the set; at its end the margin is 3.9 N m."""
+    law, within = smc.law("classical", k=5.0, c=0.5), smc.Uncertainty(disturbance=1.0)
+    made = smc.certify(smc.Scenario(plant="inverted_pendulum", law=law), within)
+    assert part(made.data, "reaching")["X"] > 3.0
+    assert margins(made, "reaching")["reaching"] < 5.0 - 1.0 - 0.5 * 9.81 * 0.5
+
+
+def test_levels_of_a_law_that_switches_fall_along_its_surface():
+    """Where W is level far out, s = 0 leads nowhere: the outer level lies below."""
+    law, within = smc.law("classical", k=5.0, c=0.3), smc.Uncertainty(disturbance=1.0)
+    assert smc.certify(smc.Scenario(plant="duffing", law=law), within).bound == 0.0
+
+
+def test_the_bound_is_that_of_the_inner_level_to_its_last_digit():
+    plant, law = smc.plant("van_der_pol", M=0.685, mu=0.164, k=0.803), smc.law("classical", k=2.271, c=0.275)
+    assert smc.certify(smc.Scenario(plant=plant, law=law, x0=1.58)).bound == 0.0
+
+
 def test_super_twisting_needs_an_integral_faster_than_the_disturbance():
     for slope, why in ((None, "bound of d'"), (9.0, "no quadratic form")):
         with pytest.raises(smc.ScenarioError, match=why):
@@ -280,6 +306,13 @@ def test_the_checker_refuses_a_mutant_with_a_new_seal(name):
     assert refused(data)
 
 
+def no_rate(data):
+    """Bound d' by less than 0, with the margins that there are then."""
+    data["slope"] = -1.0
+    for name in ("integral", "slope"):
+        set_margin(TWISTING, name, lambda margin: margin + 1.0)(data)
+
+
 TWISTING = "super-twisting"
 OTHERS = {
     "no damping that is told as damping": ("van_der_pol", "observer_free", set_margin(SATURATED, "damping", abs)),
@@ -294,6 +327,7 @@ OTHERS = {
     "a longer surface": ("duffing", "terminal", put("parts", "reaching", "X", change=times(1.001))),
     "a larger form": ("duffing", "super_twisting", put("parts", TWISTING, "q", change=times(2.0))),
     "another L": ("duffing", "super_twisting", put("parts", TWISTING, "L", change=times(1.2))),
+    "a negative bound of d'": ("duffing", "super_twisting", no_rate),
     "k2": ("duffing", "super_twisting", put("law", "gains", "k2", change=times(0.999))),
     "a spring that pushes": ("pendulum_network", "observer_free", put("plant", "parameters", "kc", change=times(-1))),
     "inverted pendulums": (

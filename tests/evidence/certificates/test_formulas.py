@@ -115,9 +115,9 @@ def test_a_set_is_reached_up_to_where_the_plant_is_as_strong_as_the_law(terms):
     x, s = np.meshgrid(*np.linspace(-1.0, 1.0, 201)[None].repeat(2, 0))
     exact = max(X for X in sizes if strongest(x * X, 0.5 * s * X).max() < 2.3)
     assert 0.85 * exact <= found <= exact
-    margins = accepted(found)
+    margins, least = accepted(found), 2.3 - strongest(x * found, 0.5 * s * found).max()
     assert margins
-    assert float(margins["reaching"]) == pytest.approx(2.3 - strongest(found, -0.5 * found))
+    assert least - 0.1 < float(margins["reaching"]) <= least
     assert float(margins["actuator"]) == pytest.approx(1.7)
 
 
@@ -133,7 +133,8 @@ def test_a_terminal_surface_holds_up_to_where_its_term_and_the_plant_are_as_stro
         return np.abs(made.phi(x) + made.D(x) * v + np.minimum(0.9 * 0.7 * vs, 0.55) - 1.3 * 0.9 * 0.7 * vs) + 0.2
 
     margins = checker.reaching(doc, {"X": 0.6, "S": 0.0}, e, f)
-    assert float(margins["reaching"]) == pytest.approx(2.3 - strongest(0.6))
+    least = 2.3 - strongest(np.linspace(0.0, 0.6, 1001)).max()
+    assert least - 0.1 < float(margins["reaching"]) <= least
     assert float(margins["actuator"]) == pytest.approx(4.0 - 2.3 - 0.55)
     with pytest.raises(checker.Refused, match="reaching"):
         checker.reaching(doc, {"X": 9.0, "S": 0.0}, e, f)
@@ -358,7 +359,8 @@ def test_what_is_left_out_is_said_in_full(snapshot):
     machine = smc.Scenario(
         plant="duffing", law=gain_sets.law("duffing", "observer_free"), friction=smc.Coulomb(0.3), input_delay=0.004,
         noise=smc.Noise(position=0.01, velocity=0.02), sensor=smc.Encoder(2000), velocity="levant",
-        actuator=smc.Lag(0.01), jump=smc.Jump(1.0, {"M": 1.2}), control_period=0.002,
+        actuator=smc.Lag(0.01), jump=smc.Jump(1.0, {"M": 1.2}), control_period=0.002, physics_step=0.00025,
+        clock=smc.Clock(jitter=0.0005, missed=0.3),
     )  # fmt: skip
     told = [f"{name}: {text}" for one in (plain, machine) for name, text in maker.left_out(one).items()]
     assert "\n".join(told) == snapshot
