@@ -6,9 +6,10 @@ from pathlib import Path
 
 from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.draw import style
-from smc_mujoco.evidence.audit.verdict import ANSWERS, NOT_TESTABLE, PARTLY, REFUTED, SUPPORTED, Claim, totals
+from smc_mujoco.evidence.audit.verdict import ANSWERS, PARTLY, REFUTED, SUPPORTED, VERDICTS, Claim, totals
 
-COLOURS = {SUPPORTED: "#2b7a3d", PARTLY: "#8a6100", REFUTED: "#b3322b", NOT_TESTABLE: "#6a6a6a"}  # white on each: 5:1
+COLOURS: dict[str, str] = dict.fromkeys(VERDICTS, "#6a6a6a")  # white on each: 5:1
+COLOURS |= {SUPPORTED: "#2b7a3d", PARTLY: "#8a6100", REFUTED: "#b3322b"}
 COLOURS |= dict.fromkeys(ANSWERS.values(), "#3d5a80")  # of a question
 SHORT_WORDS = {PARTLY: "partly"}
 LABEL_COLOUR = "#444"

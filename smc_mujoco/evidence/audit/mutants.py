@@ -24,7 +24,7 @@ MUTANTS: dict[str, Callable[[Component], Component]] = {
     "no memory": forgetful,
     "relay": relay,
 }
-KEPT, BLIND = "kept by every mutant", "refuted, and no mutant changes its numbers"
+KEPT, BLIND = "kept by every mutant", "not supported, and no mutant changes its numbers"
 
 
 def survivors(
@@ -38,8 +38,8 @@ def survivors(
     """Return claim -> KEPT or BLIND, for the claims that no mutant of their first law loses. There should be none.
 
     A mutant loses a claim if fewer of the claim's sentences hold than under the law itself, or if the claim's function
-    cannot measure the mutant. A refuted claim has nothing to lose: there the numbers must change. Claims with `immune`
-    are skipped.
+    cannot measure the mutant. A claim of which no sentence holds has nothing to lose: there the numbers must change.
+    Claims with `immune` are skipped.
 
     Args:
       paper, only, gains, quick, threads: as of `smc.audit`.

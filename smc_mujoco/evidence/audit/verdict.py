@@ -2,14 +2,15 @@
 
 A claim consists of one sentence or several. A sentence holds if all its checks hold; an existential one ("may",
 "there is") if one does. Under one set of gains a claim is supported if all its sentences hold, refuted if none does,
-partly supported between; without checks it is not testable.
+partly supported between; without checks it is not testable. What is said of some gains or cases is supported by one
+example. Examples that fail refute no such claim: it is not shown.
 
 A verdict is of what the paper says, or of what follows from it. A question beside the paper has an answer in its
 place, "yes" for "supported", and totals count the paper's sentences alone (`totals`).
 
 If all sets of gains give the same verdict, that is the verdict of the claim. If they differ, the claim is partly
-supported, and flips. A universal claim ("every", "any", "by construction") is about all gains: a counter-example under
-one set refutes it. An existential one is supported by an example under one set.
+supported, and flips. A universal claim ("every", "any", "by construction") and one over all gains are refuted by a
+counter-example under one set. An existential one and one over some gains are supported by an example under one.
 """
 
 import dataclasses
@@ -22,10 +23,11 @@ from typing import Any, NamedTuple
 from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, find, shown
 
-SUPPORTED, PARTLY, REFUTED, NOT_TESTABLE = VERDICTS = ("supported", "partly supported", "refuted", "not testable")
-ANSWERS = {SUPPORTED: "yes", PARTLY: "in part", REFUTED: "no", NOT_TESTABLE: "no answer"}  # to a question
-MARKS = {SUPPORTED: "●", PARTLY: "◐", REFUTED: "○", NOT_TESTABLE: "–"}
-MARKS |= dict(zip(ANSWERS.values(), "■◧□–", strict=True))
+SUPPORTED, PARTLY, REFUTED = "supported", "partly supported", "refuted"
+NOT_SHOWN, NOT_TESTABLE = "not shown", "not testable"
+VERDICTS = (SUPPORTED, PARTLY, REFUTED, NOT_SHOWN, NOT_TESTABLE)
+ANSWERS: dict[str, str] = dict(zip(VERDICTS, ("yes", "in part", "no", "no example", "no answer"), strict=True))
+MARKS = dict(zip((*VERDICTS, *ANSWERS.values()), "●◐○◌–■◧□◇–", strict=True))
 
 PAPER, DERIVED, OURS = WHOSE = ("paper", "derived", "ours")  # whose a claim is
 WHOSE_WORDS = {PAPER: "the paper's", DERIVED: "derived", OURS: "a question"}
@@ -290,12 +292,14 @@ def _marked(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{MARKS[kind]} {count} {kind}" for kind, count in counts.items()) or "none"
 
 
-def verdict(evidence: Evidence, quantifier: str = NAMED) -> str:
-    """Return the verdict under one set of gains."""
+def verdict(evidence: Evidence, quantifier: str = NAMED, over: str = "") -> str:
+    """Return the verdict under one set of gains, of a claim over "all" or "some" gains or over none in particular."""
     hold = sentences(evidence, quantifier)
     if not hold:
         return NOT_TESTABLE
-    return SUPPORTED if all(hold) else PARTLY if any(hold) else REFUTED
+    if any(hold):
+        return SUPPORTED if all(hold) else PARTLY
+    return NOT_SHOWN if quantifier == EXISTENTIAL or over == "some" else REFUTED
 
 
 def sentences(evidence: Evidence, quantifier: str = NAMED) -> list[bool]:
@@ -308,24 +312,26 @@ def sentences(evidence: Evidence, quantifier: str = NAMED) -> list[bool]:
 
 
 def combined(
-    verdicts: Mapping[str, str], quantifier: str = NAMED, answers: Mapping[str, str] | None = None
+    verdicts: Mapping[str, str], quantifier: str = NAMED, answers: Mapping[str, str] | None = None, over: str = ""
 ) -> tuple[str, bool, str]:
     """Return the verdict over all sets of gains, whether it flips, and a sentence about that, in answers if given."""
     kinds = set(verdicts.values())
     if len(kinds) == 1:
         return kinds.pop(), False, ""
     by_set = ", ".join(f"{(answers or {}).get(kind, kind)} with {name} gains" for name, kind in verdicts.items())
-    decisive = {UNIVERSAL: REFUTED, EXISTENTIAL: SUPPORTED}.get(quantifier)
+    some = quantifier == EXISTENTIAL or over == "some"
+    decisive = SUPPORTED if some else REFUTED if quantifier == UNIVERSAL or over == "all" else None
     if decisive in kinds:
-        return str(decisive), True, f"The claim is {quantifier}, so that one set of gains decides: {by_set}."
+        about = f"of {over} gains" if over else quantifier
+        return str(decisive), True, f"The claim is {about}, so that one set of gains decides: {by_set}."
     return PARTLY, True, f"The verdict depends on the gains: {by_set}."
 
 
 def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     """Return a claim with its verdict, from set of gains -> checks and the numbers beside them."""
-    verdicts = {name: verdict(some, statement.quantifier) for name, some in evidence.items()}
+    verdicts = {name: verdict(some, statement.quantifier, statement.over) for name, some in evidence.items()}
     answers = ANSWERS if statement.whose == OURS else None
-    overall, flips, sentence = combined(verdicts, statement.quantifier, answers)
+    overall, flips, sentence = combined(verdicts, statement.quantifier, answers, statement.over)
     if answers:
         overall, verdicts = answers[overall], {name: answers[kind] for name, kind in verdicts.items()}
     shared = {field.name: getattr(statement, field.name) for field in dataclasses.fields(Statement)}

@@ -57,7 +57,8 @@ def claims(
 
     Under a set of gains a claim is supported if all its sentences hold, refuted if none does, and partly supported
     otherwise. If the verdict depends on the set of gains, the table says so. One counter-example refutes a universal
-    claim. Claims that you name are shown in full, with every check. All of Gaber's, the default, take minutes.
+    claim. What is said of some gains is "not shown" where a search finds no example. Claims that you name are shown in
+    full, with every check. All of Gaber's, the default, take minutes.
 
     Totals are of the paper's own sentences. What is derived from them is listed apart, and so are questions beside the
     paper, which have answers and no verdicts.

@@ -32,6 +32,7 @@ COLOURS = {
     verdicts.SUPPORTED: "blue",
     verdicts.PARTLY: "yellow",
     verdicts.REFUTED: "red",
+    verdicts.NOT_SHOWN: "dim",
     verdicts.NOT_TESTABLE: "dim",
     **dict.fromkeys(verdicts.ANSWERS.values(), "cyan"),  # to a question
 }

@@ -18,10 +18,11 @@ from smc_mujoco.evidence.audit import runs as claim_runs
 from smc_mujoco.evidence.audit.audit import claims, evaluations
 from smc_mujoco.evidence.audit.paper import Entry, paper
 from smc_mujoco.evidence.audit.runs import Runs
-from smc_mujoco.evidence.audit.variants import reversed_gain, squeezed, with_gains, zero_gain
+from smc_mujoco.evidence.audit.variants import forgetful, relay, reversed_gain, squeezed, with_gains, zero_gain
 from smc_mujoco.evidence.audit.verdict import (
     EXISTENTIAL,
     NAMED,
+    NOT_SHOWN,
     NOT_TESTABLE,
     PARTLY,
     REFUTED,
@@ -119,7 +120,7 @@ OTHER = YES._replace(what="other", sentence="b")
     [
         ([YES, NO], UNIVERSAL, REFUTED),
         ([YES, NO], EXISTENTIAL, SUPPORTED),
-        ([NO], EXISTENTIAL, REFUTED),
+        ([NO], EXISTENTIAL, NOT_SHOWN),
         ([*ABOUT, OTHER], NAMED, PARTLY),
         ([*ABOUT, OTHER], EXISTENTIAL, SUPPORTED),
         ([ABOUT[1], OTHER], UNIVERSAL, PARTLY),
@@ -135,6 +136,9 @@ def test_one_counter_example_refutes_what_is_said_of_all_gains():
     assert combined(found, EXISTENTIAL)[:2] == (SUPPORTED, True)
     assert combined(found, NAMED)[:2] == (PARTLY, True)
     assert combined({"study": PARTLY, "tuned": SUPPORTED}, UNIVERSAL)[0] == PARTLY
+    assert combined(found, over="all")[:2] == (REFUTED, True)
+    assert "is of all gains, so that one set of gains decides: supported with study" in combined(found, over="all")[2]
+    assert combined({"study": SUPPORTED, "tuned": NOT_SHOWN}, UNIVERSAL, over="some")[:2] == (SUPPORTED, True)
 
 
 def test_universal_claims_are_those_of_the_list():
@@ -306,6 +310,12 @@ def test_an_input_gain_multiplies_the_command_at_each_sample(runs):
         assert np.array_equal(trace.s, traces[0].s) is (trace is traces[0])
         expected = -law.gains["lam"] * np.tanh(trace.v + law.gains["k1"] * trace.x) * gain(trace.x)
         np.testing.assert_allclose(trace.u, expected, rtol=1e-12)
+
+
+def test_each_variant_of_each_law_has_its_own_file_in_numba_s_cache():
+    laws = [smc.law(name) for name in ("classical", "pid")]
+    made = [vary(law) for law in laws for vary in (reversed_gain, zero_gain, squeezed, relay, forgetful)]
+    assert len({one.function.__qualname__ for one in made}) == len(made)
 
 
 def test_an_input_gain_multiplies_what_the_actuator_gives_and_not_what_the_law_asks_for(runs):
