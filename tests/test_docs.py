@@ -16,7 +16,7 @@ from helpers.pages import ROOT, beside, blocks, titled
 import smc_mujoco as smc
 from smc_mujoco.analysis import linear_theory
 from smc_mujoco.cli import law_pages
-from smc_mujoco.evidence.audit.paper import paper
+from smc_mujoco.evidence.audit.paper import paper, shipped
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies import scene
 
@@ -73,6 +73,10 @@ def test_each_marker_is_in_one_page_and_stands_for_a_row_of_each_thing(known):
         assert [row.split()[1] for row in rows] == names
         assert {row.count("|") for row in rows} == {head.partition("\n")[0].count("|")}
         assert min(map(len, rows)) > 40
+    papers = [name for name in shipped() if name != "gaber"]
+    assert re.findall(r"^\| `(\w+)`", "\n".join(known.audits()), re.MULTILINE) == papers
+    shown = "\n".join(known.decisions()).split("???")[1:]
+    assert [text.count("\n    | ") - 1 for text in shown] == [len(paper(name).claims) for name in papers]
     laws = [*smc.laws(), *smc.joint_laws()]
     assert sorted(re.findall(r"`(\w+)`", "".join(known.kinds()))) == sorted(laws)
 

@@ -1,8 +1,10 @@
 """What pages show that the package knows, written into them when the site is built: a marker in a page -> its text."""
 
 import inspect
+import json
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import catalogue
 
@@ -11,10 +13,12 @@ from smc_mujoco.control.joint_law import catalogue as joint_laws
 from smc_mujoco.control.properties import families
 from smc_mujoco.draw import style
 from smc_mujoco.evidence.audit.paper import paper
+from smc_mujoco.evidence.audit.verdict import DERIVED, MARKS, OURS, PAPER, VERDICTS, WHOSE_WORDS
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies import scene
 
+AUDITS = json.loads((Path(__file__).parent / "verdicts.json").read_text(encoding="utf-8"))  # see test_full_verdicts.py
 TASKS = re.compile(r"^    ([A-Z][a-z ,]+): ((?:.|\n {8})+)$", re.MULTILINE)  # of the package's docstring
 
 OTHERS = {  # title -> names of modules that are no public names
@@ -121,6 +125,33 @@ def instead() -> Iterator[str]:
             yield _row(f"{claim.id}: {_plain(claim.text)}", _plain(claim.instead), f"`{claim.shown_by}`")
 
 
+def audits() -> Iterator[str]:
+    """Yield a table of the audits: what was read, and how many sentences of the paper have each verdict."""
+    kinds = VERDICTS[:-1]
+    heads = "audit", "read", *(f"{MARKS[kind]} {kind}" for kind in kinds), "derived", "questions"
+    yield f"{_row(*heads)}\n|{'---|' * len(heads)}"
+    for name, shown in AUDITS.items():
+        about = paper(name)
+        whose = {id: claim.whose for id, claim in about.claims.items()}
+        own = [verdict for id, (verdict, _) in shown.items() if whose[id] == PAPER]
+        counts = [*map(own.count, kinds), *(list(whose.values()).count(kind) for kind in (DERIVED, OURS))]
+        yield _row(f"`{name}`", about.read, *(str(count) if count else "" for count in counts))
+
+
+def decisions() -> Iterator[str]:
+    """Yield each audit's claims with their verdicts and the checks that decide, in a box that opens."""
+    for name, shown in AUDITS.items():
+        about = paper(name)
+        yield f'\n??? note "{about.authors}: {about.title}"\n'
+        yield f"    `{name}`: {_plain(about.source)}. Read: {about.read}; {_plain(about.access)}.\n"
+        yield "    | claim | whose | verdict | decided by |\n    |---|---|---|---|"
+        for id, (verdict, decided) in shown.items():
+            claim = about.claims[id]
+            immune = f" No broken law can lose it: {claim.immune}." * bool(claim.immune)
+            cells = f"{id}: {claim.text}{'.' * bool(immune)}{immune}", WHOSE_WORDS[claim.whose]
+            yield f"    {_row(*map(_plain, cells), f'{MARKS[verdict]} {verdict}', _plain(decided))}"
+
+
 def questions() -> Iterator[str]:
     """Yield a table of the scenes."""
     yield "| scene | question |\n|---|---|"
@@ -144,6 +175,8 @@ SHOWN = {
     "<!-- every metric -->": definitions,
     "<!-- what holds instead of each claim -->": instead,
     "<!-- every scene -->": questions,
+    "<!-- every audit -->": audits,
+    "<!-- what decides every claim -->": decisions,
 }
 
 

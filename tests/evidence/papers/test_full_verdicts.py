@@ -1,0 +1,65 @@
+"""The verdicts of full audits, which docs/papers.md shows, are those that the audits give.
+
+    python tests/evidence/papers/test_full_verdicts.py levant_1993
+
+This writes a paper's again, and those of all but Gaber's without a name. His audit takes minutes.
+"""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from smc_mujoco.evidence.audit.audit import audit
+from smc_mujoco.evidence.audit.paper import paper, shipped
+from smc_mujoco.evidence.audit.verdict import Claim
+
+ROOT = Path(__file__).parents[3]
+SHOWN = ROOT / "docs" / "site" / "verdicts.json"
+PAPERS = [name for name in shipped() if name != "gaber"]
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]\d+)?")
+
+Shown = dict[str, list[str]]  # claim -> verdict, and the check that decides
+
+
+def known(name: str) -> Shown:
+    """Return what the page shows of a paper."""
+    return json.loads(SHOWN.read_text(encoding="utf-8"))[name]
+
+
+def full(name: str) -> Shown:
+    """Return what the page is to show of a paper."""
+    return {claim.id: [claim.verdict, decided(claim)] for claim in audit(name).claims}
+
+
+def decided(claim: Claim) -> str:
+    """Return the check that decides, under the set of gains that has the claim's verdict, the hardest of several."""
+    sets = [name for name, verdict in claim.verdicts.items() if verdict == claim.verdict] or [*claim.verdicts]
+    checks = {name: check for name in sets if (check := claim.decisive(name))}
+    name = min(checks, key=lambda name: (checks[name].holds, checks[name].slack))
+    return claim.decided(name) + (f", {name} gains" if len(claim.verdicts) > 1 else "")
+
+
+def test_the_page_shows_every_claim_of_every_paper():
+    assert {name: [*known(name)] for name in PAPERS} == {name: [*paper(name).claims] for name in PAPERS}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PAPERS)
+def test_full_verdicts_are_those_of_the_page(name):
+    found, shown = full(name), known(name)
+    for id, (verdict, words) in found.items():
+        told, said = shown[id]
+        assert (verdict, NUMBER.split(words)) == (told, NUMBER.split(said)), id
+        numbers = [[float(one) for one in NUMBER.findall(text)] for text in (words, said)]
+        assert numbers[0] == pytest.approx(numbers[1], rel=0.05, abs=1e-8), id
+
+
+if __name__ == "__main__":
+    everything = json.loads(SHOWN.read_text(encoding="utf-8")) if SHOWN.exists() else {}
+    for name in sys.argv[1:] or PAPERS:
+        everything[name] = full(name)
+        text = json.dumps(dict(sorted(everything.items())), indent=1, ensure_ascii=False)
+        SHOWN.write_text(text + "\n", encoding="utf-8")
