@@ -64,7 +64,7 @@ def _multiplied(function: Callable, name: str) -> Callable:
         u, s = body(y, gains, memory)
         return factor(y.x) * min(max(u, -y.limit), y.limit), s
 
-    return multiplied
+    return _named(multiplied, function, name)
 
 
 @functools.cache
@@ -76,7 +76,7 @@ def _without_memory(function: Callable) -> Callable:
         memory[:] = 0.0
         return body(y, gains, memory)
 
-    return without_memory
+    return _named(without_memory, function, "forgetful")
 
 
 @functools.cache
@@ -88,4 +88,10 @@ def _signed(function: Callable) -> Callable:
         u, s = body(y, gains, memory)
         return y.limit if u > 0.0 else -y.limit if u < 0.0 else 0.0, s
 
-    return signed
+    return _named(signed, function, "relay")
+
+
+def _named(variant: Callable, function: Callable, name: str) -> Callable:
+    """Return the variant under a name that no other has, as its file in numba's cache is named so."""
+    variant.__qualname__ = f"{function.__module__}.{function.__qualname__}.{name}"
+    return variant

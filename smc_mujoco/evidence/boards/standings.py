@@ -75,7 +75,7 @@ def _row(name: str, trace: Trace, robot: str) -> Row:
     for rule, right in _ruled(on_board(robot, "none")).items():
         if (value := ran.get(rule)) != right:
             raise errors.ScenarioError(
-                f"{rule} of the run is {errors.shown(value)} and on the boards {errors.shown(right)}: "
+                f"the run has {rule} {errors.shown(value)}, and the boards have {errors.shown(right)}: "
                 "use smc.boards.on_board"
             )
     return Row(name=name, score=score(values), **{field: getattr(values, field) for field in Row._fields[1:6]})
