@@ -23,6 +23,7 @@ from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
+from numba import types
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.files import shipped
@@ -162,6 +163,8 @@ class _CodePickler(pickle._Pickler):
             contents = obj.co_code, obj.co_exceptiontable, *names, obj.co_consts
         elif isinstance(obj, type):
             kind, contents = obj.__qualname__, _class_contents(obj)
+        elif isinstance(obj, types.Type):
+            contents = obj.key  # not its number, which depends on what numba has compiled before
         elif isinstance(obj, set | frozenset):
             contents = sorted(obj, key=repr)
         elif isinstance(obj, Mapping):

@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 from helpers import runs
 from llvmlite import ir
+from numba import from_dtype, types
 
 import smc_mujoco as smc
 from smc_mujoco.common import fingerprint
+from smc_mujoco.control import joint_law
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.mechanisms.plant import Variant
 from smc_mujoco.metrics.catalogue import metrics
@@ -147,12 +149,14 @@ def test_a_key_does_not_depend_on_the_process():
     assert done.stdout.strip() == key(grid(["duffing"], ["adaptive"], ["noise"], [3], "study")[0])
 
 
-def test_types_that_a_compiler_has_made_by_then_change_no_key():
-    """A law of many joints reaches llvmlite, which keeps each type that it has made."""
+def test_types_that_a_compiler_has_made_by_then_change_no_key(monkeypatch):
+    """A law of many joints reaches llvmlite, which keeps each type that it has made, and numba, which numbers them."""
     joint = smc.Scenario(plant="inverted_pendulum_network", law="passivity_based")
     before = key(joint), fingerprint.now(joint.law.function)
     ir.IntType(57)
+    monkeypatch.setattr(from_dtype(joint_law.HANDLE), "_code", 1_000_000)
     assert (key(joint), fingerprint.now(joint.law.function)) == before
+    assert fingerprint.now(types.float32) != fingerprint.now(types.float64)
 
 
 def test_a_global_changes_a_run_until_its_law_is_compiled():
