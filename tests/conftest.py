@@ -21,14 +21,18 @@ from syrupy.assertion import SnapshotAssertion
 pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).parents[1]
-VARYING = {  # in a sentence: members of a catalogue, addresses, and what Python and numba say, which differs by version
+VARYING = {  # in a sentence: members of a catalogue, addresses, and what Python, numba and MuJoCo say in some version
     re.compile(r"(choose from (?=(\S+, ){5})|or one of (?=(\S+, ){4}))[^;]*"): r"\1many",
     re.compile(r" at 0x\w+"): "",
     re.compile(r"(\(\w+Error, |\(Expecting ).*\)(?=: )"): r"\1...)",
     re.compile(r"((?:Attribute|ZeroDivision)Error \().*\)(?= in )"): r"\1...)",
     re.compile(r"(does not compile: ).*"): r"\1...",
+    re.compile(r"(MuJoCo cannot read .*? \().*?(?=( in <\w+>)?, line \d+\): fix)"): r"\1...",
 }
-VALUE = re.compile(r" is .*: ")  # in a refusal, between what is refused and the cure
+VALUE = re.compile(  # in a refusal
+    r"(?<= is )(?:[-+\d.\[({<'\"]|b'|None|True|False|nan|inf|Ellipsis|array|[A-Z]\w*\().*?(?=: )"
+    r"|(?<= )(?:None|True|Ellipsis|\[.*?\]|\{.*?\}|<.*?>|array\(.*\))(?=[: ])|'[^']*'|[-+]?\b\d[\w.+-]*"
+)
 os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".pytest_cache" / "numba"))
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
@@ -98,8 +102,8 @@ def refused(request: pytest.FixtureRequest, snapshot: SnapshotAssertion) -> Iter
         if recorded:
             for pattern, plain in VARYING.items():
                 sentence = pattern.sub(plain, sentence)
-            sentence = sentence.replace(folder, "FOLDER") if folder else sentence
-            sentences.setdefault(VALUE.sub(" is ...: ", sentence), sentence)
+            sentence = sentence.replace(folder, "FOLDER").replace("FOLDER\\", "FOLDER/") if folder else sentence
+            sentences.setdefault(VALUE.sub("...", sentence), sentence)
         return str(caught.value)
 
     yield check

@@ -92,18 +92,15 @@ def without_units(y, gains, memory):
     return -gains.k * y.v, y.v
 
 
-@pytest.mark.parametrize(
-    ("law", "wanted"),
-    [
+def test_bad_input_is_one_sentence(refused):
+    for law, wanted in [
         ("classical", {}),
         ("classical", {"amplitude": -1.0}),
         ("classical", {"frequency": 100.0, "u_max": 0.005}),
         (without_units(), {"amplitude": 1e-3}),
         (smc.law("classical", k=(1.0, 2.0)), {"amplitude": 1.0, "plant": "double_pendulum"}),
-    ],
-)
-def test_bad_input_is_one_sentence(law, wanted, refused):
-    refused(lambda: smc.gains_for(law, **({"plant": "duffing"} | wanted), **LAG))
+    ]:
+        refused(lambda law=law, wanted=wanted: smc.gains_for(law, **({"plant": "duffing"} | wanted), **LAG))
 
 
 def predicted(frequency, amplitude):

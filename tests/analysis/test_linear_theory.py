@@ -75,9 +75,9 @@ def test_a_network_has_the_modes_of_its_path_graph():
     assert linearisation.linear(plant).modes == pytest.approx(p["m"] * p["grav"] * p["l"] + p["kc"] * graph)
 
 
-@pytest.mark.parametrize("name", ["cart_pole", "overhead_crane"])
-def test_a_joint_without_an_actuator_is_refused(name, refused):
-    refused(lambda: linear_theory.smallest_lam(smc.plant(name), 1.0))
+def test_a_joint_without_an_actuator_is_refused(refused):
+    for name in ["cart_pole", "overhead_crane"]:
+        refused(lambda name=name: linear_theory.smallest_lam(smc.plant(name), 1.0))
 
 
 def test_a_plant_coupled_by_more_than_springs_or_whose_joints_differ_is_refused(refused):

@@ -277,26 +277,23 @@ def test_a_csv_file_of_margins_has_a_row_for_each(found, tmp_path, refused):
     refused(lambda: margins.save_csv([], tmp_path / "margins.json"))
 
 
-@pytest.mark.parametrize("text", ["", "3", '[{"plant": 1}]'])
-def test_what_holds_no_margins_is_refused(text, tmp_path, refused):
+def test_what_holds_no_margins_is_refused(tmp_path, refused):
     path = tmp_path / "margins.json"
-    path.write_text(text)
-    refused(lambda: margins.load(path))
+    for text in ("", "3", '[{"plant": 1}]'):
+        path.write_text(text)
+        refused(lambda: margins.load(path))
     refused(lambda: margins.save([], tmp_path / "margins.csv"))
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
+def test_an_unknown_name_is_refused_with_the_cure(refused):
+    for arguments in [
         (["duffin"], ["classical"], ["delay"], "study"),
         (["duffing"], ["classic"], ["delay"], "study"),
         (["duffing"], ["classical"], ["delays"], "study"),
         (["duffing"], ["classical"], {"delay": 1.0}, "study"),
         (["duffing"], ["classical"], ["delay"], "best"),
-    ],
-)
-def test_an_unknown_name_is_refused_with_the_cure(arguments, refused):
-    refused(lambda: margins.margins(*arguments))
+    ]:
+        refused(lambda arguments=arguments: margins.margins(*arguments))
 
 
 def test_the_command_prints_a_table_and_writes_a_file(tmp_path, capsys):

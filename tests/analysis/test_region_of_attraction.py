@@ -243,11 +243,11 @@ def test_a_map_survives_its_file(weak, tmp_path):
     assert again.outcome.dtype == np.int8
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"plant": 1}'])
-def test_what_is_no_map_is_refused(text, tmp_path, refused):
+def test_what_is_no_map_is_refused(tmp_path, refused):
     path = tmp_path / "map.json"
-    path.write_text(text)
-    refused(lambda: maps.load(path))
+    for text in ("", "[]", '{"plant": 1}'):
+        path.write_text(text)
+        refused(lambda: maps.load(path))
 
 
 def test_a_picture_is_drawn_and_its_shares_are_a_whole(weak, tmp_path, refused):
@@ -260,24 +260,25 @@ def test_a_picture_is_drawn_and_its_shares_are_a_whole(weak, tmp_path, refused):
     refused(lambda: region.draw([weak], tmp_path / "map.gif"))
 
 
-@pytest.mark.parametrize("points", [(1, 5), (5, 0), (5, 2.5)])
-def test_a_grid_of_nothing_is_refused(points, refused):
-    refused(lambda: maps.basin("duffing", "observer_free", points, gains="study"))
-    refused(lambda: maps.basin("duffing", "observer_free", (*points, 5), gains="study"))
+def test_a_grid_of_nothing_is_refused(refused):
+    for points in [(1, 5), (5, 0), (5, 2.5)]:
+        refused(lambda points=points: maps.basin("duffing", "observer_free", points, gains="study"))
+        refused(lambda points=points: maps.basin("duffing", "observer_free", (*points, 5), gains="study"))
     refused(lambda: maps.basin(dataclasses.replace(smc.plant("duffing"), x0=(0.0,)), "observer_free"))
 
 
-@pytest.mark.parametrize("early", [True, False])
-def test_too_short_a_duration_is_one_sentence_and_a_longer_one_is_mapped(early, refused):
-    least = 0.067 if early else 0.01
-    short = base("duffing", smc.law("classical"), duration=0.8 * least)
-    refused(lambda: maps.basin_of(short, [0.1], [0.1], early=early))
-    assert maps.basin_of(dataclasses.replace(short, duration=least), [0.1], [0.1], early=early).outcome.shape == (1, 1)
+def test_too_short_a_duration_is_one_sentence_and_a_longer_one_is_mapped(refused):
+    for early in [True, False]:
+        least = 0.067 if early else 0.01
+        short = base("duffing", smc.law("classical"), duration=0.8 * least)
+        refused(lambda early=early, short=short: maps.basin_of(short, [0.1], [0.1], early=early))
+        mapped = maps.basin_of(dataclasses.replace(short, duration=least), [0.1], [0.1], early=early)
+        assert mapped.outcome.shape == (1, 1)
 
 
-@pytest.mark.parametrize("x", [[], [math.nan], [[1.0]], ["a"], [[1.0], 2.0]])
-def test_positions_that_are_none_are_refused(x, refused):
-    refused(lambda: maps.basin_of(base("duffing", WEAK), x, [0.0]))
+def test_positions_that_are_none_are_refused(refused):
+    for x in [[], [math.nan], [[1.0]], ["a"], [[1.0], 2.0]]:
+        refused(lambda x=x: maps.basin_of(base("duffing", WEAK), x, [0.0]))
 
 
 def test_the_study_maps_by_name_and_tells_how_far_it_is():

@@ -238,19 +238,15 @@ def pid(y, gains, memory):
 SLOW, QUICK = smc.law("classical", k=2.0), smc.law("classical", k=6.0)
 
 
-@pytest.mark.parametrize(
-    "changed",
-    [
+def test_grid_refuses_two_things_of_one_name(refused):
+    for changed in [
         {"laws": [SLOW, QUICK]},
         {"laws": ["classical", QUICK]},
         {"plants": ["duffing", smc.plant("duffing", beta=5.0)]},
         {"conditions": [WORN, smc.condition("worn gear", u_max=3.0)]},
         {"laws": [pid(k=2.0)]},
-    ],
-)
-def test_grid_refuses_two_things_of_one_name(changed, refused):
-    given = {"plants": "duffing", "laws": "classical"}
-    refused(lambda: smc.grid(**(given | changed)))
+    ]:
+        refused(lambda given={"plants": "duffing", "laws": "classical"} | changed: smc.grid(**given))
     assert len(smc.grid(["duffing"] * 2, [SLOW, smc.law("classical", k=2.0), pid().named("my pid")])) == 6
 
 

@@ -22,6 +22,7 @@ import time
 import types
 import warnings
 from pathlib import Path
+from unittest import mock
 
 import mujoco
 import numba
@@ -692,19 +693,15 @@ def test_the_path_of_process_noise_does_not_change_with_what_is_put_before_it(be
 # (k) file names
 
 
-@pytest.mark.parametrize(
-    "conditions",
-    [
+def test_names_that_make_the_same_file_are_refused(refused):
+    for conditions in [
         {"a": {"B c": 1, "b_c": 2}},
         {"a": {"?": 1, "!": 2}},
         {"A": {"x": 1}, "a": {"x": 2}},
         {"a": {"b-c": 1}, "a-b": {"c": 2}},
-    ],
-    ids=["labels", "signs", "conditions", "both together"],
-)
-def test_names_that_make_the_same_file_are_refused(conditions, refused):
-    runs = {c: {label: scenario(seed=seed) for label, seed in labels.items()} for c, labels in conditions.items()}
-    refused(lambda: smc.Scene(title="T", conditions=runs))
+    ]:
+        runs = {c: {label: scenario(seed=seed) for label, seed in labels.items()} for c, labels in conditions.items()}
+        refused(lambda runs=runs: smc.Scene(title="T", conditions=runs))
 
 
 # (l) users' signals
@@ -865,11 +862,9 @@ def test_the_generalised_force_of_a_horizontal_force_is_that_of_the_jacobian(joi
     assert force == pytest.approx(jacobian[direction, 0], rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    "drive", ['tendon="t"', 'joint="j" gear="2"', 'joint="j" gear="-1"', 'joint="j" gear="0"', 'jointinparent="j"']
-)
-def test_an_actuator_that_is_no_motor_of_gear_1_on_a_joint_is_refused(drive, refused):
-    refused(lambda: channels(mechanism(drive)))
+def test_an_actuator_that_is_no_motor_of_gear_1_on_a_joint_is_refused(refused):
+    for drive in ['tendon="t"', 'joint="j" gear="2"', 'joint="j" gear="-1"', 'joint="j" gear="0"', 'jointinparent="j"']:
+        refused(lambda drive=drive: channels(mechanism(drive)))
 
 
 def test_a_joint_along_no_world_axis_is_refused(refused):
@@ -1024,23 +1019,18 @@ def test_ctrl_c_that_comes_while_numba_compiles_is_heard_when_it_is_done(monkeyp
     assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
 
 
-@pytest.mark.parametrize(
-    "error",
-    [
+def test_memory_that_runs_out_is_said_in_one_sentence(monkeypatch, refused):
+    for error in (
         MemoryError("std::bad_alloc"),
         mujoco.FatalError("Could not allocate memory"),
         ValueError("Could not allocate memory"),
-    ],
-    ids=lambda error: type(error).__name__,
-)
-def test_memory_that_runs_out_is_said_in_one_sentence(error, monkeypatch, refused):
-    def runs_out(*arguments):
-        raise error
-
-    monkeypatch.setattr(RUN, "ScenarioBatch", runs_out)
-    refused(lambda: smc.run([scenario(), scenario(seed=1)]))
-    monkeypatch.setattr(reference, "simulate", runs_out)
-    refused(lambda: plainly(scenario(made(lambda y, gains, memory: (json.dumps(y.t), 0.0)))))
+    ):
+        runs_out = mock.Mock(side_effect=error)
+        with monkeypatch.context() as patch:
+            patch.setattr(RUN, "ScenarioBatch", runs_out)
+            refused(lambda: smc.run([scenario(), scenario(seed=1)]))
+            patch.setattr(reference, "simulate", runs_out)
+            refused(lambda: plainly(scenario(made(lambda y, gains, memory: (json.dumps(y.t), 0.0)))))
 
 
 @pytest.mark.parametrize("error", [ValueError("sour"), mujoco.FatalError("sour")])
