@@ -51,8 +51,12 @@ def write(trace: Trace, file: Path) -> None:
         writer.write_message("/machine", scene, 0, 0)
         for k, time in enumerate((1e9 * trace.t).round().astype(int).tolist()):
             if k in at:
-                poses = FrameTransforms()
-                add_poses(poses, frames(model), places[at[k]], turns[at[k]], time)
+                poses, (world, *names) = FrameTransforms(), frames(model)
+                for name, place, turn in zip(names, places[at[k], 1:], turns[at[k], 1:], strict=True):
+                    transform = poses.transforms.add(parent_frame_id=world, child_frame_id=name)
+                    transform.timestamp.FromNanoseconds(time)
+                    put(transform.translation, "xyz", place)
+                    put(transform.rotation, "wxyz", turn)
                 writer.write_message("/poses", poses, time, time)
             for name in LOGGED:
                 if np.isfinite(values := getattr(trace, name)[k]).any():
@@ -99,15 +103,6 @@ def posed(trace: Trace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def frames(model: mujoco.MjModel) -> list[str]:
     """Return the name of each body's frame, (nbody,): its own, or its number; that of the first is "world"."""
     return [model.body(i).name or f"body {i}" for i in range(model.nbody)]
-
-
-def add_poses(message: Any, names: Sequence[str], places: np.ndarray, turns: np.ndarray, time: int) -> None:
-    """Add the pose of each body in the world to a FrameTransforms; `time` in ns."""
-    for name, place, turn in list(zip(names, places, turns, strict=True))[1:]:
-        transform = message.transforms.add(parent_frame_id=names[0], child_frame_id=name)
-        transform.timestamp.FromNanoseconds(time)
-        put(transform.translation, "xyz", place)
-        put(transform.rotation, "wxyz", turn)
 
 
 def add_shapes(message: Any, model: mujoco.MjModel) -> None:

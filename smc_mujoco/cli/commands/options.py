@@ -207,6 +207,17 @@ def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
     return values
 
 
+def numbers(text: str | None, option: str, example: str) -> dict[str, float]:
+    """Return name -> number from the text of an option; arguments and errors as in `pairs`."""
+    values = {}
+    for name, value in pairs(text, option, example).items():
+        try:
+            values[name] = float(value)
+        except ValueError:
+            raise ScenarioError(f"{option} {name}={value} is no number: write it as {example}") from None
+    return values
+
+
 def noise_key_of(number: int | None) -> int | str:
     """Return the noise key of a study from the option --noise-key."""
     return "drawn" if number is None else number

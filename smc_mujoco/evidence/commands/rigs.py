@@ -55,7 +55,7 @@ def identify(
         as_plant(options.plant(rig)) if rig not in rigs() and (rig in plants() or ".xml" in rig) else rig,
         [load(file, named) for file in files],
         options.names(quantities) or None,
-        start=_numbers(start),
+        start=options.numbers(start, "--set", "M=5,b=8"),
         starts=starts,
         seed=seed,
         progress=True,
@@ -69,23 +69,6 @@ def identify(
         terminal.wrote(identified.save(json))
     if figure:
         terminal.wrote(*identified.figure(figure))
-
-
-def _numbers(text: str | None) -> dict[str, float]:
-    """Return name -> value from the option --set, such as "M=5,b=8"; {} for None.
-
-    Raises:
-      ScenarioError: a value that is not a number.
-    """
-    from smc_mujoco.common.errors import ScenarioError
-
-    numbers = {}
-    for name, value in options.pairs(text, "--set", "M=5,b=8").items():
-        try:
-            numbers[name] = float(value)
-        except ValueError:
-            raise ScenarioError(f"--set {name}={value} is no number: write it as M=5,b=8") from None
-    return numbers
 
 
 @errors_as_sentences()
@@ -129,18 +112,19 @@ def replay(
     if isinstance(record, Trace):
         raise ScenarioError(f"{file} is a trace: give a record, with columns {', '.join(twin.needed)}")
     twins = {"twin": twin} | {name: twin.set(name) for name in options.names(quantities)}
-    fits = {"twin": twin.fit(record)} | {name: each.fits([record])[0] for name, each in twins.items() if name != "twin"}
+    fits = {"twin": twin.fit(record)}
+    fits |= {name: shown.fits([record])[0] for name, shown in twins.items() if name != "twin"}
     terminal.print(tables.fits(twin.label, fits | {"do nothing": twin.idle(record)}))
     title = f"{twin.name}: {file.stem}"
     if figure:
         from smc_mujoco.evidence.rigs.figure import residual_figure
 
-        shown = {name: each.predictions([record])[0] for name, each in twins.items()}
-        predicted = {name: each[0] for name, each in shown.items()}
-        _, measured, t = shown["twin"]
+        predictions = {name: shown.predictions([record])[0] for name, shown in twins.items()}
+        predicted = {name: columns for name, (columns, _, _) in predictions.items()}
+        _, measured, t = predictions["twin"]
         terminal.wrote(*residual_figure(title, t, measured, predicted, fits, twin.units, figure))
     if film:
-        repeated = run([each.replay(record, start, duration, rounded=False) for each in twins.values()])
+        repeated = run([shown.replay(record, start, duration, rounded=False) for shown in twins.values()])
         traces = [twin.measured(record, start, duration), *repeated]
         since = float(record[twin.columns.time][0]) + (twin.start if start is None else start)
         title += f", from {since:.6g} s of the record" * bool(since)

@@ -17,11 +17,11 @@ from smc_mujoco.common.files import no_room
 from smc_mujoco.common.jit import AtAddress
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.common.version import __version__
-from smc_mujoco.control import from_text
-from smc_mujoco.control.component import Component, GainValue, Template, gain_at, gain_text
+from smc_mujoco.control.component import Component, Template, gain_at, gain_text
 from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.c.translate import JOINTS, MATH, SLOTS, Untranslatable, plain, rows, translate
+from smc_mujoco.simulation import coerce
 
 NUMBER_BYTES = {"double": 8, "float": 4, "q15": 8}  # of a number of memory, by type of numbers
 Q15_LAW = "observer_free_q15"
@@ -67,9 +67,9 @@ def with_head(law: Component, numbers: str, slots: int, code: str, joints: int, 
 
 def writable(law: Component | Template | str) -> Component:
     """Return a law that can be written in C."""
-    law = from_text.law(law) if isinstance(law, str) else law() if isinstance(law, Template) else law
-    if not isinstance(law, Component) or law.kind != "law" or law.function is None:
-        raise ScenarioError(f"cannot write {shown(law)} in C: give smc.law(...), your own law, or a name")
+    law = coerce.law(law)
+    if law.function is None:
+        raise ScenarioError("law 'none' cannot be written in C: give another")
     if isinstance(law.function, AtAddress):
         raise ScenarioError(f"law {law.name!r} is in C already: take {law.function.__module__}")
     if not law.joint and law.of_channel(0) is not law:
@@ -144,7 +144,8 @@ def _fixed_point(law: Component) -> str:
 
 def _facts(law: Component, slots: int, joints: int, single: bool) -> str:
     """Return the header, the names of the gains, and the constants that describe the law."""
-    defaults = ",".join(f"{plain(name)}={_default(value)}" for name, value in law.gains.items())
+    texts = {name: " ".join(map(repr, v if isinstance(v, tuple) else (v,))) for name, v in law.gains.items()}
+    defaults = ",".join(f"{plain(name)}={text}" for name, text in texts.items())
     values = [_literal(gain_at(value, i), single) for value in law.gains.values() for i in range(max(joints, 1))]
     lines = [
         *([f"#define {JOINTS} {joints}", f"#define {SLOTS} {slots}"] if joints else []),
@@ -160,11 +161,6 @@ def _facts(law: Component, slots: int, joints: int, single: bool) -> str:
         "",
     ]
     return "\n".join(lines)
-
-
-def _default(value: GainValue) -> str:
-    """Return the default of a gain, or those of all joints."""
-    return " ".join(map(repr, value)) if isinstance(value, tuple) else repr(value)
 
 
 def _literal(value: float, single: bool) -> str:

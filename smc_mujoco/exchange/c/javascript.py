@@ -54,19 +54,14 @@ def to_js(component: Component) -> str:
 
 def _rewritten(code: str) -> str:
     """Return the functions and constant arrays of some C in JavaScript."""
-    code = _arrays(WORD_PATTERN.sub(_word, code))
+    arrays = rf"^static {TYPE_PATTERN} ([\w$]+)\[\d+\] = \{{\n(.*?)\n\}};"
+    code = re.sub(arrays, r"const \1 = [\n\2\n];", WORD_PATTERN.sub(_word, code), flags=re.DOTALL | re.MULTILINE)
     code = re.sub(r"^ *\(void\)[\w$]+;\n", "", code, flags=re.MULTILINE)
     code = re.sub(r"\n\{\n(.*?)\n\}(?=\n|$)", _body, code, flags=re.DOTALL)
     code = re.sub(r"^(?:static )?(?:void|int|smc_real|int32_t) ([\w$]+)\(([^)]*)\)", _head, code, flags=re.MULTILINE)
     code = re.sub(r"^( *)([\w$]+)\(([^;]*?),?\s*(&[^;]*)\);", _call, code, flags=re.MULTILINE)
     code = code.replace("(int32_t)", "~~").replace("(smc_real)", "").replace("y->", "y.")
     return re.sub(rf"(?<=[\s(]){TYPE_PATTERN} (?=[\w$]+ = )", "let ", code)
-
-
-def _arrays(code: str) -> str:
-    """Rewrite constant arrays."""
-    pattern = rf"^static {TYPE_PATTERN} ([\w$]+)\[\d+\] = \{{\n(.*?)\n\}};"
-    return re.sub(pattern, r"const \1 = [\n\2\n];", code, flags=re.DOTALL | re.MULTILINE)
 
 
 def _head(match: re.Match[str]) -> str:

@@ -218,13 +218,9 @@ class Requests:
                 return 1
             return 0
 
-        def product(w, parameters, memory, out) -> int:
-            return answer(out, coriolis, w[:joints])
-
-        def tip(nothing, parameters, memory, out) -> int:
-            return answer(out, jacobian)
-
-        self.joints, self.functions = joints, (ON_REQUEST(product), ON_REQUEST(tip))
+        product = ON_REQUEST(lambda w, parameters, memory, out: answer(out, coriolis, w[:joints]))
+        tip = ON_REQUEST(lambda nothing, parameters, memory, out: answer(out, jacobian))
+        self.joints, self.functions = joints, (product, tip)
         addresses = [float(ctypes.cast(function, ctypes.c_void_p).value or 0) for function in self.functions]
         self.table = doubles([*addresses, 0.0, 1.0])
         self.address = ctypes.addressof(self.table)

@@ -313,7 +313,8 @@ class Function:
     def arrays(self) -> Iterable[str]:
         """Return the declarations of the function's arrays."""
         kinds = {self.c_name(n): kind for n, kind in self.kinds.items() if n not in self.parameters}
-        return [declared(kind, name) for name, kind in (kinds | self.temporaries).items() if shape(kind)]
+        shaped = [(name, base(kind), shape(kind)) for name, kind in (kinds | self.temporaries).items() if shape(kind)]
+        return [f"{TYPES[of]} {name}[{' * '.join(dimensions)}];" for name, of, dimensions in shaped]
 
     def head(self, name: str) -> str:
         """Return the declaration without a semicolon. Arrays are pointers."""
@@ -383,13 +384,13 @@ class Function:
                 yield f"{self.destination(target, number.kind)} = {number.text};"
             return
         targets, values = target.elts, self.parts(value, len(target.elts))
-        if values is not None and clash(targets, values):
+        if values and any(names_in(targets[:i]) & names_in([value]) for i, value in enumerate(values)):
             yield "{"
             yield from self.at_once(targets, values)
             yield "}"
         elif values is not None:
-            for one, part in zip(targets, values, strict=True):
-                yield from self.assign(one, part)
+            for part, of_part in zip(targets, values, strict=True):
+                yield from self.assign(part, of_part)
         elif isinstance(value, ast.IfExp):
             yield f"if ({self.truth(value.test)}) {{"
             yield from self.assign(target, value.body)
@@ -404,7 +405,7 @@ class Function:
     def at_once(self, targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> Iterator[str]:
         """Compute all values before the first assignment, because one reads an earlier target. Arrays are refused."""
         new = [self.numeric(value) for value in values]
-        if any(shape(one.kind) for one in new):
+        if any(shape(v.kind) for v in new):
             raise refuse(values[0], "arrays that change places at once")
         yield from (f"const {TYPES[v.kind]} new_{i} = {v.text};" for i, v in enumerate(new))
         for i, (target, value) in enumerate(zip(targets, new, strict=True)):
@@ -453,7 +454,8 @@ class Function:
 
     def augment(self, node: ast.AugAssign) -> Iterator[str]:
         """Translate target op= value, element by element if the target is an array."""
-        result = self.numeric(whole_expression(node))
+        whole = ast.BinOp(syntax(ast.unparse(node.target), "eval").body, node.op, node.value)  # target op value
+        result = self.numeric(whole)
         if self.is_array(node.target):
             yield from self.store(node.target, result)
             return
@@ -518,7 +520,7 @@ class Function:
         self.results = self.results or [v.kind for v in values]
         if len(values) != len(self.results):
             raise refuse(value, "another number of results")
-        self.results = [wider(one, v.kind) for one, v in zip(self.results, values, strict=True)]
+        self.results = [wider(kind, v.kind) for kind, v in zip(self.results, values, strict=True)]
         wanted = f"real[{JOINTS}]" if self.program.joints else "real"
         if self.entry and (len(values) != 2 or any(not self.fits(kind, wanted) for kind in self.results)):
             joints = "a result other than two vectors, u and s, of one number for each joint,"
@@ -603,8 +605,7 @@ class Function:
 
     def fits(self, kind: str, other: str) -> bool:
         """Return whether two kinds have the same shape."""
-        sizes = [[self.program.size(n) for n in shape(one)] for one in (kind, other)]
-        return sizes[0] == sizes[1]
+        return [*map(self.program.size, shape(kind))] == [*map(self.program.size, shape(other))]
 
     def index(self, place: int = 0) -> str:
         """Return the name of a loop's index, which no variable has."""
@@ -699,16 +700,6 @@ class Function:
         self.temporaries[name] = kind
         return array_at(name, kind)
 
-    def stored(self, value: Value, node: ast.AST) -> Value:
-        """Return an array whose numbers lie in a row: itself, or a copy."""
-        if value.pointer:
-            return value
-        kept = self.temporary(value.kind)
-        lines = list(self.fill(kept, value))
-        for line in lines:
-            self.move(line, node)
-        return kept
-
     def argument(self, node: ast.expr) -> Value:
         """Translate an argument of a function: a number, an array as a pointer, or y or gains."""
         value = self.outside(self.value, node)
@@ -716,8 +707,11 @@ class Function:
             raise refuse(node, "a function that gets the memory")
         if not shape(value.kind):
             return value
-        kept = self.stored(value, node)
-        return kept._replace(text=kept.pointer)
+        if not value.pointer:  # its numbers do not lie in a row: copy them
+            value, of_elements = self.temporary(value.kind), value
+            for line in list(self.fill(value, of_elements)):
+                self.move(line, node)
+        return value._replace(text=value.pointer)
 
     def truth(self, node: ast.expr) -> str:
         """Translate an expression as a condition."""
@@ -814,7 +808,8 @@ class Function:
                 continue
             index = self.outside(self.numeric, place)
             self.check_index(node, place, index, dimension)
-            index = index if dimension == SLOTS else self.from_start(place, index, dimension)
+            if dimension != SLOTS and not self.natural(place):  # Python counts a negative index from the end
+                index = Value(f"{self.program.helper('wrapped', 'int')}({index.text}, {dimension})", "int")
             text = text.replace(f"[{token}]", f"[{index.text}]").replace(token, index.within(PRODUCT))
             row = pointer and token == ROW and len(places) == 2
             pointer = f"{pointer} + {index.within(PRODUCT)} * {shape(owner.kind)[1]}" if row else ""
@@ -834,12 +829,6 @@ class Function:
             self.program.claim(node, int(constant))
         elif constant is not None and not -(size := self.program.size(dimension)) <= constant < size:
             raise refuse(node, f"an index outside {-size} to {size - 1}")
-
-    def from_start(self, place: ast.expr, index: Value, length: int | str) -> Value:
-        """Return an index from the start for an index of Python, which counts from the end if it is negative."""
-        if self.natural(place):
-            return index
-        return Value(f"{self.program.helper('wrapped', 'int')}({index.text}, {length})", "int")
 
     def counts_naturals(self, node: ast.expr) -> bool:
         """Return whether no number of a range with a step of 1 or -1 is negative."""
@@ -915,7 +904,7 @@ class Function:
         if any(type(sign) not in COMPARISONS for sign in node.ops):
             raise refuse(node, "the comparison")
         pairs = zip(itertools.pairwise(terms), node.ops, strict=True)
-        parts = [f"{one} {COMPARISONS[type(sign)]} {other}" for (one, other), sign in pairs]
+        parts = [f"{left} {COMPARISONS[type(sign)]} {right}" for (left, right), sign in pairs]
         return Value(" && ".join(parts), "bool", LOOSE)
 
     def _boolop(self, node: ast.BoolOp) -> Value:
@@ -938,7 +927,7 @@ class Function:
             return self.outside(self.value, node.func.value)._replace(pointer="")
         function = self.callee(node)
         if function in ELEMENTWISE or function in HELPER_NAMES or function is np.where:
-            return self.elementwise(lambda one: self.of_elements(function, one), node)
+            return self.elementwise(lambda call: self.of_elements(function, call), node)
         if function is len or function is np.full or function in FILL_VALUES:
             method = self.sized
         elif function is np.array:
@@ -971,10 +960,6 @@ class Function:
         if function in CASTS and len(values) == 1:
             kind = CASTS[function]
             return Value(f"({TYPES[kind]}){values[0].within(UNARY)}", kind, UNARY)
-        if function in (abs, math.fabs):
-            if values[0].kind in WHOLE_KINDS:
-                return Value(f"{self.program.helper('absolute', 'int')}({values[0].text})", "int")
-            return self.math("fabs", values)
         if function in ROUNDING:
             return Value(f"(int32_t){self.math(ROUNDING[function], values).text}", "int", UNARY)
         return self.math(function.__name__, values) if function in SAME_IN_C else None
@@ -1017,7 +1002,7 @@ class Function:
         name, dimensions = REQUESTED_ARRAYS[function]
         y, *rest = [self.argument(a) for a in node.args]
         array = self.temporary("real" + "".join(f"[{n}]" for n in dimensions))
-        arguments = [f"{y.text}->plant", *(one.text for one in rest)]
+        arguments = [f"{y.text}->plant", *(argument.text for argument in rest)]
         self.move(f"{y.text}->{name}({', '.join(arguments)}, {array.pointer});", node)
         return array
 
@@ -1050,14 +1035,14 @@ class Function:
         """Return the dimensions that an expression gives: a number, len(array), a variable, or a tuple of these."""
         match node:
             case ast.Tuple(elts=elements) if len(elements) <= 2:
-                return [self.dimensions(one)[0] for one in elements]
+                return [self.dimensions(element)[0] for element in elements]
             case ast.Constant(value=int(size)) if size > 0:
                 return [str(size)]
             case ast.Call(func=ast.Name(id="len"), args=[array]):
                 if dimensions := shape(self.value(array).kind):
                     return [dimensions[0]]
             case ast.Name(id=name):
-                given = [one for one in ast.walk(self.tree) if name in assigned(one)]
+                given = [statement for statement in ast.walk(self.tree) if name in assigned(statement)]
                 if len(given) == 1 and isinstance(given[0], ast.Assign) and isinstance(given[0].targets[0], ast.Name):
                     return self.dimensions(given[0].value)
                 if isinstance(size := self.globals.get(name), int) and not given and name not in self.kinds:
@@ -1124,11 +1109,6 @@ def parsed(function: Any) -> tuple[FunctionType, ast.FunctionDef]:
     return written, tree
 
 
-def whole_expression(node: ast.AugAssign) -> ast.BinOp:
-    """Return the value that target op= value assigns, target op value."""
-    return ast.BinOp(syntax(ast.unparse(node.target), "eval").body, node.op, node.value)
-
-
 def names_in(nodes: Iterable[ast.AST]) -> set[str]:
     """Return the names in some code."""
     return {n.id for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name)}
@@ -1147,11 +1127,6 @@ def returns(body: Sequence[ast.stmt]) -> bool:
             return bool(no) and returns(yes) and returns(no)
         case last:
             return isinstance(last, ast.Return)
-
-
-def clash(targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> bool:
-    """Return whether a value reads an earlier target, which rules out assigning one after the other."""
-    return any(names_in(targets[:i]) & names_in([value]) for i, value in enumerate(values))
 
 
 def known(name: str, kind: str, names: Iterable[str]) -> None:
@@ -1196,9 +1171,9 @@ def shared_arguments(function: Any) -> set[int]:
     inside, before = list(ast.walk(tree)), {}
     while before != origins:
         before = dict(origins)
-        for one in inside:
-            if isinstance(one, ast.Assign):
-                origins |= {name: origins.get(name, set()) | shared(one.value) for name in assigned(one)}
+        for node in inside:
+            if isinstance(node, ast.Assign):
+                origins |= {name: origins.get(name, set()) | shared(node.value) for name in assigned(node)}
     return set().union(*(shared(n.value) for n in inside if isinstance(n, ast.Return) and n.value is not None))
 
 
@@ -1218,17 +1193,13 @@ def root(node: ast.expr) -> str:
 # writing C
 
 
-def wider(one: str, other: str) -> str:
+def wider(first: str, second: str) -> str:
     """Return the kind of an operation on two kinds, in C and in numba. An integer and a single give a real."""
-    first, _, shape = one.partition("[")
-    second, _, other_shape = other.partition("[")
-    if shape != other_shape:
+    bases, shapes = zip(*((base(kind), kind.removeprefix(base(kind))) for kind in (first, second)), strict=True)
+    if shapes[0] != shapes[1]:
         raise refuse(None, "a name for a number and an array, or for arrays of two shapes,")
-    if "single" in (first, second) and (first in WHOLE_KINDS or second in WHOLE_KINDS):
-        kind = "real"
-    else:
-        kind = max(first, second, key=KINDS.index)
-    return kind + one[len(first) :]
+    mixed = "single" in bases and any(kind in WHOLE_KINDS for kind in bases)
+    return ("real" if mixed else max(bases, key=KINDS.index)) + shapes[0]
 
 
 def call_to(beginning: str, pointers: str) -> str:
@@ -1280,11 +1251,6 @@ def shape(kind: str) -> list[str]:
 def base(kind: str) -> str:
     """Return the kind of the elements."""
     return kind.partition("[")[0]
-
-
-def declared(kind: str, name: str) -> str:
-    """Return the declaration of an array, whose numbers lie in one row."""
-    return f"{TYPES[base(kind)]} {name}[{' * '.join(shape(kind))}];"
 
 
 def array_at(pointer: str, kind: str, offset: str = "") -> Value:

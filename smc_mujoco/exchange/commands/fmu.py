@@ -8,7 +8,6 @@ import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import errors_as_sentences
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
@@ -49,19 +48,14 @@ def export_fmu(
     Example: smc-mujoco export-fmu super_twisting --gains k1=5,k2=8 --velocity levant --u-max 6 --out controller.fmu
     """
     with delay_ctrl_c():
-        from smc_mujoco.control import estimator
-        from smc_mujoco.control import surface as surfaces
-        from smc_mujoco.control.from_text import component
         from smc_mujoco.exchange.fmu.export import export_fmu as export
 
     chosen = options.law_with(law, gains)
-    parts = {
-        "surface": surface and component("surface", surface, surfaces.catalogue(), "linear(c=3)"),
-        "velocity": velocity and component("velocity estimator", velocity, estimator.catalogue(), "levant(L=4800)"),
-    }
-    numbers = {"control_period": period, "u_max": u_max, "joints": joints}
     with options.joints_as_option():
-        path = export(chosen, out, **parts, **numbers, model=model, joint=joint, binary=binary)  # pyright: ignore[reportArgumentType]
+        path = export(
+            chosen, out, surface=surface, velocity=velocity, control_period=period, u_max=u_max, model=model,
+            joint=joint, joints=joints, binary=binary,
+        )  # fmt: skip
     print(f"{path}, {path.stat().st_size / 1024:.0f} kB; FMI 3.0, Co-Simulation, every {period:g} s")
 
 
@@ -92,12 +86,7 @@ def check_fmu(
     with delay_ctrl_c():
         from smc_mujoco.exchange.fmu.load import check
 
-    values = {}
-    for name, text in options.pairs(constants or None, "--constants", "enable=1").items():
-        try:
-            values[name] = float(text)
-        except ValueError:
-            raise ScenarioError(f"--constants: {name} is {text!r}: give a number, as {name}=0") from None
+    values = options.numbers(constants or None, "--constants", "enable=1")
     meanings = options.pairs(variables or None, "--variables", "x=theta,u=torque")
     for line in check(file, timeout, variables=meanings, constants=values, period=period):
         print(line)

@@ -150,7 +150,10 @@ def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> li
         computed.append(("v_estimated", "estimated velocity", SPEED))
     for name, words, unit in computed:
         listed += [Variable(name + place, "SMC_COMPUTED", words, unit) for place in places]
-    listed += [bounded(f"u_max{place}", bound) for place, bound in zip(places, controller.u_max, strict=True)]
+    words = "bound on the magnitude of u"
+    for place, bound in zip(places, controller.u_max, strict=True):
+        start = bound if math.isfinite(bound) else MAX_DOUBLE
+        listed.append(Variable(f"u_max{place}", "SMC_PARAMETER", words, FORCE, start, 0.0, True))
     for kind, part in controller.parts.items():
         for name, value in part.gains.items():
             indices = places if kind == "law" and name not in part.shared else ("",)
@@ -196,12 +199,6 @@ def reads(code: Iterable[tuple[int, str]]) -> set[str]:
     return {name for _, text in code for name in re.findall(r"->(\w+)", text)}  # a function may call it other than y
 
 
-def bounded(name: str, bound: float) -> Variable:
-    """Return the parameter that bounds the magnitude of a command."""
-    start = bound if math.isfinite(bound) else MAX_DOUBLE
-    return Variable(name, "SMC_PARAMETER", "bound on the magnitude of u", FORCE, start, 0.0, True)
-
-
 def parameter(kind: str, part: Component, name: str, value: float, index: str = "") -> Variable:
     """Return a gain of a component, or its element for one joint, such as "[1]", as a parameter."""
     gain = part.template.gains[name] if part.template and name in part.template.gains else None
@@ -231,91 +228,95 @@ def header(listed: Sequence[Variable], controller: Controller, identifier: str, 
       token: the instantiation token.
     """
     memory = next((i for i, variable in enumerate(listed) if variable.kind == "SMC_STATE"), len(listed))
-    lines = [
-        "/* controller.h: sizes of this controller, and the indices of its variables. */",
-        "#ifndef SMC_CONTROLLER_H",
-        "#define SMC_CONTROLLER_H",
-        "",
-        "/* own names, so that several FMUs can be linked into one program */",
-        *(f"#define {name} {identifier}_{name}" for name in SYMBOLS),
-        "",
-        *([f"#define {JOINTS} {controller.joints}"] if controller.joints else []),
-        '#include "smc_fmu.h"',
-        "",
-        f'#define SMC_TOKEN "{token}"',
-        f"#define SMC_DT {controller.period!r} /* s */",
-        f"#define SMC_TIME {place('time')}",
-        "enum {",
-        *(f"    {place(variable.name)}," for variable in listed),
-        "    SMC_VARIABLES,",
-        f"    SMC_MEMORY = {memory} /* the first variable that outlives a sample */",
-        "};",
-        "",
-        "#endif",
-        "",
-    ]
-    return "\n".join(lines)
+    own_names = "\n".join(f"#define {name} {identifier}_{name}" for name in SYMBOLS)
+    joints = f"\n#define {JOINTS} {controller.joints}" if controller.joints else ""
+    indices = "\n".join(f"    {place(variable.name)}," for variable in listed)
+    return f"""/* controller.h: sizes of this controller, and the indices of its variables. */
+#ifndef SMC_CONTROLLER_H
+#define SMC_CONTROLLER_H
+
+/* own names, so that several FMUs can be linked into one program */
+{own_names}
+{joints}
+#include "smc_fmu.h"
+
+#define SMC_TOKEN "{token}"
+#define SMC_DT {controller.period!r} /* s */
+#define SMC_TIME {place("time")}
+enum {{
+{indices}
+    SMC_VARIABLES,
+    SMC_MEMORY = {memory} /* the first variable that outlives a sample */
+}};
+
+#endif
+"""
 
 
-def source(listed: Sequence[Variable], helpers: Iterable[str], body: Iterable[str]) -> str:
+def source(listed: Sequence[Variable], helpers: str, body: Iterable[str]) -> str:
     """Return controller.c: the table of variables, and the function that runs all parts at a sample.
 
     Args:
-      helpers: lines of functions before that one.
+      helpers: C functions before that one.
       body: its statements, without indentation.
     """
-    lines = [
-        "/* controller.c: estimator, surface, law and saturation, in the order of smc_mujoco's own runs. */",
-        '#include "controller.h"',
-        "",
-        "#include <float.h>",
-        "#include <math.h>",
-        "#include <stddef.h>",
-        "",
-        "const smc_variable smc_variables[] = {",
-        *(f'    {{"{v.name}", {v.kind}, {v.start!r}, {_c_number(v.minimum)}, {int(v.positive)}}},' for v in listed),
-        "};",
-        "",
-        "/* Returns a gain or a bound. The largest double means that there is none. */",
-        "static double number(double x)",
-        "{",
-        "    return x >= DBL_MAX ? INFINITY : x <= -DBL_MAX ? -INFINITY : x;",
-        "}",
-        "",
-        *helpers,
-        "int smc_controller(double *value, double t)",
-        "{",
-        *(f"    {line}" for line in body),
-        "}",
-        "",
-    ]
-    return "\n".join(lines)
+    limits = {-math.inf: "-INFINITY"}
+    table = "\n".join(
+        f'    {{"{v.name}", {v.kind}, {v.start!r}, {limits.get(v.minimum, v.minimum)}, {int(v.positive)}}},'
+        for v in listed
+    )
+    statements = "\n".join(f"    {line}" for line in body)
+    return f"""/* controller.c: estimator, surface, law and saturation, in the order of smc_mujoco's own runs. */
+#include "controller.h"
+
+#include <float.h>
+#include <math.h>
+#include <stddef.h>
+
+const smc_variable smc_variables[] = {{
+{table}
+}};
+
+/* Returns a gain or a bound. The largest double means that there is none. */
+static double number(double x)
+{{
+    return x >= DBL_MAX ? INFINITY : x <= -DBL_MAX ? -INFINITY : x;
+}}
+
+{helpers}int smc_controller(double *value, double t)
+{{
+{statements}
+}}
+"""
 
 
-def helpers(controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterator[str]:
-    """Yield the lines of the C functions that a law of many joints calls: coriolis, for C(x, v) w, and jacobian."""
-    wanted, needs = inputs(controller, code), reads([code["law"]])
+def helpers(controller: Controller, code: Mapping[str, tuple[int, str]]) -> str:
+    """Return the C functions that a law of many joints calls: coriolis, for C(x, v) w, and jacobian."""
+    wanted, needs, functions = inputs(controller, code), reads([code["law"]]), ""
     if "coriolis" in needs:
-        yield "/* out = C w */"
-        yield "static void coriolis(void *plant, const double *w, double *out)"
-        yield "{"
-        if "C" in wanted:
-            yield f"    const double *C = (const double *)plant + {place('C[1,1]')};"
-        else:
-            yield "    (void)plant, (void)w;"
-        yield "    for (int i = 0; i < SMC_JOINTS; i++) {"
-        yield "        out[i] = 0.0;"
-        if "C" in wanted:
-            yield "        for (int j = 0; j < SMC_JOINTS; j++) out[i] += C[i * SMC_JOINTS + j] * w[j];"
-        yield "    }"
-        yield from ("}", "")
+        given = "C" in wanted
+        matrix = f"const double *C = (const double *)plant + {place('C[1,1]')}" if given else "(void)plant, (void)w"
+        add = "\n        for (int j = 0; j < SMC_JOINTS; j++) out[i] += C[i * SMC_JOINTS + j] * w[j];" * given
+        functions += f"""/* out = C w */
+static void coriolis(void *plant, const double *w, double *out)
+{{
+    {matrix};
+    for (int i = 0; i < SMC_JOINTS; i++) {{
+        out[i] = 0.0;{add}
+    }}
+}}
+
+"""
     if "jacobian" in needs:
-        yield "static void jacobian(void *plant, double *out)"
-        yield "{"
-        source = f"((const double *)plant)[{place('J[1,1]')} + i]" if "J" in wanted else "NAN"
-        yield from () if "J" in wanted else ("    (void)plant;",)
-        yield f"    for (int i = 0; i < 3 * SMC_JOINTS; i++) out[i] = {source};"
-        yield from ("}", "")
+        given = "J" in wanted
+        source = f"((const double *)plant)[{place('J[1,1]')} + i]" if given else "NAN"
+        functions += f"""static void jacobian(void *plant, double *out)
+{{
+{"" if given else "    (void)plant;" + chr(10)}    for (int i = 0; i < 3 * SMC_JOINTS; i++) out[i] = {source};
+}}
+
+"""
+    return functions
 
 
 def body(listed: Sequence[Variable], controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterator[str]:
@@ -359,14 +360,14 @@ def body(listed: Sequence[Variable], controller: Controller, code: Mapping[str, 
 
 def _tables(listed: Sequence[Variable], controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterator[str]:
     """Yield the lines that collect the gains of each component, and find its memory."""
-    names = {one.name for one in listed}
+    names = {variable.name for variable in listed}
     for kind, part in controller.parts.items():
         yield f"const double {kind}_gains[] = {{"
         for name in part.gains:
             shared = f"{kind}.{plain(name)}"
             elements = [shared] * max(1, controller.joints * (kind == "law"))
             elements = elements if shared in names else [shared + place for place in controller.places]
-            yield from (f"    number(value[{place(one)}])," for one in elements)
+            yield from (f"    number(value[{place(element)}])," for element in elements)
         yield from ("    0.0,",) if not part.gains else ()
         yield "};"
         first = place(f"{kind}.memory[1{',1' * bool(controller.joints)}]")
@@ -404,20 +405,8 @@ def _call(kind: str, measured: str, memory: str) -> Iterator[str]:
     yield "if (failure) return failure;"
 
 
-def _c_number(value: float) -> str:
-    """Return a number in C."""
-    return repr(value) if math.isfinite(value) else "-INFINITY" if value < 0.0 else "INFINITY"
-
-
 def component_file(component: Component, slots: int, text: str) -> str:
     """Return the C file of a surface or an estimator, with its number of memory slots and its C code."""
     title = f"/* {component.name}: {component.kind}, with {slots} numbers of memory. */"
-    names = export.gain_names(component)
-    parts = [title, *export.includes(text), '#include "controller.h"', "", *names, "", text, ""]
-    return "\n".join(parts)
-
-
-def law_file(controller: Controller, slots: int, text: str) -> str:
-    """Return the C file of the law: that of `export-c`, without the size of its code, which depends on the compiler."""
-    written = export.with_head(controller.law, "double", slots, text, controller.joints, measured=False)
-    return f'#include "controller.h"\n{written}'
+    head = [title, *export.includes(text), '#include "controller.h"', "", *export.gain_names(component)]
+    return "\n".join([*head, "", text, ""])

@@ -1,14 +1,13 @@
 """modelDescription.xml, buildDescription.xml and the page of documentation of an FMU."""
 
 import html
-import itertools
 import math
 import xml.etree.ElementTree as xml
 from collections.abc import Iterable, Sequence
 
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.units import Unit
-from smc_mujoco.exchange.fmu.controller import MAX_DOUBLE, OUTPUTS, Controller, Variable
+from smc_mujoco.exchange.fmu.controller import OUTPUTS, Controller, Variable
 
 # Kind of joint -> units of force and position: name, exponents of the base units.
 JOINT_UNITS = {
@@ -33,11 +32,8 @@ PAGE_HTML = """<!DOCTYPE html>
 <p>The law runs at t = start + k dt, dt = {period:g} s, on the inputs as they are set at that time, and u is held in
 between. With Event Mode, u follows the inputs without delay. Without it, the u that is read after a step is computed
 from the inputs that were set before the step, so an importer that applies it after the step has a delay of one step.
-Gains can be changed while it runs. The sources need a C99 compiler and nothing else.</p>
-<table style="border-collapse: collapse; text-align: left">
-<tr><th>variable</th><th>role</th><th>unit</th><th>start</th><th>meaning</th></tr>
-{rows}
-</table>
+Gains can be changed while it runs. The sources need a C99 compiler and nothing else. modelDescription.xml has the
+unit, the start and the meaning of each variable.</p>
 <p>Written by smc_mujoco {version}.</p>
 </body>
 </html>
@@ -102,7 +98,7 @@ def model_description(
         fixedInternalStepSize=repr(controller.period),
     )
     units = xml.SubElement(root, "UnitDefinitions")
-    for unit in _units(listed):
+    for unit in dict.fromkeys(v.unit for v in listed if v.unit is not None and any(v.unit)):
         definition = xml.SubElement(units, "Unit", name=unit_name(unit, joint))
         if (base := base_units(unit, joint)) is not None:
             xml.SubElement(definition, "BaseUnit", {name: str(n) for name, n in base.items()})
@@ -122,11 +118,6 @@ def model_description(
 def is_output(variable: Variable) -> bool:
     """Return whether a variable is u or s, or an element of these."""
     return variable.name.partition("[")[0] in OUTPUTS
-
-
-def _units(listed: Iterable[Variable]) -> list[Unit]:
-    """Return the units of the variables, each once."""
-    return list(dict.fromkeys(one.unit for one in listed if one.unit is not None and any(one.unit)))
 
 
 def _variable(reference: int, variable: Variable, joint: str) -> xml.Element:
@@ -172,22 +163,7 @@ def summary(controller: Controller) -> str:
     return f"Sliding-mode controller: {', '.join(parts)}; every {controller.period:g} s"
 
 
-def page(listed: Iterable[Variable], controller: Controller, joint: str) -> str:
-    """Return documentation/index.html. The elements of a vector or a matrix share a row."""
-    rows = []
-    for name, elements in itertools.groupby(listed, lambda variable: variable.name.partition("[")[0]):
-        first, *others = elements
-        if first.kind == "SMC_STATE":
-            continue
-        role = "output" if is_output(first) else VARIABLE_ROLES[first.kind][0]
-        unit = unit_name(first.unit, joint) if first.unit is not None and any(first.unit) else ""
-        starts = ["unbounded" if element.start == MAX_DOUBLE else f"{element.start:g}" for element in (first, *others)]
-        start = "identity" if name == "M" else ", ".join(starts[: 1 if len(set(starts)) == 1 else None])
-        start = "" if first.kind in ("SMC_CLOCK", "SMC_COMPUTED") else start
-        cells = (f"{first.name} to {others[-1].name}" if others else first.name, role, unit, start, first.description)
-        rows.append("<tr>" + "".join(f"<td style='padding-right: 1em'>{html.escape(c)}</td>" for c in cells) + "</tr>")
-    about = html.escape(summary(controller))
-    title = html.escape(controller.law.name)
-    return PAGE_HTML.format(
-        name=title, summary=about, period=controller.period, rows="\n".join(rows), version=__version__
-    )
+def page(controller: Controller) -> str:
+    """Return documentation/index.html."""
+    name, about = html.escape(controller.law.name), html.escape(summary(controller))
+    return PAGE_HTML.format(name=name, summary=about, period=controller.period, version=__version__)

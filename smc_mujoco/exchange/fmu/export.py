@@ -26,7 +26,7 @@ from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.exchange.c import build
-from smc_mujoco.exchange.c.export import number_of_joints, writable
+from smc_mujoco.exchange.c.export import number_of_joints, with_head, writable
 from smc_mujoco.exchange.fmu import controller as inside
 from smc_mujoco.exchange.fmu import description
 from smc_mujoco.exchange.fmu.controller import Controller
@@ -77,23 +77,16 @@ def export_fmu(
     Raises:
       ScenarioError: a law in C, Python without translation into C, a surface that does not fit, no compiler.
     """
+    chosen = {"surface": surface, "velocity": velocity, "control_period": control_period, "u_max": u_max}
+    chosen |= {"model": model, "joints": joints}
     if isinstance(law, Scenario):
-        given = {"surface": surface, "velocity": velocity, "control_period": control_period}
-        given |= {"u_max": u_max, "model": model, "joint": joint, "joints": joints}
-        law, about, joint = _of_scenario(law, given)
+        law, chosen, joint = law.resolved.law, *_of_scenario(law, chosen | {"joint": joint})
     else:
-        about = {
-            "surface": surface,
-            "velocity": velocity,
-            "control_period": 1e-3 if control_period is None else control_period,
-            "u_max": math.inf if u_max is None else u_max,
-            "model": model,
-            "joints": joints,
-        }
         joint = "hinge" if joint is None else joint
         find("joint", joint, description.JOINT_UNITS)
-    controller = _controller(law, **about)
-    identifier = _identifier(controller.law.name)
+    controller = _controller(law, **chosen)
+    plain = re.sub(r"\W+", "_", controller.law.name, flags=re.ASCII).strip("_")
+    identifier = plain if plain[:1].isalpha() else f"law_{plain}".rstrip("_")  # of C
     target = with_ending(path if path is not None else f"{identifier}.fmu", ".fmu")
     files = _files(controller, identifier, joint)
     if binary:
@@ -104,32 +97,28 @@ def export_fmu(
     return target
 
 
-def _of_scenario(scenario: Scenario, given: Mapping[str, Any]) -> tuple[Law, dict[str, Any], str]:
-    """Return a scenario's law, its other arguments of `export_fmu`, and its kind of joint."""
-    if chosen := [name for name, value in given.items() if value is not None]:
-        raise ScenarioError(f"a scenario has its own {chosen[0]}: leave {chosen[0]} out, or give its law instead")
+def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
+    """Return a scenario's arguments of `_controller`, and its kind of joint. `chosen`: those that the user gives."""
+    if given := [name for name, value in chosen.items() if value is not None]:
+        raise ScenarioError(f"a scenario has its own {given[0]}: leave {given[0]} out, or give its law instead")
     s, limits = scenario.resolved, set(scenario.limits)
     several = len(limits) > 1 and not s.law.joint
     if several or s.feedforward is not None:
         what = "a bound for each channel" if several else "a feedforward"
         raise ScenarioError(f"the scenario has {what}, which an FMU cannot have: give its law, with u_max=")
-    about = {
-        "surface": s.surface,
-        "velocity": s.velocity,
-        "control_period": s.control_period,
-        "u_max": list(scenario.limits) if s.law.joint else limits.pop(),
-        "model": s.model,
-        "joints": s.plant.n if s.law.joint else None,
-    }
-    return s.law, about, MIXED_JOINTS if s.law.joint and s.plant.mixed else "slide" if s.plant.unit == "m" else "hinge"
+    own = {name: getattr(s, name) for name in ("surface", "velocity", "control_period", "model")}
+    joint = MIXED_JOINTS if s.law.joint and s.plant.mixed else "slide" if s.plant.unit == "m" else "hinge"
+    if s.law.joint:
+        return own | {"u_max": list(scenario.limits), "joints": s.plant.n}, joint
+    return own | {"u_max": limits.pop(), "joints": None}, joint
 
 
 def _controller(
     law: Law | Template | str,
     surface: Surface | Template | str | None,
     velocity: Estimator | Template | str | None,
-    control_period: float,
-    u_max: float | Sequence[float],
+    control_period: float | None,
+    u_max: float | Sequence[float] | None,
     model: str | None,
     joints: int | None,
 ) -> Controller:
@@ -149,8 +138,8 @@ def _controller(
         law=chosen,
         surface=surface,
         estimator=None if estimator is None or estimator.name == "measured" else estimator,
-        period=number("control_period", control_period, above=0.0),
-        u_max=_bounds(u_max, count),
+        period=1e-3 if control_period is None else number("control_period", control_period, above=0.0),
+        u_max=_bounds(math.inf if u_max is None else u_max, count),
         modelled=chosen.requires_model or model == "nominal",
         joints=count,
     )
@@ -162,13 +151,7 @@ def _bounds(u_max: float | Sequence[float], joints: int) -> tuple[float, ...]:
     if len(bounds) != max(1, joints):
         raise ScenarioError(f"u_max has {len(bounds)} values for {joints} joints: give one, or {joints}")
     names = [f"u_max[{i}]" for i in range(joints)] if joints and bounds[0] is not u_max else ["u_max"] * len(bounds)
-    return tuple(number(name, one, above=0.0, infinite=True) for name, one in zip(names, bounds, strict=True))
-
-
-def _identifier(name: str) -> str:
-    """Return a law's name as an identifier of C."""
-    plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_")
-    return plain if plain[:1].isalpha() else f"law_{plain}".rstrip("_")
+    return tuple(number(name, bound, above=0.0, infinite=True) for name, bound in zip(names, bounds, strict=True))
 
 
 def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str]:
@@ -177,12 +160,11 @@ def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str
     listed = inside.variables(controller, code)
     if joint == MIXED_JOINTS:
         joint = "hinge"  # of which no unit is left but powers of the second
-        listed = [
-            one if one.unit and not (one.unit.force or one.unit.position) else one._replace(unit=None) for one in listed
-        ]
+        listed = [v if v.unit and not (v.unit.force or v.unit.position) else v._replace(unit=None) for v in listed]
     body = inside.body(listed, controller, code)
     files = {"controller.c": inside.source(listed, inside.helpers(controller, code), body)}
-    files["law.c"] = inside.law_file(controller, *code["law"])
+    law = with_head(controller.law, "double", *code["law"], controller.joints, measured=False)
+    files["law.c"] = f'#include "controller.h"\n{law}'
     for kind, (slots, text) in code.items():
         if kind != "law":
             files[f"{kind}.c"] = inside.component_file(controller.parts[kind], slots, text)
@@ -196,7 +178,7 @@ def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str
     files |= {name: (FOLDER / "headers" / name).read_text(encoding="utf-8") for name in FMI_HEADERS}
     return {
         "modelDescription.xml": description.model_description(listed, controller, identifier, token, joint),
-        "documentation/index.html": description.page(listed, controller, joint),
+        "documentation/index.html": description.page(controller),
         "sources/buildDescription.xml": description.build_description(compiled, identifier),
         **{f"sources/{name}": text for name, text in files.items()},
     }

@@ -126,21 +126,17 @@ class FmuLaw(Uncompiled):
         address = memory.ctypes.data
         _end(_begun.get(address, 0))  # the instance of a run whose memory was set to 0, to begin again
         if self.once:
-            self._make_room()
+            gc.collect()  # ends the instances of runs that are over
+            if any(other.law == self for other in _running.values()):
+                raise ScenarioError(
+                    f"FMU {Path(self.path).name!r} can have only one instance in a process, by its description: "
+                    "give a plant of one channel"
+                )
         made = Slave(str(extracted(self.path, self.digest)), names, self.outputs, self.fixed(gains), y.t)
         _running[place], _begun[address] = Running(self, made, y.t, [0.0, 0.0]), place
         owner: Any = memory if memory.base is None else memory.base
         weakref.finalize(owner, _end, place)
         return place
-
-    def _make_room(self) -> None:
-        """Raise ScenarioError if the FMU already has an instance. For FMUs that can have only one in a process."""
-        gc.collect()  # ends the instances of runs that are over
-        if any(other.law == self for other in _running.values()):
-            raise ScenarioError(
-                f"FMU {Path(self.path).name!r} can have only one instance in a process, by its description: "
-                "give a plant of one channel"
-            )
 
 
 def steps(period: float | None, dt: float) -> tuple[int, float]:
@@ -307,12 +303,12 @@ def _description(file: Path, digest: str) -> Any:
     if not any(binary.stem == about.coSimulation.modelIdentifier for binary in binaries.glob("*")):
         if binaries.exists():
             raise ScenarioError(f"{file.name} has no binary of its modelIdentifier in {binaries.name}: export it again")
-        places = sorted(each.name for each in (folder / "binaries").glob("*")) if (folder / "binaries").exists() else []
+        machines = sorted(path.name for path in (folder / "binaries").glob("*"))
         cure = (
             "compile its sources with FMPy, fmpy compile" if (folder / "sources").is_dir() else "export it for this one"
         )
         raise ScenarioError(
-            f"{file.name} has a binary for {', '.join(places) or 'no machine'}, and this one is {here}: {cure}"
+            f"{file.name} has a binary for {', '.join(machines) or 'no machine'}, and this one is {here}: {cure}"
         )
     return about
 

@@ -9,6 +9,7 @@ from smc_mujoco.common.guard import ALTERS, Arithmetic, Fault
 REAL_TYPES = ("Real", "Float64", "Float32")  # types of real numbers, as in the names of FMPy's functions
 WHOLE_TYPES = ("Integer", "Enumeration", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)))
 CONSTANT_TYPES = (*REAL_TYPES, *WHOLE_TYPES, "Boolean")  # types of inputs that may keep one value
+CONVERTERS = dict.fromkeys(WHOLE_TYPES, round) | {"Boolean": bool}  # of numbers into values of other types
 TRIAL_STEPS, TRIAL_PERIOD = 500, 1e-3  # of a trial: number of steps, and their length if the FMU names none, s; chosen
 MAX_POSITION = 3.0  # where the double integrator of a trial stops, because a law need not stabilise it; chosen
 MAX_COMMAND = 6.0  # bound on u in a trial; chosen
@@ -84,7 +85,7 @@ class Slave:
     def _set(self, groups: Sequence[Group], values: Sequence[float]) -> None:
         """Set variables to the values at their places."""
         for kind, names, references, places in groups:
-            typed = [_of_type(kind, values[place]) for place in places]
+            typed = [CONVERTERS.get(kind, float)(values[place]) for place in places]
             setter = ("setInteger" if self.two else "setInt64") if kind == "Enumeration" else f"set{kind}"
             what = ", ".join(f"{name} = {value:g}" for name, value in zip(names, typed, strict=True))
             self._called(f"setting {what}", getattr(self.fmu, setter), references, typed)
@@ -99,31 +100,22 @@ class Slave:
         return values
 
     def _called(self, what: str, function: Any, *arguments: Any, **named: Any) -> Any:
-        """Call a function of FMPy. Raise Fault if it fails, with the FMU's own words, or changes our arithmetic."""
+        """Call a function of FMPy. Raise Fault if it fails, with the FMU's last words, or changes our arithmetic."""
         try:
             result = function(*arguments, **named)
         except Exception as error:
-            raise self._fault(what, error) from error
+            why = self.said[-1] if self.said else f"{type(error).__name__}: {error}"
+            raise Fault(f"{what} fails ({' '.join(why.split())})") from error
         finally:
             changed = self.arithmetic.changed()
         if changed:
             raise Fault(f"{what} {ALTERS}")
         return result
 
-    def _fault(self, what: str, error: Exception) -> Fault:
-        """Return the Fault of a call that failed, with the FMU's last words or else those of the error."""
-        why = self.said[-1] if self.said else f"{type(error).__name__}: {error}"
-        return Fault(f"{what} fails ({' '.join(why.split())})")
-
     def _log(self, *words: Any) -> None:
         """Keep what the FMU says; the text is the last argument, in FMI 2 and 3."""
         text = words[-1]
         self.said.append(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
-
-
-def _of_type(kind: str, value: float) -> float:
-    """Return a value as a variable of a type has it: a whole number, a truth value, or as it is."""
-    return round(value) if kind in WHOLE_TYPES else value != 0.0 if kind == "Boolean" else value
 
 
 def attempt(order: Mapping[str, Any], say: Callable) -> None:

@@ -19,6 +19,7 @@ from smc_mujoco.exchange.c.javascript import to_js
 from smc_mujoco.exchange.live import facts as known
 from smc_mujoco.exchange.live import npm
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.grid import listed_laws
 
 PAGE_FOLDER = Path(__file__).parent / "page"
@@ -50,7 +51,7 @@ def live(
     """
     names = [plants] if isinstance(plants, str | Plant) else items_of("plants", plants)
     chosen = known.checked(names or DEFAULT_PLANTS)
-    users = [_user_law(law) for law in (listed_laws(laws) if laws else ())]
+    users = [checked_name(coerce.law(law)) for law in (listed_laws(laws) if laws else ())]
     functions = {("law", law.name): to_js(law) for law in users}
     offered = list(users)
     for component in _library(chosen):
@@ -85,14 +86,6 @@ def _script(functions: Mapping[tuple[str, str], str]) -> str:
         entries = [f"{json.dumps(name)}: {text},\n" for (of, name), text in functions.items() if of == kind]
         lines.append(f"export const {kind}s = {{\n{''.join(entries)}}};\n")
     return "".join(lines)
-
-
-def _user_law(law: object) -> Component:
-    """Return a user's law, with its default gains if it is a template."""
-    made = find_law(law) if isinstance(law, str) else law() if isinstance(law, Template) else law
-    if not isinstance(made, Component) or made.kind != "law":
-        raise ScenarioError(f"laws has {shown(law)}: give laws made by @smc.law_function")
-    return checked_name(made)
 
 
 def _writable(folder: Path) -> Path:

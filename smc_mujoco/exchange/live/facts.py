@@ -71,7 +71,7 @@ def checked(names: Sequence[str | Plant]) -> list[Plant]:
 
 def facts(chosen: Sequence[Plant], offered: Sequence[Component], users: Sequence[Component]) -> dict[str, Any]:
     """Return facts.json as a dict."""
-    kinds = {kind: [one for one in offered if one.kind == kind] for kind in ("law", "surface", "estimator")}
+    kinds = {kind: [part for part in offered if part.kind == kind] for kind in ("law", "surface", "estimator")}
     return {
         "version": __version__,
         "includes": {name: model_path(name).read_text(encoding="utf-8") for name in _included(chosen)},
@@ -94,8 +94,8 @@ def facts(chosen: Sequence[Plant], offered: Sequence[Component], users: Sequence
         "own": [law.name for law in users],
         "plants": {plant.name: _plant(plant, kinds, users) for plant in chosen},
         "laws": {law.name: _component(law) | _law(law) for law in kinds["law"]},
-        "surfaces": {one.name: _component(one) for one in kinds["surface"]},
-        "estimators": {one.name: _component(one) for one in kinds["estimator"]},
+        "surfaces": {surface.name: _component(surface) for surface in kinds["surface"]},
+        "estimators": {estimator.name: _component(estimator) for estimator in kinds["estimator"]},
     }
 
 
@@ -155,8 +155,8 @@ def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], users: Sequen
         "laws": list(gains),
         "gains": gains,
         "ranges": {law.name: _ranges(law, plant, gains[law.name]) for law in offered},
-        "surface_ranges": {one.name: _ranges(one, plant, one.gains) for one in kinds["surface"]},
-        "estimator_ranges": {one.name: _ranges(one, plant, one.gains) for one in kinds["estimator"]},
+        "surface_ranges": {part.name: _ranges(part, plant, part.gains) for part in kinds["surface"]},
+        "estimator_ranges": {part.name: _ranges(part, plant, part.gains) for part in kinds["estimator"]},
         "start": _opening([law.name for law in users if law.name in gains], list(gains)),
         "started": max(range(plant.n), key=lambda i: abs(resolved.x0[i])),
         "beside": abs(plant.lane[0]) > abs(plant.lane[1]),

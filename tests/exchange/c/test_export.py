@@ -405,7 +405,7 @@ def test_what_is_no_law_or_is_in_c_already_is_refused(folder):
     (folder / "none.c").write_text(smc.law_to_c("none"))
     with pytest.raises(smc.ScenarioError, match=r"law 'none' is in C already: take none\.c"):
         smc.law_to_c(smc.law_from_c(folder / "none.c"))
-    with pytest.raises(smc.ScenarioError, match="cannot write 3 in C"):
+    with pytest.raises(smc.ScenarioError, match="law is 3: give"):
         smc.law_to_c(3)
 
 

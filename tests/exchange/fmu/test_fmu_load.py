@@ -422,7 +422,7 @@ def test_the_command_says_what_the_variables_mean(foreign, capsys):
 def test_the_command_ends_in_one_sentence(foreign, capsys):
     for words, said in (
         (["--constants", "mode=4"], "controller.fmu: the step from t = 0 s fails (the licence has ended)"),
-        (["--constants", "mode=on"], "--constants: mode is 'on': give a number, as mode=0"),
+        (["--constants", "mode=on"], "--constants mode=on is no number: write it as enable=1"),
     ):
         assert_refused(capsys, ["check-fmu", str(foreign), *words], said)
 
