@@ -160,6 +160,6 @@ def papers(
         terminal.note(f"the seal is whole: {data['paper']['authors']}, {data['paper']['title']}: {counts}", wrap=True)
     if new or check:
         return
-    lines = {name: f"{one.authors}: {one.title} ({one.contents})" for name, one in paper.papers().items()}
+    lines = {name: f"{known.authors}: {known.title} ({known.contents})" for name, known in paper.papers().items()}
     rows = [(name, tables.with_package(line, paper.catalogue().package(name))) for name, line in lines.items()]
     terminal.print(tables.catalogue("Papers, for smc-mujoco claims --paper", rows))

@@ -162,9 +162,8 @@ def identified(result: Identified, names: Sequence[str]) -> list[Table]:
     fits = titled("fit, % (before)", "record", *heads)
     for name, fit, before in zip(names, result.fits, result.fits_before, strict=True):
         fits.add_row(name, *(f"{value:.1f} ({before[key]:.1f})" for key, value in fit.items()))
+    parts = result.fits, result.fits_before
     for word, chosen in (("median", median_low), ("worst", min)) if len(names) > 2 else ():
-        after, before = (
-            {key: chosen([fit[key] for fit in each]) for key in each[0]} for each in (result.fits, result.fits_before)
-        )
-        fits.add_row(word, *(f"{after[key]:.1f} ({before[key]:.1f})" for key in after))
+        columns = (tuple(chosen(fit[key] for fit in part) for part in parts) for key in result.fits[0])
+        fits.add_row(word, *(f"{after:.1f} ({before:.1f})" for after, before in columns))
     return [values, fits]

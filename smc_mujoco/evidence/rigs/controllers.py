@@ -41,4 +41,4 @@ def cascade(y, gains, memory):
     return gains.kv * (-gains.kp * y.e - y.v), 0.0
 
 
-CONTROLLERS = {one.name: one for one in (state_feedback, cascade)}
+CONTROLLERS = {law.name: law for law in (state_feedback, cascade)}

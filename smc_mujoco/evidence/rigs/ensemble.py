@@ -6,10 +6,11 @@ print(ensemble.verdict(smc.leaderboard(table)))
 
 import dataclasses
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.rigs.rig import Rig, Values
 from smc_mujoco.simulation.grid import grid
@@ -45,7 +46,7 @@ def runs(
         )
     shipped = {law.name: law for law in rig.laws}
     given = rig.laws if laws is None else laws
-    if not (chosen := [shipped.get(one, one) if isinstance(one, str) else one for one in given]):
+    if not (chosen := [shipped.get(law, law) if isinstance(law, str) else law for law in given]):
         raise ScenarioError(f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)")
     scenarios, around = [], starts or Starts(x0=rig.x0)
     for name, member in rig.members().items():
@@ -73,12 +74,13 @@ def verdict(boards: Sequence[Any]) -> str:
     Args:
       boards: of `smc.leaderboard`, whose conditions are the sets.
     """
-    lines = []
-    for board in boards:
-        count, blocks_won = len(board.blocks), wins(board)
-        if board.winner:
-            lines.append(f"{board.metric}: {board.winner} wins on all {count} parameter sets")
-            continue
-        others = ", ".join(f"{law} on {number}" for law, number in blocks_won.items()) or "none on any"
-        lines.append(f"{board.metric}: no law wins on all {count} parameter sets ({others})")
-    return "\n".join(lines)
+    return "\n".join(f"{board.metric}: {sentence(board)}" for board in boards)
+
+
+def sentence(board: Any, labels: Mapping[str, str] = frozen({})) -> str:
+    """Return whether one law wins on every parameter set, and who wins on how many. `labels`: law -> its label."""
+    count = len(board.blocks)
+    if board.winner:
+        return f"{labels.get(board.winner, board.winner)} wins on all {count} parameter sets"
+    others = ", ".join(f"{labels.get(law, law)} on {number}" for law, number in wins(board).items()) or "none on any"
+    return f"no law wins on all {count} parameter sets ({others})"

@@ -48,11 +48,11 @@ class Identified:
     def notes(self) -> list[str]:
         """Sentences on what the records cannot determine, and on a poor fit."""
         names, sentences = list(self.values), []
-        for i, one in enumerate(names):
-            for j, other in enumerate(names[:i]):
+        for i, second in enumerate(names):
+            for j, first in enumerate(names[:i]):
                 if abs(self.correlations[i, j]) > MAX_CORRELATION:
                     sentences.append(
-                        f"{other} and {one} cannot be told apart (correlation {self.correlations[i, j]:.3f})"
+                        f"{first} and {second} cannot be told apart (correlation {self.correlations[i, j]:.3f})"
                     )
         for name, value in self.values.items():
             quantity = self.rig.quantities[name]
@@ -109,10 +109,10 @@ class Identified:
         """
         whole("count", count, 1, 1000)
         names, rng = list(self.values), np.random.default_rng(whole("seed", seed, 0, 2**53 - 1))
-        spread, middle = (np.array([each[name] for name in names]) for each in (self.errors, self.values))
+        spread, middle = (np.array([of[name] for name in names]) for of in (self.errors, self.values))
         draws = rng.multivariate_normal(middle, self.correlations * np.outer(spread, spread), count, method="eigh")
         known = [self.rig.quantities[name] for name in names]
-        kept = np.clip(draws, [each.least for each in known], [each.most for each in known])
+        kept = np.clip(draws, [quantity.least for quantity in known], [quantity.most for quantity in known])
         return dataclasses.replace(
             self.rig, ensemble=tuple(dict(zip(names, row, strict=True)) for row in kept.tolist())
         )

@@ -123,17 +123,13 @@ def _refuse_swapped(twin: Rig, names: list[str], data: Sequence[Mapping[str, Any
     (x, *others), u = twin.columns.x, twin.columns.u
     if others or twin.columns.state or twin.dynamics is not None or reached.fit >= POOR_FIT:
         return
-    swapped = Replays(twin, names, [dict(record) | {x: record[u], u: record[x]} for record in data], False, _ignore)
+    swapped = Replays(twin, names, [dict(record) | {x: record[u], u: record[x]} for record in data], False)
     fit = search.search(swapped, 4, 0, search.ROUGH_STEPS).fit
     if fit > max(RADIANS_GAIN, reached.fit + RADIANS_GAIN):
         raise ScenarioError(
             f"the columns {x} and {u} of the record of {twin.name} look swapped, as its pieces fit by {fit:.0f} % with "
             f"them exchanged and by {reached.fit:.0f} % as they are: name the position {x} and the command {u}"
         )
-
-
-def _ignore(count: int) -> None:
-    """Report nothing of `count` replays."""
 
 
 def _starting_states(
@@ -147,7 +143,7 @@ def _starting_states(
         return [None] * len(data)
     if replays.closed:
         return [replays.state(point, k) for k in range(len(data))]
-    whole_records = Replays(fitted, [], data, False, _ignore, whole=True)
+    whole_records = Replays(fitted, [], data, False, whole=True)
     whole_records.steps = replays.short_steps
     firsts = [next(k for k, piece in enumerate(replays.pieces) if piece.record == i) for i in range(len(data))]
     candidates = [whole_records.start, Point(np.zeros(0), point.states[firsts])]

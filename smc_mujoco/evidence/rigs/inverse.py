@@ -30,7 +30,7 @@ class Filter:
         from scipy.signal import butter
 
         t = data[columns.time]
-        self.data, self.step = data, step_of(data, columns)
+        self.data, self.step = data, step_of(t)
         if not long_enough(data, columns):
             raise ScenarioError(
                 f"the record lasts {t[-1] - t[0]:.3g} s, with a sample every {self.step:.3g} s: for its torques give "
@@ -74,7 +74,7 @@ def measured(data: Record, columns: Columns) -> Record:
 def long_enough(data: Record, columns: Columns) -> bool:
     """Return whether a record's torques can be compared."""
     t = data[columns.time]
-    return bool(t[-1] - t[0] >= MIN_DURATION and step_of(data, columns) <= MAX_STEP)
+    return bool(t[-1] - t[0] >= MIN_DURATION and step_of(t) <= MAX_STEP)
 
 
 def torques(plant: Plant, data: Record, columns: Columns) -> Record:

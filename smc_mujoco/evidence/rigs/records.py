@@ -127,20 +127,31 @@ def _cell(text: str) -> float:
         return np.nan
 
 
-def of_trace(trace: Trace, columns: Columns) -> Record:
-    """Return a run as a record with a rig's columns. Positions have noise and rounding, but no delay and no losses."""
-    s, sensor = trace.scenario, trace.scenario.sensor
-    offset = columns.offset or (0.0,) * len(columns.x)
-    record = {columns.time: trace.t, columns.u: trace.u[:, 0]}
+def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:
+    """Return the positions of a run as its encoder gives them, without delay, losses and the columns' offset.
+
+    Args:
+      noisy: whether they have the noise of the run's measurement.
+    """
+    s, sensor, by_column = trace.scenario, trace.scenario.sensor, {}
     for i, name in enumerate(columns.x):
         x = trace.x[:, i] + (sensor.bias if sensor else 0.0)
-        if s.noise.position:
+        if noisy and s.noise.position:
             kind = philox.MEASUREMENT
             x = x + s.noise.position * np.array([philox.normals(s.seed, i, kind, k)[0] for k in range(len(x))])
         if quantum := sensor.quantum(s.plant.units[i] == "rad") if sensor else 0.0:
             x = quantum * np.floor(x / quantum + 0.5)
-        record[name] = x + offset[i]
-    added = [0.0 if s.feedforward is None else evaluate(s.feedforward, t)[0] for t in trace.t]
+        by_column[name] = x
+    return by_column
+
+
+def of_trace(trace: Trace, columns: Columns) -> Record:
+    """Return a run as a record with a rig's columns."""
+    offset, feedforward = columns.offset or (0.0,) * len(columns.x), trace.scenario.feedforward
+    record = {columns.time: trace.t, columns.u: trace.u[:, 0]}
+    for (name, x), zero in zip(positions(trace, columns, noisy=True).items(), offset, strict=True):
+        record[name] = x + zero
+    added = [0.0 if feedforward is None else evaluate(feedforward, t)[0] for t in trace.t]
     record |= dict(zip(columns.state, np.column_stack([trace.x, trace.v]).T, strict=False))
     return record | {columns.reference: trace.r[:, 0], columns.feedforward: np.array(added)}
 
@@ -172,6 +183,17 @@ def checked(record: Mapping[str, Any], columns: Columns, period: float | None, r
                 f"column {name} of {rig} has {len(values)} samples and {columns.time} has {len(t)}: "
                 "give as many of each"
             )
+    step = _checked_step(t, period, rig)
+    if period is None:
+        even = t[0] + step * np.arange(int((t[-1] - t[0]) / step + 1e-6) + 1)
+        data = {name: np.interp(even, t, values) for name, values in data.items()}
+    for name, offset in zip(columns.x, columns.offset, strict=False):
+        data[name] = data[name] - offset
+    return data
+
+
+def _checked_step(t: np.ndarray, period: float | None, rig: str) -> float:
+    """Return the median step of a record's times, s. Refuse times that a replay cannot use."""
     if len(t) < 2:
         raise ScenarioError(f"the record of {rig} has {len(t)} samples: give at least two")
     back = np.flatnonzero(np.diff(t) <= 0.0)
@@ -180,7 +202,7 @@ def checked(record: Mapping[str, Any], columns: Columns, period: float | None, r
             f"time of {rig} runs backward at sample {back[0] + 1}, from {t[back[0]]:.6g} s to {t[back[0] + 1]:.6g} s: "
             "give times that increase"
         )
-    step = step_of(data, columns)
+    step = step_of(t)
     if step > MAX_PERIOD:
         raise ScenarioError(
             f"the record of {rig} is sampled every {step:g} s and lasts {t[-1] - t[0]:g} s: give time in s (a column "
@@ -197,17 +219,12 @@ def checked(record: Mapping[str, Any], columns: Columns, period: float | None, r
             f"the record of {rig} has a gap after sample {gaps[0]}, from {t[gaps[0]]:.6g} s to {t[gaps[0] + 1]:.6g} s: "
             "fill it in, or cut the record there"
         )
-    if period is None:
-        even = t[0] + step * np.arange(int((t[-1] - t[0]) / step + 1e-6) + 1)
-        data = {name: np.interp(even, t, values) for name, values in data.items()}
-    for name, offset in zip(columns.x, columns.offset, strict=False):
-        data[name] = data[name] - offset
-    return data
+    return step
 
 
-def step_of(data: Record, columns: Columns) -> float:
-    """Return the median step of a record's time, s."""
-    return max(RESOLUTION, round(float(np.median(np.diff(data[columns.time]))) / RESOLUTION) * RESOLUTION)
+def step_of(t: np.ndarray) -> float:
+    """Return the median step of times, s."""
+    return max(RESOLUTION, round(float(np.median(np.diff(t))) / RESOLUTION) * RESOLUTION)
 
 
 def noise(data: Record, columns: Columns) -> float:
@@ -217,7 +234,7 @@ def noise(data: Record, columns: Columns) -> float:
     deviation sqrt(70) sigma for white noise of sigma. Their median ignores short transients.
     """
     differences = [np.abs(np.diff(data[name], 4)) for name in columns.x]
-    return min(float(np.median(each)) / (NORMAL_MEDIAN * math.sqrt(70.0)) for each in differences)
+    return min(float(np.median(column)) / (NORMAL_MEDIAN * math.sqrt(70.0)) for column in differences)
 
 
 def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
@@ -253,11 +270,11 @@ def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.nd
     return x, np.array([cubic[2] for cubic in cubics])
 
 
-def rate(values: np.ndarray, period: float) -> np.ndarray:
-    """Return the rate of a column, (K,), from a cubic through the samples about each."""
+def rate(values: np.ndarray, period: float, order: int = 1) -> np.ndarray:
+    """Return a derivative of a column, (K,), from a cubic through the samples about each. Order 0 is the cubic."""
     from scipy.signal import savgol_filter
 
-    return np.asarray(savgol_filter(values, 2 * STATE_SAMPLES + 1, 3, deriv=1, delta=period))
+    return np.asarray(savgol_filter(values, 2 * STATE_SAMPLES + 1, 3, deriv=order, delta=period))
 
 
 def in_radians(record: Mapping[str, Any], columns: Columns, names: Sequence[str]) -> Record:

@@ -128,7 +128,7 @@ class Replays:
 
     def __init__(
         self, twin: Rig, names: list[str], data: Sequence[Mapping[str, Any]], closed: bool,
-        report: Callable[[int], None], whole: bool = False,
+        report: Callable[[int], None] = lambda count: None, whole: bool = False,
     ):  # fmt: skip
         """Cut the records into pieces.
 
@@ -196,8 +196,8 @@ class Replays:
     def residuals(self, points: Sequence[Point]) -> list[list[np.ndarray]]:
         """Return the residuals of each piece, (N,), at each point. All replays are one batch."""
         return [
-            [self.relative(piece, each) for piece, each in zip(self.pieces, one, strict=True)]
-            for one in self.predicted(points)
+            [self.relative(piece, columns) for piece, columns in zip(self.pieces, by_piece, strict=True)]
+            for by_piece in self.predicted(points)
         ]
 
     def predicted(self, points: Sequence[Point]) -> list[list[Record]]:
@@ -205,7 +205,7 @@ class Replays:
         self.evaluations += len(points)
         rigs = [self.rig(point) for point in points]
         if self.twin.dynamics is not None:
-            predictions = [[each[0] for each in rig.predictions(list(self.data))] for rig in rigs]
+            predictions = [[predicted for predicted, _, _ in rig.predictions(list(self.data))] for rig in rigs]
         else:
             predictions = self._replayed(rigs, points, self.steps)
         self.report(len(points))
@@ -213,10 +213,10 @@ class Replays:
             return predictions
         return [
             [
-                {name: values + added[name] for name, values in each.items()}
-                for each, added in zip(one, self.corrections, strict=True)
+                {name: values + added[name] for name, values in columns.items()}
+                for columns, added in zip(by_piece, self.corrections, strict=True)
             ]
-            for one in predictions
+            for by_piece in predictions
         ]
 
     def correct(self, point: Point, halvings: int) -> bool:
@@ -235,8 +235,8 @@ class Replays:
             self._replayed([rig], [point], _steps(plain, k))[0] for k in (0, halvings - 1, halvings)
         )
         self.corrections = [
-            {name: 2.0 * b[name] - a[name] - values for name, values in each.items()}
-            for each, a, b in zip(plain_steps, coarse, fine, strict=True)
+            {name: 2.0 * b[name] - a[name] - values for name, values in columns.items()}
+            for columns, a, b in zip(plain_steps, coarse, fine, strict=True)
         ]
         return True
 
@@ -301,7 +301,7 @@ class Replays:
             np.column_stack([(ahead[j][k] - back[j][k]) / gap for j, gap in enumerate(gaps)])
             for k in range(len(self.pieces))
         ]
-        by_values, by_states = ([each[:, part] for each in columns] for part in (slice(p), slice(p, None)))
+        by_values, by_states = ([of_piece[:, part] for of_piece in columns] for part in (slice(p), slice(p, None)))
         return Slopes(point, residuals, by_values, by_states, len(self.pieces[0].measured), len(self.data))
 
     def _pieces(self, i: int) -> list[Piece]:

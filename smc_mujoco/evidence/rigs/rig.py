@@ -352,7 +352,7 @@ class Rig:
 
     def step(self, data: Record) -> float:
         """Return the time between samples of a record, as `checked` returns it, s: in a closed loop the period."""
-        return self.period or records.step_of(data, self.columns)
+        return self.period or records.step_of(data[self.columns.time])
 
     def reading(self, many: Sequence[Source]) -> tuple["Rig", list[Mapping[str, Any]]]:
         """Return the rig that repeats some records, and the records as columns.
@@ -441,7 +441,7 @@ class Rig:
         Args:
           states: positions and velocities at the start of each, as in `replay`; None: those measured.
           changes: fields of the replays that differ, such as their physics step.
-        """  # fmt: skip
+        """
         predictions = self.predictions(many, rounded, states, **changes)
         fits = [percentages(*prediction[:2]) for prediction in predictions]
         if self.controller is not None:
@@ -464,24 +464,24 @@ class Rig:
         data, time = [self.checked(record) for record in many], self.columns.time
         if self.dynamics is not None:
             return [
-                (self.torques(one), self.measured_torques(one), inverse.times(each, self.columns))
-                for one, each in zip(many, data, strict=True)
+                (self.torques(record), self.measured_torques(record), inverse.times(columns, self.columns))
+                for record, columns in zip(many, data, strict=True)
             ]
         pairs = zip(many, states or [None] * len(many), strict=True)
-        traces = run([self.repeated(self.part(one), rounded, state, **changes) for one, state in pairs])
+        traces = run([self.repeated(self.part(record), rounded, state, **changes) for record, state in pairs])
         replayed = []
-        for each, trace in zip(data, traces, strict=True):
+        for columns, trace in zip(data, traces, strict=True):
             period = trace.scenario.control_period
             first, after = round(self.score_from / period), round((self.score_from - self.start) / period)
             if len(trace.t) < after + records.MIN_SAMPLES:
                 seconds = (first + records.MIN_SAMPLES) * period
                 raise ScenarioError(
-                    f"the record of {self.name} lasts {len(each[time]) * period:.3g} s, too short to score it from "
+                    f"the record of {self.name} lasts {len(columns[time]) * period:.3g} s, too short to score it from "
                     f"{self.score_from:g} s on: give at least {seconds:.3g} s"
                 )
             predicted = {name: values[after:] for name, values in self.predicted(trace).items()}
-            parts = {name: each[name][first : first + len(values)] for name, values in predicted.items()}
-            replayed.append((predicted, parts, each[time][first : first + len(trace.t) - after]))
+            parts = {name: columns[name][first : first + len(values)] for name, values in predicted.items()}
+            replayed.append((predicted, parts, columns[time][first : first + len(trace.t) - after]))
         return replayed
 
     def idle(self, record: Mapping[str, Any]) -> dict[str, float]:
@@ -509,12 +509,7 @@ class Rig:
 
     def predicted(self, trace: Trace) -> Record:
         """Return the columns of a record that a replay gives, (K,) each, without the columns' offset."""
-        sensor = trace.scenario.sensor
-        by_column = {}
-        for i, name in enumerate(self.columns.x):
-            by_column[name] = trace.x[:, i] + (sensor.bias if sensor else 0.0)
-            if quantum := sensor.quantum(trace.scenario.plant.units[i] == "rad") if sensor else 0.0:
-                by_column[name] = quantum * np.floor(by_column[name] / quantum + 0.5)
+        by_column = records.positions(trace, self.columns)
         return by_column | ({} if trace.scenario.law.name == "none" else {self.columns.u: trace.u[:, 0]})
 
     def torques(self, record: Mapping[str, Any]) -> Record:

@@ -58,7 +58,7 @@ def test_times_are_those_of_a_record_up_to_each_bound(times, period, refused):
     np.testing.assert_allclose(data["q"], 3.0 * data["t"] + 0.5)
     np.testing.assert_allclose(data["u"], 4.0 * data["t"])
     if period is None:  # its own even rate, from the first sample to the last
-        step = records.step_of({"t": np.asarray(times)}, NAMES)
+        step = records.step_of(np.asarray(times))
         np.testing.assert_allclose(np.diff(data["t"]), step)
         assert times[-1] - step < data["t"][-1] <= times[-1] + 1e-9
     else:

@@ -50,68 +50,60 @@ def linear(q):
     }  # fmt: skip
 
 
-def electric(source, resistance, inductance, torque_constant, rotor, gear=1.0, efficiency=1.0, voltage=10.0):
-    """Return name -> Quantity of a motor and gearbox, from numbers of one source in the units below."""
-    return {
-        "resistance": Quantity(resistance, "ohm", source, 1e-3),
-        "inductance": Quantity(inductance, "H", source, 0.0),
-        "torque_constant": Quantity(torque_constant, "N m/A", source, 1e-6),
-        "rotor_inertia": Quantity(rotor, "kg m^2", source, 0.0),
-        "gear": Quantity(gear, "", source, 1e-3),
-        "efficiency": Quantity(efficiency, "", source, 0.01, 1.0),
-        "voltage": Quantity(voltage, "V", source, 0.1),
-    }
+UNITS = {  # quantity -> unit, and range
+    "resistance": ("ohm", 1e-3), "inductance": ("H", 0.0), "torque_constant": ("N m/A", 1e-6),
+    "rotor_inertia": ("kg m^2", 0.0), "gear": ("", 1e-3), "efficiency": ("", 0.01, 1.0), "voltage": ("V", 0.1),
+    "arm_inertia": ("kg m^2", 1e-7), "arm_length": ("m", 1e-3), "arm_damping": ("N m s/rad", 0.0),
+    "pendulum_mass": ("kg", 1e-4), "pendulum_centre": ("m", 1e-3), "pendulum_inertia": ("kg m^2", 1e-8),
+    "pendulum_damping": ("N m s/rad", 0.0), "counts": ("1/turn", 2.0),
+}  # fmt: skip
 
 
-def pendulum(source, arm_inertia, arm_length, arm_damping, mass, centre, inertia, damping, counts):
-    """Return name -> Quantity of an arm and a pendulum, from numbers of one source in the units below."""
-    return {
-        "arm_inertia": Quantity(arm_inertia, "kg m^2", source, 1e-7),
-        "arm_length": Quantity(arm_length, "m", source, 1e-3),
-        "arm_damping": Quantity(arm_damping, "N m s/rad", source, 0.0),
-        "pendulum_mass": Quantity(mass, "kg", source, 1e-4),
-        "pendulum_centre": Quantity(centre, "m", source, 1e-3),
-        "pendulum_inertia": Quantity(inertia, "kg m^2", source, 1e-8),
-        "pendulum_damping": Quantity(damping, "N m s/rad", source, 0.0),
-        "counts": Quantity(counts, "1/turn", source, 2.0),
-    }
+def quantities(source, **values):
+    """Return name -> Quantity, from numbers of one source in UNITS."""
+    values = {name: values[name] for name in UNITS if name in values}
+    return {name: Quantity(value, UNITS[name][0], source, *UNITS[name][1:]) for name, value in values.items()}
 
 
-def qube(version, source, motor, divisor, arm_damping, pendulum_damping, about):
-    """Return a QUBE-Servo with its rotary pendulum; the arm has the inertia m r^2 / divisor."""
-    arm, pole = (0.095, 0.085), (0.024, 0.129)  # kg, m
-    return Rig(
-        name=f"qube_servo_{version}",
-        label=f"QUBE-Servo {version} with rotary pendulum, by its published parameters",
-        quantities=electric(source, *motor)
-        | pendulum(
-            source, arm[0] * arm[1] ** 2 / divisor, arm[1], arm_damping, pole[0], pole[1] / 2,
-            pole[0] * pole[1] ** 2 / 12, pendulum_damping, 2048.0,
-        ),
-        machine=rotary,
-        about=about,
+def qube(version, source, arm_inertia, about, **values):
+    """Return a QUBE-Servo with its rotary pendulum, a uniform rod of 0.024 kg and 0.129 m."""
+    numbers = quantities(
+        source, arm_inertia=arm_inertia, arm_length=0.085, pendulum_mass=0.024, pendulum_centre=0.129 / 2,
+        pendulum_inertia=0.024 * 0.129**2 / 12, counts=2048.0, gear=1.0, efficiency=1.0, voltage=10.0, **values,
     )  # fmt: skip
+    label = f"QUBE-Servo {version} with rotary pendulum, by its published parameters"
+    return Rig(name=f"qube_servo_{version}", label=label, quantities=numbers, machine=rotary, about=about)
 
 
 QUBE_SERVO_2 = qube(
-    2, DRIVER, (8.4, 1.16e-3, 0.042, 4e-6), 12.0, 5e-5, 2.5e-6,
+    2, DRIVER, 0.095 * 0.085**2 / 12.0,
     "The arm's inertia is m r^2/12. With m r^2/3 a controller that balances the machine lets the twin fall.",
+    resistance=8.4, inductance=1.16e-3, torque_constant=0.042, rotor_inertia=4e-6, arm_damping=5e-5,
+    pendulum_damping=2.5e-6,
 )  # fmt: skip
 QUBE_SERVO_3 = qube(
-    3, QUBE_3, (7.5, 1.15e-3, 0.0422, 1.4e-6), 3.0, 1e-3, 5e-5,
+    3, QUBE_3, 0.095 * 0.085**2 / 3.0,
     "As published, with m r^2/3 for the arm. Records of the first QUBE-Servo contradict that inertia.",
+    resistance=7.5, inductance=1.15e-3, torque_constant=0.0422, rotor_inertia=1.4e-6, arm_damping=1e-3,
+    pendulum_damping=5e-5,
 )  # fmt: skip
 SRV02_PENDULUM = Rig(
     name="srv02",
     label="SRV02 with rotary pendulum, by its published parameters",
-    quantities=electric(SRV02, 2.6, 0.18e-3, 7.68e-3, 3.9e-7, gear=70.0, efficiency=0.9 * 0.69)
-    | pendulum(SRV02, 2e-3, 0.216, 2.4e-3, 0.127, 0.156, 1.2e-3, 2.4e-3, 4096.0),
+    quantities=quantities(
+        SRV02, resistance=2.6, inductance=0.18e-3, torque_constant=7.68e-3, rotor_inertia=3.9e-7, gear=70.0,
+        efficiency=0.9 * 0.69, voltage=10.0, arm_inertia=2e-3, arm_length=0.216, arm_damping=2.4e-3,
+        pendulum_mass=0.127, pendulum_centre=0.156, pendulum_inertia=1.2e-3, pendulum_damping=2.4e-3, counts=4096.0,
+    ),
     machine=rotary,
-)
+)  # fmt: skip
 IP02_CART = Rig(
     name="ip02",
     label="IP02 cart with a pendulum, by its published parameters",
-    quantities=electric(IP02, 2.6, 0.18e-3, 7.67e-3, 3.9e-7, gear=3.71 / 6.35e-3)
+    quantities=quantities(
+        IP02, resistance=2.6, inductance=0.18e-3, torque_constant=7.67e-3, rotor_inertia=3.9e-7, gear=3.71 / 6.35e-3,
+        efficiency=1.0, voltage=10.0,
+    )
     | {
         "cart_mass": Quantity(0.57, "kg", f"{IP02}; 0.94 with its weight", 0.01),
         "cart_damping": Quantity(5.4, "N s/m", f"{IP02}; 4.3 without its weight", 0.0),
@@ -124,4 +116,4 @@ IP02_CART = Rig(
     about="The pole is uniform, with 6 % more inertia about its centre than Quanser's, whose tip is 0.6413 m from the "
     "hinge. The cart's position has the pendulum's 4096 counts, for a metre in place of a turn. The counts of the "
     "machine are 22.75 um.",
-)
+)  # fmt: skip

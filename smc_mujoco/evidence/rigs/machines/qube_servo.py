@@ -11,7 +11,7 @@ import numpy as np
 from smc_mujoco.control.laws.rotary_swing_up import rotary_swing_up
 from smc_mujoco.control.source import SHIPPED
 from smc_mujoco.evidence.rigs.controllers import state_feedback
-from smc_mujoco.evidence.rigs.records import Columns, Record
+from smc_mujoco.evidence.rigs.records import STATE_SAMPLES, Columns, Record, rate
 from smc_mujoco.evidence.rigs.rig import Quantity, Reached, Rig
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
@@ -21,7 +21,6 @@ START_TIME = 2.0  # s: before, the pendulum is caught
 BARS = 9  # of the commutator; its two brushes bridge two bars at 18 places a turn
 PITCH = math.tau / BARS  # rad
 ANGLE_COUNT = 80  # that are tried in a pitch, 0.5 degrees apart; chosen
-CUBIC_SAMPLES = 31  # of the cubics for the balance of the arm, 60 ms; chosen
 FRICTION_SPEED = 0.05  # rad/s, at which dry friction is at its limit in that balance; chosen
 MIN_PROBABILITY = 0.95  # of the angles within a sixteenth of a pitch: below it a brush's is not known; chosen
 PERIOD, STEP = 2e-3, 5e-4  # s; the fit is the same to 0.3 % at half the step
@@ -71,17 +70,18 @@ def zero(q, record: Record) -> dict[str, float]:
     sure of short records: of 12 angles from quarters of the public ones 4 are wrong.
     """
     theta, alpha, u = (record[name][round(START_TIME / PERIOD) :] for name in ("theta", "alpha", "plant_input"))
-    if not q.ripple or len(u) < CUBIC_SAMPLES or not np.ptp(u):
+    if not q.ripple or len(u) <= 2 * STATE_SAMPLES or not np.ptp(u):
         return {}
-    x, v, a = (_cubics(theta, order) for order in range(3))
-    pendulum, speed, acceleration = (_cubics(alpha, order) for order in range(3))
+    x, v, a = (rate(theta, PERIOD, order) for order in range(3))
+    pendulum, speed, acceleration = (rate(alpha, PERIOD, order) for order in range(3))
     pull = q.pendulum_mass * q.arm_length * q.pendulum_length / 2
     torque = q.torque_per_volt * (np.roll(u, 1) - q.back_emf * v)  # held after a delay of 1 ms
     inertia = q.arm_inertia + q.pendulum_mass * q.arm_length**2
-    lacks = inertia * a + pull * (np.cos(pendulum) * acceleration - np.sin(pendulum) * speed**2) - _cubics(torque)
+    moved = inertia * a + pull * (np.cos(pendulum) * acceleration - np.sin(pendulum) * speed**2)
+    lacks = moved - rate(torque, PERIOD, 0)
     smooth, _ = np.linalg.qr(np.column_stack([np.ones(len(x)), x, v, np.tanh(v / FRICTION_SPEED), a, acceleration]))
     angles = PITCH * np.arange(1, ANGLE_COUNT + 1) / ANGLE_COUNT
-    gaps = np.array([lacks, *(lacks - _cubics(ripples(q, x - angle) * torque) for angle in angles)])
+    gaps = np.array([lacks, *(lacks - rate(ripples(q, x - angle) * torque, PERIOD, 0) for angle in angles)])
     gaps -= gaps @ smooth @ smooth.T
     left = np.log(np.linalg.norm(gaps, axis=1))
     even, *likely = np.exp((left.min() - left) * _independent(gaps[0]))
@@ -97,13 +97,6 @@ def _independent(values: np.ndarray) -> float:
     correlation = correlate(values, values)[len(values) - 1 :]
     until = np.argmax(correlation < 0.0)
     return float(len(values) * correlation[0] / (2.0 * correlation[:until].sum() - correlation[0]))
-
-
-def _cubics(values: np.ndarray, derivative: int = 0) -> np.ndarray:
-    """Return a column or its derivative, (K,), from cubics through the samples about each."""
-    from scipy.signal import savgol_filter
-
-    return np.asarray(savgol_filter(values, CUBIC_SAMPLES, 3, deriv=derivative, delta=PERIOD))
 
 
 def commands(record: Record, first: int) -> np.ndarray:

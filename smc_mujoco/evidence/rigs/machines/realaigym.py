@@ -49,16 +49,12 @@ def plant_of(name, q):
     return plant(name, **{key: getattr(q, key) for key in MODEL_1_0})
 
 
-def fields(name, x0):
-    """Return a `Rig.machine` for the plant `name`, which starts hanging at rest."""
-
-    def machine(q):
-        return {
-            "plant": plant_of(name, q), "sensor": Encoder(counts=4096), "u_max": q.torque_limit,
-            "control_period": 2e-3, "x0": x0,
-        }  # fmt: skip
-
-    return machine
+def fields(name, q):
+    """Return the fields of a scenario of the plant `name`, which starts hanging at rest."""
+    return {
+        "plant": plant_of(name, q), "sensor": Encoder(counts=4096), "u_max": q.torque_limit,
+        "control_period": 2e-3, "x0": (0.0, 0.0),
+    }  # fmt: skip
 
 
 COMMON = {
@@ -81,9 +77,9 @@ COMMON = {
 }
 PENDUBOT = Rig(
     name="realaigym_pendubot", label="RealAIGym's double pendulum, driven at the shoulder", quantities=quantities(),
-    machine=fields("pendubot", (0.0, 0.0)), **COMMON,
+    machine=lambda q: fields("pendubot", q), **COMMON,
 )  # fmt: skip
 ACROBOT = Rig(
     name="realaigym_acrobot", label="RealAIGym's double pendulum, driven at the elbow", quantities=quantities(),
-    machine=fields("acrobot", (0.0, 0.0)), **COMMON,
+    machine=lambda q: fields("acrobot", q), **COMMON,
 )  # fmt: skip
