@@ -47,8 +47,8 @@ def equal(stated, derived, what):
 
 def margins(part, derived):
     """Refuse conditions other than these, with other margins (None: checked elsewhere), or a wrong `holds`."""
-    told = {one["name"]: one["margin"] for one in part["conditions"]}
-    need([one["name"] for one in part["conditions"]] == list(derived), f"the conditions of {part['theorem']}")
+    told = {condition["name"]: condition["margin"] for condition in part["conditions"]}
+    need(len(told) == len(part["conditions"]) and list(told) == list(derived), f"the conditions of {part['theorem']}")
     for name in (name for name, value in derived.items() if value is not None):
         equal(told[name], derived[name], f"the margin of {name}")
     need(part["holds"] is all(m > 0 or (m == 0 and k != "reaching") for k, m in told.items()), "whether it holds")
@@ -139,7 +139,7 @@ def restoring(told, e, f):
         need(told["at"] > 0 and m < 0, "the place where the law is too weak")
         return equal(m, 1 - phi(e, arb(told["at"])) / sigma(f, c * told["at"]), "the margin of restoring")
     boxes, best = told["boxes"], (1 - (e.A + e.B) / (f.a * c)).min(arb(1)) if smooth else arb(1)
-    joined = all(one[1] == two[0] for one, two in pairwise(boxes))
+    joined = all(box[1] == following[0] for box, following in pairwise(boxes))
     need(joined and boxes[0][0] == 0 and boxes[-1][1] is None, "boxes from 0 to infinity, without a gap")
     for a, b in boxes[:-1]:
         x, mid = hull(a, b), arb(a) / 2 + arb(b) / 2
@@ -179,7 +179,7 @@ def levels(doc, part, e, f):
     i, j = (sum(bool(z >= edge) for edge in edges) - 1 for z, edges in ((x, xs), (s, ss)))
     at = max(*W[i][j : j + 2], *W[i + 1][j : j + 2]) if x < xs[-1] and abs(s) < ss[-1] else 1
     if f.kind == "sgn":
-        (box,) = (one for one in doc["parts"] if one["theorem"] == "reaching")
+        (box,) = (other for other in doc["parts"] if other["theorem"] == "reaching")
         need(all(x <= box["X"] and abs(s) <= box["S"] for x, s in inside), "an inner set from which s = 0 is reached")
     elif d0 == 0:
         quadratic(part["P"], e, f, inside)

@@ -7,16 +7,17 @@ import itertools
 import json
 from collections.abc import Mapping
 from importlib.metadata import version
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.source import in_words
-from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.plan import FULL, Plan
+from smc_mujoco.mechanisms.plant import catalogue as plants
+from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.studies.table import Table
 
 SHOWN_PACKAGES = ("plotly", "pyarrow", "scipy")  # packages whose versions are shown beside those that each run records
@@ -63,9 +64,10 @@ class About:
     @functools.cached_property
     def conditions(self) -> dict[str, str]:
         """Condition -> the Scenario fields that it sets, in words."""
-        texts = {}
+        texts, duration = {}, self.plan.duration
         for name in self.plan.conditions:
-            fields = {words.plant(p): _fields(scenarios.fields(name, p, self.plan.duration)) for p in self.plan.plants}
+            known = find_condition(name)
+            fields = {words.plant(p): known.brief(plants()[p], duration) or "nothing" for p in self.plan.plants}
             same = len(set(fields.values())) == 1
             texts[name] = next(iter(fields.values())) if same else "; ".join(f"{p}: {t}" for p, t in fields.items())
         return texts
@@ -95,22 +97,6 @@ def about(plan: Plan, table: Table, spent: Mapping[str, float], no_film: str | N
     )
 
 
-def _fields(fields: Mapping[str, Any]) -> str:
-    return ", ".join(f"{name.replace('_', ' ')} {_short(value)}" for name, value in fields.items()) or "nothing"
-
-
-def _short(value: Any) -> str:
-    """Return a field's value as it would be written, without what it leaves at its default."""
-    if not dataclasses.is_dataclass(value) or isinstance(value, type):
-        return " ".join(str(value).split())
-    shown = [
-        f"{field.name}={_short(getattr(value, field.name))}"
-        for field in dataclasses.fields(value)
-        if field.init and getattr(value, field.name) != field.default
-    ]
-    return f"{type(value).__name__}({', '.join(shown)})"
-
-
 def laws_of(plan: Plan, gains: str) -> dict[str, dict[str, Component]]:
     """Return plant -> law's name -> law, for the laws that a set has gains for on that plant."""
     laws: dict[str, dict[str, Component]] = {}
@@ -121,6 +107,7 @@ def laws_of(plan: Plan, gains: str) -> dict[str, dict[str, Component]]:
 
 
 def _source(plant: str, law: str, name: str) -> str:
+    """Return where the gains of a law in a set come from, in words."""
     if name not in sets.OBJECTIVES:
         return "chosen by hand before any comparison"
     its = sets.tuned(plant, law, name)

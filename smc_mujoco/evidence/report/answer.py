@@ -106,12 +106,6 @@ def settles(by_cell: Cells, plant: str, condition: str, law: str) -> bool:
     return all(s.median < math.inf for s in by_cell.get((plant, condition, "settling_time"), ()) if s.law == law)
 
 
-def lead(by_cell: Cells, plant: str, condition: str, metric: str) -> str:
-    """Return how the winner compares with its closest rival, in words; "" if there is no winner."""
-    said = next((score.lead for score in by_cell[plant, condition, metric] if score.wins), "")
-    return words.pretty(said)
-
-
 def standings(findings: "Findings", metric: str) -> list[Standing]:
     """Return how often each law leads, and how often another law is better, most wins first."""
     by_cell = {key: scores for key, scores in cells(findings.scores).items() if key[2] == metric}
@@ -139,28 +133,19 @@ def undecided(by_cell: Cells, metrics: Sequence[str]) -> tuple[int, int]:
     return winners.count(None), len(winners)
 
 
-def losses(by_cell: Cells, metrics: Sequence[str], law: str = words.PAPER_LAW) -> list[Loss]:
-    """Return the cells in which another law is better than this one, worst first."""
+def losses(by_cell: Cells, metrics: Sequence[str]) -> list[Loss]:
+    """Return the cells in which another law is better than the paper's, worst first."""
     lost: list[Loss] = []
     for (plant, condition, metric), scores in by_cell.items():
-        score = next((s for s in scores if s.law == law), None)
+        score = next((s for s in scores if s.law == words.PAPER_LAW), None)
         if metric not in metrics or score is None or not score.beaten:
             continue
         best = min((s for s in scores if s.best), key=lambda s: s.median, default=None)
         if best is not None and math.isfinite(best.median):
             resolution = max(best.floor, ROUNDING)
-            loss = Loss(
-                metric=metric,
-                plant=plant,
-                condition=condition,
-                median=score.median,
-                rival=best.median,
-                law=best.law,
-                times=score.median / max(best.median, resolution),
-                rounded=best.median < resolution,
-                settles=settles(by_cell, plant, condition, best.law),
-            )
-            lost.append(loss)
+            times, rounded = score.median / max(best.median, resolution), best.median < resolution
+            arrives = settles(by_cell, plant, condition, best.law)
+            lost.append(Loss(metric, plant, condition, score.median, best.median, best.law, times, rounded, arrives))
     return sorted(lost, key=lambda loss: -loss.times)
 
 
@@ -224,7 +209,8 @@ def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
         of, lost, alone = (sum(getattr(row, name) for row in of_paper) for name in ("of", "lost", "alone"))
         parts.append(f"its observer-free law is beaten in {lost} of {of} comparisons and wins in {alone or 'none'}")
     if findings.claims:
-        parts.append(f"of its {len(findings.claims)} checked claims, {_verdicts(findings)}")
+        verdicts = joined(f"{n} {'are' if n != 1 else 'is'} {said}" for said, n in totals(findings.claims).items())
+        parts.append(f"of its {len(findings.claims)} checked claims, {verdicts}")
     return f"The paper: {'; '.join(parts)}." if parts else ""
 
 
@@ -279,19 +265,19 @@ def leads(findings: "Findings", metric: str) -> str:
 
 
 def rest(findings: "Findings", metrics: Sequence[str]) -> list[str]:
-    """Return the other sentences: how sure it is, who settles, how the paper's law and its claims do."""
-    return list(
-        filter(None, [_sure(findings, metrics), _settled(findings), _paper(findings, metrics), _claims(findings)])
-    )
+    """Return the other sentences: how sure it is, and who settles."""
+    return list(filter(None, [_sure(findings, metrics), _settled(findings)]))
 
 
 def _sure(findings: "Findings", metrics: Sequence[str]) -> str:
+    """Return how many comparisons have no winner, and what their samples are."""
     open, of = undecided(cells(findings.scores), metrics)
+    compared = len({(s.plant, s.condition) for s in findings.scores})
     repeated = len({(s.plant, s.condition) for s in findings.scores if s.runs < s.seeds})
     samples = list(dict.fromkeys(s.sample for s in findings.scores if s.runs == s.seeds)) or ["distinct runs only"]
     return (
         f"In {open} of {of} comparisons no single winner can be declared; each has {samples[0]}, and the tests of a "
-        f"metric are corrected for all {len({(s.plant, s.condition) for s in findings.scores})} cells."
+        f"metric are corrected for all {compared} cells."
         + f" In {repeated} of the cells seeds change nothing, or not each: equal runs count once."
         * bool(repeated)
     )
@@ -308,31 +294,3 @@ def _settled(findings: "Findings") -> str:
         text = f"{words.law(worst)} settles least often, in {100 * share[worst]:.0f} % of its runs; a run that does "
         text += "not settle may still be calm"
     return f"{text}. {findings.about.failed or 'None'} of {findings.about.runs} runs failed."
-
-
-def _paper(findings: "Findings", metrics: Sequence[str]) -> str:
-    of_paper = {metric: row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER_LAW}
-    if not of_paper:
-        return ""
-    lost = losses(cells(findings.scores), metrics)
-    how = f"{len(lost)} comparisons, listed below, in half of them" if len(lost) > 1 else "1 comparison, listed below,"
-    beaten = f"; it is beaten in {how} by a factor of " if lost else ""
-    beaten += f"{words.number(lost[(len(lost) - 1) // 2].times)} or more" if lost else ""
-    return (
-        "The paper’s observer-free law leads, or is level with what leads, in "
-        f"{joined([f'{row.best} on {words.metric(metric)}' for metric, row in of_paper.items()])}, "
-        f"of {of_paper[metrics[0]].of} cells each{beaten}."
-    )
-
-
-def _claims(findings: "Findings") -> str:
-    if not findings.claims:
-        return ""
-    flips = sum(claim.flips for claim in findings.claims)
-    depend = f"; {flips} of these verdicts depend on the gains" if flips else ""
-    return f"Of {len(findings.claims)} claims of the paper that were checked, {_verdicts(findings)}{depend}."
-
-
-def _verdicts(findings: "Findings") -> str:
-    """Return how many of the paper's own sentences have each verdict."""
-    return joined(f"{n} {'are' if n != 1 else 'is'} {verdict}" for verdict, n in totals(findings.claims).items())

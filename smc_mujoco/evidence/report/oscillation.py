@@ -17,6 +17,7 @@ from smc_mujoco.studies.cache import cached
 
 LAG = 0.01  # s, of the actuator
 DURATION = 8.0  # s, of the runs
+PREDICTED = ("amplitude", "frequency", "third_harmonic", "uncertainty")  # fields of a `Chattering` that are kept
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -67,26 +68,16 @@ def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) 
     rows, cases = [], [case(plant, law, "nominal", DURATION, GAINS, changes={"actuator": Lag(LAG)}) for law in laws]
     traces = run(cases, threads)
     changes = step_halving(traces, 0, threads)
-    for done, (one, trace, change) in enumerate(zip(cases, traces, changes, strict=True)):
+    for done, (scenario, trace, change) in enumerate(zip(cases, traces, changes, strict=True)):
         report(done, len(cases))
         try:
-            cycle = chattering(one)
+            cycle = chattering(scenario)
         except ScenarioError:
             continue
         amplitude, frequency = NO_CYCLE if trace.diverged_at is not None else channel_cycle(trace)
-        rows.append(
-            Oscillation(
-                plant=plant,
-                law=one.law.name,
-                amplitude=cycle.amplitude,
-                frequency=cycle.frequency,
-                measured_amplitude=amplitude,
-                measured_frequency=frequency,
-                third_harmonic=cycle.third_harmonic,
-                uncertainty=cycle.uncertainty,
-                marked=change.marked,
-            )
-        )
+        predicted = {name: getattr(cycle, name) for name in PREDICTED}
+        measured = {"measured_amplitude": amplitude, "measured_frequency": frequency, "marked": change.marked}
+        rows.append(Oscillation(plant=plant, law=scenario.law.name, **predicted, **measured))
     return rows
 
 

@@ -14,7 +14,7 @@ import re
 from collections.abc import Hashable, Iterable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control.law import laws
@@ -95,7 +95,7 @@ def page(findings: Findings) -> str:
         # tables: what identifies a row -> column -> cell
         board=pivot(((s.plant, s.condition, s.law), s.metric, s) for s in findings.scores),
         places=pivot(((p.plant, p.law), p.metric, p) for p in findings.places),
-        set_margins=set_margins(findings),
+        set_margins=pivot(((m.kind, m.plant, m.law), name, m) for name, some in findings.by_set.items() for m in some),
         gains=pivot(((row.plant, row.law), row.set, row) for row in findings.about.gains),
         # how it was computed
         laws=laws(),
@@ -103,7 +103,7 @@ def page(findings: Findings) -> str:
         u_max=scenarios.U_MAX,
         control_period=scenarios.CONTROL_PERIOD,
         relevant=100 * findings.about.plan.relevant,
-        metrics={metric.name: paragraphs(inspect.getdoc(metric.formula) or "") for metric in metrics()},
+        metrics={metric.name: (inspect.getdoc(metric.formula) or "").split("\n\n") for metric in metrics()},
     )
 
 
@@ -113,11 +113,6 @@ def pivot(cells: Iterable[tuple[Row, Column, Cell]]) -> dict[Row, dict[Column, C
     for row, column, cell in cells:
         table.setdefault(row, {})[column] = cell
     return table
-
-
-def set_margins(findings: Findings) -> dict[tuple[str, str, str], dict[str, Any]]:
-    """Return (kind, plant, law) -> set of gains -> Margin; a law that a set has no gains for lacks that set."""
-    return pivot(((m.kind, m.plant, m.law), name, m) for name, margins in findings.by_set.items() for m in margins)
 
 
 def checks(sets: Sequence[str], claim: Claim) -> list[SimpleNamespace]:
@@ -144,8 +139,3 @@ def link(what: str) -> str:
 def uri(kind: str, data: bytes) -> str:
     """Return bytes as a data URI."""
     return f"data:{kind};base64,{base64.b64encode(data).decode()}"
-
-
-def paragraphs(text: str) -> list[str]:
-    """Return a docstring's paragraphs, with signs as people write them."""
-    return [words.pretty(" ".join(part.split())) for part in text.strip().split("\n\n")]

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, printable
-from smc_mujoco.common.text import joined
 from smc_mujoco.control.source import in_words
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.plan import Report, Work
@@ -54,14 +53,8 @@ class Machine:
 
     def sentence(self, board: Board) -> str:
         """Return who wins in a metric, and whether on every parameter set."""
-        count, won, what = len(board.blocks), ensemble.wins(board), words.metric(board.metric)
-        what = what[:1].upper() + what[1:]
-        if board.winner:
-            return f"{what}: {self.laws[board.winner]} wins on all {count} sets of quantities: the ranking survives."
-        if not won:
-            return f"{what}: no law wins on any of the {count} sets of quantities."
-        others = joined([f"{self.laws[law]} on {number}" for law, number in won.items()])
-        return f"{what}: no law wins on all sets of quantities; {others} of {count}."
+        what = words.metric(board.metric)
+        return f"{what[:1].upper()}{what[1:]}: {ensemble.sentence(board, self.laws)}."
 
     def medians(self, metric: str, law: str) -> list[float]:
         """Return a law's medians on the sets."""

@@ -288,12 +288,6 @@ def fronts(plan: Plan) -> tuple[Front, ...]:
         for law in plan.laws:
             with contextlib.suppress(ScenarioError):
                 tuned = sets.tuned(plant, law, GAINS)
-                front = Front(
-                    plant=plant,
-                    law=law,
-                    tracking=tuple(tracking for tracking, _ in tuned.front),
-                    variation=tuple(variation for _, variation in tuned.front),
-                    chosen=tuned.best,
-                )
-                pairs.append(front)
+                tracking, variation = zip(*tuned.front, strict=True)
+                pairs.append(Front(plant=plant, law=law, tracking=tracking, variation=variation, chosen=tuned.best))
     return tuple(pairs)

@@ -276,13 +276,6 @@ def test_a_report_says_what_a_condition_sets_and_where_gains_are_from(snapshot):
     its = about.About(plan=SMALL, runs=1, failed=0, seeds=1, sources="", versions={}, spent={})
     assert its.left_out == [one for one in FULL.conditions if one not in SMALL.conditions]
     assert "\n".join(f"{name}: {text}" for name, text in its.conditions.items()) == snapshot
-    assert about._short(smc.Noise(position=0.01)) == "Noise(position=0.01)"
-    assert about._short("a   b\n c") == "a b c"
-    assert about._fields({}) == "nothing"
-    assert (
-        about._fields({"input_delay": 0.01, "friction": smc.Coulomb(0.3)})
-        == "input delay 0.01, friction Coulomb(level=0.3)"
-    )
     assert about._source("duffing", "classical", "study") == "chosen by hand before any comparison"
     its = gain_sets.tuned("duffing", "classical", "tuned")
     said = f"shipped ({its.search}); the best of {len(its.sets)}; objective {its.objective:.4g} s²"

@@ -169,7 +169,7 @@ def reaching(runs):
 def explicit(runs):
     """Total variation of u, and the largest |x|, implicit over explicit."""
     traces = runs.traced(runs.grid())
-    pairs = {one: [traces[runs.plant, law, one] for law in runs.laws] for one in runs.conditions}
+    pairs = {condition: [traces[runs.plant, law, condition] for law in runs.laws] for condition in runs.conditions}
     return {
         "variation of u, implicit / explicit": {
             k: variation_of(a.u) / variation_of(b.u) for k, (a, b) in pairs.items()
@@ -216,7 +216,8 @@ def rests(runs):
 
 def observed(runs):
     """Exponent of the largest error of the predicted position of the last half in the control period."""
-    errors = {h: largest(one.s) for h, one in at_periods(runs, runs.conditions[0], -1 if runs.quick else None).items()}
+    traces = at_periods(runs, runs.conditions[0], -1 if runs.quick else None)
+    errors = {h: largest(trace.s) for h, trace in traces.items()}
     return {
         "exponent of the largest |e1| in h": exponent([*errors], errors.values()),
         "largest |e1|, m": {f"{h:g} s": error for h, error in errors.items()},
