@@ -8,8 +8,8 @@ A run tolerates a level if it does not fail and its ultimate bound after 10 s is
 (`conventions`). Then the envelope has shrunk, as the paper's claim on delay requires, because it starts at the scale.
 The search tries up to nine levels from small to large. Then it halves the interval below the FIRST level that is not
 tolerated, until it is known to one control period of delay, an eighth of one of jitter, or 2 % of other levels. There
-may be tolerated levels above one that is not. Noise is one realisation, seed 0, the same for every law. A disturbance
-is positive and acts on every channel.
+may be tolerated levels above one that is not, and levels that are not between two that were tried. Noise is one
+realisation, seed 0, the same for every law. A disturbance is positive and acts on every channel.
 
 Linear theory gives the delay above which rest is unstable. A smooth law then oscillates with an amplitude that grows
 from 0, so it tolerates a little more. Theory also gives the constant force, or dry friction, that holds the plant at
@@ -262,10 +262,10 @@ class Margin:
     Attributes:
       plant, law: their names.
       kind: one of MARGIN_KINDS.
-      value: largest tolerated level. NaN if the run without it fails already. If equal to `searched`, all are
-        tolerated.
+      value: largest tolerated level below the first one tried that is not. NaN if the run without it fails already. If
+        equal to `searched`, all that were tried are tolerated.
       unit: unit of value, resolution, searched and theory.
-      resolution: the first level that is not tolerated is at most this much larger.
+      resolution: a level that is not tolerated is at most this much larger.
       searched: largest level of the search.
       theory: the margin by linear theory, or None.
     """

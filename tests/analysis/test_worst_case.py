@@ -58,6 +58,23 @@ def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(name):
     assert np.abs(np.array(made.resolved.x0) - 1.5).max() <= 1.5 * within.x0 * (1 + 1e-12)
 
 
+def test_the_ends_of_a_class_are_within_it():
+    """A delay and a jitter are counted in steps, and friction may be both scaled and added."""
+    base = scenario(friction=smc.Coulomb(0.1), physics_step=1e-3)
+    within = smc.Uncertainty(
+        delay=(3e-4, 1.6e-3), jitter=2e-4, friction=(0.0, 0.2), friction_scale=(0.5, 1.5), mass=(0.12, 1.14)
+    )
+    members = Members([base], within)
+    low, high = (members.with_constants(np.full(len(members.ends), share)) for share in (0.0, 1.0))
+    assert (low.input_delay, high.input_delay) == (1e-3, 1e-3)
+    assert (low.clock.jitter, high.clock.jitter) == (0.0, 1.25e-4)
+    assert [one.friction[0].level for one in (low, high)] == pytest.approx([0.05, 0.35])
+    assert (low.mismatch["mass"], high.mismatch["mass"]) == (0.12, 1.14)
+    for few in ({"delay": (3e-4, 4e-4)}, {"delay": (0.0, 4e-4)}, {"jitter": 1e-4}):
+        with pytest.raises(smc.ScenarioError, match="give a range with one of these"):
+            Members([base], smc.Uncertainty(**few))
+
+
 def test_errors_of_measurement_reach_the_law_alike_in_both_loops():
     error, steps = smc.Held([0.0, 0.05], [0.02, -0.02]), smc.TimeSeries([0.0, 0.2], [0.1, -0.1])
     made = scenario(duration=0.1, noise=smc.Noise(position=1e-3, position_error=error, velocity_error=steps))

@@ -33,6 +33,7 @@ SHIFT_PROBABILITY = 0.5  # that a change of a force shifts a switch, if there is
 MOVE_PROBABILITY = 0.5  # of each constant, in a change of constants; chosen
 CONSTANT_DEVIATION = 0.3  # standard deviation by which a constant moves, of its range; chosen
 JITTER_SHARES = 8  # jitter is a multiple of this part of the control period; chosen
+MULTIPLE_TOLERANCE = 1e-6  # of a step: a bound so close to a multiple is one
 ROUNDING = 1e-12  # of the largest force: a smaller change of slope is none
 DEFAULT_FORCE_SHARE = 1 / 6  # of the force of the weakest drive: the disturbance of the default class; chosen
 DEFAULT_FRICTION_SCALE = (0.5, 1.5)  # of the default class; chosen
@@ -50,13 +51,14 @@ class Uncertainty:
       position_noise, velocity_noise: bounds on errors of measurement, rad or m, and per second, beside the scenario's
         own noise. The adversary chooses the errors, the same in every channel.
       hold: s, for which each error of measurement lasts.
-      delay: lowest and highest input delay, s, beside the scenario's own.
-      jitter: largest delay of a sample, s, at most 7/8 of the control period, see `smc.Clock`. Which samples are late
-        is as the scenario's seed says.
+      delay: lowest and highest input delay, s, beside the scenario's own; those tried are multiples of its physics
+        step.
+      jitter: largest delay of a sample, s, see `smc.Clock`; those tried are eighths of the control period. Which
+        samples are late is as the scenario's seed says.
       mass: lowest and highest factor on the plant's mass.
       parameters: name -> lowest and highest factor on other parameters of the plant, or what is added to one of
         `plant.added`: {"payload": (0.0, 2.0)}.
-      friction: lowest and highest dry friction, N or N m, beside the scenario's own.
+      friction: lowest and highest dry friction, N or N m, beside the scenario's own; it is not scaled.
       friction_scale: lowest and highest factor on the friction of the scenario and on the dry friction of its plant.
       x0: how far each channel may start from the scenario's x0, as a share of it.
 
@@ -334,19 +336,20 @@ SetConstant = Callable[[Scenario, float], Scenario]
 def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[tuple[str, SetConstant]]:
     """Yield the name of each constant that may differ, and the function that sets it to a share of its range."""
     if within.delay != (0.0, 0.0):
-        yield "delay", _of_range(within.delay, _with_delay)
+        yield "delay", _of_range(_multiples("delay", within.delay, scenario.resolved.physics_step), _with_delay)
     if within.jitter:
-        yield "jitter", _of_range((0.0, within.jitter / scenario.control_period), with_jitter)
+        _, jitter = _multiples("jitter", (0.0, within.jitter), scenario.control_period / JITTER_SHARES)
+        yield "jitter", _of_range((0.0, jitter / scenario.control_period), with_jitter)
     for name, bounds in {"mass": within.mass, **within.parameters}.items():
         if bounds != (1.0, 1.0):
             yield name, _of_range(bounds, functools.partial(_with_factor, name=name))
-    if within.friction != (0.0, 0.0):
-        yield "friction", _of_range(within.friction, with_friction)
     if within.friction_scale != (1.0, 1.0):
         if not (scenario.friction or _dry(scenario.plant)):
             cure = "give it some, such as friction=smc.Coulomb(0.1), or a class with friction=(0.0, 0.1)"
             raise ScenarioError(f"friction_scale of {scenario.plant.name}, which has no friction here: {cure}")
         yield "friction x", _of_range(within.friction_scale, _with_friction_scale)
+    if within.friction != (0.0, 0.0):
+        yield "friction", _of_range(within.friction, with_friction)
     for i in range(scenario.plant.n if within.x0 else 0):
         yield f"x0[{i}]", _of_range((-within.x0, within.x0), functools.partial(_with_start, i=i))
 
@@ -354,11 +357,25 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[tuple[str, S
 def _of_range(bounds: Range, put: SetConstant) -> SetConstant:
     """Return a function that sets the value at a share of a range."""
     low, high = bounds
-    return lambda scenario, share: put(scenario, low + share * (high - low))
+    return lambda scenario, share: put(scenario, min(low + share * (high - low), high))
+
+
+def _multiples(name: str, bounds: Range, step: float) -> Range:
+    """Return the lowest and the highest multiple of a step, s, within bounds.
+
+    Raises:
+      ScenarioError: there is none but 0.
+    """
+    low = math.ceil(bounds[0] / step - MULTIPLE_TOLERANCE) * step
+    high = math.floor(bounds[1] / step + MULTIPLE_TOLERANCE) * step
+    if high < max(low, step):
+        told = f"from {bounds[0]:g} to {bounds[1]:g} s, and a run has multiples of {step:g} s"
+        raise ScenarioError(f"Uncertainty's {name} is {told}: give a range with one of these")
+    return low, high
 
 
 def _with_delay(scenario: Scenario, delay: float) -> Scenario:
-    """Return the scenario with a longer input delay, to the nearest physics step."""
+    """Return the scenario with an input delay longer by a number of physics steps."""
     step = scenario.resolved.physics_step
     return dataclasses.replace(scenario, input_delay=(scenario.delay_steps + round(delay / step)) * step)
 
