@@ -1,4 +1,4 @@
-"""Advice, the result of `adviser`: the finalists of a comparison of laws, as a table and as an answer in sentences.
+"""Advice, the result of `adviser`: the laws of a comparison, as a table and as an answer in sentences.
 
 Every sentence is made from the numbers of the comparison, so it changes when they do.
 """
@@ -12,7 +12,7 @@ import numpy as np
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import joined, number
+from smc_mujoco.common.text import every, joined, number
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.source import in_words
@@ -22,7 +22,8 @@ from smc_mujoco.studies.board import size_in_words
 from smc_mujoco.studies.needs import NEEDS, TIES, Choice, ties
 from smc_mujoco.studies.table import Table
 
-MAX_NAMES = 6  # of laws that the screening left out
+MAX_ROWS = 12  # laws in the table; chosen
+MAX_NAMES = 6  # of laws in a sentence; chosen
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -34,12 +35,11 @@ class Advice(Tables):
       conditions: names of the conditions.
       needs: names of the compared needs, such as "fast".
       wanted: properties that every law has, in words.
-      choices: the finalists, the advised one first.
-      others: names of the laws that the screening left out, in its order.
-      comparison: of the finalists that are fit, or of all if none is; its blocks are those of `blocks`.
-      table: the finalists' runs.
+      choices: the laws, best first.
+      comparison: of the laws that are fit, or of all if none is; its blocks are those of `blocks`.
+      table: their runs.
       effort: unit of u, "N m", "N" or "V"; "" for that of a force, or where conditions differ.
-      untuned: names of the laws with default gains, over which no other law is advised; the screened ones too.
+      untuned: names of the laws with default gains, over which no other law is advised.
     """
 
     plant: Plant
@@ -47,7 +47,6 @@ class Advice(Tables):
     needs: tuple[str, ...]
     wanted: tuple[str, ...]
     choices: tuple[Choice, ...]
-    others: tuple[str, ...]
     comparison: Comparison
     table: Table
     effort: str = ""
@@ -79,7 +78,7 @@ class Advice(Tables):
         return [block for block, better in zip(self.blocks, self.comparison.better[:, a, b], strict=True) if better]
 
     def better(self, law: str, need: str) -> dict[str, list[str]]:
-        """Return finalist -> the conditions in which it is better than a law on a need; most conditions first."""
+        """Return law -> the conditions in which it is better than a law on a need; most conditions first."""
         by_rival = {}
         for rival in self.compared:
             if conditions := [condition for other, condition in self.wins(rival, law) if other == need]:
@@ -92,24 +91,24 @@ class Advice(Tables):
         return any(value for (compared, _), value in zip(self.blocks, row, strict=True) if compared == need)
 
     def dominated(self, law: str) -> list[str]:
-        """Return the finalists that are better than a law in some block, and worse in none."""
+        """Return the laws that are better than a law in some block, and worse in none."""
         rivals = (name for name in self.compared if name != law)
         return [name for name in rivals if self.wins(name, law) and not self.wins(law, name)]
 
     @property
     def compared(self) -> list[str]:
-        """The finalists that are compared, best first."""
+        """The laws that are compared, best first."""
         return [choice.law.name for choice in self.choices if choice.law.name in self.comparison.laws]
 
     @property
     def level(self) -> list[str]:
-        """The finalists that cannot be told from the advised law in any block."""
+        """The laws that cannot be told from the advised law in any block."""
         first, *others = self.compared
         return [name for name in others if not self.wins(first, name) and not self.wins(name, first)]
 
     @property
     def all_level(self) -> bool:
-        """Whether there are several finalists, none better or worse than the advised law."""
+        """Whether there are several laws, none better or worse than the advised law."""
         return 1 < len(self.compared) == len(self.level) + 1
 
     @property
@@ -122,7 +121,7 @@ class Advice(Tables):
 
     @property
     def tied(self) -> list[str]:
-        """The finalists that are level with the advised law, and whose medians do not differ relevantly from its."""
+        """The laws that are level with the advised law, and whose medians do not differ relevantly from its."""
         laws, first = self.comparison.laws, self.compared[0]
         return [name for name in self.compared[1:] if self.comparison.tied[laws.index(first), laws.index(name)]]
 
@@ -142,11 +141,11 @@ class Advice(Tables):
 
     @property
     def tables(self) -> list[Tabular]:
-        """One table with a row for each finalist, above the answer; marked where no finalist is better."""
+        """One table with a row for each of the first laws, above the answer; marked where no law is better."""
         metrics = [NEEDS[need].metric for need in self.needs]
         units = [f"{each.need}: {each.label} ({each.unit_for(self.plant.unit, self.effort)})" for each in metrics]
         rows = []
-        for choice in self.choices:
+        for choice in self.choices[:MAX_ROWS]:
             place, name = f"{choice.rank.place:g}" if choice.fit else "–", choice.law.name
             settles = f"{100 * choice.settles:.0f} %"
             rows.append(
@@ -157,7 +156,7 @@ class Advice(Tables):
         return [Tabular(headings=["law", "place", "settles", *units], rows=rows, title=self.title, notes=notes)]
 
     def _cell(self, choice: Choice, need: str) -> Cell:
-        """Return a median, marked if no finalist is better in any condition and no run fails."""
+        """Return a median, marked if no law is better in any condition and no run fails."""
         name, entry = choice.law.name, NEEDS[need]
         rivalled = len(self.compared) > 1 and name in self.compared
         doubted = rivalled and self._any(self.comparison.undecided | self.comparison.beaten, name, need)
@@ -169,17 +168,19 @@ class Advice(Tables):
         of = f" of {len(self.conditions)} conditions" if len(self.conditions) > 1 else ""
         medians = f", and medians{of}, with 95 % intervals over {self.samples}" * (not self._untested)
         text = f"place by failed runs, then by mean rank{medians}. "
-        text += f"*: no finalist is better{' in any condition' if of else ''}, and every run has a value."
+        if more := [choice.law.name for choice in self.choices[MAX_ROWS:]]:
+            text += f"{len(more)} more law{'s' * (len(more) > 1)}: {_first_of(more)}. "
+        text += f"*: no law is better{' in any condition' if of else ''}, and every run has a value."
         bare = any(not NEEDS[need].below(choice) for choice in self.choices for need in self.needs)
         text += " No interval: its ends are equal, or one is a run without a value." * bare
         if self.comparison.undecided.any():
             text += " A law is not marked where samples are too few to tell."
-        if sources := in_words({choice.law.name: [choice.law.source] for choice in self.choices}):
+        if sources := in_words({choice.law.name: [choice.law.source] for choice in self.choices[:MAX_ROWS]}):
             text += f" {sources[:1].upper()}{sources[1:]}."
         if any(self.dominated(name) for name in self.compared):
             text += " A law stands behind those that dominate it: better somewhere, worse nowhere."
         if self._shared and len(self._shared) < len(self.comparison.laws):
-            text += f" Sets of gains, which are the sample of a law that has several: {', '.join(self._shared)}."
+            text += f" Sets of gains, which are the sample of a law that has several: {_first_of(self._shared)}."
         text += " –: settles too seldom to be advised." * any(not choice.fit for choice in self.choices)
         resolved = float(self.comparison.floors.max())
         sensor = f", for positions at least what the sensor resolves, {number(resolved)} {self.plant.unit}"
@@ -187,7 +188,7 @@ class Advice(Tables):
 
     @property
     def samples(self) -> str:
-        """The largest sample of two finalists in words: "24 runs", or "3 sets of gains" where runs share them."""
+        """The largest sample of two laws in words: "24 runs", or "3 sets of gains" where runs share them."""
         samples, sets = self.comparison.samples, self.comparison.sets.max(axis=1)
         block, a, b = np.unravel_index(int(samples.argmax()), samples.shape)
         count = int(samples[block, a, b]) if len(sets) > 1 else int(self.comparison.seeds.max())
@@ -196,7 +197,7 @@ class Advice(Tables):
 
     @property
     def _shared(self) -> list[str]:
-        """The finalists whose runs share several sets of gains."""
+        """The laws whose runs share several sets of gains."""
         seeds = self.comparison.seeds.max()
         counts = self.comparison.sets.max(axis=1).tolist()
         named = zip(self.comparison.laws, counts, strict=True)
@@ -221,16 +222,16 @@ class Advice(Tables):
         remarks = [NEEDS[need].remark(self.choices) for need in self.needs]
         advice = [self._use(), self._because(), *remarks, *self._instead(), self._second(), self._sure()]
         parts = [self._refusal(), *remarks] if self.barred else advice
-        return list(filter(None, [*parts, self._left_out()]))
+        return list(filter(None, parts))
 
     def _refusal(self) -> str:
         """Return why no law is advised over rivals with default gains."""
         one = len(self.barred) == 1
-        why = f"No law is advised over {joined(self.barred)}, whose gains are {'its' if one else 'their'} defaults"
+        why = f"No law is advised over {_first_of(self.barred)}, whose gains are {'its' if one else 'their'} defaults"
         return f"{why}: tune {'it' if one else 'them'}, or ask for it with defaults=True (--defaults)."
 
     def _use(self) -> str:
-        first, others = self.choices[0], self.compared[1:]
+        first = self.choices[0]
         law = f"{first.law} ({first.gains})"
         longer = f"longer runs than {self.table.scenario(0).duration:g} s"
         cure = f"give {longer}, a stronger actuator, more suitable laws or easier conditions"
@@ -244,9 +245,9 @@ class Advice(Tables):
             comparisons = f"{len(self.blocks)} comparison{'s' * (len(self.blocks) > 1)}"
             return f"No law can be called the best: {self.samples} are too few for {comparisons}."
         if self.all_level:
-            every = f"all {len(self.compared)} finalists" if len(others) > 1 else "both laws"
+            laws = f"{every(len(self.compared))} laws"
             where = "in the worst that was found" if self._untested else f"in every comparison of {self.samples}"
-            return f"No law can be called the best: {every} are level {where}. Use the one that you know."
+            return f"No law can be called the best: {laws} are level {where}. Use the one that you know."
         return f"Use {law}."
 
     @property
@@ -262,13 +263,13 @@ class Advice(Tables):
             return f"Each settles in {'at least ' * (share < 1)}{100 * share:.0f} % of its runs."
         leads = first.rank.mean == min(choice.rank.mean for choice in self.choices if choice.fit)
         equals = [c.law.name for c in self.choices[1:] if c.fit and c.rank.mean == first.rank.mean]
-        why = f"it has the best mean rank of {count} finalists"
-        why += f", as {'has' if len(equals) == 1 else 'have'} {joined(equals)}" if equals else ""
+        why = f"it has the best mean rank of {count} laws"
+        why += f", as {'has' if len(equals) == 1 else 'have'} {_first_of(equals)}" if equals else ""
         if not leads:
             why = "it has the best mean rank of those that none dominates, being better somewhere and worse nowhere"
         ahead = [c.law.name for c in self.choices[1:] if c.law.name in self.tied and c.rank.mean < first.rank.mean]
         if ahead:
-            why = f"it ties with {joined(ahead)}, of better mean rank, and {self.rule}"
+            why = f"it ties with {_first_of(ahead)}, of better mean rank, and {self.rule}"
         if count == 1:
             alone = "is the only law here that suits" if len(self.choices) == 1 else "alone settles often enough"
             why = f"it {alone}"
@@ -281,15 +282,15 @@ class Advice(Tables):
         value, better = self._value(choice, need), self.better(choice.law.name, need)
         if not better:
             few = ", as far as so few sets of gains tell" * self._any(self.comparison.undecided, choice.law.name, need)
-            return f"{need.capitalize()}: {value}; no finalist is better{few}."
+            return f"{need.capitalize()}: {value}; no law is better{few}."
         by_where: dict[str, list[str]] = {}
         for name, conditions in better.items():
             by_where.setdefault(self._where(conditions), []).append(name)
-        rivals = [f"{joined(names)}{where}" for where, names in by_where.items()]
+        rivals = [f"{_first_of(names)}{where}" for where, names in by_where.items()]
         return f"{need.capitalize()}: {value}; better {'is' if len(better) == 1 else 'are'} {'; '.join(rivals)}."
 
     def _instead(self) -> list[str]:
-        """Return for each need the finalist that is better than the advised law, if there is one, and what it costs."""
+        """Return for each need the law that is better than the advised law, if there is one, and what it costs."""
         first, sentences = self.choices[0], []
         if len(self.needs) == 1 or not first.fit or not first.reliable or self.all_level:
             return []
@@ -338,10 +339,10 @@ class Advice(Tables):
         mixed = [name for name in others if self.wins(name, first)]
         unsure = [name for name in self.level if name not in self.tied]
         parts = [
-            f"it dominates {joined(beaten)}: better somewhere, worse nowhere" if beaten else "",
-            f"it ties with {joined(self.tied)}; {self.rule}" if self.tied else "",
-            f"not to be told from {joined(unsure)}" if unsure else "",
-            f"a matter of what counts against {joined(mixed)}, better here and worse there" if mixed else "",
+            f"it dominates {_first_of(beaten)}: better somewhere, worse nowhere" if beaten else "",
+            f"it ties with {_first_of(self.tied)}; {self.rule}" if self.tied else "",
+            f"not to be told from {_first_of(unsure)}" if unsure else "",
+            f"a matter of what counts against {_first_of(mixed)}, better here and worse there" if mixed else "",
             self._against(others[0]),
         ]
         return f"How sure: {'; '.join(filter(None, parts))}. {self._holds} {self._luck}".strip()
@@ -378,7 +379,7 @@ class Advice(Tables):
         gains = "over sets of gains" if several.all() else "for these gains"
         if several.any() and not several.all():
             single = [law for law, many in zip(self.comparison.laws, several.tolist(), strict=True) if not many]
-            gains = f"over sets of gains, but for these gains of {joined(single)}"
+            gains = f"over sets of gains, but for these gains of {_first_of(single)}"
         others = [need for need in self.needs if not NEEDS[need].tested]
         these = f"Except for {joined(others)}, these" if others else "These"
         return f"{these} comparisons hold {gains}, over starts and noise."
@@ -388,19 +389,11 @@ class Advice(Tables):
         """Which laws might be first by chance, in words; "" if none."""
         first, *others = self.compared
         rivals = any(first not in self.dominated(name) for name in others)
-        which = ["it does not dominate"] * rivals + ["the screening left out"] * bool(self.others)
         told = (
-            f"The order is not tested: with other starts and noise a law that {' or that '.join(which)} may be first."
+            "The order is not tested: with other starts and noise, or among other laws, a law that it does not "
+            "dominate may be first."
         )
-        return told * bool(which and not self._untested)
-
-    def _left_out(self) -> str:
-        if not self.others:
-            return ""
-        names, more = self.others[:MAX_NAMES], ", ..." * (len(self.others) > MAX_NAMES)
-        laws = "law" if len(self.others) == 1 else "laws"
-        left = f"A screening with fewer runs left out {len(self.others)} other {laws}, best first"
-        return f"{left}: {', '.join(names)}{more}"
+        return told * (rivals and not self._untested)
 
     def _value(self, choice: Choice, need: str) -> str:
         """Return a median in words, such as "settling time 0.92 s"."""
@@ -427,3 +420,9 @@ class Advice(Tables):
 
     def __repr__(self) -> str:
         return f"Advice({self.plant.name}: {'no law' if self.barred else self.law})"
+
+
+def _first_of(names: Sequence[str]) -> str:
+    """Return names in a row; if they are many, the first ones and how many more there are."""
+    more = len(names) - MAX_NAMES
+    return joined([*names[:MAX_NAMES], f"{more} more"]) if more > 1 else joined(names)

@@ -10,11 +10,11 @@ With "no-velocity", laws that read a velocity get one that is differentiated fro
 1. Every law that suits gets gains for the plant: those that come with the package, or by the same rule from `tune`,
    with the same bound on u, the same starts and as many evaluations as those of the package. A law's own gains are one
    more set that is tried.
-2. Screening: each law runs in each condition from a few seeds. The finalists are those with the best mean ranks, and
-   the best one on each need.
-3. The finalists run from further seeds, which the screening has not seen, so that a law which was lucky there has no
-   advantage. They are compared by the rules of `ranking`. A block is a need in a condition, so every need weighs the
-   same in every condition, and the tests are corrected for all pairs of finalists in all blocks.
+2. Every law runs in each condition from the same seeds, which no search of gains has seen.
+3. They are compared by the rules of `ranking`. A block is a need in a condition, so every need weighs the same in every
+   condition, and the tests are corrected for all pairs of laws in all blocks.
+
+No law is left out after fewer runs: a few seeds would decide which law may be first.
 
 A law is not fit if, in some condition, it settles in less than half as many runs as the law that settles most often.
 Otherwise a law that does nothing would be the calmest. Laws that are not fit are not compared. A law is reliable if it
@@ -25,12 +25,12 @@ A law dominates another if it is better in some block and worse in none. Laws wi
 laws by mean rank, but none before a law that dominates it. Laws that tie with the next law in this order stand by their
 overshoot, and then by their energy of u, less first. The first law is advised, unless all are level.
 
-"robust" is the one need that is not a metric of these runs. An adversary attacks each law in each condition, with few
-runs in the screening and with the default budget of `worst_case`, over all conditions, in the finals. A law is better
-if the worst found for it is less by more than the least relevant difference. There is no test, as that is no sample."""
+"robust" is the one need that is not a metric of these runs. An adversary attacks each law, with the default budget of
+`worst_case` over all conditions. A law is better if the worst found for it is less by more than the least relevant
+difference. There is no test, as that is no sample."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -38,7 +38,7 @@ import numpy as np
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.paired_runs import SETTLES, Scores
-from smc_mujoco.analysis.ranking import Comparison, Rank, block_ranks, compare, ranked, ranks
+from smc_mujoco.analysis.ranking import Comparison, Rank, compare, ranked, ranks
 from smc_mujoco.analysis.relevant_difference import RELEVANT, checked_share
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, default_class
 from smc_mujoco.common.errors import ScenarioError, number, unknown, whole
@@ -62,22 +62,20 @@ DEFAULT_NEEDS = ("fast", "accurate", "calm")
 DEFAULT_CONDITIONS = ("nominal", "noise", "sine")
 NO_VELOCITY = "no-velocity"
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
-SCREENING_BUDGET = 16  # runs of an adversary in the screening, and as many random ones; chosen
+MIN_BUDGET = 16  # runs of an adversary in a condition, and as many random ones; chosen
 MIN_SETTLED = 0.5  # of the largest share of runs that settle under a law; chosen
 
 
 class Extent(NamedTuple):
-    """How much is run: seeds of screening and finals, number of finalists, s of a run, sets of gains a tuning tries."""
+    """How much is run: s of a run, sets of gains that a tuning tries, and in how many parts a budget is shared."""
 
-    screening: int
-    seeds: int
-    finalists: int
     duration: float
     budget: int
+    parts: int
 
 
-FULL = Extent(screening=8, seeds=24, finalists=6, duration=5.0, budget=96)
-QUICK = Extent(screening=4, seeds=24, finalists=4, duration=3.0, budget=32)
+FULL = Extent(duration=5.0, budget=96, parts=1)
+QUICK = Extent(duration=3.0, budget=32, parts=3)
 
 
 def which(
@@ -85,7 +83,7 @@ def which(
     conditions: str | Condition | Sequence[str | Condition] | None = None,
     needs: str | Sequence[str] = (),
     laws: str | Component | Template | Sequence[str | Component | Template] | None = None,
-    seeds: int | None = None,
+    seeds: int = 24,
     duration: float | None = None,
     starts: Starts | None = None,
     out: str | Path = "which",
@@ -106,10 +104,10 @@ def which(
         "no-overshoot", "robust" (in the worst case); by default fast, accurate and calm. And what every law must have:
         "no-velocity", "continuous" and the other names in `smc_mujoco.control.properties.PROPERTIES`.
       laws: the laws to compare, by name or with your own gains. Default: all that suit.
-      seeds: of the finals, the number of runs of a law in a condition. Default: 24.
+      seeds: runs of a law in each condition, each with another start and other noise.
       duration: of a run, s. Default: 5, or 3 if quick; 8 under an adversary.
       out: folder for gains and runs, which another call reads.
-      quick: fewer seeds and finalists, shorter runs, a third of the evaluations of a tuning.
+      quick: shorter runs, and a third of the evaluations of a tuning.
       defaults: whether a law may be advised over rivals whose gains are their defaults.
       starts, relevant, noise_key: as in `compare`.
       threads, progress: as in `run`.
@@ -119,7 +117,7 @@ def which(
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
     """
     extent, machine = QUICK if quick else FULL, as_plant(plant)
-    seeds = whole("seeds", extent.seeds if seeds is None else seeds, 1, 10_000)
+    count = whole("seeds", seeds, 1, 10_000)
     compared, properties = _needs(needs, machine)
     length = extent.duration if duration is None else number("duration", duration, above=0.0)
     attacked_for = DURATION if duration is None else length
@@ -131,29 +129,23 @@ def which(
     options: dict[str, Any] = {"threads": threads, "progress": progress}
     chosen = _suited(machine, properties, laws)
     candidates = _by_name(fair_gains(machine, chosen, folder / "gains", extent.budget, starts, **options))
-
-    def contest(names: Sequence[str], numbers: range, part: str, budget: int | None = None) -> Contest:
-        contestants = [candidates[name] for name in names]
-        runs = all_combinations([machine], lambda _: contestants, tested, numbers, length, starts)
-        table = study(runs, folder / part, noise_key=noise_key, replay=True, **options)
-        (group,) = paired_runs.groups(table, by=("plant",))
-        worst = {}
-        if ROBUST in compared:
-            cases = [[case(machine, c.law, on, attacked_for, starts=starts) for on in tested] for c in contestants]
-            worst = _worst(cases, within, budget, 3 if quick else 1, folder / "worst" / part, **options)
-        return _contest(Runs(table, group, worst), machine, compared, relevant)
-
-    others, finals = _screened(contest, list(candidates), extent, seeds)
+    runs = all_combinations([machine], lambda _: list(candidates.values()), tested, range(count), length, starts)
+    table = study(runs, folder, noise_key=noise_key, replay=True, **options)
+    (group,) = paired_runs.groups(table, by=("plant",))
+    worst = {}
+    if ROBUST in compared:
+        cases = [[case(machine, c.law, on, attacked_for, starts=starts) for on in tested] for c in candidates.values()]
+        worst = _worst(cases, within, extent.parts, folder / "worst", **options)
+    contest = _contest(Runs(table, group, worst), machine, compared, relevant)
     efforts = {scenario.efforts[0] for scenario in tried}
     return Advice(
         plant=machine,
         conditions=tuple(one.name for one in tested),
         needs=compared,
         wanted=tuple(PROPERTIES[name].words for name in properties),
-        choices=_choices(finals, candidates),
-        others=others,
-        comparison=finals.comparison,
-        table=finals.runs.table,
+        choices=_choices(contest, candidates),
+        comparison=contest.comparison,
+        table=table,
         effort=efforts.pop() if len(efforts) == 1 else "",
         untuned=()
         if defaults
@@ -238,42 +230,28 @@ def _by_name(candidates: Sequence[Candidate]) -> dict[str, Candidate]:
 # the comparison
 
 
-def _screened(
-    contest: "Callable[..., Contest]", names: Sequence[str], extent: Extent, seeds: int
-) -> tuple[tuple[str, ...], "Contest"]:
-    """Return the laws that a screening leaves out, in its order, and the finals of the others."""
-    others = []
-    if len(names) > extent.finalists:
-        screening = contest(names, range(extent.screening), "screening", SCREENING_BUDGET)
-        first = {rank.law for rank in screening.order[: extent.finalists]} | set(screening.specialists)
-        others = [rank.law for rank in screening.order if rank.law not in first]
-        names = [name for name in names if name in first]
-    return tuple(others), contest(names, range(extent.screening, extent.screening + seeds), "finals")
-
-
 def _worst(
     cases: Sequence[Sequence[Scenario]],
     within: Uncertainty | None,
-    budget: int | None,
     parts: int,
-    path: Path,
+    folder: Path,
     **options: Any,
 ) -> dict[str, list[WorstCase]]:
     """Return law -> its worst case in each condition, by default within the class of the first scenario.
 
     Args:
       cases: of each law, a scenario for each condition.
-      budget: runs of a search. Default: the default of `worst_case`, divided by the conditions and by `parts`.
-      path: beginning of the names of the files of results.
+      parts: the default budget of `worst_case` is divided by the conditions and by this.
+      folder: of the files of results.
       options: threads and progress, as in `run`.
     """
     first = cases[0][0]
     within = within or default_class(first)
-    budget = budget or max(SCREENING_BUDGET, default_budget(first, within) // (len(cases[0]) * parts))
+    budget = max(MIN_BUDGET, default_budget(first, within) // (len(cases[0]) * parts))
     worst: dict[str, list[WorstCase]] = {}
     for law in cases:
         for i, scenario in enumerate(law):
-            file = Path(f"{path}-{i}-{scenario.plant.name}-{scenario.law.name}.json")
+            file = folder / f"{i}-{scenario.plant.name}-{scenario.law.name}.json"
             worst.setdefault(scenario.law.name, []).append(cached_worst_case(file, scenario, within, budget, **options))
     return worst
 
@@ -287,7 +265,6 @@ class Contest(NamedTuple):
       order: all laws, best first. Those that are not fit come last, with NaN for a rank.
       settled: share of runs that settle, (laws, conditions).
       fit: names of the laws that are fit.
-      specialists: the law with the best mean rank on each need.
     """
 
     runs: Runs
@@ -296,7 +273,6 @@ class Contest(NamedTuple):
     order: list[Rank]
     settled: np.ndarray
     fit: set[str]
-    specialists: list[str]
 
 
 def _contest(runs: Runs, plant: Plant, needs: Sequence[str], relevant: float) -> Contest:
@@ -320,11 +296,9 @@ def _contest(runs: Runs, plant: Plant, needs: Sequence[str], relevant: float) ->
         relevant=relevant,
         untested=[not need.tested for need, _ in blocks],
     )
-    by_need = np.split(block_ranks(comparison), len(needs), axis=1)
-    specialists = [comparison.laws[int(each.mean(axis=1).argmin())] for each in by_need]
     order = _order(comparison, _restraint(runs, ran, plant))
     order += [Rank(law, math.nan, math.nan, best=False) for law in group.laws if law not in laws]
-    return Contest(runs, scores, comparison, order, settled, fit, specialists)
+    return Contest(runs, scores, comparison, order, settled, fit)
 
 
 def _stacked(parts: Sequence[Mapping[str, np.ndarray]], laws: Sequence[str], fill: float = -1) -> dict[str, np.ndarray]:
@@ -372,9 +346,9 @@ def _fit(laws: Sequence[str], settled: np.ndarray) -> set[str]:
     return {law for law, fit in zip(laws, enough.tolist(), strict=True) if fit}
 
 
-def _choices(finals: Contest, candidates: Mapping[str, Candidate]) -> tuple[Choice, ...]:
-    """Return the finalists, best first."""
-    shares = dict(zip(finals.runs.group.laws, finals.settled, strict=True))
+def _choices(contest: Contest, candidates: Mapping[str, Candidate]) -> tuple[Choice, ...]:
+    """Return the laws, best first."""
+    shares = dict(zip(contest.runs.group.laws, contest.settled, strict=True))
     return tuple(
         Choice(
             law=candidates[rank.law].law,
@@ -382,9 +356,9 @@ def _choices(finals: Contest, candidates: Mapping[str, Candidate]) -> tuple[Choi
             rank=rank,
             settles=float(shares[rank.law].mean()),
             reliable=bool((shares[rank.law] >= RELIABLE).all()),
-            fit=rank.law in finals.fit,
-            medians={need: NEEDS[need].median(scores, rank.law) for need, scores in finals.scores.items()},
-            worst=tuple(finals.runs.worst.get(rank.law, ())),
+            fit=rank.law in contest.fit,
+            medians={need: NEEDS[need].median(scores, rank.law) for need, scores in contest.scores.items()},
+            worst=tuple(contest.runs.worst.get(rank.law, ())),
         )
-        for rank in finals.order
+        for rank in contest.order
     )

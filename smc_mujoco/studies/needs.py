@@ -33,7 +33,7 @@ class Runs(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Choice:
-    """A finalist.
+    """A law that was compared.
 
     Attributes:
       law: with its gains for the plant.
@@ -87,7 +87,7 @@ class Need:
         return median_of(scores.values[law], samples=samples_of(scores.sets[law]))
 
     def below(self, choice: Choice) -> str:
-        """Return the text below the median of a finalist in a table: its interval, if that has a width."""
+        """Return the text below the median of a law in a table: its interval, if that has a width."""
         median = choice.medians[self.metric.need]
         return spread(median, self.metric.name) * (median.low < median.high)
 

@@ -1,7 +1,6 @@
 """What the calls of studies refuse, and what their arguments and defaults become, recorded; nothing is run."""
 
 from collections.abc import Callable
-from types import SimpleNamespace
 
 import pytest
 
@@ -97,24 +96,20 @@ def test_what_is_asked_reaches_gains_and_runs_with_these_defaults(stopped, snaps
     assert "\n".join(stopped) == snapshot
 
 
-def test_the_finals_follow_the_screening_and_robust_has_an_adversary(stopped, monkeypatch, snapshot):
-    """The contests are given; what is asked of them is told."""
+def test_robust_has_an_adversary_with_these_defaults(stopped, monkeypatch, snapshot):
+    """The contest is given; what is asked of it is told."""
     monkeypatch.setattr(adviser, "study", lambda runs, folder, **options: stopped.append(f"study {folder}"))
     monkeypatch.setattr(adviser.paired_runs, "groups", lambda table, by: [by])
     monkeypatch.setattr(adviser, "default_budget", lambda scenario, within: 1000)
     monkeypatch.setattr(
         adviser, "cached_worst_case", lambda *given, **options: stopped.append(shown([*given, options]))
     )
-    contests = []
 
     def contest(runs, plant, needs, relevant):
-        contests.append(runs)
         stopped.append(shown(["contest", runs.group, sorted(runs.worst), needs, relevant]))
-        order = [SimpleNamespace(law=name) for name in LAWS]
-        return SimpleNamespace(order=order, specialists=["pid"]) if len(contests) == 1 else reached()
+        reached()
 
     monkeypatch.setattr(adviser, "_contest", contest)
-    monkeypatch.setattr(adviser, "FULL", adviser.FULL._replace(finalists=1))
     with pytest.raises(Reached):
         smc.which("duffing", ["nominal", "noise"], "calm,robust", LAWS, seeds=2, relevant=0.1)
     assert "\n".join(stopped) == snapshot

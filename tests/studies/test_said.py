@@ -153,7 +153,7 @@ def test_a_mechanism_with_parts_takes_sixteen_steps_a_period_and_half_of_them_on
     assert "\n".join(said) == snapshot
 
 
-def test_needs_and_finalists_say_as_recorded(snapshot):
+def test_needs_and_choices_say_as_recorded(snapshot):
     cases = (attacked("classical", 0.2, 0.05), attacked("classical", 0.3, 0.02))
     first = Choice(
         law=smc.law("classical"), remark="", rank=Rank("classical", 1.0, 1.0, True), settles=1.0, reliable=True,

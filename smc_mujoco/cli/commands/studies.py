@@ -29,10 +29,7 @@ def which(
     condition: options.Conditions = None,
     law: options.Laws = None,
     quick: options.Quick = False,
-    seeds: Annotated[
-        int | None,
-        typer.Option(min=1, help="Runs of a law in each condition of the finals, each from another start; default 24."),
-    ] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Runs of a law in each condition, each from another start.")] = 24,
     duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 5, with --quick 3.")] = None,
     x0: options.X0 = None,
     spread: options.Spread = None,
@@ -50,13 +47,12 @@ def which(
     """Advise a law for a plant: which to use, with which gains, why, the second choice, and how sure that is.
 
     All laws that suit the plant are compared. Their gains are those that the package has for it, or else they are tuned
-    now by the same rule, which takes some seconds for each law. A first round with few starts selects the finalists.
-    They run from new starts, with new noise, and with all sets of gains that their tuning may end with. The rules are
-    those of `compare`: a law is better only if its values are lower by more than the least relevant difference, in a
-    paired test that is corrected for all comparisons. If no law is better than another, the answer says so. If you stop
-    the command, it continues when you start it again.
+    now by the same rule, which takes some seconds for each law. They run from the same starts, with the same noise, and
+    with all sets of gains that their tuning may end with. The rules are those of `compare`: a law is better only if its
+    values are lower by more than the least relevant difference, in a paired test that is corrected for all comparisons.
+    If no law is better than another, the answer says so. If you stop the command, it continues when you start it again.
 
-    For the need robust, an adversary attacks each finalist within a bound on the disturbance, and the worst runs are
+    For the need robust, an adversary attacks each law within a bound on the disturbance, and the worst runs are
     compared, see `smc-mujoco worst`. The answer also gives the median of random disturbances.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --needs calm,fast
@@ -89,7 +85,7 @@ def which(
         within=None if disturbance is None else Uncertainty(disturbance=disturbance),
     )
     terminal.print(advice)
-    runs = f"{len(advice.table)} runs of the finalists are in {printable(str(out / 'finals' / 'results.parquet'))}"
+    runs = f"{len(advice.table)} runs are in {printable(str(out / 'results.parquet'))}"
     terminal.note(f"{runs}; {terminal.seconds:.0f} s", "dim")
 
 
