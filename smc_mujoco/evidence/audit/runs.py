@@ -166,8 +166,8 @@ class Runs:
         return self.mutated(dataclasses.replace(law, gains={**law.gains, **gains}))
 
     def mutated(self, law: Component) -> Component:
-        """Return the law, or its mutant in this audit."""
-        return self._substitute.get(law.name, lambda same: same)(law)
+        """Return the law, or its mutant in this audit under the law's name, by which a claim may look for its run."""
+        return dataclasses.replace(self._substitute.get(law.name, lambda same: same)(law), name=law.name)
 
     def scenario(
         self, plant: str, law_name: str, /, condition: str | Condition = "nominal", **changes: Any

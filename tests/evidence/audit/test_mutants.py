@@ -36,6 +36,9 @@ def end(runs):
     return {"size": float(abs(one.x[-1, 0]))}
 def constant(runs):
     return {"size": 1.0}
+def named(runs):
+    law = {one.scenario.law.name: one for one in runs.traces(runs.grid().values())}["classical"]
+    return {"size": float(law.x.shape[1])}
 def picky(runs):
     (one,) = runs.traces(runs.grid().values())
     if not np.abs(one.u).any():
@@ -80,7 +83,7 @@ def test_mutants_reverse_the_command_drop_it_forget_or_switch():
 @pytest.mark.parametrize(
     ("function", "asked", "kept"),
     [("end", "< 1.49", None), ("constant", "< 2", KEPT), ("constant", "> 2", BLIND), ("end", "> 2", None),
-     ("moved", "> 2", None), ("picky", "< 2", None)],
+     ("moved", "> 2", None), ("picky", "< 2", None), ("named", "< 2", KEPT)],
 )  # fmt: skip
 def test_a_claim_that_no_mutant_loses_is_found(paper, function, asked, kept):
     done = []
