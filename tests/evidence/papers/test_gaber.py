@@ -18,7 +18,7 @@ from smc_mujoco.evidence.audit.audit import claims, measure
 from smc_mujoco.evidence.audit.paper import paper
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.variants import reversed_gain, with_gains, zero_gain
-from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED, Check, verdict
+from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED, Beside, Check, verdict
 from smc_mujoco.evidence.papers.gaber import claims as measured
 from smc_mujoco.evidence.papers.gaber import lyapunov, timing
 from smc_mujoco.evidence.papers.gaber.scenarios import LAWS
@@ -90,8 +90,17 @@ def drawn_by_lot(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     return x0 * np.exp(-fast * T), 6.0 * large * np.sin(40.0 * often * T)
 
 
+def ends(values: list[float]) -> str:
+    """Return a number, or the mean, the least and the largest of several."""
+    several = [f"{one:.4g}" for one in (np.mean(values), np.min(values), np.max(values))]
+    return several[0] if several[1] == several[2] else "{} ({} to {})".format(*several)
+
+
 def test_the_evidence_of_runs_drawn_by_lot_is_the_recorded_one(snapshot, monkeypatch):
-    """Which runs a claim looks at, what it makes of them, its limits and words; the numbers come from no simulation."""
+    """Which runs a claim looks at, what it makes of them, its limits and words; the numbers come from no simulation.
+
+    What is measured at several places is told by its mean, its ends, their number, the first place and the last.
+    """
     monkeypatch.setattr(measured, "nanoseconds", lambda laws, quick: {law: 1.0 + len(law) for law in laws})
 
     def told(s: Scenario) -> dict[str, float]:
@@ -103,9 +112,16 @@ def test_the_evidence_of_runs_drawn_by_lot_is_the_recorded_one(snapshot, monkeyp
     for id, quick in [(id, id == "18") for id in GABER.claims] + [(id, True) for id in ("20", "24", "61")]:
         runs = Stub(told, drawn_by_lot, quick=quick).of(GABER.claims[id])
         said.append(f"{id}{', quick' * quick}")
+        groups: dict[tuple[str, ...], list[Check | Beside]] = {}
         for one in measure(GABER.claims[id], runs):
-            asked = f" {one.relation} {one.limit:.4g} {one.sentence}".rstrip() if isinstance(one, Check) else ""
-            said.append(f"  {one.what} = {one.value:.4g}{asked}")
+            asked = (one.relation, one.sentence) if isinstance(one, Check) else ()
+            groups.setdefault((one.what.rpartition(": ")[2], *asked), []).append(one)
+        for (what, *asked), several in groups.items():
+            places = dict.fromkeys(several[k].what.rpartition(": ")[0] for k in (0, -1))
+            line = f"  {what} = {ends([one.value for one in several])}"
+            if asked:
+                line += f" {asked[0]} {ends([one.limit for one in several if isinstance(one, Check)])} {asked[1]}"
+            said.append(f"{line.rstrip()}; {len(several)}: {' to '.join(places)}".removesuffix("; 1: "))
     assert "\n".join(said) == snapshot
 
 
