@@ -23,7 +23,7 @@ def told(value):
     """Return a value of a rig as text: what its plant, laws and parts differ in from their defaults."""
     match value:
         case Quantity():
-            text = f"{value.value:.9g} {value.unit} in [{value.least:.9g}, {value.most:.9g}], {value.source}"
+            text = f"{value.value:.9g} {value.unit} in [{value.least:.9g}, {value.most:.9g}]"
         case Plant():
             text = f"{value.name} {told(value.parameters)}"
         case Component():
@@ -46,14 +46,17 @@ def told(value):
 
 
 def lines(rig):
-    """Yield a line for each quantity and each other field of a rig, and the fields of its scenarios."""
-    yield from (f"{name}: {told(one)}" for name, one in rig.quantities.items())
+    """Yield a line for each source with its quantities, for each other field of a rig, and for its scenarios."""
+    sources: dict[str, list[str]] = {}
+    for name, one in rig.quantities.items():
+        sources.setdefault(one.source, []).append(f"{name} {told(one)}")
+    yield from (f"{source}: {'; '.join(known)}" for source, known in sources.items())
     for field in dataclasses.fields(Rig):
         value = getattr(rig, field.name)
         if field.name not in ("quantities", "machine") and value:
             parts = value if field.name in ("ensemble", "laws", "reached") else (value,)
             yield from (f"{field.name}: {told(one)}" for one in parts)
-    yield from (f"scenario {name}: {told(one)}" for name, one in machine(rig).items())
+    yield f"scenario {'; '.join(f'{name}: {told(one)}' for name, one in machine(rig).items())}"
     if rig.dynamics:
         yield f"dynamics: {told(rig.dynamics(Values(**rig.values)))}"
 
