@@ -368,8 +368,8 @@ def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size):
     assert len({to_hex(dot.get_color()) for dot in dots}) == 3
     assert not any("…" in text.get_text() for text in texts(page))
     assert [ax.get_title(loc="right") for ax in page.axes[:3]] == ["never", "", ""]
-    with pytest.raises(smc.ScenarioError, match="unknown metric 'itea': did you mean 'itae'"):
-        smc.plot(Rows(), metrics=["itea"])
+    with pytest.raises(smc.ScenarioError, match="unknown metric 'itaee': did you mean 'itae'"):
+        smc.plot(Rows(), metrics=["itaee"])
 
 
 @pytest.mark.parametrize("size", [None, COLUMN])

@@ -236,3 +236,11 @@ def test_every_step_of_every_law_obeys_the_equation(plant, condition):
 
             end = integrated(slope, states[:, part], 0.0, s.resolved.physics_step)
             np.testing.assert_allclose(end, states[:, first + 1 : last + 1], rtol=0, atol=1e-10, err_msg=str(s.law))
+
+
+def test_a_cart_that_becomes_heavier_on_its_way_accelerates_less():
+    cart = smc.plant("servo_axis", M=2.0, b=0.0, cf=0.0, offset=0.0)
+    parts = {"disturbance": smc.Constant(1.0), "jump": smc.Jump(0.1, {"mass": 4.0}), "duration": 0.3}
+    trace = smc.run(smc.Scenario(plant=cart, law="none", x0=0.0, **parts))
+    after = np.maximum(trace.t - 0.1, 0.0)
+    np.testing.assert_allclose(trace.v[:, 0], np.minimum(trace.t, 0.1) / 2.0 + after / 8.0, atol=1e-12)

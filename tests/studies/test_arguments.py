@@ -127,17 +127,17 @@ SCENES = [
     {"conditions": {"nominal": {"a": 3}}}, {"conditions": {"": {"a": RUN}}}, {"conditions": {"nominal": {"": RUN}}},
     {"conditions": {"nominal": {"a": RUN, "b": OTHER}}}, {"conditions": {"nominal": {"a": RUN, "A": RUN}}},
     {"conditions": {"x": {"a": RUN}, "X": {"a": RUN}}}, {"film": "noise"}, {"figure": "figures"},
-    {"answers": ("itea",)}, {"facts": {"a": 3}}, {"facts": ["a"]}, {"answer": "a"}, {"camera": (1.0,)},
+    {"answers": ("itaee",)}, {"facts": {"a": 3}}, {"facts": ["a"]}, {"answer": "a"}, {"camera": (1.0,)},
 ]  # fmt: skip
 REFUSED = {
-    smc.leaderboard: [{"metrics": "itae"}, {"metrics": []}, {"metrics": ["itea"]}, {"seed": -1}, {"seed": 2**53}],
+    smc.leaderboard: [{"metrics": "itae"}, {"metrics": []}, {"metrics": ["itaee"]}, {"seed": -1}, {"seed": 2**53}],
     smc.study: [
         {"out": 3}, {"scenarios": [3]}, {"scenarios": []}, {"scenarios": "duffing"}, {"traces": "best"},
         {"executor": "ray"}, {"executor": "dask://host"}, {"executor": "dask://:80"}, {"executor": "dask://host:65536"},
         {"executor": 3}, {"noise_key": "secret"}, {"noise_key": -1}, {"noise_key": 2**53},
     ],
     smc.compare: [
-        {"seeds": 0}, {"relevant": -0.1}, {"duration": 0.0}, {"budget": 0}, {"metrics": ["itea"]}, {"gains": "best"},
+        {"seeds": 0}, {"relevant": -0.1}, {"duration": 0.0}, {"budget": 0}, {"metrics": ["itaee"]}, {"gains": "best"},
         {"out": 3}, {"laws": "clasical"}, {"plants": "dufing"}, {"conditions": "nois"}, {"executor": "ray"},
     ],
     smc.which: [

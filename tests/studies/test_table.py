@@ -61,7 +61,7 @@ def test_a_table_is_read_back_selected_and_run_again(tmp_path):
     with pytest.raises(smc.ScenarioError, match="unknown plant of this table 3"):
         table.select(plant=3)  # pyright: ignore[reportArgumentType]
     with pytest.raises(smc.ScenarioError, match="unknown column"):
-        table.column("itea")
+        table.column("itaee")
     with pytest.raises(smc.ScenarioError, match="has no row 8"):
         table.scenario(8)
 

@@ -18,7 +18,6 @@ def build(n):
 
 def fields(model, p):
     yield Field("body_mass", model.body("cart").id, p.M)
-    yield Field("dof_M0", 0, p.M)  # from where MuJoCo takes the inertia of a single slide joint
     yield Field("jnt_stiffness", 0, p.k)
     yield Field("dof_damping", 0, p.b)
 

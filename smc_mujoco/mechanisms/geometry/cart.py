@@ -4,12 +4,9 @@ The cart has rubber buffers at its ends, above the two rails, so that blows act 
 its block lies on a lining, pressed down by its weight through the joint `lift`, and slides with Coulomb friction.
 """
 
-from collections.abc import Iterator
-
 import mujoco
 
 from smc_mujoco.mechanisms.hardware.contact import SOFT_IMPEDANCE, SOLREF_RUB, bar, box, hit, rub, solid
-from smc_mujoco.mechanisms.plant import Field, Values
 
 STOP_RESTITUTION = 0.5  # of rubber buffers: chosen
 BED_FRICTION = 0.1  # of the block on its bed: chosen, 1 N beside springs of 1 to 3 N and commands of 6 N
@@ -24,13 +21,6 @@ STOP_DEPTH = 1.0  # m, depth of a stop behind its face, enough for a blow of 100
 FACE_X = HALF_BLOCK + BUFFER_RADIUS  # m, from the cart's middle to the face of its buffers
 POST_RADIUS = 0.020  # m
 SINK_DEPTH = (1 - SOFT_IMPEDANCE) * GRAVITY * SOLREF_RUB[0] ** 2 / 4  # m, of the block's corners at rest
-
-
-def mass_fields(model: mujoco.MjModel, p: Values) -> Iterator[Field]:
-    """Yield the fields that the mass M of a cart sets, if nothing else moves with the cart."""
-    body = model.body("cart").id
-    yield Field("body_mass", body, p.M)
-    yield Field("dof_M0", model.dof_bodyid == body, p.M)  # MuJoCo reads a lone slide's inertia here
 
 
 def stops(spec: mujoco.MjSpec, x: float) -> None:

@@ -34,7 +34,7 @@ def fields(model, p):
 
 
 def body_fields(model, p):
-    yield from cart.mass_fields(model, p)
+    yield Field("body_mass", model.body("cart").id, p.M)
     yield Field("dof_damping", model.joint("slide").dofadr[0], p.delta)
 
 

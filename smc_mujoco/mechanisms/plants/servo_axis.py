@@ -8,7 +8,6 @@ Identification Benchmarks, 2019: its four identified parameters. The drive gives
 
 import mujoco
 
-from smc_mujoco.mechanisms.geometry import cart
 from smc_mujoco.mechanisms.plant import Field, Plant, model_path
 
 FORCE_LIMIT = 35.1507 * 10.0  # N
@@ -20,7 +19,7 @@ def build(n):
 
 def fields(model, p):
     dof = model.joint("slide").dofadr[0]
-    yield from cart.mass_fields(model, p)
+    yield Field("body_mass", model.body("cart").id, p.M)
     yield Field("dof_damping", dof, p.b)
     yield Field("dof_frictionloss", dof, p.cf)
     yield Field("opt.gravity", 0, -p.offset / p.M)  # a slope

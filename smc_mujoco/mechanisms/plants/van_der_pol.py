@@ -45,7 +45,7 @@ def draw_springs(spec, height, radius):
 
 def fields(model, p):
     far = model.site("far")
-    yield from cart.mass_fields(model, p)
+    yield Field("body_mass", model.body("cart").id, p.M)
     yield Field("jnt_stiffness", model.joint("slide").id, p.k)
     yield Field("dof_damping", model.joint("slide").dofadr[0], -p.mu)
     yield Field("tendon_damping", model.tendon("across").id, p.mu * model.site_pos[far.id, 1] ** 2)
@@ -99,7 +99,7 @@ def add_springs(spec):
 
 def spring_fields(model, p):
     springs = [model.tendon(name).id for name, _ in SPRINGS]
-    yield from cart.mass_fields(model, p)
+    yield Field("body_mass", model.body("cart").id, p.M)
     yield Field("tendon_stiffness", springs, 0.5 * p.k)
     yield Field("tendon_damping", model.tendon("across").id, p.mu * (1.0 + ANCHOR_Y**2))
     yield Field("actuator_biasprm", (model.actuator("passive:active_damper").id, 2), p.mu)
