@@ -23,11 +23,12 @@ if TYPE_CHECKING:
     from smc_mujoco.studies.accuracy import AccuracyTable
 
 KEYS_PER_LINE = 5  # laws in a line of a legend
-# Of logarithmic axes; plotly writes powers a quarter larger than the size says.
+# Of logarithmic axes. Plotly writes powers a quarter larger than this size.
 LOG_AXIS: dict[str, Any] = {"type": "log", "exponentformat": "power", "tickfont": {"size": 9}}
 
 
-def _named(law: str) -> str:
+def _label(law: str) -> str:
+    """Return a law's name for a chart."""
     return words.escape(words.law(law))
 
 
@@ -67,7 +68,7 @@ def _whisker(score: Score, ends: tuple[bool, float, float]) -> dict[str, Any]:
     at, left, right = (min(max(v, inner[0]), inner[1]) for v in (score.median, low, high))
     symbol = "triangle-right" if score.median > inner[1] else "triangle-left" if score.median < inner[0] else "circle"
     symbol += "" if score.best else "-open"
-    colour, name = words.colour(score.law), _named(score.law)
+    colour, name = words.colour(score.law), _label(score.law)
     text = f"<b>{name}</b><br>{_quantity(score.median, words.unit(score.metric, score.plant))}"
     spread = words.interval(score.median, score.low, score.high)
     bar = {"type": "data", "symmetric": False, "array": [right - at], "arrayminus": [at - left]}
@@ -101,7 +102,7 @@ def fronts(drawn: "Sequence[Front]") -> Figure:
         layout |= panel.axes(x | {"dtick": max(1, math.ceil((across[1] - across[0]) / 4))}, y)
     for law in laws:  # an entry of the legend, which switches all curves of the law
         colour = words.colour(law)
-        key = {"type": "scatter", "mode": "lines+markers", "x": [None], "y": [None], "name": _named(law)}
+        key = {"type": "scatter", "mode": "lines+markers", "x": [None], "y": [None], "name": _label(law)}
         key |= {"legendgroup": law, "line": {"color": colour, "width": 2}, "marker": {"size": 8, "color": colour}}
         data.append(key)
     legend = 21 * math.ceil(len(laws) / KEYS_PER_LINE)  # px that it takes above the panels
@@ -121,9 +122,10 @@ def _span(values: Sequence[float], floor: float | None) -> list[float]:
 
 
 def _front(front: "Front") -> list[dict[str, Any]]:
+    """Return the staircase of a law, and the dot at the study's gains."""
     colour = words.colour(front.law)
     common = {"type": "scatter", "legendgroup": front.law, "showlegend": False}
-    hover = f"<b>{_named(front.law)}</b><br>variation %{{x:.3g}} 1/s<br>tracking %{{y:.3g}} s²<extra></extra>"
+    hover = f"<b>{_label(front.law)}</b><br>variation %{{x:.3g}} 1/s<br>tracking %{{y:.3g}} s²<extra></extra>"
     across, up = zip(*sorted(zip(front.variation, front.tracking, strict=True)), strict=True)  # for steps to the right
     line = {"mode": "lines+markers", "line": {"color": colour, "width": 1.5, "shape": "hv"}}
     line["marker"] = {"size": 4, "color": colour}
@@ -145,16 +147,17 @@ def margins(drawn: "Sequence[Margin]", kind: str) -> Figure:
     data: list[dict] = []
     layout: dict[str, Any] = {"annotations": plant_titles(grid, plants)}
     for panel, plant in zip(grid, plants, strict=True):
-        here = [margin for margin in drawn if (margin.plant, margin.kind) == (plant, kind)]
-        _, _, end = scale([v for m in here for v in (m.value, m.theory or 0.0)], False)
-        data += [trace | panel.trace for margin in here for trace in _margin(margin, end)]
+        on_plant = [margin for margin in drawn if (margin.plant, margin.kind) == (plant, kind)]
+        _, _, end = scale([v for m in on_plant for v in (m.value, m.theory or 0.0)], False)
+        data += [trace | panel.trace for margin in on_plant for trace in _margin(margin, end)]
         x = {"range": [-0.03 * end, end], "nticks": 4, "rangemode": "tozero"}
         layout |= panel.axes(x, law_axis(laws, panel is grid[0]))
     return figure(data, layout, 98 + 19 * len(laws), (172, 14, 42, 28))
 
 
 def _margin(margin: "Margin", end: float) -> list[dict[str, Any]]:
-    colour, name = words.colour(margin.law), _named(margin.law)
+    """Return the point of a law with its stem, and the bar of linear theory; a cross without any margin."""
+    colour, name = words.colour(margin.law), _label(margin.law)
     common = {"type": "scatter", "mode": "markers", "y": [name], "cliponaxis": False}
     if math.isnan(margin.value):
         cross = {"size": 8, "symbol": "x-thin", "line": {"width": 2, "color": colour}}
@@ -199,7 +202,7 @@ def accuracies(table: "AccuracyTable") -> Figure:
 
 def _accuracy(row: "Accuracy", named: bool) -> list[dict[str, Any]]:
     """Return the line of a law's errors over the control period in ms, and theory's slope through its middle."""
-    colour, name = words.colour(row.law), _named(row.law)
+    colour, name = words.colour(row.law), _label(row.law)
     h = [1e3 * period for period in row.periods]
     common = {"type": "scatter", "legendgroup": row.law, "x": rounded(h)}
     hover = f"<b>{name}</b><br>%{{y:.2g}} {row.unit} at %{{x:g}} ms<br>order {row.e}<extra></extra>"
@@ -233,7 +236,7 @@ def curves(scene: Scene) -> Figure:
 
 def _curve(curve: Curve) -> list[dict[str, Any]]:
     """Return the line of x, the band of u if it chatters, and the line of u."""
-    colour, name = words.colour(curve.law), _named(curve.law)
+    colour, name = words.colour(curve.law), _label(curve.law)
     line = {"type": "scatter", "mode": "lines", "legendgroup": curve.law, "line": {"color": colour, "width": 1.8}}
     hover = {"hovertemplate": f"<b>{name}</b> %{{y:.4g}} at %{{x:.3f}} s<extra></extra>"}
     traces = [line | hover | {"x": rounded(curve.t), "y": rounded(curve.x), "name": name}]

@@ -97,13 +97,7 @@ def plant_titles(grid: Sequence[Panel], plants: Sequence[str]) -> list[dict[str,
 def figure(
     data: list[dict], layout: dict[str, Any], height: int, margin: tuple[int, int, int, int], **fields: Any
 ) -> Figure:
-    """Return a figure in the report's style.
-
-    Args:
-      height: in px.
-      margin: left, right, top and bottom, in px.
-      fields: more of the layout.
-    """
+    """Return a figure in the report's style. Height and margin (left, right, top, bottom) are in px."""
     sides = dict(zip("lrtb", margin, strict=True))
     common = {"template": {"layout": STYLE}, "height": height, "margin": sides, "showlegend": False}
     return {"data": data, "layout": common | layout | fields}

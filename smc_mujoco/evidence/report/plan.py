@@ -32,7 +32,7 @@ class Plan(Extent):
       kinds: of margins, searched for all plants and laws.
       attacked: plants on which an adversary searches the worst case of each law.
       attacks: runs of its search; None for 10 s of processor time a law and plant.
-      compared: those kinds that are searched under every set of gains.
+      compared: kinds of margins that are searched under every set of gains.
       basins: plants with maps of their regions of attraction: on 2 cores a map of 1000 states takes 12 s.
       basin_laws: laws of these maps.
       points: of a map, across and up.

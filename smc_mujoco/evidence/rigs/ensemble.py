@@ -60,11 +60,7 @@ def runs(
 
 
 def wins(board: Any) -> dict[str, int]:
-    """Return law -> number of parameter sets on which it wins.
-
-    Args:
-      board: a `leaderboard.Board` whose conditions are the sets.
-    """
+    """Return law -> number of parameter sets on which it wins. The sets are the conditions of the board."""
     return dict(Counter(block.winner for block in board.blocks if block.winner).most_common())
 
 

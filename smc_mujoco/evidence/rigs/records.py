@@ -57,11 +57,7 @@ class Columns:
     torque: tuple[str, ...] = ()
 
     def needed(self, closed: bool) -> tuple[str, ...]:
-        """Return the columns that a record must have.
-
-        Args:
-          closed: whether it is of a closed loop, and so needs the reference.
-        """
+        """Return the columns that a record must have, of a closed loop also the reference."""
         command = self.torque or (self.u, self.reference)[: 1 + closed]
         return self.time, *self.x, *command
 
@@ -128,11 +124,7 @@ def _cell(text: str) -> float:
 
 
 def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:
-    """Return the positions of a run as its encoder gives them, without delay, losses and the columns' offset.
-
-    Args:
-      noisy: whether they have the noise of the run's measurement.
-    """
+    """Return a run's positions by column, with the encoder's bias and rounding and, if `noisy`, the run's noise."""
     s, sensor, by_column = trace.scenario, trace.scenario.sensor, {}
     for i, name in enumerate(columns.x):
         x = trace.x[:, i] + (sensor.bias if sensor else 0.0)
@@ -160,8 +152,6 @@ def checked(record: Mapping[str, Any], columns: Columns, period: float | None, r
     """Return the record's known columns as float arrays, (K,) each.
 
     Args:
-      record: column -> values.
-      columns: names of the rig's columns.
       period: s, of the rig's controller, at which a closed loop must be recorded. None for an open loop, whose columns
         are interpolated at the record's own median step.
       rig: its name, for errors.

@@ -220,11 +220,7 @@ class Replays:
         ]
 
     def correct(self, point: Point, halvings: int) -> bool:
-        """Correct all replays by what shorter steps change at a point. Return whether steps err at all.
-
-        Args:
-          halvings: of MAX_STEP, 1 or more.
-        """
+        """Correct all replays by what `halvings` of MAX_STEP change at a point. Return whether steps err at all."""
         if self.closed or self.twin.columns.state or self.twin.dynamics is not None:
             return False  # simulated runs have the errors of the scenario's own steps, too
         rig = self.rig(point)

@@ -407,10 +407,7 @@ class Rig:
         """Raise ScenarioError if a record has degrees in place of radians.
 
         It has if it fits far better after all its angles, those of a joint, or the references are converted to radians.
-
-        Args:
-          record: column -> values.
-          fit: of the record as it is. A record that fits well is not simulated again.
+        A record that fits well as it is, by `fit`, is not simulated again.
         """
         if min(fit.values()) >= 100.0 - RADIANS_GAIN or "rad" not in self.scenario("none").plant.units:
             return

@@ -54,11 +54,7 @@ def law_to_c(law: Component | Template | str, numbers: str = "double", joints: i
 
 
 def with_head(law: Component, numbers: str, slots: int, code: str, joints: int, *, measured: bool) -> str:
-    """Return the file of a law that is translated.
-
-    Args:
-      measured: whether its head has the size of the compiled code, which depends on the compiler.
-    """
+    """Return the file of a law that is translated. If `measured`, its head has the size that a compiler gives it."""
     real = ["#define SMC_REAL float"] if numbers == "float" else []
     facts = _facts(law, slots, joints, numbers == "float")
     body = "\n".join([*includes(facts + code), "", *real, facts, code, ""])

@@ -227,12 +227,7 @@ class Requests:
 
 
 def stored(head, requests: Requests, arrays) -> list[float]:
-    """Return the numbers of a joint measurement, as `joint_law.measurement_at` reads them.
-
-    Args:
-      head: t, dt and model.
-      arrays: the numbers of each of its arrays, in their order.
-    """
+    """Return the numbers of a joint measurement from t, dt and model and its arrays, see `joint_law.measurement_at`."""
     return [*head, float(requests.address), requests.joints, *itertools.chain.from_iterable(arrays)]
 
 

@@ -133,11 +133,8 @@ class Value(NamedTuple):
 def translate(component: Component, single: bool, joints: int = 0) -> tuple[int, str]:
     """Return the number of memory slots of a component, and the C of its function and of all functions it calls.
 
-    The function's name is smc_law, smc_surface or smc_estimator.
-
-    Args:
-      single: whether smc_real is float.
-      joints: for how many joints a law of many joints is written; 0 for a component of one channel.
+    The function's name is smc_law, smc_surface or smc_estimator. If `single`, smc_real is float. `joints` is 0 for a
+    component of one channel.
     """
     program = Program(component, single, joints)
     functions = [Function(program, component.function, list(ARGUMENTS), {}, entry=True).text(program.symbol)]
@@ -1208,12 +1205,7 @@ def call_to(beginning: str, pointers: str) -> str:
 
 
 def literal(value: Any, single: bool, node: ast.AST) -> Value:
-    """Return a Python number in C.
-
-    Args:
-      single: whether smc_real is float.
-      node: the code that contains it, for errors.
-    """
+    """Return a Python number in C. `single`: whether smc_real is float."""
     kind = "single" if type(value) is np.float32 else "real"
     if isinstance(value, bool):
         return Value(str(int(value)), "bool")

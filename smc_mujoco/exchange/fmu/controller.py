@@ -220,13 +220,7 @@ def place(variable: str) -> str:
 
 
 def header(listed: Sequence[Variable], controller: Controller, identifier: str, token: str) -> str:
-    """Return controller.h: the sizes, and the indices of the variables in their array.
-
-    Args:
-      listed: the variables in order.
-      identifier: name of the model in C.
-      token: the instantiation token.
-    """
+    """Return controller.h: the sizes, and the indices of the variables. `identifier`: the model's name in C."""
     memory = next((i for i, variable in enumerate(listed) if variable.kind == "SMC_STATE"), len(listed))
     own_names = "\n".join(f"#define {name} {identifier}_{name}" for name in SYMBOLS)
     joints = f"\n#define {JOINTS} {controller.joints}" if controller.joints else ""
@@ -254,17 +248,10 @@ enum {{
 
 
 def source(listed: Sequence[Variable], helpers: str, body: Iterable[str]) -> str:
-    """Return controller.c: the table of variables, and the function that runs all parts at a sample.
-
-    Args:
-      helpers: C functions before that one.
-      body: its statements, without indentation.
-    """
-    limits = {-math.inf: "-INFINITY"}
-    table = "\n".join(
-        f'    {{"{v.name}", {v.kind}, {v.start!r}, {limits.get(v.minimum, v.minimum)}, {int(v.positive)}}},'
-        for v in listed
-    )
+    """Return controller.c: the variables, the functions `helpers`, and a last one with the statements `body`."""
+    limits = {0.0: "0.0", -math.inf: "-INFINITY"}
+    lines = (f'"{v.name}", {v.kind}, {v.start!r}, {limits[v.minimum]}, {int(v.positive)}' for v in listed)
+    table = "\n".join(f"    {{{line}}}," for line in lines)
     statements = "\n".join(f"    {line}" for line in body)
     return f"""/* controller.c: estimator, surface, law and saturation, in the order of smc_mujoco's own runs. */
 #include "controller.h"

@@ -69,14 +69,7 @@ def base_units(unit: Unit, joint: str) -> dict[str, int] | None:
 def model_description(
     listed: Sequence[Variable], controller: Controller, identifier: str, token: str, joint: str
 ) -> str:
-    """Return modelDescription.xml of an FMU for Co-Simulation.
-
-    Args:
-      listed: variables in the order of their value references.
-      identifier: name of the model in C.
-      token: the instantiation token.
-      joint: "hinge" or "slide", which decides the units.
-    """
+    """Return modelDescription.xml of an FMU for Co-Simulation, with the units of a hinge or a slide."""
     root = xml.Element(
         "fmiModelDescription",
         fmiVersion="3.0",

@@ -319,10 +319,8 @@ def _meanings(
     """Return our name -> the FMU's, for its inputs and for its outputs.
 
     Args:
-      file: the file's name, for errors.
       known: name -> variable of the FMU.
-      chosen: our name -> the FMU's, from the user.
-      constants: inputs of the FMU that do not change.
+      chosen, constants: `variables` and `constants` of `law_from_fmu`.
     """
     for what, value in (("variables", chosen), ("constants", constants)):
         if not isinstance(value, Mapping):

@@ -119,12 +119,7 @@ class Slave:
 
 
 def attempt(order: Mapping[str, Any], say: Callable) -> None:
-    """Run an FMU on a double integrator x'' = u.
-
-    Args:
-      order: what `load` gave: folder, names of variables, fixed values and step, s.
-      say: reports a stage.
-    """
+    """Run an FMU on a double integrator x'' = u. `order` is from `load`, and `say` reports a stage."""
     try:
         _run(order, say)
     except Fault as fault:
