@@ -157,13 +157,13 @@ def variation(runs):
 
 def reaching(runs):
     """Time from which |x| <= h rho, over the paper's bound h k0 = |x0| / (a - rho), rho the amplitude of d."""
-    ratios = {}
-    for (_, law, condition), trace in runs.traced(runs.grid()).items():
-        rho, gains = trace.scenario.disturbance[0].amplitude, trace.scenario.law.gains
-        bound = abs(trace.scenario.resolved.v0[0]) / (gains["a" if "a" in gains else "k"] - rho)
-        time = settled(trace, trace.v[:-1], 1.01 * trace.scenario.control_period * rho)
-        ratios[f"{law}, {condition}"] = time / bound
-    return {"time to |x| <= h largest |d|, over h k0": ratios}
+
+    def share(trace):
+        rho = trace.scenario.disturbance[0].amplitude
+        bound = abs(trace.scenario.resolved.v0[0]) / (trace.scenario.law.gains["k"] - rho)
+        return settled(trace, trace.v[:-1], 1.01 * trace.scenario.control_period * rho) / bound
+
+    return {"time to |x| <= h largest |d|, over h k0": by_condition(runs, share)}
 
 
 def explicit(runs):
@@ -202,7 +202,7 @@ def twisting(runs):
         for h, trace in at_periods(runs, condition).items():
             gap = trace.x[1:] - h**2 * trace.d[:-1]
             errors[f"{condition}, {h:g} s"] = largest(gap) / (h**2 * trace.scenario.disturbance[0].amplitude)
-    return {"largest |x / (h^2 d) - 1|": errors}
+    return {"largest |x - h^2 d| / (h^2 largest |d|)": errors}
 
 
 def rests(runs):
