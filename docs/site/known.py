@@ -128,7 +128,7 @@ def instead() -> Iterator[str]:
 def audits() -> Iterator[str]:
     """Yield a table of the audits: what was read, and how many sentences of the paper have each verdict."""
     kinds = VERDICTS[:-1]
-    heads = "audit", "read", *(f"{MARKS[kind]} {kind}" for kind in kinds), "derived", "questions"
+    heads = "audit", "read", *(MARKS[kind] for kind in kinds), "derived", "questions"
     yield f"{_row(*heads)}\n|{'---|' * len(heads)}"
     for name, shown in AUDITS.items():
         about = paper(name)
@@ -144,12 +144,13 @@ def decisions() -> Iterator[str]:
         about = paper(name)
         yield f'\n??? note "{about.authors}: {about.title}"\n'
         yield f"    `{name}`: {_plain(about.source)}. Read: {about.read}; {_plain(about.access)}.\n"
-        yield "    | claim | whose | verdict | decided by |\n    |---|---|---|---|"
+        yield "    | claim | verdict | decided by |\n    |---|---|---|"
         for id, (verdict, decided) in shown.items():
             claim = about.claims[id]
-            immune = f" No broken law can lose it: {claim.immune}." * bool(claim.immune)
-            cells = f"{id}: {claim.text}{'.' * bool(immune)}{immune}", WHOSE_WORDS[claim.whose]
-            yield f"    {_row(*map(_plain, cells), f'{MARKS[verdict]} {verdict}', _plain(decided))}"
+            whose = f", {WHOSE_WORDS[claim.whose]}" * (claim.whose != PAPER)
+            immune = f". No broken law can lose it: {claim.immune}" * bool(claim.immune)
+            cells = f"{id}{whose}: {claim.text}{immune}", f"{MARKS[verdict]} {verdict}", decided
+            yield f"    {_row(*map(_plain, cells))}"
 
 
 def questions() -> Iterator[str]:
