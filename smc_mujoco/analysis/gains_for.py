@@ -46,8 +46,9 @@ class Design:
     Attributes:
       law: the law with these gains.
       chattering: predicted for it.
-      disturbance: the largest constant force that it tolerates, N m or N, in runs of 10 s: see `smc.margins`. NaN if it
-        does not hold the plant even without one.
+      disturbance: the largest constant force that it tolerates in both directions, N m or N, in runs of 10 s: see
+        `smc.margins`. A force that changes may be worse: see `smc.worst_case`. NaN if it does not hold the plant even
+        without one.
       size, speed: q and w, over the gains that were given.
     """
 

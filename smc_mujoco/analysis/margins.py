@@ -9,7 +9,7 @@ A run tolerates a level if it does not fail and its ultimate bound after 10 s is
 The search tries up to nine levels from small to large. Then it halves the interval below the FIRST level that is not
 tolerated, until it is known to one control period of delay, an eighth of one of jitter, or 2 % of other levels. There
 may be tolerated levels above one that is not, and levels that are not between two that were tried. Noise is one
-realisation, seed 0, the same for every law. A disturbance is positive and acts on every channel.
+realisation, seed 0, the same for every law. A disturbance acts on every channel, and both of its signs are tolerated.
 
 Linear theory gives the delay above which rest is unstable. A smooth law then oscillates with an amplitude that grows
 from 0, so it tolerates a little more. Theory also gives the constant force, or dry friction, that holds the plant at
@@ -126,6 +126,7 @@ class Kind:
       levels: levels tried first, from small to large.
       put: function of a scenario and a level that returns the scenario with this level.
       none: level without any effect.
+      signed: whether a level is tolerated only if minus the level is, too.
       quantum: function of a scenario that returns the number of which a level is a multiple; 0: any level.
       theory: function that returns the largest level by linear theory, None if there is no theory; it may refuse the
         plant.
@@ -136,12 +137,17 @@ class Kind:
     levels: tuple[float, ...]
     put: Callable[[Scenario, float], Scenario]
     none: float = 0.0
+    signed: bool = False
     quantum: Callable[[Scenario], float] = lambda base: 0.0
     theory: Callable[[Scenario], float | None] = lambda base: None
 
     def unit_for(self, x: str) -> str:
         """Return the unit for positions in x, "rad" or "m"."""
         return self.unit.format(x=x, u=EFFORT[x])
+
+    def scenarios(self, base: Scenario, level: float) -> list[Scenario]:
+        """Return the scenarios that tell whether a level is tolerated."""
+        return [self.put(base, signed) for signed in ((level, -level) if self.signed else (level,))]
 
     def search(self, base: Scenario, resolution: float) -> Search:
         """Return the search for the margin of a scenario."""
@@ -215,6 +221,7 @@ MARGIN_KINDS: dict[str, Kind] = {
         unit="{u}",
         levels=_doubling_levels(MAX_FORCE),
         put=lambda base, level: dataclasses.replace(base, disturbance=(*base.disturbance, Constant(level))),
+        signed=True,
         theory=_tolerated_force,
     ),
     "friction": Kind(
@@ -347,20 +354,22 @@ def margins_of(
     going = dict(enumerate(searches))
     done = 0
 
-    def tolerated(scenarios: Sequence[Scenario]) -> list[bool]:
-        """Run scenarios, and return whether each is tolerated. Traces are not kept."""
+    def tolerated(groups: Sequence[Sequence[Scenario]]) -> list[bool]:
+        """Run groups of scenarios, and return whether all of a group are tolerated. Traces are not kept."""
         nonlocal done
+        scenarios = [one for group in groups for one in group]
+        owners = [k for k, group in enumerate(groups) for _ in group]
         now = sum(scenario.work for scenario in scenarios)
-        expected = sum(search.left * cells[i][0].work for i, search in going.items())
-        results = [False] * len(scenarios)
+        expected = sum(search.left * cells[i][0].work * (1 + cells[i][1].signed) for i, search in going.items())
+        results = [True] * len(groups)
         for i, trace in stream(scenarios, threads, summed(report, done, done + max(now, expected))):
-            results[i] = tolerates(trace)
+            results[owners[i]] &= tolerates(trace)
         done += now
         return results
 
-    without = tolerated(bases)
+    without = tolerated([[base] for base in bases])
     going = {i: search for i, search in going.items() if without[i // len(kinds)]}
-    find_boundaries(going, lambda tried: tolerated([cells[i][1].put(cells[i][0], level) for i, level in tried]))
+    find_boundaries(going, lambda tried: tolerated([cells[i][1].scenarios(cells[i][0], level) for i, level in tried]))
     return [
         Margin(
             plant=base.plant.name,

@@ -52,8 +52,8 @@ def test_it_is_the_boundary_between_what_is_tolerated_and_what_is_not(found):
         kind = margins.MARGIN_KINDS[margin.kind]
         levels = margin.value, margin.value + margin.resolution
         assert margin.resolution > 0.0
-        runs = smc.run([kind.put(bases[margin.law], level) for level in levels])
-        assert [margins.tolerates(trace) for trace in runs] == [True, False]
+        runs = [smc.run(kind.scenarios(bases[margin.law], level)) for level in levels]
+        assert [all(map(margins.tolerates, traces)) for traces in runs] == [True, False]
 
 
 def test_a_run_tolerates_what_leaves_it_within_five_percent_of_its_start():
@@ -103,6 +103,19 @@ def test_it_stops_at_the_first_level_that_is_not_tolerated(monkeypatch):
     (margin,) = margins.margins_of([pushed(True)], ["island"])
     assert margin.value == pytest.approx(1.3, rel=FINE)
     assert margin.searched == 4.0
+
+
+def test_both_signs_of_a_disturbance_are_tolerated(monkeypatch):
+    onesided = kind_of(lambda base, level: pushed(level > -1.5))
+    monkeypatch.setitem(margins.MARGIN_KINDS, "onesided", dataclasses.replace(onesided, signed=True))
+    (margin,) = margins.margins_of([pushed(True)], ["onesided"])
+    assert margin.value == pytest.approx(1.5, rel=FINE)
+    law = smc.law("super_twisting", k1=7.634, k2=28.49, c=2.5)  # winds up when pushed towards 0
+    wound = dataclasses.replace(BASE, law=law, actuator=smc.Lag(0.01), duration=5.0)
+    (margin,) = margins.margins_of([wound], ["disturbance"], COARSE)
+    runs = smc.run([dataclasses.replace(wound, disturbance=smc.Constant(sign * 4.5)) for sign in (1.0, -1.0)])
+    assert [margins.tolerates(one) for one in runs] == [True, False]
+    assert margin.value < 4.5
 
 
 def test_an_island_between_two_levels_goes_unseen(monkeypatch):
