@@ -63,7 +63,7 @@ def draw_map(ax, region: Basin) -> None:
     ax.set_ylabel(f"initial velocity ({region.unit}/s)")
     marks = [
         Patch(facecolor=COLOURS[k], edgecolor=style.RULE, label=f"{words}: {100 * share:.3g} %")
-        for k, words in meanings(after, "comes to rest, by {:.3g} s", "does not").items()
+        for k, words in meanings(after, "comes to rest, by {:.3g} s", f"not within {region.duration:g} s").items()
         if (share := (classes == k).mean())
     ]
     ax.legend(handles=marks, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=style.points(9.5))
