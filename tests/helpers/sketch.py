@@ -4,6 +4,7 @@ Data that a formula makes are the same on all processors, so a record of them ha
 """
 
 import dataclasses
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from typing import ClassVar
 
@@ -32,6 +33,11 @@ def number(value: float) -> str:
 def numbers(values: Iterable) -> str:
     """Return numbers in brackets."""
     return f"({', '.join(map(number, np.ravel(np.asarray(values, float))))})"
+
+
+def counted(notes: Iterable[str]) -> str:
+    """Return each note once, in the order in which they come first, with how often it came."""
+    return "\n".join(f"{count} x {note}" if count > 1 else note for note, count in Counter(notes).items())
 
 
 def made(scenario: smc.Scenario) -> smc.Trace:

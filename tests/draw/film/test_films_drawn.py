@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 from helpers import arms, sketch
-from helpers.sketch import Pen, failed, made, numbers
+from helpers.sketch import Pen, counted, failed, made, numbers
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
@@ -58,7 +58,7 @@ def test_letters_and_badges_of_machines_in_a_row_and_behind_each_other(row, pen,
     for time, gone, speed in ((0.3, False, 0.125), (1.7, False, 0.2), (1.9, True, 4.0)):
         caption.over(paper(), time, (False, gone), (told[0][0], told[1][gone]), speed)
     pen += [f"{name} {numbers(getattr(caption, name))}" for name in ("room", "badge", "pills", "badges", "apart")]
-    assert "\n".join(pen) == snapshot
+    assert counted(pen) == snapshot
 
 
 def test_the_strip_of_an_encoder_and_a_network_with_a_title(pen, snapshot):
@@ -70,7 +70,7 @@ def test_the_strip_of_an_encoder_and_a_network_with_a_title(pen, snapshot):
     caption = Caption([many], ["a far too long label " * 5], COLOURS[:1], None, SIZE, 1.0, arrows.scales([many]))
     caption.place(np.array([[20.0, 60, 120, 220]]))
     caption.over(paper(), 0.25, (False,))
-    assert "\n".join(pen) == snapshot
+    assert counted(pen) == snapshot
 
 
 @pytest.mark.parametrize("limits", [[0.4, 0.2, 0.9], math.inf])
@@ -95,7 +95,14 @@ def test_bars_force_and_blow_of_an_arm(limits, pen, monkeypatch, snapshot):
         for one in (*over.trails, *over.wanted)
     ]
     sums = [picture[:, :, k].mean() for k in range(3)]
-    said = [*arm.key([trace]), *pen, *trails, numbers(sums), numbers(arm.room([trace], 300.0)), numbers(over.errors)]
+    said = [
+        *arm.key([trace]),
+        counted(pen),
+        *trails,
+        numbers(sums),
+        numbers(arm.room([trace], 300.0)),
+        numbers(over.errors),
+    ]
     assert "\n".join(said) == snapshot
 
 
@@ -171,7 +178,7 @@ def test_the_stage_of_two_machines_with_arrows_ghosts_and_shadows(kind, pen, sna
         said += [
             str(mount._replace(front=numbers(() if mount.front is None else mount.front))) for mount in stage.mounts[1]
         ]
-    assert "\n".join([*said, *pen]) == snapshot
+    assert counted([*said, *pen]) == snapshot
 
 
 def test_a_model_without_round_shapes_has_no_radii():
