@@ -103,7 +103,8 @@ def refused(request: pytest.FixtureRequest, snapshot: SnapshotAssertion) -> Iter
             for pattern, plain in VARYING.items():
                 sentence = pattern.sub(plain, sentence)
             sentence = sentence.replace(folder, "FOLDER").replace("FOLDER\\", "FOLDER/") if folder else sentence
-            sentences.setdefault(VALUE.sub("...", sentence), sentence)
+            what, colon, cure = sentence.rpartition(": ")
+            sentences.setdefault(VALUE.sub("...", f"{what}: ") + colon + cure, sentence)
         return str(caught.value)
 
     yield check

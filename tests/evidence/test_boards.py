@@ -518,7 +518,7 @@ def raising(y, gains, memory):
     return 1 // int(y.q > 9.0), y.x
 
 
-def test_a_mistake_is_one_sentence(snapshot):
+def test_a_mistake_is_one_sentence(refused):
     short, duffing = boards.entry("acrobot", duration=0.01), smc.Scenario(plant="duffing", law="none", duration=0.01)
     rows, law = boards.SIMULATION["acrobot"]["v2"], {"plant": "acrobot", "law": "none"}
     mistakes = [
@@ -546,13 +546,8 @@ def test_a_mistake_is_one_sentence(snapshot):
         lambda: Machine(smc.Scenario(**law, surface=smc.surface("linear", c=1.0))),
         lambda: Machine(boards.on_board("acrobot", raising())).simulate(Case()),
     ]
-    said = []
     for wrong in mistakes:
-        with pytest.raises(smc.ScenarioError) as raised:
-            wrong()
-        said.append(str(raised.value))
-    assert not [one for one in said if "\n" in one]
-    assert "\n".join(said) == snapshot
+        refused(wrong)
 
 
 def test_a_law_that_does_not_compile_is_refused():
