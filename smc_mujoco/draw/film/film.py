@@ -230,12 +230,13 @@ def framed(
 ) -> Stage:
     """Return the stage from the chosen view or, if that shows nothing, from the first of others that shows something.
 
-    Arguments are those of `Stage`. It warns of a chosen view that shows nothing, and if no view shows anything.
+    The library's own machines are in sight unless a view is chosen. Arguments are those of `Stage`. It warns of a
+    chosen view that shows nothing, and if no view shows anything.
     """
     name = traces[0].scenario.plant.name
     for view in (chosen, *scene.OTHER_VIEWS):
         stage = Stage(traces, colours, size, room, view, motions, apart)
-        if stage.shows():
+        if (chosen is None and not stage.is_users) or stage.shows():
             if view != chosen is not None:
                 fact = f"camera {chosen!r} shows nothing of {name}: the picture is from camera={view}"
                 warnings.warn(fact, ScenarioWarning, users_stacklevel())
