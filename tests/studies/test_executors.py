@@ -269,8 +269,8 @@ def wait(there: Callable[[], object]) -> None:
 
 
 @pytest.fixture(scope="module")
-def dask(tmp_path_factory) -> Iterator[tuple[str, list[subprocess.Popen]]]:
-    """The address of a scheduler; its process, and those of its two workers. One test kills a worker, the next all."""
+def dask(tmp_path_factory) -> Iterator[tuple[str, list[subprocess.Popen], Callable[[], subprocess.Popen]]]:
+    """The address of a scheduler; its process and that of its worker; what starts another worker."""
     tmp_path = tmp_path_factory.mktemp("dask")
     file = tmp_path / "scheduler.json"
     common = "--no-dashboard", "--scheduler-file", str(file)
@@ -278,10 +278,16 @@ def dask(tmp_path_factory) -> Iterator[tuple[str, list[subprocess.Popen]]]:
     worker = ["-m", "distributed.cli.dask_worker", "--no-nanny", "--nthreads", "1", *common]
     worker += ["--local-directory", str(tmp_path)]
     running = [start(*scheduler, log=tmp_path / "scheduler.log")]
+
+    def another() -> subprocess.Popen:
+        workers = len(running)
+        running.append(start(*worker, log=tmp_path / f"worker{workers}.log"))
+        wait(lambda: (tmp_path / "scheduler.log").read_text().count("Register worker") == workers)
+        return running[-1]
+
     try:
-        running += [start(*worker, log=tmp_path / f"worker{i}.log") for i in range(2)]
-        wait(lambda: "Register worker" in (tmp_path / "scheduler.log").read_text())
-        yield json.loads(file.read_text())["address"].replace("tcp://", "dask://"), running
+        another()
+        yield json.loads(file.read_text())["address"].replace("tcp://", "dask://"), running, another
     finally:
         for process in running:
             process.kill()
@@ -329,16 +335,17 @@ def test_a_client_of_ones_own_and_its_address_give_the_same_table(dask, tmp_path
 
 @pytest.mark.slow
 def test_a_worker_that_is_killed_in_mid_run_changes_nothing(dask, half_done, tmp_path):
-    _, (_, *workers) = dask
-    workers[0].send_signal(signal.SIGKILL)
+    _, (_, worker), another = dask
+    other = another()
+    worker.send_signal(signal.SIGKILL)
     (tmp_path / "go").touch()
     said, _ = half_done.communicate(timeout=300)
     assert (said, half_done.returncode) == ("True\n", 0), (tmp_path / "client.log").read_text()
-    assert (workers[0].poll(), workers[1].poll()) == (-signal.SIGKILL, None)
+    assert (worker.poll(), other.poll()) == (-signal.SIGKILL, None)
 
 
 def test_a_scheduler_that_is_killed_in_mid_run_is_one_sentence_and_finished_runs_stay(dask, half_done, tmp_path):
-    _, (scheduler, *_) = dask
+    _, (scheduler, *_), _ = dask
     scheduler.send_signal(signal.SIGKILL)
     (tmp_path / "go").touch()
     half_done.communicate(timeout=300)

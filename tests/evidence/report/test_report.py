@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from smc_mujoco.analysis import chattering
 from smc_mujoco.common import gl
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.evidence.papers.gaber import scenarios
@@ -59,10 +60,12 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module", autouse=True)
-def small_films():
-    """Films of a ninth of the pixels."""
+def small_films_and_coarse_grid():
+    """Films of a ninth of the pixels, and limit cycles on a sixth of the grid's points."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(films, "SIZE", (320, 180))
+        patch.setattr(chattering, "GRID_FREQUENCIES", 24)
+        patch.setattr(chattering, "GRID_AMPLITUDES", 15)
         yield
 
 
