@@ -8,9 +8,11 @@ import math
 
 import numpy as np
 import pytest
+from helpers.pages import ROOT
 
 import smc_mujoco as smc
 
+PAGE = (ROOT / "docs" / "published.md").read_text(encoding="utf-8")
 L, BOUND = 1.0, 2.0  # of |d'| and of |u|, in N/s and N
 
 
@@ -46,6 +48,7 @@ def test_conditioned_super_twisting_does_not_wind_up_as_the_plain_law_does():
     ours, plain = run(laws, v0=10.0, u_max=BOUND, integrator="Euler")
     assert 0.0 < -ours.v.min() < min(BOUND**2 / (2.0 * 1.1), (BOUND / 1.5) ** 2) < -plain.v.min()
     assert np.abs(ours.u).max() == BOUND
+    assert f"overshoots by {-plain.v.min():.1f} m/s in place of {-ours.v.min():.2f}." in PAGE
 
 
 @pytest.mark.parametrize(("slope", "kept"), [(0.95, True), (1.05, False)])
