@@ -13,10 +13,10 @@ the sample, and the conclusion holds for these gains. For two laws, runs that ar
 are one sample, whose difference is the median of theirs. A run that repeats the results of both laws is not counted.
 
 The test. The difference of two laws in a sample is the logarithm of the ratio of their values. For shares, and where
-3 % of a value is less than the sensor resolves, it is the difference of the values. A law is better than another if the
-signed-rank test (see `signed_rank`) rejects that its values are lower by the least relevant difference or less: the
-interval of the ratio lies beyond that difference. Besides, its median must not be the higher one, and it must not fail
-more often.
+3 % of a value is less than what matters (see `paired_runs.floor`), it is the difference of the values. A law is better
+than another if the signed-rank test (see `signed_rank`) rejects that its values are lower by the least relevant
+difference or less: the interval of the ratio lies beyond that difference. Besides, its median must not be the higher
+one, and it must not fail more often.
 
 The correction. There are two families, over all blocks of a metric in a table, however the table is grouped into
 boards. Both are corrected by S. Holm's method (Scandinavian Journal of Statistics 6(2), 1979), with two-sided p-values.
@@ -356,7 +356,7 @@ def _shifts(centres: np.ndarray, floors: np.ndarray, relative: np.ndarray, relev
 
 
 def _ratios_make_sense(cells: np.ndarray, floor: float, relevant: float) -> np.ndarray:
-    """Return for which laws (laws, laws) the relevant share of both medians is above what the sensor resolves.
+    """Return for which laws (laws, laws) the relevant share of both medians is above the floor.
 
     Args:
       cells: (laws, seeds), of one block.

@@ -12,13 +12,13 @@ import numpy as np
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import every, joined, number
+from smc_mujoco.common.text import every, joined
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw.style import law_colour
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.studies.board import size_in_words
+from smc_mujoco.studies.board import relevance, size_in_words
 from smc_mujoco.studies.needs import NEEDS, TIES, Choice, ties
 from smc_mujoco.studies.table import Table
 
@@ -182,9 +182,10 @@ class Advice(Tables):
         if self._shared and len(self._shared) < len(self.comparison.laws):
             text += f" Sets of gains, which are the sample of a law that has several: {_first_of(self._shared)}."
         text += " –: settles too seldom to be advised." * any(not choice.fit for choice in self.choices)
-        resolved = float(self.comparison.floors.max())
-        sensor = f", for positions at least what the sensor resolves, {number(resolved)} {self.plant.unit}"
-        return f"{text} Least relevant difference: {100 * self.comparison.relevant:g} %{sensor * bool(resolved)}."
+        metrics = [NEEDS[need].metric.name for need, _ in self.blocks]
+        floors = zip(metrics, self.comparison.floors.tolist(), strict=True)
+        relevant = relevance(self.comparison.relevant, floors, self.plant.unit)
+        return f"{text} Least relevant difference: {relevant}."
 
     @property
     def samples(self) -> str:

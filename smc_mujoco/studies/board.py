@@ -22,6 +22,7 @@ from smc_mujoco.control.source import Source, in_words, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.metrics.conventions import REST_SHARE
 
 if TYPE_CHECKING:
     from smc_mujoco.studies.worst_case import WorstCase
@@ -144,7 +145,7 @@ class Board(Tables):
       limits: of the p-values, after the correction.
       level: level of intervals and tests.
       relevant: share of a value that is relevant.
-      resolution: the largest difference that a sensor does not resolve, in the unit of the board.
+      resolution: the largest lower bound on the least relevant difference, in the unit of the board.
       by_step: whether it is about chattering without RK4, which half the physics step may change.
     """
 
@@ -443,18 +444,24 @@ def key(boards: Sequence[Board]) -> str:
     several = f", corrected for {family} comparisons a metric" * (family > 1)
     words += (
         ". Marked: no law is better, and no run failed. A winner is better than every other law in a paired test"
-        f"{several}; how much: by pairs of runs, not by the medians; {relevance(boards)}."
+        f"{several}; how much: by pairs of runs, not by the medians; least relevant difference: "
+        f"{relevance(boards[0].relevant, [(board.metric, board.resolution) for board in boards])}."
     )
     words += f" {UNTRIED[:1].upper()}{UNTRIED[1:]}." * any(board.by_step for board in boards)
     gains = in_words(sources(boards))
     return f"{words} {gains[:1].upper()}{gains[1:]}." if gains else words
 
 
-def relevance(boards: Sequence[Board]) -> str:
-    """Return the least relevant difference of boards in words."""
-    resolved = max((board.resolution for board in boards if board.unit == "{x}"), default=0.0)
-    sensor = f", for positions at least what the sensor resolves, up to {number(resolved)} rad or m" if resolved else ""
-    return f"least relevant difference: {100 * boards[0].relevant:g} % of the larger value{sensor}"
+def relevance(share: float, floors: Iterable[tuple[str, float]], x: str = "rad or m") -> str:
+    """Return the least relevant difference in words: a share, and a lower bound for each metric, of positions in x."""
+    of_unit: dict[str, float] = {}
+    for metric, floor in floors:
+        unit = "" if metric == SETTLES else CATALOGUE[metric].unit.removesuffix("/s")
+        of_unit[unit] = max(floor, of_unit.get(unit, 0.0))
+    words = f"{100 * share:g} % of the larger value"
+    if resolved := of_unit.get("{x}"):
+        words += f", for positions at least what the sensor resolves, up to {number(resolved)} {x}"
+    return words + f", for u and its variation at least {100 * REST_SHARE:g} % of its bound" * bool(of_unit.get("{u}"))
 
 
 def sources(boards: Iterable[Board]) -> dict[str, list[Source]]:

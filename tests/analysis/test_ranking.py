@@ -820,7 +820,10 @@ def test_positions_are_told_apart_as_far_as_the_sensor_of_the_condition_resolves
     noisy = paper.scenario("duffing", "none", changes={"noise": smc.Noise(position=0.02)})
     assert [cells.floor(one, "{x}") for one in (fine, coarse, noisy)] == [0.0, 0.5 / 50, 0.02]
     assert cells.floor(noisy, "%") == pytest.approx(100 * 0.02 / 1.5)
-    assert [cells.floor(noisy, unit) for unit in ("s", "{u}/s", "{x} s^2")] == [0.0] * 3
+    assert [cells.floor(noisy, unit) for unit in ("s", "({u})^2 s", "{x} s^2")] == [0.0] * 3
+    assert [cells.floor(fine, unit) for unit in ("{u}", "{u}/s")] == [6e-3, 6e-3]  # |u| <= 6 N
+    unbounded = paper.scenario("duffing", "none", changes={"u_max": math.inf})
+    assert cells.floor(unbounded, "{u}/s") == 0.0
     table = stand({"a": blocks(1e-6), "b": blocks(2e-6)}, metric="ultimate_bound")
     table.columns["scenario"] = np.array([run_key.row(fine)["scenario"]] * 40)
     assert leaderboard(table, ["ultimate_bound"])[0].winner == "a"
@@ -828,6 +831,16 @@ def test_positions_are_told_apart_as_far_as_the_sensor_of_the_condition_resolves
     (board,) = leaderboard(table, ["ultimate_bound"])
     assert board.result == "no winner: both laws are level"
     assert "for positions at least what the sensor resolves, up to 0.0200" in " ".join(printed([board]).split())
+
+
+def test_commands_of_laws_that_friction_holds_are_level_though_one_creeps_a_thousand_times_less():
+    held = run_key.row(paper.scenario("duffing", "none", changes={"friction": smc.Coulomb(0.2)}))["scenario"]
+    for size, winner in ((1e-8, None), (1.0, "a")):
+        table = stand({"a": blocks(size), "b": blocks(1e3 * size)}, metric="tv_rate")
+        table.columns["scenario"] = np.array([held] * 40)
+        (board,) = leaderboard(table, ["tv_rate"])
+        assert board.winner == winner
+        assert "for u and its variation at least 0.1 % of its bound" in " ".join(printed([board]).split())
 
 
 @pytest.fixture(scope="module")

@@ -243,7 +243,7 @@ def test_why_there_is_no_winner_as_recorded(snapshot):
                 dataclasses.replace(one, sources=(about,), failed=k) for k, one in enumerate(made.entries)
             ),
         },
-        "sensor": {"unit": "{x}", "resolution": 0.02, "by_step": True},
+        "sensor": {"metric": "ultimate_bound", "unit": "{x}", "resolution": 0.02, "by_step": True},
     }
     said = []
     for name, change in changes.items():
