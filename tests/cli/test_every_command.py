@@ -27,7 +27,7 @@ from smc_mujoco.studies.scene import Scene
 from tests.helpers.words import words
 
 TYPED = ("duffin", "hierarchica", "encode", "vdp_nois", "noise+duffin")  # begun names: what completes them is told
-CALLS = {  # command line -> the functions that it calls, of which the last does the work
+CALLS = {  # command line -> the functions that it calls, of which the last does the work; not for audits
     "laws": ["cli.law_pages.print_lists"],
     "laws pid": ["cli.law_pages.print_pages"],
     "laws --needs continuous,two-gains": ["cli.law_pages.print_suitable"],
@@ -93,11 +93,6 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "check-fmu law.fmu --variables x=theta,u=torque --constants enable=1 --period 0.002 --timeout 4": [
         "exchange.fmu.load.check"
     ],
-    "report": ["evidence.report.report"],
-    "report --quick --out there --seeds 3 --records r --law pid --relevant 0.05 --threads 2": [
-        "evidence.report.report"
-    ],
-    "report --paper gaber --quick --out there --threads 2": ["evidence.report.paper.report"],
 }
 
 
@@ -222,7 +217,7 @@ def about(name: str, parameter: inspect.Parameter, info: Any) -> str:
 
 
 def test_the_calls_above_have_every_option_of_their_commands():
-    beside = {"--timing", "--serve", "--port", "--paper"}  # for what is done after the work, or instead of it
+    beside = {"--timing", "--serve", "--port"}  # for what is done after the work, or instead of it
     for name, (_, command) in COMMANDS.items():
         words = {word.partition("=")[0] for line in CALLS if line.split()[0] == name for word in line.split()}
         options = [{*names.split("/")} for names in parameters(command) if names.startswith("-")] if words else []

@@ -314,23 +314,11 @@ def about():
 @pytest.fixture(scope="module")
 def findings():
     found = tuple(margins())
+    made = scores, places, claims, fields, fronts, oscillations, basins, machines, repeated, scenes
     return Findings(
-        scores=tuple(scores()),
-        places=tuple(places()),
-        claims=tuple(claims()),
-        fields=tuple(fields()),
-        fronts=tuple(fronts()),
-        worst=tuple(worst_cases()),
-        margins=found,
-        by_set={"tuned": found[:6], "study": found[:4]},
-        oscillations=tuple(oscillations()),
-        accuracies=AccuracyTable(accuracies()),
-        basins=tuple(basins()),
-        machines=tuple(machines()),
-        repeated=tuple(repeated()),
-        scenes=tuple(scenes()),
-        about=about(),
-    )
+        **{one.__name__: tuple(one()) for one in made}, worst=tuple(worst_cases()), margins=found,
+        by_set={"tuned": found[:6], "study": found[:4]}, accuracies=AccuracyTable(accuracies()), about=about(),
+    )  # fmt: skip
 
 
 PLOT = re.compile(r'<script type="application/json" data-plot="(.*?)">(.*?)</script>', re.S)

@@ -25,36 +25,21 @@ runs = "duration=0.1"
 sets = ["slow", "study"]
 [gains.slow]
 classical = { k = 3.0, c = 2.0 }
-[[claim]]
-id = "1"
-whose = "paper"
-text = "the law & its plant are calm"
-where = "p. 1"
-function = "calm"
-plants = ["duffing"]
-laws = ["classical"]
-holds_if = { "TV rate" = "< 1e9" }
-[[claim]]
-id = "2"
-whose = "paper"
-text = "nothing moves"
-where = "p. 2"
-function = "calm"
-plants = ["van_der_pol"]
-laws = ["classical"]
-holds_if = { "TV rate" = "< 0" }
-[[claim]]
-id = "3"
-whose = "derived"
-how = "by sec. 2"
-varies = "it is timed"
-text = "it is fast"
-where = "p. 3"
-function = "calm"
-plants = ["duffing"]
-laws = ["classical"]
-holds_if = { "TV rate" = "< 1e9" }
 """
+CLAIM = """
+[[claim]]
+id = "{}"
+whose = "{}"
+text = "{}"
+where = "p. {}"
+function = "calm"
+plants = ["{}"]
+laws = ["classical"]
+holds_if = {{ "TV rate" = "< {}" }}
+"""
+DATA += CLAIM.format(1, "paper", "the law & its plant are calm", 1, "duffing", "1e9")
+DATA += CLAIM.format(2, "paper", "nothing moves", 2, "van_der_pol", "0")
+DATA += CLAIM.format(3, "derived", "it is fast", 3, "duffing", "1e9") + 'how = "by sec. 2"\nvaries = "it is timed"\n'
 CODE = """
 def calm(runs):
     return {"TV rate": runs.scores(runs.grid().values())[0]["tv_rate"], "beside it": 0.125}
