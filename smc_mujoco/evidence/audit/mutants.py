@@ -37,9 +37,9 @@ def survivors(
 ) -> dict[str, str]:
     """Return claim -> KEPT or BLIND, for the claims that no mutant of their first law loses. There should be none.
 
-    A mutant loses a claim if fewer of the claim's sentences hold than under the law itself, or if the claim's function
-    cannot measure the mutant. A claim of which no sentence holds has nothing to lose: there the numbers must change.
-    Claims with `immune` are skipped.
+    A mutant loses a claim if a sentence of the claim holds under the law itself and not under the mutant, or if the
+    claim's function cannot measure the mutant. A claim of which no sentence holds has nothing to lose: there the
+    numbers must change. Claims with `immune` are skipped.
 
     Args:
       paper, only, gains, quick, threads: as of `smc.audit`.
@@ -67,7 +67,10 @@ def survivors(
                 report(1)
 
     intact = {(id, name): evidence for id, name, evidence in measured(kept.values(), "", "")}
-    holding = {id: any(any(sentences(intact[id, name] or [], kept[id].quantifier)) for name in names) for id in kept}
+    holding = {
+        id: any(any(sentences(intact[id, name] or [], entry.quantifier).values()) for name in names)
+        for id, entry in kept.items()
+    }
     for mutant in MUTANTS:
         report((len(tested) - len(kept)) * len(names))
         for law in sorted({first_law(entry) for entry in kept.values()}):
@@ -102,5 +105,6 @@ def lost(entry: Entry, intact: Evidence, mutant: Evidence | None, holding: bool)
     if mutant is None:
         return True
     if holding:
-        return sum(sentences(mutant, entry.quantifier)) < sum(sentences(intact, entry.quantifier))
+        still = sentences(mutant, entry.quantifier)
+        return any(held and not still.get(one) for one, held in sentences(intact, entry.quantifier).items())
     return [repr(item.value) for item in mutant] != [repr(item.value) for item in intact]  # repr: NaN equals NaN

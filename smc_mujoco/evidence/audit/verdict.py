@@ -294,7 +294,7 @@ def _marked(counts: Mapping[str, int]) -> str:
 
 def verdict(evidence: Evidence, quantifier: str = NAMED, over: str = "") -> str:
     """Return the verdict under one set of gains, of a claim over "all" or "some" gains or over none in particular."""
-    hold = sentences(evidence, quantifier)
+    hold = sentences(evidence, quantifier).values()
     if not hold:
         return NOT_TESTABLE
     if any(hold):
@@ -302,13 +302,14 @@ def verdict(evidence: Evidence, quantifier: str = NAMED, over: str = "") -> str:
     return NOT_SHOWN if quantifier == EXISTENTIAL or over == "some" else REFUTED
 
 
-def sentences(evidence: Evidence, quantifier: str = NAMED) -> list[bool]:
-    """Return whether each sentence holds: all its checks do, or one of an existential claim."""
+def sentences(evidence: Evidence, quantifier: str = NAMED) -> dict[str, bool]:
+    """Return sentence -> whether it holds: all its checks do, or one of an existential claim."""
     checks: dict[str, list[bool]] = {}
     for one in evidence:
         if isinstance(one, Check):
             checks.setdefault(one.sentence, []).append(one.holds)
-    return [any(holds) if quantifier == EXISTENTIAL else all(holds) for holds in checks.values()]
+    rule = any if quantifier == EXISTENTIAL else all
+    return {sentence: rule(holds) for sentence, holds in checks.items()}
 
 
 def combined(

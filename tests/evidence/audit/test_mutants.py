@@ -39,6 +39,10 @@ def constant(runs):
 def named(runs):
     law = {one.scenario.law.name: one for one in runs.traces(runs.grid().values())}["classical"]
     return {"size": float(law.x.shape[1])}
+def swaps(runs):
+    (one,) = runs.traces(runs.grid().values())
+    rest = float(abs(one.u[:-1]).max())
+    return {"size": 1.0 - rest, "other": rest}
 def picky(runs):
     (one,) = runs.traces(runs.grid().values())
     if not np.abs(one.u).any():
@@ -89,6 +93,13 @@ def test_a_claim_that_no_mutant_loses_is_found(paper, function, asked, kept):
     done = []
     assert survivors(paper(function, asked), report=done.append) == ({"1": kept} if kept else {})
     assert sum(done) == evaluations(paper(function, asked)) == 5
+
+
+def test_a_mutant_that_loses_one_sentence_and_gains_another_loses_the_claim(paper):
+    file = paper("swaps", "ASKED") / "paper.toml"
+    two = 'size = { asked = "> 0", sentence = "it rests" }, other = { asked = "> 1", sentence = "it acts" }'
+    file.write_text(file.read_text().replace('size = "ASKED"', two))
+    assert survivors(file.parent) == {}
 
 
 def test_a_claim_that_says_why_is_not_asked(paper):
