@@ -104,7 +104,7 @@ def test_pages_are_as_recorded(snapshot):
         "picture": html.embedded(b"abc", "image/png"),
     }
     for name, text in made.items():
-        assert text.replace("><", ">\n<") == snapshot(name=name)
+        assert re.sub("><(?=tr|pol|pat|text|/tab|/svg)", ">\n<", text) == snapshot(name=name)
     left, right, top, bottom = html._MARGINS
     first, second, reference = points(made["panel"])
     width, height = html.WIDTH - left - right, html.HEIGHT - top - bottom

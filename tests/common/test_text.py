@@ -1,6 +1,7 @@
 """Numbers and lists in words, and a table for every reader: terminal, plain text, notebook, LaTeX."""
 
 import math
+import re
 
 import pytest
 
@@ -57,7 +58,7 @@ def test_a_table_fits_into_a_width(width, stacked, snapshot):
 
 
 def test_a_table_for_notebooks_and_for_latex_has_all_its_words(snapshot):
-    assert TABLE._repr_html_().replace("><", ">\n<") == snapshot(name="html")
+    assert re.sub("><(?=tr|/table)", ">\n<", TABLE._repr_html_()) == snapshot(name="html")
     assert TABLE.to_latex() == snapshot(name="latex")
     long = Tabular(headings=["a"], rows=[["b"]] * 41)
     assert long._repr_html_().count("<tr>") == 1 + 40 + 1

@@ -218,7 +218,7 @@ def test_the_plugin_tells_pytest_of_its_options_and_its_marker(snapshot):
     recorder = Recorder()
     plugin.pytest_addoption(recorder)
     plugin.pytest_configure(recorder)
-    assert recorder.told == snapshot
+    assert [str(one) for one in recorder.told] == snapshot
 
 
 def test_what_a_response_says_is_recorded(pole, step_response, snapshot):

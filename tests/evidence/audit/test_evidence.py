@@ -120,7 +120,9 @@ def test_a_claim_leads_to_its_runs_numbers_threshold_and_verdict(told):
 def test_it_holds_what_is_recorded(told, snapshot):
     """Its fields and words. Hashes, numbers of runs, versions and the order of runs, by their hashes, are left out."""
     runs = sorted(told["runs"].values(), key=lambda run: json.dumps([run["condition"], run["gains"]]))
-    text = json.dumps(told | {"runs": runs, "software": [*told["software"]]}, indent=1)
+    lines = [f"claim {json.dumps(one)}" for one in told["claims"]] + [f"run {json.dumps(one)}" for one in runs]
+    lines += [f"{name} {json.dumps(one)}" for name, one in told.items() if name not in ("claims", "runs", "software")]
+    text = "\n".join([*lines, f"software {' '.join(told['software'])}"])
     text = re.sub('"[0-9a-f]{16}(?:[0-9a-f]{48})?"', '"HASH"', text)
     assert re.sub(r'("(?:value|k|c)": )[\d.e-]+', r"\1#", text) == snapshot
 
