@@ -11,6 +11,7 @@ import imageio_ffmpeg
 import matplotlib.figure
 import numpy as np
 import pytest
+from helpers.films import without_charts
 from PIL import Image
 
 import smc_mujoco as smc
@@ -73,6 +74,7 @@ def test_show_takes_any_figure_and_the_file_of_one(cell, trace, tmp_path):
 
 
 @renders
+@without_charts
 def test_frames_are_those_of_the_film_again_and_again(trace):
     frames = smc.frames(trace, title="twice", **FILM)
     assert len(frames) == 5
@@ -87,6 +89,7 @@ def test_frames_are_those_of_the_film_again_and_again(trace):
 
 
 @renders
+@without_charts
 def test_mediapy_takes_the_frames_with_their_speed(trace):
     mediapy = pytest.importorskip("mediapy")
     shown = mediapy.show_video(smc.frames(trace, **FILM), return_html=True)
@@ -94,6 +97,7 @@ def test_mediapy_takes_the_frames_with_their_speed(trace):
 
 
 @renders
+@without_charts
 def test_show_films_traces_and_frames(cell, trace):
     smc.show([trace, trace], labels=["a", "b"], **FILM)
     smc.show(smc.frames(trace, **FILM))

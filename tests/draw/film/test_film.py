@@ -1,16 +1,17 @@
 """Films: the right frames, moving machines in their laws' colours, arrows that push, failures that show."""
 
+import contextlib
 import dataclasses
 import itertools
 import os
 import signal
 import subprocess
 import sys
-from unittest import mock
 
 import imageio_ffmpeg
 import numpy as np
 import pytest
+from helpers.films import without_charts
 from PIL import Image
 
 import smc_mujoco as smc
@@ -49,19 +50,9 @@ def broken(trace: smc.Trace, at: int) -> smc.Trace:
     return dataclasses.replace(trace, **arrays, diverged_at=float(trace.t[at]), failure="it blew up")
 
 
-class Blank:
-    """In the place of charts that a test does not look at: drawing them takes half of a picture's time."""
-
-    def __init__(self, traces, names, colours, size, scale):
-        self.image = np.full((size[1], size[0], 3), 255, np.uint8)
-
-    def at(self, time):
-        return self.image
-
-
 def pictures(traces, times, charts=False, **options) -> list[np.ndarray]:
     clock = Clock(np.array(times), np.ones(len(times)))
-    with mock.patch.object(film, "Charts", film.Charts if charts else Blank):
+    with contextlib.nullcontext() if charts else without_charts:
         return list(film.frames(traces, clock, options.get("labels"), None, options.get("size", SIZE)))
 
 
@@ -85,6 +76,7 @@ def share(picture: np.ndarray, colour: str) -> float:
 
 
 @renders
+@without_charts
 def test_film_has_a_frame_every_thirtieth_of_a_second(tmp_path):
     written = []
     path = film.film(runs(), tmp_path / "new" / "a.mp4", size=SIZE, report=written.append, speed=1.0)
@@ -243,6 +235,7 @@ def test_an_encoder_that_is_started_never_receives_ctrl_c():
 
 
 @renders
+@without_charts
 def test_a_film_that_is_stopped_leaves_nothing(tmp_path):
     def stop(made):
         raise KeyboardInterrupt
@@ -278,6 +271,7 @@ smc.film([trace], sys.argv[1], size=(320, 180), report=lambda n: print(n, flush=
 
 
 @renders
+@without_charts
 def test_stills_and_clips_are_written_and_networks_are_cut(tmp_path):
     many = smc.plant("inverted_pendulum_network", n=30)
     traces = smc.run([smc.Scenario(plant=many, law="none", duration=0.2)])
@@ -288,6 +282,7 @@ def test_stills_and_clips_are_written_and_networks_are_cut(tmp_path):
         assert (clip.n_frames, clip.size) == (5, SIZE)
 
 
+@without_charts
 def test_one_trace_is_filmed_like_a_list_of_one(tmp_path):
     (trace,) = runs(laws=LAWS[:1], duration=0.1)
     for name, given in (("a.png", trace), ("b.png", [trace])):

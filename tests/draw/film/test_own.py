@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.films import without_charts
 from PIL import Image
 
 import smc_mujoco as smc
@@ -22,6 +23,7 @@ if SUITE is None or not SUITE.submodule_search_locations:
 FOREIGN = Path(SUITE.submodule_search_locations[0]) / "suite"
 
 
+@without_charts
 def test_a_foreign_model_has_its_picture(tmp_path):
     """From above, as its camera sees it. Its target reaches below the floor."""
     plant = smc.plant_from(FOREIGN / "reacher.xml", {"shoulder": None, "wrist": None})
@@ -36,6 +38,7 @@ def test_a_foreign_model_has_its_picture(tmp_path):
 @pytest.mark.parametrize(
     ("group", "floor", "words"), [(3, "", "shows no part that moves"), (0, '<geom type="box" size="9 9 .1"/>', None)]
 )
+@without_charts
 def test_a_picture_that_shows_nothing_is_told(tmp_path, group, floor, words):
     (tmp_path / "one.xml").write_text(f"""
       <mujoco><worldbody>{floor}<body pos="0 0 .5"><joint name="j" axis="0 1 0"/>
@@ -51,6 +54,7 @@ def test_a_picture_that_shows_nothing_is_told(tmp_path, group, floor, words):
             smc.still([trace], 0.1, tmp_path / "a.png", size=(320, 180))
 
 
+@without_charts
 def test_a_view_that_shows_nothing_is_framed_again(tmp_path):
     """The wall hides the machine from the model's own camera, and from the chosen one."""
     (tmp_path / "one.xml").write_text("""
@@ -116,6 +120,7 @@ def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():
     assert words[0].startswith("violet arrow: friction, limits and contact, longest ")
 
 
+@without_charts
 def test_a_body_without_a_shape_has_no_arrow_and_no_error(tmp_path):
     (tmp_path / "bare.xml").write_text("""
       <mujoco><worldbody><geom size="1 1 .1" type="plane"/><body>

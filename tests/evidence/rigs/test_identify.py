@@ -72,8 +72,8 @@ def test_columns_of_the_axis_give_all_four_however_they_begin(begin):
 
 @pytest.fixture(scope="module")
 def moved():
-    """1 s of the axis on a sine, read by its encoder."""
-    return smc.run(AXIS.scenario(duration=1.0, reference=smc.Sine(0.05, 4.0), x0=0.0))
+    """0.6 s of the axis on a sine, read by its encoder."""
+    return smc.run(AXIS.scenario(duration=0.6, reference=smc.Sine(0.05, 4.0), x0=0.0))
 
 
 @pytest.fixture(scope="module")
@@ -83,10 +83,10 @@ def found(moved):
 
 @pytest.fixture(scope="module")
 def swung():
-    """2.5 s of the pendulum under a torque, with noise."""
+    """1.5 s of the pendulum under a torque, with noise."""
     return smc.run(
         PENDULUM.scenario(
-            "none", feedforward=smc.Sine(2.0, 4.5), duration=2.5, x0=-math.pi, noise=smc.Noise(1e-3), seed=3
+            "none", feedforward=smc.Sine(2.0, 4.5), duration=1.5, x0=-math.pi, noise=smc.Noise(1e-3), seed=3
         )
     )
 
