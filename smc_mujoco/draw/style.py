@@ -117,19 +117,19 @@ def law_colour(law: Component | str) -> str:
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
     """Return one colour per law for one picture, all different.
 
-    Each law has its colour. Only where two would be mistaken for each other, as where a law runs twice or two of the
-    user's laws have the same place in the palette, the later one gets the colour farthest from all in the picture. A
-    law that is not of the library, whose colour says nothing, keeps twice the distance.
+    The library's laws have their colours. Only where two would be mistaken for each other, as where a law runs twice,
+    the later one gets the colour farthest from all in the picture. Laws that are not of the library, whose colours say
+    nothing, come after them, wherever they stand, and keep twice the distance.
     """
-    colours: list[str] = []
-    for law in laws:
-        wanted, library = law_colour(law), _template(law)[1] in known_laws().own
-        apart = MIN_DISTANCE if library else 2.0 * MIN_DISTANCE
-        clear = all(distance(wanted, other) > apart for other in colours)
-        used = [*colours, PAPER, DISTURBANCE, REACTION, FAILED]
+    library = [_template(law)[1] in known_laws().own for law in laws]
+    colours: dict[int, str] = {}
+    for i in sorted(range(len(laws)), key=lambda i: not library[i]):
+        wanted, apart = law_colour(laws[i]), MIN_DISTANCE if library[i] else 2.0 * MIN_DISTANCE
+        clear = all(distance(wanted, other) > apart for other in colours.values())
+        used = [*colours.values(), PAPER, DISTURBANCE, REACTION, FAILED]
         free = () if clear else [colour for colour in _grid(len(colours)) if colour not in used]
-        colours.append(wanted if clear else _farthest(free, used)[0])
-    return colours
+        colours[i] = wanted if clear else _farthest(free, used)[0]
+    return [colours[i] for i in range(len(laws))]
 
 
 @functools.cache

@@ -79,6 +79,11 @@ def test_laws_that_would_be_mistaken_for_each_other_differ_in_one_picture():
     assert min(style.distance(*pair) for pair in itertools.combinations(given, 2)) > style.MIN_DISTANCE
     several = style.law_colours(mine[:8])  # twice as far, as their places in the palette say nothing
     assert min(style.distance(*pair) for pair in itertools.combinations(several, 2)) > 2 * style.MIN_DISTANCE
+    green = style.law_colour("super_twisting")
+    for law in mine:  # the library's law keeps its colour, whichever comes first
+        first, second = style.law_colours([law, "super_twisting"])
+        assert second == green
+        assert style.distance(first, second) > 2 * style.MIN_DISTANCE
 
 
 def test_law_colours_never_repeat_in_one_picture():
