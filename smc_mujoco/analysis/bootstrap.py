@@ -36,6 +36,7 @@ from numpy.typing import ArrayLike
 from smc_mujoco.common.errors import ScenarioError, number, whole
 
 RESAMPLES = 1999  # chosen, so that one more is a multiple of 1000 and percentiles are whole numbers of resamples
+MIN_INTERVAL_SAMPLES = 6  # with fewer no interval of a median covers 95 %: it is their range
 
 
 class Interval(NamedTuple):

@@ -10,8 +10,9 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
-from smc_mujoco.analysis.bootstrap import Interval, median_interval, share_interval
-from smc_mujoco.analysis.paired_runs import SETTLES, Columns, sources, values
+from smc_mujoco.analysis.bootstrap import MIN_INTERVAL_SAMPLES, Interval, median_of, share_interval
+from smc_mujoco.analysis.paired_runs import GROUPS, SETTLES, Columns, groups, sources, values
+from smc_mujoco.analysis.ranking import samples_of
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
@@ -38,8 +39,10 @@ def plot(
 ) -> Figure | SubFigure:
     """Draw the median of each law over the seeds, with its 95 % bootstrap interval: dots, by condition.
 
-    There is a column of panels per metric and a row per plant. A dot at the right edge, under "never", is a law whose
-    median run fails or does not settle. Sizes below 1e-9 are rounding: they are drawn at 1e-9.
+    Medians and intervals are those of a leaderboard: of the runs that all laws have. Runs that share one of several
+    sets of gains are one sample. There is a column of panels per metric and a row per plant. A dot at the right edge,
+    under "never", is a law whose median run fails or does not settle. Sizes below 1e-9 are rounding: they are drawn at
+    1e-9.
 
     Args:
       table: a study's runs, as `smc.Table.read` returns them.
@@ -47,7 +50,7 @@ def plot(
       path, title, size, format, fig: as in `figure`.
 
     Raises:
-      ScenarioError: no runs, an unknown metric, or as `figure`.
+      ScenarioError: no runs, an unknown metric, laws without runs in common, or as `figure`.
     """
     if isinstance(table, Trace):
         raise ScenarioError(f"table is {shown(table)}: smc.figure draws traces, and this draws the table of a study")
@@ -62,8 +65,9 @@ def plot(
         raise ScenarioError("no runs or no metrics to draw: give a table with rows, and at least one metric")
     colours = dict(zip(laws, style.law_colours(laws), strict=True))
     marks = dict(zip(laws, itertools.cycle(MARKS), strict=False))
+    found = _intervals(table, names)
     with style.page(width):
-        key, shared = _key(table, colours, marks)
+        key, shared = _key(table, colours, marks, min(one.n for one in found.values()) if found else 0)
         tall = [0.5 + LINE_HEIGHT * (len(laws) + 1) * len(_conditions_of(table, plant, conditions)) for plant in plants]
         space = pages.head_height(width, key) + style.points(0.6)
         page = pages.blank(width, height or space + style.points(sum(tall)), fig)
@@ -71,7 +75,8 @@ def plot(
         room = 72 * width / len(names) - style.points(50)  # what the axis' numbers and the space beside it leave
         for i, plant in enumerate(plants):
             for k, (name, label) in enumerate(zip(names, _labels(names, plant, room), strict=True)):
-                _panel(axes[i, k], table, plant, name, conditions, laws, colours, marks)
+                of_panel = {cell[2:]: one for cell, one in found.items() if cell[:2] == (name, plant)}
+                _panel(axes[i, k], of_panel, _conditions_of(table, plant, conditions), colours, marks, name != SETTLES)
                 axes[i, k].set_xlabel(label)
                 axes[i, k].tick_params(labelleft=k == 0)
             over_never = 1.0 + style.points(1.7 * pages.TEXT_SIZE / 72) / style.points(tall[i])
@@ -82,14 +87,35 @@ def plot(
     return page
 
 
-def _key(table: Columns, colours: Mapping[str, str], marks: Mapping[str, str]) -> tuple[list[Handle], str]:
+def _intervals(table: Columns, metrics: Sequence[str]) -> dict[tuple[str, str, str, str], Interval]:
+    """Return (metric, plant, condition, law) -> the median, or the share of runs that settle, with its interval."""
+    by_row, found = {metric: values(table, metric) for metric in metrics}, {}
+    for group in groups(table, GROUPS):
+        for metric in metrics:
+            scores = group.scores(by_row[metric])
+            for law, of_law in scores.values.items():
+                one = median_of(of_law, samples=samples_of(scores.sets[law]))
+                if metric == SETTLES:
+                    one = share_interval(float((of_law == 0.0).mean()), one.n)
+                else:
+                    middle, low, high = (max(v, MIN_SIZE) if v > 0.0 else v for v in one[:3])
+                    one = Interval(middle, low, high, one.n)
+                found[metric, *group.blocks[0], law] = one
+    return found
+
+
+def _key(
+    table: Columns, colours: Mapping[str, str], marks: Mapping[str, str], samples: int
+) -> tuple[list[Handle], str]:
     """Return the entries of the legend, law by law, and where all gains come from if that is the same."""
     known, key = sources(table), []
     gains, shared = pages.gain_sources([known.get(law, ()) for law in colours])
     for law, source in zip(colours, gains, strict=True):
         look = {"marker": marks[law], "ms": style.points(6), "mec": "none", "lw": style.points(1.5)}
         key.append(Line2D([], [], color=colours[law], label=style.law_name(law) + source, **look))
-    return [*key, Line2D([], [], color=style.MUTED, lw=style.points(1.5), label="95 % interval of the median")], shared
+    few = f"; of fewer than {MIN_INTERVAL_SAMPLES} samples their range" * (samples < MIN_INTERVAL_SAMPLES)
+    label = f"95 % interval of the median{few}"
+    return [*key, Line2D([], [], color=style.MUTED, lw=style.points(1.5), label=label)], shared
 
 
 def _conditions_of(table: Columns, plant: str, conditions: Sequence[str]) -> list[str]:
@@ -98,34 +124,34 @@ def _conditions_of(table: Columns, plant: str, conditions: Sequence[str]) -> lis
     return [condition for condition in conditions if condition in ran]
 
 
-def _panel(ax: Axes, table: Columns, plant: str, metric: str, conditions, laws, colours, marks) -> None:
-    """Draw a metric of one plant: a block of lines per condition, with a dot per law."""
-    column, found = values(table, metric), {}
-    of_plant, of_law, of_condition = (table.column(name) for name in ("plant", "law", "condition"))
-    there = _conditions_of(table, plant, conditions)
-    for j, condition in enumerate(there):
-        for k, law in enumerate(laws):
-            here = column[(of_plant == plant) & (of_law == law) & (of_condition == condition)]
-            here = here[~np.isnan(here)]
-            if len(here) and metric == SETTLES:
-                found[law, j * (len(laws) + 1) + k] = share_interval(float((here == 0.0).mean()), len(here))
-            elif len(here):
-                one = median_interval(here)
-                middle, low, high = (max(v, MIN_SIZE) if v > 0.0 else v for v in one[:3])
-                found[law, j * (len(laws) + 1) + k] = Interval(middle, low, high, one.n)
+def _panel(
+    ax: Axes,
+    found: Mapping[tuple[str, str], Interval],
+    conditions: Sequence[str],
+    colours: Mapping[str, str],
+    marks: Mapping[str, str],
+    log: bool,
+) -> None:
+    """Draw a metric of one plant, (condition, law) -> its interval: a block of lines per condition, a dot per law.
+
+    If `log`, its axis is logarithmic where values differ much.
+    """
+    height = len(colours) + 1
     sizes = [v for one in found.values() for v in one[:3] if np.isfinite(v)]
-    if metric != SETTLES and sizes and min(sizes) > 0.0 and max(sizes) > 20.0 * min(sizes):
+    if log and sizes and min(sizes) > 0.0 and max(sizes) > 20.0 * min(sizes):
         ax.set_xscale("log")
         ax.xaxis.set_minor_formatter(NullFormatter())  # numbers between decades would overlap
-    for (law, line), one in found.items():
-        _dot(ax, one, line, {"color": colours[law], "marker": marks[law], "ms": style.points(6), "mec": "none"})
+    for (j, condition), (k, law) in itertools.product(enumerate(conditions), enumerate(colours)):
+        if (condition, law) in found:
+            look = {"color": colours[law], "marker": marks[law], "ms": style.points(6), "mec": "none"}
+            _dot(ax, found[condition, law], j * height + k, look)
     if not sizes:
         ax.set_xticks([])
-    for j in range(1, len(there)):
-        ax.axhline(j * (len(laws) + 1) - 1, color=style.RULE, lw=style.points(0.8))
-    middles = [j * (len(laws) + 1) + (len(laws) - 1) / 2 for j in range(len(there))]
-    ax.set_yticks(middles, [name.replace("_", " ") for name in there])
-    ax.set_ylim(len(there) * (len(laws) + 1) - 1, -1)
+    for j in range(1, len(conditions)):
+        ax.axhline(j * height - 1, color=style.RULE, lw=style.points(0.8))
+    middles = [j * height + height / 2 - 1 for j in range(len(conditions))]
+    ax.set_yticks(middles, [name.replace("_", " ") for name in conditions])
+    ax.set_ylim(len(conditions) * height - 1, -1)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from smc_mujoco.analysis.bootstrap import Interval
+from smc_mujoco.analysis.bootstrap import MIN_INTERVAL_SAMPLES, Interval
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.ranking import Effect, Limits, Rank
 from smc_mujoco.analysis.signed_rank import min_p
@@ -31,7 +31,6 @@ MAX_RATIO_OF_TIMES_LESS = 0.5  # a smaller ratio is "so many times less", a larg
 MIN_RATIO_OF_TIMES_AS_MUCH = 10.0  # a larger ratio is "so many times as much", not so many percent; chosen
 MIN_DIFFERENCE = 1e-9  # smaller differences are not printed, see `number`
 MAX_NAMES = 4  # of plants or conditions in a verdict
-MIN_INTERVAL_RUNS = 6  # with fewer runs no interval of a median covers 95 %, see `analysis.bootstrap`
 NO_BOARDS = Tabular(headings=["no boards: no metric applies"], rows=[])
 
 
@@ -438,8 +437,8 @@ def _cell(board: Board, entry: Entry) -> Cell:
 def key(boards: Sequence[Board]) -> str:
     """Return what the cells of a table show."""
     words = f"Medians with {100 * boards[0].level:g} % intervals over runs, or over sets of gains that runs share"
-    if any(block.runs < MIN_INTERVAL_RUNS for board in boards for block in board.blocks):
-        words += f"; of fewer than {MIN_INTERVAL_RUNS} runs the interval is their range, and covers less"
+    if any(block.runs < MIN_INTERVAL_SAMPLES for board in boards for block in board.blocks):
+        words += f"; of fewer than {MIN_INTERVAL_SAMPLES} runs the interval is their range, and covers less"
     family = max(board.family for board in boards)
     several = f", corrected for {family} comparisons a metric" * (family > 1)
     words += (

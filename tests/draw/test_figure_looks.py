@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import json
 
 import matplotlib.text
 import numpy as np
@@ -378,6 +379,26 @@ def test_a_board_of_made_up_runs_as_recorded(size, snapshot):
     rows.rows = [row for row in rows.rows if row[0] == "duffing"]
     metrics = ["settling_time", "ultimate_bound", "settles"]
     assert sketch(smc.plot(rows, metrics=metrics, size=size, title="A board" if size else None)) == snapshot
+
+
+def test_a_board_s_intervals_are_those_of_the_table_where_runs_share_gains():
+    class Shared(Rows):
+        def column(self, name):
+            if name != "scenario":
+                return super().column(name)
+            return np.array([json.dumps({"plant": {}, "law": seed % 3}) for *_, seed, _ in self.rows], object)
+
+        def scenario(self, i):
+            raise smc.ScenarioError("it has none")
+
+    rows = Shared(laws=("classical", "pid"), seeds=24)
+    page = smc.plot(rows, metrics=["tv_rate"])
+    assert "of fewer than 6 samples their range" in " ".join(text.get_text() for text in texts(page))
+    drawn = {tuple(line.get_xdata()) for ax in page.axes for line in ax.lines if len(line.get_xdata()) == 2}
+    for board in smc.leaderboard(rows, ["tv_rate"], by=("plant", "condition")):
+        for entry in board.entries:
+            assert entry.interval.n == 3
+            assert (entry.interval.low, entry.interval.high) in drawn
 
 
 def test_the_axis_of_a_board_comprises_intervals_that_reach_to_never():
