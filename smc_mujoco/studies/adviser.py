@@ -48,15 +48,15 @@ from smc_mujoco.control.properties import PROPERTIES, suitable
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
-from smc_mujoco.simulation.grid import all_combinations, case, check_moving, listed, listed_laws
+from smc_mujoco.simulation.grid import case, check_moving, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
-from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.advice import Advice
-from smc_mujoco.studies.fair_gains import Candidate, fair_gains, law_or_template
+from smc_mujoco.studies.fair_gains import Candidate, law_or_template
 from smc_mujoco.studies.needs import NEEDS, ROBUST, Choice, Need, Runs, ties
 from smc_mujoco.studies.noise_key import DRAWN
-from smc_mujoco.studies.study import study
-from smc_mujoco.studies.worst_case import DURATION, WorstCase, cached_worst_case, default_budget
+from smc_mujoco.studies.table import Table
+from smc_mujoco.studies.trial import Trial
+from smc_mujoco.studies.worst_case import DURATION, WorstCase, default_budget
 
 DEFAULT_NEEDS = ("fast", "accurate", "calm")
 DEFAULT_CONDITIONS = ("nominal", "noise", "sine")
@@ -109,47 +109,34 @@ def which(
       out: folder for gains and runs, which another call reads.
       quick: shorter runs, and a third of the evaluations of a tuning.
       defaults: whether a law may be advised over rivals whose gains are their defaults.
-      starts, relevant, noise_key: as in `compare`.
-      threads, progress: as in `run`.
+      starts, relevant, noise_key, threads, progress: as in `compare`.
       within: the class for the need "robust". Default: that of `worst_case`.
 
     Raises:
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
     """
     extent, machine = QUICK if quick else FULL, as_plant(plant)
-    count = whole("seeds", seeds, 1, 10_000)
+    count, relevant = whole("seeds", seeds, 1, 10_000), checked_share(relevant)
     compared, properties = _needs(needs, machine)
     length = extent.duration if duration is None else number("duration", duration, above=0.0)
-    attacked_for = DURATION if duration is None else length
     tested = _conditions(conditions, machine, length, NO_VELOCITY in properties)
-    tried = [case(machine, "none", one, length, starts=starts) for one in tested]
-    for scenario in tried:  # refuses what cannot be compared before gains are searched
-        check_moving([scenario])
-    folder, relevant, properties = Path(out), checked_share(relevant), [n for n in properties if n != NO_VELOCITY]
-    options: dict[str, Any] = {"threads": threads, "progress": progress}
-    chosen = _suited(machine, properties, laws)
-    candidates = _by_name(fair_gains(machine, chosen, folder / "gains", extent.budget, starts, **options))
-    runs = all_combinations([machine], lambda _: list(candidates.values()), tested, range(count), length, starts)
-    table = study(runs, folder, noise_key=noise_key, replay=True, **options)
-    (group,) = paired_runs.groups(table, by=("plant",))
-    worst = {}
-    if ROBUST in compared:
-        cases = [[case(machine, c.law, on, attacked_for, starts=starts) for on in tested] for c in candidates.values()]
-        worst = _worst(cases, within, extent.parts, folder / "worst", **options)
-    contest = _contest(Runs(table, group, worst), machine, compared, relevant)
-    efforts = {scenario.efforts[0] for scenario in tried}
+    where: dict[str, Any] = {"starts": starts, "folder": Path(out), "threads": threads, "progress": progress}
+    trial = Trial(plants=[machine], conditions=tested, duration=length, **where)
+    effort, wanted = _effort(trial), [name for name in properties if name != NO_VELOCITY]
+    candidates = _candidates(trial, wanted, laws, extent.budget)
+    table = trial.run({machine.name: [*candidates.values()]}, count, noise_key=noise_key)
+    worst = _worst(trial, candidates, duration, within, extent.parts) if ROBUST in compared else {}
+    contest = _contest(table, worst, machine, compared, relevant)
     return Advice(
         plant=machine,
         conditions=tuple(one.name for one in tested),
         needs=compared,
-        wanted=tuple(PROPERTIES[name].words for name in properties),
+        wanted=tuple(PROPERTIES[name].words for name in wanted),
         choices=_choices(contest, candidates),
         comparison=contest.comparison,
         table=table,
-        effort=efforts.pop() if len(efforts) == 1 else "",
-        untuned=()
-        if defaults
-        else tuple(name for name, c in candidates.items() if c.law.source.kind == source.DEFAULT),
+        effort=effort,
+        untuned=() if defaults else tuple(n for n, c in candidates.items() if c.law.source.kind == source.DEFAULT),
     )
 
 
@@ -194,6 +181,16 @@ def _without_velocity(condition: Condition) -> Condition:
     return Condition(f"{condition.name} (no velocity sensor)", fields)
 
 
+def _effort(trial: Trial) -> str:
+    """Return the unit of u, or "" where conditions differ; refuse conditions in which nothing moves."""
+    plant, efforts = trial.plants[0], set()
+    for condition in trial.conditions:
+        scenario = case(plant, "none", condition, trial.duration, starts=trial.starts)
+        check_moving([scenario])
+        efforts.add(scenario.efforts[0])
+    return efforts.pop() if len(efforts) == 1 else ""
+
+
 def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> Sequence[Component | Template]:
     """Return the laws to compare. Those without given gains are templates.
 
@@ -219,8 +216,10 @@ def _has(law: Component | Template, properties: Sequence[str]) -> bool:
     return template is None or all(PROPERTIES[name].holds(template) for name in properties)
 
 
-def _by_name(candidates: Sequence[Candidate]) -> dict[str, Candidate]:
-    """Return name of the law -> candidate; raise ScenarioError if two laws have one name."""
+def _candidates(trial: Trial, properties: Sequence[str], laws: Any, budget: int) -> dict[str, Candidate]:
+    """Return name of the law -> the law with gains; raise ScenarioError if two laws have one name."""
+    (plant,) = trial.plants
+    (candidates,) = trial.gains({plant.name: _suited(plant, properties, laws)}, budget).values()
     by_name = {candidate.law.name: candidate for candidate in candidates}
     if len(by_name) < len(candidates):
         raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")
@@ -231,29 +230,26 @@ def _by_name(candidates: Sequence[Candidate]) -> dict[str, Candidate]:
 
 
 def _worst(
-    cases: Sequence[Sequence[Scenario]],
-    within: Uncertainty | None,
-    parts: int,
-    folder: Path,
-    **options: Any,
+    trial: Trial, candidates: Mapping[str, Candidate], duration: float | None, within: Uncertainty | None, parts: int
 ) -> dict[str, list[WorstCase]]:
-    """Return law -> its worst case in each condition, by default within the class of the first scenario.
+    """Return law -> its worst case in each condition, by default within the class of the first one.
 
     Args:
-      cases: of each law, a scenario for each condition.
+      duration: of a run, s. Default: that of `worst_case`.
       parts: the default budget of `worst_case` is divided by the conditions and by this.
-      folder: of the files of results.
-      options: threads and progress, as in `run`.
     """
-    first = cases[0][0]
+    lasting = DURATION if duration is None else duration
+    cases = {
+        name: [case(trial.plants[0], one.law, on, lasting, starts=trial.starts) for on in trial.conditions]
+        for name, one in candidates.items()
+    }
+    first = next(iter(cases.values()))[0]
     within = within or default_class(first)
-    budget = max(MIN_BUDGET, default_budget(first, within) // (len(cases[0]) * parts))
-    worst: dict[str, list[WorstCase]] = {}
-    for law in cases:
-        for i, scenario in enumerate(law):
-            file = folder / f"{i}-{scenario.plant.name}-{scenario.law.name}.json"
-            worst.setdefault(scenario.law.name, []).append(cached_worst_case(file, scenario, within, budget, **options))
-    return worst
+    budget = max(MIN_BUDGET, default_budget(first, within) // (len(trial.conditions) * parts))
+    return {
+        name: [trial.attack(f"{i}-{trial.plants[0].name}-{name}", one, within, budget) for i, one in enumerate(several)]
+        for name, several in cases.items()
+    }
 
 
 class Contest(NamedTuple):
@@ -275,9 +271,12 @@ class Contest(NamedTuple):
     fit: set[str]
 
 
-def _contest(runs: Runs, plant: Plant, needs: Sequence[str], relevant: float) -> Contest:
+def _contest(
+    table: Table, worst: Mapping[str, Sequence[WorstCase]], plant: Plant, needs: Sequence[str], relevant: float
+) -> Contest:
     """Compare laws over all needs and conditions."""
-    table, group = runs.table, runs.group
+    (group,) = paired_runs.groups(table, by=("plant",))
+    runs = Runs(table, group, worst)
     rows = paired_runs.values(table, SETTLES)[group.rows]
     settled = 1.0 - np.nanmean(np.where(group.rows >= 0, rows, np.nan), axis=2)
     fit = _fit(group.laws, settled)

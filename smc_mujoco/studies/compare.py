@@ -10,6 +10,7 @@ Its parts can be used alone: `fair_gains`, `smc.grid`, `smc.study` and `smc.lead
 
 import dataclasses
 import functools
+import itertools
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -34,17 +35,18 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition, applicable, find_condition
-from smc_mujoco.simulation.grid import all_combinations, case, check_names, listed, listed_laws
+from smc_mujoco.simulation.grid import case, check_moving, check_names, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import executors
 from smc_mujoco.studies.board import Boards
-from smc_mujoco.studies.fair_gains import Candidate, fair_gains, law_or_template
+from smc_mujoco.studies.fair_gains import Candidate, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard
 from smc_mujoco.studies.noise_key import DRAWN
-from smc_mujoco.studies.study import FULL, QUICK, study
+from smc_mujoco.studies.study import FULL, QUICK
 from smc_mujoco.studies.table import Table
+from smc_mujoco.studies.trial import Trial
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
@@ -261,34 +263,23 @@ def compare(
     count, relevant = whole("seeds", seeds, 1, MAX_ITEMS), checked_share(relevant)
     length = extent.duration if duration is None else checked("duration", duration, above=0.0)
     tries = search.BUDGET // (3 if quick else 1) if budget is None else whole("budget", budget, 1, MAX_ITEMS)
-    where = executors.as_executor("local" if executor is None else executor)
+    workers = executors.as_executor("local" if executor is None else executor)
     _check_names(metrics, gains, out)
     machines = [as_plant(plant) for plant in (extent.plants if plants is None else listed("plants", plants))]
     given = applicable(extent.conditions, machines, length) if conditions is None else listed("conditions", conditions)
-    tested = [find_condition(one) for one in given]
-    compared = _checked(machines, tested, laws, length, starts)
-    folder = Path(out)
-    options = {"tune": tune and gains == "tuned", "gains": gains, "shipped_budget": budget is None}
-    candidates = {
-        plant.name: fair_gains(
-            plant, compared[plant.name], folder / "gains", tries, starts, threads, progress, **options
-        )
-        for plant in machines
-    }
-    runs = all_combinations(machines, lambda plant: candidates[plant.name], tested, range(count), length, starts)
-    table = study(runs, folder, not fresh, where, threads, progress, traces, noise_key, replay=True)
-    attacked: dict[str, dict[str, WorstCase]] = {}
-    if worst:
-        within, lasting = None if worst is True else worst, None if duration is None else length
-        attacked = _worst_cases(machines, candidates, within, lasting, starts, folder / "worst", threads, progress)
+    where: dict[str, Any] = {"starts": starts, "folder": Path(out), "threads": threads, "progress": progress}
+    trial = Trial(plants=machines, conditions=[find_condition(one) for one in given], duration=length, **where)
+    tuning: dict[str, Any] = {"tune": tune and gains == "tuned", "gains": gains, "shipped_budget": budget is None}
+    candidates = trial.gains(_checked(trial, laws), tries, **tuning)
+    stored: dict[str, Any] = {"resume": not fresh, "traces": traces, "noise_key": noise_key}
     return Compared(
-        table=table,
+        table=trial.run(candidates, count, executor=workers, **stored),
         candidates=candidates,
         metrics=tuple(metrics),
         defaults=defaults,
         relevant=relevant,
-        out=folder,
-        worst=attacked,
+        out=trial.folder,
+        worst=_worst_cases(trial, candidates, None if worst is True else worst, duration) if worst else {},
     )
 
 
@@ -302,34 +293,25 @@ def _check_names(metrics: Sequence[str], gains: str, out: object) -> None:
 
 
 def _worst_cases(
-    plants: Sequence[Plant],
-    candidates: Mapping[str, Sequence[Candidate]],
-    within: "Uncertainty | None",
-    duration: float | None,
-    starts: Starts | None,
-    folder: Path,
-    threads: int | None,
-    progress: bool,
+    trial: Trial, candidates: Mapping[str, Sequence[Candidate]], within: "Uncertainty | None", duration: float | None
 ) -> "dict[str, dict[str, WorstCase]]":
     """Return `Compared.worst`: the worst case of each law with its best gains on each plant."""
-    from smc_mujoco.studies.worst_case import DURATION, cached_worst_case
+    from smc_mujoco.studies.worst_case import DURATION
 
     def attacked(plant: Plant, law: Law) -> "WorstCase":
-        scenario = case(plant, law, "nominal", DURATION if duration is None else duration, starts=starts)
-        path = folder / f"{plant.name}-{law.name}.json"
-        return cached_worst_case(path, scenario, within, None, threads, progress)
+        scenario = case(plant, law, "nominal", DURATION if duration is None else duration, starts=trial.starts)
+        return trial.attack(f"{plant.name}-{law.name}", scenario, within)
 
-    return {plant.name: {one.law.name: attacked(plant, one.law) for one in candidates[plant.name]} for plant in plants}
+    return {p.name: {one.law.name: attacked(p, one.law) for one in candidates[p.name]} for p in trial.plants}
 
 
-def _checked(
-    plants: Sequence[Plant], conditions: Sequence[Condition], laws: Any, duration: float, starts: Starts | None
-) -> dict[str, list[Law | Template]]:
+def _checked(trial: Trial, laws: Any) -> dict[str, list[Law | Template]]:
     """Return plant -> laws to compare on it. What cannot run is refused here, before gains are searched."""
-    compared = {plant.name: [law_or_template(law) for law in _chosen(laws, plant)] for plant in plants}
+    compared = {plant.name: [law_or_template(law) for law in _chosen(laws, plant)] for plant in trial.plants}
     every = {id(law): law for its in compared.values() for law in its}.values()
-    check_names(plants, [coerce.law(law) for law in every], conditions)
-    all_combinations(plants, lambda _: [lambda _: coerce.law("none")], conditions, [0], duration, starts)
+    check_names(trial.plants, [coerce.law(law) for law in every], trial.conditions)
+    for plant, condition in itertools.product(trial.plants, trial.conditions):
+        check_moving([case(plant, "none", condition, trial.duration, starts=trial.starts)])
     return compared
 
 

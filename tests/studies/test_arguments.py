@@ -5,7 +5,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
-from smc_mujoco.studies import adviser, compare, scene
+from smc_mujoco.studies import adviser, scene, trial, worst_case
 from smc_mujoco.studies.fair_gains import Candidate
 
 pytestmark = pytest.mark.quick
@@ -54,10 +54,9 @@ def stopped(monkeypatch):
         raise Reached
 
     calls: list[str] = []
-    for module in (adviser, compare):
-        monkeypatch.setattr(module, "fair_gains", gains)
-        monkeypatch.setattr(module, "all_combinations", combinations)
-        monkeypatch.setattr(module, "study", runs)
+    monkeypatch.setattr(trial, "fair_gains", gains)
+    monkeypatch.setattr(trial, "all_combinations", combinations)
+    monkeypatch.setattr(trial, "study", runs)
     return calls
 
 
@@ -89,15 +88,14 @@ def test_what_is_asked_reaches_gains_and_runs_with_these_defaults(stopped, snaps
 
 def test_robust_has_an_adversary_with_these_defaults(stopped, monkeypatch, snapshot):
     """The contest is given; what is asked of it is told."""
-    monkeypatch.setattr(adviser, "study", lambda runs, folder, **options: stopped.append(f"study {folder}"))
-    monkeypatch.setattr(adviser.paired_runs, "groups", lambda table, by: [by])
+    monkeypatch.setattr(trial, "study", lambda runs, folder, **options: stopped.append(f"study {folder}"))
     monkeypatch.setattr(adviser, "default_budget", lambda scenario, within: 1000)
     monkeypatch.setattr(
-        adviser, "cached_worst_case", lambda *given, **options: stopped.append(shown([*given, options]))
+        worst_case, "cached_worst_case", lambda *given, **options: stopped.append(shown([*given, options]))
     )
 
-    def contest(runs, plant, needs, relevant):
-        stopped.append(shown(["contest", runs.group, sorted(runs.worst), needs, relevant]))
+    def contest(table, worst, plant, needs, relevant):
+        stopped.append(shown(["contest", plant, sorted(worst), needs, relevant]))
         reached()
 
     monkeypatch.setattr(adviser, "_contest", contest)
