@@ -142,11 +142,10 @@ def rejection(runs):
 
 def multiplier(runs):
     """Largest |u + mean of d over the period before|, over the largest |d|."""
-
-    def late(trace):
-        return largest((trace.u[1:] + means(trace)[:-1])[:-1]) / trace.scenario.disturbance[0].amplitude
-
-    return {"largest |u + mean d of the period before| / largest |d|": by_condition(runs, late)}
+    ratios = by_condition(
+        runs, lambda run: largest((run.u[1:] + means(run)[:-1])[:-1]) / run.scenario.disturbance[0].amplitude
+    )
+    return {"largest |u + mean d of the period before| / largest |d|": ratios}
 
 
 def variation(runs):
