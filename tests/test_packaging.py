@@ -274,7 +274,7 @@ MISSING = {
     ],
     "smc.report('r', quick=True)": ["a report", "jinja2 and plotly", "pip install 'smc-mujoco[report]'"],
     "smc.film(t, 'a.mp4')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],
-    "films.film([t], 'a')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[report]'"],
+    "films.film([t], 'a')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],
 }
 
 

@@ -1,6 +1,6 @@
 """Curves and films of a report's scenes: runs side by side, in few points and few bytes.
 
-Films are WebM (VP9), which every browser plays and no patent covers. They are small, as they are part of the page.
+Films are WebM, and small, as they are part of the page.
 """
 
 import dataclasses
@@ -9,20 +9,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
-from smc_mujoco.common import extras, gl
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import replacing, scratch
 from smc_mujoco.draw import decimate
 from smc_mujoco.draw.film import film as video
 from smc_mujoco.draw.film import pace
-from smc_mujoco.draw.film.encoder import sigint_blocked
+from smc_mujoco.draw.film.encoder import encoder
 from smc_mujoco.evidence.report.plan import Report
 from smc_mujoco.simulation.trace import Trace
 
 SIZE, FPS = (960, 540), 20  # px; 1/s
-# Chosen: letters stay clean at 100 to 200 kB for 5 s.
-VP9 = ["-crf", "34", "-b:v", "0", "-deadline", "good", "-cpu-used", "4", "-row-mt", "1", "-g", "60"]
 BAND_WINDOWS = 250  # windows of a band across the run
 POSTER_TIME = 0.5  # s
 
@@ -87,37 +84,17 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whol
     Raises:
       ScenarioError: nothing renders here, or ffmpeg cannot write.
     """
-    with extras.extra("report", "a film"):
-        import imageio_ffmpeg
-    from PIL import Image
-
-    if why := gl.missing():
-        raise ScenarioError(why)
     shown, poster = pace.clock(traces, FPS), io.BytesIO()
     count = len(shown.times)
     with scratch() as folder:
         path = folder / "film.webm"
-        writer = imageio_ffmpeg.write_frames(
-            path, SIZE, fps=FPS, codec="libvpx-vp9", output_params=VP9, macro_block_size=2, ffmpeg_log_level="error"
-        )
-        try:
-            with sigint_blocked():
-                writer.send(None)
+        with encoder(path, (SIZE[1], SIZE[0]), FPS) as write:
             for k, picture in enumerate(video.frames(traces, shown, None, title, SIZE)):
                 if k == min(int(np.searchsorted(shown.times, POSTER_TIME)), count - 1):
                     Image.fromarray(picture).save(poster, "JPEG", quality=80, optimize=True)
-                writer.send(np.ascontiguousarray(picture))
+                write(picture)
                 report(k + 1, count)
-        except OSError as error:
-            raise ScenarioError(f"cannot write a film: {' '.join(str(error).split())}; make room") from error
-        finally:
-            writer.close()
         return path.read_bytes(), poster.getvalue()
-
-
-def missing() -> str | None:
-    """Return None when a film can be made, else one sentence that says why not and what to do."""
-    return gl.missing() or extras.missing("report", "no film: it", "imageio_ffmpeg")
 
 
 def save(made: tuple[bytes, bytes], path: Path) -> None:

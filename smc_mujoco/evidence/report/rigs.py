@@ -48,8 +48,7 @@ class Machine:
 
     def unit(self, metric: str) -> str:
         """Return the unit of a metric on this machine."""
-        scenario = self.rig.scenario("none")
-        return CATALOGUE[metric].unit_for(scenario.plant.unit, scenario.efforts[0])
+        return CATALOGUE[metric].unit_in(self.rig.scenario("none"))
 
     def sentence(self, board: Board) -> str:
         """Return who wins in a metric, and whether on every parameter set."""

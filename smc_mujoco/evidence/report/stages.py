@@ -20,6 +20,7 @@ from smc_mujoco.analysis.region_of_attraction import Basin
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.control import gain_sets as sets
+from smc_mujoco.draw.film import film as video
 from smc_mujoco.evidence.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.papers.gaber import lyapunov, scenarios
@@ -120,7 +121,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
     machines = rigs.machines(work)
     oscillations = oscillation.oscillations(work)
     accuracies = precision.accuracies(work)
-    no_film = films.missing() if plan.filmed else None
+    no_film = video.missing() if plan.filmed else None
     with bars.stage("statistics"):
         return Findings(
             scores=scores.scores(table, plan.relevant),
@@ -246,10 +247,10 @@ def all_scenes(work: Work) -> tuple[films.Scene, ...]:
         runs = scenarios.comparison(plant, condition, plan.scene_laws, duration=plan.scene, gains=GAINS)
         traces = run(list(runs.values()), work.threads)
         film = poster = None
-        if scene in plan.scenes[: plan.filmed] and films.missing() is None:
+        if scene in plan.scenes[: plan.filmed] and video.missing() is None:
             film, poster = cached(
                 work.folder / f"film-{plant}-{condition}.webm",
-                [plan.scene_laws, plan.scene, GAINS, films.SIZE, films.FPS, films.VP9],
+                [plan.scene_laws, plan.scene, GAINS, films.SIZE, films.FPS],
                 lambda: films.film(traces, f"{words.plant(plant)}, {words.condition(condition)}", report),
                 films.save,
                 films.load,

@@ -412,12 +412,8 @@ def _period(about: Any) -> float | None:
     inside = about.coSimulation
     if inside.canHandleVariableCommunicationStepSize:
         return None
-    fixed = getattr(inside, "fixedInternalStepSize", None)
-    default = about.defaultExperiment.stepSize if about.defaultExperiment else None
-    for step in (fixed, default):
-        if step is not None and float(step) > 0.0:
-            return float(step)
-    return None
+    steps = getattr(inside, "fixedInternalStepSize", None), getattr(about.defaultExperiment, "stepSize", None)
+    return next((float(step) for step in steps if step is not None and float(step) > 0.0), None)
 
 
 def _try(law: FmuLaw, gains: Iterable[float], timeout: float) -> None:

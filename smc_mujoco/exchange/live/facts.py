@@ -71,10 +71,12 @@ def checked(names: Sequence[str | Plant]) -> list[Plant]:
 
 def facts(chosen: Sequence[Plant], offered: Sequence[Component], users: Sequence[Component]) -> dict[str, Any]:
     """Return facts.json as a dict."""
+    models = [_mjcf(plant).read_text(encoding="utf-8") for plant in chosen]
+    included = {name for text in models for name in re.findall(r'<include file="([^"]+)"', text)}
     kinds = {kind: [part for part in offered if part.kind == kind] for kind in ("law", "surface", "estimator")}
     return {
         "version": __version__,
-        "includes": {name: model_path(name).read_text(encoding="utf-8") for name in _included(chosen)},
+        "includes": {name: model_path(name).read_text(encoding="utf-8") for name in sorted(included)},
         "noise": {"position": SENSOR_NOISE.position, "velocity": SENSOR_NOISE.velocity},
         "max_step": defaults.MAX_STEP,
         "realistic_step": defaults.REALISTIC_STEP,
@@ -172,12 +174,6 @@ def _opening(users: Sequence[str], offered: Sequence[str]) -> list[str]:
 
 def _mjcf(plant: Plant) -> Path:
     return model_path(f"{plant.name}.xml")
-
-
-def _included(chosen: Sequence[Plant]) -> list[str]:
-    """Return the files that the plants' models include, relative to models/."""
-    texts = [_mjcf(plant).read_text(encoding="utf-8") for plant in chosen]
-    return sorted({name for text in texts for name in re.findall(r'<include file="([^"]+)"', text)})
 
 
 def _conditions(plant: Plant, s: defaults.Resolved) -> list[dict[str, Any]]:

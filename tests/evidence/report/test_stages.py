@@ -1,5 +1,6 @@
 """How a report is put together: its plan, its progress, what it keeps, and small pieces of its stages."""
 
+import contextlib
 import dataclasses
 import io
 import json
@@ -222,23 +223,21 @@ def test_a_film_and_its_picture_are_kept_beside_each_other(tmp_path):
 def test_a_film_has_every_frame_and_the_picture_half_a_second_in(tmp_path, monkeypatch):
     written, reached, count = [], [], 30
 
-    def writer(path, size, **options):
-        written.append((path.name, size, options["fps"], options["codec"]))
-        while True:
-            picture = yield
-            written.append(None if picture is None else int(picture[0, 0, 0]))
-            path.write_bytes(b"webm")
+    @contextlib.contextmanager
+    def encoder(path, shape, fps):
+        written.append((path.name, shape, fps))
+        yield lambda picture: written.append(int(picture[0, 0, 0]))
+        path.write_bytes(b"webm")
 
     trace = made(smc.Scenario(plant="duffing", law="pid", duration=1.0))
     pictures = lambda traces, shown, names, title, size: (  # noqa: E731
         np.full((4, 4, 3), 4 * k, np.uint8) for k in range(len(shown.times))
     )
-    monkeypatch.setattr(films.gl, "missing", lambda: None)
-    monkeypatch.setattr("imageio_ffmpeg.write_frames", writer)
+    monkeypatch.setattr(films, "encoder", encoder)
     monkeypatch.setattr(films.pace, "clock", lambda traces, fps: SimpleNamespace(times=np.arange(count) / fps))
     monkeypatch.setattr(films.video, "frames", pictures)
     film, picture = films.film([trace], "title", lambda done, whole: reached.append((done, whole)))
-    assert written == [("film.webm", (960, 540), 20, "libvpx-vp9"), *range(0, 4 * count, 4)]
+    assert written == [("film.webm", (540, 960), 20), *range(0, 4 * count, 4)]
     assert reached == [(k + 1, count) for k in range(count)]
     assert film == b"webm"
     assert abs(int(np.asarray(Image.open(io.BytesIO(picture)))[0, 0, 0]) - 40) <= 2  # frame 10 of 20 a second
