@@ -269,6 +269,11 @@ def test_a_class_is_said_in_words_with_its_units(plant, snapshot):
     rubbing = dataclasses.replace(one, friction=smc.Coulomb(0.1))
     said = [everything.words(one.plant), outside(one, everything), outside(one, smc.Uncertainty(disturbance=6.0))]
     said += [outside(dataclasses.replace(one, law=smc.law("super_twisting", k2=8.0)), CLASSES["slope"])]
+    machine = dataclasses.replace(
+        one, input_delay=0.002, noise=smc.Noise(position=1e-3), actuator=smc.Lag(0.01), clock=smc.Clock(missed=0.1),
+        disturbance=(smc.Sine(-1.0, 2.0), smc.Constant(0.5)),
+    )  # fmt: skip
+    said += [outside(machine, smc.Uncertainty(disturbance=0.5)), outside(machine, smc.Uncertainty(x0=0.1))]
     said += [default_class(case).words(one.plant) for case in (one, rubbing)]
     assert said == snapshot
 

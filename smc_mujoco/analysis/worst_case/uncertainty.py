@@ -22,6 +22,7 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
+from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Relay, Signal
 from smc_mujoco.simulation.time_series import Held, TimeSeries
@@ -140,8 +141,9 @@ def strength(scenario: Scenario) -> float:
 
 
 def outside(scenario: Scenario, within: Uncertainty) -> str:
-    """Return how a class goes beyond the theorem of the law, in words; "" if nothing is known of that."""
-    reasons, d, u = [], within.disturbance, EFFORT[scenario.plant.units[0]]
+    """Return how a class around a scenario goes beyond the theorem of its law, in words; "" if nothing is known."""
+    before = sum(abs(getattr(signal, "amplitude", 0.0)) for signal in scenario.disturbance)
+    reasons, d, u = [], within.disturbance and within.disturbance + before, EFFORT[scenario.plant.units[0]]
     if d >= (largest := strength(scenario)):
         reasons.append(f"no law holds |d| = {d:g} {u} with drives of {largest:.3g} {u}")
     admits = {} if scenario.law.template is None else scenario.law.template.admits
@@ -150,9 +152,11 @@ def outside(scenario: Scenario, within: Uncertainty) -> str:
             reasons.append(f"its theorem needs |d| < {bound:.3g} {u} with these gains")
         if d and "d'" in admits and (within.slope or math.inf) >= (bound := admits["d'"](gains)):
             reasons.append(f"its theorem needs |d'| < {bound:.3g} {u}/s with these gains")
-    beside = {"delay": within.delay[1], "noise": within.position_noise + within.velocity_noise, "jitter": within.jitter}
+    noise = within.position_noise or within.velocity_noise or scenario.noise != Noise() or scenario.sensor
+    beside = {"delay": within.delay[1] or scenario.input_delay, "noise": noise, "drives": scenario.actuator}
+    beside |= {"late or missed samples": within.jitter or not scenario.clock.regular}
     if admits and any(beside.values()):
-        reasons.append(f"its theorem is without {joined(name for name, size in beside.items() if size)}")
+        reasons.append(f"its theorem is without {joined(name for name, there in beside.items() if there)}")
     return "; ".join(reasons)
 
 
