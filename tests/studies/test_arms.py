@@ -1,7 +1,10 @@
 """Tasks of the arm: what seeds change, where the wall's path is, and the cost of the search for gains."""
 
+import re
+
 import numpy as np
 import pytest
+from helpers.pages import ROOT
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.plants import panda
@@ -65,3 +68,25 @@ def test_the_hybrid_law_presses_as_hard_as_it_should_and_stays_on_the_wall():
         assert scores["touching"] == 100.0
         assert scores["depth"] < 1e-3
     assert smc.tip_scores(known)["force_ripple"] < smc.tip_scores(unknown)["force_ripple"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("task", "payload", "column"), [("sway", 2.0, 0), ("payload", 0.0, 2)])
+def test_medians_of_the_page_are_those_of_its_runs(task, payload, column):
+    """Each law's tip error and variation of u over 12 seeds, as `benchmarks/arm_study.py` prints them."""
+    page = (ROOT / "docs" / "arms.md").read_text(encoding="utf-8")
+    told = {
+        name: cells.split(" | ")
+        for name, cells in re.findall(r"^\| `(\w+)` \| (.* \| .* \| .*) \|$", page, re.MULTILINE)
+    }
+    assert [*told] == [*arms.GAINS]
+    for name in arms.GAINS:
+        runs = [arms.scenario(task, arms.gained(name), seed, payload) for seed in range(1, 13)]
+        traces = smc.run(runs)
+        if arms.unstable(runs, traces):
+            assert told[name][column : column + 2] == ["unstable"] * 2, name
+            continue
+        rms = np.median([1e3 * smc.tip_scores(trace)["rms_error"] for trace in traces])
+        rate = np.median([max(one["tv_rate"] for one in smc.joint_scores(trace).values()) for trace in traces])
+        assert f"{rms:.3g}" == told[name][column].split()[0], name
+        assert float(told[name][column + 1]) == pytest.approx(rate, rel=0.005), name
