@@ -140,6 +140,8 @@ class Held(TimeSeries):
 def _floats(what: str, items: object) -> tuple[float, ...]:
     """Return a user's sequence of finite numbers as floats."""
     if isinstance(items, np.ndarray):
+        if items.dtype == float and items.ndim == 1 and np.isfinite(items).all():
+            return tuple(items.tolist())
         items = items.tolist()
     if not isinstance(items, Iterable) or isinstance(items, str | bytes | dict | set):
         raise ScenarioError(f"{what} are {shown(items)}: give a sequence of numbers")

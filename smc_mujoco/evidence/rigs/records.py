@@ -261,7 +261,7 @@ def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.nd
 
 
 def rate(values: np.ndarray, period: float, order: int = 1) -> np.ndarray:
-    """Return a derivative of a column, (K,), from a cubic through the samples about each. Order 0 is the cubic."""
+    """Return a derivative of columns, (..., K), from a cubic through the samples about each. Order 0 is the cubic."""
     from scipy.signal import savgol_filter
 
     return np.asarray(savgol_filter(values, 2 * STATE_SAMPLES + 1, 3, deriv=order, delta=period))

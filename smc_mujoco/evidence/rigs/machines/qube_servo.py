@@ -81,7 +81,7 @@ def zero(q, record: Record) -> dict[str, float]:
     lacks = moved - rate(torque, PERIOD, 0)
     smooth, _ = np.linalg.qr(np.column_stack([np.ones(len(x)), x, v, np.tanh(v / FRICTION_SPEED), a, acceleration]))
     angles = PITCH * np.arange(1, ANGLE_COUNT + 1) / ANGLE_COUNT
-    gaps = np.array([lacks, *(lacks - rate(ripples(q, x - angle) * torque, PERIOD, 0) for angle in angles)])
+    gaps = np.vstack([lacks, lacks - rate(ripples(q, x - angles[:, np.newaxis]) * torque, PERIOD, 0)])
     gaps -= gaps @ smooth @ smooth.T
     left = np.log(np.linalg.norm(gaps, axis=1))
     even, *likely = np.exp((left.min() - left) * _independent(gaps[0]))
