@@ -423,14 +423,6 @@ def test_the_command_prints_one_json_document(terminal, tmp_path):
     assert json.loads((tmp_path / "claims.json").read_text()) == told
 
 
-def test_a_claim_is_shown_in_full(terminal):
-    done = terminal("18", "--gains", "study", "--quick")
-    assert done.exit_code == 0, done.output
-    assert "quick: coarser grids" in done.stdout
-    for part in ("Vdot <= -eps s^2", "holds if", "refuted", "van_der_pol: share of the plane", "largest Vdot, at x"):
-        assert part in done.stdout
-
-
 def test_a_folder_is_no_file_to_write(terminal, tmp_path):
     done = terminal("3", "--out", str(tmp_path))
     assert done.exit_code == 2
