@@ -244,7 +244,7 @@ class Advice(Tables):
             return f"No law is reliable here: {first.law.name}, {self._among}, settles in {runs}; {cure}."
         if self.all_level and self._too_few:
             comparisons = f"{len(self.blocks)} comparison{'s' * (len(self.blocks) > 1)}"
-            return f"No law can be called the best: {self.samples} are too few for {comparisons}."
+            return f"No law can be called the best with {self.samples}: too few for {comparisons}."
         if self.all_level:
             laws = f"{every(len(self.compared))} laws"
             where = "in the worst that was found" if self._untested else f"in every comparison of {self.samples}"
