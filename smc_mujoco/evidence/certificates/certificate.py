@@ -155,11 +155,14 @@ class Certificate:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What is proven and what is not, a sentence for each theorem; then what no theorem is about."""
+        """What is proven and what is not: a sentence for each theorem, whether none speaks of d, what all leave out."""
         here = "; ".join(f"{name} ({what})" for name, what in self.leaves_out.items() if what)
         absent = ", ".join(name for name, what in self.leaves_out.items() if not what)
         left_out = f"no theorem here is about {here}" + f"; nor about what is not here: {absent}" * bool(absent)
-        return *(self._sentence(part) for part in self.data["parts"]), left_out
+        d0, unit = self.data["disturbance"], EFFORT[self.data["unit"]]
+        silent = d0 > 0.0 and self.theorems == ("saturated PD",)
+        nothing = (f"nothing is proven under every |d| <= {d0:g} {unit}",) * silent
+        return *(self._sentence(part) for part in self.data["parts"]), *nothing, left_out
 
     def _sentence(self, part: Mapping[str, Any]) -> str:
         """Return what a theorem says of this plant, or which of its conditions fail, by how much."""

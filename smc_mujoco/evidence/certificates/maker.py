@@ -33,6 +33,7 @@ MARGIN_SHARE = 1e-4  # share by which a margin is stated below the true one
 BOX_COUNTS = (64, 256, 1024, 4096)  # tried in turn
 SET_FACTOR = 0.98  # factor on the largest set that a condition allows: chosen
 SIZE_HALVINGS = 40  # of a set's size, in search of the largest
+POSITIVE_GAINS = "lam", "k", "k1", "c", "phi", "kp", "kd", "q1"  # of the laws that have them; the theorems need it
 LAWS = ("observer_free", "boundary_layer", "lqr", "pid", "classical", "terminal", "super_twisting")
 Judge = Callable[[str, dict], dict[str, Any] | None]  # theorem, its data -> its margins, None where it is refused
 PLANTS = ("inverted_pendulum", "duffing", "van_der_pol", "pendulum_network", "inverted_pendulum_network")
@@ -111,7 +112,9 @@ def _check(scenario: Scenario) -> None:
             f"there is no theorem for {law.name} on {plant.name}: certify one of {', '.join(LAWS)} on one of "
             f"{', '.join(PLANTS)}"
         )
+    zero = [name for name in POSITIVE_GAINS if law.uniform and law.gains.get(name, 1.0) <= 0.0]
     refused = {
+        f"{law.name} with {' and '.join(zero)} not above 0": zero,
         f"super_twisting on the {plant.n} pendulums of a network": law.name == "super_twisting" and plant.n > 1,
         "model='nominal'": scenario.resolved.model != "none",
         "a surface": scenario.surface is not None,

@@ -29,6 +29,7 @@ SAID = {
         "inverted_pendulum", "classical", {"k": 3.0, "c": 2.0},
         [part("saturated PD", {"damping": 0.5}), REACHED, part("level sets", {"start": -0.1}, **LEVELS)],
     ),
+    "nothing under a disturbance": certificate(parts=[part("saturated PD", {"damping": 0.5})]),
     "a terminal surface": certificate("duffing", "terminal", {"k": 3.0, "b": 2.0, "p": 0.75, "bound": 1.0}, [TERMINAL]),
     "super-twisting": certificate(
         "van_der_pol", "super_twisting", {"k1": 3.0, "k2": 2.0, "c": 1.5}, disturbance=0.5, slope=1.75,

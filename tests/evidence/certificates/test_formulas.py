@@ -316,6 +316,8 @@ def refused(**changes):
         ({"plant": "pendulum_network", "u_max": (5.0, 6.0, 6.0, 6.0, 6.0)}, "gains or bounds by channel"),
         ({"actuator": smc.DCMotor(command="voltage")}, "a motor's voltage as u"),
         ({"law": smc.law("pid", ki=0.5)}, "pid with an integral"),
+        ({"law": smc.law("pid", kp=0.0, ki=0.0, kd=0.0)}, "pid with kp and kd not above 0"),
+        ({"law": smc.law("classical", c=0.0)}, "classical with c not above 0"),
         ({"mechanism": "springs"}, "mechanism 'springs'"),
     ],
 )
