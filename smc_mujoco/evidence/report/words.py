@@ -44,9 +44,9 @@ def interval(median: float, low: float, high: float) -> str:
 
 
 def colour(name: str) -> str:
-    """Return the colour of a law in figures and films; no two laws of the short list have the same."""
-    ours: dict[str, str] = dict(zip(gain_sets.LAWS, style.law_colours(gain_sets.LAWS), strict=True))
-    return ours.get(name) or style.law_colour(name)
+    """Return the colour of a law in figures and films; no law has that of another law of the short list."""
+    shown = list(dict.fromkeys([*gain_sets.LAWS, name]))
+    return style.law_colours(shown)[shown.index(name)]
 
 
 def plant(name: str) -> str:

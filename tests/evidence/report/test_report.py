@@ -239,6 +239,8 @@ def test_thirteen_laws_have_colours_and_short_names_of_their_own(monkeypatch):
     assert max(len(words.short(law)) for law in THIRTEEN) <= 3
     assert words.colour("classical") == words.style.law_colour("classical")
     assert words.law("pid") == "PID"
+    near = (words.style.distance(words.colour(f"law_{k}"), words.colour("super_twisting")) for k in range(300))
+    assert min(near) > 2 * words.style.MIN_DISTANCE  # a user's law, of any name
 
 
 def forest_of(findings):
