@@ -163,4 +163,5 @@ def _sentence(source: Path, symbol: str, command: str, output: str) -> str:
         wanted = what.removeprefix("#error").strip(' "')
         return f"{name} does not compile: {wanted}"
     where = f"line {error['line']}" if file == name else f"{error['file']}, line {error['line']}"
-    return f"{name} does not compile: {where}, {what}; fix it"
+    cure = f"the law must be {PROTOTYPE.format(symbol)}" if "unknown type name 'smc_" in what else "fix it"
+    return f"{name} does not compile: {where}, {what}; {cure}"

@@ -293,6 +293,7 @@ def test_what_cannot_be_loaded_is_one_sentence(file):
     for text, words in (
         (law("out[0] = y->e return;"), "my_law.c does not compile: line 7, expected ';' before 'return'"),
         (law("out[0] = y->position;"), "has no member named 'position'"),
+        (MINE.replace("smc_measurement", "smc_in"), f"unknown type name 'smc_in'; the law must be {TYPE}"),
         ('#include "nowhere.h"\n' + MINE, "does not compile: line 1, nowhere.h: No such file"),
         ("int smc_law(double e, double de) { return e + de; }", f"{CALLED} {TYPE}"),
         (MINE.replace("int smc_law(", "double smc_law("), f"{CALLED} {TYPE}"),
