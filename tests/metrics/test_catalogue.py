@@ -657,7 +657,7 @@ def test_a_run_at_rest_scores_zero_however_short(n, samples):
 
 def test_a_run_of_one_step_by_hand():
     scores = m.score(run([0, 0.5], [2.0, -1.0], u=[3.0, -1.0], s=[1.0, 0.5]))
-    assert scores == {
+    assert {name: None if math.isnan(value) else value for name, value in scores.items()} == {
         "settling_time": math.inf,
         "rise_time": 0.0,  # 10 % and 90 % at the same sample
         "overshoot": 50.0,
@@ -676,8 +676,8 @@ def test_a_run_of_one_step_by_hand():
         "tv_rate": 0.0,
         "energy": 4.5,
         "hf_share": 0.0,
-        "chattering_amplitude": limit_cycle.NO_CYCLE[0],  # the object, as NaN is not equal to itself
-        "chattering_frequency": limit_cycle.NO_CYCLE[1],
+        "chattering_amplitude": None,  # no limit cycle
+        "chattering_frequency": None,
         "stick_time": 0.0,
         "peak_reaction": 0.0,
         "reversal_rate": 0.0,
