@@ -528,8 +528,9 @@ def check_law(s: Resolved) -> None:
     for law in s.law.parts:
         if not fits(law, s.plant):
             paired = dataclasses.replace(s.plant, underactuated=True)
-            hint = ": give each channel a partner" if s.plant.own and fits(law, paired) else ""
-            raise ScenarioError(f"law {law.name!r} is only for {', '.join(law.plants)}, not for {s.plant.name}{hint}")
+            listed = f"smc-mujoco laws --plant {s.plant.argument} lists those for it"
+            cure = "give each channel a partner" if s.plant.own and fits(law, paired) else listed
+            raise ScenarioError(f"law {law.name!r} is only for {', '.join(law.plants)}, not for {s.plant.name}: {cure}")
     if s.model == "nominal" and s.plant.unmodelled:
         raise ScenarioError(f"{s.plant.name} has no nominal model: {s.plant.unmodelled}")
     for law in s.law.parts:
