@@ -524,6 +524,7 @@ def test_gains_are_tuned_within_a_bound_on_predicted_chattering():
     assert "predicted chattering of s <= 0.0001" in str(bound.definition)
 
 
+@pytest.mark.usefixtures("coarse_grid")
 def test_it_warns_if_all_gains_tried_chatter_too_much():
     with pytest.warns(smc.ScenarioWarning, match="are predicted to chatter with more than 1e-12"):
         tuned = tune("duffing", "classical", 2, objective=LAGGED, chattering=1e-12)
