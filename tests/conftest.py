@@ -123,6 +123,12 @@ def coarse_grid(monkeypatch):
     monkeypatch.setattr("smc_mujoco.analysis.gains_for.SPEEDS", tuple(10.0 ** (0.4 * k - 1.0) for k in range(6)))
 
 
+@pytest.fixture
+def present_objects_frozen():
+    """Exclude the present objects from a test's own `gc.collect`, which takes half a second with them."""
+    gc.freeze()
+
+
 @pytest.fixture(scope="module")
 def replayed_here():
     """Replay runs of one's own laws in this process: its two processes take 2 s to start."""

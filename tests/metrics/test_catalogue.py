@@ -703,6 +703,7 @@ def test_scoring_looks_for_the_limit_cycle_of_a_channel_once(monkeypatch):
     assert asked == [0]
 
 
+@pytest.mark.usefixtures("present_objects_frozen")
 def test_scoring_keeps_no_trace_and_looks_once_in_each_group(monkeypatch):
     t, asked = np.arange(2001) / 100, []
     both = run(t, np.zeros((len(t), 2)), s=np.sin(60 * t)[:, None] * np.ones(2), units=("m", "rad"))

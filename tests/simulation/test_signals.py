@@ -313,6 +313,7 @@ def test_a_recorded_run_is_all_there_wherever_decimal_times_put_its_end():
             assert on == list(range(start, start + count))
 
 
+@pytest.mark.usefixtures("present_objects_frozen")
 def test_a_time_series_lives_as_long_as_its_scenario():
     def made(k):
         t = np.linspace(0.0, 0.2, 201)

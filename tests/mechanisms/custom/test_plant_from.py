@@ -249,6 +249,7 @@ def test_threads_change_nothing(arm):
         np.testing.assert_array_equal(one.x, alone.x)
 
 
+@pytest.mark.usefixtures("present_objects_frozen")
 def test_data_of_a_nominal_model_are_reused_by_later_runs(arm):
     plant = arm()
     base = smc.Scenario(plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1))
@@ -260,6 +261,7 @@ def test_data_of_a_nominal_model_are_reused_by_later_runs(arm):
     assert len(prepared(plant.nominal, frozen(plant.parameters))[3]) == len(many)
 
 
+@pytest.mark.usefixtures("present_objects_frozen")
 def test_data_of_a_nominal_model_are_reused_after_a_failed_run(arm):
     plant = arm(bodies=BALL)
     good = smc.Scenario(plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1))
@@ -272,6 +274,7 @@ def test_data_of_a_nominal_model_are_reused_after_a_failed_run(arm):
     assert len(prepared(plant.nominal, frozen(plant.parameters))[3]) == 1
 
 
+@pytest.mark.usefixtures("present_objects_frozen")
 def test_no_room_for_what_a_nominal_model_works_on_is_said_once(arm, monkeypatch):
     nominal, parameters = (plant := arm()).nominal, frozen(plant.parameters)
     assert isinstance(nominal, NominalModel)
