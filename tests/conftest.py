@@ -118,8 +118,8 @@ def coarse_grid(monkeypatch):
 
     What is found there is refined as ever; a law with several cycles may lose one.
     """
-    monkeypatch.setattr("smc_mujoco.analysis.chattering.GRID_FREQUENCIES", 24)
-    monkeypatch.setattr("smc_mujoco.analysis.chattering.GRID_AMPLITUDES", 15)
+    monkeypatch.setattr("smc_mujoco.analysis.chattering.GRID_FREQUENCIES", 23)
+    monkeypatch.setattr("smc_mujoco.analysis.chattering.GRID_AMPLITUDES", 14)
     monkeypatch.setattr("smc_mujoco.analysis.gains_for.SPEEDS", tuple(10.0 ** (0.4 * k - 1.0) for k in range(6)))
 
 

@@ -7,17 +7,22 @@
 A limit cycle e = a sin(omega t) solves N(a, omega) L(j omega) = 1. N is the first harmonic of what the law returns, and
 L the answer of the linearised mechanism (`harmonics`), without any integrator's error. Then the equation is solved
 again with the other harmonics of e, which follow from those of u. The solution is exact if the cycle is not locked to
-the control samples. `uncertainty` says how much such locking may change it. Cycles that are not stable by Loeb's
-criterion are left out.
+the control samples. `uncertainty` says how much such locking may change it.
+
+The |N| of a law with a dead zone first rises with the amplitude, which gives two solutions. By Loeb's criterion the
+inner one is unstable: a run that starts within it comes to rest, and one that starts outside ends in the outer one.
+`threshold_x` is the amplitude of the inner one.
 Sources: A. Gelb & W. E. Vander Velde, Multiple-Input Describing Functions, 1968; I. Boiko, Discontinuous Control
 Systems, 2009; U. Perez-Ventura & L. Fridman, arXiv 1705.09711, 2017.
 """
 
+import cmath
 import dataclasses
+import functools
 import itertools
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,22 +37,30 @@ from smc_mujoco.mechanisms.hardware.drives import RateLimit
 from smc_mujoco.simulation.scenario import Scenario
 
 MIN_FREQUENCY = 0.5  # Hz: slower oscillations do not count as chattering
-GRID_FREQUENCIES, GRID_AMPLITUDES = 60, 36  # points of the grid on which cycles are sought: chosen
-COARSE_SAMPLES = 60  # samples of a period on that grid: chosen
+GRID_FREQUENCIES, GRID_AMPLITUDES = 59, 35  # cells of the coarse grid on which cycles are sought: chosen
+CUTS = 8  # of a cell's sides, at most: a cell of the finest grid is 11 % in amplitude and 1.5 % in frequency; chosen
+CELL_MARGIN = 0.5  # of a cell's range of N L, by which N L may be outside that of the corners: chosen
+COARSE_SAMPLES = 60.618  # samples of a period on the grid, not whole, so that periods differ in their places; chosen
+COARSE_NOISE = 0.1  # of the log of N L, by the places of few samples: chosen
+CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])  # of a cell, in order
 MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-12, 3.0  # rad or m, of the error
-SAME_CYCLE_TOLERANCE = 0.02  # relative difference below which two cycles are one: chosen
-BRACKET_MARGIN = 1.0  # of the log of an amplitude, by which a bracket from the coarse grid is widened: chosen
-MAX_NYQUIST_SHARE = 0.9  # of half the sampling frequency: faster waves beat with their images
+SAME_CYCLE_TOLERANCE = 0.02  # of the logs of amplitude and omega, below which two cycles are one: chosen
+MAX_SHIFT = 1.0  # of these logs, from a cell to its cycle, or from that to the cycle with harmonics: chosen
+BALANCE_TOLERANCE = 0.01  # of the log of N L at a cycle: the places of the samples make N jump; chosen
+MAX_NYQUIST_SHARE = 2.0 / 3.0  # of half the sampling frequency: runs lock faster waves to two samples a period
+SMALLEST = 1e-300  # for the log of 0
 MIN_GAIN_GROWTH = 3.0  # of a law that switches, from an amplitude to a thousandth of it: chosen
-CYCLE_TOLERANCE = 1e-4  # relative, of the slowest and the fastest cycle
-FREQUENCY_STEP = 0.93  # factor from one frequency to the next in the search for these
+CYCLE_TOLERANCE = 1e-4  # of the logs of amplitude and omega of a cycle: the last step of the search
 DERIVATIVE_STEP = 1e-3  # of the logs of amplitude and omega: smaller ones see jumps of the gain by the samples; chosen
 STABILITY_STEP = 0.1  # relative, in Loeb's criterion: smaller ones see these jumps too; chosen
 # Factors on the ends of ranges. With them the ranges have the truth in 95 % of random loops: benchmarks/chattering.py.
 AMPLITUDE_FACTOR, FREQUENCY_FACTOR = 1.01, 1.01
 MAX_GAIN_DRIFT = 0.05  # relative: a law whose gain drifts more gets a remark; chosen
 RESONANCE_DAMPING = 0.01  # imaginary part of frequencies over the real one, so that resonances have a width; chosen
-PHASE_POINTS = 2000  # of the curve of phase over frequency; chosen
+PHASE_STEP = 0.005  # of the log of omega, along the curve of phase over frequency; chosen
+
+Balance = tuple[float, float]  # amplitude of e, rad or m, and omega, rad/s, where N L = 1
+Cell = tuple[np.ndarray, np.ndarray]  # the lowest and the highest logs of amplitude and omega, (2,) each
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -61,6 +74,8 @@ class Chattering:
       frequency: Hz.
       power: mean square of s', (amplitude omega)^2 / 2 with the first harmonic of s. For s' = u + d it is the mean
         square of the delivered force per unit of mass.
+      threshold_x: amplitude of the position of the largest unstable cycle within this one, rad or m; 0 without one. A
+        smaller oscillation does not grow into this one.
       third_harmonic: third harmonic of s over the first; NaN for two samples in a period. If it is large, the law does
         not see a sine, and the prediction is rough.
       samples: control samples in a period.
@@ -79,6 +94,7 @@ class Chattering:
     amplitude_u: float = math.nan
     frequency: float = math.nan
     power: float = math.nan
+    threshold_x: float = 0.0
     third_harmonic: float = math.nan
     samples: float = math.nan
     amplitude_range: tuple[float, float] = (math.nan, math.nan)
@@ -112,7 +128,8 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
       fields: of the Scenario, such as plant, actuator, input_delay, control_period.
 
     Returns:
-      The stable limit cycle. If there are several, the fastest, which is that of a mechanism near rest.
+      The stable limit cycle. If there are several, the fastest, and of equally fast ones the smallest. The others are
+      in `assumptions`.
 
     Raises:
       ScenarioError: a law that does not compile, a channel that is not driven, or as Scenario.
@@ -137,11 +154,31 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
     if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < scenario.plant.driven:
         raise ScenarioError(f"channel is {shown(channel)}: give 0 to {scenario.plant.driven - 1}")
     loop = Loop(scenario, channel)
-    waves = _stable_cycles(loop, cycles(loop))
+    stable, unstable = cycles(loop)
     assumptions = tuple(_assumptions(loop))
-    if not waves:
-        return _locked_ranges(scenario, channel, assumptions) if switches(loop) else Chattering(assumptions=assumptions)
-    return _prediction(loop, max(waves, key=lambda wave: wave.omega), assumptions, ranges)
+    if not stable:
+        return _locked_ranges(loop, assumptions) if switches(loop) else Chattering(assumptions=assumptions)
+    fastest = max(omega for _, omega in stable)
+    one = min(one for one in stable if one[1] > fastest / (1.0 + SAME_CYCLE_TOLERANCE))
+    assumptions += tuple(_other_cycles(loop, [other for other in stable if other is not one]))
+    return _prediction(loop, one, _threshold(loop, one, unstable), assumptions, ranges)
+
+
+def _other_cycles(loop: Loop, others: Sequence[Balance]) -> Iterator[str]:
+    """Yield what a run from elsewhere may end in."""
+    for amplitude, omega in others:
+        s = f"{loop.wave(amplitude, omega).s:.2g} {loop.scenario.plant.units[loop.channel]}/s"
+        yield f"from elsewhere a run may end in another cycle, of {s} at {omega / math.tau:.3g} Hz"
+
+
+def _threshold(loop: Loop, one: Balance, unstable: Sequence[Balance]) -> float:
+    """Return the amplitude of x of the largest unstable cycle within a stable one, 0 without one.
+
+    Only those count whose L has the phase of the stable one, without a turn more or less.
+    """
+    smaller = [other for other in unstable if other[0] < one[0]]
+    *turns, turn = _turns(loop, [*smaller, one])
+    return max((a for (a, _), other in zip(smaller, turns, strict=True) if round(other - turn) == 0), default=0.0)
 
 
 def switches(loop: Loop) -> bool:
@@ -153,162 +190,183 @@ def switches(loop: Loop) -> bool:
     return smaller > MIN_GAIN_GROWTH * small
 
 
-def _locked_ranges(scenario: Scenario, channel: int, assumptions: tuple[str, ...]) -> Chattering:
+def _locked_ranges(loop: Loop, assumptions: tuple[str, ...]) -> Chattering:
     """Return the ranges of a cycle that is locked to the samples, of a law that switches.
 
     Such a law switches at most half a control period later than on average. So the cycle is not larger and not slower
     than that of the same loop with half a control period more delay.
     """
-    loop = Loop(scenario, channel, 0.5 * scenario.control_period)
-    waves = _stable_cycles(loop, cycles(loop))
-    if not waves:
+    control_period = loop.scenario.control_period
+    later = loop.later(0.5 * control_period)
+    stable, _ = cycles(later)
+    if not stable:
         return Chattering(assumptions=assumptions)
-    wave = max(waves, key=lambda wave: wave.omega)
+    wave = later.wave(*max(stable, key=lambda one: one[1]))
     assumptions += ("the balance has no solution, but the law switches: a cycle locked to the samples is possible",)
     return Chattering(
         amplitude_range=(0.0, AMPLITUDE_FACTOR * wave.s + loop.s_of_one_count),
-        frequency_range=(wave.omega / FREQUENCY_FACTOR / math.tau, 0.5 / scenario.control_period),
+        frequency_range=(wave.omega / FREQUENCY_FACTOR / math.tau, 0.5 / control_period),
         assumptions=assumptions,
     )
 
 
-def cycles(loop: Loop) -> list[Wave]:
-    """Return the solutions of N L = 1 up to half the sampling frequency, where |N| falls with the amplitude."""
-    fastest = math.pi / loop.scenario.control_period
-    omegas = np.geomspace(math.tau * MIN_FREQUENCY, MAX_NYQUIST_SHARE * fastest, GRID_FREQUENCIES)
-    amplitudes = np.geomspace(MIN_AMPLITUDE, MAX_AMPLITUDE, GRID_AMPLITUDES)
-    balanced: list[tuple[float, float]] = []
-    for bracket in _brackets(loop, omegas, amplitudes):
-        cycle = _balanced(loop, *bracket)
-        if cycle and all(abs(cycle[0] / a - 1) + abs(cycle[1] / w - 1) > SAME_CYCLE_TOLERANCE for a, w in balanced):
-            balanced.append(cycle)
-    return [loop.wave(*one) for one in (balanced or _of_two_samples(loop, fastest, amplitudes))]
+def cycles(loop: Loop) -> tuple[list[Balance], list[Balance]]:
+    """Return the stable and the other solutions of N L = 1 up to half the sampling frequency.
 
-
-Bracket = tuple[tuple[float, float], tuple[float, float]]  # two omegas and two amplitudes, between which a cycle may be
-
-
-def _brackets(loop: Loop, omegas: np.ndarray, amplitudes: np.ndarray) -> Iterator[Bracket]:
-    """Yield brackets that may contain a cycle: along the curve |N L| = 1, the phase of N L changes its sign there."""
-    branches: list[list[tuple[float, float]]] = []  # for each omega: (amplitude, phase) where |N L| = 1
-    for omega in omegas:
-        response = loop.response(omega)
-        products = np.array([loop.gain(a, omega, COARSE_SAMPLES) * response for a in amplitudes])
-        sizes = np.log(np.abs(products) + 1e-300)
-        here = []
-        for k in np.flatnonzero(np.diff(np.sign(sizes))):
-            share = sizes[k] / (sizes[k] - sizes[k + 1])
-            amplitude = math.exp(np.interp(share, [0, 1], np.log(amplitudes[k : k + 2])))
-            here.append((amplitude, float(np.angle(products[k] * (1 - share) + products[k + 1] * share))))
-        if not here:  # the curve ends at amplitude 0, or beyond the largest
-            end = 0 if sizes[0] < 0.0 else -1
-            here.append((float(amplitudes[end]), float(np.angle(products[end]))))
-        branches.append(here)
-    for (w0, before), (w1, after) in itertools.pairwise(zip(omegas, branches, strict=True)):
-        for (a0, p0), (a1, p1) in itertools.product(before, after):
-            if p0 * p1 <= 0.0 and abs(p0 - p1) < math.pi:
-                yield (w0, w1), (min(a0, a1), max(a0, a1))
-
-
-def _balanced(loop: Loop, omegas: tuple[float, float], amplitudes: tuple[float, float]) -> tuple[float, float] | None:
-    """Return amplitude and omega of the cycle in a bracket, or None.
-
-    The search is nested bisection, because N may jump with the places of the samples. The bracket is widened to both
-    sides, because the few samples of the coarse grid shift the phase of a law that switches.
+    Of two solutions in one cell of the finest grid both may be missed.
     """
+    balances: list[Balance] = []
+    for cells in _starts(loop):
+        one = next((balance for cell in cells if (balance := _balanced(loop, *cell))), None)
+        if one and all(_distance(one, other) > SAME_CYCLE_TOLERANCE for other in balances):
+            balances.append(one)
+    stable = _stable(loop, balances) or _of_two_samples(loop)
+    return stable, [one for one in balances if one not in stable]
+
+
+def _distance(one: Balance, other: Balance) -> float:
+    """Return the larger difference of the logs of amplitude and omega."""
+    return max(abs(math.log(a / b)) for a, b in zip(one, other, strict=True))
+
+
+def _starts(loop: Loop) -> Iterator[list[Cell]]:
+    """Yield groups of cells of a fine grid, one of which has a solution; cells whose image under N L winds around 1.
+
+    A cell of the coarse grid is cut into four, again and again, where N L may be 1 in it. N is that of few samples,
+    whose places make the image of some neighbours wind, too, in turns to the left and to the right.
+    """
+    from scipy.ndimage import label
+
+    fastest = MAX_NYQUIST_SHARE * math.pi / loop.scenario.control_period
+    start, end = np.log([[math.tau * MIN_FREQUENCY, MIN_AMPLITUDE], [fastest, MAX_AMPLITUDE]])
+    count = np.array([GRID_FREQUENCIES, GRID_AMPLITUDES])
+    step = (end - start) / (CUTS * count)
+    (slow, low), (dw, dz) = start.tolist(), step.tolist()
+
+    @functools.cache
+    def response(i: int) -> tuple[float, complex]:
+        omega = math.exp(slow + i * dw)
+        return omega, loop.response(omega)
+
+    @functools.cache
+    def product(i: int, k: int) -> complex:
+        omega, answer = response(i)
+        return loop.gain(math.exp(low + k * dz), omega, COARSE_SAMPLES) * answer
+
+    def at_corners(cells: np.ndarray, side: int) -> np.ndarray:
+        places = (cells[:, None] + side * CORNERS).reshape(-1, 2).tolist()
+        return np.array([product(i, k) for i, k in places]).reshape(-1, len(CORNERS))
+
+    cells, side = CUTS * np.argwhere(np.ones(count)), CUTS  # by the numbers of their lowest omega and amplitude
+    while side > 1:
+        cells = cells[_may_balance(at_corners(cells, side), side * step)]
+        side //= 2
+        cells = (cells[:, None] + side * CORNERS).reshape(-1, 2)
+    winding = np.zeros(CUTS * count)
+    winding[tuple(cells.T)] = _winding(at_corners(cells, 1))
+    neighbours, groups = label(winding, np.ones((3, 3)))  # type: ignore[misc]
+    for group in range(1, groups + 1):
+        cells = np.argwhere(neighbours == group)
+        turns = winding[tuple(cells.T)]
+        for sign in (1.0, -1.0):
+            if sign * turns.sum() >= 0.0:
+                yield [((start + step * one)[::-1], (start + step * (one + 1))[::-1]) for one in cells[turns == sign]]
+
+
+def _may_balance(products: np.ndarray, sides: np.ndarray) -> np.ndarray:
+    """Return whether N L, given at the corners of cells (K, 4), may be 1 in each cell, (K,).
+
+    Size and phase may be outside those of the corners by a share of their range, of the `sides` in the logs of omega
+    and amplitude, or of the noise of few samples.
+    """
+    sizes = np.log(np.maximum(np.abs(products), SMALLEST))
+    margins = CELL_MARGIN * np.maximum(np.ptp(sizes, axis=1), max(sides[1], COARSE_NOISE))
+    near = (sizes.min(axis=1) <= margins) & (sizes.max(axis=1) >= -margins)
+    largest = np.take_along_axis(products, np.abs(products).argmax(axis=1)[:, None], axis=1)
+    phases = np.angle(largest) + np.angle(np.where(products == 0.0, 1.0, products * largest.conj()))
+    margins = CELL_MARGIN * np.maximum(np.ptp(phases, axis=1), max(sides[0], COARSE_NOISE))
+    lowest, highest = phases.min(axis=1) - margins, phases.max(axis=1) + margins
+    return near & (np.ceil(lowest / math.tau) * math.tau <= highest)
+
+
+def _winding(products: np.ndarray) -> np.ndarray:
+    """Return how often polygons wind around 1, (K,): -1, 0 or 1, of their corners (K, 4)."""
+    around = products - 1.0
+    return np.round(np.angle(np.roll(around, -1, axis=1) * around.conj()).sum(axis=1) / math.tau)
+
+
+def _balanced(loop: Loop, low: np.ndarray, high: np.ndarray) -> Balance | None:
+    """Return the balance in a cell or near it, with all samples; None where N jumps across it."""
+    from scipy.optimize import root
+
+    least, largest = low - MAX_SHIFT, high + MAX_SHIFT
+    largest[1] = min(largest[1], math.log(math.pi / loop.scenario.control_period))
+
+    def excess(z: np.ndarray) -> np.ndarray:
+        inside = np.clip(z, least, largest)
+        amplitude, omega = np.exp(inside).tolist()
+        product = cmath.log(loop.gain(amplitude, omega) * loop.response(omega) or math.exp(-MAX_SHIFT))
+        return np.array([product.real, product.imag]) + (inside - z)
+
+    def solved() -> Iterator[np.ndarray]:
+        yield root(excess, 0.5 * (low + high), options={"xtol": CYCLE_TOLERANCE, "eps": DERIVATIVE_STEP}).x
+        yield _bisected(excess, low, high)
+
+    for z in solved():
+        if (z == np.clip(z, least, largest)).all() and np.abs(excess(z)).max() < BALANCE_TOLERANCE:
+            amplitude, omega = np.exp(z).tolist()
+            return amplitude, omega
+    return None
+
+
+def _bisected(excess: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Return where size and phase change their signs, in a cell or beside it: by turns along amplitude and omega."""
     from scipy.optimize import brentq
 
-    low, high = math.log(amplitudes[0]) - BRACKET_MARGIN, math.log(amplitudes[1]) + BRACKET_MARGIN
-    first, last = np.log(omegas)
+    z = 0.5 * (low + high)
+    for part in (0, 1, 0, 1, 0):
+        side = high[part] - low[part]
 
-    def phase(w: float) -> float:
-        return _on_curve(loop, math.exp(w), low, high)[1]
+        def along(at: float, part: int = part) -> float:
+            z[part] = at
+            return float(excess(z)[part])
 
-    fastest = math.log(MAX_NYQUIST_SHARE * math.pi / loop.scenario.control_period)
-    first, last = 2 * first - last, min(2 * last - first, fastest)
-    if phase(first) * phase(last) > 0.0:
-        return None  # the coarse grid's bracket has no cycle with all samples
-    omega = math.exp(float(brentq(phase, first, last, xtol=1e-8)))  # type: ignore[arg-type]
-    amplitude, _ = _on_curve(loop, omega, low, high)
-    return (amplitude, omega) if low < math.log(amplitude) < high else None
-
-
-def _on_curve(loop: Loop, omega: float, low: float, high: float, tolerance: float = 1e-9) -> tuple[float, float]:
-    """Return the amplitude at which |N L| = 1 for an omega, and the phase of N L there.
-
-    Args:
-      low, high: range of the amplitude's log. Without a solution in it, the nearer end is returned.
-      tolerance: of the amplitude's log.
-    """
-    from scipy.optimize import brentq
-
-    response = loop.response(omega)
-
-    def size(z: float) -> float:
-        return math.log(abs(loop.gain(math.exp(z), omega) * response) + 1e-300)
-
-    if size(low) <= 0.0:
-        z = low
-    elif size(high) >= 0.0:
-        z = high
-    else:
-        z = float(brentq(size, low, high, xtol=tolerance))  # type: ignore[arg-type]
-    return math.exp(z), float(np.angle(loop.gain(math.exp(z), omega) * response))
+        ends = low[part] - side, high[part] + side
+        if along(ends[0]) * along(ends[1]) > 0.0:
+            break
+        z[part] = brentq(along, *ends)  # type: ignore[arg-type]
+    return z
 
 
-def _shifted_cycle(loop: Loop, wave: Wave, shift: float) -> Wave:
-    """Return the cycle of a law that acts later or earlier.
-
-    The search follows the curve |N L| = 1, towards slower waves for a later law. It ends at the slowest wave that
-    counts as chattering, or at a wave of two samples a period.
+def _nearest_cycle(loop: Loop, wave: Wave, shift: float) -> Wave | None:
+    """Return the cycle of a law that acts later or earlier: the nearest one that is not faster or not slower.
 
     Args:
       wave: the cycle of the law as it is.
       shift: rad at the cycle's omega; negative for a later law.
     """
+    later = loop.later(-shift / wave.omega)
+    stable, _ = cycles(later)
+    sign = math.copysign(1.0, shift)
+    beside = [one for one in stable if sign * math.log(one[1] / wave.omega) >= -SAME_CYCLE_TOLERANCE]
+    if not beside and shift > 0.0:
+        beside = _of_two_samples(later)
+    nearest = min(beside, key=lambda one: abs(one[1] - wave.omega), default=None)
+    return later.wave(*nearest) if nearest else None
+
+
+def _of_two_samples(loop: Loop) -> list[Balance]:
+    """Return the stable cycles of two samples. For them N L is real, so its magnitude decides."""
     from scipy.optimize import brentq
 
-    half = math.pi / loop.scenario.control_period
-    slowest, fastest, z = math.tau * MIN_FREQUENCY, MAX_NYQUIST_SHARE * half, math.log(wave.amplitude)
-
-    def excess(omega: float) -> float:
-        nonlocal z
-        amplitude, phase = _on_curve(loop, omega, z - BRACKET_MARGIN, z + BRACKET_MARGIN, CYCLE_TOLERANCE)
-        z = math.log(amplitude)
-        return phase + shift * omega / wave.omega
-
-    omega, before, step = wave.omega, shift, FREQUENCY_STEP if shift < 0.0 else 1.0 / FREQUENCY_STEP
-    if omega > fastest:  # a wave of two samples, which cannot be faster
-        omega, before = fastest, excess(fastest) if shift < 0.0 else 0.0
-    if before * shift <= 0.0:
-        return wave
-    while slowest < omega * step < fastest:
-        after = excess(omega * step)
-        if before * after <= 0.0 and abs(before - after) < math.pi:
-            try:
-                omega = float(brentq(excess, omega, omega * step, rtol=CYCLE_TOLERANCE))  # type: ignore[arg-type]
-            except ValueError:  # the curve has branches, and the search has changed to another one
-                omega *= step
-            excess(omega)
-            return loop.wave(math.exp(z), omega)
-        omega, before = omega * step, after
-    if step < 1.0:
-        return loop.wave(math.exp(z), omega)
-    amplitudes = np.geomspace(MIN_AMPLITUDE, MAX_AMPLITUDE, GRID_AMPLITUDES)
-    return loop.wave(*min(_of_two_samples(loop, half, amplitudes), default=(math.exp(z), omega)))
-
-
-def _of_two_samples(loop: Loop, fastest: float, amplitudes: np.ndarray) -> list[tuple[float, float]]:
-    """Return amplitude and omega of the cycles of two samples. For them N L is real, so its magnitude decides."""
-    from scipy.optimize import brentq
-
+    fastest = math.pi / loop.scenario.control_period
     response = loop.response(fastest).real
 
     def excess(z: float) -> float:
         product = loop.gain(math.exp(z), fastest).real * response
         return math.log(product) if product > 0.0 else -50.0
 
-    places = np.log(amplitudes)
+    places = np.linspace(math.log(MIN_AMPLITUDE), math.log(MAX_AMPLITUDE), GRID_AMPLITUDES + 1)
     sizes = [excess(z) for z in places]
     return [
         (math.exp(float(brentq(excess, low, high))), fastest)  # type: ignore[arg-type]
@@ -317,32 +375,36 @@ def _of_two_samples(loop: Loop, fastest: float, amplitudes: np.ndarray) -> list[
     ]
 
 
-def _stable_cycles(loop: Loop, waves: list[Wave]) -> list[Wave]:
+def _stable(loop: Loop, balances: Sequence[Balance]) -> list[Balance]:
     """Return the stable cycles.
 
     A cycle is stable if a larger oscillation decays (Loeb's criterion) and the phase of L has not lost a whole turn
     since a slower cycle of that kind. A delay gives a row of such cycles, of which only the slowest is stable.
     """
-    decaying = sorted((wave for wave in waves if _decays(loop, wave)), key=lambda wave: wave.omega)
-    if len(decaying) < 2:
-        return decaying
-    omegas = np.geomspace(0.9 * decaying[0].omega, 1.1 * decaying[-1].omega, PHASE_POINTS)
-    phases = np.unwrap([np.angle(loop.response(w * (1.0 - RESONANCE_DAMPING * 1j))) for w in omegas])
-    turns = np.interp([wave.omega for wave in decaying], omegas, phases) / math.tau
-    return [wave for k, wave in enumerate(decaying) if all(round(turns[k] - before) >= 0 for before in turns[:k])]
+    decaying = sorted((one for one in balances if _decays(loop, *one)), key=lambda one: one[1])
+    turns = _turns(loop, decaying)
+    return [one for k, one in enumerate(decaying) if all(round(turns[k] - before) >= 0 for before in turns[:k])]
 
 
-def _decays(loop: Loop, wave: Wave) -> bool:
+def _decays(loop: Loop, amplitude: float, omega: float) -> bool:
     """Return whether an oscillation that is a little larger than the cycle decays."""
-    if wave.omega >= math.pi / loop.scenario.control_period:
-        return True  # two samples a period: the gain falls with the amplitude
 
-    def product(amplitude: float, omega: float) -> complex:
-        return complex(np.log(loop.gain(amplitude, omega) * loop.response(omega)))
+    def product(a: float, w: float) -> complex:
+        return cmath.log(loop.gain(a, w) * loop.response(w) or SMALLEST)
 
-    up, down = (product(wave.amplitude * (1 + d), wave.omega) for d in (STABILITY_STEP, -STABILITY_STEP))
-    fast, slow = (product(wave.amplitude, wave.omega * (1 + d)) for d in (STABILITY_STEP, -STABILITY_STEP))
-    return ((up - down) / (fast - slow)).imag < 0.0
+    up, down = (product(amplitude * (1 + d), omega) for d in (STABILITY_STEP, -STABILITY_STEP))
+    fast, slow = (product(amplitude, omega * (1 + d)) for d in (STABILITY_STEP, -STABILITY_STEP))
+    return ((up - down) * (fast - slow).conjugate()).imag < 0.0
+
+
+def _turns(loop: Loop, balances: Sequence[Balance]) -> np.ndarray:
+    """Return the phase of L at cycles, unwrapped over frequency, in turns."""
+    omegas = [omega for _, omega in balances]
+    if len(omegas) < 2:
+        return np.zeros(len(omegas))
+    between = np.exp(np.arange(math.log(0.9 * min(omegas)), math.log(1.1 * max(omegas)), PHASE_STEP))
+    phases = np.unwrap([np.angle(loop.response(w * (1.0 - RESONANCE_DAMPING * 1j))) for w in between])
+    return np.interp(omegas, between, phases) / math.tau
 
 
 def _with_harmonics(loop: Loop, wave: Wave) -> Wave:
@@ -358,11 +420,14 @@ def _with_harmonics(loop: Loop, wave: Wave) -> Wave:
 
     start = np.log([wave.amplitude, wave.omega])
     solved = root(excess, start, options={"xtol": CYCLE_TOLERANCE, "eps": DERIVATIVE_STEP})
-    return loop.wave(*np.exp(solved.x)) if solved.success and np.abs(solved.x - start).max() < BRACKET_MARGIN else wave
+    return loop.wave(*np.exp(solved.x)) if solved.success and np.abs(solved.x - start).max() < MAX_SHIFT else wave
 
 
-def _prediction(loop: Loop, sine: Wave, assumptions: tuple[str, ...], ranges: bool) -> Chattering:
-    """Return a limit cycle with its numbers; `sine` is the cycle in which e is a sine."""
+def _prediction(
+    loop: Loop, balance: Balance, threshold: float, assumptions: tuple[str, ...], ranges: bool
+) -> Chattering:
+    """Return a limit cycle with its numbers; `balance` is the cycle in which e is a sine."""
+    sine = loop.wave(*balance)
     wave = _with_harmonics(loop, sine)
     response = loop.response(wave.omega)
     if not math.isnan(wave.third):
@@ -373,13 +438,17 @@ def _prediction(loop: Loop, sine: Wave, assumptions: tuple[str, ...], ranges: bo
     if coupling:
         words = f"other driven channels rest, though this command moves one of them {coupling:.2g} times as far"
         assumptions += (words,)
+    if threshold:
+        unit = loop.scenario.plant.units[loop.channel]
+        assumptions += (f"x has moved beyond {threshold:.2g} {unit}, an unstable cycle: smaller oscillations die out",)
     if wave.drift > MAX_GAIN_DRIFT:
         assumptions += ("gains or memories of the law drift: the prediction is a snapshot",)
     sizes, omegas = [math.nan], [math.nan]
     if ranges:
-        waves = [sine, *(_shifted_cycle(loop, sine, phase) for phase in loop.phases(sine.amplitude, sine.omega))]
-        sizes = [one.s / sine.s * wave.s for one in waves]
-        omegas = [one.omega / sine.omega * wave.omega for one in waves]
+        later, earlier = (_nearest_cycle(loop, sine, phase) for phase in loop.phases(*balance))
+        waves = [one for one in (sine, later, earlier) if one]
+        sizes = [one.s / sine.s * wave.s for one in waves] + [0.0] * (earlier is None)
+        omegas = [one.omega / sine.omega * wave.omega for one in waves] + [math.inf] * (earlier is None)
     fastest, nyquist = max(omegas) * FREQUENCY_FACTOR / math.tau, 0.5 / loop.scenario.control_period
     return Chattering(
         amplitude=wave.s,
@@ -387,6 +456,7 @@ def _prediction(loop: Loop, sine: Wave, assumptions: tuple[str, ...], ranges: bo
         amplitude_u=wave.u,
         frequency=wave.omega / math.tau,
         power=wave.rate**2 / 2.0,
+        threshold_x=threshold,
         third_harmonic=wave.third,
         samples=math.tau / wave.omega / loop.scenario.control_period,
         amplitude_range=(min(sizes) / AMPLITUDE_FACTOR, max(sizes) * AMPLITUDE_FACTOR + loop.s_of_one_count),

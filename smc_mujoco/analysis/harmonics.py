@@ -12,6 +12,7 @@ There is no approximation but that this error is a sine. Play between rotor and 
 describing function is that of two free masses, see `play`, and multiplies the gain.
 """
 
+import contextlib
 import copy
 import dataclasses
 import functools
@@ -82,10 +83,10 @@ class Wave:
 
 
 class Loop:
-    """The law and the linearised mechanism of one driven channel of a scenario; `delay`: additional delay of u, s."""
+    """The law and the linearised mechanism of one driven channel of a scenario."""
 
-    def __init__(self, scenario: Scenario, channel: int = 0, delay: float = 0.0):
-        self.scenario, self.channel, self.delay, s = scenario, channel, delay, scenario.resolved
+    def __init__(self, scenario: Scenario, channel: int = 0):
+        self.scenario, self.channel, self.delay, s = scenario, channel, 0.0, scenario.resolved
         plant = s.plant
         if not s.clock.regular:
             raise ScenarioError(
@@ -102,9 +103,16 @@ class Loop:
         self.controller = Controller(s.velocity, s.surface, s.law.of_channel(channel))
         self._linearise_mechanism()
         self.nominal_models = [self._nominal_model(joint) for joint in self.joints]
-        # all amplitudes of a frequency have the same answer and the same clock
-        self._answer = functools.lru_cache(maxsize=256)(self._solve)
+        # all amplitudes of a frequency have the same answer and the same clock, and a later loop has the same gains
+        self._answer = functools.lru_cache(maxsize=1024)(self._solve)
+        self.gain = functools.lru_cache(maxsize=10_000)(self._gain)
         self._clock = functools.lru_cache(maxsize=4)(self._clock_of)
+
+    def later(self, delay: float) -> "Loop":
+        """Return the loop with a delay, s, in addition."""
+        made = copy.copy(self)
+        made.delay = self.delay + delay
+        return made
 
     def _linearise_mechanism(self) -> None:
         """Linearise MuJoCo's model about rest at x = 0, without contacts, limits, dry friction and gaps."""
@@ -182,7 +190,7 @@ class Loop:
         fixed = {DT: h, LIMIT: self.scenario.limits[self.channel], MODEL: s.model == "nominal"}
         return self.controller(0, fixed, motion, self.nominal_models, self.controller.memories())
 
-    def gain(self, amplitude: float, omega: float, max_samples: int = MAX_SAMPLES_PER_PERIOD) -> complex:
+    def _gain(self, amplitude: float, omega: float, max_samples: float = MAX_SAMPLES_PER_PERIOD) -> complex:
         """Return the first harmonic of u over that of e = amplitude sin(omega t), times that of play, see `Wave`.
 
         Args:
@@ -254,7 +262,7 @@ class Loop:
         return [amplitude, *(x * (shift / abs(shift)) ** n if shift else 0j for n, x in enumerate(rest, 2))]
 
     def _excited(
-        self, amplitudes: Sequence[complex], omega: float, max_samples: int, position: float = 0.0
+        self, amplitudes: Sequence[complex], omega: float, max_samples: float, position: float = 0.0
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return omega t, u and s of the samples after memories have settled, for an error of these harmonics.
 
@@ -279,7 +287,7 @@ class Loop:
         limit = self.scenario.limits[self.channel]
         return clock.angles, np.clip(u[clock.first :], -limit, limit), s[clock.first :]
 
-    def _clock_of(self, omega: float, max_samples: int, position: float) -> "Clock":
+    def _clock_of(self, omega: float, max_samples: float, position: float) -> "Clock":
         """Return the times of an excitation's samples."""
         period = math.tau / omega
         h = max(self.scenario.resolved.control_period, period / max_samples)
@@ -349,7 +357,7 @@ class Controller:
         out, y = np.empty((len(x), 2)), np.empty(len(FIELDS))
         (g0, g1, g2), (m0, m1, m2) = self.gains, memories
         model = np.array([models[0], of_joint])
-        with delay_ctrl_c():  # numba may compile it now
+        with contextlib.nullcontext() if _run.overloads else delay_ctrl_c():  # numba compiles it at the first call
             done = _run(self.addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out)
         if done < 0:
             raise ScenarioError("the law raised an exception in the harmonic balance")

@@ -126,7 +126,7 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
 
 
 def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour: str) -> None:
-    """Draw s in the last periods of a run, and the predicted amplitude as a band."""
+    """Draw s in the last periods of a run, the predicted amplitude as a band and an unstable one as lines."""
     start = trace.t[-1] - SHOWN_PERIODS / cycle.frequency if cycle else trace.t[0]
     part = trace.t >= start
     t, s = trace.t[part] - trace.t[part][0], trace.s[part, channel]
@@ -140,4 +140,9 @@ def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour
         low, high = ax.get_ylim()
         ax.set_ylim(low, high + 0.18 * (high - low))
         words = f"band: ±{style.short(cycle.amplitude)} {unit}, predicted"
+        if cycle.threshold_x:
+            unstable = cycle.threshold_x * cycle.amplitude / cycle.amplitude_x
+            for level in (mean - unstable, mean + unstable):
+                ax.axhline(level, color=colour, lw=style.points(1.2), ls="dotted")
+            words += f"; dotted: ±{style.short(unstable)}, unstable, within it a run rests"
         ax.text(0.99, 0.97, words, ha="right", va="top", transform=ax.transAxes, fontsize=style.points(9.5))

@@ -13,10 +13,11 @@ from helpers.words import words
 
 import smc_mujoco as smc
 from smc_mujoco import chattering, describing_function
-from smc_mujoco.analysis.chattering import Chattering, _assumptions, _stable_cycles, cycles, save, switches
+from smc_mujoco.analysis.chattering import Chattering, _assumptions, cycles, save, switches
 from smc_mujoco.analysis.harmonics import Loop, Wave, play
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.analysis.step_halving import StepChange
+from smc_mujoco.metrics.limit_cycle import channel_cycle
 
 COARSELY = pytest.mark.usefixtures("coarse_grid")
 
@@ -368,17 +369,45 @@ def relay_with_a_dead_zone(a):
 
 @pytest.mark.parametrize(
     ("law", "wanted"),  # N at the cycles: 2 p / K
-    [(saturation, 1.0 / 1.02), (saturation, 0.7), (saturation, 1.05), (relay, 3.0), (relay_with_a_dead_zone, 5.0)],
+    [
+        (saturation, 1.0 / 1.02),
+        (saturation, 0.7),
+        (saturation, 1.05),
+        (relay, 3.0),
+        (relay_with_a_dead_zone, 5.0),
+        (relay_with_a_dead_zone, 40.0),
+        (relay_with_a_dead_zone, 62.0),
+    ],
 )
-def test_the_cycle_of_a_closed_form_is_found_where_its_gain_falls(law, wanted):
+def test_the_cycles_of_a_closed_form_are_stable_where_its_gain_falls(law, wanted):
+    """The largest N of the relay with a dead zone is 63.7, at 0.0141; N = 62 at 0.0126 and 0.0162."""
     turn, places = 40.0, np.geomspace(1e-3, 3.0, 200_001)
     loop = Formula(law, 2.0 * turn / wanted, turn)
-    falls = np.flatnonzero(np.diff(np.sign([law(a) - wanted for a in places])) < 0)
-    found = cycles(loop)
-    assert [wave.amplitude for wave in found] == pytest.approx(places[falls], rel=1e-4)
-    assert [wave.omega for wave in found] == pytest.approx([turn] * len(falls), rel=1e-6)
-    assert _stable_cycles(loop, found) == found
+    signs = np.diff(np.sign([law(a) - wanted for a in places]))
+    for found, sign in zip(cycles(loop), (-1, 1), strict=True):
+        crossings = np.flatnonzero(signs * sign > 0)
+        assert [amplitude for amplitude, _ in found] == pytest.approx(places[crossings], rel=1e-4)
+        assert [omega for _, omega in found] == pytest.approx([turn] * len(crossings), rel=1e-6)
     assert switches(loop) == (law is relay)
+
+
+@smc.law_function(gains={"k": 2.5, "d": 0.01})
+def thruster(y, gains, memory):
+    """Pushes back outside a dead zone of the position."""
+    return -gains.k * math.copysign(1.0, y.x) if abs(y.x) > gains.d else 0.0, y.x
+
+
+def test_of_the_two_cycles_behind_a_dead_zone_a_run_ends_in_the_outer_one_or_rests():
+    damped = smc.plant("duffing", alpha=0.0, beta=0.0, delta=2.0)
+    scenario = smc.Scenario(plant=damped, law=thruster(), actuator=smc.Lag(0.02), v0=0.0, duration=20.0)
+    cycle = chattering(scenario)
+    assert cycle.threshold_x == pytest.approx(0.0107, rel=0.01)  # where 4 k |L| sqrt(1 - (d / a)^2) / (pi a) is 1
+    assert any("smaller oscillations die out" in said for said in cycle.assumptions)
+    calm, *others = smc.run([dataclasses.replace(scenario, x0=q * cycle.threshold_x) for q in (0.9, 1.1, 10.0)])
+    assert np.ptp(calm.s[calm.t > 10.0]) == 0.0
+    for trace in others:
+        assert channel_cycle(trace) == pytest.approx((cycle.amplitude, cycle.frequency), rel=0.02)
+    assert cycle.uncertainty < 0.05  # the law as it is, later and earlier: all of the outer cycle
 
 
 def test_what_half_a_step_changes_is_relative_and_infinite_where_one_cycle_is_lost():
