@@ -41,6 +41,7 @@ GRID_FREQUENCIES, GRID_AMPLITUDES = 59, 35  # cells of the coarse grid on which 
 CUTS = 8  # of a cell's sides, at most: a cell of the finest grid is 11 % in amplitude and 1.5 % in frequency; chosen
 CELL_MARGIN = 0.5  # of a cell's range of N L, by which N L may be outside that of the corners: chosen
 COARSE_SAMPLES = 60.618  # samples of a period on the grid, not whole, so that periods differ in their places; chosen
+MAX_OTHER_CYCLES = 3  # stable ones beside the predicted; more are made by the places of the samples: chosen
 COARSE_NOISE = 0.1  # of the log of N L, by the places of few samples: chosen
 CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])  # of a cell, in order
 MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-12, 3.0  # rad or m, of the error
@@ -165,7 +166,11 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
 
 
 def _other_cycles(loop: Loop, others: Sequence[Balance]) -> Iterator[str]:
-    """Yield what a run from elsewhere may end in."""
+    """Yield what a run from elsewhere may end in, or that too many balances lie beside each other to mean cycles."""
+    if len(others) > MAX_OTHER_CYCLES:
+        slow, *_, fast = sorted(omega / math.tau for _, omega in others)
+        yield f"N L is about 1 everywhere from {slow:.3g} to {fast:.3g} Hz: the prediction is not to be trusted"
+        return
     for amplitude, omega in others:
         s = f"{loop.wave(amplitude, omega).s:.2g} {loop.scenario.plant.units[loop.channel]}/s"
         yield f"from elsewhere a run may end in another cycle, of {s} at {omega / math.tau:.3g} Hz"

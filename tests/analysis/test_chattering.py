@@ -13,7 +13,7 @@ from helpers.words import words
 
 import smc_mujoco as smc
 from smc_mujoco import chattering, describing_function
-from smc_mujoco.analysis.chattering import Chattering, _assumptions, cycles, save, switches
+from smc_mujoco.analysis.chattering import Chattering, _assumptions, _other_cycles, cycles, save, switches
 from smc_mujoco.analysis.harmonics import Loop, Wave, play
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.analysis.step_halving import StepChange
@@ -472,3 +472,9 @@ def test_bad_input_is_one_sentence(refused):
         lambda: describing_function(raising(), 1.0, 3.0, 100),
     ):
         refused(call)
+
+
+def test_many_balances_beside_each_other_are_no_cycles():
+    slow, *others = [(1e-3, math.tau * frequency) for frequency in (15.0, 4.0, 6.0, 9.0)]
+    (sentence,) = _other_cycles(None, [slow, *others])
+    assert sentence == "N L is about 1 everywhere from 4 to 15 Hz: the prediction is not to be trusted"
