@@ -101,7 +101,7 @@ class LogBar(Bar):
 
     def show(self) -> None:
         """Print a line."""
-        print(self, file=sys.stderr, flush=True)
+        print(self, file=sys.stderr)
 
     @property
     def share(self) -> float:

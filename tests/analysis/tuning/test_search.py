@@ -53,6 +53,14 @@ def rival():
 # the same seed, a larger budget
 
 
+def test_tracking_is_a_share_of_where_a_run_starts():
+    """It moves by a tenth of its start until the second sample."""
+    trace = smc.run(smc.Scenario(plant="duffing", law="none", x0=1.0, v0=100.0, duration=0.05))
+    tracking, variation = SHORT.terms_of_run(trace)
+    assert tracking == itae(trace)
+    assert variation == 0.0
+
+
 @pytest.mark.filterwarnings("ignore:no set of gains")
 def test_the_same_seed_gives_the_same_gains_to_the_last_bit_at_any_thread_count(found):
     assert tune("duffing", "observer_free", budget=32, seed=3, objective=SHORT, threads=1) == found

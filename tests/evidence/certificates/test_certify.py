@@ -506,6 +506,7 @@ def test_the_command_proves_writes_and_checks(tmp_path, monkeypatch, capsys):
     with pytest.raises(SystemExit) as ended:
         main(["certify", "--check", "d.json"])
     assert ended.value.code in (0, None)
+    assert "d.json: every statement is proven" in capsys.readouterr().out
     data = json.loads((tmp_path / "d.json").read_text())
     data["plant"]["parameters"]["M"] = 1.1
     (tmp_path / "d.json").write_text(json.dumps(data))
