@@ -391,8 +391,8 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     if hasattr(traces, "column"):
         raise ScenarioError(f"traces is {shown(traces)}: smc.plot draws a table, and this draws traces of smc.run")
     traces = [traces] if isinstance(traces, Trace) else items_of("traces", traces)
-    for other in (one for one in traces if not isinstance(one, Trace)):
-        raise ScenarioError(f"traces has {shown(other)}, which is no trace: give those of smc.run or smc.load")
+    if others := [given for given in traces if not isinstance(given, Trace)]:
+        raise ScenarioError(f"traces has {shown(others[0])}, which is no trace: give those of smc.run or smc.load")
     if not traces:
         raise ScenarioError("no traces to draw: give at least one, from smc.run(...) or smc.load(...)")
     plants = sorted({trace.scenario.plant.name for trace in traces})

@@ -1,4 +1,4 @@
-"""The page of a study that nobody ran: its findings are typed in, so that what it says and draws can be recorded."""
+"""The report's page, made from findings that are written here, without any run."""
 
 import dataclasses
 import html
