@@ -19,9 +19,9 @@ from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.control.source import Source, restore
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.channel_groups import groups as channel_groups
-from smc_mujoco.metrics.conventions import REST_SHARE
 from smc_mujoco.simulation.scenario import Scenario
 
+MIN_COMMAND_SHARE = 1e-3  # of the bound on u: smaller differences of u matter on no machine; chosen
 SETTLES = "settles"  # a name used like a metric's: whether the settling time is finite
 GROUPS = ("plant", "condition")
 LAW_ENTRIES = ("law", "model", "surface", "velocity", "versions")  # of a description; they may differ within a cell
@@ -262,12 +262,12 @@ def floor(scenario: Scenario | None, unit: str) -> float:
     """Return the difference of two values of a metric in this unit that matters on no machine, however small they are.
 
     For a position it is what the sensor does not resolve: the larger of half a count of the encoder and the standard
-    deviation of the noise. For a share of the initial error it is that of the largest |x0| of a driven channel. For a
-    command, and its variation in a second, it is REST_SHARE of the bound on u: where friction holds a joint that creeps
-    in the simulation, u varies by less. It is 0 for other units, and for no scenario.
+    deviation of the noise. For a share of the initial error it is that of the largest |x0| of a driven channel. For u
+    and its variation it is MIN_COMMAND_SHARE of the bound on u: where friction holds a joint that creeps in the
+    simulation, u varies by less. It is 0 for other units, and for no scenario.
     """
     if scenario is not None and unit in ("{u}", "{u}/s"):
-        return REST_SHARE * max((bound for bound in scenario.limits if math.isfinite(bound)), default=0.0)
+        return MIN_COMMAND_SHARE * max((bound for bound in scenario.limits if math.isfinite(bound)), default=0.0)
     if scenario is None or unit not in ("{x}", "%"):
         return 0.0
     driven = [group for group in channel_groups(scenario) if group.driven]

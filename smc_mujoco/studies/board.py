@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.bootstrap import MIN_INTERVAL_SAMPLES, Interval
-from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, SETTLES
 from smc_mujoco.analysis.ranking import Effect, Limits, Rank
 from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.analysis.step_halving import UNTRIED
@@ -22,7 +22,6 @@ from smc_mujoco.control.source import Source, in_words, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.metrics.conventions import REST_SHARE
 
 if TYPE_CHECKING:
     from smc_mujoco.studies.worst_case import WorstCase
@@ -460,7 +459,9 @@ def relevance(share: float, floors: Iterable[tuple[str, float]], x: str = "rad o
     words = f"{100 * share:g} % of the larger value"
     if resolved := of_unit.get("{x}"):
         words += f", for positions at least what the sensor resolves, up to {number(resolved)} {x}"
-    return words + f", for u and its variation at least {100 * REST_SHARE:g} % of its bound" * bool(of_unit.get("{u}"))
+    if of_unit.get("{u}"):
+        words += f", for u and its variation at least {100 * MIN_COMMAND_SHARE:g} % of its bound"
+    return words
 
 
 def sources(boards: Iterable[Board]) -> dict[str, list[Source]]:

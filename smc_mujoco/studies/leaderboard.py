@@ -62,8 +62,7 @@ def leaderboard(
       level: level of confidence.
       resamples, seed: number of resamples of the bootstrap, and seed of their draws.
       defaults: whether a winner may be named over laws whose gains are their defaults.
-      relevant: the least relevant difference, as a share of the larger value; at least what the sensor of a condition
-        resolves is relevant too.
+      relevant: the least relevant difference, as a share of the larger value. `paired_runs.floor` is its lower bound.
       worst: plant -> law -> its `worst_case`, for a column of the tables.
 
     Raises:
