@@ -13,7 +13,7 @@ from smc_mujoco.simulation.signals import Signal
 
 pytestmark = pytest.mark.quick
 
-OTHERWISE = {  # flag -> classes that have it, of slots, or else have it not
+OTHERWISE = {  # flag -> classes that differ: they lack it, or of "slots", have it
     "frozen": {"margins.Search", "_Ledger", "Frames", "BorrowedData", "Tip"},
     "eq": {
         *("Linear", "Comparison", "Basin", "Member", "Network", "Frames", "Certificate", "Levels", "BorrowedData"),
@@ -22,11 +22,11 @@ OTHERWISE = {  # flag -> classes that have it, of slots, or else have it not
     "repr": {"Tuned", "Frames", "Held", "TimeSeries", "Waypoints", "Board", "Advice", "Compared", "StepResponse"},
     "slots": {"Functions", "Packed", "Prepared"},
 }
-POSITIONAL = {  # beside signals and parts of machines
+POSITIONAL = {  # fields by position, as signals and parts of machines
     *("Clock", "Wave", "StepChange", "_Ledger", "Member", "Added", "LinearLaw", "File", "Network", "Policy", "Gain"),
     *("Frames", "Audit", "Robustness", "Identified", "Columns", "Piece", "Point", "Slopes", "rig.Part", "Quantity"),
     *("Reached", "FmuLaw", "Source", "BorrowedData", "NominalModel", "UserFields", "UserModel", "Tip", "Condition"),
-    *("Jump", "Noise", "Functions", "Packed", "Prepared", "Held", "TimeSeries", "Waypoints", "Need"),
+    *("Jump", "Noise", "Functions", "Packed", "Prepared", "Need"),
 }
 
 
@@ -48,7 +48,7 @@ def test_a_class_of_data_is_made_and_compared_as_the_others_are():
         room = one.__module__.rpartition(".")[2]
         params, names = one.__dataclass_params__, {one.__name__, f"{room}.{one.__name__}"}
         flags = {flag for flag in ("frozen", "eq", "order", "repr", "unsafe_hash") if getattr(params, flag)}
-        flags |= {"slots"} & {"slots" * ("__slots__" in vars(one))}
+        flags |= {"slots"} if "__slots__" in vars(one) else set()
         assert flags == {"frozen", "eq", "repr"} ^ {flag for flag in OTHERWISE if names & OTHERWISE[flag]}, one
         by_keyword = not names & POSITIONAL and not issubclass(one, Signal | Part)
         assert not by_keyword or all(field.kw_only for field in dataclasses.fields(one) if field.init), one

@@ -150,7 +150,7 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
     """Return what `chattering` returns for a scenario.
 
     Args:
-      ranges: False to leave the ranges of a predicted cycle NaN, which takes half the time.
+      ranges: False to leave the ranges of a predicted cycle NaN, which is faster.
     """
     if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < scenario.plant.driven:
         raise ScenarioError(f"channel is {shown(channel)}: give 0 to {scenario.plant.driven - 1}")
@@ -235,7 +235,7 @@ def _distance(one: Balance, other: Balance) -> float:
 
 
 def _starts(loop: Loop) -> Iterator[list[Cell]]:
-    """Yield groups of cells of a fine grid, one of which has a solution; cells whose image under N L winds around 1.
+    """Yield groups of neighbouring cells of a fine grid whose images under N L wind around 1: one has a solution.
 
     A cell of the coarse grid is cut into four, again and again, where N L may be 1 in it. N is that of few samples,
     whose places make the image of some neighbours wind, too, in turns to the left and to the right.
@@ -249,14 +249,9 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
     (slow, low), (dw, dz) = start.tolist(), step.tolist()
 
     @functools.cache
-    def response(i: int) -> tuple[float, complex]:
-        omega = math.exp(slow + i * dw)
-        return omega, loop.response(omega)
-
-    @functools.cache
     def product(i: int, k: int) -> complex:
-        omega, answer = response(i)
-        return loop.gain(math.exp(low + k * dz), omega, COARSE_SAMPLES) * answer
+        omega = math.exp(slow + i * dw)
+        return loop.gain(math.exp(low + k * dz), omega, COARSE_SAMPLES) * loop.response(omega)
 
     def at_corners(cells: np.ndarray, side: int) -> np.ndarray:
         places = (cells[:, None] + side * CORNERS).reshape(-1, 2).tolist()
@@ -344,7 +339,7 @@ def _bisected(excess: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high:
 
 
 def _nearest_cycle(loop: Loop, wave: Wave, shift: float) -> Wave | None:
-    """Return the cycle of a law that acts later or earlier: the nearest one that is not faster or not slower.
+    """Return the nearest cycle of a law that acts later, which is not faster, or earlier, which is not slower, or None.
 
     Args:
       wave: the cycle of the law as it is.
@@ -425,7 +420,8 @@ def _with_harmonics(loop: Loop, wave: Wave) -> Wave:
 
     start = np.log([wave.amplitude, wave.omega])
     solved = root(excess, start, options={"xtol": CYCLE_TOLERANCE, "eps": DERIVATIVE_STEP})
-    return loop.wave(*np.exp(solved.x)) if solved.success and np.abs(solved.x - start).max() < MAX_SHIFT else wave
+    near = solved.success and np.abs(solved.x - start).max() < MAX_SHIFT
+    return loop.wave(*np.exp(solved.x).tolist()) if near else wave
 
 
 def _prediction(

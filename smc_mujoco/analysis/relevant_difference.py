@@ -21,7 +21,7 @@ def least_difference(value: ArrayLike, resolution: ArrayLike = 0.0, relevant: fl
     It is the larger of a share of the value and the resolution. Any difference from inf is relevant.
 
     Args:
-      resolution: what the sensor resolves, in the unit of the value; 0 without a limit.
+      resolution: a lower bound in the unit of the value, see `paired_runs.floor`; 0 without one.
       relevant: the share of the value.
     """
     share = relevant * np.where(np.isinf(value), 0.0, np.abs(value))

@@ -144,5 +144,5 @@ def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour
             unstable = cycle.threshold_x * cycle.amplitude / cycle.amplitude_x
             for level in (mean - unstable, mean + unstable):
                 ax.axhline(level, color=colour, lw=style.points(1.2), ls="dotted")
-            words += f"; dotted: ±{style.short(unstable)}, unstable, within it a run rests"
+            words += f"; dotted: about ±{style.short(unstable)}, unstable, within it a run rests"
         ax.text(0.99, 0.97, words, ha="right", va="top", transform=ax.transAxes, fontsize=style.points(9.5))

@@ -145,7 +145,7 @@ class Advice(Tables):
         metrics = [NEEDS[need].metric for need in self.needs]
         units = [f"{each.need}: {each.label} ({each.unit_for(self.plant.unit, self.effort)})" for each in metrics]
         rows = []
-        for choice in self.choices[:MAX_ROWS]:
+        for choice in self._shown:
             place, name = f"{choice.rank.place:g}" if choice.fit else "–", choice.law.name
             settles = f"{100 * choice.settles:.0f} %"
             rows.append(
@@ -154,6 +154,11 @@ class Advice(Tables):
         answer = [*self.answer, *([f"In Python: {self.code}"] if self.code else [])]
         notes = [line for sentence in (self.key, *answer) for line in (sentence, "")][:-1]
         return [Tabular(headings=["law", "place", "settles", *units], rows=rows, title=self.title, notes=notes)]
+
+    @property
+    def _shown(self) -> tuple[Choice, ...]:
+        """The laws that have a row in the table."""
+        return self.choices[:MAX_ROWS]
 
     def _cell(self, choice: Choice, need: str) -> Cell:
         """Return a median, marked if no law is better in any condition and no run fails."""
@@ -171,17 +176,17 @@ class Advice(Tables):
         if more := [choice.law.name for choice in self.choices[MAX_ROWS:]]:
             text += f"{len(more)} more law{'s' * (len(more) > 1)}: {_first_of(more)}. "
         text += f"*: no law is better{' in any condition' if of else ''}, and every run has a value."
-        bare = any(not NEEDS[need].below(choice) for choice in self.choices for need in self.needs)
+        bare = any(not NEEDS[need].below(choice) for choice in self._shown for need in self.needs)
         text += " No interval: its ends are equal, or one is a run without a value." * bare
         if self.comparison.undecided.any():
             text += " A law is not marked where samples are too few to tell."
-        if sources := in_words({choice.law.name: [choice.law.source] for choice in self.choices[:MAX_ROWS]}):
+        if sources := in_words({choice.law.name: [choice.law.source] for choice in self._shown}):
             text += f" {sources[:1].upper()}{sources[1:]}."
         if any(self.dominated(name) for name in self.compared):
             text += " A law stands behind those that dominate it: better somewhere, worse nowhere."
         if self._shared and len(self._shared) < len(self.comparison.laws):
             text += f" Sets of gains, which are the sample of a law that has several: {_first_of(self._shared)}."
-        text += " –: settles too seldom to be advised." * any(not choice.fit for choice in self.choices)
+        text += " –: settles too seldom to be advised." * any(not choice.fit for choice in self._shown)
         metrics = [NEEDS[need].metric.name for need, _ in self.blocks]
         floors = zip(metrics, self.comparison.floors.tolist(), strict=True)
         relevant = relevance(self.comparison.relevant, floors, self.plant.unit)

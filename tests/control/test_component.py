@@ -31,14 +31,6 @@ def test_gain_keeps_its_unit_and_the_decorators_sign():
         made(a=0.0)
 
 
-def present(y, gains, memory):
-    return -y.v_eq - gains.eq * y.has_surface, y.s
-
-
-def former(y, gains, memory):
-    return -y.eq - gains.eq * y.surfaced, y.s
-
-
 @pytest.mark.parametrize("decorator", [smc.surface_function, smc.estimator_function, smc.law_function])
 def test_option_of_no_such_component_is_one_sentence(decorator):
     option = "colours" if decorator is smc.law_function else "plants"

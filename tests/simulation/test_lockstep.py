@@ -25,7 +25,6 @@ import smc_mujoco as smc
 from smc_mujoco.simulation import reference
 
 PLANTS = pytest.mark.parametrize("plant", smc.plants())
-STUDY = pytest.mark.parametrize("plant", smc.paper.GAINS)
 STUDIED = [*smc.paper.GAINS["duffing"], "none"]
 runner = importlib.import_module("smc_mujoco.simulation.run")  # smc.run is the function
 batch_module = importlib.import_module("smc_mujoco.simulation.batch")

@@ -295,7 +295,6 @@ ZEROS = {
     },
     "lugre": {"friction": smc.LuGre(1e-9, 1e-9, 1.0, stiffness=1e-6, damping=0.0)},
 }
-ZERO = pytest.mark.parametrize("zero", ZEROS)
 
 
 @TWO

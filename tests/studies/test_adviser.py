@@ -360,6 +360,9 @@ def test_every_law_runs_from_the_same_seeds_and_none_is_left_out(folder):
     (table,) = few.tables
     assert [row[0].text for row in table.rows] == [choice.law.name for choice in few.choices[:12]]
     assert f"2 more laws: {few.choices[12].law.name} and {few.choices[13].law.name}. " in table.notes[0]
+    unfit = dataclasses.replace(few.choices[-1], fit=False)
+    assert "–:" in dataclasses.replace(few, choices=(unfit, *few.choices[1:])).key
+    assert "–:" not in dataclasses.replace(few, choices=(*few.choices[:-1], unfit)).key  # it has no row
 
 
 # gains

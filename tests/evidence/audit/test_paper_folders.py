@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.evidence.audit import evidence, template
+from smc_mujoco.evidence.audit import evidence
 from smc_mujoco.evidence.audit.audit import claims
 from smc_mujoco.evidence.audit.paper import CODE_FILE, PAPER_FILE, new, paper
 from smc_mujoco.evidence.audit.runs import Runs
@@ -17,7 +17,6 @@ from smc_mujoco.evidence.audit.verdict import REFUTED, SUPPORTED, Beside, Check,
 
 pytestmark = pytest.mark.quick
 
-TEMPLATE = Path(template.__file__).parent
 MINIMAL = """
 title = "t"
 authors = "a"

@@ -2,8 +2,8 @@
 
     python tests/evidence/papers/test_full_verdicts.py levant_1993
 
-This writes a paper's again, and those of all but Gaber's without a name. His audit takes minutes, and is not repeated
-here: test_quick_verdicts_of_gaber.py tells when it changes.
+This writes the verdicts of one paper again; without a name, those of all papers but Gaber's. His audit takes minutes,
+and no test repeats it: test_quick_verdicts_of_gaber.py tells when it changes.
 """
 
 import json
@@ -57,6 +57,7 @@ def test_readme_counts_the_claims_of_gaber_s_paper():
 @pytest.mark.parametrize("name", PAPERS)
 def test_full_verdicts_are_those_of_the_page(name):
     found, shown = full(name), known(name)
+    assert [*found] == [*shown]
     for id, (verdict, words) in found.items():
         told, said = shown[id]
         assert (verdict, NUMBER.split(words)) == (told, NUMBER.split(said)), id
