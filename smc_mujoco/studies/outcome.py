@@ -260,7 +260,7 @@ def _of_group(trace: Trace, name: str, group: str) -> float:
 
 
 def _floor(measure: Measure, run: Trace, group: str) -> float:
-    """Return the largest difference that the run's sensor does not resolve, as on leaderboards; 0 for a function."""
+    """Return the difference of a metric that matters on no machine, as on leaderboards; 0 for a function."""
     return floor(run.scenario, CATALOGUE[measure].unit) if isinstance(measure, str) and not group else 0.0
 
 

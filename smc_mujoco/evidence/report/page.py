@@ -26,6 +26,7 @@ from smc_mujoco.evidence.report.plan import GAINS
 from smc_mujoco.evidence.report.stages import Findings
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics.catalogue import metrics
+from smc_mujoco.studies.board import relevance
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -71,7 +72,7 @@ def page(findings: Findings) -> str:
     from markupsafe import Markup
     from plotly.offline import get_plotlyjs
 
-    made = environment()
+    made, share = environment(), findings.about.plan.relevant
     made.globals |= {
         "f": findings,
         "about": findings.about,
@@ -102,7 +103,8 @@ def page(findings: Findings) -> str:
         objective=Objective(),
         u_max=scenarios.U_MAX,
         control_period=scenarios.CONTROL_PERIOD,
-        relevant=100 * findings.about.plan.relevant,
+        relevant=100 * share,
+        relevance=relevance(share, ((s.metric, s.floor) for s in findings.scores)),
         metrics={metric.name: (inspect.getdoc(metric.formula) or "").split("\n\n") for metric in metrics()},
     )
 

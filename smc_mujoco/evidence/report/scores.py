@@ -30,7 +30,7 @@ class Score(NamedTuple):
     `best`: no other law is better there, and no run failed, see `ranking`; several laws may be. `beaten`: another law
     is better, or runs failed; neither where samples are too few to tell. `wins`: it is better than every other, `lead`
     says by how much. `seeds`: of the runs, `runs`: how many of them are distinct, `sample`: the size of the sample in
-    words, `failed`: how many runs failed. `floor`: what the sensor does not resolve. `barred`: no winner is named
+    words, `failed`: how many runs failed. `floor`: see `paired_runs.floor`. `barred`: no winner is named
     there, over laws with default gains.
     """
 

@@ -61,6 +61,7 @@ def scores():
                         failed=(i + m) % 3 // 2,
                         runs=6 - j,
                         sample=f"{6 - j} starts",
+                        floor={"ultimate_bound": 1e-4, "max_u": 6e-3}.get(metric, 0.0),
                     )
 
 
