@@ -167,7 +167,8 @@ class Runs:
 
     def mutated(self, law: Component) -> Component:
         """Return the law, or its mutant in this audit under the law's name, by which a claim may look for its run."""
-        return dataclasses.replace(self._substitute.get(law.name, lambda same: same)(law), name=law.name)
+        mutant = self._substitute.get(law.name)
+        return dataclasses.replace(mutant(law), name=law.name) if mutant else law
 
     def scenario(
         self, plant: str, law_name: str, /, condition: str | Condition = "nominal", **changes: Any

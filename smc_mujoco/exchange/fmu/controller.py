@@ -295,11 +295,12 @@ static void coriolis(void *plant, const double *w, double *out)
 
 """
     if "jacobian" in needs:
-        given = "J" in wanted
-        source = f"((const double *)plant)[{place('J[1,1]')} + i]" if given else "NAN"
+        source, unused = "NAN", "    (void)plant;\n"
+        if "J" in wanted:
+            source, unused = f"((const double *)plant)[{place('J[1,1]')} + i]", ""
         functions += f"""static void jacobian(void *plant, double *out)
 {{
-{"" if given else "    (void)plant;" + chr(10)}    for (int i = 0; i < 3 * SMC_JOINTS; i++) out[i] = {source};
+{unused}    for (int i = 0; i < 3 * SMC_JOINTS; i++) out[i] = {source};
 }}
 
 """
