@@ -29,17 +29,19 @@ NAME_AND_GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DO
 LABELLED = re.compile(r"(?P<label>[^:()]+):\s*(?P<rest>.+(?:\(.*\)|\.\w+)\s*)", re.DOTALL)  # slow: pid(kp=50)
 
 
-def law(text: str, **gains: float | Sequence[float]) -> Law:
+def law(text: str | Law | Template, **gains: float | Sequence[float]) -> Law:
     """Return a law from a text, with these gains. `smc.law(...).named("slow")` gives it another name.
 
     Args:
       text: the name of a law of the library, such as "pid"; a name with gains, such as "pid(kp=50, ki=1)"; or a file
-        with one law: FILE.json that `smc-mujoco tune` wrote, FILE.py, FILE.c or FILE.fmu.
+        with one law: FILE.json that `smc-mujoco tune` wrote, FILE.py, FILE.c or FILE.fmu. Or your own law itself.
       gains: one number for all channels, or a sequence with one for each driven channel.
 
     Raises:
       ScenarioError: an unknown law or gain, a gain out of range, or a file without a law or with several.
     """
+    if isinstance(text, Law | Template) and text.kind == "law":
+        return _with_gains(text() if isinstance(text, Template) else text, gains)
     first, *others = (known_laws()[item]() if isinstance(item, str) else item for item in laws(text))
     if others:
         names = ", ".join(law.name for law in (first, *others))

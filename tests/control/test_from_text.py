@@ -61,7 +61,8 @@ def test_a_tuning_is_its_law_and_keeps_its_source(files, tuned):
     law = smc.law("st.json")
     assert (law, law.source) == (tuned.law, tuned.law.source)
     assert law.source.kind == "tuned here"
-    assert smc.law("st.json", c=9.0).gains == {**tuned.law.gains, "c": 9.0}
+    assert smc.law("st.json", c=9.0).gains == smc.law(tuned.law, c=9.0).gains == {**tuned.law.gains, "c": 9.0}
+    assert smc.law(tuned.law.template, c=9.0) == tuned.law.template(c=9.0)
     assert {s.law for s in smc.grid("duffing", ["st.json"], seeds=2)} == {tuned.law}
 
 
