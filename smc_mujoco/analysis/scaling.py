@@ -92,10 +92,10 @@ class Accuracy:
 
     @property
     def why(self) -> str:
-        """The remarks on e and on s in one text; "" for none."""
+        """The remarks on e and on s in one text, which tells them apart where they differ; "" for none."""
         if self.e.why == self.s.why:
             return self.e.why
-        return ". ".join(f"{name} {remark}" for name in QUANTITIES if (remark := getattr(self, name).why))
+        return "; ".join(f"for {name}, {remark}" for name in QUANTITIES if (remark := getattr(self, name).why))
 
     @property
     def theory(self) -> str:
