@@ -387,7 +387,7 @@ def test_levant_s_default_gain_is_the_largest_jerk_of_the_study_s_actuator():
         plant.nominal(np.zeros(plant.n), np.zeros(plant.n), 0, plant.values({}))[1]
         for plant in map(smc.plant, scenarios.PLANTS)
     )
-    lag = scenarios.fields("lag_20ms", "duffing")["actuator"].tau
+    lag = scenarios.scenario("duffing", "none", "lag_20ms").actuator[0].tau
     assert smc.estimator("levant").gains["L"] == pytest.approx(2.0 * g * scenarios.U_MAX / lag, rel=1e-9)
 
 

@@ -131,7 +131,7 @@ def test_the_study_warns_of_nothing():
     for plant in smc.plants():
         for condition in scenarios.CONDITIONS:
             try:
-                fields = scenarios.fields(condition, plant, 5.0)
+                fields = scenarios.find_condition(condition).on(smc.plant(plant), 5.0)
                 smc.Scenario(plant=plant, law="none", duration=5.0, **{"x0": None} | fields)
             except smc.ScenarioError:  # it is not for this plant
                 continue

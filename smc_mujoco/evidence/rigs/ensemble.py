@@ -59,11 +59,6 @@ def runs(
     return scenarios
 
 
-def wins(board: Any) -> dict[str, int]:
-    """Return law -> number of parameter sets on which it wins. The sets are the conditions of the board."""
-    return dict(Counter(block.winner for block in board.blocks if block.winner).most_common())
-
-
 def verdict(boards: Sequence[Any]) -> str:
     """Return a line for each metric: whether one law wins on every parameter set.
 
@@ -78,5 +73,6 @@ def sentence(board: Any, labels: Mapping[str, str] = frozen({})) -> str:
     count = len(board.blocks)
     if board.winner:
         return f"{labels.get(board.winner, board.winner)} wins on all {count} parameter sets"
-    others = ", ".join(f"{labels.get(law, law)} on {number}" for law, number in wins(board).items()) or "none on any"
+    wins = Counter(block.winner for block in board.blocks if block.winner).most_common()
+    others = ", ".join(f"{labels.get(law, law)} on {number}" for law, number in wins) or "none on any"
     return f"no law wins on all {count} parameter sets ({others})"

@@ -16,7 +16,6 @@ from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.mechanisms.named import as_plant
-from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import (  # noqa: F401  # smc.paper has the paper's own numbers, too
     CONTROL_PERIOD,
     DIFFERENCED,
@@ -39,15 +38,6 @@ GAINS = sets.STUDY
 
 CONDITIONS = NAMED  # of the whole suite
 REALISTIC = REAL
-
-
-def fields(condition: str | Condition, plant: str | Plant, duration: float = DURATION) -> dict[str, Any]:
-    """Return the Scenario fields that a condition sets; what happens once does so at half of the duration.
-
-    Raises:
-      ScenarioError: an unknown condition or plant, or a condition that has no numbers for the plant.
-    """
-    return find_condition(condition).on(as_plant(plant), duration)
 
 
 def scenario(
@@ -76,7 +66,7 @@ def scenario(
     sets.paper_plant(plant)
     law = sets.law(plant, law_name, "default" if law_name == "none" else gains)
     common = {"duration": duration, "control_period": CONTROL_PERIOD, "u_max": U_MAX, "seed": seed}
-    conditioned = fields(condition, plant, duration)
+    conditioned = find_condition(condition).on(as_plant(plant), duration)
     made = Scenario(**({"plant": plant, "law": law} | common | conditioned | dict(changes)))
     return made if changes else made.named(find_condition(condition).name)
 
@@ -85,10 +75,9 @@ def comparison(
     plant: str,
     condition: str | Condition = "nominal",
     laws: Sequence[str] = LAWS,
-    seed: int = 0,
     duration: float = DURATION,
     changes: Mapping[str, Any] = frozen({}),
     gains: str = "study",
 ) -> dict[str, Scenario]:
     """Return law name -> scenario, for one plant in one condition; arguments as of `scenario`."""
-    return {name: scenario(plant, name, condition, seed, duration, changes, gains) for name in laws}
+    return {name: scenario(plant, name, condition, duration=duration, changes=changes, gains=gains) for name in laws}
