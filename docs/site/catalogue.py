@@ -16,6 +16,7 @@ import notation
 
 from smc_mujoco.cli.law_pages import DEGREES
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.text import capital
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.docstring import SOURCE, entry
@@ -424,7 +425,7 @@ def _equation(text: str, names) -> str:
 def _capital(text: str, plant: Plant) -> str:
     """Return a text that begins with a capital letter, unless with a symbol."""
     first = text.split(" ", maxsplit=1)[0]
-    return text if (len(first) == 1 and first != "a") or first in plant.parameters else text[:1].upper() + text[1:]
+    return text if (len(first) == 1 and first != "a") or first in plant.parameters else capital(text)
 
 
 def units(plant: Plant) -> list[str]:

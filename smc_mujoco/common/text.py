@@ -26,6 +26,11 @@ def joined(parts: Iterable[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
+def capital(text: str) -> str:
+    """Return the text with a capital first letter, as at the start of a sentence; the others stay."""
+    return text[:1].upper() + text[1:]
+
+
 def every(count: int) -> str:
     """Return "both" of two things, "all 3" of three."""
     return "both" if count == 2 else f"all {count}"

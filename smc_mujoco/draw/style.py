@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, items_of, shown
+from smc_mujoco.common.text import capital
 from smc_mujoco.control import estimator as estimators
 from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
@@ -217,7 +218,7 @@ def _template(law: Component | str) -> tuple[Template | None, str]:
 
 def in_words(name: str) -> str:
     """Return an identifier as words: boundary_layer as "Boundary layer"."""
-    return name[:1].upper() + name[1:].replace("_", " ")
+    return capital(name.replace("_", " "))
 
 
 def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:

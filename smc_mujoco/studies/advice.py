@@ -12,7 +12,7 @@ import numpy as np
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import every, joined
+from smc_mujoco.common.text import capital, every, joined
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.source import in_words
@@ -181,7 +181,7 @@ class Advice(Tables):
         if self.comparison.undecided.any():
             text += " A law is not marked where samples are too few to tell."
         if sources := in_words({choice.law.name: [choice.law.source] for choice in self._shown}):
-            text += f" {sources[:1].upper()}{sources[1:]}."
+            text += f" {capital(sources)}."
         if any(self.dominated(name) for name in self.compared):
             text += " A law stands behind those that dominate it: better somewhere, worse nowhere."
         if self._shared and len(self._shared) < len(self.comparison.laws):
@@ -288,12 +288,12 @@ class Advice(Tables):
         value, better = self._value(choice, need), self.better(choice.law.name, need)
         if not better:
             few = ", as far as so few sets of gains tell" * self._any(self.comparison.undecided, choice.law.name, need)
-            return f"{need.capitalize()}: {value}; no law is better{few}."
+            return f"{capital(need)}: {value}; no law is better{few}."
         by_where: dict[str, list[str]] = {}
         for name, conditions in better.items():
             by_where.setdefault(self._where(conditions), []).append(name)
         rivals = [f"{_first_of(names)}{where}" for where, names in by_where.items()]
-        return f"{need.capitalize()}: {value}; better {'is' if len(better) == 1 else 'are'} {'; '.join(rivals)}."
+        return f"{capital(need)}: {value}; better {'is' if len(better) == 1 else 'are'} {'; '.join(rivals)}."
 
     def _instead(self) -> list[str]:
         """Return for each need the law that is better than the advised law, if there is one, and what it costs."""

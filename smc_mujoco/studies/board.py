@@ -17,7 +17,7 @@ from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import every, joined, number
+from smc_mujoco.common.text import capital, every, joined, number
 from smc_mujoco.control.source import Source, in_words, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.plant import catalogue
@@ -445,9 +445,9 @@ def key(boards: Sequence[Board]) -> str:
         f"{several}; how much: by pairs of runs, not by the medians; least relevant difference: "
         f"{relevance(boards[0].relevant, [(board.metric, board.resolution) for board in boards])}."
     )
-    words += f" {UNTRIED[:1].upper()}{UNTRIED[1:]}." * any(board.by_step for board in boards)
+    words += f" {capital(UNTRIED)}." * any(board.by_step for board in boards)
     gains = in_words(sources(boards))
-    return f"{words} {gains[:1].upper()}{gains[1:]}." if gains else words
+    return f"{words} {capital(gains)}." if gains else words
 
 
 def relevance(share: float, floors: Iterable[tuple[str, float]], x: str = "rad or m") -> str:

@@ -22,6 +22,7 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.errors import find as lookup
 from smc_mujoco.common.files import shipped, slug
 from smc_mujoco.common.scripts import execute
+from smc_mujoco.common.text import capital
 from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
@@ -104,8 +105,8 @@ class Scene:
             )
         text = " ".join(text.split())
         labels = "|".join(re.escape(label) for _, label, _ in self.runs())
-        begins = text[:1] if re.match(rf"(?:{labels})(?!\w)", text) else text[:1].upper()  # labels stay as in tables
-        return begins + text[1:] + "." * (not text.endswith((".", "?", "!")))
+        text = text if re.match(rf"(?:{labels})(?!\w)", text) else capital(text)  # labels stay as in tables
+        return text + "." * (not text.endswith((".", "?", "!")))
 
     def seeded(self, seed: int) -> "Scene":
         """Return the same scene with another seed in every run."""

@@ -7,7 +7,7 @@ import pytest
 
 from smc_mujoco.common import tabular
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import joined, number
+from smc_mujoco.common.text import capital, joined, number
 
 pytestmark = pytest.mark.quick
 
@@ -46,6 +46,7 @@ def test_a_number_has_as_many_digits_as_are_asked_for(value):
 
 def test_a_list_reads_as_a_sentence():
     assert [joined(""), joined("a"), joined("ab"), joined("abc")] == ["", "a", "a and b", "a, b and c"]
+    assert [capital(""), capital("all of LQR"), capital("|e|")] == ["", "All of LQR", "|e|"]
 
 
 @pytest.mark.parametrize("width", [80, 44])

@@ -9,6 +9,7 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.text import capital
 
 if TYPE_CHECKING:
     from smc_mujoco.evidence.certificates.certificate import Certificate
@@ -84,7 +85,7 @@ def certify(
         raise ScenarioError("give a plant, such as duffing, or --check FILE.json")
     terminal.print(tables.certificate(made))
     for sentence in made.sentences:
-        terminal.note(f"{sentence[0].upper()}{sentence[1:]}.", "bold", wrap=True)
+        terminal.note(f"{capital(sentence)}.", "bold", wrap=True)
     if worst_run:
         unit = made.data["unit"]
         terminal.note(

@@ -13,7 +13,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from smc_mujoco.cli.tables import plain, titled
-from smc_mujoco.common.text import number
+from smc_mujoco.common.text import capital, number
 from smc_mujoco.evidence.audit import verdict as verdicts
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.boards.published import RobustnessRow, Row
@@ -74,8 +74,7 @@ def print_claims(claims: Sequence[Claim], console: Console, full: bool) -> None:
         console.print(_claims_overview(claims))
     flips = sum(claim.flips for claim in claims)
     depend = f" ({flips} of all depend{'s' * (flips == 1)} on the gains)" if flips else ""
-    words = verdicts.summary(claims)
-    console.print(Text(words[0].upper() + words[1:] + depend), highlight=False)
+    console.print(Text(capital(verdicts.summary(claims)) + depend), highlight=False)
 
 
 def _claims_overview(claims: Sequence[Claim]) -> Table:

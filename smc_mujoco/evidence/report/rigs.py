@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, printable
+from smc_mujoco.common.text import capital
 from smc_mujoco.control.source import in_words
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.plan import Report, Work
@@ -43,8 +44,7 @@ class Machine:
     @property
     def gains(self) -> str:
         """Where the gains of the laws come from, in words."""
-        text = in_words({words.style.law_name(law): [law.source] for law in self.rig.laws})
-        return text[:1].upper() + text[1:]
+        return capital(in_words({words.style.law_name(law): [law.source] for law in self.rig.laws}))
 
     def unit(self, metric: str) -> str:
         """Return the unit of a metric on this machine."""
@@ -52,8 +52,7 @@ class Machine:
 
     def sentence(self, board: Board) -> str:
         """Return who wins in a metric, and whether on every parameter set."""
-        what = words.metric(board.metric)
-        return f"{what[:1].upper()}{what[1:]}: {ensemble.sentence(board, self.laws)}."
+        return f"{capital(words.metric(board.metric))}: {ensemble.sentence(board, self.laws)}."
 
     def medians(self, metric: str, law: str) -> list[float]:
         """Return a law's medians on the sets."""
