@@ -8,8 +8,8 @@ A need is a metric to compare (fast, accurate, calm ...) or a property that a la
 With "no-velocity", laws that read a velocity get one that is differentiated from the position.
 
 1. Every law that suits gets gains for the plant: those that come with the package, or by the same rule from `tune`,
-   with the same bound on u, the same starts and as many evaluations as those of the package. A law's own gains are one
-   more set that is tried.
+   with the same bound on u. Where laws have gains of the package, a search for others has the starts and the number of
+   evaluations of these. A law's own gains are one more set that is tried.
 2. Every law runs in each condition from the same seeds, which no search of gains has seen.
 3. They are compared by the rules of `ranking`. A block is a need in a condition, so every need weighs the same in every
    condition, and the tests are corrected for all pairs of laws in all blocks.
@@ -107,7 +107,7 @@ def which(
       seeds: runs of a law in each condition, each with another start and other noise.
       duration: of a run, s. Default: 5, or 3 if quick; 8 under an adversary.
       out: folder for gains and runs, which another call reads.
-      quick: shorter runs, and a third of the evaluations of a tuning.
+      quick: shorter runs, and a third of the evaluations of a tuning and of an adversary's runs.
       defaults: whether a law may be advised over rivals whose gains are their defaults.
       starts, relevant, noise_key, threads, progress: as in `compare`.
       within: the class for the need "robust". Default: that of `worst_case`.
