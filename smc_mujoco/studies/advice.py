@@ -287,7 +287,7 @@ class Advice(Tables):
         """Return the median of a law on a need, and who is better."""
         value, better = self._value(choice, need), self.better(choice.law.name, need)
         if not better:
-            few = ", as far as so few sets of gains tell" * self._any(self.comparison.undecided, choice.law.name, need)
+            few = ", as far as so few samples tell" * self._any(self.comparison.undecided, choice.law.name, need)
             return f"{capital(need)}: {value}; no law is better{few}."
         by_where: dict[str, list[str]] = {}
         for name, conditions in better.items():

@@ -436,8 +436,9 @@ def _cell(board: Board, entry: Entry) -> Cell:
 def key(boards: Sequence[Board]) -> str:
     """Return what the cells of a table show."""
     words = f"Medians with {100 * boards[0].level:g} % intervals over runs, or over sets of gains that runs share"
-    if any(block.runs < MIN_INTERVAL_SAMPLES for board in boards for block in board.blocks):
-        words += f"; of fewer than {MIN_INTERVAL_SAMPLES} runs the interval is their range, and covers less"
+    medians = [entry.interval for board in boards if board.metric != SETTLES for entry in board.entries]
+    if any(one.n < MIN_INTERVAL_SAMPLES for one in medians):
+        words += f"; of fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, and covers less"
     family = max(board.family for board in boards)
     several = f", corrected for {family} comparisons a metric" * (family > 1)
     words += (

@@ -807,11 +807,11 @@ def test_a_block_without_randomness_is_in_every_resample():
 
 
 @pytest.mark.parametrize(("seeds", "told"), [(5, True), (6, False)])
-def test_the_table_says_that_intervals_of_very_few_runs_cover_less(seeds, told):
+def test_the_table_says_that_intervals_of_very_few_samples_cover_less(seeds, told):
     text = " ".join(
         printed(leaderboard(stand({"a": blocks(1.0, seeds=seeds), "b": blocks(2.0, seeds=seeds)}), ["itae"])).split()
     )
-    assert ("of fewer than 6 runs the interval is their range" in text) == told
+    assert ("of fewer than 6 samples the interval is their range" in text) == told
 
 
 def test_positions_are_told_apart_as_far_as_the_sensor_of_the_condition_resolves_them():

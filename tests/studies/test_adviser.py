@@ -164,6 +164,9 @@ def test_where_another_law_is_better_the_answer_says_which_and_what_it_gives_and
     assert "a matter of what counts against observer_free, better here and worse there" in first
     assert "with other starts and noise, or among other laws, a law that it does not dominate may be first." in first
     assert "it dominates classical" in first
+    once = np.where(np.arange(24) * [[1], [0], [1], [0]], math.nan, 1.0)  # one distinct run without noise
+    few = with_cells(advice, observer_free=once * [[1], [1], [9.9], [9.9]], slow=once * [[2], [2], [3], [9.9]])
+    assert "; no law is better, as far as so few samples tell." in text(few)
 
 
 def test_a_need_in_one_condition_is_named_with_it(advice):

@@ -234,7 +234,10 @@ def test_why_there_is_no_winner_as_recorded(snapshot):
         "few sets": {"blocks": (dataclasses.replace(first, ahead=None, samples=3, sets=3),)},
         "linked sets": {"blocks": (dataclasses.replace(first, ahead=None, samples=2, sets=3),)},
         "few runs of two": {"blocks": (dataclasses.replace(first, ahead=None, samples=1, runs=7),)},
-        "repeated runs": {"blocks": (dataclasses.replace(first, ahead=None, samples=4, runs=4),)},
+        "repeated runs": {
+            "blocks": (dataclasses.replace(first, ahead=None, samples=4, runs=4),),
+            "entries": tuple(dataclasses.replace(one, interval=one.interval._replace(n=4)) for one in made.entries),
+        },
         "few for many": {"blocks": (dataclasses.replace(first, ahead=None, samples=6, runs=20),), "family": 40},
         "without an interval": {"blocks": (dataclasses.replace(first, lead=None),)},
         "searched about defaults": {
