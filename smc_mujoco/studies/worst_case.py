@@ -99,7 +99,7 @@ class WorstCase(Tables):
     @property
     def class_words(self) -> str:
         """The class in words."""
-        sets = [f"any of {self.sets} sets of parameters"] if self.sets > 1 else []
+        sets = [f"any of {self.sets} parameter sets"] if self.sets > 1 else []
         return ", ".join([*sets, self.within.words(self.nominal.plant)])
 
     def shown(self, value: float) -> str:
@@ -209,7 +209,7 @@ def worst_case(
 
     Args:
       scenario: plant, law and conditions, to whose disturbances, noise, delay and parameters the class adds. Of several
-        scenarios, such as those of a rig's sets of parameters, the first is the nominal one, and the adversary chooses.
+        scenarios, such as those of a rig's parameter sets, the first is the nominal one, and the adversary chooses.
       metric: name of any metric; more is worse. Default: the rms error from a quarter of the run on.
       within: the class, such as smc.Uncertainty(disturbance=2.0, mass=(0.7, 1.3)). Default: what the
         plant declares as `uncertain`, such as an arm's payload, or else disturbances up to a sixth of the force of the
@@ -305,7 +305,7 @@ def _listed(given: object) -> list[Scenario]:
     if not scenarios or not all(isinstance(each, Scenario) for each in scenarios):
         raise ScenarioError(f"worst_case attacks a Scenario, not {shown(given)}: give smc.Scenario(...)")
     if len({(each.samples, each.control_period, each.plant.n) for each in scenarios}) > 1:
-        raise ScenarioError("worst_case attacks one run on several sets of parameters: give all the same duration")
+        raise ScenarioError("worst_case attacks one run on several parameter sets: give all the same duration")
     return scenarios
 
 

@@ -194,7 +194,7 @@ class Member:
 
 
 class Members:
-    """The members of a class around one scenario, or around the same scenario on several sets of parameters.
+    """The members of a class around one scenario, or around the same scenario on several parameter sets.
 
     Attributes:
       constants: name -> function of a scenario and a share in [0, 1] that returns the scenario with this constant. The

@@ -184,7 +184,7 @@ def worst(
 
     You say only what is uncertain: a bound on the disturbance, ranges of mass, delay and friction. By default, it is
     what the plant declares, such as an arm's payload, or else a disturbance up to a sixth of what the weakest drive
-    gives. Of a rig, such as qube_servo, the adversary also chooses one of its sets of parameters.
+    gives. Of a rig, such as qube_servo, the adversary also chooses one of its parameter sets.
 
     The search is the same for every law: constant forces, forces that switch with the sign of s, of e or of its rate,
     waves at the frequency of the loop, all corners of the ranges, and an evolution from the worst of these. There may
@@ -233,7 +233,7 @@ def _ranges(ranges: Mapping[str, str | None], parameters: Sequence[str]) -> dict
 def _attacked_cases(
     plant: str, law: list[str] | None, condition: str, duration: float, gains: str
 ) -> "tuple[list[str | Law], list[list[Scenario]]]":
-    """Return the laws to attack, and the scenarios of each: one on a plant, one for each set of parameters of a rig."""
+    """Return the laws to attack, and the scenarios of each: one on a plant, one for each parameter set of a rig."""
     from smc_mujoco.common import annexes
     from smc_mujoco.control import gain_sets
     from smc_mujoco.simulation.grid import case

@@ -26,7 +26,7 @@ def identify(
         str | None,
         typer.Option("--set", metavar="NAME=VALUE,...", help="Values from which the search starts, SI units: M=5,b=8."),
     ] = None,
-    starts: Annotated[int, typer.Option(min=1, help="How many sets of values the search may start from.")] = 4,
+    starts: Annotated[int, typer.Option(min=1, help="How many parameter sets the search may start from.")] = 4,
     seed: Annotated[int, typer.Option(min=0, help="Seed of these starts.")] = 0,
     figure: Annotated[Path | None, options.picture("the first record and its residuals")] = None,
     json: options.Json = None,
@@ -64,7 +64,7 @@ def identify(
         terminal.print(table)
     for note in identified.notes:
         terminal.note(note, wrap=True)
-    terminal.note(f"{identified.evaluations} sets of values, seed {seed}, {terminal.seconds:.0f} s")
+    terminal.note(f"{identified.evaluations} parameter sets, seed {seed}, {terminal.seconds:.0f} s")
     if json:
         terminal.wrote(identified.save(json))
     if figure:
@@ -77,7 +77,7 @@ def replay(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A record: CSV or npz file of columns.")],
     columns: options.Columns = None,
     quantities: Annotated[
-        str | None, typer.Option(help="Published sets of quantities whose twins are shown too, as a,b; default none.")
+        str | None, typer.Option(help="Published parameter sets whose twins are shown too, as a,b; default none.")
     ] = None,
     start: Annotated[
         float | None, typer.Option(min=0.0, help="Where the film starts, s of the record; default the rig's own start.")

@@ -42,7 +42,7 @@ class Plan(Extent):
       filmed: how many of the scenes are filmed.
       scene_laws: laws side by side in a scene.
       scene: duration of traces and films, s.
-      rigs: machines whose laws are compared on all their sets of quantities.
+      rigs: machines whose laws are compared on all their parameter sets.
       accurate: plants on which accuracy is measured without noise.
       periods: control periods of that, s.
       accuracy_starts: initial states of that.

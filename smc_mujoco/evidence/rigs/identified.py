@@ -31,7 +31,7 @@ class Identified:
       fits, fits_before: `Rig.fit` of each record after and before, in an open loop with short steps; for `fits` the
         states at the starts are found too.
       predictions: of each record, the predicted columns, the measured columns and their times.
-      evaluations: how many sets of values were simulated.
+      evaluations: how many parameter sets were simulated.
     """
 
     rig: Rig
@@ -98,7 +98,7 @@ class Identified:
         return sentences
 
     def drawn(self, count: int = 8, seed: int = 0) -> Rig:
-        """Return the rig with an ensemble of other sets of values that the records allow, for rankings over them.
+        """Return the rig with an ensemble of other parameter sets that the records allow, for rankings over them.
 
         Args:
           count: number of sets. They are drawn from the normal distribution of the errors, and cut to the ranges.

@@ -52,7 +52,7 @@ def identify(
       records: one record or several: columns by name (see `Rig.columns`), or traces of simulated runs.
       quantities: names of those to find; None: the rig's `free`, or all parameters of a plant that are not 0.
       start: quantity -> value, SI units, from which the search starts; those not given start at the rig's own.
-      starts: number of sets of values from which the search may start: the present one, and the best of random ones,
+      starts: number of parameter sets from which the search may start: the present one, and the best of random ones,
         which differ from it by up to a factor of 100.
       seed: of these starts. The same seed gives the same result.
       most: largest number of steps of the search.

@@ -98,7 +98,7 @@ class Part:
 
 @dataclasses.dataclass(frozen=True)
 class Reached:
-    """How well a set of quantities fits records that the package does not contain. Tests check it if they have them.
+    """How well a parameter set fits records that the package does not contain. Tests check it if they have them.
 
     Attributes:
       quantities: "identified", the name of a published set, or "do nothing", see `Rig.idle`.
@@ -135,7 +135,7 @@ class Rig:
       free: names of the quantities that its records determine, which `smc.identify` finds by default.
       window: s, of the pieces in which identification first repeats a record; each starts from its measured state.
       published: name of a parameter set -> its values of quantities by name, and its source under "source".
-      ensemble: other sets of quantities that fit about as well, each by name.
+      ensemble: other parameter sets that fit about as well, each by name.
       laws: laws with gains for this machine, which a ranking compares by default.
       x0: middle of the initial states of a ranking, rad or m, (n,); None: the plant's own.
       reached: how well it fits records that the package does not contain.
@@ -193,7 +193,7 @@ class Rig:
         return dataclasses.replace(self, quantities=changed)
 
     def set(self, name: str) -> "Rig":
-        """Return the rig with a published set of parameters."""
+        """Return the rig with a published parameter set."""
         chosen = dict(find(f"parameter set of {self.name}", name, self.published))
         return self.with_values(chosen, chosen.pop("source"))
 

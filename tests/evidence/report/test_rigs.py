@@ -1,4 +1,4 @@
-"""The report's section on real machines: rankings over sets of quantities, and records beside their twins."""
+"""The report's section on real machines: rankings over parameter sets, and records beside their twins."""
 
 import re
 from pathlib import Path
