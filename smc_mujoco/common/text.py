@@ -34,3 +34,8 @@ def capital(text: str) -> str:
 def every(count: int) -> str:
     """Return "both" of two things, "all 3" of three."""
     return "both" if count == 2 else f"all {count}"
+
+
+def counted(count: int, noun: str) -> str:
+    """Return "1 run" or "3 runs"."""
+    return f"{count} {noun}{'s' * (count != 1)}"

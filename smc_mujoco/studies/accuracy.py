@@ -16,6 +16,7 @@ for plain equations, keeps the scenario's step.
 """
 
 import dataclasses
+import itertools
 import math
 import os
 import warnings
@@ -95,8 +96,8 @@ class AccuracyTable(Tables, list[Accuracy]):
     @property
     def tables(self) -> list[Tabular]:
         """A table for each plant and condition, with remarks on its laws."""
-        made = [_table(f"{title}: |e| in {rows[0].unit}", rows) for title, rows in self.groups.items()]
-        return [*made[:-1], *(dataclasses.replace(one, notes=[*one.notes, KEY]) for one in made[-1:])]
+        tables = [_table(f"{title}: |e| in {rows[0].unit}", rows) for title, rows in self.groups.items()]
+        return [*tables[:-1], *(dataclasses.replace(last, notes=[*last.notes, KEY]) for last in tables[-1:])]
 
     def to_pandas(self) -> "pandas.DataFrame":
         """Return a pandas DataFrame with a row for each law on each plant in each condition.
@@ -205,18 +206,11 @@ def accuracy(
     ]
     _warn_of_defaults(setups, gains)
     scenarios = [scenario for setup in setups for scenario in setup.scenarios]
-    runs: dict[int, Run] = {}
     counted = summed(report, 0.0, sum(scenario.work for scenario in scenarios))
-    for k, trace in stream(scenarios, threads, counted):
-        runs[k] = _measured(trace)
-    rows, first = [], 0
-    for setup in setups:
-        rows.append(_row(setup, [runs[first + k] for k in range(len(setup.scenarios))]))
-        first += len(setup.scenarios)
-    groups: dict[tuple[str, str], list[Accuracy]] = {}
-    for row in rows:
-        groups.setdefault((row.plant, row.condition), []).append(row)
-    return AccuracyTable(row for group in groups.values() for row in sorted(group, key=lambda row: row.place))
+    runs = {k: _measured(trace) for k, trace in stream(scenarios, threads, counted)}
+    in_order = iter([runs[k] for k in range(len(scenarios))])
+    rows = AccuracyTable(_row(setup, list(itertools.islice(in_order, len(setup.scenarios)))) for setup in setups)
+    return AccuracyTable(row for group in rows.groups.values() for row in sorted(group, key=lambda row: row.place))
 
 
 def _longest_first(periods: Sequence[float]) -> tuple[float, ...]:
@@ -237,7 +231,7 @@ class Run(NamedTuple):
     Attributes:
       parts: "e" and "s" -> largest magnitude in each of the last three parts of the run; inf if it failed.
       saturated: share of the samples of the last part at which u is at its bound.
-      failure: what happened if the run failed.
+      failure: how the run failed; None if it did not.
     """
 
     parts: Mapping[str, Sequence[float]]
@@ -287,11 +281,7 @@ def _setup(
     duration: float,
     starts: Starts | None,
 ) -> Setup:
-    """Return the runs of a law on a plant in a condition.
-
-    Raises:
-      ScenarioError: a condition that sets the period, driven channels in several units, or as `case`.
-    """
+    """Return the runs of a law on a plant in a condition. Raises like `accuracy`."""
     fields = condition.on(plant, duration)
     if "control_period" in fields:
         raise ScenarioError(f"condition {condition.name!r} sets control_period, which accuracy varies: leave it out")
@@ -337,8 +327,7 @@ def _warn_of_defaults(setups: Sequence[Setup], gains: str) -> None:
 
 def _row(setup: Setup, runs: Sequence[Run]) -> Accuracy:
     """Return the row of a law from its runs, in the order of `Setup.scenarios`."""
-    base, halved = setup.scenarios[0], runs[-1]
-    counted = runs[:-1]
+    base, counted, halved = setup.scenarios[0], runs[:-1], runs[-1]
     failures = [run.failure for run in counted if run.failure]
     shape = setup.starts, len(setup.periods), PARTS
     floor = RESOLUTION * (max(map(abs, base.resolved.x0)) or 1.0)

@@ -12,7 +12,7 @@ import numpy as np
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import capital, every, joined
+from smc_mujoco.common.text import capital, counted, every, joined
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.source import in_words
@@ -143,14 +143,12 @@ class Advice(Tables):
     def tables(self) -> list[Tabular]:
         """One table with a row for each of the first laws, above the answer; marked where no law is better."""
         metrics = [NEEDS[need].metric for need in self.needs]
-        units = [f"{each.need}: {each.label} ({each.unit_for(self.plant.unit, self.effort)})" for each in metrics]
+        units = [f"{m.need}: {m.label} ({m.unit_for(self.plant.unit, self.effort)})" for m in metrics]
         rows = []
         for choice in self._shown:
-            place, name = f"{choice.rank.place:g}" if choice.fit else "–", choice.law.name
-            settles = f"{100 * choice.settles:.0f} %"
-            rows.append(
-                [Cell(name, colour=law_colour(name)), place, settles, *(self._cell(choice, n) for n in self.needs)]
-            )
+            law = Cell(choice.law.name, colour=law_colour(choice.law.name))
+            place, settles = f"{choice.rank.place:g}" if choice.fit else "–", f"{100 * choice.settles:.0f} %"
+            rows.append([law, place, settles, *(self._cell(choice, need) for need in self.needs)])
         answer = [*self.answer, *([f"In Python: {self.code}"] if self.code else [])]
         notes = [line for sentence in (self.key, *answer) for line in (sentence, "")][:-1]
         return [Tabular(headings=["law", "place", "settles", *units], rows=rows, title=self.title, notes=notes)]
@@ -174,7 +172,7 @@ class Advice(Tables):
         medians = f", and medians{of}, with 95 % intervals over {self.samples}" * (not self._untested)
         text = f"place by failed runs, then by mean rank{medians}. "
         if more := [choice.law.name for choice in self.choices[MAX_ROWS:]]:
-            text += f"{len(more)} more law{'s' * (len(more) > 1)}: {_first_of(more)}. "
+            text += f"{counted(len(more), 'more law')}: {_first_of(more)}. "
         text += f"*: no law is better{' in any condition' if of else ''}, and every run has a value."
         bare = any(not NEEDS[need].below(choice) for choice in self._shown for need in self.needs)
         text += " No interval: its ends are equal, or one is a run without a value." * bare
@@ -198,8 +196,7 @@ class Advice(Tables):
         samples, sets = self.comparison.samples, self.comparison.sets.max(axis=1)
         block, a, b = np.unravel_index(int(samples.argmax()), samples.shape)
         count = int(samples[block, a, b]) if len(sets) > 1 else int(self.comparison.seeds.max())
-        kind = "set{} of gains" if max(sets[a], sets[b]) > 1 else "run{}"
-        return f"{count} {kind.format('s' * (count != 1))}"
+        return f"{counted(count, 'set')} of gains" if max(sets[a], sets[b]) > 1 else counted(count, "run")
 
     @property
     def _shared(self) -> list[str]:
@@ -232,13 +229,12 @@ class Advice(Tables):
 
     def _refusal(self) -> str:
         """Return why no law is advised over rivals with default gains."""
-        one = len(self.barred) == 1
-        why = f"No law is advised over {_first_of(self.barred)}, whose gains are {'its' if one else 'their'} defaults"
-        return f"{why}: tune {'it' if one else 'them'}, or ask for it with defaults=True (--defaults)."
+        its, it = ("its", "it") if len(self.barred) == 1 else ("their", "them")
+        why = f"No law is advised over {_first_of(self.barred)}, whose gains are {its} defaults"
+        return f"{why}: tune {it}, or ask for it with defaults=True (--defaults)."
 
     def _use(self) -> str:
         first = self.choices[0]
-        law = f"{first.law} ({first.gains})"
         longer = f"longer runs than {self.table.scenario(0).duration:g} s"
         cure = f"give {longer}, a stronger actuator, more suitable laws or easier conditions"
         if not first.settles or not first.fit:
@@ -246,19 +242,16 @@ class Advice(Tables):
             return f"No law can be advised, because {why}: {cure}."
         if not first.reliable:
             runs = f"{100 * first.settles:.0f} % of its runs"
-            return f"No law is reliable here: {first.law.name}, {self._among}, settles in {runs}; {cure}."
+            among = f"the first of {len(self.compared)}" if len(self.compared) > 1 else "the only one compared"
+            return f"No law is reliable here: {first.law.name}, {among}, settles in {runs}; {cure}."
         if self.all_level and self._too_few:
-            comparisons = f"{len(self.blocks)} comparison{'s' * (len(self.blocks) > 1)}"
+            comparisons = counted(len(self.blocks), "comparison")
             return f"No law can be called the best with {self.samples}: too few for {comparisons}."
         if self.all_level:
             laws = f"{every(len(self.compared))} laws"
             where = "in the worst that was found" if self._untested else f"in every comparison of {self.samples}"
             return f"No law can be called the best: {laws} are level {where}. Use the one that you know."
-        return f"Use {law}."
-
-    @property
-    def _among(self) -> str:
-        return f"the first of {len(self.compared)}" if len(self.compared) > 1 else "the only one compared"
+        return f"Use {first.law} ({first.gains})."
 
     def _because(self) -> str:
         first, count = self.choices[0], len(self.compared)
@@ -317,7 +310,7 @@ class Advice(Tables):
                 if self.better(name, cost).get(first.law.name)
                 and other.medians[cost].median > first.medians[cost].median
             ]
-            changes = [f"{self._value(other, each)} instead of {self._number(first, each)}" for each in (need, *costs)]
+            changes = [f"{self._value(other, n)} instead of {self._number(first, n)}" for n in (need, *costs)]
             text = f"If only {need} counts: {other.law}, with {changes[0]}"
             sentences.append(text + f"; it costs {joined(changes[1:])}." if costs else text + ".")
         return sentences
@@ -361,10 +354,8 @@ class Advice(Tables):
         for need in self.needs:
             blocks = [k for k, block in enumerate(self.blocks) if block[0] == need]
             if self.comparison.untested[blocks].all():
-                one, other = (
-                    self._number(choice, need) for choice in self.choices if choice.law.name in (first, rival)
-                )
-                parts.append(f"{need} {one} to {other}")
+                values = [self._number(choice, need) for choice in self.choices if choice.law.name in (first, rival)]
+                parts.append(f"{need} {' to '.join(values)}")
                 continue
             worst = max(blocks, key=lambda k: self.comparison.p[k, a, b])
             effect = self.comparison.effect(worst, first, rival, winner=False)

@@ -26,8 +26,9 @@ laws by mean rank, but none before a law that dominates it. Laws that tie with t
 overshoot, and then by their energy of u, less first. The first law is advised, unless all are level.
 
 "robust" is the one need that is not a metric of these runs. An adversary attacks each law, with the default budget of
-`worst_case` over all conditions. A law is better if the worst found for it is less by more than the least relevant
-difference. There is no test, as that is no sample."""
+`worst_case` over all conditions. A law is better if its worst case is smaller by more than the least relevant
+difference. There is no test, because a worst case is no sample.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -120,8 +121,7 @@ def which(
     compared, properties = _needs(needs, machine)
     length = extent.duration if duration is None else number("duration", duration, above=0.0)
     tested = _conditions(conditions, machine, length, NO_VELOCITY in properties)
-    where: dict[str, Any] = {"starts": starts, "folder": Path(out), "threads": threads, "progress": progress}
-    trial = Trial(plants=[machine], conditions=tested, duration=length, **where)
+    trial = Trial([machine], tested, length, starts, Path(out), threads, progress)
     effort, wanted = _effort(trial), [name for name in properties if name != NO_VELOCITY]
     candidates = _candidates(trial, wanted, laws, extent.budget)
     table = trial.run({machine.name: [*candidates.values()]}, count, noise_key=noise_key)
@@ -129,7 +129,7 @@ def which(
     contest = _contest(table, worst, machine, compared, relevant)
     return Advice(
         plant=machine,
-        conditions=tuple(one.name for one in tested),
+        conditions=tuple(condition.name for condition in tested),
         needs=compared,
         wanted=tuple(PROPERTIES[name].words for name in wanted),
         choices=_choices(contest, candidates),
@@ -167,8 +167,8 @@ def _needs(needs: str | Sequence[str], plant: Plant) -> tuple[tuple[str, ...], t
 def _conditions(given: Any, plant: Plant, duration: float, without_velocity: bool) -> list[Condition]:
     """Return the given conditions, or the default ones that have numbers for the plant."""
     names = applicable(DEFAULT_CONDITIONS, [plant], duration) if given is None else listed("conditions", given)
-    tested = [find_condition(name) for name in names]
-    return [_without_velocity(condition) for condition in tested] if without_velocity else tested
+    chosen = [find_condition(name) for name in names]
+    return [_without_velocity(condition) for condition in chosen] if without_velocity else chosen
 
 
 def _without_velocity(condition: Condition) -> Condition:
@@ -238,17 +238,17 @@ def _worst(
       duration: of a run, s. Default: that of `worst_case`.
       parts: the default budget of `worst_case` is divided by the conditions and by this.
     """
-    lasting = DURATION if duration is None else duration
-    cases = {
-        name: [case(trial.plants[0], one.law, on, lasting, starts=trial.starts) for on in trial.conditions]
-        for name, one in candidates.items()
+    (plant,), length = trial.plants, DURATION if duration is None else duration
+    scenarios = {
+        name: [case(plant, candidate.law, condition, length, starts=trial.starts) for condition in trial.conditions]
+        for name, candidate in candidates.items()
     }
-    first = next(iter(cases.values()))[0]
+    first = next(iter(scenarios.values()))[0]
     within = within or default_class(first)
     budget = max(MIN_BUDGET, default_budget(first, within) // (len(trial.conditions) * parts))
     return {
-        name: [trial.attack(f"{i}-{trial.plants[0].name}-{name}", one, within, budget) for i, one in enumerate(several)]
-        for name, several in cases.items()
+        name: [trial.attack(f"{i}-{plant.name}-{name}", attacked, within, budget) for i, attacked in enumerate(of_law)]
+        for name, of_law in scenarios.items()
     }
 
 
@@ -256,6 +256,7 @@ class Contest(NamedTuple):
     """Runs of laws and their comparison.
 
     Attributes:
+      runs: what the needs are computed from.
       scores: need -> the scores of all laws.
       comparison: of the laws that are fit, or of all if none is.
       order: all laws, best first. Those that are not fit come last, with NaN for a rank.
@@ -279,19 +280,20 @@ def _contest(
     runs = Runs(table, group, worst)
     rows = paired_runs.values(table, SETTLES)[group.rows]
     settled = 1.0 - np.nanmean(np.where(group.rows >= 0, rows, np.nan), axis=2)
-    fit = _fit(group.laws, settled)
+    enough = np.all(settled >= MIN_SETTLED * settled.max(axis=0), axis=1)
+    fit = {law for law, settles in zip(group.laws, enough.tolist(), strict=True) if settles}
     laws = [law for law in group.laws if law in fit] or group.laws
     scores = {need: NEEDS[need].scores(runs) for need in needs}
-    for need, each in scores.items():
-        if not each.blocks:
+    for need, its in scores.items():
+        if not its.blocks:
             raise ScenarioError(f"need {need!r} has no number in any run on {plant.name}: leave it out")
-    blocks = [(NEEDS[need], k) for need, each in scores.items() for k in each.blocks]
+    blocks = [(NEEDS[need], k) for need, its in scores.items() for k in its.blocks]
     ran = paired_runs.scenarios(table, group)
     comparison = compare(
-        _stacked([each.values for each in scores.values()], laws, math.nan),
+        _stacked([its.values for its in scores.values()], laws, math.nan),
         [paired_runs.floor(ran[k], need.metric.unit) for need, k in blocks],
-        outcomes=_stacked([each.outcomes for each in scores.values()], laws),
-        sets=_stacked([each.sets for each in scores.values()], laws),
+        outcomes=_stacked([its.outcomes for its in scores.values()], laws),
+        sets=_stacked([its.sets for its in scores.values()], laws),
         relevant=relevant,
         untested=[not need.tested for need, _ in blocks],
     )
@@ -337,12 +339,6 @@ def _order(comparison: Comparison, restraint: Mapping[str, tuple[float, ...]]) -
         ordered.append(min(tied, key=lambda rank: restraint[rank.law]))
         left.remove(ordered[-1])
     return ordered
-
-
-def _fit(laws: Sequence[str], settled: np.ndarray) -> set[str]:
-    """Return the laws that settle in enough runs of every condition."""
-    enough = np.all(settled >= MIN_SETTLED * settled.max(axis=0), axis=1)
-    return {law for law, fit in zip(laws, enough.tolist(), strict=True) if fit}
 
 
 def _choices(contest: Contest, candidates: Mapping[str, Candidate]) -> tuple[Choice, ...]:

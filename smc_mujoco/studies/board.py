@@ -17,7 +17,7 @@ from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
-from smc_mujoco.common.text import capital, every, joined, number
+from smc_mujoco.common.text import capital, counted, every, joined, number
 from smc_mujoco.control.source import Source, in_words, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.plant import catalogue
@@ -122,9 +122,8 @@ class Block:
     @property
     def sample(self) -> str:
         """The size of the sample in words, such as "20 seeds, 1 distinct run" or "24 seeds, 3 sets of gains"."""
-        seeds = f"{self.seeds} seed{'s' * (self.seeds > 1)}"
-        parts = [seeds] + [_distinct(self.runs)] * (self.runs < self.seeds)
-        return ", ".join(parts + [f"{self.sets} sets of gains"] * (self.sets > 1))
+        distinct = [counted(self.runs, "distinct run")] * (self.runs < self.seeds)
+        return ", ".join([counted(self.seeds, "seed"), *distinct, *[f"{self.sets} sets of gains"] * (self.sets > 1)])
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, repr=False)
@@ -209,7 +208,7 @@ class Board(Tables):
     def where(self) -> str:
         """The plants and conditions in words, such as " on duffing under noise"."""
         parts = {"on": [block.plant for block in self.blocks], "under": [block.condition for block in self.blocks]}
-        return "".join(f" {preposition} {_counted(names)}" for preposition, names in parts.items())
+        return "".join(f" {preposition} {_some_of(names)}" for preposition, names in parts.items())
 
     @property
     def verdict(self) -> str:
@@ -221,7 +220,8 @@ class Board(Tables):
         """The result in words: the winner, else where laws win and lose, why there is no winner, or the best laws."""
         if self.winner:
             leads = [block.lead for block in self.blocks if block.lead]
-            closest = min(leads, key=_closeness, default=None)
+            # ratios come before differences, and are ordered by the end of their interval
+            closest = max(leads, key=lambda lead: lead.effect.high if lead.effect.relative else -math.inf, default=None)
             several = f" in {every(len(self.blocks))} {self.kind}" * (len(self.blocks) > 1)
             how = f": {'at least ' * (len(leads) > 1)}{closest.words}" if closest else ""
             return f"{self.winner} wins{several}{how}{self._gains([self.winner])}"
@@ -277,7 +277,7 @@ class Board(Tables):
         if largest.sets > 1:
             return f"{largest.sets} sets of gains{compared}"
         if largest.samples < largest.runs:
-            return f"{largest.sample}, of two laws {_distinct(largest.samples)}"
+            return f"{largest.sample}, of two laws {counted(largest.samples, 'distinct run')}"
         return largest.sample + compared * (largest.runs == largest.seeds or smallest_p <= error)
 
     def failures(self, entry: Entry) -> str:
@@ -319,19 +319,10 @@ def _percent(share: float) -> str:
     return f"{share:g}" if math.isinf(share) else f"{100 * share:.2g}" if abs(share) < 0.0995 else f"{100 * share:.0f}"
 
 
-def _counted(names: Sequence[str]) -> str:
+def _some_of(names: Sequence[str]) -> str:
     """Return different names in words; if they are many, the first and the last."""
     several = list(dict.fromkeys(names))
     return joined(several) if len(several) <= MAX_NAMES else f"{several[0]} ... {several[-1]} ({len(several)})"
-
-
-def _closeness(lead: Lead) -> float:
-    """Return a number that is smallest for the closest lead: ratios by the end of their interval, then differences."""
-    return -lead.effect.high if lead.effect.relative else math.inf
-
-
-def _distinct(runs: int) -> str:
-    return f"{runs} distinct run{'s' * (runs > 1)}"
 
 
 class Boards(Tables, list[Board]):
@@ -390,10 +381,10 @@ def tables(boards: Iterable[Board], worst: Mapping[str, Mapping[str, WorstCase]]
     groups: dict[str, list[Board]] = {}
     for board in boards:
         groups.setdefault(board.about, []).append(board)
-    made = [_table(name, each, (worst or {}).get(each[0].group.get("plant", ""), {})) for name, each in groups.items()]
+    made = [_table(name, its, (worst or {}).get(its[0].group.get("plant", ""), {})) for name, its in groups.items()]
     if not made:
         return [NO_BOARDS]
-    words = key([board for each in groups.values() for board in each])
+    words = key([board for its in groups.values() for board in its])
     return [*made[:-1], dataclasses.replace(made[-1], notes=(*made[-1].notes, words))]
 
 
@@ -479,4 +470,4 @@ def _verdicts(boards: Sequence[Board]) -> list[str]:
     results: dict[str, list[Board]] = {}
     for board in boards:
         results.setdefault(board.result, []).append(board)
-    return [f"{', '.join(one.label for one in same)}{same[0].where}: {result}." for result, same in results.items()]
+    return [f"{', '.join(board.label for board in same)}{same[0].where}: {result}." for result, same in results.items()]

@@ -83,7 +83,7 @@ class Compared(Tables):
     @property
     def gains(self) -> dict[str, dict[str, Law]]:
         """Plant -> law -> the law with its best gains; `gains["duffing"]["classical"].source` says their source."""
-        return {plant: {each.law.name: each.law for each in laws} for plant, laws in self.candidates.items()}
+        return {plant: {one.law.name: one.law for one in laws} for plant, laws in self.candidates.items()}
 
     @functools.cached_property
     def leaderboard(self) -> Boards:
@@ -134,7 +134,7 @@ class Compared(Tables):
             return []
         from smc_mujoco.studies.worst_case import WorstCases
 
-        return [table for cases in self.worst.values() for table in WorstCases(cases.values()).tables]
+        return [table for worst_cases in self.worst.values() for table in WorstCases(worst_cases.values()).tables]
 
     def to_latex(self, path: str | os.PathLike[str] | None = None) -> str:
         """Return a LaTeX tabular for each plant in each condition, below comments with the verdicts; needs booktabs.
@@ -169,7 +169,6 @@ class Compared(Tables):
         for board in self.leaderboard:
             worst = self.worst.get(board.group.get("plant", ""), {})
             for entry in board.entries:
-                low, high = entry.interval.low, entry.interval.high
                 yield {
                     **{"plant": "", "condition": ""} | dict(board.group),
                     "law": entry.law,
@@ -177,8 +176,8 @@ class Compared(Tables):
                     "metric": board.metric,
                     "unit": board.unit,
                     "median": entry.interval.median,
-                    "low": low,
-                    "high": high,
+                    "low": entry.interval.low,
+                    "high": entry.interval.high,
                     "failed": entry.failed,
                     "runs": entry.runs,
                     "best": entry.rank.best,
@@ -228,7 +227,8 @@ def compare(
 
     A law whose gains you gave keeps them. Any other law, yours too, has those that come with the package for the plant,
     or is tuned by the same rule, which takes some seconds for each law on each plant. Gains and runs are kept in the
-    folder: after a kill, the same call goes on from there. A winner is not named over laws with default gains.
+    folder: after a kill, the same call goes on from there. A winner is not named over laws with default gains. One run
+    of each of your laws on each plant in each condition is replayed, see `replay`.
 
     Args:
       laws: names, or your own laws. Default: those of the report's first page that are for the plant, or else all that
@@ -239,9 +239,8 @@ def compare(
       seeds: runs of a law on each plant in each condition; each has another start and other noise, the same for every
         law, and the next of the law's sets of gains.
       tune: whether to tune laws without gains for a plant; otherwise they run with their defaults.
-      worst: whether to search the worst case of each law on each plant too: a class, or True for the default one of
-        `worst_case`.
-      executor: where runs are computed, as in `study`; None for this machine.
+      worst: whether to search the worst case of each law on each plant too, in a class, or for True in the default one.
+      executor, noise_key, traces: as in `study`; by default on this machine, with a key that is drawn now.
       out: folder for gains and runs.
       metrics, defaults, relevant: as in `leaderboard`.
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
@@ -251,9 +250,6 @@ def compare(
         and no law has gains of the package.
       quick: shorter runs and searches; by default three plants and three conditions.
       fresh: whether to remove the runs that are in the folder first.
-      noise_key: as in `study`: drawn after the laws are fixed, so that none can know its noise. One run of each of
-        your laws on each plant in each condition is replayed, too.
-      traces: as in `study`.
       threads, progress: as in `run`.
 
     Raises:
@@ -267,13 +263,12 @@ def compare(
     _check_names(metrics, gains, out)
     machines = [as_plant(plant) for plant in (extent.plants if plants is None else listed("plants", plants))]
     given = applicable(extent.conditions, machines, length) if conditions is None else listed("conditions", conditions)
-    where: dict[str, Any] = {"starts": starts, "folder": Path(out), "threads": threads, "progress": progress}
-    trial = Trial(plants=machines, conditions=[find_condition(one) for one in given], duration=length, **where)
-    tuning: dict[str, Any] = {"tune": tune and gains == "tuned", "gains": gains, "shipped_budget": budget is None}
-    candidates = trial.gains(_checked(trial, laws), tries, **tuning)
-    stored: dict[str, Any] = {"resume": not fresh, "traces": traces, "noise_key": noise_key}
+    trial = Trial(machines, [find_condition(name) for name in given], length, starts, Path(out), threads, progress)
+    candidates = trial.gains(
+        _checked(trial, laws), tries, tune=tune and gains == "tuned", gains=gains, shipped_budget=budget is None
+    )
     return Compared(
-        table=trial.run(candidates, count, executor=workers, **stored),
+        table=trial.run(candidates, count, executor=workers, resume=not fresh, traces=traces, noise_key=noise_key),
         candidates=candidates,
         metrics=tuple(metrics),
         defaults=defaults,

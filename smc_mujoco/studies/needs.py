@@ -24,7 +24,7 @@ TIES = {"no-overshoot": "overshoot", "frugal": "energy of u"}  # need -> its met
 
 
 class Runs(NamedTuple):
-    """Runs of laws on one plant; for the need "robust" law -> its worst case in each condition, else {}."""
+    """Runs of laws on one plant. `worst` is for the need "robust": law -> its worst case in each condition; else {}."""
 
     table: Table
     group: Group

@@ -45,23 +45,17 @@ def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume
       ScenarioError: `wanted` is none of these.
     """
     if wanted == DRAWN:
-        given = []
-        for scenario in scenarios:
-            if not isinstance(scenario, Scenario):
-                yield scenario  # which the study refuses
-                return
-            given.append(scenario)
+        scenarios = list(scenarios)
         if not resume:
             (folder / FILE).unlink(missing_ok=True)
-        scenarios = given
-        laws = {law_hash(scenario): scenario for scenario in filter(has_user_code, given)}
+        laws = {law_hash(scenario): scenario for scenario in filter(has_user_code, scenarios)}
         key = _of_folder(folder / FILE, {name: _description(scenario) for name, scenario in laws.items()})
     elif isinstance(wanted, str):
         raise ScenarioError(f"noise_key is {shown(wanted)}: give a whole number, or {DRAWN!r}")
     else:
         key = whole("noise_key", wanted, 0, MAX_SEED)
     for scenario in scenarios:
-        same = not isinstance(scenario, Scenario) or scenario.noise_key == key or not key
+        same = scenario.noise_key == key or not key
         yield scenario if same else dataclasses.replace(scenario, noise_key=key).named(scenario.condition)
 
 

@@ -12,9 +12,10 @@ changed.
 import dataclasses
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
+from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError, find, printable, shown
 from smc_mujoco.common.progress import counter
@@ -99,7 +100,9 @@ def study(
     threads = cores(threads)
     store, folder = Store(Path(out)), Path(out) / "traces"
     plants: run_key.Hashes = {}
-    by_key = _by_key(scenarios, plants, lambda given: noise.keyed(given, noise_key, Path(out), resume))
+    by_key: dict[str, Scenario] = {}
+    for scenario in noise.keyed(_checked(scenarios), noise_key, Path(out), resume):
+        by_key.setdefault(run_key.key(scenario, plants=plants), scenario)
     store.open(resume)
     missing = {name: scenario for name, scenario in by_key.items() if name not in store.where}
     if progress and (done := len(by_key) - len(missing)):
@@ -146,17 +149,14 @@ def _compute(
                 executors.compute_elsewhere(executors.batches(missing.values(), 1), pool, finish, counts.stepped)
 
 
-def _by_key(
-    scenarios: Iterable[Scenario], plants: run_key.Hashes, keyed: Callable[[Iterable[Scenario]], Iterable[Scenario]]
-) -> dict[str, Scenario]:
-    """Return key -> scenario, in order and each once, after `keyed` has set their noise keys."""
-    by_key: dict[str, Scenario] = {}
-    several = isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
-    for scenario in keyed(scenarios) if several else ():  # one by one: a generator with a wrong item may be endless
+def _checked(scenarios: Any) -> Iterator[Scenario]:
+    """Yield the scenarios of a study, one by one, because a generator with a wrong item may be endless."""
+    empty, several = True, isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
+    for scenario in scenarios if several else ():
         if not isinstance(scenario, Scenario):
             raise ScenarioError(f"cannot study {shown(scenario)}: give scenarios, such as those of smc.grid")
         checked_name(scenario.law)
-        by_key.setdefault(run_key.key(scenario, plants=plants), scenario)
-    if not by_key:
+        yield scenario
+        empty = False
+    if empty:
         raise ScenarioError(f"scenarios is {shown(scenarios)}: give several, such as a list")
-    return by_key

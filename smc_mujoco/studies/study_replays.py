@@ -10,6 +10,7 @@ from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import write_json
+from smc_mujoco.common.text import counted
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.run import PlainLoopWarning, run
 from smc_mujoco.simulation.scenario import Scenario
@@ -34,7 +35,7 @@ def replayed(
     chosen, known = _chosen(runs), _known(folder / FILE)
     if missing := [name for name in chosen if name not in known]:
         if progress:
-            print(f"replaying {len(missing)} run{'s' * (len(missing) > 1)} of your laws", file=sys.stderr)
+            print(f"replaying {counted(len(missing), 'run')} of your laws", file=sys.stderr)
         try:
             known |= _results({name: runs[name] for name in missing}, store, threads)
             write_json(folder / FILE, known)

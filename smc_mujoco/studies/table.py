@@ -29,7 +29,7 @@ from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import MAX_RATIO, MAX_UNPACKED, from_json, reading, replacing, to_json
 from smc_mujoco.common.html import table as html_table
-from smc_mujoco.common.text import number
+from smc_mujoco.common.text import counted, number
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.run import run
@@ -154,8 +154,7 @@ class Table:
         return self.data.num_rows
 
     def __repr__(self) -> str:
-        sizes = {name: len(set(self.column(name).tolist())) for name in ("plant", "law", "condition")}
-        counts = [f"{size} {name}{'s' * (size != 1)}" for name, size in sizes.items()]
+        counts = (counted(len(set(self.column(name).tolist())), name) for name in ("plant", "law", "condition"))
         return f"Table({len(self)} runs: {', '.join(counts)})"
 
     def _repr_html_(self) -> str:
@@ -204,8 +203,8 @@ class Table:
                 several = isinstance(wanted, Iterable) and not isinstance(wanted, str)
                 names = items_of(name, wanted) if several else [wanted]
                 known = dict.fromkeys(self.column(name).tolist())
-                for one in names:
-                    find(f"{name} of this table", one, known)
+                for value in names:
+                    find(f"{name} of this table", value, known)
                 data = data.filter(pc.field(name).isin(pa.array(names, pa.string())))
         return dataclasses.replace(self, data=data)
 

@@ -1,14 +1,15 @@
 """A trial: plants, conditions and starts on which laws are compared, and the folder of its results.
 
-trial = Trial(plants=[plant], conditions=[noise], duration=5.0, folder=Path("which"))
-candidates = trial.gains({plant.name: laws}, budget=96)
-table = trial.run(candidates, seeds=24)
+    trial = Trial([plant], [noise], duration=5.0, starts=None, folder=Path("which"), threads=None, progress=True)
+    candidates = trial.gains({plant.name: laws}, budget=96)
+    table = trial.run(candidates, seeds=24)
+
+`compare` and `adviser` take these steps.
 """
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.plant import Plant
@@ -25,17 +26,16 @@ if TYPE_CHECKING:
     from smc_mujoco.studies.worst_case import WorstCase
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Trial:
+class Trial(NamedTuple):
     """What laws are compared on. `duration` is that of a run, s; `threads` and `progress` are as in `run`."""
 
     plants: Sequence[Plant]
     conditions: Sequence[Condition]
     duration: float
-    starts: Starts | None = None
+    starts: Starts | None
     folder: Path
-    threads: int | None = None
-    progress: bool = False
+    threads: int | None
+    progress: bool
 
     def gains(
         self, laws: Mapping[str, Sequence[Component | Template]], budget: int, **options: Any
@@ -46,16 +46,9 @@ class Trial:
 
     def run(self, candidates: Mapping[str, Sequence[Candidate]], seeds: int, **options: Any) -> Table:
         """Run the laws of each plant in each condition from the seeds 0, 1, ..., with the options of `study`."""
-        runs = all_combinations(
-            self.plants,
-            lambda plant: candidates[plant.name],
-            self.conditions,
-            range(seeds),
-            self.duration,
-            self.starts,
-        )
-        options |= {"threads": self.threads, "progress": self.progress}
-        return study(runs, self.folder, replay=True, **options)
+        grid = self.plants, lambda plant: candidates[plant.name], self.conditions, range(seeds)
+        runs = all_combinations(*grid, self.duration, self.starts)
+        return study(runs, self.folder, replay=True, threads=self.threads, progress=self.progress, **options)
 
     def attack(
         self, name: str, scenario: Scenario, within: "Uncertainty | None", budget: int | None = None

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from smc_mujoco.analysis.worst_case.search import Search, Tried
+from smc_mujoco.analysis.worst_case.search import Search
 from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, default_class, outside
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import read_json, write_json
@@ -240,6 +240,7 @@ def worst_case(
         early = sorted(drawing.tried[:MIN_RUNS], key=lambda tried: tried.key, reverse=True)
         search.search(np.random.default_rng([seed, 1]), early[:FIRST_MEMBERS])
     worst = max(search.worst, drawing.worst, key=lambda tried: tried.key)
+    values = [(tried.member.kind, tried.key[0]) for tried in (*drawing.tried, *search.tried)]
     return WorstCase(
         value=float(worst.key[0]),
         median=float(np.median([tried.key[0] for tried in drawing.tried])),
@@ -247,7 +248,7 @@ def worst_case(
         scenario=members.scenario_of(worst.member),
         found_by=worst.member.kind,
         tried=drawing.runs + search.runs,
-        strategies=_largest_by_kind([*drawing.tried, *search.tried]),
+        strategies={kind: max(value for other, value in values if other == kind) for kind in dict(values)},
         nominal=scenario,
         within=within,
         metric=metric,
@@ -257,19 +258,11 @@ def worst_case(
     )
 
 
-def _largest_by_kind(tried: Sequence[Tried]) -> dict[str, float]:
-    """Return `WorstCase.strategies`."""
-    largest: dict[str, float] = {}
-    for one in tried:
-        largest[one.member.kind] = max(largest.get(one.member.kind, -np.inf), one.key[0])
-    return largest
-
-
 def cached_worst_case(
     path: Path,
     scenario: Scenario,
-    within: Uncertainty | None = None,
-    budget: int | None = None,
+    within: Uncertainty | None,
+    budget: int | None,
     threads: int | None = None,
     progress: bool = False,
 ) -> WorstCase:
@@ -278,8 +271,9 @@ def cached_worst_case(
 
     def load(file: Path) -> WorstCase:
         data = read_json(file)
-        known = serialise.restore(data.pop("scenario"))
-        return WorstCase(**data, scenario=dataclasses.replace(known, law=scenario.law), nominal=scenario, within=within)
+        restored = serialise.restore(data.pop("scenario"))
+        worst = dataclasses.replace(restored, law=scenario.law)
+        return WorstCase(**data, scenario=worst, nominal=scenario, within=within)
 
     def save(worst: WorstCase, file: Path) -> None:
         about = worst.about()
