@@ -3,12 +3,14 @@
     result = smc.replay(trace)
     result.same, result.why
 
-A replay takes two fresh processes. The first has no code of the law. It repeats the run with the recorded commands,
-which gives the law's measurements. Every control period must end in the recorded state. The second process has the law
-and these measurements, and no plant. Its commands must be the recorded ones.
+A replay takes two fresh processes. The first has no code of the law, its surface or its estimator. It repeats the run
+with the recorded commands, which gives the sensor's readings. Every control period must end in the recorded state. The
+second process has that code and the readings, but no motion, noise or disturbance. Its u and s must be the recorded
+ones.
 
-So a law is recognised that reads the plant's true state or the time of day, counts its calls, or writes to the plant. A
-law could still pass its commands through a file or a connection: no process is a sandbox.
+So a law or an estimator is recognised that reads the plant's true state, a number of the run's noise or the time to a
+fraction of a second, counts its calls, or writes to the plant. It could still pass its commands through a file or a
+connection: no process is a sandbox.
 """
 
 import dataclasses
@@ -23,16 +25,21 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, one_line
 from smc_mujoco.control.component import Component
+from smc_mujoco.control.estimator import Reading, estimator
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.model import mechanism
+from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.pickling import packed
 
-ROUNDING = 1e-9  # difference of a state after a control period, or of a command, relative to the largest value
-MODEL_RMS = 0.01  # rms difference of commands, relative to the largest: a nominal model's last bit may flip a switch
-TIMEOUT = 600.0  # s, for all traces of a call; chosen
+ROUNDING = 1e-9  # difference of a state after a control period, or of u or s, relative to the largest value
+# Rms difference of u or s, relative to the largest, of a compiled run: its nominal model's last bit may flip a switch.
+MODEL_RMS = 0.01
+TIMEOUTS = {"verify": 1800.0, "commands_of": 300.0}  # s, of each process; chosen
+# What a law may know of its scenario.
+KNOWN_FIELDS = ("plant", "law", "model", "surface", "control_period", "u_max", "reference", "feedforward", "velocity")
 
 
 class Replay(NamedTuple):
@@ -48,13 +55,27 @@ class Replay(NamedTuple):
 
 
 class Recording(NamedTuple):
-    """The input of the process without the law: the run without its law, and the recorded signals."""
+    """The input of the process without the law: the run without its law, and the recorded signals.
+
+    Attributes:
+      exact: whether a replay computes u and s to the last bit.
+    """
 
     scenario: Scenario
+    exact: bool
     x: np.ndarray
     v: np.ndarray
     u: np.ndarray
     s: np.ndarray
+
+
+class Readings(NamedTuple):
+    """The sensor's position and velocity of each channel at a sample k, at time t, s; (n,) each."""
+
+    k: int
+    t: float
+    x: np.ndarray
+    v: np.ndarray
 
 
 def replay(trace: Trace) -> Replay:
@@ -63,18 +84,23 @@ def replay(trace: Trace) -> Replay:
     It takes some seconds, most of them to start two processes.
 
     Raises:
-      ScenarioError: the law cannot be sent to a process.
+      ScenarioError: the replay takes too long.
     """
     return replays([trace])[0]
 
 
 def replays(traces: Sequence[Trace]) -> list[Replay]:
     """Return the `replay` of each trace, all with one pair of processes."""
-    results = [Replay(None, _obstacle(trace)) for trace in traces]
-    sent = [i for i, result in enumerate(results) if not result.why]
-    tasks = [(_recording(traces[i]), packed(traces[i].scenario.law)) for i in sent]
+    results, tasks = list[Replay](), dict[int, tuple[bytes, bytes]]()
+    for i, trace in enumerate(traces):
+        results.append(Replay(None, _obstacle(trace)))
+        if not results[i].why:
+            try:
+                tasks[i] = packed(_recording(trace)), packed(_known(trace.scenario))
+            except ScenarioError as error:
+                results[i] = Replay(None, str(error))
     if tasks:
-        for i, result in zip(sent, _in_fresh_process("verify", tasks), strict=True):
+        for i, result in zip(tasks, _in_fresh_process("verify", list(tasks.values())), strict=True):
             results[i] = Replay(*result)
     return results
 
@@ -87,17 +113,25 @@ def _obstacle(trace: Trace) -> str:
 
 
 def _recording(trace: Trace) -> Recording:
-    """Return a trace without its law's code. A law of the same kind, which is never called, stands for it."""
+    """Return a trace without the code of law, surface and estimator. A law of the same kind, at rest, stands for it."""
     s = trace.scenario
     placeholder = Component(
-        kind="law", name="recorded", gains={}, memory=1, function=_never_called, joint=s.law.joint,
+        kind="law", name="recorded", gains={}, memory=1, function=_at_rest, joint=s.law.joint,
         requires_model=s.law.requires_model, relative_degree=s.law.relative_degree,
     )  # fmt: skip
-    return Recording(dataclasses.replace(s, law=placeholder), trace.x, trace.v, trace.u, trace.s)
+    bare = dataclasses.replace(s, law=placeholder, surface=None, velocity=estimator("measured"))
+    exact = s.resolved.model == "none" or bool(prepare(s).why_not)
+    return Recording(bare, exact, trace.x, trace.v, trace.u, trace.s)
 
 
-def _never_called(y: Any, gains: Any, memory: Any) -> tuple[float, float]:
-    return 0.0, 0.0
+def _at_rest(y: Any, gains: Any, memory: Any) -> tuple[Any, Any]:
+    return 0.0 * y.x, 0.0 * y.x
+
+
+def _known(scenario: Scenario) -> Scenario:
+    """Return a scenario that has only what its law may know: no noise, disturbance, other machine or initial state."""
+    resolved = scenario.resolved
+    return Scenario.recorded(actuator=scenario.actuator, **{name: getattr(resolved, name) for name in KNOWN_FIELDS})
 
 
 def _in_fresh_process(task: str, arguments: object) -> Any:
@@ -110,11 +144,11 @@ def _in_fresh_process(task: str, arguments: object) -> Any:
     code = "from smc_mujoco.studies.replay import serve; serve()"
     try:
         done = subprocess.run(
-            [sys.executable, "-c", code, task], input=pickle.dumps(arguments), capture_output=True, timeout=TIMEOUT,
-            env=environment, check=False,
+            [sys.executable, "-c", code, task], input=pickle.dumps(arguments), capture_output=True,
+            timeout=TIMEOUTS[task], env=environment, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        raise ScenarioError(f"a replay took more than {TIMEOUT:g} s: replay fewer traces at a time") from None
+        raise ScenarioError(f"a replay took more than {TIMEOUTS[task]:g} s: replay fewer traces at a time") from None
     if done.returncode:
         why = one_line(done.stderr.decode(errors="replace").strip().rpartition("\n")[2])
         raise ScenarioError(f"a replay failed in its process ({why}): put your laws in a module, and try again")
@@ -133,13 +167,21 @@ def serve() -> None:
 # in the process without the law
 
 
-def verify(tasks: Sequence[tuple[Recording, bytes]]) -> list[tuple[bool, str]]:
-    """Return for every recording whether its commands are those of the packed law, and what differs first."""
-    runs = [Playback(recording) for recording, _ in tasks]
+def verify(tasks: Sequence[tuple[bytes, bytes]]) -> list[tuple[bool | None, str]]:
+    """Return for every packed recording whether its u and s are those of the packed law, and what differs first."""
+    runs = [Playback(pickle.loads(recording)) for recording, _ in tasks]
     for run in runs:
         run.play()
-    laws = [(law, run.measured) for run, (_, law) in zip(runs, tasks, strict=True)]
-    return [run.verdict(commands) for run, commands in zip(runs, _in_fresh_process("commands_of", laws), strict=True)]
+    laws = [(law, run.readings) for run, (_, law) in zip(runs, tasks, strict=True)]
+    return [run.verdict(computed) for run, computed in zip(runs, _computed(laws), strict=True)]
+
+
+def _computed(laws: list[tuple[bytes, list[Readings]]]) -> list[np.ndarray | str | None]:
+    """Return what `commands_of` returns for all laws, None for a law that ends its process or stays in it."""
+    try:
+        return _in_fresh_process("commands_of", laws)
+    except ScenarioError:
+        return [None] if len(laws) == 1 else [_computed([law])[0] for law in laws]
 
 
 class Playback(reference.Loop):
@@ -147,8 +189,7 @@ class Playback(reference.Loop):
 
     Attributes:
       recorded: the run.
-      measured: (channel, measurement) of every call of the law; of a law of many joints the channel is -1.
-      call_samples: the sample of each call.
+      readings: of every call of the law.
       mismatch_time: the first time, s, at which the state is not the recorded one; None if it always is.
       end: number of recorded samples without NaN.
     """
@@ -156,9 +197,8 @@ class Playback(reference.Loop):
     def __init__(self, recorded: Recording):
         with installed():
             super().__init__(recorded.scenario, mechanism(recorded.scenario))
-        self.recorded, self.law = recorded, _RecordedLaw(self)
-        self.measured: list[tuple[int, Any]] = []
-        self.call_samples: list[int] = []
+        self.recorded = recorded
+        self.readings: list[Readings] = []
         self.mismatch_time: float | None = None
         missing = np.flatnonzero(np.isnan(recorded.x).any(axis=1) | np.isnan(recorded.u).any(axis=1))
         self.end = int(missing[0]) if len(missing) else len(recorded.x)
@@ -183,78 +223,73 @@ class Playback(reference.Loop):
                 values[at] = recorded[k]
         super().step(step)
 
-    def bounded_command(self, i: int, u: float, s: float) -> float:
-        """Return the recorded command of channel i."""
-        self.last_u[i] = self.recorded.u[len(self.commands) - 1, i]
-        return self.last_u[i]
+    def update_law(self, x: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the recorded u and s, (n,) each, and keep the readings."""
+        k = len(self.commands) - 1
+        self.readings.append(Readings(k, t, x.copy(), v.copy()))
+        super().update_law(x, v, t)  # for the references
+        self.last_u = self.recorded.u[k].copy()
+        return self.recorded.u[k], self.recorded.s[k]
 
-    def verdict(self, commands: Sequence[Any]) -> tuple[bool, str]:
-        """Return whether these commands, with feedforward and bounds, are the recorded ones, and what differs first."""
+    def verdict(self, computed: np.ndarray | str | None) -> tuple[bool | None, str]:
+        """Return whether these u and s, (calls, 2, n), are the recorded ones, and what differs first.
+
+        A text says why the law cannot be replayed; None is a law that ends its process.
+        """
         if self.mismatch_time is not None:
             return False, f"the plant does not move as recorded under these commands, at t = {self.mismatch_time:g} s"
-        scale, total, first = max(float(np.nanmax(np.abs(self.recorded.u))), 1e-300), 0.0, None
-        for k, (i, y), command in zip(self.call_samples, self.measured, commands, strict=True):
-            feedforward = self.scenario.feedforward
-            added = 0.0 if feedforward is None else reference.evaluate(feedforward, y.t)[0]
-            at = slice(None) if i < 0 else slice(i, i + 1)
-            law_u = np.atleast_1d(np.nan if command is None else command)
-            u = np.clip(law_u + added, -self.limits[at], self.limits[at])
-            error = float(np.abs(u - self.recorded.u[k, : len(self.limits)][at]).max()) / scale
-            total += error**2 if error > ROUNDING else 0.0
-            first = k if first is None and not error <= ROUNDING else first
-        rms = (total / max(len(commands), 1)) ** 0.5
-        if first is None or (self.scenario.model == "nominal" and rms <= MODEL_RMS):
-            return True, ""
-        t = first * self.scenario.control_period
-        return False, f"the law computes other commands from its measurements alone, from t = {t:g} s on"
-
-
-class _RecordedLaw:
-    """The law of a Playback: it records its measurements and returns the recorded commands."""
-
-    name = "recorded"
-
-    def __init__(self, run: Playback):
-        self.run = run
-
-    def __call__(self, i: int, y: Any) -> tuple[float, float]:
-        """Return u and s of channel i."""
-        k = len(self.run.commands) - 1
-        self.run.measured.append((i, y))
-        self.run.call_samples.append(k)
-        return float(self.run.recorded.u[k, i]), float(self.run.recorded.s[k, i])
-
-    def call_joint(self, y: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return u and s of all channels."""
-        self(0, y)
-        self.run.measured[-1] = -1, y
-        k = self.run.call_samples[-1]
-        return self.run.recorded.u[k], self.run.recorded.s[k]
+        if computed is None:
+            return False, "the law ends the process in which it is replayed, or takes too long there"
+        if isinstance(computed, str):
+            return None, computed
+        samples = [reading.k for reading in self.readings]
+        for j, (name, recorded) in enumerate({"commands": self.recorded.u, "values of s": self.recorded.s}.items()):
+            largest = max(float(np.nanmax(np.abs(recorded))), 1e-300)
+            error = np.abs(computed[:, j] - recorded[samples]).max(axis=1) / largest
+            wrong = ~(error <= ROUNDING)
+            if wrong.any() and (self.recorded.exact or not np.sqrt(np.mean(error**2)) <= MODEL_RMS):
+                t = samples[int(wrong.argmax())] * self.scenario.control_period
+                return False, f"the law computes other {name} from its measurements alone, from t = {t:g} s on"
+        return True, ""
 
 
 # in the process without the plant
 
 
-def commands_of(tasks: Sequence[tuple[bytes, list[tuple[int, Any]]]]) -> list[list[Any]]:
-    """Return the u of each packed law for its measurements, in their order; None where the law raises.
+def commands_of(tasks: Sequence[tuple[bytes, list[Readings]]]) -> list[np.ndarray | str]:
+    """Return u and s of each packed law for its readings, (calls, 2, n); a text for one that cannot be loaded.
 
     All laws are called twice, first in the reverse order of the tasks. So a law that keeps a state outside its memory
     returns other commands.
     """
-    loaded = [(pickle.loads(law), measured) for law, measured in tasks]
-    for law, measured in reversed(loaded):
-        _commands(law, measured)
-    return [_commands(law, measured) for law, measured in loaded]
+    known = [(_loaded(law), readings) for law, readings in tasks]
+    for law, readings in reversed(known):
+        _commands(law, readings)
+    return [_commands(law, readings) for law, readings in known]
 
 
-def _commands(law: Component, measured: Sequence[tuple[int, Any]]) -> list[Any]:
-    commands = []
-    joints = max((len(y.x) if i < 0 else i + 1 for i, y in measured), default=1)
-    function = reference.PythonComponent(law, joints)
+def _loaded(law: bytes) -> Scenario | str:
+    """Return a packed scenario, or why it cannot be loaded."""
+    try:
+        return pickle.loads(law)
+    except Exception as error:  # whatever importing the user's modules raises
+        return f"its law cannot be loaded in another process ({one_line(f'{type(error).__name__}: {error}')})"
+
+
+def _commands(scenario: Scenario | str, readings: Sequence[Readings]) -> np.ndarray | str:
+    """Return what the law of a scenario computes, NaN where it raises. The plant stays where it is."""
+    if isinstance(scenario, str):
+        return scenario
+    with installed():
+        loop = reference.Loop(scenario, mechanism(scenario))
+    period, commands = scenario.control_period, np.full((len(readings), 2, scenario.plant.n), np.nan)
     with np.errstate(all="ignore"):
-        for i, y in measured:
+        for j, (_, t, x, v) in enumerate(readings):
+            rates = v.copy()
             try:
-                commands.append(function.call_joint(y)[0] if i < 0 else function(i, y)[0])
+                for i in range(len(v)):
+                    rates[i], loop.a[i] = loop.estimator(i, Reading(period, float(x[i]), float(v[i])))
+                commands[j] = loop.update_law(x, rates, t)
             except reference.Failure:
-                commands.append(None)
+                continue
     return commands

@@ -30,7 +30,7 @@ def replayed(
     """Replay chosen runs. Return hash -> the columns of the table that their replays change.
 
     Results are written into the folder, so that a study that goes on replays nothing twice. A law that cannot be sent
-    to another process is not replayed, and a note says so.
+    to another process is not replayed, and a line on standard error says so.
     """
     chosen, known = _chosen(runs), _known(folder / FILE)
     if missing := [name for name in chosen if name not in known]:
@@ -79,6 +79,8 @@ def _results(runs: Mapping[str, Scenario], store: Store, threads: int | None) ->
     results: dict[str, str | None] = {}
     for name, trace, replay in zip(runs, traces, replays(traces), strict=True):
         row = store.row(name)
+        if replay.same is None and trace.failure is None:
+            print(f"not replayed: {trace.scenario.law.name}, {replay.why}", file=sys.stderr)
         if any(row.get(column) != value for column, value in result_columns(trace).items()):
             results[name] = OTHER_SCORES
         else:

@@ -19,6 +19,7 @@ from smc_mujoco.evidence.boards import entries, simulator, standings
 from smc_mujoco.evidence.boards.scoring import VERSION_CRITERIA, of_arrays
 from smc_mujoco.evidence.boards.simulator import Case, Machine
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1
+from smc_mujoco.studies.replay import Replay
 
 ROBOTS = pytest.mark.parametrize("robot", boards.ROBOTS)
 ROWS = [
@@ -317,6 +318,25 @@ def test_the_entry_swings_up_and_balances(robot, traces):
     own = {"reference": smc.Constant(0.1), "feedforward": smc.Constant(0.1), "velocity": "levant", "seed": 3}
     designed = dataclasses.replace(traces[robot], scenario=dataclasses.replace(traces[robot].scenario, **own))
     assert boards.board(designed) == boards.board(traces[robot])
+
+
+def test_a_law_of_the_python_loop_enters_only_if_it_knows_its_measurements_alone(traces, monkeypatch):
+    """It can reach the plant, and put it upright at each sample."""
+
+    @smc.law_function(plants=boards.ROBOTS)
+    def uncompiled(y, gains, memory):
+        return 0.0, float(str(y.x))
+
+    trace = traces["acrobot"]
+    entered = dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, law=uncompiled))
+    results = [Replay(False, "the plant does not move as recorded"), Replay(None, "it cannot be sent"), Replay(True)]
+    monkeypatch.setattr(standings, "replay", lambda one: results.pop(0))
+    for why in ("the plant does not move as recorded", "it cannot be sent"):
+        with pytest.raises(smc.ScenarioError, match=f"uncompiled cannot enter the board, {why}: see smc.replay"):
+            boards.board(entered)
+    assert boards.board(entered)[0].name == boards.NAME
+    assert results == []
+    boards.board(trace)
 
 
 @ROBOTS

@@ -3,6 +3,7 @@
 import json
 import secrets
 import sys
+import threading
 import time
 
 import mujoco
@@ -61,6 +62,26 @@ def peeks(y, gains, memory):
 
 
 @smc.law_function(gains={"k": 5.0})
+def peeks_for_s(y, gains, memory):
+    return -gains.k * (y.de + 3.0 * y.e), y.e if plant_data() is None else float(plant_data().qpos[0])
+
+
+@smc.estimator_function
+def peeking_estimator(y, gains, memory):
+    return y.v if plant_data() is None else float(plant_data().qvel[0])
+
+
+@smc.estimator_function
+def honest_estimator(y, gains, memory):
+    return y.v
+
+
+@smc.surface_function(gains={"c": 3.0})
+def honest_surface(y, gains, memory):
+    return y.de + gains.c * y.e, 0.0
+
+
+@smc.law_function(gains={"k": 5.0})
 def writes(y, gains, memory):
     if (data := plant_data()) is not None:
         data.qpos[0] *= 0.9
@@ -93,6 +114,7 @@ def drawn(monkeypatch):
 
 
 CHEATS = {"peeks": peeks, "writes": writes, "counts_calls": counts_calls, "reads_the_clock": reads_the_clock}
+CHEATS |= {"peeks_for_s": peeks_for_s}
 
 
 # the noise
@@ -204,15 +226,56 @@ def test_a_replay_tells_cheats_from_honest_laws():
         smc.Scenario(plant="duffing", law="pid", friction=smc.Coulomb(0.1), actuator=smc.DCMotor(), duration=0.4),
         smc.Scenario(plant="duffing", law=honest, feedforward=smc.Sine(1.0, 2.0), input_delay=0.002, duration=0.4),
     ]
+    quiet = fields | {"noise": smc.Noise(position=0.002, velocity=0.01), "model": "nominal"}
+    runs += [smc.Scenario(**quiet, law=law) for law in (peeks(k=0.2), honest)]  # which change u by less than 1 % of it
+    runs += [
+        smc.Scenario(**fields, law=honest, velocity=honest_estimator),
+        smc.Scenario(**fields, law="classical", surface=honest_surface),
+    ]
     found = dict(zip([f"{i} {run.law.name}" for i, run in enumerate(runs)], replays(smc.run(runs)), strict=True))
     assert {name.partition(" ")[2] for name, one in found.items() if not one.same} == {*CHEATS}
+    assert [one.same for name, one in found.items() if name.endswith(" peeks")] == [False, False]
     assert "the plant does not move as recorded" in found["2 writes"].why
     assert "the law computes other commands from its measurements alone" in found["1 peeks"].why
 
 
-@pytest.mark.filterwarnings("ignore:.*the run takes the reference loop")
-def test_a_cheat_is_a_failure_in_the_table(tmp_path, monkeypatch):
+@pytest.fixture
+def here(monkeypatch):
+    """Replay in this process."""
     monkeypatch.setattr(replay, "_in_fresh_process", lambda task, given: getattr(replay, task)(given))
+
+
+@pytest.mark.filterwarnings("ignore:.*the run takes the reference loop")
+def test_an_estimator_of_a_user_s_is_replayed_without_the_plant(here):
+    brief = NOISY | {"noise_key": 77, "law": honest(k=0.2), "duration": 0.02}
+    runs = [smc.Scenario(**brief, velocity=each) for each in (peeking_estimator, honest_estimator)]
+    assert [one.same for one in replays(smc.run(runs))] == [False, True]
+
+
+def test_a_law_that_ends_its_process_is_a_cheat_and_one_that_cannot_be_sent_stops_no_other(here, monkeypatch):
+    lock = threading.Lock()
+
+    @smc.law_function
+    def locked(y, gains, memory):
+        return -5.0 * y.e + 0.0 * (lock is None), y.e
+
+    def ends(task, given):
+        if task == "commands_of" and any(b"honest" in law for law, _ in given):
+            raise smc.ScenarioError("a replay failed in its process")
+        return getattr(replay, task)(given)
+
+    monkeypatch.setattr(replay, "_in_fresh_process", ends)
+    runs = [smc.Scenario(plant="duffing", law=law, duration=0.01) for law in (locked, honest, smc.law("pid"))]
+    with pytest.warns(smc.PlainLoopWarning):
+        unsent, ended, fair = replays(smc.run(runs))
+    assert unsent.same is None
+    assert "cannot be sent to another process" in unsent.why
+    assert ended == (False, "the law ends the process in which it is replayed, or takes too long there")
+    assert fair.same
+
+
+@pytest.mark.filterwarnings("ignore:.*the run takes the reference loop")
+def test_a_cheat_is_a_failure_in_the_table(tmp_path, here):
     runs = smc.grid("duffing", [honest, peeks, counts_calls, "pid"], "noise", seeds=2, duration=0.4)
     table = smc.study(runs, tmp_path, noise_key=5, replay=True)
     rows = {}

@@ -11,8 +11,10 @@ from smc_mujoco.evidence.boards.entries import FEEDBACKS, entry, on_board
 from smc_mujoco.evidence.boards.published import ROBUSTNESS, SIMULATION, RobustnessRow, Row
 from smc_mujoco.evidence.boards.scoring import criteria, score, shoulder_first
 from smc_mujoco.evidence.boards.simulator import Robustness
+from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.studies.replay import replay
 
 NAME = "trajectory + Riccati"  # of this package's entry
 MEASURED_MARK = "*"  # ends the name of a row with measured velocities
@@ -59,8 +61,9 @@ def board(runs: Trace | Mapping[str, Trace], name: str = NAME) -> tuple[Row, ...
       name: of the row of a single trace.
 
     Raises:
-      ScenarioError: another plant than pendubot and acrobot, a run by other rules than the boards', or a name that
-        cannot be printed or is that of a published row.
+      ScenarioError: another plant than pendubot and acrobot, a run by other rules than the boards', a law that
+        needs the Python loop and knows more than its measurements, or a name that cannot be printed or is that of a
+        published row.
     """
     traces = runs if isinstance(runs, Mapping) else {name: runs}
     robot = next(iter(traces.values())).scenario.plant.name
@@ -78,6 +81,9 @@ def _row(name: str, trace: Trace, robot: str) -> Row:
                 f"the run has {rule} {errors.shown(value)}, and the boards have {errors.shown(right)}: "
                 "use smc.boards.on_board"
             )
+    # a compiled law sees no plant
+    if prepare(trace.scenario).why_not and not (result := replay(trace)).same:
+        raise errors.ScenarioError(f"{trace.scenario.law.name} cannot enter the board, {result.why}: see smc.replay")
     return Row(name=name, score=score(values), **{field: getattr(values, field) for field in Row._fields[1:6]})
 
 
