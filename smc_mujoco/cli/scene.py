@@ -10,6 +10,7 @@ from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import slug
+from smc_mujoco.draw import style
 from smc_mujoco.draw.film.camera import Camera
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
@@ -27,9 +28,9 @@ def perform(
     threads: int | None,
     clock: Timer,
     terminal: Terminal,
-    export: Sequence[str] = (),
-    question: str = "",
-    speed: float | None = None,
+    export: Sequence[str],
+    question: str,
+    speed: float | None,
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film to the folder `out`.
 
@@ -38,7 +39,7 @@ def perform(
       threads: simulations at once; None for one per core.
       clock: measures the time of each part.
       export: formats in which traces are written besides .npz.
-      question: printed first.
+      question: printed first; "" for none.
       speed: playback speed of the film; None to choose it by the motion.
     """
     if question:
@@ -82,11 +83,11 @@ def simulate(scene: Scene, threads: int | None, clock: Timer = contextlib.nullco
     """Run all scenarios of the scene at once, with a progress bar."""
     with clock("compiling"):
         runs = [(condition, label, prepare(scenario)) for condition, label, scenario in scene.runs()]
-    traces: dict[str, dict[str, Trace]] = {condition: {} for condition in scene.conditions}
     with clock("simulating"):
         made = run([prepared for _, _, prepared in runs], threads, progress=True)
+    traces: dict[str, dict[str, Trace]] = {}
     for (condition, label, _), trace in zip(runs, made, strict=True):
-        traces[condition][label] = trace
+        traces.setdefault(condition, {})[label] = trace
     return traces
 
 
@@ -107,10 +108,10 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
     from smc_mujoco.draw.page import files
 
     if scene.figure == "signals":
-        flat = [(condition, trace) for condition, runs in traces.items() for trace in runs.values()]
-        path = out / "signals"
-        signals([t for _, t in flat], path, labels=[c for c, _ in flat], title=scene.title)
-        return files(path)
+        named = [(condition, trace) for condition, runs in traces.items() for trace in runs.values()]
+        labels = [condition for condition, _ in named]
+        signals([trace for _, trace in named], out / "signals", labels=labels, title=scene.title)
+        return files(out / "signals")
     if scene.figure == "chattering":
         from smc_mujoco.draw.amplitudes import amplitudes
 
@@ -119,26 +120,18 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
     from smc_mujoco.draw.joints import joints
 
     written: list[Path] = []
+    draw = joints if scene.figure == "joints" else figure
     for condition, runs in traces.items():
         path = out / f"{slug(condition)}.svg"
-        drawn = joints if scene.figure == "joints" else figure
-        drawn(list(runs.values()), path, labels=_labels(runs), title=_title(scene, condition))
+        draw(list(runs.values()), path, labels=[*map(style.label, runs)], title=_title(scene, condition))
         written += files(path)
     return written
 
 
-def _labels(runs: Mapping[str, Trace]) -> list[str]:
-    """Return the labels of a condition's runs for pictures: boundary_layer as "Boundary layer"."""
-    from smc_mujoco.draw.style import label
-
-    return [label(name) for name in runs]
-
-
-def film(scene: Scene, traces: Traces, out: Path, terminal: Terminal, speed: float | None = None) -> list[Path]:
+def film(scene: Scene, traces: Traces, out: Path, terminal: Terminal, speed: float | None) -> list[Path]:
     """Film the scene's filmed condition and return the file; if nothing can render, print why and return []."""
-    runs = traces[scene.film]
-    path = out / f"{slug(scene.film)}.mp4"
-    return filmed(list(runs.values()), path, _labels(runs), _title(scene, scene.film), terminal, speed, scene.camera)
+    runs, path, title = traces[scene.film], out / f"{slug(scene.film)}.mp4", _title(scene, scene.film)
+    return filmed(list(runs.values()), path, [*map(style.label, runs)], title, terminal, speed, scene.camera)
 
 
 def filmed(

@@ -19,7 +19,7 @@ from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.catalogue import scores as metric_scores
 from smc_mujoco.metrics.channel_groups import Group, groups
-from smc_mujoco.metrics.conventions import Metric
+from smc_mujoco.metrics.conventions import CATALOGUE, Metric
 from smc_mujoco.metrics.tip import tip_scores, worst_joint
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
@@ -100,7 +100,8 @@ def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:
     if not next(iter(traces.values())).scenario.plant.tip:
         return []
     values = {label: tip_scores(trace) for label, trace in traces.items() if trace.diverged_at is None}
-    shown = {head: one for head, one in TIP_COLUMNS.items() if any(one[0] in each for each in values.values())}
+    known = {name for its in values.values() for name in its}
+    shown = {head: column for head, column in TIP_COLUMNS.items() if column[0] in known}
     heads = [Text(f"{head}\n").append(unit, "dim") for head, (_, unit, _) in shown.items()]
     room = len(shown) < MAX_TIP_COLUMNS
     table = _by_label(f"{title}, tip", [*heads, *([Text("most work\n").append("J", "dim")] * room)], traces.values())
@@ -118,12 +119,12 @@ def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:
 
 def headings(scenario: Scenario) -> dict[Group, str]:
     """Return group of channels -> heading that names its joints; "" for the only group of a plant."""
-    each = groups(scenario)
-    if len(each) == 1:
-        return {each[0]: ""}
+    of_plant = groups(scenario)
+    if len(of_plant) == 1:
+        return {of_plant[0]: ""}
     names = [joint.name for joint in joints(scenario.plant.spec())]
     titles = {}
-    for group in each:
+    for group in of_plant:
         n = len(group.channels)
         listed = ", ".join(names[i] for i in group.channels) if n <= MAX_NAMED_JOINTS else f"{n} joints"
         titles[group] = f"{'driven' if group.driven else 'free'}: {listed} ({group.unit})"
@@ -139,13 +140,13 @@ def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> 
       names: of the metrics. Those that apply to none of the plants are left out.
       traces: condition -> label -> trace.
     """
-    every = (trace.scenario for runs in traces.values() for trace in runs.values())
-    plants = {(scenario.plant, scenario.efforts[0]): None for scenario in every}
-    known = {m.name: m for m in metrics() if not all(m.refusal(plant) for plant, _ in plants)}
+    scenarios = (trace.scenario for runs in traces.values() for trace in runs.values())
+    plants = dict.fromkeys((scenario.plant, scenario.efforts[0]) for scenario in scenarios)
     shown = {}
-    for name in filter(known.__contains__, names):
-        units = dict.fromkeys(known[name].unit_for(plant.unit, effort) for plant, effort in plants)
-        shown[f"{name} ({' or '.join(units)})"] = known[name]
+    for name in names:
+        if not all(CATALOGUE[name].refusal(plant) for plant, _ in plants):
+            units = dict.fromkeys(CATALOGUE[name].unit_for(plant.unit, effort) for plant, effort in plants)
+            shown[f"{name} ({' or '.join(units)})"] = CATALOGUE[name]
     if len(traces) == 1:
         (runs,) = traces.values()
         return [_answer("", [(head, metric, runs) for head, metric in shown.items()])]
@@ -154,12 +155,12 @@ def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> 
 
 def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace]]]) -> Table:
     """Return a table with a line for every label; each column has a heading, a metric and labelled runs."""
-    runs = [trace for _, _, each in columns for trace in each.values()]
-    table = _by_label(title, [Text(head) for head, _, _ in columns], runs, 30)
+    traces = [trace for _, _, runs in columns for trace in runs.values()]
+    table = _by_label(title, [Text(head) for head, _, _ in columns], traces, 30)
     table.min_width = len(title)  # a narrower table would break the title
-    lines = {label: trace for _, _, runs in reversed(columns) for label, trace in runs.items()}
+    first = {label: trace for _, _, runs in reversed(columns) for label, trace in runs.items()}
     for label in dict.fromkeys(label for _, _, runs in columns for label in runs):
-        table.add_row(_label(label, lines[label]), *(_cell(metric, runs.get(label)) for _, metric, runs in columns))
+        table.add_row(_label(label, first[label]), *(_cell(metric, runs.get(label)) for _, metric, runs in columns))
     return table
 
 
@@ -172,11 +173,8 @@ def _cell(metric: Metric, trace: Trace | None) -> Text | str:
 
 def _score_text(metric: str, value: float) -> str:
     """Return a score as text. Overshoot of a run that goes far away has no digits that matter."""
-    return (
-        f"> {MAX_PRINTED_OVERSHOOT}"
-        if metric == "overshoot" and MAX_PRINTED_OVERSHOOT < value < math.inf
-        else number(value)
-    )
+    large = metric == "overshoot" and MAX_PRINTED_OVERSHOOT < value < math.inf
+    return f"> {MAX_PRINTED_OVERSHOOT}" if large else number(value)
 
 
 def _by_label(title: str, heads: Iterable[Text], traces: Iterable[Trace], width: int = 16) -> Table:
@@ -281,13 +279,10 @@ def chattering(
     table = titled(f"chattering of {plant.name}: predicted, and measured in runs", "law", *numbers)
     for scenario, cycle, (amplitude, frequency), change in zip(scenarios, cycles, measured, changes, strict=True):
         law = Text(scenario.law.name, style=style.law_colour(scenario.law.name))
-        both = [
-            text
-            for predicted, run in ((cycle.amplitude, amplitude), (cycle.frequency, frequency))
-            for text in (number(predicted), number(run) + change.mark)
-        ]
+        sizes = number(cycle.amplitude), number(amplitude) + change.mark
+        rates = number(cycle.frequency), number(frequency) + change.mark
         share = cycle.coupling if plant.driven > 1 else cycle.third_harmonic
-        table.add_row(law, *both, _share(cycle.uncertainty), _share(share))
+        table.add_row(law, *sizes, *rates, _share(cycle.uncertainty), _share(share))
     if any(change.marked for change in changes):
         table.caption = NOTE
     return table
@@ -301,7 +296,8 @@ def _share(share: float) -> str:
 def designs(designs: Sequence[Design], unit: str) -> Table:
     """Return the gains of each design, and the constant disturbance, in `unit`, that it tolerates."""
     table = titled("largest gains", "law", "gains", Column(f"tolerates ({unit})", justify="right"))
-    for one in designs:
-        gains = ", ".join(f"{name}={number(gain)}" for name, gain in one.law.gains.items() if math.isfinite(gain))
-        table.add_row(Text(one.law.name, style=style.law_colour(one.law.name)), gains, number(one.disturbance))
+    for design in designs:
+        law = Text(design.law.name, style=style.law_colour(design.law.name))
+        gains = ", ".join(f"{name}={number(gain)}" for name, gain in design.law.gains.items() if math.isfinite(gain))
+        table.add_row(law, gains, number(design.disturbance))
     return table

@@ -11,6 +11,7 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.gains_for import Design
@@ -62,18 +63,8 @@ def tune(
 
     writable(out, front)
     path, terminal = out and with_ending(out, ".json"), Terminal()
-    tuned = search.tune(
-        options.plant(plant),
-        law,
-        search.BUDGET if budget is None else budget,
-        seed,
-        objective,
-        threads,
-        progress=True,
-        conditions=options.conditions(condition) or None,
-        starts=options.starts(x0, spread),
-        chattering=chattering,
-    )
+    tries, tested, start = budget or search.BUDGET, options.conditions(condition) or None, options.starts(x0, spread)
+    tuned = search.tune(options.plant(plant), law, tries, seed, objective, threads, True, tested, start, chattering)
     terminal.print(tuned)
     terminal.note(f"{terminal.seconds:.0f} s", "dim")
     if path:
@@ -134,8 +125,8 @@ def margins(
         results = search(machines, chosen, kind, gains, quick, threads, progress.reached, condition, start)
     for name in kind:
         terminal.print(tables.margins(name, [margin for margin in results if margin.kind == name]))
-    count = f"{len(results)} margin{'s' * (len(results) != 1)}"
-    terminal.note(f"{count}, {options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim", wrap=True)
+    words = f"{counted(len(results), 'margin')}, {options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s"
+    terminal.note(words, "dim", wrap=True)
     if out:
         terminal.wrote(save_csv(results, out))
     if json:
@@ -211,11 +202,11 @@ def worst(
     set_bounds: dict[str, Any] = {name: bound for name, bound in bounds.items() if bound}
     within = Uncertainty(hold=hold, **set_bounds) if set_bounds else None
     chosen, cases = _attacked_cases(plant, law, condition, duration, gains)
-    results = WorstCases(worst_case(one, metric, within, budget, seed, threads, progress=True) for one in cases)
+    results = WorstCases(worst_case(runs, metric, within, budget, seed, threads, progress=True) for runs in cases)
     terminal.print(results)
-    terminal.note(f"{sum(one.tried for one in results)} runs, {options.gains_used(chosen, gains)}", "dim", wrap=True)
+    terminal.note(f"{sum(case.tried for case in results)} runs, {options.gains_used(chosen, gains)}", "dim", wrap=True)
     if json:
-        terminal.wrote(write_json(json, [one.about() for one in results]))
+        terminal.wrote(write_json(json, [case.about() for case in results]))
     if out:
         results.figure(out)
         terminal.wrote(*files(out))
@@ -243,10 +234,10 @@ def _attacked_cases(
         rig, ensemble = rigs.rig(plant), annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig")
         gain_set = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
         chosen = options.laws(law, of_rig=rig.laws) or rig.laws
-        cases = [ensemble.runs(rig, [one], 1, gain_set, duration) for one in chosen]
+        cases = [ensemble.runs(rig, [attacked], 1, gain_set, duration) for attacked in chosen]
         return [runs[0].law for runs in cases], cases
     chosen = options.laws(law, gain_sets.LAWS)
-    return chosen, [[case(options.plant(plant), one, condition, duration, gains)] for one in chosen]
+    return chosen, [[case(options.plant(plant), attacked, condition, duration, gains)] for attacked in chosen]
 
 
 @errors_as_sentences()
@@ -351,22 +342,13 @@ def basin(
     chosen = options.law(law)
     with bar(f"{law} on {plant}") as progress:
         region = search(
-            options.plant(plant),
-            chosen,
-            (points, points),
-            gains=gains,
-            duration=duration,
-            threads=threads,
-            report=progress.reached,
-            condition=condition,
-        )
+            options.plant(plant), chosen, (points, points), gains=gains, duration=duration, threads=threads,
+            report=progress.reached, condition=condition,
+        )  # fmt: skip
     terminal.note(f"{region.law} on {region.plant}: {100 * region.share:.3g} % of the states converge")
     yes, no, undecided = (int((region.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED))
-    terminal.note(
-        f"{yes} converge, {no} do not, {undecided} undecided after {duration:g} s; "
-        f"{options.gains_used([chosen], gains)}, {terminal.seconds:.0f} s",
-        "dim",
-    )
+    counts = f"{yes} converge, {no} do not, {undecided} undecided after {duration:g} s"
+    terminal.note(f"{counts}; {options.gains_used([chosen], gains)}, {terminal.seconds:.0f} s", "dim")
     if json:
         terminal.wrote(region.save(json))
     if pictures:
@@ -462,12 +444,14 @@ def _designed(
     """Return the cases whose laws have gains for the bounds, with these gains, and the gains; name the other laws."""
     from smc_mujoco.analysis.gains_for import design
 
-    designs = []
-    for one in cases:
+    designed, designs = [], []
+    for scenario in cases:
         try:
-            designs.append((one, design(one, amplitude, frequency, channel)))
+            designs.append(design(scenario, amplitude, frequency, channel))
         except ScenarioError as error:
-            terminal.note(f"{one.law.name} is left out: {error}", "yellow", wrap=True)
+            terminal.note(f"{scenario.law.name} is left out: {error}", "yellow", wrap=True)
+        else:
+            designed.append(dataclasses.replace(scenario, law=designs[-1].law))
     if not designs:
         raise ScenarioError("no law has such gains: give a larger --amplitude or --frequency")
-    return [dataclasses.replace(one, law=made.law) for one, made in designs], [made for _, made in designs]
+    return designed, designs

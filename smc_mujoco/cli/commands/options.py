@@ -218,11 +218,6 @@ def numbers(text: str | None, option: str, example: str) -> dict[str, float]:
     return values
 
 
-def noise_key_of(number: int | None) -> int | str:
-    """Return the noise key of a study from the option --noise-key."""
-    return "drawn" if number is None else number
-
-
 def columns(text: str | None) -> dict[str, str]:
     """Return the rig's name of a column -> the file's, from the option --columns."""
     return pairs(text, "columns", "theta=arm_angle,t=time")

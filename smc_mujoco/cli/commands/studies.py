@@ -1,5 +1,6 @@
 """smc-mujoco compare, which: questions that many runs of many laws answer."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,9 +10,12 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.interrupts import delay_ctrl_c
+from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.initial_states import Starts
+    from smc_mujoco.simulation.scenario import Scenario
+    from smc_mujoco.studies.board import Boards
     from smc_mujoco.studies.table import Table
 
 
@@ -66,24 +70,13 @@ def which(
         from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
         from smc_mujoco.studies.adviser import which as advise
 
-    terminal = Terminal()
+    terminal, tested, start = Terminal(), options.conditions(condition) or None, options.starts(x0, spread)
     advice = advise(
-        options.plant(plant),
-        options.conditions(condition) or None,
-        options.names(needs),
-        options.laws(law) or None,
-        seeds,
-        duration,
-        options.starts(x0, spread),
-        out,
-        quick,
-        threads,
-        progress=True,
-        defaults=defaults,
-        relevant=RELEVANT if relevant is None else relevant,
-        noise_key=options.noise_key_of(noise_key),
+        options.plant(plant), tested, options.names(needs), options.laws(law) or None, seeds, duration, start, out,
+        quick, threads, progress=True, defaults=defaults, relevant=RELEVANT if relevant is None else relevant,
+        noise_key="drawn" if noise_key is None else noise_key,
         within=None if disturbance is None else Uncertainty(disturbance=disturbance),
-    )
+    )  # fmt: skip
     terminal.print(advice)
     runs = f"{len(advice.table)} runs are in {printable(str(out / 'results.parquet'))}"
     terminal.note(f"{runs}; {terminal.seconds:.0f} s", "dim")
@@ -147,40 +140,32 @@ def compare(
         from smc_mujoco.common.files import writable
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.compare import compare as run
+        from smc_mujoco.studies.leaderboard import leaderboard
+        from smc_mujoco.studies.study import study
 
     terminal, pictures = Terminal(), files(figure)
     relevant = RELEVANT if relevant is None else relevant
     writable(*pictures, latex)
-    start, key = options.starts(x0, spread), options.noise_key_of(noise_key)
+    start, key = options.starts(x0, spread), "drawn" if noise_key is None else noise_key
     if rig is not None:
         if plants or condition or gains != "tuned" or worst or figure or latex:
             raise ScenarioError(
                 "--rig brings its own plant, parameter sets and gains: leave out the plants, --condition, --gains, "
                 "--worst, --figure and --latex"
             )
-        _compare_on_rig(rig, law, seeds, duration, start, out, fresh, executor, threads, defaults, relevant, key)
+        scenarios, verdict = _on_rig(rig, law, seeds, duration, start)
+        table = study(scenarios, out, not fresh, executor, threads, progress=True, noise_key=key, replay=True)
+        boards = leaderboard(table, defaults=defaults, relevant=relevant)
+        terminal.print(boards)
+        terminal.note(verdict(boards))
+        _finish(table, out, terminal)
         return
     machines = [options.plant(text) for text in options.names(plants)]
     comparison = run(
-        options.compared_laws(law, machines, gains),
-        machines or None,
-        options.conditions(condition) or None,
-        seeds,
-        tune,
-        worst,
-        executor,
-        out=out,
-        duration=duration,
-        starts=start,
-        gains=gains,
-        quick=quick,
-        defaults=defaults,
-        relevant=relevant,
-        traces=traces,
-        fresh=fresh,
-        noise_key=key,
-        threads=threads,
-    )
+        options.compared_laws(law, machines, gains), machines or None, options.conditions(condition) or None, seeds,
+        tune, worst, executor, out=out, duration=duration, starts=start, gains=gains, quick=quick, defaults=defaults,
+        relevant=relevant, traces=traces, fresh=fresh, noise_key=key, threads=threads,
+    )  # fmt: skip
     terminal.print(comparison)
     if latex:
         comparison.to_latex(latex)
@@ -191,41 +176,23 @@ def compare(
     _finish(comparison.table, out, terminal)
 
 
-def _compare_on_rig(
-    rig: str,
-    law: list[str] | None,
-    seeds: int,
-    duration: float | None,
-    starts: "Starts | None",
-    out: Path,
-    fresh: bool,
-    executor: str,
-    threads: int | None,
-    defaults: bool,
-    relevant: float,
-    noise_key: int | str,
-) -> None:
-    """Compare laws over the parameter sets of a rig."""
+def _on_rig(
+    rig: str, law: list[str] | None, seeds: int, duration: float | None, starts: "Starts | None"
+) -> "tuple[list[Scenario], Callable[[Boards], str]]":
+    """Return the runs of laws over the parameter sets of a rig, and what says if one law wins on all sets."""
     from smc_mujoco.common import annexes
-    from smc_mujoco.studies.leaderboard import leaderboard
-    from smc_mujoco.studies.study import FULL, study
+    from smc_mujoco.studies.study import FULL
 
-    terminal, ensemble = Terminal(), annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
+    ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
     machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
-    chosen = options.laws(law, of_rig=machine.laws) or None
-    length = FULL.duration if duration is None else duration
-    scenarios = ensemble.runs(machine, chosen, seeds, "default", length, starts)
-    table = study(scenarios, out, not fresh, executor, threads, progress=True, noise_key=noise_key, replay=True)
-    boards = leaderboard(table, defaults=defaults, relevant=relevant)
-    terminal.print(boards)
-    terminal.note(ensemble.verdict(boards))
-    _finish(table, out, terminal)
+    chosen, length = options.laws(law, of_rig=machine.laws) or None, FULL.duration if duration is None else duration
+    return ensemble.runs(machine, chosen, seeds, "default", length, starts), ensemble.verdict
 
 
 def _finish(table: "Table", out: Path, terminal: Terminal) -> None:
     """Print the number of runs and the file with all of them."""
     failed = len(table) - table.data["failure"].null_count
-    runs = f"{len(table)} run{'s' * (len(table) != 1)}, {failed} of them failed"
+    runs = f"{counted(len(table), 'run')}, {failed} of them failed"
     key = table.column("noise_key")[0]
     terminal.note(f"{runs}, {f'noise key {key}' if key else 'noise of public seeds'}, {terminal.seconds:.0f} s")
     terminal.wrote(out / "results.parquet")
