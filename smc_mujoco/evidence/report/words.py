@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from smc_mujoco.analysis.margins import MARGIN_KINDS
 from smc_mujoco.common.text import number as in_digits
 from smc_mujoco.control import gain_sets
-from smc_mujoco.control.law import laws
+from smc_mujoco.control.law import known_laws, laws
 from smc_mujoco.draw import style
 from smc_mujoco.draw.style import law_initials as short
 from smc_mujoco.draw.style import law_name as law
@@ -44,8 +44,8 @@ def interval(median: float, low: float, high: float) -> str:
 
 
 def colour(name: str) -> str:
-    """Return the colour of a law in figures and films; no law has that of another law of the short list."""
-    shown = list(dict.fromkeys([*gain_sets.LAWS, name]))
+    """Return the colour of a law; no law has that of one of the short list, or of an installed package."""
+    shown = list(dict.fromkeys([*gain_sets.LAWS, *known_laws().added, name]))
     return style.law_colours(shown)[shown.index(name)]
 
 

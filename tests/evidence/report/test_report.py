@@ -6,6 +6,7 @@ The browser is Chromium (Debian, Ubuntu: apt-get install chromium); without it t
 import dataclasses
 import html.parser
 import importlib
+import itertools
 import json
 import math
 import os
@@ -14,6 +15,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -241,6 +243,10 @@ def test_thirteen_laws_have_colours_and_short_names_of_their_own(monkeypatch):
     assert words.law("pid") == "PID"
     near = (words.style.distance(words.colour(f"law_{k}"), words.colour("super_twisting")) for k in range(300))
     assert min(near) > 2 * words.style.MIN_DISTANCE  # a user's law, of any name
+    mine = [f"law_{k}" for k in range(8)]  # of installed packages, in one report
+    monkeypatch.setattr(words, "known_laws", lambda: SimpleNamespace(added=mine), raising=False)
+    several = itertools.combinations(map(words.colour, mine), 2)
+    assert min(words.style.distance(*pair) for pair in several) > words.style.MIN_DISTANCE
 
 
 def forest_of(findings):
