@@ -1,29 +1,21 @@
 """What every command says of itself, and that each of its options reaches the function that does the work."""
 
-import dataclasses
 import importlib
 import inspect
 import itertools
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from types import NoneType
 from typing import Any
 
 import pytest
 from typer.models import OptionInfo
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.cli import main
-from smc_mujoco.control.component import Component
 from smc_mujoco.draw import display
-from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.conditions import Condition
-from smc_mujoco.simulation.initial_states import Starts
-from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.studies.scene import Scene
+from tests.helpers.arguments import told
 from tests.helpers.words import words
 
 TYPED = ("duffin", "hierarchica", "encode", "vdp_nois", "noise+duffin")  # begun names: what completes them is told
@@ -115,31 +107,6 @@ PRINTED = [  # command lines that are run to their ends
 
 class Reached(BaseException):
     """The function that does the work was called; it passes the command's sentences for errors."""
-
-
-def told(value: Any) -> str:
-    """Return an argument in words: of what the package makes, its name and what differs from the default."""
-    return next((words(value) for kind, words in WORDS.items() if isinstance(value, kind)), f"a {type(value).__name__}")
-
-
-def told_scenario(scenario: Scenario) -> str:
-    """Return plant, law and what differs from the default."""
-    plain = Scenario(plant=scenario.plant, law=scenario.law)
-    given = {one.name: getattr(scenario, one.name) for one in dataclasses.fields(scenario)}
-    changed = [f"{name}={told(one)}" for name, one in given.items() if one != getattr(plain, name)]
-    return f"Scenario({', '.join([told(scenario.plant), told(scenario.law), *changed])})"
-
-
-WORDS: dict[Any, Callable[[Any], str]] = {
-    Scenario: told_scenario,
-    Scene: lambda scene: f"Scene({scene.title}, camera={scene.camera}, seeds={ {s.seed for _, _, s in scene.runs()} })",
-    Plant: lambda plant: f"plant {plant.name}",
-    Component: lambda one: f"{one.kind} {one.name if one.source.search else one}, gains of kind {one.source.kind}",
-    Path: lambda path: f"Path({path.as_posix()})",
-    Mapping: lambda values: "{" + ", ".join(f"{key}: {told(one)}" for key, one in values.items()) + "}",
-    (list, tuple): lambda values: f"[{', '.join([*map(told, values[:3]), *['...'] * (len(values) > 3)])}]",
-    (bool, int, float, str, NoneType, Condition, Starts, Uncertainty): repr,
-}
 
 
 def called(function: Callable, arguments: tuple, named: dict[str, Any]) -> str:

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.arguments import told
 from helpers.certificates import certificate
 
 import smc_mujoco as smc
@@ -62,24 +63,12 @@ def identified(count):
     )
 
 
-def shown(value):
-    """An argument in words."""
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {shown(one)}" for key, one in value.items()) + "}"
-    if isinstance(value, list | tuple | Claims):
-        return f"[{', '.join(map(shown, value))}]"
-    if isinstance(value, smc.Scenario):
-        return f"<{value.law.name} on {value.plant.name}, {value.condition}, gains {value.law.source.kind}>"
-    plain = isinstance(value, str | int | float | None | Path | smc.Uncertainty)
-    return str(value) if plain else f"<{getattr(value, 'name', type(value).__name__)}>"
-
-
 class Notes(list):
     """What the stubs were called with."""
 
     def stub(self, monkeypatch, name, gives=None):
         def noted(*given, **options):
-            words = [*map(shown, given), *(f"{key}={shown(one)}" for key, one in options.items())]
+            words = [*map(told, given), *(f"{key}={told(one)}" for key, one in options.items())]
             self.append(f"{name.rpartition('.')[2]}({', '.join(words)})")
             return gives(*given, **options) if callable(gives) else gives
 

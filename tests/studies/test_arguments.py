@@ -1,6 +1,7 @@
 """What the calls of studies refuse, and what their arguments and defaults become, recorded; nothing is run."""
 
 import pytest
+from helpers.arguments import told
 
 import smc_mujoco as smc
 from smc_mujoco.simulation import coerce
@@ -21,36 +22,22 @@ def reached(*given: object, **options: object) -> None:
     raise Reached(given, options)
 
 
-def shown(value: object) -> str:
-    """Return an argument as text, without what differs between processes and folders."""
-    if callable(value) and not isinstance(value, Candidate):
-        return getattr(value, "__name__", "function")
-    if isinstance(value, list | tuple) and not hasattr(value, "_fields"):
-        return f"[{', '.join(map(shown, value))}]"
-    if isinstance(value, dict):
-        return f"{{{', '.join(f'{name}: {shown(one)}' for name, one in value.items())}}}"
-    if isinstance(value, smc.Scenario):
-        given = value.law.name, value.plant.name, value.condition, value.seed, value.noise_key, value.duration
-        return f"Scenario{given}, {value.control_period:g}, {value.physics_step}, {value.velocity}, x0 {value.x0}"
-    return getattr(value, "name", None) or str(value)
-
-
 @pytest.fixture
 def stopped(monkeypatch):
     """What gains, combinations of runs and a study were given; none is searched or run."""
 
     def gains(plant, laws, folder, *given, **options):
         names = [law.name for law in laws]
-        calls.append(f"gains {plant.name} {names} {folder.name} {shown(given)} {shown(options)}")
+        calls.append(f"gains {plant.name} {names} {folder.name} {told(given)} {told(options)}")
         return [Candidate(coerce.law(law), (coerce.law(law),), "a remark") for law in laws]
 
     def combinations(plants, laws, conditions, seeds, *given):
         made = [str(one.on(plants[0], 2.0)) if "(" in one.name else one.name for one in conditions]
-        calls.append(f"runs {shown(plants)} {made} {seeds} {shown(given)}")
+        calls.append(f"runs {told(plants)} {made} {seeds} {told(given)}")
         return []
 
     def runs(scenarios, folder, *given, **options):
-        calls.append(f"study {folder.name} {shown(given)} {shown(options)}")
+        calls.append(f"study {folder.name} {told(given)} {told(options)}")
         raise Reached
 
     calls: list[str] = []
@@ -91,11 +78,11 @@ def test_robust_has_an_adversary_with_these_defaults(stopped, monkeypatch, snaps
     monkeypatch.setattr(trial, "study", lambda runs, folder, **options: stopped.append(f"study {folder}"))
     monkeypatch.setattr(adviser, "default_budget", lambda scenario, within: 1000)
     monkeypatch.setattr(
-        worst_case, "cached_worst_case", lambda *given, **options: stopped.append(shown([*given, options]))
+        worst_case, "cached_worst_case", lambda *given, **options: stopped.append(told([*given, options]))
     )
 
     def contest(table, worst, plant, needs, relevant):
-        stopped.append(shown(["contest", plant, sorted(worst), needs, relevant]))
+        stopped.append(told(["contest", plant, sorted(worst), needs, relevant]))
         reached()
 
     monkeypatch.setattr(adviser, "_contest", contest)
