@@ -88,8 +88,8 @@ class Metric:
         if not any(map(self.fits, driven)):
             return f"{self.name} compares channels and {plant.name} has one of a kind: give a network, n >= 2"
         if "{" in self.unit and len(driven) > 1:
-            each = " and ".join(group.unit for group in driven)
-            return f"{self.name} has no one value where channels are in {each}, as in {plant.name}: use smc.scores"
+            units = " and ".join(group.unit for group in driven)
+            return f"{self.name} has no one value where channels are in {units}, as in {plant.name}: use smc.scores"
         return ""
 
     @property
@@ -122,8 +122,8 @@ class Metric:
 
     def unit_in(self, machine: Plant | Scenario, group: str = "") -> str:
         """Return the unit in the group of that name, such as "free"; without a name, that of the first driven group."""
-        by_name = {one.name: one for one in groups(machine)}
-        chosen = by_name.get(group) or next(iter(by_name.values()))
+        of_plant = groups(machine)
+        chosen = next((known for known in of_plant if known.name == group), of_plant[0])
         return self.unit_for(chosen.unit, chosen.effort)
 
 
@@ -136,11 +136,9 @@ def metric(
     """
 
     def enter(formula: Callable[[Trace], float]) -> Callable[[Trace], float]:
-        name, doc = formula.__name__, inspect.getdoc(formula) or ""
-        summary = doc.partition("\n")[0]
-        label_or_name = label or name.replace("_", " ")
-        entry = Metric(name=name, unit=unit, summary=summary, formula=formula, label=label_or_name, need=need, **flags)
-        CATALOGUE[name] = entry
+        name, summary = formula.__name__, (inspect.getdoc(formula) or "").partition("\n")[0]
+        fields = {"summary": summary, "formula": formula, "label": label or name.replace("_", " "), "need": need}
+        entry = CATALOGUE[name] = Metric(name=name, unit=unit, **fields, **flags)
 
         @functools.wraps(formula)
         def checked(trace: Trace) -> float:

@@ -156,8 +156,8 @@ def respond(
     plant: Plant | str,
     law: Component | Template | str,
     step: float,
-    condition: str | Condition = "nominal",
-    fields: Mapping[str, object] | None = None,
+    condition: str | Condition,
+    fields: Mapping[str, object],
 ) -> StepResponse:
     """Run a law from rest to a step of the reference at t = 0. Rest is at 0, or at `plant.rest` if the plant has it.
 
@@ -170,23 +170,22 @@ def respond(
     Raises:
       ScenarioError: an argument is unknown or out of range.
     """
-    given = dict(fields or {})
-    for name in given:
+    for name in fields:
         if name not in Scenario.fields():
             raise unknown("field of a Scenario", name, Scenario.fields())
-    if "reference" in given:
-        raise ScenarioError(f"reference is {shown(given['reference'])}: leave it out, as it is the step of {step}")
+    if "reference" in fields:
+        raise ScenarioError(f"reference is {shown(fields['reference'])}: leave it out, as it is the step of {step}")
     if isinstance(law, Callable) and not isinstance(law, Template):
         raise ScenarioError(f"law is {shown(law)}: put @smc.law_function(gains={{...}}) above the function")
     height = number("step", step)
     if height == 0.0:
         raise ScenarioError("step is 0: give the height of the step in rad or m, such as 0.2")
     chosen, plant = find_condition(condition), as_plant(plant)
-    under = chosen.on(plant, number("duration", given.get("duration", DURATION)))
+    under = chosen.on(plant, number("duration", fields.get("duration", DURATION)))
     start = {"x0": 0.0, "reference": Step(height)}
     if plant.rest:
         start = {"x0": plant.rest, "reference": [Constant(x + height) for x in plant.rest[: plant.driven]]}
-    scenario = Scenario(**({"plant": plant, "law": law} | start | under | given))  # pyright: ignore[reportArgumentType]
+    scenario = Scenario(plant=plant, law=law, **(start | under | dict(fields)))  # pyright: ignore[reportArgumentType]
     words = [chosen.name] if chosen.name != "nominal" else []
-    words += [f"{name}={shown(value)}" for name, value in given.items()]
+    words += [f"{name}={shown(value)}" for name, value in fields.items()]
     return StepResponse(trace=run(scenario), step=height, condition=", ".join(words))
