@@ -1,8 +1,8 @@
 """Amplitude of chattering over the actuator's lag: predicted as lines, run as dots, one colour for each label.
 
-Each run is repeated with half its physics step. Where that changes its cycle by more than 10 %, the dot is hollow.
+    amplitudes({"lag 1 ms": {"relay": trace, "super-twisting": other}, "lag 10 ms": {...}}, "chattering.svg")
 
-amplitudes({"lag 1 ms": {"relay": trace, "super-twisting": other}, "lag 10 ms": {...}}, "chattering.svg")
+Each run is repeated with half its physics step. Where that changes its cycle by more than 10 %, the dot is hollow.
 """
 
 import itertools
@@ -62,9 +62,8 @@ def amplitudes(
       ScenarioError: no traces, or as `chattering` and `figure`.
     """
     runs: dict[str, list[Trace]] = {}
-    for labelled in traces.values():
-        for label, trace in labelled.items():
-            runs.setdefault(label, []).append(trace)
+    for label, trace in (pair for by_label in traces.values() for pair in by_label.items()):
+        runs.setdefault(label, []).append(trace)
     if not runs:
         raise ScenarioError("no trace to draw: give at least one")
     paths = pages.files(path, format)
@@ -72,15 +71,15 @@ def amplitudes(
     with style.page(width):
         page = pages.blank(width, height or style.points(PAGE_HEIGHT), fig)
         ax = page.subplots()
-        colours = style.law_colours([of[0].scenario.law for of in runs.values()])
+        colours = style.law_colours([its[0].scenario.law for its in runs.values()])
         handles, predicted, hollow = [], {}, False
-        gains, shared = pages.gain_sources([[trace.scenario.law.source for trace in of] for of in runs.values()])
-        for (label, of), colour, source in zip(runs.items(), colours, gains, strict=True):
-            of.sort(key=lambda trace: lag(trace.scenario))
-            lags = [1e3 * lag(trace.scenario) for trace in of]
-            predicted[label] = lags, [predict(trace.scenario, ranges=False).amplitude for trace in of]
+        gains, shared = pages.gain_sources([[trace.scenario.law.source for trace in its] for its in runs.values()])
+        for (label, its), colour, source in zip(runs.items(), colours, gains, strict=True):
+            its.sort(key=lambda trace: lag(trace.scenario))
+            lags = [1e3 * lag(trace.scenario) for trace in its]
+            predicted[label] = lags, [predict(trace.scenario, ranges=False).amplitude for trace in its]
             ax.plot(*predicted[label], color=colour, lw=style.points(2.0))
-            for at, trace, change in zip(lags, of, step_halving(of, 0), strict=True):
+            for at, trace, change in zip(lags, its, step_halving(its, 0), strict=True):
                 face, edge = (style.PAPER, colour) if change.marked else (colour, style.PAPER)
                 ax.plot(at, channel_cycle(trace)[0], "o", color=face, ms=style.points(7.0), mec=edge)
                 hollow |= change.marked

@@ -65,18 +65,20 @@ def plot(
         raise ScenarioError("no runs or no metrics to draw: give a table with rows, and at least one metric")
     colours = dict(zip(laws, style.law_colours(laws), strict=True))
     marks = dict(zip(laws, itertools.cycle(MARKS), strict=False))
-    found = _intervals(table, names)
+    intervals = _intervals(table, names)
+    ran = set(zip(table.column("plant").tolist(), table.column("condition").tolist(), strict=True))
+    conditions_of = {plant: [name for name in conditions if (plant, name) in ran] for plant in plants}
     with style.page(width):
-        key, shared = _key(table, colours, marks, min(one.n for one in found.values()) if found else 0)
-        tall = [0.5 + LINE_HEIGHT * (len(laws) + 1) * len(_conditions_of(table, plant, conditions)) for plant in plants]
+        key, shared = _key(table, colours, marks, min((interval.n for interval in intervals.values()), default=0))
+        tall = [0.5 + LINE_HEIGHT * (len(laws) + 1) * len(conditions_of[plant]) for plant in plants]
         space = pages.head_height(width, key) + style.points(0.6)
         page = pages.blank(width, height or space + style.points(sum(tall)), fig)
         axes = page.subplots(len(plants), len(names), squeeze=False, height_ratios=tall)
         room = 72 * width / len(names) - style.points(50)  # what the axis' numbers and the space beside it leave
         for i, plant in enumerate(plants):
             for k, (name, label) in enumerate(zip(names, _labels(names, plant, room), strict=True)):
-                of_panel = {cell[2:]: one for cell, one in found.items() if cell[:2] == (name, plant)}
-                _panel(axes[i, k], of_panel, _conditions_of(table, plant, conditions), colours, marks, name != SETTLES)
+                of_panel = {cell[2:]: its for cell, its in intervals.items() if cell[:2] == (name, plant)}
+                _panel(axes[i, k], of_panel, conditions_of[plant], colours, marks, name != SETTLES)
                 axes[i, k].set_xlabel(label)
                 axes[i, k].tick_params(labelleft=k == 0)
             over_never = 1.0 + style.points(1.7 * pages.TEXT_SIZE / 72) / style.points(tall[i])
@@ -89,19 +91,19 @@ def plot(
 
 def _intervals(table: Columns, metrics: Sequence[str]) -> dict[tuple[str, str, str, str], Interval]:
     """Return (metric, plant, condition, law) -> the median, or the share of runs that settle, with its interval."""
-    by_row, found = {metric: values(table, metric) for metric in metrics}, {}
+    by_row, intervals = {metric: values(table, metric) for metric in metrics}, {}
     for group in groups(table, GROUPS):
         for metric in metrics:
             scores = group.scores(by_row[metric])
             for law, of_law in scores.values.items():
-                one = median_of(of_law, samples=samples_of(scores.sets[law]))
+                interval = median_of(of_law, samples=samples_of(scores.sets[law]))
                 if metric == SETTLES:
-                    one = share_interval(float((of_law == 0.0).mean()), one.n)
+                    interval = share_interval(float((of_law == 0.0).mean()), interval.n)
                 else:
-                    middle, low, high = (max(v, MIN_SIZE) if v > 0.0 else v for v in one[:3])
-                    one = Interval(middle, low, high, one.n)
-                found[metric, *group.blocks[0], law] = one
-    return found
+                    middle, low, high = (max(v, MIN_SIZE) if v > 0.0 else v for v in interval[:3])
+                    interval = Interval(middle, low, high, interval.n)
+                intervals[metric, *group.blocks[0], law] = interval
+    return intervals
 
 
 def _key(
@@ -118,15 +120,9 @@ def _key(
     return [*key, Line2D([], [], color=style.MUTED, lw=style.points(1.5), label=label)], shared
 
 
-def _conditions_of(table: Columns, plant: str, conditions: Sequence[str]) -> list[str]:
-    """Return the conditions in which a plant ran, in order."""
-    ran = set(table.column("condition")[table.column("plant") == plant].tolist())
-    return [condition for condition in conditions if condition in ran]
-
-
 def _panel(
     ax: Axes,
-    found: Mapping[tuple[str, str], Interval],
+    intervals: Mapping[tuple[str, str], Interval],
     conditions: Sequence[str],
     colours: Mapping[str, str],
     marks: Mapping[str, str],
@@ -137,14 +133,14 @@ def _panel(
     If `log`, its axis is logarithmic where values differ much.
     """
     height = len(colours) + 1
-    sizes = [v for one in found.values() for v in one[:3] if np.isfinite(v)]
+    sizes = [v for interval in intervals.values() for v in interval[:3] if np.isfinite(v)]
     if log and sizes and min(sizes) > 0.0 and max(sizes) > 20.0 * min(sizes):
         ax.set_xscale("log")
         ax.xaxis.set_minor_formatter(NullFormatter())  # numbers between decades would overlap
     for (j, condition), (k, law) in itertools.product(enumerate(conditions), enumerate(colours)):
-        if (condition, law) in found:
+        if (condition, law) in intervals:
             look = {"color": colours[law], "marker": marks[law], "ms": style.points(6), "mec": "none"}
-            _dot(ax, found[condition, law], j * height + k, look)
+            _dot(ax, intervals[condition, law], j * height + k, look)
     if not sizes:
         ax.set_xticks([])
     for j in range(1, len(conditions)):
@@ -156,20 +152,21 @@ def _panel(
     ax.tick_params(axis="y", length=0)
 
 
-def _dot(ax: Axes, one: Interval, line: int, look: dict) -> None:
+def _dot(ax: Axes, interval: Interval, line: int, look: dict) -> None:
     """Draw a median with its interval. An infinite median is at the right edge, under "never"."""
     never = {"transform": ax.get_yaxis_transform(), "clip_on": False}
-    if np.isfinite(one.median):
-        ax.plot(one.median, line, **look)
+    median, low, high = interval[:3]
+    if np.isfinite(median):
+        ax.plot(median, line, **look)
     else:
         ax.plot(1.0, line, **look | {"mfc": style.PAPER, "mec": look["color"]}, **never)
         drawing.note(ax, "never")
-    if np.isfinite(one.low) and np.isfinite(one.high):
-        ax.plot([one.low, one.high], [line, line], color=look["color"], lw=style.points(1.5))
-    elif np.isfinite(one.low):  # up to "never"
-        ax.plot(one.low, line)  # nothing is seen: the axis comprises the interval
+    if np.isfinite(low) and np.isfinite(high):
+        ax.plot([low, high], [line, line], color=look["color"], lw=style.points(1.5))
+    elif np.isfinite(low):  # up to "never"
+        ax.plot(low, line)  # nothing is seen: the axis comprises the interval
         look = {"arrowstyle": "-", "color": look["color"], "lw": style.points(1.5), "ls": ":"}
-        ax.annotate("", (1.0, line), (one.low, line), ("axes fraction", "data"), "data", arrowprops=look)
+        ax.annotate("", (1.0, line), (low, line), ("axes fraction", "data"), "data", arrowprops=look)
 
 
 def _labels(metrics: Sequence[str], plant: str, room: float) -> list[str]:

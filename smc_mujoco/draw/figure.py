@@ -101,8 +101,8 @@ def _composed_page(
     (width, height), shown = size, drawing.horizon(traces)
     early = [drawing.until(trace, shown) for trace in traces]
     overview = _overview(early, chosen)
-    each = style.split(early) if "channels" in chosen else ()
-    small = [row for group in each for row in drawing.small(early, group)]
+    by_group = style.split(early) if "channels" in chosen else ()
+    small = [row for group in by_group for row in drawing.small(early, group)]
     small.sort(key=lambda row: row[0].channel or 0)
     beside = [name for name in chosen if name in SIDE_PANELS]
     groups = [Panel("x", *each) for each in style.split(traces).items()]
@@ -145,7 +145,7 @@ def _cells(
         return first, rest[: len(heights[0])], rest[len(heights[0]) :]
     there = [i for i, part in enumerate(parts) if part]
     grid = page.add_gridspec(1, len(there), width_ratios=[(2.6, 1.7, 1.0)[i] for i in there])
-    over, beside = ([] if not each else _column(grid[there.index(i)], each) for i, each in enumerate(heights, 1))
+    over, beside = (_column(grid[there.index(i)], tall) if tall else [] for i, tall in enumerate(heights, 1))
     return grid[0] if parts[0] else None, over, beside
 
 
@@ -189,7 +189,7 @@ def _overview(traces: Sequence[Trace], chosen: Sequence[str]) -> list[Panel]:
 def _by_joint(panels: Sequence[Panel]) -> list[Panel]:
     """Return the panels, divided into one for each joint of a robot: these have nothing in common."""
     direct = any(panel.traces[0].scenario.plant.direct for panel in panels)
-    return [one for panel in panels for one in (drawing.by_channel(panel) if direct else [panel])]
+    return [part for panel in panels for part in (drawing.by_channel(panel) if direct else [panel])]
 
 
 def _time(span: tuple[float, float]) -> str:
@@ -199,16 +199,9 @@ def _time(span: tuple[float, float]) -> str:
 
 
 def _draw_over_time(
-    page,
-    cells: Sequence[SubplotSpec],
-    overview: Sequence[Panel],
-    words: Sequence[str],
-    names,
-    colours,
-    changes,
-    span: tuple[float, float],
+    page, cells: Sequence[SubplotSpec], overview: Sequence[Panel], words, names, colours, changes, span
 ) -> None:
-    """Draw panels over time in the cells of a column; `span`: the time shown, and that of the run, s."""
+    """Draw panels over time in the cells of a column, labelled `words`; `span`: the time shown, and the run's, s."""
     frames: list[Axes] = []
     axes: list[Axes] = []
     for i, panel in enumerate(overview):
@@ -376,7 +369,7 @@ def signals(
 
 def _by_law_and_condition(traces: Sequence[Trace], conditions: Sequence[str]) -> dict[tuple[str, str], Trace]:
     """Return law, condition -> trace; refuse two traces of one law under one condition."""
-    cells = {(trace.scenario.law.name, one): trace for trace, one in zip(traces, conditions, strict=True)}
+    cells = {(trace.scenario.law.name, name): trace for trace, name in zip(traces, conditions, strict=True)}
     if len(cells) < len(traces):
         raise ScenarioError("two traces of one law under one condition: give each condition its own label")
     return cells

@@ -1,7 +1,4 @@
-"""One small panel for each joint of an arm: how far it is from its reference, and the tip's distance or force.
-
-joints([trace, other], "joints.svg", labels=["computed torque", "passivity"])
-"""
+"""One small panel for each joint of an arm: how far it is from its reference, and the tip's distance or force."""
 
 import dataclasses
 import os
@@ -70,8 +67,7 @@ def joints(
             if k + columns >= len(drawn):
                 ax.set_xlabel("time (s)")
                 ax.tick_params(labelbottom=True)
-        look = panels.dotted()
-        events = [Line2D([], [], **look, label=f"{what} at {time:g} s") for time, what in marks.items()]
+        events = [Line2D([], [], **panels.dotted(), label=f"{what} at {time:g} s") for time, what in marks.items()]
         title = title or style.plant_name(traces[0].scenario.plant)
         handles, gains = pages.run_handles(traces, names, colours)
         pages.set_head(page, width, title, [*handles, *events], gains)
@@ -84,8 +80,8 @@ def panels_of(traces: Sequence[Trace]) -> list[Panel]:
     groups, of_joints = list(style.split(traces)), []
     for group in groups:
         for i in group.channels:
-            one = dataclasses.replace(group, channels=(i,))
-            of_joints.append(Panel("joint", one, [group_trace(trace, one) for trace in traces], i))
+            joint = dataclasses.replace(group, channels=(i,))
+            of_joints.append(Panel("joint", joint, [group_trace(trace, joint) for trace in traces], i))
     of_joints.sort(key=lambda panel: panel.channel)
     names = ["tip"] * bool(traces[0].scenario.plant.tip)
     names += ["contact"] * all(tip.knows_contacts(trace.scenario) for trace in traces)
@@ -119,11 +115,5 @@ def mark_losses(ax: Axes, t: np.ndarray, force: np.ndarray, colour: str, row: in
     """Mark when a contact that was there is lost, by bars at the bottom of the panel."""
     touched = np.flatnonzero(force > 0.0)
     lost = (force <= 0.0) & (np.arange(len(t)) > (touched[0] if len(touched) else len(t)))
-    ax.fill_between(
-        t,
-        0.02 + 0.035 * row,
-        0.045 + 0.035 * row,
-        where=lost.tolist(),
-        color=colour,
-        transform=ax.get_xaxis_transform(),
-    )
+    low, transform = 0.02 + 0.035 * row, ax.get_xaxis_transform()
+    ax.fill_between(t, low, low + 0.025, where=lost.tolist(), color=colour, transform=transform)

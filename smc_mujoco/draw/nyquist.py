@@ -95,13 +95,8 @@ def _legend(scenario: Scenario, cycle: Chattering) -> str:
 
 def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour: str) -> None:
     """Draw L over frequency and 1/N over amplitude, and mark where they cross."""
-    ax.set(
-        xlabel="real part",
-        ylabel="imaginary part",
-        xlim=(-PLANE_EDGE, 0.2 * PLANE_EDGE),
-        ylim=(-0.6 * PLANE_EDGE, 0.6 * PLANE_EDGE),
-        aspect="equal",
-    )
+    ax.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
+    ax.set(xlim=(-PLANE_EDGE, 0.2 * PLANE_EDGE), ylim=(-0.6 * PLANE_EDGE, 0.6 * PLANE_EDGE))
     ax.axhline(0.0, color=style.RULE, lw=style.points(0.8))
     ax.axvline(0.0, color=style.RULE, lw=style.points(0.8))
     if not cycle:
@@ -111,13 +106,8 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
     fastest = math.pi / scenario.control_period
     omegas = np.geomspace(omega / SPAN_FACTOR, min(omega * SPAN_FACTOR, fastest), 400)
     response = np.array([loop.response(w) for w in omegas]) / unit
-    inverse = np.array(
-        [
-            1.0 / (loop.gain(cycle.amplitude_x * q, omega) or math.nan)
-            for q in np.geomspace(1 / SPAN_FACTOR, SPAN_FACTOR, 60)
-        ]
-    )
-    inverse /= unit
+    amplitudes = cycle.amplitude_x * np.geomspace(1 / SPAN_FACTOR, SPAN_FACTOR, 60)
+    inverse = np.array([1.0 / (loop.gain(a, omega) or math.nan) for a in amplitudes]) / unit
     ax.plot(response.real, response.imag, color=style.INK, lw=style.points(1.6), label="L, over frequency")
     ax.plot(inverse.real, inverse.imag, color=colour, lw=style.points(1.6), ls=(0, (4, 2)), label="1/N, over amplitude")
     cycle_label = "cycle, with harmonics of e"

@@ -87,9 +87,8 @@ def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, f
 
 def blank(width: float, height: float, fig: Figure | SubFigure | None = None) -> Figure | SubFigure:
     """Return a page to draw on: `fig`, or a new one of this size in inches. Its layout keeps texts apart."""
-    layout = ConstrainedLayoutEngine(
-        w_pad=style.points(7.2) / 72, h_pad=style.points(TITLE_PAD) / 72, wspace=0.02, hspace=0.02
-    )
+    across, down = style.points(7.2) / 72, style.points(TITLE_PAD) / 72  # inches
+    layout = ConstrainedLayoutEngine(w_pad=across, h_pad=down, wspace=0.02, hspace=0.02)
     if fig is None:
         return Page(figsize=(width, height), layout=layout)
     if isinstance(fig, Figure) and fig.get_layout_engine() is None:
@@ -118,10 +117,8 @@ def _wrapped(handles: Sequence[Handle], width: float) -> list[str]:
     size, labels = style.points(TEXT_SIZE), [str(handle.get_label()) for handle in handles]
 
     def wrapped(share: float) -> list[str]:
-        return [
-            style.wrapped(label, share * 72 * width - (ENTRY_SAMPLE + ENTRY_SPACE) * size, size, lines=2)
-            for label in labels
-        ]
+        room = share * 72 * width - (ENTRY_SAMPLE + ENTRY_SPACE) * size
+        return [style.wrapped(label, room, size, lines=2) for label in labels]
 
     narrow = wrapped(MAX_SHARE)
     return narrow if legend_columns(narrow, width) > 1 else wrapped(MAX_SINGLE_SHARE)
@@ -139,16 +136,10 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
     if note:
         note = style.cropped(note, MAX_SHARE * room, size)
         room -= style.width(note, size) + big
-        place = {
-            "xytext": (-8, -style.points(TITLE_PAD) - big),
-            "textcoords": "offset points",
-            "ha": "right",
-            "va": "baseline",
-        }
+        place = {"xytext": (-8, -style.points(TITLE_PAD) - big), "textcoords": "offset points", "ha": "right"}
         look = {"fontsize": size, "color": style.MUTED, "parse_math": False, "annotation_clip": False}
-        page.add_artist(Annotation(note, (1.0, 1.0), xycoords=page.transSubfigure, **place, **look)).set_in_layout(
-            False
-        )
+        text = Annotation(note, (1.0, 1.0), xycoords=page.transSubfigure, **place, va="baseline", **look)
+        page.add_artist(text).set_in_layout(False)
     legend = page.legend(
         handles=handles or [Line2D([], [], lw=0)],
         labels=["."] * len(words) or [""],  # matplotlib leaves out labels that begin with _
@@ -184,10 +175,10 @@ def gain_sources(sources: Sequence[Iterable[Source]]) -> tuple[list[str], str]:
 
     If all gains come from the same source, the note says so, and the texts are "".
     """
-    words = [f"gains: {source}" if (source := kinds(each)) not in ("", NONE) else "" for each in sources]
-    if len(different := {one for one in words if one}) == 1:
+    words = [f"gains: {source}" if (source := kinds(its)) not in ("", NONE) else "" for its in sources]
+    if len(different := {text for text in words if text}) == 1:
         return [""] * len(words), different.pop()
-    return [f", {one}" if one else "" for one in words], ""
+    return [f", {text}" if text else "" for text in words], ""
 
 
 def files(path: str | os.PathLike[str] | None, format: str | None = None) -> list[Path]:
@@ -212,7 +203,7 @@ def files(path: str | os.PathLike[str] | None, format: str | None = None) -> lis
     if format is not None and ending in FORMATS and ending != format:
         raise ScenarioError(f"cannot draw to {Path(path).name!r} as {format}: end the name in .{format}")
     several = ("pdf",) if ending == "pdf" else ("svg", "png")
-    return [base.with_name(f"{base.name}.{one}") for one in ((format,) if format else several)]
+    return [base.with_name(f"{base.name}.{ending}") for ending in ((format,) if format else several)]
 
 
 def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:

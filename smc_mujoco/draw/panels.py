@@ -199,10 +199,10 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
     groups, plant = list(style.split(traces).items()), traces[0].scenario.plant
     driven = [each for each in groups if each[0].driven]
     if all(trace.scenario.plant.tip for trace in traces):
-        one, first = Panel("tip", groups[0][0], traces), groups[0][0]
+        first = groups[0][0]
         if all(tip.knows_contacts(trace.scenario) for trace in traces):
-            return [one, Panel("contact", first, traces)]
-        return [one, *(Panel("worst", *each) for each in driven)]
+            return [Panel("tip", first, traces), Panel("contact", first, traces)]
+        return [Panel("tip", first, traces), *(Panel("worst", *each) for each in driven)]
     if all(len(group.channels) == 1 for group, _ in groups):
         settling = [Panel("settling", *driven[0])] * (len(groups) < CROWDED_STRIP)
         return [*(Panel("x", *each) for each in groups), *settling, *(Panel("u", *each) for each in driven)]
@@ -256,11 +256,9 @@ def mean_window(traces: Sequence[Trace]) -> float | None:
     """Return the longest window of the means drawn for u, s; None if no u chatters visibly."""
     low, high = limits(traces, "u")
     times = []
-    for trace in traces:
-        if any(
-            smoothed(trace) and np.abs(smooth(u, window(trace)) - u).max() > VISIBLE_CHATTERING * (high - low)
-            for u in trace.u.T[light(trace.u.shape[1])]
-        ):
+    for trace in filter(smoothed, traces):
+        lines = trace.u.T[light(trace.u.shape[1])]
+        if any(np.abs(smooth(u, window(trace)) - u).max() > VISIBLE_CHATTERING * (high - low) for u in lines):
             times.append(window(trace) * trace.scenario.control_period)
     return max(times, default=None)
 
@@ -386,8 +384,8 @@ def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], limits: tuple[float, 
     return styles
 
 
-def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True) -> None:
-    """Fit the vertical range to lasting reactions. Mark short impacts outside the range, and print their size."""
+def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str], label: bool) -> None:
+    """Fit the vertical range to lasting reactions. Mark short impacts outside it and, if `label`, print their size."""
     sizes = [np.abs(trace.reaction[np.isfinite(trace.reaction)]) for trace in panel.traces]
     peak = max(size.max(initial=0.0) for size in sizes)
     levels = [float(np.quantile(size, LASTING_QUANTILE)) for size in sizes if size.size]
@@ -403,8 +401,7 @@ def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str], label: bool = T
             look = {"marker": mark, "ls": "", "color": colour, "ms": style.points(5), "mew": style.points(1.2)}
             ax.plot(starts, np.full(len(starts), side * top), clip_on=False, in_layout=False, **look)
     if label:
-        words = f"|reaction| up to {style.short(peak, 3)} {style.units(panel.group)['force']}"
-        note(ax, words)
+        note(ax, f"|reaction| up to {style.short(peak, 3)} {style.units(panel.group)['force']}")
 
 
 def note(ax: Axes, words: str) -> None:
@@ -483,10 +480,9 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], rests: Sequ
     """
     drawn = list(zip(traces, colours, rests, phase_dashes(traces), strict=True))
     for trace, colour, samples, dash in reversed(drawn):
-        for x, v in zip(trace.x.T[light(trace.x.shape[1])], trace.v.T[light(trace.x.shape[1])], strict=True):
-            ax.plot(
-                *thinned(x, v), color=colour, lw=style.points(LINE if trace.x.shape[1] == 1 else LIGHT_LINE), ls=dash
-            )
+        shown, width = light(trace.x.shape[1]), style.points(LINE if trace.x.shape[1] == 1 else LIGHT_LINE)
+        for x, v in zip(trace.x.T[shown], trace.v.T[shown], strict=True):
+            ax.plot(*thinned(x, v), color=colour, lw=width, ls=dash)
             ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
         x, v = trace.x[:, 0], trace.v[:, 0]
         for sample in samples:
@@ -588,21 +584,17 @@ def thinned(x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def lasting(traces: Sequence[Trace], name: str) -> dict[int, np.ndarray]:
     """Return the values of successful runs by their index; if there are none, of failed ones without their ends."""
     values = {k: QUANTITIES[name](trace) for k, trace in enumerate(traces)}
+    shares = {k: UNDIVERGED_SHARE if traces[k].plant_diverged else 1.0 for k in values}
     lasted = {k: y for k, y in values.items() if traces[k].diverged_at is None}
-    if not lasted:
-        lasted = {
-            k: y[: max(1, int(UNDIVERGED_SHARE * len(y)))] if traces[k].plant_diverged else y for k, y in values.items()
-        }
+    lasted = lasted or {k: y[: max(1, int(shares[k] * len(y)))] for k, y in values.items()}
     return {k: y for k, y in lasted.items() if np.isfinite(y).all()}
 
 
 def far_off(traces: Sequence[Trace], name: str) -> int | None:
     """Return the index of the run that would flatten all others in a panel of an arm, or None."""
-    sizes = (
-        {k: float(np.abs(y).max()) for k, y in lasting(traces, name).items()}
-        if name in LABELS_OF_ARMS and name != "settling"
-        else {}
-    )
+    if name not in LABELS_OF_ARMS or name == "settling":
+        return None
+    sizes = {k: float(np.abs(y).max()) for k, y in lasting(traces, name).items()}
     if len(sizes) < 2:
         return None
     *_, second, largest = sorted(sizes, key=lambda k: sizes[k])

@@ -23,7 +23,6 @@ from smc_mujoco.draw.page import Size
 PAGE_HEIGHT = 6.4  # inches on a full page
 MIN_VARIATION = 1e-6  # 1/s: smaller ones are drawn here, because the axis is logarithmic
 MARKS = "osD^vPX"  # one for each law, for readers who see no colours
-CHOSEN = {"mfc": "none", "lw": 0}
 
 
 def pareto(
@@ -49,15 +48,15 @@ def pareto(
     with style.page(width):
         page = pages.blank(width, height or style.points(PAGE_HEIGHT), fig)
         ax = page.subplots()
-        looks = zip(best, itertools.cycle(MARKS), style.law_colours([one.law for one in best]), strict=False)
+        looks = zip(best, itertools.cycle(MARKS), style.law_colours([tuned.law for tuned in best]), strict=False)
         handles = [_front(ax, *look) for look in looks]
         ax.set(xscale="log", yscale="log")
         ax.set_xlabel("tracking: ITAE / |x₀|, summed over conditions (s²)")
         ax.set_ylabel("variation: TV / (u_max T), summed over conditions (1/s)")
         ax.tick_params(which="both", length=0)
         ax.margins(0.04, 0.06)
-        of = best[0].definition
-        limit = 2 / of.control_period * len(of.conditions)  # of a command from bound to bound at every sample, 1/s
+        goal = best[0].definition
+        limit = 2 / goal.control_period * len(goal.conditions)  # of a command from bound to bound at every sample, 1/s
         if ax.get_ylim()[1] > 0.1 * limit:
             dashed = {"color": style.RULE, "lw": style.points(1.0), "ls": (0, (4, 3))}
             ax.axhline(limit, **dashed)
@@ -69,8 +68,8 @@ def pareto(
 
 
 def _ring() -> dict[str, Any]:
-    """Return the size of the mark of chosen gains."""
-    return CHOSEN | {"ms": style.points(11), "mew": style.points(2.0)}
+    """Return the look of the mark of chosen gains."""
+    return {"mfc": "none", "lw": 0, "ms": style.points(11), "mew": style.points(2.0)}
 
 
 def _front(ax: Axes, tuned: Tuned, mark: str, colour: str) -> Line2D:
@@ -78,10 +77,10 @@ def _front(ax: Axes, tuned: Tuned, mark: str, colour: str) -> Line2D:
     words = style.law_name(tuned.law)
     if not tuned.front:
         return Line2D([], [], color=colour, lw=style.points(3), label=f"{words}: every run failed")
-    x = [one.tracking for one in tuned.front]
-    y = [max(one.variation, MIN_VARIATION) for one in tuned.front]
+    x = [tried.tracking for tried in tuned.front]
+    y = [max(tried.variation, MIN_VARIATION) for tried in tuned.front]
     ax.step(x, y, where="post", color=colour, marker=mark, ms=style.points(4.5), mec="none", alpha=0.9)
-    chosen = min(tuned.history, key=lambda one: one.objective)
+    chosen = min(tuned.history, key=lambda tried: tried.objective)
     ax.plot([chosen.tracking], [max(chosen.variation, MIN_VARIATION)], color=colour, marker=mark, zorder=3, **_ring())
     label = f"{words}: J = {tuned.objective:.3g} s²"
     return Line2D([], [], color=colour, lw=style.points(3), marker=mark, ms=style.points(7), mec="none", label=label)

@@ -202,11 +202,8 @@ def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, mou
         length = np.linalg.norm(arm)
         if length < MIN_LEVER:
             return
-        reach, width, out = (
-            mount.unit * HINGE_LENGTH * length,
-            RADIUS_SHARE * radius + LENGTH_SHARE * mount.unit * min(length, LONG_PENDULUM),
-            arm / length,
-        )
+        reach, out = mount.unit * HINGE_LENGTH * length, arm / length
+        width = RADIUS_SHARE * radius + LENGTH_SHARE * mount.unit * min(length, LONG_PENDULUM)
         along, start = np.cross(data.xaxis[mount.joint], out), radius + ARC_DISTANCE * width
         if mount.beyond:
             out = np.array([0.0, 0.0, -1.0 if out[2] > 0.0 else 1.0])

@@ -45,9 +45,8 @@ class Canvas:
         self.casts = shadows.casting(model, middle * camera.pixel(size), shadows.MIN_ARM_SIZE if arms else 0.0)
         ball, widest = roundness(model) / (middle * camera.pixel(size))
         quality = model.vis.quality
-        quality.numstacks = (
-            FEW_STACKS if ball < SMALL_RADIUS else facets(ball, np.pi, quality.numstacks)
-        )  # of cylinders, too
+        # of cylinders, too
+        quality.numstacks = FEW_STACKS if ball < SMALL_RADIUS else facets(ball, np.pi, quality.numstacks)
         if arms:  # joints hide the round ends of links
             ball = model.geom_size[model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE, 0].max(initial=0.0)
             ball /= middle * camera.pixel(size)
@@ -84,17 +83,16 @@ class Canvas:
             areas = self.changed(shapes, loose)
         if not areas:
             return self.picture
-        casting = []
-        if self.sun is not None:
-            casting = shadows.draw(shown, self.sun, self.casts, self.model.stat.extent)
+        casting = [] if self.sun is None else shadows.draw(shown, self.sun, self.casts, self.model.stat.extent)
         boxes = self.boxes(geoms, casting, around(shapes), around(loose))
-        areas = joined(
-            areas, lambda area: pixels(area) + RECTANGLE_COST + SHAPE_COST * int((~outside(boxes, area)).sum())
-        )
+
+        def load(area: Area) -> int:
+            return pixels(area) + RECTANGLE_COST + SHAPE_COST * int((~outside(boxes, area)).sum())
+
         geoms = list(shown.geoms[: shown.ngeom])
         picture = self.picture.copy() if self.picture.size else np.empty((self.size[1], self.size[0], 3), np.uint8)
         views = [eye.frustum_top for eye in shown.camera]
-        for area in areas:
+        for area in joined(areas, load):
             left, top, right, bottom = area
             away = [geoms[i] for i in np.flatnonzero(outside(boxes, area))]
             kinds = [geom.type for geom in away]
@@ -207,11 +205,11 @@ def joined(areas: Sequence[Area], load: Callable[[Area], int]) -> list[Area]:
         new, k = area, 0
         while k < len(covering):
             a, b, c, d = covering[k]
-            one = min(a, new[0]), min(b, new[1]), max(c, new[2]), max(d, new[3])
+            both = min(a, new[0]), min(b, new[1]), max(c, new[2]), max(d, new[3])
             k += 1
-            if load(one) <= load(covering[k - 1]) + load(new):
+            if load(both) <= load(covering[k - 1]) + load(new):
                 del covering[k - 1]
-                new, k = one, 0  # it may now be close to those that were too far away
+                new, k = both, 0  # it may now be close to those that were too far away
         covering.append(new)
     return covering
 

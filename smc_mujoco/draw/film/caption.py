@@ -56,13 +56,11 @@ class Caption:
         inside = size[0] - 2 * EDGE * scale
         clock = style.width("00.000 s", TITLE_SIZE * scale, bold=True) + EDGE * scale
         clock += style.width("8× slower", KEY_SIZE * scale, bold=True) + 2 * KEY_SIZE * scale
-        self.title = style.cropped(
-            title or style.plant_name(traces[0].scenario.plant), inside - clock, TITLE_SIZE * scale, bold=True
-        )
-        notes = [
-            style.width(f"{words} since {time:g} s", KEY_SIZE * scale, bold=True) for time, words in self.jumps.items()
-        ]
-        self.note_room = min(max(notes, default=0.0) + EDGE * scale, 0.4 * inside)
+        title = title or style.plant_name(traces[0].scenario.plant)
+        self.title = style.cropped(title, inside - clock, TITLE_SIZE * scale, bold=True)
+        notes = [f"{words} since {time:g} s" for time, words in self.jumps.items()]
+        longest = max((style.width(note, KEY_SIZE * scale, bold=True) for note in notes), default=0.0)
+        self.note_room = min(longest + EDGE * scale, 0.4 * inside)
         gains = in_words({name: [t.scenario.law.source] for name, t in zip(names, traces, strict=True)}, short=True)
         parts = [*(key(traces, scales) if parts is None else parts), *filter(None, [gains])]
         self.key = wrapped(parts, inside - self.note_room, KEY_SIZE * scale)
@@ -72,9 +70,8 @@ class Caption:
         badges = [max((style.width(text, letters, bold=True) + margin for text in each), default=0.0) for each in words]
         self.gauges = [gauges(trace.scenario) and not each for trace, each in zip(traces, words, strict=True)]
         badges = [max(wide, STRIP_WIDTH * scale * on) for wide, on in zip(badges, self.gauges, strict=True)]
-        self.badge = np.array(
-            [badges, [1.6 * BADGE_SIZE * scale * any(badges)] * len(traces)]
-        ).T  # width and height, px
+        height = 1.6 * BADGE_SIZE * scale * any(badges)
+        self.badge = np.array([(width, height) for width in badges])  # px
         top = (106 + 1.4 * KEY_SIZE * (len(self.key) - 1)) * scale
         if below is not None:
             self.badge[:] = np.array(below) * scale
@@ -103,9 +100,8 @@ class Caption:
         words = []
         for name, trace, gone in zip(self.names, self.traces, failed, strict=True):
             end = f": {style.ending(trace)}" if gone and trace.diverged_at is not None else ""
-            words.append(
-                style.cropped(name, self.max_label - self.width(end), LABEL_SIZE * self.scale, bold=True) + end
-            )
+            room = self.max_label - self.width(end)
+            words.append(style.cropped(name, room, LABEL_SIZE * self.scale, bold=True) + end)
         return words
 
     def width(self, text: str) -> float:
@@ -189,11 +185,9 @@ class Caption:
         """Draw a machine's state: pale while it moves, dark while friction holds it, bright in contact."""
         looks = {CALM: (style.PAPER, style.MUTED), STUCK: (style.INK,) * 2, STRUCK: (style.REACTION,) * 2}
         fill, rim = looks[state.mood]
-        size, middle = BADGE_SIZE * self.scale, ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
-        draw.rounded_rectangle(
-            tuple(box), radius=5 * self.scale, fill=fill, outline=rim, width=max(1, round(self.scale))
-        )
-        draw.text(middle, state.words, style.letters_on(fill), style.font(size, bold=True), anchor="mm")
+        s, middle = self.scale, ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
+        draw.rounded_rectangle(tuple(box), radius=5 * s, fill=fill, outline=rim, width=max(1, round(s)))
+        draw.text(middle, state.words, style.letters_on(fill), style.font(BADGE_SIZE * s, bold=True), anchor="mm")
 
     def _strip(self, draw: ImageDraw.ImageDraw, k: int, time: float) -> None:
         """Draw the counts of machine k's encoder around its position at a time, s, and which of them is read."""
@@ -230,12 +224,11 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
 
     def longest(quantity: str) -> str:
         """Return the values of the longest arrows, one a group, such as "6 N"; "" if there are none."""
-        sizes = [(getattr(scale, quantity), group, scale) for group, scale in scales.items()]
         unit = "u" if quantity == "control" else "force"
         return ", ".join(
             f"{style.short(size)} {style.units(group)[unit]}{' or more' * (quantity in scale.exceeded)}"
-            for size, group, scale in sizes
-            if size
+            for group, scale in scales.items()
+            if (size := getattr(scale, quantity))
         )
 
     words = []
@@ -248,8 +241,7 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
         words.append(f"dark arrow: disturbance, longest {sizes}")
     if sizes := longest("reaction"):
         words.append(f"violet arrow: {reaction_words(traces)}, longest {sizes}")
-    words.append("translucent machine: where the reference wants it")
-    words += [scenery] if (scenery := traces[0].scenario.plant.scenery) else []
+    words += filter(None, ["translucent machine: where the reference wants it", traces[0].scenario.plant.scenery])
     if any(gauges(trace.scenario) for trace in traces):
         words.append("strip: counts of the encoder, the line is the position, the dot what is read")
     count = max(trace.scenario.plant.n for trace in traces)

@@ -26,7 +26,7 @@ CURSOR = np.array(style.rgb(style.MUTED))
 class Charts:
     """The charts as pictures of `size` px; `at` returns a frame of them.
 
-    Attributes:
+    Args:
       scale: pixels per px of a film 1280 wide, for letters and lines.
     """
 

@@ -148,10 +148,8 @@ def still(
 def _checked_size(size: Iterable[int]) -> tuple[int, int]:
     """Return width and height of a film; refuse odd ones, and those out of range."""
     sides = items_of("size", size)
-    fit = [
-        isinstance(side, int | np.integer) and low <= side <= high and side % 2 == 0
-        for side, low, high in zip(sides, MIN_SIZE, MAX_SIZE, strict=False)
-    ]
+    limits = zip(sides, MIN_SIZE, MAX_SIZE, strict=False)
+    fit = [isinstance(side, int | np.integer) and low <= side <= high and side % 2 == 0 for side, low, high in limits]
     if fit != [True, True] or len(sides) != 2:
         raise ScenarioError(f"a film of {errors.shown(size)} px: give two even numbers from {MIN_SIZE} to {MAX_SIZE}")
     return int(sides[0]), int(sides[1])
@@ -192,11 +190,8 @@ def frames(
     motions = [motion(trace, times) for trace in traces]
     with framed(traces, colours, above, caption.room, chosen, motions, caption.apart if arms else 0.0) as stage:
         caption.place(stage.boxes)
-        over = (
-            arm.Overlay(traces, colours, stage.where, stage.project, above, edges, caption.badges, scale)
-            if arms
-            else None
-        )
+        overlaid = traces, colours, stage.where, stage.project, above, edges, caption.badges, scale
+        over = arm.Overlay(*overlaid) if arms else None
         places = [positions(trace.t, trace.x, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         wanted = [positions(trace.t, trace.r, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         ahead = [rotors(trace, edges)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]

@@ -102,14 +102,10 @@ def set_floor(
     model: mujoco.MjModel, turn: np.ndarray, place: np.ndarray, size: tuple[int, int], points: np.ndarray
 ) -> None:
     """Suit the floor to machines whose points are (m, 3) m: its grid, and the haze into which it fades behind them."""
-    model.stat.center[:], model.stat.extent = (
-        (points.min(axis=0) + points.max(axis=0)) / 2,
-        np.ptp(points, axis=0).max(),
-    )
-    cell = min(
-        (step * 10.0**power for power in range(-4, 5) for step in (1.0, 2.0, 5.0)),
-        key=lambda m: abs(np.log(FLOOR_CELLS * m / model.stat.extent)),
-    )
+    model.stat.center[:] = (points.min(axis=0) + points.max(axis=0)) / 2
+    model.stat.extent = np.ptp(points, axis=0).max()
+    sizes = [step * 10.0**power for power in range(-4, 5) for step in (1.0, 2.0, 5.0)]  # m
+    cell = min(sizes, key=lambda size: abs(np.log(FLOOR_CELLS * size / model.stat.extent)))
     model.mat_texrepeat[model.material("floor").id] = 1.0 / cell
     start = float(((points - place) @ -turn[:, 2]).max())
     stop = min(camera.floor_distance(turn, place, size), HAZE_HORIZON * start)

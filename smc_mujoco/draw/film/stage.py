@@ -66,22 +66,22 @@ class Stage:
         self.rest: list[np.ndarray | None] = [None] * len(traces)
         ends = np.cumsum([0, *(puppet.shapes[0].model.nq for puppet in self.puppets)]).tolist()
         self.blocks = [slice(*pair) for pair in itertools.pairwise(ends)]
-        bodies = np.cumsum([0, *(each.shapes[0].model.nbody - 1 for each in self.puppets)]).tolist()
+        bodies = np.cumsum([0, *(puppet.shapes[0].model.nbody - 1 for puppet in self.puppets)]).tolist()
         self.links = [
-            np.flatnonzero(np.isin(self.model.geom_bodyid, np.array(each.links) + first) & self.visible())
-            for each, first in zip(self.puppets, bodies, strict=False)
+            np.flatnonzero(np.isin(self.model.geom_bodyid, np.array(puppet.links) + first) & self.visible())
+            for puppet, first in zip(self.puppets, bodies, strict=False)
         ]
         material = self.model.geom_matid
         self.paint = np.where((material >= 0)[:, None], self.model.mat_rgba[material], self.model.geom_rgba)
         names = [[joint.name for joint in joints(models.spec(scenario))] for scenario in scenarios]
-        self.joints = [[self.model.joint(f"m{k}/{name}").id for name in each] for k, each in enumerate(names)]
+        self.joints = [[self.model.joint(f"m{k}/{name}").id for name in its] for k, its in enumerate(names)]
         self.shape, self.colours, self.changed = [-1] * len(scenarios), [""] * len(scenarios), True
         for k, colour in enumerate(colours):
             self.set_shape(k, 0.0)
             self.set_colour(k, colour)
             self.pose(k, traces[k].x[0, : self.shown[k]])
         machines = zip(scenarios, self.joints, self.puppets, strict=True)
-        self.mounts = [arrows.mounts(one, ids, each.slides, each.rail, turn[:, 2]) for one, ids, each in machines]
+        self.mounts = [arrows.mounts(s, ids, puppet.slides, puppet.rail, turn[:, 2]) for s, ids, puppet in machines]
         film = self.model.camera("film")
         film.pos = place
         mujoco.mju_mat2Quat(self.model.cam_quat[film.id], turn.ravel())
