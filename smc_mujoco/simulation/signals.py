@@ -67,6 +67,10 @@ class Signal:
         """Return parameter name -> value."""
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
 
+    def bounds(self) -> tuple[float, float] | None:
+        """Return bounds of |d| and |d'|, inf where d jumps, or None if none are known."""
+        return None
+
 
 @dataclasses.dataclass(frozen=True)
 class PerChannel(Signal):
@@ -88,6 +92,10 @@ class Constant(Signal):
 
     amplitude: float = 0.0
 
+    def bounds(self) -> tuple[float, float]:
+        """Return bounds of |d| and |d'|."""
+        return abs(self.amplitude), 0.0
+
     @staticmethod
     def value(t, p):
         return p.amplitude, 0.0, 0.0
@@ -100,6 +108,10 @@ class Sine(Signal):
     amplitude: float
     omega: float
     phase: float = 0.0
+
+    def bounds(self) -> tuple[float, float]:
+        """Return bounds of |d| and |d'|."""
+        return abs(self.amplitude), abs(self.amplitude * self.omega)
 
     @staticmethod
     def value(t, p):
@@ -114,6 +126,10 @@ class Step(Signal):
 
     amplitude: float
     time: float = 0.0
+
+    def bounds(self) -> tuple[float, float]:
+        """Return bounds of |d| and |d'|."""
+        return abs(self.amplitude), math.inf
 
     @staticmethod
     def value(t, p):
@@ -149,6 +165,10 @@ class MinimumJerk(Signal):
 
     positive = ("duration",)
 
+    def bounds(self) -> tuple[float, float]:
+        """Return bounds of |d| and |d'|."""
+        return abs(self.amplitude), 1.875 * abs(self.amplitude) / self.duration
+
     @staticmethod
     def value(t, p):
         a = min(max((t - p.time) / p.duration, 0.0), 1.0)
@@ -166,6 +186,10 @@ class Pulse(Signal):
     width: float
 
     positive = ("width",)
+
+    def bounds(self) -> tuple[float, float]:
+        """Return bounds of |d| and |d'|."""
+        return abs(self.amplitude), math.inf
 
     @staticmethod
     def value(t, p):
@@ -288,6 +312,10 @@ class Relay(Signal):
     memory = 1  # its force now
     natural = ("slope", "start")
     sees = True
+
+    def bounds(self) -> tuple[float, float]:
+        """Return bounds of |d| and |d'|."""
+        return abs(self.amplitude), math.inf
 
     @staticmethod
     def value(t, p, memory, e, de, s):

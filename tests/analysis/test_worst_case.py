@@ -269,6 +269,8 @@ def test_a_class_is_said_in_words_with_its_units(plant, snapshot):
     rubbing = dataclasses.replace(one, friction=smc.Coulomb(0.1))
     said = [everything.words(one.plant), outside(one, everything), outside(one, smc.Uncertainty(disturbance=6.0))]
     said += [outside(dataclasses.replace(one, law=smc.law("super_twisting", k2=8.0)), CLASSES["slope"])]
+    shaken = dataclasses.replace(one, law="super_twisting", disturbance=(smc.Sine(-0.1, 50.0), smc.Constant(0.5)))
+    said += [outside(shaken, smc.Uncertainty(disturbance=0.5, slope=1.0)), outside(shaken, smc.Uncertainty(x0=0.1))]
     machine = dataclasses.replace(
         one, input_delay=0.002, noise=smc.Noise(position=1e-3), actuator=smc.Lag(0.01), clock=smc.Clock(missed=0.1),
         disturbance=(smc.Sine(-1.0, 2.0), smc.Constant(0.5)),

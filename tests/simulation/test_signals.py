@@ -104,6 +104,17 @@ def test_the_compiled_function_gives_the_bits_of_the_written_one(signal):
     np.testing.assert_array_equal(compiled(signal, times), written(signal, times))
 
 
+def test_bounds_of_a_signal_and_of_its_slope_are_reached_and_not_passed():
+    times = np.linspace(0.0, 1.6, 16_001)
+    known = [signal for signal in EVERY if signal.bounds()]
+    assert {type(signal) for signal in known} == {Constant, Sine, Step, Pulse, MinimumJerk, Relay}
+    for signal in known:
+        d, (bound, slope) = path(signal, times), signal.bounds()
+        steepest = np.abs(np.diff(d)).max() / times[1]
+        assert np.abs(d).max() == pytest.approx(bound)
+        assert steepest == pytest.approx(slope, rel=1e-3) or steepest > 1e3 < slope == math.inf
+
+
 @pytest.mark.parametrize("signal", EVERY, ids=lambda s: type(s).__name__)
 def test_a_signal_disturbs_alike_in_both_loops(signal):
     made = scenario(plant=smc.plant("pendulum_network", n=2), disturbance=[signal, Sine(0.1, 3.0)], duration=0.4)

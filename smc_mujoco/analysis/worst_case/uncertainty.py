@@ -142,15 +142,17 @@ def strength(scenario: Scenario) -> float:
 
 def outside(scenario: Scenario, within: Uncertainty) -> str:
     """Return how a class around a scenario goes beyond the theorem of its law, in words; "" if nothing is known."""
-    before = sum(abs(getattr(signal, "amplitude", 0.0)) for signal in scenario.disturbance)
-    reasons, d, u = [], within.disturbance and within.disturbance + before, EFFORT[scenario.plant.units[0]]
+    reasons, u = [], EFFORT[scenario.plant.units[0]]
+    known = [bounds for signal in scenario.disturbance if (bounds := signal.bounds())]
+    of_class = within.disturbance, (within.slope or math.inf) if within.disturbance else 0.0
+    d, slope = map(sum, zip(of_class, *known, strict=True))
     if d >= (largest := strength(scenario)):
         reasons.append(f"no law holds |d| = {d:g} {u} with drives of {largest:.3g} {u}")
     admits = {} if scenario.law.template is None else scenario.law.template.admits
     for gains in [SimpleNamespace(**one.gains) for one in scenario.law.of_channels(scenario.plant.driven)][:1]:
         if d and "d" in admits and d >= (bound := admits["d"](gains)):
             reasons.append(f"its theorem needs |d| < {bound:.3g} {u} with these gains")
-        if d and "d'" in admits and (within.slope or math.inf) >= (bound := admits["d'"](gains)):
+        if d and "d'" in admits and slope >= (bound := admits["d'"](gains)):
             reasons.append(f"its theorem needs |d'| < {bound:.3g} {u}/s with these gains")
     noise = within.position_noise or within.velocity_noise or scenario.noise != Noise() or scenario.sensor
     beside = {"delay": within.delay[1] or scenario.input_delay, "noise": noise, "drives": scenario.actuator}

@@ -26,7 +26,7 @@ from smc_mujoco.evidence.certificates import search
 from smc_mujoco.evidence.certificates.certificate import Certificate, finite, holds
 from smc_mujoco.evidence.certificates.loops import Loop, loop_of
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Constant, Pulse, Sine, Step
+from smc_mujoco.simulation.signals import Constant
 
 GRID_REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 3.0 * max(map(abs, plant.x0))}  # in x: chosen
 MARGIN_SHARE = 1e-4  # share by which a margin is stated below the true one
@@ -134,13 +134,11 @@ def _bounds(scenario: Scenario) -> tuple[float, float]:
     """Return bounds of |d| and |d'| of a scenario's disturbance."""
     bound = slope = 0.0
     for signal in scenario.disturbance:
-        if not isinstance(signal, Constant | Sine | Step | Pulse):
+        if (bounds := signal.bounds()) is None:
             raise ScenarioError(
                 f"{type(signal).__name__} has no bound: leave it out, and give within=smc.Uncertainty(disturbance=...)"
             )
-        bound += abs(signal.amplitude)
-        if not isinstance(signal, Constant):
-            slope += abs(signal.amplitude * signal.omega) if isinstance(signal, Sine) else math.inf
+        bound, slope = bound + bounds[0], slope + bounds[1]
     return bound, slope
 
 
