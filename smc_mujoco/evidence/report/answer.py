@@ -208,9 +208,9 @@ def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
     if of_paper:
         of, lost, alone = (sum(getattr(row, name) for row in of_paper) for name in ("of", "lost", "alone"))
         parts.append(f"its observer-free law is beaten in {lost} of {of} comparisons and wins in {alone or 'none'}")
-    if findings.claims:
-        verdicts = joined(f"{n} {'are' if n != 1 else 'is'} {said}" for said, n in totals(findings.claims).items())
-        parts.append(f"of its {len(findings.claims)} checked claims, {verdicts}")
+    if counts := totals(findings.claims):
+        verdicts = joined(f"{n} {'are' if n != 1 else 'is'} {said}" for said, n in counts.items())
+        parts.append(f"of its {sum(counts.values())} checked claims, {verdicts}")
     return f"The paper: {'; '.join(parts)}." if parts else ""
 
 

@@ -419,7 +419,8 @@ def test_the_papers_verdict_is_one_line_that_counts(findings):
         *scores("sine", observer_free=1.0, classical=1.0),
     ]
     claims = [dataclasses.replace(findings.claims[0], verdict=v) for v in ("supported", "refuted", "refuted")]
-    few = dataclasses.replace(findings, scores=tuple(cells), claims=tuple(claims))
+    beside = dataclasses.replace(claims[0], whose="derived")  # not counted
+    few = dataclasses.replace(findings, scores=tuple(cells), claims=(*claims, beside))
     assert answer.verdict(few, ["settling_time"]) == (
         "The paper: its observer-free law is beaten in 1 of 3 comparisons and wins in 1; of its 3 checked claims, "
         "1 is supported and 2 are refuted."
