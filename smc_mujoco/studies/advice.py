@@ -386,11 +386,10 @@ class Advice(Tables):
         """Which laws might be first by chance, in words; "" if none."""
         first, *others = self.compared
         rivals = any(first not in self.dominated(name) for name in others)
-        told = (
-            "The order is not tested: with other starts and noise, or among other laws, a law that it does not "
-            "dominate may be first."
-        )
-        return told * (rivals and not self._untested)
+        if self._untested or not rivals:
+            return ""
+        chance = "with other starts and noise, or among other laws, a law that it does not dominate may be first"
+        return f"The order is not tested: {chance}."
 
     def _value(self, choice: Choice, need: str) -> str:
         """Return a median in words, such as "settling time 0.92 s"."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.bootstrap import MIN_INTERVAL_SAMPLES, Interval
 from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, SETTLES
-from smc_mujoco.analysis.ranking import Effect, Limits, Rank
+from smc_mujoco.analysis.ranking import Effect, Rank
 from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.common.frozen import frozen
@@ -136,10 +136,7 @@ class Board(Tables):
       unit: of the medians, with {x} and {u} as in `conventions.Metric.unit`; "" for "settles", which is 0 to 1.
       entries: lowest mean rank first. A median over several plants is NaN if its unit depends on the plant.
       blocks: the same laws on each plant in each condition.
-      cells: number of runs of each law in the cells that all laws have; equal runs count once.
-      seeds: number of seeds, equal runs included.
       family: number of blocks of the table for which winners are corrected.
-      limits: of the p-values, after the correction.
       level: level of intervals and tests.
       relevant: share of a value that is relevant.
       resolution: the largest lower bound on the least relevant difference, in the unit of the board.
@@ -151,10 +148,7 @@ class Board(Tables):
     unit: str
     entries: tuple[Entry, ...]
     blocks: tuple[Block, ...]
-    cells: int
-    seeds: int
     family: int
-    limits: Limits
     level: float
     relevant: float
     resolution: float

@@ -534,7 +534,7 @@ def test_a_board_for_each_plant_and_metric_with_medians_shares_and_winners():
     each = [np.median(table.column("itae")[rows & (table.column("condition") == c)]) for c in ("nominal", "noise")]
     assert itae.entries[1].interval.median == np.median(each)
     assert [block.medians["b"] for block in itae.blocks] == each
-    assert (itae.winner, itae.cells, itae.seeds) == ("a", 40, 20)
+    assert (itae.winner, [(block.runs, block.seeds) for block in itae.blocks]) == ("a", [(20, 20)] * 2)
     start = "ITAE on duffing under nominal and noise: a wins in both conditions: at least 50 % less than b"
     assert itae.verdict.startswith(start)
     assert itae.unit == "{x} s^2"
@@ -576,7 +576,7 @@ def test_the_order_of_rows_and_the_names_of_laws_change_nothing():
 def test_groups_may_be_conditions_or_all_runs_where_units_allow():
     table = study()
     (all_runs,) = leaderboard(table, ["itae"], by=())
-    assert all_runs.cells == 80
+    assert [block.runs for block in all_runs.blocks] == [20] * 4
     assert math.isnan(all_runs.entries[0].interval.median)  # rad and m, N and N m
     assert all_runs.winner == "a"
     assert leaderboard(table, ["itae"], by=np.array([]))[0] == all_runs  # pyright: ignore[reportArgumentType]
@@ -590,10 +590,10 @@ def test_only_runs_that_all_laws_have_are_compared():
     table = study()
     lacking = (table.column("law") == "b") & (table.column("seed") == 3) & (table.column("condition") == "noise")
     boards = leaderboard(table.taken(~lacking), ["itae"])
-    assert [b.cells for b in boards] == [39, 39]
+    assert [[block.runs for block in board.blocks] for board in boards] == [[20, 19]] * 2
     assert {entry.interval.n for entry in boards[0].entries} == {20}
     without = leaderboard(table.taken((table.column("law") != "b") | (table.column("seed") != 3)), ["itae"])
-    assert [(b.cells, b.seeds) for b in without] == [(38, 19), (38, 19)]
+    assert [[block.runs for block in board.blocks] for board in without] == [[19, 19]] * 2
 
 
 def test_a_metric_that_does_not_apply_has_no_board():
@@ -745,7 +745,7 @@ def test_seeds_that_change_nothing_are_one_sample():
     once = {"a": [[1.0]], "b": [[2.0]]}
     same = stand({law: np.repeat(values, 20, axis=1) for law, values in once.items()})
     (board,) = leaderboard(same, ["itae"])
-    assert (board.cells, board.seeds, board.winner) == (1, 20, None)
+    assert board.winner is None
     assert board.result == "no winner: 20 seeds, 1 distinct run"
     assert all(math.isnan(entry.interval.low) for entry in board.entries)
     assert "20 seeds, 1 distinct run" in " ".join(printed([board]).split())
@@ -754,9 +754,9 @@ def test_seeds_that_change_nothing_are_one_sample():
 def test_a_seed_is_a_sample_of_two_laws_if_it_changes_one():
     still, moved = np.ones((1, 20)), blocks(2.0)
     (board,) = leaderboard(stand({"a": still, "b": moved}), ["itae"])
-    assert (board.cells, board.winner) == (20, "a")
+    assert (board.blocks[0].runs, board.winner) == (20, "a")
     other = stand({"a": still, "b": 2 * still}, tv_rate=np.tile(np.arange(20.0), 2))
-    assert leaderboard(other, ["itae"])[0].cells == 20
+    assert leaderboard(other, ["itae"])[0].blocks[0].runs == 20
 
 
 def test_a_seed_that_changes_a_third_law_is_no_sample_of_two():
@@ -783,7 +783,6 @@ def test_one_condition_without_randomness_is_one_sample_beside_others():
     table = stand({"a": np.stack([a, one]), "b": np.stack([b, 2 * one])})
     (board,) = leaderboard(table, ["itae"])
     assert [(block.seeds, block.runs, block.winner) for block in board.blocks] == [(20, 20, "a"), (20, 1, None)]
-    assert board.cells == 21
     text = " ".join(printed([board]).split())
     assert "20 seeds, 1 distinct run" in text
     assert board.result == "no winner in both conditions: a wins under c0, for these gains"
