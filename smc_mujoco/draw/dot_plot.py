@@ -115,8 +115,8 @@ def _key(
     for law, source in zip(colours, gains, strict=True):
         look = {"marker": marks[law], "ms": style.points(6), "mec": "none", "lw": style.points(1.5)}
         key.append(Line2D([], [], color=colours[law], label=style.law_name(law) + source, **look))
-    few = f"; of fewer than {MIN_INTERVAL_SAMPLES} samples their range" * (samples < MIN_INTERVAL_SAMPLES)
-    label = f"95 % interval of the median{few}"
+    few = f"; a median's is the range of fewer than {MIN_INTERVAL_SAMPLES} samples" * (samples < MIN_INTERVAL_SAMPLES)
+    label = f"95 % interval{few}"
     return [*key, Line2D([], [], color=style.MUTED, lw=style.points(1.5), label=label)], shared
 
 

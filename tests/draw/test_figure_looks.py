@@ -395,7 +395,7 @@ def test_a_board_s_intervals_are_those_of_the_table_where_runs_share_gains():
     page = smc.plot(rows, metrics=["tv_rate"])
     boards = smc.leaderboard(rows, ["tv_rate"], by=("plant", "condition"))
     assert "of fewer than 6 samples the interval is their range" in " ".join(repr(boards).split())
-    assert "of fewer than 6 samples their range" in " ".join(text.get_text() for text in texts(page))
+    assert "a median's is the range of fewer than 6 samples" in " ".join(text.get_text() for text in texts(page))
     drawn = {tuple(line.get_xdata()) for ax in page.axes for line in ax.lines if len(line.get_xdata()) == 2}
     for board in boards:
         for entry in board.entries:
