@@ -12,7 +12,6 @@ There is no approximation but that this error is a sine. Play between rotor and 
 describing function is that of two free masses, see `play`, and multiplies the gain.
 """
 
-import contextlib
 import copy
 import dataclasses
 import functools
@@ -22,11 +21,9 @@ from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
-from numba import njit
 
 from smc_mujoco.analysis.state_space import NONLINEAR_FLAGS, rates
 from smc_mujoco.common.errors import ScenarioError, number, whole
-from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.component import Component, Template
@@ -357,8 +354,7 @@ class Controller:
         out, y = np.empty((len(x), 2)), np.empty(len(FIELDS))
         (g0, g1, g2), (m0, m1, m2) = self.gains, memories
         model = np.array([models[0], of_joint])
-        with contextlib.nullcontext() if _run.overloads else delay_ctrl_c():  # numba compiles it at the first call
-            done = _run(self.addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out)
+        done = _run(self.addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out)
         if done < 0:
             raise ScenarioError("the law raised an exception in the harmonic balance")
         if done < len(x):
@@ -480,7 +476,7 @@ def _window(count: int) -> np.ndarray:
     return window / window.sum()
 
 
-@njit(error_model="numpy")
+@cfunctions.cached
 def _run(addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out):
     """Call estimator, surface and law for each sample. Stop where u is not finite; y is then the measurement there.
 

@@ -19,7 +19,7 @@ from typing import IO, Any
 
 import numpy as np
 from llvmlite import ir
-from numba import from_dtype, njit, types
+from numba import from_dtype, njit, typeof, types
 from numba.extending import intrinsic
 
 from smc_mujoco.common.errors import printable
@@ -27,6 +27,7 @@ from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.numba_internals import (
     CFunc,
     CPUCodeLibrary,
+    Dispatcher,
     FunctionCache,
     FunctionIdentity,
     IndexDataCacheFile,
@@ -205,13 +206,23 @@ def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = Fal
         whose closure holds other functions needs a name and a hash of all that it reaches.
     """
     made = CFunc(body, normalize_signature(signature), {}, {"error_model": "numpy"})
+    _compile(made, body, cache)
+    return made
+
+
+def compile_for(made: Dispatcher, arguments: tuple[Any, ...], cache: bool | tuple[str, str]) -> None:
+    """Compile a function of numba's njit for the types of these arguments, as `compiled` does."""
+    _compile(made, made.py_func, cache, tuple(map(typeof, arguments)))
+
+
+def _compile(made: Any, body: Callable, cache: bool | tuple[str, str], *types: Any) -> None:
+    """Load a function from the disk, or compile it and write it there."""
     if cache:
         with contextlib.suppress(RuntimeError):  # nowhere to write
             made._cache = Cache(body, *(() if cache is True else cache))
     with delay_ctrl_c(), NUMBERS.given():
         _load_numba()
-        made.compile()
-    return made
+        made.compile(*types)
 
 
 def _load_numba() -> None:

@@ -16,8 +16,9 @@ import functools
 import math
 import re
 from collections.abc import Callable
+from typing import Any
 
-from numba import carray, types
+from numba import carray, njit, types
 from numba.extending import intrinsic
 
 from smc_mujoco.common import fingerprint
@@ -29,6 +30,7 @@ from smc_mujoco.common.jit import (
     Uncompiled,
     attempt,
     checked,
+    compile_for,
     floats,
     jit,
     loader,
@@ -196,6 +198,19 @@ def _stored(native: Callable, function: Callable, *arguments: object) -> Functio
     compiled = Function(native, _disk_key(function, *arguments))
     fingerprint.keep(function)
     return compiled
+
+
+def cached(function: Callable) -> Callable:
+    """Compile a function of numbers and arrays at its first call. It is kept on disk, as C functions are."""
+    made = njit(error_model="numpy")(function)
+
+    @functools.wraps(function)
+    def call(*arguments: Any) -> Any:
+        if not made.overloads:
+            compile_for(made, arguments, _disk_key(function))
+        return made(*arguments)
+
+    return call
 
 
 def _disk_key(function: Callable, *arguments: object) -> tuple[str, str] | bool:

@@ -52,7 +52,7 @@ def test_a_user_s_helper_follows_a_change_of_its_globals():
         ("CFunc", "compile address cache_hits"),
         ("CPUCodeLibrary", "has_dynamic_globals add_linking_library"),
         ("RuntimeLinker", "PREFIX"),
-        ("Dispatcher", "get_call_template"),
+        ("Dispatcher", "compile get_call_template"),
         ("builtin_registry", "globals"),
         ("global_compiler_lock", "__enter__"),
         *((name, "") for name in ("TypingError", "normalize_signature", "dynamic_modname", "dynamic_module")),

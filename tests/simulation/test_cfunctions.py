@@ -53,6 +53,13 @@ def mine(body="y.x + gains.k", **space) -> FunctionType:
     return space["mine"]
 
 
+FACTOR = 2.0
+
+
+def ratio_to(x):
+    return FACTOR / x[0]
+
+
 @njit
 def factorial(n):
     return 1.0 if n < 2 else n * factorial(n - 1)
@@ -60,6 +67,19 @@ def factorial(n):
 
 def test_a_law_is_compiled_once_for_all_processes():
     assert [hits(smc.law("classical").function, gains=("k", "c")) for _ in range(2)] == [0, 1]
+
+
+def test_a_function_of_arrays_is_compiled_once_for_all_processes(cache):
+    """Numba's own cache would take a function with another number of its module for the same."""
+
+    def ratio(factor, x):
+        return cfunctions.cached(FunctionType(ratio_to.__code__, {"FACTOR": factor}))(np.array([x]))
+
+    assert ratio(2.0, 1.0) == 2.0
+    (kept,) = cache.rglob("*.nbc")
+    code = kept.read_bytes()  # has numbers that no compilation gives again
+    assert (ratio(2.0, 0.0), kept.read_bytes()) == (np.inf, code)
+    assert ratio(3.0, 1.0) == 3.0
 
 
 def test_another_kind_other_gains_or_another_memory_are_compiled_again():
@@ -230,7 +250,6 @@ def test_code_that_holds_an_address_or_a_number_of_this_process_is_not_kept(cach
 
 def test_own_functions_divide_as_numpy_does_and_those_of_laws_as_python_does():
     """An exception cannot leave the callback, so a division by zero gives inf there. In a law it ends the run."""
-    from smc_mujoco.analysis import harmonics
     from smc_mujoco.control import law
     from smc_mujoco.simulation import channels, clock, controller, philox, signals, time_series
 
@@ -239,7 +258,7 @@ def test_own_functions_divide_as_numpy_does_and_those_of_laws_as_python_does():
         own = [one for module, one in found if one.py_func.__module__ == module.__name__]
         return [one.targetoptions.get("error_model", "python") for one in own]
 
-    callbacks = models(harmonics, channels, clock, controller, philox, signals, time_series)
+    callbacks = models(channels, clock, controller, philox, signals, time_series)
     assert len(callbacks) > 20
     assert set(callbacks) == {"numpy"}
     assert set(models(law)) == {"python"}

@@ -15,11 +15,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit
 from scipy.linalg import solve_continuous_lyapunov
 from scipy.optimize import brentq
 
 from smc_mujoco.evidence.certificates.loops import Loop
+from smc_mujoco.simulation.cfunctions import cached
 
 Proven = Callable[[tuple[float, ...], tuple[float, ...]], bool]
 Attracts = Callable[[np.ndarray], bool]
@@ -260,7 +260,7 @@ def _smooth(W: np.ndarray, count: int, switches: bool) -> np.ndarray:
     return W
 
 
-@njit(error_model="numpy")
+@cached
 def _sweep(W, open_, cells, shares, decay):
     """Update W in four orders of its nodes, and return its largest change."""
     nx, ns = W.shape
