@@ -19,7 +19,7 @@ test: ## all tests but the slow ones, a file of them at a time on each core
 	@./setup.sh requirements-test.lock
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"
 
-slow: ## the tests of more than about 4 s each, or of what a faster one shows; for releases, and weekly
+slow: ## the tests of more than about 0.3 s each whose lines faster ones run, too; for releases, and weekly
 	@./setup.sh requirements-test.lock
 	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
 

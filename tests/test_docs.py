@@ -81,6 +81,7 @@ def test_each_marker_is_in_one_page_and_stands_for_a_row_of_each_thing(known):
     assert sorted(re.findall(r"`(\w+)`", "".join(known.kinds()))) == sorted(laws)
 
 
+@pytest.mark.slow
 def test_numbers_that_the_mathematics_tell_are_what_their_code_prints(tmp_path, monkeypatch):
     page, seen = DOCS / "mathematics.md", 0
     monkeypatch.chdir(tmp_path)

@@ -18,6 +18,7 @@ def test_wild_scenarios_are_refused_or_run_to_sound_traces(part, cases, tmp_path
     assert sum(how != "refused" for how, _ in ended) > cases / 20
 
 
+@pytest.mark.slow
 def test_wild_calls_end_well_or_in_a_sentence():
     ended = list(attack.slice_of("calls", 0, 0, 15))
     assert [why for _, _, why in ended if why] == []
@@ -35,6 +36,7 @@ HANGS = """m = (c := __import__("ctypes")).create_string_buffer(64)
         with attack.alarm(0.1): [c.PyDLL(None).pthread_mutex_lock(m) for _ in "12"]"""  # and hears no signal
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("part", "broken", "words"),
     [

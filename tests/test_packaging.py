@@ -420,6 +420,7 @@ def test_packages_of_a_set_up_that_was_stopped_are_installed_again(checkout):
     assert not (base.parent / "adding").exists()
 
 
+@pytest.mark.slow
 def test_set_up_without_network_is_one_sentence_and_is_taken_up_again(checkout):
     """The environments get pip by a link: unpacking it takes most of the time."""
     import pip

@@ -178,6 +178,7 @@ def test_the_describing_function_of_play_is_that_of_a_run_under_a_sine(gap, omeg
     assert found / loop.response(omega) == pytest.approx(play(abs(found), loop.gap), abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("law", "gap"), [("twisting", 2e-2), ("quasi_continuous", 2e-3)])
 def test_predicted_chattering_behind_play_is_that_of_a_run(law, gap):
     gear = smc.Backlash(gap, rotor_inertia=5e-3)
@@ -204,6 +205,7 @@ def test_a_coarse_encoder_s_count_moves_s_as_in_a_run(counts):
     assert math.isnan(smc.score(trace)["chattering_frequency"])  # irregular
 
 
+@pytest.mark.slow
 @COARSELY
 @pytest.mark.parametrize("name", LAWS)
 def test_amplitude_and_frequency_follow_formulas_runs_and_exponents_of_the_lag(name):
@@ -246,6 +248,7 @@ def test_predicted_chattering_of_plants_is_that_of_runs(plant, law, actuator):
     assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.15)
 
 
+@pytest.mark.slow
 @COARSELY
 def test_an_estimator_of_the_velocity_is_in_the_prediction():
     slow = smc.Scenario(
@@ -267,6 +270,7 @@ def test_a_relay_without_an_actuator_chatters_from_sample_to_sample():
 RELAY = smc.law("classical", k=4.0, c=2.5)
 
 
+@pytest.mark.slow
 def test_samples_delay_a_relay_by_half_a_period_and_a_smooth_law_by_none():
     scenario = smc.Scenario(plant=smc.plant("duffing", **INTEGRATOR), law=RELAY, actuator=smc.Lag(0.01))
     cycle = chattering(scenario)
@@ -416,6 +420,7 @@ def test_what_half_a_step_changes_is_relative_and_infinite_where_one_cycle_is_lo
     assert [change(*pair) for pair in pairs] == pytest.approx([0.25, 0.25, 0.0, math.inf, math.inf])
 
 
+@pytest.mark.slow
 @COARSELY
 def test_a_smooth_law_oscillates_only_above_its_critical_delay():
     plant = smc.plant("duffing")
@@ -430,6 +435,7 @@ def test_a_smooth_law_oscillates_only_above_its_critical_delay():
     assert (above.amplitude, above.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.15)
 
 
+@pytest.mark.slow
 @COARSELY
 def test_a_user_s_law_is_predicted_with_its_memory():
     @smc.law_function(gains={"k": 2.0}, memory=1)

@@ -69,6 +69,7 @@ def loops(seed):
             yield loop, amplitude, frequency
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive", ["lags", "motor"])
 def test_random_loops_behind_drives_oscillate_as_the_machine_does(drive):
     driven = (one for one in loops(1) if getattr(one[0], drive))

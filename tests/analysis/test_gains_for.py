@@ -14,6 +14,7 @@ COARSELY = pytest.mark.usefixtures("coarse_grid")
 LAG = {"actuator": smc.Lag(0.01)}
 
 
+@pytest.mark.slow
 @COARSELY
 def test_super_twisting_gets_the_largest_gains_in_the_proportion_of_its_theorem():
     design = smc.gains_for("super_twisting", "duffing", amplitude=1e-3, **LAG)
@@ -27,6 +28,7 @@ def test_super_twisting_gets_the_largest_gains_in_the_proportion_of_its_theorem(
     assert 4.0 < design.disturbance <= 6.0  # N, as u is at most 6 N
 
 
+@pytest.mark.slow
 @COARSELY
 def test_forces_among_the_gains_stay_at_the_actuators_limit():
     design = smc.gains_for(smc.law("classical", k=0.5, c=2.5), "duffing", amplitude=1.0, u_max=2.0, **LAG)
@@ -42,6 +44,7 @@ def test_forces_among_the_gains_stay_at_the_limit_of_every_channel():
     assert _force_headroom(base) == pytest.approx(least / 2.0)
 
 
+@pytest.mark.slow
 @COARSELY
 def test_a_law_that_does_not_chatter_gets_the_largest_gains_there_are():
     design = smc.gains_for("boundary_layer", "duffing", amplitude=1e-3, u_max=10.0, **LAG)
@@ -63,6 +66,7 @@ def test_a_frequency_decides_the_speed():
     assert design.law.gains["c"] == pytest.approx(20.0 * design.speed)
 
 
+@pytest.mark.slow
 @COARSELY
 @pytest.mark.filterwarnings("ignore:classical with these gains")
 def test_an_amplitude_and_a_frequency_decide_size_and_speed():
@@ -76,6 +80,7 @@ def test_an_amplitude_and_a_frequency_decide_size_and_speed():
     assert both.law.gains["k"] == pytest.approx(both.size * both.speed**2)
 
 
+@pytest.mark.slow
 @COARSELY
 def test_a_frequency_that_no_speed_has_is_refused_with_the_least_there_is(refused):
     refused(lambda: smc.gains_for("classical", "duffing", frequency=5.0, **LAG), "oscillates at 66", recorded=False)

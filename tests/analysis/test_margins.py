@@ -44,6 +44,7 @@ def pushed(level):
 # what a margin is
 
 
+@pytest.mark.slow
 def test_it_is_the_boundary_between_what_is_tolerated_and_what_is_not(found):
     bases = {"observer_free": BASE, "classical": scenarios.scenario("duffing", "classical", duration=4.0)}
     closed = [margin for margin in found if not margin.open]
@@ -90,6 +91,7 @@ def test_it_comes_in_the_order_asked_for_with_units_and_to_the_resolution_asked_
             assert margin.resolution <= step * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 def test_it_does_not_depend_on_company_or_threads(found):
     assert margins.margins_of([BASE], ["disturbance", "delay"], COARSE, threads=1) == [found[1], found[0]]
 
@@ -105,6 +107,7 @@ def test_it_stops_at_the_first_level_that_is_not_tolerated(monkeypatch):
     assert margin.searched == 4.0
 
 
+@pytest.mark.slow
 def test_both_signs_of_a_disturbance_are_tolerated(monkeypatch):
     onesided = kind_of(lambda base, level: pushed(level > -1.5))
     monkeypatch.setitem(margins.MARGIN_KINDS, "onesided", dataclasses.replace(onesided, signed=True))
@@ -161,6 +164,7 @@ def test_it_tells_how_far_it_is():
 # theory beside it
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", ["van_der_pol", "pendulum_network"])
 def test_the_disturbance_tolerated_is_the_one_of_theory(plant):
     (margin,) = margins.margins([plant], ["observer_free"], ["disturbance"], "study", quick=True)
@@ -169,6 +173,7 @@ def test_the_disturbance_tolerated_is_the_one_of_theory(plant):
     assert margin.value + margin.resolution >= margin.theory * 0.999
 
 
+@pytest.mark.slow
 def test_a_delay_may_be_tolerated_beyond_where_rest_turns_unstable_in_a_small_oscillation():
     (margin,) = margins.margins(["inverted_pendulum"], ["observer_free"], ["delay"], "study")
     assert margin.theory is not None
@@ -309,6 +314,7 @@ def test_an_unknown_name_is_refused_with_the_cure(refused):
         refused(lambda arguments=arguments: margins.margins(*arguments))
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_table_and_writes_a_file(tmp_path, capsys):
     path = tmp_path / "margins.json"
     command(["duffing"], "observer_free,classical", "disturbance", "study", quick=True, json=path)

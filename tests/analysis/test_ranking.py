@@ -109,6 +109,7 @@ def test_from_six_to_forty_seeds_it_covers_93_percent_or_more():
         assert stats.binom.cdf(high - 1, n, 0.5) - stats.binom.cdf(low - 1, n, 0.5) > 0.93
 
 
+@pytest.mark.slow
 def test_blocks_are_drawn_by_seed_and_so_the_interval_covers_where_that_of_pooled_runs_does_not():
     rng, runs, covered, pooled = np.random.default_rng(0), 300, 0, 0
     for _ in range(runs):
@@ -251,6 +252,7 @@ def test_two_conditions_need_seven_seeds_as_the_least_p_is_two_to_the_one_minus_
     assert ("too few" in board.result) != wins
 
 
+@pytest.mark.slow
 def test_few_seeds_are_too_few_for_many_comparisons_and_the_board_says_so():
     laws = {f"law{i:02}": blocks(*range(i + 1, i + 6), seeds=6) for i in range(30)}
     board = leaderboard(stand(laws), ["itae"], resamples=FEW)[0]
@@ -269,6 +271,7 @@ def simulated(laws: int, seeds: int, bad: int, rng: np.random.Generator) -> dict
     return {f"law{i}": c for i, c in enumerate(cells)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("laws", "seeds", "bad"), [(2, 17, 2)])
 def test_equal_laws_are_seldom_separated_in_any_block(laws, seeds, bad):
     rng, runs, wrong = np.random.default_rng(laws + seeds), 400, 0
@@ -305,6 +308,7 @@ def test_equal_laws_whose_gains_spread_have_a_false_winner_in_at_most_five_perce
     assert stats.binomtest(wrong, 3 * runs, 0.05, alternative="greater").pvalue > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["tails"])
 def test_two_laws_apart_by_the_least_relevant_difference_have_a_false_winner_in_at_most_five_percent(shape):
     """The worst case of the hypothesis: a lead that just does not matter, and a third law far behind."""
@@ -316,6 +320,7 @@ def test_two_laws_apart_by_the_least_relevant_difference_have_a_false_winner_in_
     assert wrong > 0.01 * runs  # the test is not idle: one of its two sides is exact
 
 
+@pytest.mark.slow
 def test_a_lead_of_ten_percent_over_ten_laws_is_seen_with_a_probability_of_eighty_percent():
     rng, seen, runs = np.random.default_rng(0), 0, 100
     for _ in range(runs):
@@ -724,6 +729,7 @@ def test_runs_that_differ_in_more_than_the_law_are_not_compared(changed, words):
             leaderboard(table, ["itae"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0])
 def test_no_random_table_has_a_verdict_that_contradicts_it(seed):
     rng, named = np.random.default_rng(seed), 0
@@ -859,6 +865,7 @@ def test_a_board_of_chattering_says_where_no_run_was_compared_with_half_its_step
     assert said == {"nominal": ([False, False], False), "coulomb": ([False, True], True)}
 
 
+@pytest.mark.slow
 def test_no_board_of_real_runs_has_a_verdict_that_contradicts_it(real):
     names = [metric.name for metric in every_metric()]
     named = checked(leaderboard(real, [*METRICS, *names], resamples=FEW))

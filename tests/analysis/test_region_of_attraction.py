@@ -95,6 +95,7 @@ def test_an_early_verdict_needs_a_run_that_approaches_rests_or_fails():
     assert verdict(0.0, 0.0, False, failure="raised") == verdict(0.0, 0.0, True, diverged_at=3.0) == DOES_NOT
 
 
+@pytest.mark.slow
 def test_most_of_what_converges_leaves_early(weak):
     assert (weak.decided_at[weak.outcome == CONVERGES] < 6.0).mean() > 0.5
 
@@ -173,6 +174,7 @@ def test_the_channels_of_a_network_start_alike():
     assert (found.outcome == CONVERGES).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [smc.law("adaptive", gamma=66.11, c=2.853)])
 def test_what_a_switching_law_holds_has_converged_whatever_the_beat_of_its_ripple(law):
     """Van der Pol, from everywhere on the study's map: an independent integration is at rest in the end."""

@@ -85,6 +85,7 @@ def test_errors_of_measurement_reach_the_law_alike_in_both_loops():
     assert fast.s[0, 0] - plain.s[0, 0] == pytest.approx(2.874 * 0.02 + 0.1)
 
 
+@pytest.mark.slow
 def test_a_larger_budget_continues_the_search():
     base = scenario(duration=1.0)
     values = [smc.worst_case(base, within=CLASSES["all"], budget=n).value for n in (1, 5, 12)]
@@ -168,6 +169,7 @@ def test_the_class_where_none_is_given_is_what_the_machine_leaves_open():
     assert default_class(rig.scenario("none")).disturbance == pytest.approx(10.0 * rig.values["torque_per_volt"] / 6)
 
 
+@pytest.mark.slow
 def test_constants_and_relays_reach_what_another_adversary_found():
     """Rms errors in m on duffing within |d| <= 2 N, by an evolution of 144 straight lines and by constants."""
     found = {

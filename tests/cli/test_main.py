@@ -168,6 +168,7 @@ def test_with_its_output_closed_a_command_does_its_work(trace, folder):
 # run
 
 
+@pytest.mark.slow
 def test_run_prints_scores_of_a_scene_file_and_writes_its_files(call, scene, folder):
     code, out, err = call("run", scene, "--no-film", "--out", "results")
     assert (code, err) == (0, "")
@@ -706,6 +707,7 @@ def script(tmp_path_factory):
     return folder, python("scenes/once.py", "--no-film", cwd=folder)
 
 
+@pytest.mark.slow
 def test_a_scene_run_as_a_script_is_executed_once(script):
     _, done = script
     assert done.returncode == 0
@@ -833,6 +835,7 @@ def test_json_to_a_dash_is_printed_and_all_else_goes_to_stderr(capsys):
 # chatter
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse_grid")
 def test_chatter_prints_predictions_and_measurements_and_writes_files(call, folder):
     words = ["--law", "super_twisting,observer_free", "--actuator", "lag:0.01", "--gains", "default", "--duration", 3]
@@ -851,6 +854,7 @@ def test_chatter_prints_predictions_and_measurements_and_writes_files(call, fold
     assert (folder / "chatter.pdf").stat().st_size > 1000
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse_grid")
 def test_chatter_finds_the_largest_gains_of_a_wanted_amplitude(call):
     words = ["--law", "classical", "--actuator", "lag:0.01", "--gains", "default", "--duration", 2]

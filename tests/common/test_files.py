@@ -195,6 +195,7 @@ def test_a_name_that_no_file_can_have_is_one_sentence(name):
             call(name)
 
 
+@pytest.mark.slow
 def test_an_archive_that_unpacks_to_too_much_is_refused_before(tmp_path):
     file = tmp_path / "bomb.npz"
     packed = zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1)

@@ -51,6 +51,7 @@ def test_pid_on_a_free_mass_moves_as_its_three_poles_say():
     np.testing.assert_allclose(trace.x[::200, 0], exact[:, 1], atol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ki", "stable"), [(0.9, True), (1.1, False)])
 def test_pid_is_stable_just_where_routh_says(ki, stable):
     """s^3 + kd s^2 + kp s + ki with kp = kd = 1: just for ki < 1."""
@@ -136,6 +137,7 @@ def test_lqr_s_closed_form_solves_the_riccati_equation(seed):
     np.testing.assert_allclose(closed_form(law), riccati(a1, a2, b, q, r)[0], rtol=1e-7)
 
 
+@pytest.mark.slow
 def test_lqr_costs_what_the_riccati_equation_says_and_its_neighbours_cost_more():
     """From x(0) = 1 the integral of q1 e^2 + q2 de^2 + r u^2 is P11."""
 

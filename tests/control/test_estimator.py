@@ -287,6 +287,7 @@ def test_the_square_roots_of_kalman_s_factors_are_those_of_complex_numbers():
         assert complex(*square_root.py_func(a, b)) == pytest.approx(cmath.sqrt(complex(a, b)), rel=1e-15)
 
 
+@pytest.mark.slow
 def test_kalman_is_the_best_of_the_linear_observers_on_its_own_model():
     """Triply integrated white noise, seen under noise: no bandwidth of the others makes less error in v or a."""
     rng, K, sigma, q = np.random.default_rng(0), 20_000, 1e-3, 1e3

@@ -56,6 +56,7 @@ def test_a_text_is_its_law(files, text, name, gains):
     assert law.source.kind == ("yours" if "(" in text else "default")
 
 
+@pytest.mark.slow
 def test_a_tuning_is_its_law_and_keeps_its_source(files, tuned):
     tuned.save("st.json")
     law = smc.law("st.json")
@@ -66,6 +67,7 @@ def test_a_tuning_is_its_law_and_keeps_its_source(files, tuned):
     assert {s.law for s in smc.grid("duffing", ["st.json"], seeds=2)} == {tuned.law}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("replayed_here")
 @pytest.mark.filterwarnings("ignore:no set of gains tried")
 def test_a_tuning_goes_through_every_door(files, tuned, capsys):

@@ -94,6 +94,7 @@ def test_forms_of_a_law_take_its_gains():
     assert gains.tuned("duffing", "observer_free_single") is gains.tuned("duffing", "observer_free")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gain_set", "law"), [("tuned", "observer_free"), ("tracking", "super_twisting")])
 def test_shipped_gains_cost_what_their_record_says(gain_set, law):
     known = gains.tuned("duffing", law, gain_set)

@@ -99,6 +99,7 @@ def test_passivity_based_leaves_the_disturbance_over_its_slope():
     np.testing.assert_allclose(trace.s[-1], d / (K + k / width), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_observer_free_joint_rests_where_gravity_says():
     """Without gravity compensation lam tanh(k1 e) = -g(x), with it e = 0; V never grows on the way."""
     lam, k1 = np.array([20.0, 6.0, 9.0]), np.array([3.0, 2.0, 4.0])

@@ -78,6 +78,7 @@ def test_none_leaves_each_plant_where_its_equation_takes_it():
     assert 0.1 < ends["pendulum_network"] < 1.0
 
 
+@pytest.mark.slow
 def test_a_law_brings_its_chain_of_integrators_in_and_its_mirror_image_drives_it_out():
     for name in GENERAL:
         law = smc.law(name)

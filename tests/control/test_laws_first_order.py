@@ -303,6 +303,7 @@ def test_observer_free_integral_is_locally_stable_just_where_routh_and_hurwitz_s
     assert (np.abs(run.s[-2000:]).max() < size) == stable
 
 
+@pytest.mark.slow
 def test_observer_free_integral_leaves_no_error_under_a_constant_load_and_the_plain_law_does():
     scenarios = [paper.scenario(plant, "observer_free", "constant", duration=12.0) for plant in paper.GAINS]
     gains = [{**x.law.gains, "ki": 0.6 * x.law.gains["k1"]} for x in scenarios]
@@ -340,6 +341,7 @@ def test_observer_free_integral_does_not_wind_up():
     assert -near.s.min() < 0.1 * -far.s.min()
 
 
+@pytest.mark.slow
 def test_observer_free_adaptive_survives_the_jump_that_throws_the_plain_law():
     scenarios = [paper.scenario(plant, "observer_free", "jump_hard") for plant in paper.GAINS]
     mended = [dataclasses.replace(x, law=smc.law("observer_free_adaptive", **x.law.gains)) for x in scenarios]

@@ -126,6 +126,7 @@ def here(monkeypatch):
     monkeypatch.setattr(policy, "tried", lambda module, order, timeout: policy.load_network(policy.File(**order)))
 
 
+@pytest.mark.slow
 def test_a_library_that_a_file_crashes_is_one_sentence(tmp_path, monkeypatch):
     monkeypatch.setattr(policy, "tried", guard.tried)
     (tmp_path / "onnxruntime.py").write_text("import os\nSessionOptions = os.abort\n")

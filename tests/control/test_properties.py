@@ -40,6 +40,7 @@ def changes(name):
     return found
 
 
+@pytest.mark.slow
 def test_a_law_is_changed_by_what_it_reads_and_by_nothing_else():
     for name in smc.laws():
         read = reads(catalogue()[name])
@@ -86,6 +87,7 @@ def jump(name, model):
     return worst
 
 
+@pytest.mark.slow
 def test_u_is_continuous_where_a_law_says_so_and_jumps_where_it_does_not():
     for name in smc.laws():
         largest = max(jump(name, model) for model in (0.0, 1.0))

@@ -26,6 +26,7 @@ def test_amplitudes_that_grow_with_the_lag_and_with_its_square_cross_where_they_
     assert math.isnan(crossover(lags, [math.nan] * 3, lags))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse_grid")
 def test_predictions_are_lines_and_runs_are_dots_of_the_same_colour():
     def trace(law, tau):

@@ -60,6 +60,7 @@ def words(page) -> str:
     return " ".join(re.findall(r"<!-- (.*?) -->", page.read_text()))
 
 
+@pytest.mark.slow
 def test_writes_svg_and_png_with_names_and_units(pair, tmp_path):
     svg, png = figure(pair, tmp_path / "deep" / "a.svg", None, title="A title")
     assert [svg.name, png.name] == ["a.svg", "a.png"]
@@ -94,6 +95,7 @@ def test_a_file_does_not_say_when_it_was_written(tmp_path, monkeypatch):
     assert written[0] == written[1]
 
 
+@pytest.mark.slow
 def test_a_network_has_a_row_for_each_run_with_a_line_for_each_channel(tmp_path):
     (svg,) = figure(runs("pendulum_network", "noise", 10.0), tmp_path / "a")
     assert "angle x (rad)" in words(svg)
@@ -237,6 +239,7 @@ def test_small_values_are_drawn_in_thousandths_of_their_unit(tmp_path):
     assert " 15 20 position x (mm)" in text.replace("  ", " ")
 
 
+@pytest.mark.slow
 def test_chattering_that_cannot_be_seen_has_no_words(pair, tmp_path):
     """A ripple of a thousandth of the largest |u|, on a run that is long enough to be averaged."""
     (trace,) = runs(duration=1.0)[:1]
@@ -274,6 +277,7 @@ def test_long_and_odd_labels_stay_inside(pair, tmp_path):
     assert style.width(style.cropped("x" * 80, 100.0, 11), 11) <= 100.0
 
 
+@pytest.mark.slow
 def test_another_ending_is_refused(pair, tmp_path):
     with pytest.raises(smc.ScenarioError, match="end the name in"):
         figure(pair, tmp_path / "a.gif")
@@ -433,6 +437,7 @@ def test_a_rest_is_marked_where_the_joint_stands_and_only_where_dry_friction_can
     assert panels.rests(realistic(friction=Coulomb(0.0))) == []
 
 
+@pytest.mark.slow
 def test_blows_are_told_and_do_not_squash_what_lasts(tmp_path):
     hit = realistic(contact="stops", v0=3.0)
     text = words(draw_figure.figure([hit]))
@@ -447,12 +452,14 @@ def test_a_realistic_network_has_its_reactions(tmp_path):
     assert "reaction (N·m)" in words(draw_figure.figure([rubbed]))
 
 
+@pytest.mark.slow
 def test_a_realistic_run_that_fails_at_once_is_drawn():
     rubbed = realistic(friction=Coulomb(0.5), duration=1.0)
     for at in (0, 1):
         draw_figure.figure([broken(rubbed, at)]).draw_without_rendering()
 
 
+@pytest.mark.slow
 def test_one_trace_is_drawn_like_a_list_of_one_and_the_same_traces_give_the_same_files(pair, tmp_path):
     alone, listed = figure(pair[0], tmp_path / "a", None), figure(pair[:1], tmp_path / "b", None)
     assert [path.read_bytes() for path in alone] == [path.read_bytes() for path in listed]
@@ -476,6 +483,7 @@ def test_the_close_up_shows_no_round_off(pair, level):
     assert full.get_ylim() == pytest.approx((-1.24, 1.24))  # what is large fills it
 
 
+@pytest.mark.slow
 def test_names_of_axes_never_touch():
     parts = {"friction": Coulomb(0.05), "actuator": smc.DCMotor(), "duration": 0.2}
     several = [realistic(plant="pendulum_network", **parts)], [realistic(**parts)], runs(duration=0.2)

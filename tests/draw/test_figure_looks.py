@@ -256,6 +256,7 @@ def test_curves_that_coincide_are_all_seen(one):
     assert panels.dashes([(one.t, zero), (one.t, np.where(one.t < 0.1 * one.t[-1], 1.0, 0.0))], (0.0, 1.0)) == ["-"] * 2
 
 
+@pytest.mark.slow
 def test_each_joint_of_an_arm_has_its_reference_and_its_error_if_that_moves(arm):
     assert [ax.get_ylabel() for ax in figure(arm).axes][:3] == ["j0 x (rad)", "j0 u (N·m)", "j1 x (rad)"]
     moving = dataclasses.replace(arm[0], r=arm[0].r + arm[0].t[:, None])

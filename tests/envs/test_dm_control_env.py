@@ -183,6 +183,7 @@ def test_tasks_are_for_the_plants_that_have_them():
     assert {"swing_up", "synchronise"} <= set(tasks.tasks("inverted_pendulum_network"))
 
 
+@pytest.mark.slow
 def test_a_swing_up_cannot_push_the_pendulum_up_and_energy_can():
     environment = suite.load("inverted_pendulum", "swing_up", random=0)
     last = driven_by_dm(environment, lambda timestep: np.array([1.5]))[:, 0]

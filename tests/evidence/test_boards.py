@@ -579,6 +579,7 @@ def test_a_law_that_does_not_compile_is_refused():
         Machine(boards.on_board("acrobot", lists()))
 
 
+@pytest.mark.slow
 def test_the_command_shows_this_packages_rows_among_the_published(capsys, tmp_path):
     with pytest.raises(SystemExit) as ended:
         cli.main(["board", "acrobot", "--no-robustness", "--figure", str(tmp_path / "a")])

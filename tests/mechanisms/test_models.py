@@ -197,6 +197,7 @@ def test_the_undamped_plant_keeps_its_energy_to_the_order_of_rk4(name):
     assert coarse / fine >= 16
 
 
+@pytest.mark.slow
 def test_pymjcf_reads_every_file():
     dm_control_suite()
     mjcf = importlib.import_module("dm_control.mjcf")

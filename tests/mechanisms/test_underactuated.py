@@ -204,6 +204,7 @@ PARTS = {
 }
 
 
+@pytest.mark.slow
 @PLANTS
 def test_the_law_settles_both_joints_also_on_the_realistic_mechanism(name):
     """Each part on one of the plants. And the compiled callback gives the reference loop's bits."""
@@ -215,6 +216,7 @@ def test_the_law_settles_both_joints_also_on_the_realistic_mechanism(name):
         assert_same(start, reference.run(start.scenario))
 
 
+@pytest.mark.slow
 def test_dry_friction_at_the_hinge_is_not_matched_and_leaves_a_limit_cycle_in_proportion():
     """Where the pole sticks, by up to level / (m grav l), the cart walks; no gain k on S helps: S is 0 the while."""
     levels = np.array([0.001, 0.002, 0.004])

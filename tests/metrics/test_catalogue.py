@@ -122,6 +122,7 @@ def test_scale_falls_back_to_the_range_of_r_and_then_to_one():
     assert m.settling_time(run(t, [0, 0.03, 0.02, 0, 0])) == 2.0  # band 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("x0", [0.5, -2.0])
 def test_second_order_overshoot_is_the_textbook_one_whichever_side_it_starts_from(x0):
     zeta, omega = 0.3, 4.0
@@ -735,6 +736,7 @@ def random_runs(draw):
     return run(np.arange(samples) * 0.25, x, r=np.broadcast_to(r, x.shape), u=u, s=s, **more)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(random_runs(), st.sampled_from([-8.0, -1.0, 0.125, 4.0]), st.sampled_from([-4.0, 0.5]))
 def test_scaling_x_or_u_scales_what_has_its_unit_and_leaves_times_and_percentages(trace, c, k):
@@ -750,6 +752,7 @@ def test_scaling_x_or_u_scales_what_has_its_unit_and_leaves_times_and_percentage
             assert after[metric.name] == value, metric.name
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(random_runs(), st.randoms(use_true_random=False))
 def test_permuting_channels_changes_nothing(trace, random):
@@ -759,6 +762,7 @@ def test_permuting_channels_changes_nothing(trace, random):
     assert m.score(dataclasses.replace(trace, **shuffled)) == pytest.approx(m.score(trace), rel=1e-12, nan_ok=True)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(random_runs(), WHOLE, WHOLE)
 def test_moving_the_origin_of_x_or_t_changes_only_the_peak(trace, shift, start):

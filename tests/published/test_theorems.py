@@ -81,6 +81,7 @@ def test_proper_super_twisting_has_the_best_worst_case_of_a_sampled_law(period, 
     assert residual(trace) == pytest.approx(L * period**2, rel=0.01)
 
 
+@pytest.mark.slow
 def test_proper_conditioned_super_twisting_is_the_proper_law_until_u_is_saturated_and_then_does_not_wind_up():
     """Of the inner branch too, where |s| <= dt^2 k2; and from s = 20 with |u| <= U, it overshoots by a fraction."""
     laws = [

@@ -82,6 +82,7 @@ def test_a_function_of_arrays_is_compiled_once_for_all_processes(cache):
     assert ratio(3.0, 1.0) == 3.0
 
 
+@pytest.mark.slow
 def test_another_kind_other_gains_or_another_memory_are_compiled_again():
     assert [hits(mine()), hits(mine())] == [0, 1]
     assert hits(mine(), gains=("k", "c")) == 0
@@ -89,6 +90,7 @@ def test_another_kind_other_gains_or_another_memory_are_compiled_again():
     assert hits(mine("y.x"), kind="estimator") == 0
 
 
+@pytest.mark.slow
 def test_a_law_that_has_changed_is_not_taken_for_the_one_before():
     """By its own text, by a number of its module, and by a helper's: the laws have one name."""
     scaled = "factor * gains.k"

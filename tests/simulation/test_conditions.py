@@ -302,6 +302,7 @@ def test_margins_of_a_model_that_rests_at_0_ask_where_to_start(arm, refused):
     assert found.value > 0.0
 
 
+@pytest.mark.slow
 def test_a_condition_narrows_a_margin():
     law = smc.law("observer_free", lam=6.0, k1=3.0)
     base, late = (
@@ -325,6 +326,7 @@ def test_a_model_is_tuned_in_conditions_of_ones_own(arm, refused):
     assert found.scales["X"] == 0.4
 
 
+@pytest.mark.slow
 def test_tune_has_the_bound_of_a_grid(arm):
     starts = smc.starts(x0=0.4)
     found = smc.tune(arm, "pid", 2, conditions="nominal", starts=starts)

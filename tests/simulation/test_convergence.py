@@ -152,6 +152,7 @@ def test_halving_the_physics_step_changes_no_score():
     assert not changed
 
 
+@pytest.mark.slow
 def test_the_obstacles_of_the_study_are_hit():
     keys = [(name, contact) for name, contacts in HITS.items() for contact in contacts]
     touching = [made for key in keys for law in LAWS for made in scenarios(key, law, 1.0, 2, 1)]

@@ -167,6 +167,7 @@ def test_coriolis_is_christoffels(arm):
         assert rate == pytest.approx(2 * w @ nominal.coriolis(x, v, w, values), abs=1e-7)
 
 
+@pytest.mark.slow
 def test_a_law_that_numba_refuses_runs_in_the_reference_loop():
     @smc.law_function(joint=True, gains={"k": 4.0})
     def listed(y, gains, memory):

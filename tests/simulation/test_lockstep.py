@@ -41,6 +41,7 @@ def shortened(s, duration):
     return dataclasses.replace(s, duration=duration, disturbance=signals, jump=jump)
 
 
+@pytest.mark.slow
 def test_callback_equals_plain_loop_in_every_condition_of_the_study():
     """One plant and one law after the other."""
     laws, plants = itertools.cycle(STUDIED), itertools.cycle(smc.paper.GAINS)
@@ -177,6 +178,7 @@ def test_callback_equals_plain_loop_in_scattered_scenarios():
         assert_same(trace, reference.run(scenario))
 
 
+@pytest.mark.slow
 def test_a_users_law_sees_the_same_measurement_in_both_loops():
     """To rounding only: numba multiplies x**3 of the nominal Duffing spring out, Python takes a power."""
     scenarios = [dataclasses.replace(scattered(number), law=curious(a=3.0)) for number in range(80, 92)]

@@ -58,6 +58,7 @@ def test_normals_are_box_muller_of_the_top_53_bits():
         np.testing.assert_allclose(philox.normals(5, 2, philox.MEASUREMENT, k), expected, rtol=1e-14, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_normals_are_standard_normal():
     z = draws(1, 0, philox.MEASUREMENT, 200_000)
     for column in z.T:

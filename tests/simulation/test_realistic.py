@@ -393,6 +393,7 @@ def rested(name):
     return smc.run(resting(name))
 
 
+@pytest.mark.slow
 @TWO
 def test_under_friction_a_smooth_law_rests_where_friction_holds_the_rest(name):
     """|lam tanh(k1 x) - restoring force(x)| <= F within 2 %; and friction is what holds it."""

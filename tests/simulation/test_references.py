@@ -120,6 +120,7 @@ def followed():
     return {name: (next(traces), next(traces)) for name in FOLLOWING}
 
 
+@pytest.mark.slow
 def test_a_law_with_the_model_follows_a_sine_and_a_smooth_path_without_leaving_it(followed):
     """On a sine e ends within 2 % of the amplitude: what is left is the sampling, and an integrator's memory of the
     start. Where it starts on the path, e is at no time more than 0.5 % of the way.

@@ -554,6 +554,7 @@ def test_a_stream_holds_one_batch_and_diverging_runs_print_nothing_and_leave_no_
     assert [path.name for path in tmp_path.iterdir()] == ["job.py"]
 
 
+@pytest.mark.slow
 def test_runs_of_two_python_threads_do_not_meet():
     slow = scenario(made(with_json, {"k": 2.0}), duration=0.1, mismatch={"M": 2.0})
     fast = [

@@ -141,6 +141,7 @@ def test_its_scenario_comes_back_equal_and_gives_the_same_trace(name, traces, tm
     assert identical(smc.run(again.scenario), trace)
 
 
+@pytest.mark.slow
 def test_every_plant_and_law_comes_back(tmp_path):
     """Every plant under one law, and every law on one plant."""
     plants = {law: [plant for plant in smc.plants() if law in smc.laws(plant)] for law in smc.laws()}

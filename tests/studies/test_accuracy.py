@@ -39,6 +39,7 @@ def test_every_law_states_its_order_of_accuracy():
     assert {which: order for which, order in orders.items() if order is None or not order >= 0.0} == {}
 
 
+@pytest.mark.slow
 def test_dry_friction_orders_the_laws_as_textbooks_do():
     laws = ["observer_free", "classical", "super_twisting", "twisting"]
     table = smc.accuracy(laws, "duffing", periods=(4e-3, 2e-3), conditions="coulomb", seeds=1)
@@ -49,6 +50,7 @@ def test_dry_friction_orders_the_laws_as_textbooks_do():
     assert by_law["super_twisting"].largest[-1] < 1e-3 * by_law["twisting"].largest[-1]
 
 
+@pytest.mark.slow
 def test_second_order_laws_are_of_second_order_on_the_double_integrator_or_the_table_says_why_not():
     names = [name for name, law in catalogue().items() if law.order("s", law.defaults) == 2.0]
     table = defaults(names)
@@ -56,6 +58,7 @@ def test_second_order_laws_are_of_second_order_on_the_double_integrator_or_the_t
     assert sum(row.s.as_promised for row in table) > len(names) / 2
 
 
+@pytest.mark.slow
 def test_relays_are_of_first_order_and_layers_of_none():
     table = defaults(["classical", "boundary_layer", my_relay])
     orders = {row.law: (row.s.order, row.s.theory) for row in table}
@@ -65,6 +68,7 @@ def test_relays_are_of_first_order_and_layers_of_none():
     assert [row.law for row in table][-1] == "boundary_layer"
 
 
+@pytest.mark.slow
 def test_gains_that_cannot_hold_the_disturbance_are_said_to_limit_the_error():
     load = smc.condition("load", disturbance=smc.Sine(1.0, 3.0))
     table = defaults([smc.law("super_twisting", k1=3.0, k2=0.5), smc.law("twisting")], conditions=load)
@@ -102,6 +106,7 @@ def test_laws_without_tuned_gains_get_their_defaults_with_one_warning():
     assert "hierarchical has its default gains, pid is tuned: tune it too" in " ".join(str(beside).split())
 
 
+@pytest.mark.slow
 def test_a_table_reads_as_text_html_data_and_file(tmp_path):
     pandas = pytest.importorskip("pandas")
     with warnings.catch_warnings():

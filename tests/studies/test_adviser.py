@@ -49,6 +49,7 @@ def text(advice):
     return " ".join(advice.answer)
 
 
+@pytest.mark.slow
 def test_the_advised_law_has_the_best_mean_rank_of_those_that_settle(advice):
     ranks = {choice.law.name: choice.rank.mean for choice in advice.choices if choice.fit}
     assert advice.law.name == min(ranks, key=ranks.__getitem__) == advice.choices[0].law.name
@@ -310,6 +311,7 @@ def test_a_table_has_a_row_for_each_law_with_intervals(advice):
     assert repr(advice) == f"Advice(duffing: {FAST})"
 
 
+@pytest.mark.slow
 def test_equal_laws_are_level_and_no_law_is_called_the_best(folder):
     twins = [FAST, FAST.named("twin")]
     found = smc.which("duffing", needs="fast,calm", laws=twins, out=folder, **COMMON)
@@ -527,6 +529,7 @@ def test_the_command_prints_the_table_and_the_answer(folder, capsys, monkeypatch
     assert math.isfinite(float(printed.partition("results.parquet; ")[2].split()[0]))
 
 
+@pytest.mark.slow
 def test_its_table_fits_into_80_columns_with_three_needs(advice, folder):
     capture = io.StringIO()
     laws = [choice.law for choice in advice.choices]

@@ -59,6 +59,7 @@ def test_a_law_whose_error_depends_on_the_physics_step_is_called_unstable():
         assert arms.unstable(runs, smc.run(runs)) is expected
 
 
+@pytest.mark.slow
 def test_the_hybrid_law_presses_as_hard_as_it_should_and_stays_on_the_wall():
     """With the friction of a real arm, rubbing on the wall, and noise: within 5 %, and less than 1 mm deep."""
     known, unknown = smc.run([arms.scenario("wall", arms.hybrid(friction=one), seed=5) for one in (True, False)])

@@ -54,6 +54,7 @@ def kinds(found, plant="duffing"):
     return {law: made.source.kind for law, made in found.gains[plant].items()}
 
 
+@pytest.mark.slow
 def test_every_law_has_given_shipped_or_tuned_gains_and_its_table_says_which(found):
     assert kinds(found) == {"my_law": "tuned here", "classical": "shipped", "pid": "yours"}
     assert found.gains["duffing"]["my_law"].gains != found.gains["inverted_pendulum"]["my_law"].gains
@@ -81,6 +82,7 @@ def test_runs_use_every_set_of_gains_in_turn(found):
     assert [shipped.scenario(i).law.gains["k"] for i in range(8)] == [known[seed]["k"] for seed in range(8)]
 
 
+@pytest.mark.slow
 def test_a_verdict_names_its_metric_plant_and_condition(found):
     assert len(found.verdicts) == len(found.metrics) * 4
     for board, verdict in zip(found.leaderboard, found.verdicts, strict=True):
@@ -120,6 +122,7 @@ def test_the_same_call_goes_on_from_its_folder(found, monkeypatch):
         smc.compare(laws, PLANTS, ["friction", "encoder"], 8, out=found.out, **SHORT)
 
 
+@pytest.mark.slow
 def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -160,6 +163,7 @@ def test_what_cannot_run_is_refused_before_any_gains_are_searched(tmp_path, monk
             smc.compare(*arguments, out=tmp_path, progress=False)
 
 
+@pytest.mark.slow
 def test_one_command_tunes_runs_tables_and_draws(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.py").write_text(

@@ -344,6 +344,7 @@ def test_a_worker_that_is_killed_in_mid_run_changes_nothing(dask, half_done, tmp
     assert (worker.poll(), other.poll()) == (-signal.SIGKILL, None)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_killed_in_mid_run_is_one_sentence_and_finished_runs_stay(dask, half_done, tmp_path):
     _, (scheduler, *_), _ = dask
     scheduler.send_signal(signal.SIGKILL)
@@ -356,6 +357,7 @@ def test_a_scheduler_that_is_killed_in_mid_run_is_one_sentence_and_finished_runs
     assert len(list((tmp_path / "remote" / "parts").glob("*.parquet"))) >= 3
 
 
+@pytest.mark.slow
 def test_without_a_scheduler_there_the_sentence_says_so(tmp_path):
     client = start("-c", CLIENT, str(tmp_path), "dask://127.0.0.1:9", "0.5", log=tmp_path / "client.log")
     client.communicate(timeout=300)

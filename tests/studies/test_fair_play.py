@@ -212,6 +212,7 @@ def test_a_wrong_key_is_one_sentence(tmp_path, key):
 # replays
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*the run takes the reference loop")
 def test_a_replay_tells_cheats_from_honest_laws():
     fields = NOISY | {"noise_key": 77}

@@ -34,6 +34,7 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("study")
 
 
+@pytest.mark.slow
 def test_a_winner_is_named_over_rivals_at_their_defaults_only_where_it_is_asked_for(folder):
     (fair,) = ranked([FAST, SLOW], folder)
     assert fair.winner == "fast"
@@ -91,6 +92,7 @@ def test_a_table_keeps_the_search_behind_the_gains(tmp_path):
     assert smc.Table.read(tmp_path).scenario(0).law.source == law.source
 
 
+@pytest.mark.slow
 def test_an_adviser_names_no_law_over_rivals_at_their_defaults(tmp_path):
     options = {"seeds": 16, "duration": 2.5, "conditions": "nominal", "needs": "on-track", "out": tmp_path}
     slow = dataclasses.replace(at_default(SLOW), template=None)  # else it would be tuned
@@ -104,6 +106,7 @@ def test_an_adviser_names_no_law_over_rivals_at_their_defaults(tmp_path):
     assert "No law is advised over" not in asked.answer[0]
 
 
+@pytest.mark.slow
 def test_compare_names_a_winner_over_defaults_with_an_option(tmp_path, capsys):
     laws = "fast: observer_free(lam=6, k1=2), adaptive"
     options = [

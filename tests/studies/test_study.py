@@ -79,6 +79,7 @@ def test_a_seed_has_one_start_for_all_laws_and_conditions_near_the_papers():
     assert starts[3] != starts[4]
 
 
+@pytest.mark.slow
 def test_no_start_lies_beyond_a_stop():
     made = grid(paper.PLANTS, ["none"], ["contact"], 3, "study", duration=10.0)
     single = [s for s in made if s.plant.n == 1]
@@ -233,6 +234,7 @@ def test_a_part_that_is_none_is_computed_again(tmp_path, monkeypatch, harm):
     assert bytes_of(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_a_byte_that_changed_in_a_part_never_reaches_the_table(tmp_path, monkeypatch):
     import pyarrow.parquet as pq
 
@@ -268,6 +270,7 @@ def test_half_written_files_of_a_killed_study_are_deleted_in_time(tmp_path):
     assert new.exists()  # of a study that may still run
 
 
+@pytest.mark.slow
 def test_the_table_is_written_in_groups_from_parts_in_any_order(tmp_path, monkeypatch):
     scenarios = small(seeds=4)
     study(scenarios, tmp_path / "one")

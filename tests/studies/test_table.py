@@ -81,6 +81,7 @@ def flipped(data: bytes, bits: int) -> Iterator[bytes]:
         yield data[: bit // 8] + bytes([data[bit // 8] ^ 1 << bit % 8]) + data[bit // 8 + 1 :]
 
 
+@pytest.mark.slow
 def test_no_bit_that_flips_makes_a_table_of_other_rows(tmp_path):
     right = repr(study(small(), tmp_path).rows())
     path, refused = tmp_path / "results.parquet", 0
@@ -93,6 +94,7 @@ def test_no_bit_that_flips_makes_a_table_of_other_rows(tmp_path):
     assert refused > 40
 
 
+@pytest.mark.slow
 def test_no_bit_that_flips_in_a_part_makes_other_rows(tmp_path):
     right = repr(study(small(), tmp_path).rows())
     (path,) = (tmp_path / "parts").glob("*.parquet")

@@ -305,6 +305,7 @@ def test_metrics_are_plain_floats(step_response):
 # figure and film
 
 
+@pytest.mark.slow
 def test_a_failing_test_attaches_its_figure_and_with_smc_film_its_film(pytester, monkeypatch):
     pytester.makepyfile(test_my_laws=HEAD + BAD.replace("phi=2.0", "phi=2.0, duration=0.04"))
     pytester.makeconftest("""

@@ -61,6 +61,7 @@ def test_tracking_is_a_share_of_where_a_run_starts():
     assert variation == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:no set of gains")
 def test_the_same_seed_gives_the_same_gains_to_the_last_bit_at_any_thread_count(found):
     assert tune("duffing", "observer_free", budget=32, seed=3, objective=SHORT, threads=1) == found
@@ -68,6 +69,7 @@ def test_the_same_seed_gives_the_same_gains_to_the_last_bit_at_any_thread_count(
     assert other.history[-1].gains not in {e.gains for e in found.history}
 
 
+@pytest.mark.slow
 def test_a_larger_budget_repeats_the_starts_of_a_smaller_one_and_is_never_worse(monkeypatch):
     monkeypatch.setattr(search, "_spread", lambda *_: None)
     runs = [
@@ -116,6 +118,7 @@ def test_a_search_has_converged_when_three_starts_end_within_a_percent_of_the_be
     assert dataclasses.replace(found, ends=ends).converged is verdict
 
 
+@pytest.mark.slow
 def test_a_search_ends_when_it_has_converged_and_knows_enough_sets_of_gains(monkeypatch):
     monkeypatch.setattr(search, "converged", lambda ends: len(ends) == 2)
     monkeypatch.setattr(search, "near_optimal", lambda history: history[:MAX_SETS])
@@ -209,6 +212,7 @@ def test_the_cost_of_the_best_gains_can_be_repeated(found):
     assert [t.scenario.mismatch.get("mass", 1.0) for t in traces] == [1.0] * 5 + [0.7, 1.3]
 
 
+@pytest.mark.slow
 def test_tuning_beats_the_default_gains(found, rival):
     for tuned in (found, rival):
         assert tuned.objective < tuned.before
@@ -288,6 +292,7 @@ def test_a_gain_without_a_unit_that_is_not_positive_is_refused(refused):
     refused(lambda: tune("duffing", smc.law_function(one_gain, gains={"k": 0.0})(), budget=5, objective=LEAN))
 
 
+@pytest.mark.slow
 def test_a_search_leaves_a_box_that_lacks_the_optimum_by_a_decade_and_says_so():
     own = catalogue()["observer_free"]
     odd = dataclasses.replace(own, gains=dict(own.gains) | {"lam": Gain(6.0, Unit(force=-2), positive=True)})
@@ -451,6 +456,7 @@ def call(tmp_path, monkeypatch, capsys):
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("always")
 def test_the_command_prints_gains_and_writes_what_it_found(call, tmp_path):
     code, out, err = call("duffing", "classical", "--budget", "3", "--objective", "tracking", "--out", "k.json")
@@ -523,6 +529,7 @@ def predicted(tuned) -> float:
     return smc.chattering(tuned.law, plant=tuned.plant, actuator=smc.Lag(0.01)).amplitude
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse_grid")
 def test_gains_are_tuned_within_a_bound_on_predicted_chattering():
     free = tune("duffing", "classical", 20, objective=LAGGED)

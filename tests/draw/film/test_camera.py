@@ -86,6 +86,7 @@ def test_an_own_model_s_camera_is_found_by_its_name(trace):
         scene.turn(trace.scenario, "sid")
 
 
+@pytest.mark.slow
 @renders
 def test_the_chosen_camera_is_the_picture_s(trace):
     for chosen in ("side", (20.0, -40.0)):

@@ -35,6 +35,7 @@ def pictures(shown: Stage, push: bool) -> list[np.ndarray]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("plant", "push"), [("van_der_pol", True), ("pendulum_network", False)])
 def test_parts_drawn_again_are_those_of_the_whole_picture(plant, push, monkeypatch):
     """Shadows and springs too; the first machine stands still."""
@@ -77,6 +78,7 @@ def test_two_machines_that_move_far_apart_are_drawn_in_two_rectangles(monkeypatc
     assert sum(map(canvas.pixels, drawn[1:])) < 0.3 * SIZE[0] * SIZE[1]
 
 
+@pytest.mark.slow
 def test_cylinders_have_few_stacks_unless_the_model_has_large_round_shapes():
     for plant, few in (("van_der_pol", True), ("inverted_pendulum", False)):
         with stage(plant) as shown:
@@ -103,6 +105,7 @@ def test_a_picture_in_which_nothing_moves_is_not_drawn_again(monkeypatch):
             assert shown.render() is first
 
 
+@pytest.mark.slow
 def test_slow_motion_adds_up_until_it_is_drawn():
     with stage("inverted_pendulum") as shown:
         shown.pose(1, np.zeros(1))

@@ -99,6 +99,7 @@ def test_every_machine_moves():
     assert np.ptp(rows) > 0.5 * len(moved)  # from the nearest rail to the farthest
 
 
+@pytest.mark.slow
 @renders
 def test_every_law_has_its_colour():
     (picture,) = pictures(runs("van_der_pol"), [0.1], size=(640, 360))
@@ -106,6 +107,7 @@ def test_every_law_has_its_colour():
         assert share(picture, style.law_colour(law)) > 3e-4, law
 
 
+@pytest.mark.slow
 @renders
 def test_a_large_control_draws_an_arrow():
     (with_control,) = pictures(runs(laws=LAWS[:1]), [0.2])
@@ -159,6 +161,7 @@ def test_a_torque_s_arrow_points_to_where_it_moves_the_pendulum():
     assert leaning * right > 0.0 > leaning * left
 
 
+@pytest.mark.slow
 @renders
 def test_the_drum_on_a_crane_s_trolley_hides_none_of_its_arrow():
     trace = smc.run(smc.Scenario(plant="overhead_crane", law="none", duration=0.01))
@@ -183,6 +186,7 @@ def test_a_failed_machine_turns_grey_and_stays_where_it_was():
     assert np.abs(machines(after)[:, right:].astype(int) - machines(later)[:, right:]).max() < 30
 
 
+@pytest.mark.slow
 @renders
 def test_a_machine_that_fails_at_once_is_grey_from_the_start():
     good, bad = runs("pendulum_network", laws=LAWS[::3])
@@ -192,6 +196,7 @@ def test_a_machine_that_fails_at_once_is_grey_from_the_start():
     pictures([good, broken(bad, 0)], [0.0, 0.3], charts=True)
 
 
+@pytest.mark.slow
 @renders
 def test_a_jump_changes_the_machine_and_is_told():
     jump = smc.Jump(0.2, {"l": 1.5})
@@ -282,6 +287,7 @@ def test_stills_and_clips_are_written_and_networks_are_cut(tmp_path):
         assert (clip.n_frames, clip.size) == (5, SIZE)
 
 
+@pytest.mark.slow
 @without_charts
 def test_one_trace_is_filmed_like_a_list_of_one(tmp_path):
     (trace,) = runs(laws=LAWS[:1], duration=0.1)
@@ -469,6 +475,7 @@ def test_a_failed_machine_has_no_state(stuck):
     assert states.timeline(film.finite(broken(stuck, 0)), np.array([0.0, 1.0])) == [None, None]
 
 
+@pytest.mark.slow
 @renders
 def test_a_tendon_that_a_mechanism_shows_is_drawn_where_it_is():
     def add(spec):
@@ -485,6 +492,7 @@ def test_a_tendon_that_a_mechanism_shows_is_drawn_where_it_is():
     assert share(with_line, style.REACTION) > share(without, style.REACTION) + 3e-3
 
 
+@pytest.mark.slow
 @renders
 def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
     slack = realistic(plant="inverted_pendulum", actuator=smc.Backlash(0.2), duration=0.5)
@@ -503,6 +511,7 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
         assert shown.data.joint("m0/lift").qpos[0] == 0.0
 
 
+@pytest.mark.slow
 @renders
 def test_a_realistic_machine_that_fails_is_filmed():
     parts = {"actuator": smc.Backlash(0.2), "friction": Coulomb(0.3), "contact": "stops"}
@@ -545,6 +554,7 @@ def test_a_brief_peak_of_a_channel_does_not_set_the_longest_arrow(peak, samples,
     assert {f"coloured arrow: mean control, longest {words}", f"dark arrow: disturbance, longest {words}"} <= {*said}
 
 
+@pytest.mark.slow
 @renders
 def test_the_state_stands_in_a_badge_beside_the_label_in_the_picture():
     plant = "inverted_pendulum"

@@ -23,6 +23,7 @@ if SUITE is None or not SUITE.submodule_search_locations:
 FOREIGN = Path(SUITE.submodule_search_locations[0]) / "suite"
 
 
+@pytest.mark.slow
 @without_charts
 def test_a_foreign_model_has_its_picture(tmp_path):
     """From above, as its camera sees it. Its target reaches below the floor."""
@@ -54,6 +55,7 @@ def test_a_picture_that_shows_nothing_is_told(tmp_path, group, floor, words):
             smc.still([trace], 0.1, tmp_path / "a.png", size=(320, 180))
 
 
+@pytest.mark.slow
 @without_charts
 def test_a_view_that_shows_nothing_is_framed_again(tmp_path):
     """The wall hides the machine from the model's own camera, and from the chosen one."""
@@ -74,6 +76,7 @@ def test_a_view_that_shows_nothing_is_framed_again(tmp_path):
         )
 
 
+@pytest.mark.slow
 def test_arrows_of_a_foreign_cart_are_seen_and_all_of_its_rail_is_in_the_picture():
     """The arrow lies before the pole, which stands where it begins; the rail is longer than what moves on it."""
     plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
@@ -120,6 +123,7 @@ def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():
     assert words[0].startswith("violet arrow: friction, limits and contact, longest ")
 
 
+@pytest.mark.slow
 @without_charts
 def test_a_body_without_a_shape_has_no_arrow_and_no_error(tmp_path):
     (tmp_path / "bare.xml").write_text("""

@@ -386,6 +386,7 @@ def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory():
         assert theory <= found <= 1.02 * theory, name
 
 
+@pytest.mark.slow
 def test_a_law_without_effect_stabilises_what_hangs_alone():
     found = measured.smallest_stable(about(("duffing", "pendulum_network"), quick=True, substitute={OURS: zero_gain}))
     assert found == {"duffing": math.inf, "pendulum_network": measured.MIN_LAMBDA}
@@ -399,6 +400,7 @@ def test_the_same_audit_twice_gives_the_same():
     assert again == first
 
 
+@pytest.mark.slow
 def test_the_wrong_sign_converges_just_where_the_plant_has_it_too():
     assert claims(only=["21"], gains="study")[0].verdict == REFUTED
     assert claims(only=["21"], gains="study", substitute={OURS: reversed_gain})[0].verdict == SUPPORTED
@@ -415,6 +417,7 @@ def terminal(monkeypatch):
     return lambda *arguments: CliRunner().invoke(app, list(arguments))
 
 
+@pytest.mark.slow
 def test_the_command_prints_one_json_document(terminal, tmp_path):
     done = terminal("18", "3", "--gains", "study", "--quick", "--json", "--out", str(tmp_path / "claims.json"))
     assert done.exit_code == 0, done.output

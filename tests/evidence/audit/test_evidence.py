@@ -88,6 +88,7 @@ def told(done):
     return evidence.document(done)
 
 
+@pytest.mark.slow
 def test_a_clean_process_writes_the_same_file_of_another_folder(done, folder, tmp_path):
     here = done.save(tmp_path / "here.json")
     copy = tmp_path / "elsewhere" / "small"

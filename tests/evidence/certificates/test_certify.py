@@ -72,6 +72,7 @@ def test_margins_are_those_of_the_formulas():
     assert exact - 2e-4 < told["restoring"] < exact
 
 
+@pytest.mark.slow
 def test_van_der_pol_has_no_global_theorem_but_a_region():
     made = certificate("van_der_pol")
     assert not made.stable
@@ -129,6 +130,7 @@ def test_other_laws_have_their_theorems(plant, law):
     assert made.stable == (plant == "duffing" and law != "super_twisting")
 
 
+@pytest.mark.slow
 def test_classical_comes_to_rest_from_a_set_under_a_disturbance():
     made = certificate("inverted_pendulum", "classical", 1.0)
     assert (made.bound, made.stable) == (None, False)  # its own start lies outside
@@ -144,6 +146,7 @@ def test_a_law_as_strong_as_the_disturbance_reaches_nothing():
         assert made.sentences[1].startswith("not proven by reaching: reaching 0 N (k does not exceed")
 
 
+@pytest.mark.slow
 def test_the_margin_of_a_set_is_that_of_its_weakest_place():
     """The weight is largest at pi/2, within the set; at its end the margin is 3.9 N m."""
     law, within = smc.law("classical", k=5.0, c=0.5), smc.Uncertainty(disturbance=1.0)
@@ -152,6 +155,7 @@ def test_the_margin_of_a_set_is_that_of_its_weakest_place():
     assert margins(made, "reaching")["reaching"] < 5.0 - 1.0 - 0.5 * 9.81 * 0.5
 
 
+@pytest.mark.slow
 def test_levels_of_a_law_that_switches_fall_along_its_surface():
     """Where W is level far out, s = 0 leads nowhere: the outer level lies below."""
     law, within = smc.law("classical", k=5.0, c=0.3), smc.Uncertainty(disturbance=1.0)
@@ -295,6 +299,7 @@ MUTANTS = {
 }
 
 
+@pytest.mark.slow
 def test_the_checker_accepts_what_is_no_mutant():
     assert not refused(copy.deepcopy(certificate("duffing", disturbance=2.0).data))
 
@@ -443,11 +448,13 @@ def escapes(plant, count, duration):
     return int(left.sum()), int((np.abs(x) > bound).sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", FORCE)
 def test_no_start_leaves_its_certified_set_and_all_end_within_the_bound(plant):
     assert escapes(plant, 100, 6.0) == (0, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("plant", "d0"), [("duffing", 2.0), ("inverted_pendulum", 1.0)])
 def test_the_bound_contains_the_worst_found_and_is_below_twice_as_large(plant, d0):
     """The worst found by the adversary, on the machine that MuJoCo samples."""
@@ -457,6 +464,7 @@ def test_the_bound_contains_the_worst_found_and_is_below_twice_as_large(plant, d
     assert worst.value <= made.bound <= 2.0 * worst.value
 
 
+@pytest.mark.slow
 def test_region_of_van_der_pol_as_a_share_of_the_true_one():
     made = certificate("van_der_pol")
     found = smc.basin("van_der_pol", "observer_free", points=(8, 8))
@@ -466,6 +474,7 @@ def test_region_of_van_der_pol_as_a_share_of_the_true_one():
     assert (found.outcome[inside] == 1).all()
 
 
+@pytest.mark.slow
 def test_without_damping_no_bound_holds_from_everywhere():
     """What docs/what_the_author_may_claim.md says of d = d0 sgn(v): swings shrink from 10 rad and grow from 20."""
     free = smc.plant("inverted_pendulum", b=0.0)

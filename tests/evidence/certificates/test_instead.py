@@ -43,6 +43,7 @@ def test_each_claim_that_does_not_hold_has_a_sentence_and_a_command():
     assert [id for id in lost if not (CLAIMS[id].instead and CLAIMS[id].shown_by)] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_numbers_of_sentences_are_those_of_their_certificates(command):
     for claim in (one for one in CLAIMS.values() if one.shown_by == command):

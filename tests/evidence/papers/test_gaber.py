@@ -532,6 +532,7 @@ def opposite(s: Scenario) -> dict[str, float]:
     }
 
 
+@pytest.mark.slow
 def test_the_cells_that_runs_decide_follow_them():
     """Chattering, delay and smoothness; classical's cells against itself cannot change."""
     rows = ("no chattering", "delay-tolerant", "smoothness")
@@ -609,6 +610,7 @@ def test_real_runs_give_the_verdicts_of_the_first_gains():
     assert over.value == pytest.approx(-100 * run.x.min() / 0.5)
 
 
+@pytest.mark.slow
 def test_a_broken_law_loses_its_claims():
     ids = ["29", "35", "38", "45", "50", "57"]
     found = claims(only=ids, gains="study", substitute={OURS: reversed_gain})

@@ -19,5 +19,6 @@ def test_every_claim_says_what_where_how_and_whose(name):
         assert one.plants or one.varies, one.id
 
 
+@pytest.mark.slow
 def test_mutants_of_its_law_lose_each_cheap_claim_of_the_first_paper():
     assert survivors("gaber", ["13", "29", "45", "49", "50"]) == {}

@@ -95,6 +95,7 @@ def test_the_least_bound_of_fixed_time_is_the_integral():
         assert classical_bound(made) > integral
 
 
+@pytest.mark.slow
 def test_fixed_time_is_sampled_finely_enough_for_the_band_that_was_fixed_before_the_first_run():
     (claim,) = audit("aldana_lopez_2019", ["3"], gains=["skew"], quick=True).claims
     assert (BAND, claim.verdict) == (1e-6, "supported")

@@ -24,6 +24,7 @@ def found(tmp_path_factory):
     return second
 
 
+@pytest.mark.slow
 def test_a_switching_law_oscillates_as_predicted_and_a_smooth_one_is_calm(found):
     switching, smooth = found
     assert (switching.law, smooth.law) == PLAN.laws

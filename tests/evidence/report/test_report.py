@@ -126,6 +126,7 @@ def reader(text):
 # one file
 
 
+@pytest.mark.slow
 def test_the_report_is_one_file_under_20_megabytes(made):
     assert made.name == "report.html"
     assert made.stat().st_size < 20e6
@@ -477,6 +478,7 @@ def test_the_chosen_gains_of_a_front_are_on_it():
 # started again
 
 
+@pytest.mark.slow
 def test_what_is_there_is_not_computed_again(made, folder, monkeypatch):
     for name in (
         "analysis.region_of_attraction.basin",
@@ -509,6 +511,7 @@ def test_a_killed_stage_leaves_nothing_and_other_arguments_repeat_a_stage(tmp_pa
     assert len(list(tmp_path.iterdir())) == 1
 
 
+@pytest.mark.slow
 def test_without_a_renderer_the_report_says_so_in_one_sentence(folder, findings, monkeypatch):
     monkeypatch.setattr(gl, "missing", lambda: "no film: nothing renders here: install a renderer")
     without = stages.find(dataclasses.replace(TINY, filmed=1), folder, None, Bars(False))
@@ -703,6 +706,7 @@ def test_in_the_dark_letters_and_laws_are_legible_in_charts_too(browser, made):
     night.page.close()
 
 
+@pytest.mark.slow
 def test_it_prints_with_everything_open(seen, tmp_path):
     seen.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     assert seen.page.locator(".claim:not([open])").count() == 0

@@ -78,6 +78,7 @@ def test_every_law_of_the_machine_runs_on_every_set(work):
     assert machine.unit("itae") == "rad s^2"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not DATA.exists(), reason="the public records are not at hand")
 @pytest.mark.parametrize("kept", smc.rig("qube_servo").reached, ids=lambda kept: kept.quantities)
 def test_what_the_page_says_of_public_records_is_what_they_give(kept):

@@ -39,6 +39,7 @@ def test_torques_of_a_simulated_run_are_the_commands(swung):
     assert rms(rig.with_values({"I2": 0.06}), record) > 0.05
 
 
+@pytest.mark.slow
 def test_a_simulated_run_gives_its_moments_back(swung):
     rig, record = swung
     found = smc.identify(rig.with_values({"r2": 0.2, "I2": 0.06}), record, ("r2", "I2"), starts=1)

@@ -30,6 +30,7 @@ def test_every_set_is_a_condition_with_its_own_numbers():
     assert len({run.resolved.x0 for run in runs}) == 2
 
 
+@pytest.mark.slow
 def test_the_verdict_says_where_one_law_wins(boards):
     lines = {line.partition(":")[0]: line for line in ensemble.verdict(boards).splitlines()}
     assert lines["tv_rate"] == "tv_rate: pid wins on all 5 parameter sets"

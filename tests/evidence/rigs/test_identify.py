@@ -91,6 +91,7 @@ def swung():
     )
 
 
+@pytest.mark.slow
 def test_the_published_axis_is_found_within_two_percent(found):
     assert set(found.values) == set(AXIS.free)
     for name, value in found.values.items():
@@ -111,6 +112,7 @@ def test_equal_seeds_give_equal_results_and_another_seed_begins_elsewhere():
         assert found.values["mass"] == pytest.approx(AXIS.values["mass"], rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_motion_gives_its_quantities_within_three_standard_errors(swung):
     free = ("inertia", "mass_moment", "coulomb")
     result = smc.identify(PENDULUM.with_values({"inertia": 0.15, "coulomb": 0.15}), swung, free, starts=1)
@@ -119,6 +121,7 @@ def test_a_motion_gives_its_quantities_within_three_standard_errors(swung):
         assert result.errors[name] < 0.05 * PENDULUM.values[name]
 
 
+@pytest.mark.slow
 def test_a_closed_loop_s_transient_gives_a_quantity_within_three_errors():
     """A reference that jumps in speed decides the mass within 0.1 s. A jackknife alone errs by more than 3 deviations.
 
@@ -152,6 +155,7 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
         uncertainty._refuse_alike("emps", known, errors, np.array([[1.0, -0.99], [-0.99, 1.0]]))
 
 
+@pytest.mark.slow
 def test_a_plants_own_parameters_are_found_from_a_run():
     plant = smc.plant("duffing")
     run = smc.run(smc.Scenario(plant=plant, law="none", feedforward=smc.Sine(3.0, 2.0), x0=0.3, duration=2.0))
@@ -244,6 +248,7 @@ def test_standard_errors_cover_the_truth_from_any_start(start, seconds):
         assert low * least < found.errors[name] < high * least
 
 
+@pytest.mark.slow
 def test_shorter_steps_change_what_a_record_with_stops_says():
     """At the true quantities steps of 0.25 ms err by up to 50 um, corrected ones by less than the noise of 10 um."""
     record = pushed(1)
@@ -298,6 +303,7 @@ def test_drawn_sets_have_the_errors_and_correlations_found(found):
     assert found.drawn(3, seed=1).ensemble == rig.ensemble[:3]
 
 
+@pytest.mark.slow
 def test_the_command_identifies_a_plant_of_the_library_from_a_csv_file(tmp_path):
     run = smc.run(smc.Scenario(plant="duffing", law="none", feedforward=smc.Sine(3.0, 2.0), x0=0.3, duration=2.0))
     run.export(tmp_path / "run.csv")
@@ -312,12 +318,14 @@ def test_the_command_identifies_a_plant_of_the_library_from_a_csv_file(tmp_path)
     assert re.search(r" (99|100)\.\d \(", done.output)
 
 
+@pytest.mark.slow
 def test_values_that_are_only_tried_warn_of_nothing(moved, recwarn):
     """The motor gives 352 N at rest. It holds an offset of 340 N, and not the greater ones that the search tries."""
     smc.identify(smc.rig("emps", offset=-340.0), moved, ["offset"], starts=6, most=2)
     assert not [each for each in recwarn if "DCMotor gives at most" in str(each.message)]
 
 
+@pytest.mark.slow
 def test_results_are_saved_and_drawn(found, tmp_path):
     data = json.loads(found.save(tmp_path / "a.json").read_text())
     assert data["quantities"]["mass"]["unit"] == "kg"

@@ -31,6 +31,7 @@ def told(row):
     return [[float(fit) for fit in cell.split(", ")] for cell in cells.split(" | ")]
 
 
+@pytest.mark.slow
 def test_the_twin_and_the_published_numbers_fit_records_as_the_page_tells():
     records = [dict(np.load(DATA / f"qube-{name}.npz")) for name in ("06", "18", "30", "42", "11")]
     ours, published = (
@@ -51,6 +52,7 @@ def test_rounding_to_counts_lowers_the_fit_of_u_but_not_of_joints(records):
         assert fit["u"] > 81.0
 
 
+@pytest.mark.slow
 def test_published_numbers_let_it_fall_or_fit_less(records):
     for fit in RIG.set("driver").fits(records):
         assert 70.0 < fit["theta"] < 90.0
@@ -60,6 +62,7 @@ def test_published_numbers_let_it_fall_or_fit_less(records):
         assert max(fit.values()) < -100.0
 
 
+@pytest.mark.slow
 def test_all_sets_stand_on_record_11_which_is_not_one_of_those_identified_from():
     record = dict(np.load(DATA / "qube-11.npz"))
     for name, member in RIG.members().items():
@@ -82,6 +85,7 @@ def brushes():
     return [(record, zero(Values(**RIG.values), record)["brush"]) for record in checked]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("parts", "read", "wrong"), [(2, 10, 1), (4, 12, 4)])
 def test_parts_of_records_have_the_brushes_of_the_whole_but_for_those_that_the_docs_tell(brushes, parts, read, wrong):
     """Fewer wrong than one in twenty, as SURE promises, is not reached. Wrong is off by over a sixteenth of a pitch."""
@@ -103,6 +107,7 @@ def test_a_brush_is_read_from_a_run_and_is_unknown_if_the_torque_is_even(brush, 
     assert found == ({"brush": pytest.approx(brush, abs=np.radians(1.0))} if brush else {})
 
 
+@pytest.mark.slow
 def test_degrees_are_told_from_radians(records):
     angles = ("theta", "alpha", "target_theta", "target_alpha")
     degrees = records[0] | {name: np.rad2deg(records[0][name]) for name in angles}

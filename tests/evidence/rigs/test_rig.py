@@ -118,6 +118,7 @@ def test_a_trace_is_a_record_too():
         QUBE.fit(run)
 
 
+@pytest.mark.slow
 def test_a_record_of_another_machine_fits_less(record):
     fit = smc.rig("qube_servo", arm_length=0.1, arm_friction=0.0).fit(record)
     assert min(fit.values()) < 50.0
@@ -247,6 +248,7 @@ def test_records_of_torques_are_not_repeated():
         rig.replay(dict.fromkeys(rig.needed, np.arange(600.0)))
 
 
+@pytest.mark.slow
 def test_the_command_repeats_a_record(record, tmp_path):
     np.savez(tmp_path / "run.npz", **record)
     words = ["replay", "qube_servo", str(tmp_path / "run.npz"), "--quantities", "driver"]

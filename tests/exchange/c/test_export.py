@@ -140,6 +140,7 @@ def test_in_single_precision_it_is_the_same_python_in_numpy_s_float32(folder, na
         np.testing.assert_allclose(before, memory, rtol=4e-6, atol=4e-6)
 
 
+@pytest.mark.slow
 def test_every_law_in_single_precision_compiles_without_a_double_in_it(folder):
     paths = [folder / f"{name}-single.c" for name in LAWS]
     with unmeasured(), ThreadPoolExecutor(2) as pool:

@@ -138,6 +138,7 @@ def test_every_number_of_the_measurement_is_where_the_header_says(file):
     assert same(*smc.run([scenario(law, "cart_pole", **more, duration=0.05) for law in (mine, theirs)]))
 
 
+@pytest.mark.slow
 def test_single_precision_is_single_within_and_double_without(file):
     single = smc.law_from_c(file("#define SMC_REAL float\n" + MINE.replace("tanh", "tanhf")), isolate=True)
     fast, exact = smc.run([scenario(law, duration=1.0) for law in (single, smc.law("observer_free"))])
@@ -289,6 +290,7 @@ def test_its_functions_and_data_are_its_own_whatever_else_has_their_names(file):
 # mistakes
 
 
+@pytest.mark.slow
 def test_what_cannot_be_loaded_is_one_sentence(file):
     for text, words in (
         (law("out[0] = y->e return;"), "my_law.c does not compile: line 7, expected ';' before 'return'"),
@@ -482,12 +484,14 @@ def test_untried_a_law_that_changes_the_rounding_fails_and_harms_no_other(file):
     assert same(alone, smc.run(ours))
 
 
+@pytest.mark.slow
 def test_twenty_thousand_gains_are_tried(file):
     text = law("out[0] = -gains[19999] * y->e;")
     mine = smc.law_from_c(file(text), gains={f"k{i}": 1.0 + i for i in range(20_000)}, isolate=True, timeout=60.0)
     assert mine.defaults["k19999"] == 20_000.0
 
 
+@pytest.mark.slow
 def test_checked_or_refused_it_was_not_in_this_process(call, file, tmp_path):
     """Not by its constructor, its set-up, a call of the law or its destructor."""
     told = tmp_path / "pids"
@@ -643,6 +647,7 @@ def test_the_header_has_the_numbers_of_the_measurement_in_their_order():
     assert len(Measurement._fields) == build.MEASUREMENT_SIZE
 
 
+@pytest.mark.slow
 def test_check_c_names_its_own_options(call, file):
     wants = file(law("memory[20] = 1.0; out[0] = -gains[0] * y->e;"))
     for words, said in (

@@ -111,6 +111,7 @@ def test_all_surfaces_and_estimators_are_among_the_combinations():
     assert {one[2] for one in COMBINED} >= set(estimator.catalogue())
 
 
+@pytest.mark.slow
 def test_the_sources_compiled_by_another_tool_give_the_same(combined, folder):
     one = ("observer_free_third", None, "extended_state_observer")
     trace = combined[one][1]
@@ -129,6 +130,7 @@ def test_the_sources_compiled_by_another_tool_give_the_same(combined, folder):
     np.testing.assert_array_equal(found, trace.u[:, 0])
 
 
+@pytest.mark.slow
 def test_the_sources_compile_without_a_warning(twisting, folder):
     files = folder / "warned"
     with zipfile.ZipFile(twisting[0]) as archive:
@@ -149,6 +151,7 @@ def test_an_fmu_holds_no_python_and_no_path_of_this_machine(twisting, folder):
         assert b"smc_mujoco-" not in archive.read(library)  # the folder in which it was compiled
 
 
+@pytest.mark.slow
 def test_every_law_is_a_valid_fmu(folder):
     for name, template in catalogue().items():
         path = smc.export_fmu(template, folder / f"valid-{name}.fmu", binary=False)

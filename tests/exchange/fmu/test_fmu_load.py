@@ -51,6 +51,7 @@ def scenario(law, plant="duffing", **more) -> smc.Scenario:
     return smc.Scenario(plant=plant, law=law, **common | more)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("plant", "law", "more"),
     [
@@ -94,6 +95,7 @@ def test_an_input_that_only_the_model_needs_is_listed_with_the_model(folder):
         assert set(re.findall(r'name="(\w+)"[^>]*causality="input"', text)) == {"x", "v", "r", "dr"} | more
 
 
+@pytest.mark.slow
 def test_an_unbounded_parameter_is_infinite_and_comes_back(folder):
     path = smc.export_fmu("super_twisting", folder / "free.fmu")
     template = smc.law_from_fmu(path, isolate=False)
@@ -102,6 +104,7 @@ def test_an_unbounded_parameter_is_infinite_and_comes_back(folder):
     np.testing.assert_array_equal(first.u, second.u)
 
 
+@pytest.mark.slow
 def test_runs_have_instances_of_their_own_which_end_with_them(folder):
     path = smc.export_fmu("super_twisting", folder / "own.fmu")
     law = smc.law_from_fmu(path, isolate=False)()
@@ -188,6 +191,7 @@ def test_an_fmu_faster_than_the_law_steps_several_times_a_sample(foreign):
     np.testing.assert_allclose(trace.u[:, 0], u, rtol=1e-13, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_inputs_that_are_not_real_may_be_held(folder):
     """FMI 3.0: a Boolean and an Int32. It holds u for 5 samples."""
     path = helper.fmi3(folder)

@@ -176,6 +176,7 @@ def test_fmpy_simulates_it_with_inputs_by_their_names(made):
     np.testing.assert_array_equal(np.array([[row[name] for name in outs] for row in found])[1:50], trace.u[:49])
 
 
+@pytest.mark.slow
 def test_the_sources_compile_without_a_warning(made, folder):
     for name in ("passivity_based", "observer_free_joint"):
         with zipfile.ZipFile(made[name][0]) as archive:

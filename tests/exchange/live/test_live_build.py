@@ -57,6 +57,7 @@ def test_what_is_known_of_a_law_is_that_of_the_catalogue(vendor, tmp_path):
     assert duffing["start"] == ["observer_free", "classical"]
 
 
+@pytest.mark.slow
 def test_skins_follow_the_bodies_as_in_mujoco(vendor, tmp_path):
     skins = facts(smc.live("van_der_pol", out=tmp_path / "page"))["plants"]["van_der_pol"]["skins"]
     model = smc.plant("van_der_pol").load()
@@ -75,6 +76,7 @@ def test_skins_follow_the_bodies_as_in_mujoco(vendor, tmp_path):
     assert np.concatenate(moved) == pytest.approx(drawn.skinvert.reshape(-1, 3), abs=1e-4)
 
 
+@pytest.mark.slow
 def test_every_plant_of_the_page_has_laws_and_an_opening(vendor, tmp_path, snapshot):
     @smc.law_function(gains={"k": 1.0})
     def mine(y, gains, memory):
@@ -159,6 +161,7 @@ def test_what_the_page_cannot_have_is_one_sentence(vendor, tmp_path, monkeypatch
     assert not (tmp_path / "live").exists()
 
 
+@pytest.mark.slow
 def test_a_live_page_is_replaced_and_another_folder_is_not(vendor, tmp_path):
     page = smc.live("duffing", out=tmp_path / "page")
     assert list(facts(smc.live("van_der_pol", out=tmp_path / "page"))["plants"]) == ["van_der_pol"]

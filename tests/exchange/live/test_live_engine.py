@@ -80,6 +80,7 @@ def test_no_condition_goes_unnoticed(found):
             assert apart > 1e4 * TOLERANCE, f"{name}: {key}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("chosen", "why"),
     [

@@ -122,6 +122,7 @@ def page(seen):
     return seen.page
 
 
+@pytest.mark.slow
 def test_it_loads_without_network_and_says_nothing(seen):
     seen.page.wait_for_function("live.running()[0].simulation.time > 0.2", timeout=30_000)
     assert seen.said == []
@@ -374,6 +375,7 @@ def test_every_control_has_a_name(page):
     assert nameless == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_fits_a_phone(seen, page, scheme):
     wide = page.viewport_size

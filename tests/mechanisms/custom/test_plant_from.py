@@ -91,6 +91,7 @@ def pusher() -> smc.Plant:
     return smc.plant_from(path, dict.fromkeys(names, smc.Channel(motor=True)))
 
 
+@pytest.mark.slow
 def test_every_channel_has_the_unit_of_its_joint():
     assert (cartpole().units, cartpole().network) == (("m", "rad"), False)
     assert (acrobot().units, acrobot().unit) == (("rad", "rad"), "rad")

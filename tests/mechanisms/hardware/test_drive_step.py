@@ -248,6 +248,7 @@ def hard():
     return [smc.Scenario(plant=name, law=law, **common | fields) for name, law in laws.items() for fields in HARD]
 
 
+@pytest.mark.slow
 def test_callback_equals_plain_loop_and_company_and_threads_change_no_bit():
     scenarios = hard()
     alone = [smc.run(s) for s in scenarios]

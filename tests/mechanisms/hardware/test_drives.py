@@ -77,6 +77,7 @@ def test_a_locked_rotors_torque_comes_at_once_without_inductance():
     assert driven(locked(motor), lambda t: 4.0 * motor.scale, 0.01)[:, 3] == pytest.approx(4.0, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_free_rotors_speed_rises_in_its_mechanical_time_constant():
     motor = DCMotor(inductance=0.0)
     inertia, volts = 1.0 + motor.gear**2 * motor.rotor_inertia, 6.0

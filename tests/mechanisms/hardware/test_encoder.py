@@ -378,6 +378,7 @@ def scattered(number):
     )
 
 
+@pytest.mark.slow
 def test_scattered_encoders_give_the_same_bits_in_both_loops_and_together():
     scenarios = [scattered(number) for number in range(20)]
     for i, (s, trace) in enumerate(zip(scenarios, smc.run(scenarios), strict=True)):
