@@ -3,6 +3,7 @@
 Everything comes from the templates and their docstrings, see `smc_mujoco.control.docstring`.
 """
 
+import itertools
 import re
 from collections.abc import Iterable, Sequence
 
@@ -36,15 +37,6 @@ CALL_TEMPLATES = {  # kind of component -> how a user makes one
 }
 
 
-def catalogue() -> dict[str, list[tuple[Template, str]]]:
-    """Return name -> the law, surface and velocity estimator of that name, each with its package."""
-    by_name: dict[str, list[tuple[Template, str]]] = {}
-    for templates in CATALOGUES.values():
-        for name, template in templates().items():
-            by_name.setdefault(name, []).append((template, templates().package(name)))
-    return by_name
-
-
 def short_source(source: str) -> str:
     """Return a source in short: its one or two authors, or the first "et al.", and its year."""
     first = INITIALS.sub("", source).partition(";")[0]
@@ -68,7 +60,7 @@ def print_pages(name: str, console: Console) -> None:
     if not pages and "." in name:
         pages = [(law.template, "") for law in from_text.laws(name) if isinstance(law, Law) and law.template]
     if not pages:
-        raise unknown("law, surface or velocity estimator", name, catalogue())
+        raise unknown("law, surface or velocity estimator", name, dict.fromkeys(itertools.chain(*known)))
     for template, package in pages:
         print_page(template, console, package, name)
 

@@ -113,7 +113,7 @@ def show(
     display(HTML(embedded(what, labels, title, size, fps, speed, camera)))
 
 
-def embedded(what: object, labels=None, title=None, size=CELL_SIZE, fps=film.FPS, speed=None, camera=None) -> html.Html:
+def embedded(what: object, labels, title, size, fps, speed, camera) -> html.Html:
     """Return HTML with the film or picture in it, see `show`."""
     if isinstance(what, Figure | SubFigure):
         return html.embedded(page.png(what), "image/png", page.css_width(what))
@@ -136,6 +136,6 @@ def embedded(what: object, labels=None, title=None, size=CELL_SIZE, fps=film.FPS
 def _traces(what: object) -> list[Trace]:
     """Return what is a trace, or a list of them, as a list."""
     traces = list(what) if isinstance(what, list | tuple) else [what]
-    if not all(isinstance(one, Trace) for one in traces):
+    if not all(isinstance(trace, Trace) for trace in traces):
         raise ScenarioError(f"cannot show {shown(what)}: give traces, smc.frames, a figure, or the path of a film")
     return traces  # pyright: ignore[reportReturnType]

@@ -1,6 +1,6 @@
 """Gains for laws that are compared on a plant, all by one rule.
 
-    for candidate in fair_gains("duffing", ["classical", my_law], Path("folder")):
+    for candidate in fair_gains(plant("duffing"), [law_or_template("classical"), my_law], Path("folder")):
         print(candidate.law.name, candidate.law.source, candidate.remark)
 
 A law has the gains that the user gave it. Otherwise it has those that come with the package for the plant. Otherwise a

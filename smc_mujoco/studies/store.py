@@ -3,7 +3,7 @@
     store = Store(Path("study"))
     store.open(resume=True)
     store.add(rows)                        # a part, written whole or not at all
-    store.collect(["5f0c...", ...])        # results.parquet, in this order, from the parts
+    store.collect(["5f0c...", ...], {})    # results.parquet, in this order, from the parts
 
 A part is a parquet file, named by a hash of the runs in it. A file that is damaged, has other columns, or has scores by
 other code is ignored, and its runs count as not done. The bytes of results.parquet depend only on its rows.
@@ -23,7 +23,6 @@ import numpy as np
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import reading
-from smc_mujoco.common.frozen import frozen
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies import table
 
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
 ROWS_PER_GROUP = 4096  # rows in memory at once while the table is written; chosen
 MAX_OPEN_PARTS = 64  # parts in memory at once while the table is written; chosen
 MAX_TEMPORARY_AGE = 3600.0  # s: older temporary files belong to a killed study; chosen
-NO_CHANGES: Mapping[str, Any] = frozen({})
 PART = re.compile(r"[0-9a-f]{32}\.parquet")
 
 
@@ -92,7 +90,7 @@ class Store:
         part = self._read(path)
         return {} if part is None else part.slice(i, 1).to_pylist()[0]
 
-    def collect(self, hashes: Sequence[str], changes: Mapping[str, Mapping[str, Any]] = NO_CHANGES) -> None:
+    def collect(self, hashes: Sequence[str], changes: Mapping[str, Mapping[str, Any]]) -> None:
         """Write the table of these finished runs, in this order.
 
         Args:

@@ -18,7 +18,7 @@ from smc_mujoco.control.surface import surfaces
 pytestmark = pytest.mark.quick
 
 ROOT = Path(smc.__file__).parents[1]
-EVERY = [(name, t) for name, templates in law_pages.catalogue().items() for t, _ in templates]
+EVERY = [(name, t) for templates in law_pages.CATALOGUES.values() for name, t in templates().items()]
 ONE_BY_ONE = pytest.mark.parametrize(("name", "template"), EVERY, ids=lambda v: v if isinstance(v, str) else v.kind)
 
 
