@@ -96,6 +96,12 @@ def test_criteria_of_a_motion_are_those_of_its_formula():
     assert not of_arrays(t, q, v, u, "acrobot").success
 
 
+@pytest.mark.parametrize(("height", "up"), [(0.899, False), (0.901, True)])
+def test_the_tip_is_up_above_nine_tenths_of_the_length_of_both_links(height, up):
+    q = np.tile([math.acos(-height), 0.0], (9, 1))
+    assert of_arrays(0.1 * np.arange(9), q, np.zeros((9, 2)), np.zeros(9), "pendubot", 0.25).success is up
+
+
 def test_a_run_that_stays_down_or_diverges_scores_nothing():
     trace = smc.run(dataclasses.replace(boards.on_board("acrobot", "none"), duration=0.1))
     assert not boards.criteria(trace).success

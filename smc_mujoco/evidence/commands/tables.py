@@ -44,7 +44,7 @@ def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], bold: Colle
     tests = isinstance(rows[0], RobustnessRow)
     title, heads = BOARDS["robustness" if tests else "simulation"]
     columns = [Column(head, justify="right") for head in heads]
-    table = titled(f"{robot}, {title}, version 2", Column("controller", no_wrap=True), *columns, pad_edge=False)
+    table = titled(f"{robot}, {title}, version 2", "controller", *columns, pad_edge=False)
     for row in rows:
         values = row[1:8] if tests else row[1:7]
         digits = (1,) * 6 + (3,) if tests else (2, 2, 2, 3, 1, 3)
@@ -55,8 +55,8 @@ def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], bold: Colle
 
 def certificate(made: Certificate) -> Table:
     """Return a certificate's conditions with their margins."""
-    columns = [Column("condition", no_wrap=True), Column("holds"), Column("margin", justify="right"), Column("")]
-    table = titled(f"{made.law} on {made.plant}", Column("theorem", no_wrap=True), *columns, pad_edge=False)
+    columns = ["condition", "holds", Column("margin", justify="right"), ""]
+    table = titled(f"{made.law} on {made.plant}", "theorem", *columns, pad_edge=False)
     seen = ""
     for row in made.conditions:
         theorem, seen = row.theorem if row.theorem != seen else "", row.theorem
@@ -83,8 +83,8 @@ def _claims_overview(claims: Sequence[Claim]) -> Table:
     shown = sets if len(sets) > 1 else []
     words = f"claim, verdict, whose (what was read)\ndecided by, {sets[-1]} gains" if sets else "claim"
     table = Table(
-        Column("id", justify="right", style="cyan", no_wrap=True),
-        *(Column(name, justify="center", no_wrap=True) for name in shown),
+        Column("id", justify="right", style="cyan"),
+        *(Column(name, justify="center") for name in shown),
         Column(words),
         box=box.SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
@@ -102,7 +102,7 @@ def _claims_overview(claims: Sequence[Claim]) -> Table:
 def _print_claim(claim: Claim, console: Console) -> None:
     """Print one claim in full, then a table for each set of gains: its checks, and the numbers beside them."""
     console.print(Text.assemble((claim.id, "bold cyan"), f"  {claim.text}", (f"  {claim.where}", "dim")))
-    about, lost = plain(Column(style="dim", no_wrap=True), ""), claim.verdict != verdicts.SUPPORTED
+    about, lost = plain(Column(style="dim"), ""), claim.verdict != verdicts.SUPPORTED
     parts = {
         "whose": claim.source + (f": {claim.how}" if claim.how else ""),
         "kind": claim.quantifier,
@@ -118,7 +118,7 @@ def _print_claim(claim: Claim, console: Console) -> None:
             about.add_row(label, Text(text) if isinstance(text, str) else text)
     console.print(Padding(about, (0, 0, 1, 2)))
     for name, verdict in claim.verdicts.items():
-        columns = Column(no_wrap=True), "", Column(justify="right", no_wrap=True), Column(no_wrap=True)
+        columns = "", "", Column(justify="right"), ""
         title = Text(f"{name} gains: {verdict}", style=COLOURS[verdict])
         table = plain(*columns, title=title, title_justify="left")
         for check in claim.checks(name):

@@ -366,3 +366,20 @@ def test_what_is_left_out_is_said_in_full(snapshot):
     )  # fmt: skip
     told = [f"{name}: {text}" for one in (plain, machine) for name, text in maker.left_out(one).items()]
     assert "\n".join(told) == snapshot
+
+
+def test_a_window_is_the_widest_range_of_levels_that_no_cell_spoils_and_the_lowest_of_equals():
+    its = object.__new__(search._Grid)
+    its.x = np.array([0.0, 0.5, 2.0])
+    its.low, its.high = np.array([[0.25, 0.5], [0.625, 0.0]]), np.array([[0.5, 0.5625], [0.75, 1.0]])
+    its.bad, its.border, its.limit = np.array([[True, False], [True, False]]), 1.0, 1.0
+    assert its.window() == (0.0, 0.25)
+    its.border = 1.125
+    assert its.window() == (0.75, 1.125)
+    assert its.bound((0.25, 1.0)) == 2.0
+    its.limit = 0.75  # of levels below which the inner set lies
+    assert its.window() == (0.0, 0.25)
+    its.bad[1, 1] = True
+    assert its.window() is None
+    assert (its.bound(None), its.worth(None, (0.0, 0.0))) == (math.inf, (True, math.inf))
+    assert its.bound((-0.5, 1.0)) == 0.0

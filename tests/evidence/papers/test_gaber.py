@@ -617,6 +617,15 @@ def test_a_broken_law_loses_its_claims():
     assert {one.id: one.verdict for one in found} == dict.fromkeys(ids, REFUTED)
 
 
+def test_the_timed_loop_calls_a_law_with_each_state_and_its_four_arrays(monkeypatch):
+    monkeypatch.setattr("numba.njit", lambda loop: loop)
+    seen, calls = np.zeros(len(timing.FIELD_INDEX)), []
+    monkeypatch.setattr(timing, "call", lambda *given: calls.append([*given, *seen[[e, de]]]))
+    e, de = (timing.FIELD_INDEX[name] for name in ("e", "de"))
+    timing._loop.__wrapped__()(5, seen, np.array([[0.1, 0.2], [0.3, 0.4]]), np.array([6, 7, 8, 9]))
+    assert calls == [[5, 6, 7, 8, 9, 0.1, 0.2], [5, 6, 7, 8, 9, 0.3, 0.4]]
+
+
 def test_the_time_of_a_law_is_the_least_of_its_rounds_on_states_that_vary(monkeypatch):
     """A clock that ticks 3 s in the first round and 1 s from then on, and a law that is not called."""
     ticks, seen = itertools.accumulate([0.0, *[3.0] * 3, *[1.0] * 999]), []

@@ -18,7 +18,7 @@ from smc_mujoco.common import extras
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.report import about, films, oscillation, paper, precision, rigs, scores, stages, words
 from smc_mujoco.evidence.report import report as make
-from smc_mujoco.evidence.report.plan import FULL, QUICK, Bars, Work
+from smc_mujoco.evidence.report.plan import FULL, QUICK, Bars, Plan, Work
 from smc_mujoco.evidence.report.scores import Place
 from smc_mujoco.evidence.report.stages import Field
 from smc_mujoco.studies.accuracy import AccuracyTable
@@ -151,8 +151,11 @@ def test_records_of_a_folder_are_read_in_the_order_of_their_names(tmp_path, monk
 STAGES = {  # stage -> the function that does its work for one item, and what that gives here
     "worst_cases": ("evidence.report.stages.cached_worst_case", lambda folder, *_: folder.name),
     "all_margins": ("evidence.report.stages.margin_search.margins", lambda *_, **__: []),
+    "margins_by_set": ("evidence.report.stages.margin_search.margins", lambda *_, **__: []),
     "all_basins": ("evidence.report.stages.regions.basin", lambda *_, **__: Listed()),
+    "judged_claims": ("evidence.report.stages.audit.claims", lambda *_: []),
 }
+GIVEN = {"margins_by_set": [()], "judged_claims": ["the table"]}  # what the stages before have made
 SMALL = dataclasses.replace(
     QUICK,
     plants=("duffing", "van_der_pol"),
@@ -161,24 +164,78 @@ SMALL = dataclasses.replace(
     laws=("pid", "lqr"),
     basin_laws=("pid",),
     compared=("delay",),
+    claims=("3", "18"),
 )
 
 
 @pytest.mark.parametrize("stage", STAGES)
-def test_a_stage_hands_on_its_plan_and_keeps_a_file_for_each_item(stage, tmp_path, monkeypatch, snapshot):
+def test_a_stage_hands_on_its_plan_and_keeps_a_file_for_each_item(stage, tmp_path, monkeypatch, capsys, snapshot):
     path, gives = STAGES[stage]
     calls = noted(monkeypatch, path, gives)
     if stage == "all_basins":
         monkeypatch.setattr("smc_mujoco.analysis.region_of_attraction.Basin.save", Listed.save)
         monkeypatch.setattr("smc_mujoco.analysis.region_of_attraction.load", lambda path: path)
-    getattr(stages, stage)(work(tmp_path, SMALL))
-    lines = []
+    getattr(stages, stage)(work(tmp_path, SMALL, shown=True), *GIVEN.get(stage, ()))
+    lines = [re.sub(r" *\d+ s$", "", line) for line in capsys.readouterr().out.splitlines()]
     for given, options in calls:
-        plain = [one.name if isinstance(one, Path) else one for one in given]
+        plain = [one.name if isinstance(one, Path) else one.__name__ if callable(one) else one for one in given]
         plain = [f"{one.law.name} on {one.plant.name}" if isinstance(one, smc.Scenario) else one for one in plain]
         lines.append(f"{plain} { ({name: one for name, one in options.items() if name != 'report'}) }")
     lines += names(tmp_path)
     assert "\n".join(lines) == snapshot
+
+
+def test_findings_are_what_the_stages_give_in_their_order(tmp_path, monkeypatch, snapshot):
+    done, bars = [], Bars(False)
+    names = (
+        "rigs.repeated grid judged_claims worst_cases all_margins margins_by_set all_basins all_scenes rigs.machines "
+        "oscillation.oscillations precision.accuracies scores.scores scores.places fields fronts about.about"
+    )
+
+    def stub(name):
+        return lambda *given: done.append(f"{name}({', '.join(map(shown, given))})") or f"of {name}"
+
+    def shown(value):
+        return (
+            "spent" if value is bars.spent else type(value).__name__ if isinstance(value, (Work, Plan)) else f"{value}"
+        )
+
+    for name in names.split():
+        monkeypatch.setattr(f"smc_mujoco.evidence.report.stages.{name}", stub(name))
+    monkeypatch.setattr(stages.video, "missing", lambda: "no film: no renderer")
+    findings = stages.find(SMALL, tmp_path, 3, bars, Path("there"))
+    assert "\n".join([*done, *(f"{name}: {value}" for name, value in vars(findings).items()), *bars.spent]) == snapshot
+
+
+def test_the_grid_is_kept_and_its_noise_is_drawn_for_a_user_s_law(tmp_path, monkeypatch):
+    users = []
+    calls = noted(monkeypatch, "evidence.report.stages.study", "the table")
+    monkeypatch.setattr(stages, "has_user_code", lambda scenario: scenario.law.name in users)
+    plan = dataclasses.replace(SMALL, plants=("duffing",))
+    for users[:], key in (([], 0), (["lqr"], "drawn")):
+        assert stages.grid(work(tmp_path, plan)) == "the table"
+        (runs, folder), options = calls.pop()
+        assert [(one.law.name, one.condition, one.seed, one.duration) for one in runs] == [
+            (law, condition, seed, 3.0) for condition in plan.conditions for law in ("pid", "lqr") for seed in range(24)
+        ]
+        assert (folder, options) == (
+            tmp_path / "study", {"threads": 3, "progress": False, "noise_key": key, "replay": True},
+        )  # fmt: skip
+
+
+def test_what_the_grid_was_is_told(monkeypatch):
+    columns = {
+        "failure": [None, "far", None, "far", "far"],
+        "seed": np.array([0, 1, 1, 2, 0]),
+        "versions": ['{"a": "1"}'],
+    }
+    table = type("Table", (), {"column": lambda _, name: columns[name], "__len__": lambda _: 5})()
+    monkeypatch.setattr(about.paired_runs, "sources", lambda table: ["tuned"])
+    monkeypatch.setattr(about, "in_words", lambda sources: f"in words {sources}")
+    its = about.about(SMALL, table, {"grid": 1.5}, "no renderer")
+    assert (its.plan, its.runs, its.failed, its.seeds, its.sources) == (SMALL, 5, 3, 3, "in words ['tuned']")
+    assert list(its.versions) == ["a", "plotly", "pyarrow", "scipy"]
+    assert (its.spent, its.no_film) == ({"grid": 1.5}, "no renderer")
 
 
 def test_accuracy_is_of_each_condition_with_the_plan_s_periods(tmp_path, monkeypatch):

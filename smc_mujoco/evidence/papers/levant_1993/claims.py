@@ -70,6 +70,6 @@ def finite_time(runs):
     wide, narrow = runs.values["bands"]
     ratios = {}
     for (plant, *_), trace in runs.traced(runs.grid()).items():
-        start = max(map(abs, trace.scenario.resolved.x0))
+        (start,) = map(abs, trace.scenario.resolved.x0)
         ratios[plant] = settled(trace, trace.x, narrow * start) / settled(trace, trace.x, wide * start)
     return {"time to 1e-5 |x0| / time to 1e-2 |x0|": ratios}
