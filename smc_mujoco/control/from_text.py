@@ -125,7 +125,7 @@ def _of_tuning(path: str) -> list[Law]:
     with reading(path, "tuning", "give a .json file that smc-mujoco tune or Tuned.save wrote") as file:
         scenario = read_json(file)["scenario"]
         law = serialise.law(scenario["law"], scenario["source"])
-    if any(part.function is None for part in law.parts):
+    if law.function is None:
         gains = ", ".join(f"{name}={value!r}" for name, value in law.gains.items())
         raise ScenarioError(
             f"law {law.name} of {path} is your own: give its file with these gains, as FILE.py({gains})"

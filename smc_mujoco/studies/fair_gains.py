@@ -134,7 +134,7 @@ def _tuned(
     starts: Starts | None,
     folder: Path,
     threads: int | None,
-    progress: bool = False,
+    progress: bool,
 ) -> Candidate:
     """Return a law with gains from `tune`, or from the file of an earlier call; its defaults if it cannot be tuned."""
     usual, default = Objective(), coerce.law(law)

@@ -75,6 +75,20 @@ def test_the_ends_of_a_class_are_within_it():
             Members([base], smc.Uncertainty(**few))
 
 
+@pytest.mark.parametrize(
+    ("name", "kind", "values", "kept"),
+    [
+        ("force", smc.Held, [1, 1, 2, 2, 2, 3, 3, 3, 4], [0, 2, 5, 8]),
+        ("slope", smc.TimeSeries, [1, 1, 2, 2, 2, 3, 3, 3, 4], [0, 1, 2, 4, 5, 7, 8]),
+        ("force", smc.TimeSeries, [1, 2, 3, 4, 5, 5, 5, 5, 5], [0, 4, 8]),
+        ("force", smc.TimeSeries, [0, 1, 2, 3, 2, 1, 1, 1, 1], [0, 3, 5, 8]),
+    ],
+)
+def test_a_force_is_kept_at_its_jumps_if_few_of_its_values_change_and_else_at_its_corners(name, kind, values, kept):
+    signal = Members([scenario()], CLASSES[name]).signal(np.array(values, float))
+    assert signal == kind([1e-3 * k for k in kept], [values[k] for k in kept])
+
+
 def test_errors_of_measurement_reach_the_law_alike_in_both_loops():
     error, steps = smc.Held([0.0, 0.05], [0.02, -0.02]), smc.TimeSeries([0.0, 0.2], [0.1, -0.1])
     made = scenario(duration=0.1, noise=smc.Noise(position=1e-3, position_error=error, velocity_error=steps))

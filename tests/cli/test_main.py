@@ -10,6 +10,7 @@ import threading
 import time
 import types
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -790,6 +791,16 @@ def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(call, folder
     assert (code, err) == (130, STOPPED)
     assert "Traceback" not in out
     assert list((folder / "videos" / "long").iterdir()) == []
+
+
+def test_a_call_is_told_to_end_in_the_main_thread_alone(call, monkeypatch):
+    """Python lets no other thread set what a signal does."""
+    told = []
+    monkeypatch.setattr(main.signal, "signal", lambda *given: told.append(given))
+    ThreadPoolExecutor(1).submit(call, "--version").result()
+    assert told == []
+    assert call("--version")[0] == 0
+    assert told == [(signal.SIGTERM, main._end)]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGTERM for a process")

@@ -13,6 +13,7 @@ import wild
 
 import smc_mujoco as smc
 from smc_mujoco.control import estimator, surface
+from smc_mujoco.control.component import gain_at
 from smc_mujoco.control.law import known_laws
 from smc_mujoco.control.units import RATE, Gain
 
@@ -53,6 +54,11 @@ def test_gain_that_is_no_list_of_numbers_is_refused(value):
         smc.ScenarioError, match=r"k is {.*: give a number, or a list with one for each driven channel$"
     ):
         smc.law("classical", k=value)
+
+
+def test_a_channel_without_a_gain_in_a_list_has_the_last_and_one_number_is_each_channel_s():
+    assert [gain_at((1.0, 2.5), i) for i in range(4)] == [1.0, 2.5, 2.5, 2.5]
+    assert [gain_at(1.5, i) for i in range(2)] == [1.5, 1.5]
 
 
 def test_template_prints_as_name_and_gains():

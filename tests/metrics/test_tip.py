@@ -197,9 +197,10 @@ def test_a_lost_contact_is_marked():
     assert axes.marked == [False, False, True, True, False, True]
 
 
-def test_bad_input_is_one_sentence(trace, refused):
+def test_bad_input_is_one_sentence(trace, pressed, refused):
     plain = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.01))
     refused(lambda: smc.tip_scores(plain))
+    refused(lambda: smc.tip_scores(pressed, force=0.0))
     refused(lambda: tip.contacts(trace))
     refused(lambda: smc.score([trace]))
     refused(lambda: smc.plant_from(arms.ARM, channels=["reach"], tip="tp"))

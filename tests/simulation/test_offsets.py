@@ -133,7 +133,7 @@ def test_an_unknown_type_is_refused(monkeypatch, live):
         return [dataclasses.replace(fields[0], name="extra", type=ast_nodes.ValueType(name="quaternion_t")), *fields]
 
     doctored(monkeypatch, "mjData", insert)
-    with pytest.raises(layout.LayoutError, match="quaternion_t"):
+    with pytest.raises(layout.LayoutError, match=r"^mujoco 3\.\S+ has .* C type .*quaternion_t.*: install mujoco 3"):
         layout.checked_offsets(*live)
 
 

@@ -350,6 +350,7 @@ def test_time_series_that_differ_in_one_number_are_not_equal():
     assert dataclasses.replace(UNEVEN, values=[*UNEVEN.values[:-1], 3.1]) != UNEVEN
     assert dataclasses.replace(UNEVEN, times=[*UNEVEN.times[:-1], 1.4]) != UNEVEN
     assert scenario(disturbance=UNEVEN) == scenario(disturbance=TimeSeries(UNEVEN.times, np.array(UNEVEN.values)))
+    assert {type(x) for x in TimeSeries(np.arange(2), [np.float32(1.0), 2]).times} == {float}
 
 
 def test_a_time_series_does_not_change_and_shows_itself_in_a_line():

@@ -263,7 +263,7 @@ class Members:
         """
         change = np.diff(values)
         steps = not self.slope and 2 * np.count_nonzero(change) < len(change)
-        bends = change != 0.0 if steps else np.abs(np.diff(change, append=math.inf)) > ROUNDING * np.abs(values).max()
+        bends = change != 0.0 if steps else np.abs(np.diff(change)) > ROUNDING * np.abs(values).max()
         at = np.unique(np.concatenate([[0], np.flatnonzero(bends) + 1, [len(values) - 1]]))
         return (Held if steps else TimeSeries)((at * self.h).tolist(), values[at].tolist())
 

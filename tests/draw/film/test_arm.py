@@ -86,6 +86,8 @@ def test_bars_are_shares_of_each_joints_limit(trace):
     expected = trace.applied[:20].mean(axis=0) / np.array([4.0, 2.0, 9.0])
     assert bars.shares is not None
     np.testing.assert_allclose(bars.shares[0][0], expected, atol=0.05)
+    beyond = np.where(trace.t[:, None] < EDGES[1], 1.5, -1.5) * [4.0, 2.0, 9.0]
+    np.testing.assert_array_equal(overlay(dataclasses.replace(trace, applied=beyond)).shares, [[[1.0] * 3, [-1.0] * 3]])
     bars.shares[0][0] = (0.5, -1.0, 0.0)
     image = bars.over(paper() // 2, 0, lambda k, name: np.array([9.0, 0.0, 9.0]))
     zero = 150.0 + arm.LABEL_GAP + arm.BAR_HEIGHT / 2
