@@ -158,14 +158,10 @@ def load(
 
 
 @functools.cache
-def _all_tasks() -> tuple[tuple[str, str], ...]:
-    return tuple((plant, task) for plant in plants() for task in tasks(plant))
-
-
 def __getattr__(name: str) -> object:
     """Return ALL_TASKS, pairs of every plant and each of its tasks. It is made on demand, since it loads all models."""
     if name == "ALL_TASKS":
-        return _all_tasks()
+        return tuple((plant, task) for plant in plants() for task in tasks(plant))
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -1,8 +1,8 @@
 """The report of a failing test: tables of its step responses, a figure and, with --smc-film, a film."""
 
+import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from smc_mujoco.common.files import slug
 from smc_mujoco.simulation.trace import Trace
@@ -19,6 +19,9 @@ def report_of(test: str, responses: Sequence[StepResponse], folder: Path, video:
       folder: folder of the files; it is made if it does not exist.
       video: whether to make films.
     """
+    from smc_mujoco.draw.figure import figure
+    from smc_mujoco.draw.film.film import film
+
     parts = [f"{response}\n{response.table()}" for response in responses]
     plants: dict[str, list[Trace]] = {}
     for response in responses:
@@ -26,28 +29,17 @@ def report_of(test: str, responses: Sequence[StepResponse], folder: Path, video:
     lines = []
     for plant, traces in plants.items():
         name = slug(test[-MAX_ID:], MAX_ID) + (f"-{slug(plant)}" if len(plants) > 1 else "")
-        lines.append(_line("figure", _figure, traces, folder / f"{name}.png", test.rpartition("::")[2]))
+        titled = functools.partial(figure, title=test.rpartition("::")[2])
+        lines.append(_line("figure", titled, traces, folder / f"{name}.png"))
         if video:
-            lines.append(_line("film", _film, traces, folder / f"{name}.mp4"))
+            lines.append(_line("film", film, traces, folder / f"{name}.mp4"))
     return "\n\n".join([*parts, "\n".join(dict.fromkeys(lines))])
 
 
-def _line(what: str, make: Callable[..., Path], *arguments: Any) -> str:
-    """Return a line with the file that `make` writes, or with the reason why there is none."""
+def _line(what: str, draw: Callable[[Sequence[Trace], Path], object], traces: Sequence[Trace], path: Path) -> str:
+    """Draw traces. Return a line with the file, or with the reason why there is none."""
     try:
-        return f"{what}: {make(*arguments)}"
+        draw(traces, path)
     except Exception as error:  # a picture must not hide why the test failed
         return f"no {what}: {str(error).removeprefix(f'no {what}: ')}"
-
-
-def _figure(traces: Sequence[Trace], path: Path, title: str) -> Path:
-    from smc_mujoco.draw.figure import figure
-
-    figure(traces, path, title=title)
-    return path
-
-
-def _film(traces: Sequence[Trace], path: Path) -> Path:
-    from smc_mujoco.draw.film.film import film
-
-    return film(traces, path)
+    return f"{what}: {path}"

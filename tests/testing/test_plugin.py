@@ -16,7 +16,8 @@ from helpers.words import words
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.testing import golden, plugin, report
+from smc_mujoco.draw import figure as figures
+from smc_mujoco.testing import golden, plugin
 from smc_mujoco.testing.limits import bound, judge
 from smc_mujoco.testing.response import respond
 
@@ -59,7 +60,7 @@ def at_a_terminal(monkeypatch):
 @pytest.fixture
 def undrawn(monkeypatch):
     """Figures cost half a second each; here only their names count."""
-    monkeypatch.setattr(report, "_figure", lambda traces, path, title: path)
+    monkeypatch.setattr(figures, "figure", lambda traces, path, title: path)
 
 
 @pytest.fixture
@@ -341,7 +342,7 @@ def test_a(step_response):
 
 
 def test_a_figure_that_cannot_be_drawn_hides_nothing(session, monkeypatch):
-    monkeypatch.setattr(report, "_figure", lambda traces, path, title: 1 / 0)
+    monkeypatch.setattr(figures, "figure", lambda traces, path, title: 1 / 0)
     said = session(BAD, failed=1)
     assert re.findall(r"^(?:no )?figure.*$", said, re.MULTILINE) == ["no figure: division by zero"]
     assert "assert (inf < 0.6" in said
