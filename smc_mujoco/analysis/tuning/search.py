@@ -35,7 +35,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from smc_mujoco.analysis.tuning import search_space
-from smc_mujoco.analysis.tuning.objective import OBJECTIVES, Objective
+from smc_mujoco.analysis.tuning.objective import FAILURE_COST, OBJECTIVES, Objective
 from smc_mujoco.analysis.tuning.result import (
     AGREEING_STARTS,
     AGREEMENT_TOLERANCE,
@@ -118,7 +118,7 @@ def tune(
 
     Raises:
       ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales, an argument out of
-        range, or a law whose own code fails in every run with its own gains.
+        range, or a law whose own code fails in every run, with its own gains and with those of the first start.
 
     Warns:
       ScenarioWarning: a gain of unknown unit, which is searched about its default; the law's original gains are better
@@ -139,13 +139,15 @@ def tune(
     if search_space.without_unit(law):
         _warn(_without_unit_warning(law))
     traces = run(cases, threads)
-    _refuse_broken(law, traces)
+    failure = _failure_of_law(traces)
+    if failure and (all(trace.diverged_at == 0.0 for trace in traces) or prepare(cases[0]).why_not):
+        raise _broken(law, failure)
     tracking, variation = goal.terms(traces)
     before = tracking + goal.weight * variation + goal.excess(cases[0])
     with bar(f"{law.name} on {plant.name}", budget, shown=progress, counted=True) as progress_bar:
         ledger = _Ledger(goal, cases, tuple(box), bound, budget, threads, progress_bar.advance)
         searched = search_space.widened(law, box)
-        ends = _search(ledger, box, searched, seed)
+        ends = _search(ledger, box, searched, seed, failure)
     tuned = _result(ledger, ends, before, seed, scales, box, searched)
     _warn_of_result(tuned, chatters=bool(ledger.excess(tuple(tuned.gains.values()))))
     return tuned.sourced()
@@ -196,15 +198,14 @@ def _warn_of_result(tuned: Tuned, chatters: bool) -> None:
         )
 
 
-def _refuse_broken(law: Component, traces: Sequence[Trace]) -> None:
-    """Raise BrokenLawError if the law, and not the plant, fails in every run: at once, or as it does not compile.
+def _failure_of_law(traces: Sequence[Trace]) -> str:
+    """Return how the first run failed, if the law fails in every run, and the plant in none; else ""."""
+    fails = all(trace.failure is not None and not trace.plant_diverged for trace in traces)
+    return traces[0].failure or "" if fails else ""
 
-    Bad gains may make the numbers of a compiled law overflow later in a run. Other gains may cure that.
-    """
-    if any(trace.failure is None or trace.plant_diverged for trace in traces):
-        return
-    if all(trace.diverged_at == 0.0 for trace in traces) or prepare(traces[0].scenario).why_not:
-        raise BrokenLawError(f"{law.name} cannot be tuned, {traces[0].failure}: correct the law or signal")
+
+def _broken(law: Component, failure: str) -> BrokenLawError:
+    return BrokenLawError(f"{law.name} cannot be tuned, {failure}: correct the law or signal")
 
 
 def _warn(words: str) -> None:
@@ -302,12 +303,16 @@ def _with_gains(law: Component, names: Sequence[str], values: Sequence[float]) -
     return dataclasses.replace(law, gains=dict(law.gains) | dict(zip(names, values, strict=True)))
 
 
-def _search(ledger: _Ledger, box: Box, searched: Box, seed: int) -> tuple[float, ...]:
+def _search(ledger: _Ledger, box: Box, searched: Box, seed: int, failure: str) -> tuple[float, ...]:
     """Make starts until they have converged or the budget is spent, and return the best J of each, s^2.
+
+    Bad gains may make the numbers of a law overflow, and others may cure that. So a law that fails with its own gains
+    is refused only after a start in which every run fails.
 
     Args:
       box: from which starts are drawn.
       searched: the wider box in which they go on.
+      failure: how the law fails in every run with its own gains; "" if it does not.
     """
     ends: list[float] = []
     whole_start = EVALUATIONS_PER_GAIN * len(box)
@@ -317,6 +322,8 @@ def _search(ledger: _Ledger, box: Box, searched: Box, seed: int) -> tuple[float,
         logs, cost = _screened(ledger, box, random, int(SCREENED_SHARE * size))
         logs = _evolved(ledger, searched, random, logs, cost, int(EVOLVED_SHARE * size))
         ends.append(_descend(ledger, searched, logs, size - (ledger.screened - screened)))
+        if failure and ends[0] >= FAILURE_COST * len(ledger.cases):
+            raise _broken(ledger.cases[0].law, failure)
         if converged(ends) and len(near_optimal(ledger.evaluations)) >= MAX_SETS:
             break
     _spread(ledger, searched, np.random.default_rng([seed, len(ends)]))

@@ -425,6 +425,21 @@ def test_a_law_that_fails_by_itself_is_not_searched_and_says_why(function, monke
     refused(lambda: fair_gains(smc.plant("duffing"), [law], tmp_path, budget=4))
 
 
+@pytest.mark.filterwarnings("ignore:.* no unit")
+def test_a_law_that_fails_later_is_refused_if_no_gains_mend_it(refused):
+    def made(limit):
+        @smc.law_function(gains={"k": 3.0})
+        def sensor_lost(y, gains, memory):
+            if y.t > 0.01 and gains.k > limit:
+                raise ValueError("sensor lost")
+            return -gains.k * y.e, y.e
+
+        return sensor_lost
+
+    refused(lambda: tune("duffing", made(0.0), budget=4, objective=LEAN))
+    assert not tune("duffing", made(2.0), budget=8, objective=LEAN).sets[0].failed
+
+
 def test_a_bad_objective_is_refused(refused):
     for changed in (
         {"conditions": ("calm",)},
