@@ -15,7 +15,8 @@ import numpy as np
 
 from smc_mujoco.analysis.ranking import first_of_kind
 from smc_mujoco.analysis.relevant_difference import without_rounding
-from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
+from smc_mujoco.common.errors import ScenarioError, items_of, one_line, shown, unknown
+from smc_mujoco.common.text import counted
 from smc_mujoco.control.source import Source, restore
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.channel_groups import groups as channel_groups
@@ -60,6 +61,16 @@ def failed(table: Columns) -> np.ndarray:
     """Return which rows are runs that failed."""
     lost = np.array([failure is not None for failure in table.column("failure")], bool)
     return lost | ~np.isnan(np.array(table.column("diverged_at"), float))
+
+
+def failures(table: Columns) -> list[str]:
+    """Return a sentence for each law with failed runs: how many, and how the first one failed."""
+    laws, lost, how = np.asarray(table.column("law"), str), failed(table), table.column("failure")
+    sentences = []
+    for law in dict.fromkeys(laws[lost].tolist()):
+        its, runs = how[lost & (laws == law)], counted(int((laws == law).sum()), "run")
+        sentences.append(f"{law} failed in {len(its)} of {runs}, the first: {one_line(its[0] or 'it diverged')}.")
+    return sentences
 
 
 class Scores(NamedTuple):

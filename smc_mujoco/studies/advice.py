@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from smc_mujoco.analysis.paired_runs import failures
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.signed_rank import min_p
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
@@ -150,7 +151,7 @@ class Advice(Tables):
             place, settles = f"{choice.rank.place:g}" if choice.fit else "–", f"{100 * choice.settles:.0f} %"
             rows.append([law, place, settles, *(self._cell(choice, need) for need in self.needs)])
         answer = [*self.answer, *([f"In Python: {self.code}"] if self.code else [])]
-        notes = [line for sentence in (self.key, *answer) for line in (sentence, "")][:-1]
+        notes = [line for sentence in (self.key, *failures(self.table), *answer) for line in (sentence, "")][:-1]
         return [Tabular(headings=["law", "place", "settles", *units], rows=rows, title=self.title, notes=notes)]
 
     @property

@@ -324,9 +324,11 @@ class Boards(Tables, list[Board]):
 
     Attributes:
       worst: plant -> law -> its `worst_case`, for a column of the plant's tables; empty for none.
+      failures: a sentence for each law with failed runs, below the last table.
     """
 
     worst: Mapping[str, Mapping[str, WorstCase]] = frozen({})
+    failures: Sequence[str] = ()
 
     @property
     def tables(self) -> list[Tabular]:
@@ -335,7 +337,7 @@ class Boards(Tables, list[Board]):
         A cell has a median with its interval. The median is marked if no law is better in any block, no run failed, and
         there are enough runs for a winner.
         """
-        return tables(self, self.worst)
+        return tables(self, self.worst, self.failures)
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -366,11 +368,14 @@ def heading(board: Board) -> str:
     return metric.label + (f" ({unit})" if unit not in ("", "1") else "")
 
 
-def tables(boards: Iterable[Board], worst: Mapping[str, Mapping[str, WorstCase]] | None = None) -> list[Tabular]:
+def tables(
+    boards: Iterable[Board], worst: Mapping[str, Mapping[str, WorstCase]] | None = None, failures: Sequence[str] = ()
+) -> list[Tabular]:
     """Return a table for each group of runs, with what each metric's board says below, and a key below the last.
 
     Args:
       worst: plant -> law -> its worst case, for a last column.
+      failures: how laws failed, in sentences above the key.
     """
     groups: dict[str, list[Board]] = {}
     for board in boards:
@@ -379,7 +384,7 @@ def tables(boards: Iterable[Board], worst: Mapping[str, Mapping[str, WorstCase]]
     if not made:
         return [NO_BOARDS]
     words = key([board for its in groups.values() for board in its])
-    return [*made[:-1], dataclasses.replace(made[-1], notes=(*made[-1].notes, words))]
+    return [*made[:-1], dataclasses.replace(made[-1], notes=(*made[-1].notes, *failures, words))]
 
 
 def _table(name: str, boards: Sequence[Board], worst: Mapping[str, WorstCase]) -> Tabular:

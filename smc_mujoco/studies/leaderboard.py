@@ -73,7 +73,7 @@ def leaderboard(
     known = {SETTLES: ""} | {name: metric.unit for name, metric in CATALOGUE.items()}
     units = {name: find("metric", name, known) for name in metrics}
     boards, seed = Boards(), whole("seed", seed, 0, 2**53 - 1)
-    boards.worst = worst or {}
+    boards.worst, boards.failures = worst or {}, paired_runs.failures(table)
     by_row = {name: paired_runs.values(table, name) for name in units}
     groups = list(paired_runs.groups(table, by))
     every = groups if set(by) == set(paired_runs.GROUPS) else list(paired_runs.groups(table, paired_runs.GROUPS))

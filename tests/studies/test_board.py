@@ -76,6 +76,16 @@ def test_laws_stand_by_place_in_the_first_metric_then_in_the_next(first, laws):
     assert [row[0].text for row in table.rows] == laws
 
 
+def test_the_last_table_says_how_laws_failed():
+    stand = Stand(conditions=("nominal", "noise"))
+    stand.columns["failure"][-3:-1] = ["sensor lost, at t = 1 s", "sensor lost, at t = 2 s"]
+    stand.columns["diverged_at"][:1] = 0.5
+    first, last = (" ".join(table.notes) for table in leaderboard(stand, by=("plant", "condition")).tables)
+    assert "failed in" not in first
+    assert f"{EVIL} failed in 1 of 40 runs, the first: it diverged." in last
+    assert "third failed in 2 of 40 runs, the first: sensor lost, at t = 1 s. " in last
+
+
 def bold(text: str) -> list[str]:
     return re.findall(r"<b>(.*?)</b>", text)
 
