@@ -23,7 +23,7 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown, users_stacklevel, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
-from smc_mujoco.control.units import Gain
+from smc_mujoco.control.units import Gain, Unit
 
 GainConditions = Mapping[str, Callable[[SimpleNamespace], bool]]
 GainValue = float | tuple[float, ...]  # one number for all channels, or one for each driven channel
@@ -191,6 +191,13 @@ class Component:
 def gain_text(value: GainValue) -> str:
     """Return a gain as text, such as 3 or (3, 4.5)."""
     return f"({', '.join(f'{one:g}' for one in value)})" if isinstance(value, tuple) else f"{value:g}"
+
+
+def unit_cure(name: str, default: GainValue) -> str:
+    """Return how to give a gain a unit, as the end of a refusal."""
+    gain = f'gains={{"{name}": Gain({gain_text(default)}, UNIT)}}'
+    units = "FORCE, RATE, SPEED or another of smc_mujoco.control.units, or Unit() for a number without one"
+    return f"write {gain} in its decorator, where UNIT is {units}"
 
 
 def _checked_gain(name: str, value: object, **limits: Any) -> GainValue:
@@ -399,6 +406,8 @@ def as_gains(gains: object, known: Mapping[str, GainValue] = frozen({})) -> dict
             gain, default=_checked_gain(f"default of gain {key}", gain.default, infinite=True)
         )
     for key, gain in checked.items():
+        if not (gain.unit is None or isinstance(gain.unit, Unit) or callable(gain.unit)):
+            raise ScenarioError(f"unit of gain {key} is {shown(gain.unit)}: {unit_cure(key, gain.default)}")
         if gain.over is not None and gain.over not in checked:
             raise unknown(f"gain that {key} is divided by", gain.over, checked)
     return checked

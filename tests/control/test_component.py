@@ -61,6 +61,11 @@ def test_a_channel_without_a_gain_in_a_list_has_the_last_and_one_number_is_each_
     assert [gain_at(1.5, i) for i in range(2)] == [1.5, 1.5]
 
 
+def test_unit_of_a_gain_that_is_a_text_is_refused():
+    with pytest.raises(smc.ScenarioError, match=r"^unit of gain k is '1/s': write .*Gain\(2, UNIT\).* where UNIT is "):
+        smc.law_function(gains={"k": Gain(2.0, "1/s")})  # pyright: ignore[reportArgumentType]
+
+
 def test_template_prints_as_name_and_gains():
     template = smc.law_function(gains={"k": 2.0, "w": Gain((1.0, 0.5))})(lambda y, gains, memory: (0.0, 0.0))
     assert repr(template) == "<Template of law('<lambda>', k=2, w=(1, 0.5))>"

@@ -53,7 +53,7 @@ from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, users_stacklevel, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
-from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.component import Component, Template, unit_cure
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
@@ -118,7 +118,7 @@ def tune(
 
     Raises:
       ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales, an argument out of
-        range, or a law whose own code fails in every run, with its own gains and with those of the first start.
+        range, or a law whose own code fails in every run, with its own gains and with those of a whole start.
 
     Warns:
       ScenarioWarning: a gain of unknown unit, which is searched about its default; the law's original gains are better
@@ -218,8 +218,7 @@ def _without_unit_warning(law: Component) -> str:
     have, whose = ("have", "their defaults") if len(names) > 1 else ("has", "its default")
     return (
         f"{law.name}'s {joined(names)} {have} no unit, and so a search about {whose} in place of the rule of all laws: "
-        f'write the unit, as in gains={{"{names[0]}": Gain({law.gains[names[0]]:g}, RATE)}}, see '
-        "smc_mujoco.control.units"
+        + unit_cure(names[0], law.gains[names[0]])
     )
 
 
@@ -307,7 +306,7 @@ def _search(ledger: _Ledger, box: Box, searched: Box, seed: int, failure: str) -
     """Make starts until they have converged or the budget is spent, and return the best J of each, s^2.
 
     Bad gains may make the numbers of a law overflow, and others may cure that. So a law that fails with its own gains
-    is refused only after a start in which every run fails.
+    is refused only after a whole start in which every run fails.
 
     Args:
       box: from which starts are drawn.
@@ -322,7 +321,7 @@ def _search(ledger: _Ledger, box: Box, searched: Box, seed: int, failure: str) -
         logs, cost = _screened(ledger, box, random, int(SCREENED_SHARE * size))
         logs = _evolved(ledger, searched, random, logs, cost, int(EVOLVED_SHARE * size))
         ends.append(_descend(ledger, searched, logs, size - (ledger.screened - screened)))
-        if failure and ends[0] >= FAILURE_COST * len(ledger.cases):
+        if failure and size == whole_start and ends[0] >= FAILURE_COST * len(ledger.cases):
             raise _broken(ledger.cases[0].law, failure)
         if converged(ends) and len(near_optimal(ledger.evaluations)) >= MAX_SETS:
             break

@@ -34,7 +34,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.control.component import Component, gain_text
+from smc_mujoco.control.component import Component, unit_cure
 from smc_mujoco.control.units import FORCE, Gain, Unit
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.initial_states import START_CURE
@@ -62,11 +62,7 @@ def unit(law: Component, name: str) -> Unit | None:
     """
     gain = _gain(law, name)
     if gain.unit is None and not gain.held:
-        cure = (
-            f'write gains={{"{name}": Gain({gain_text(gain.default)}, RATE)}} in its decorator, with its own unit of '
-            "smc_mujoco.control.units, or Unit() for a number without one"
-        )
-        raise ScenarioError(f"tuning knows no unit of {law.name}'s gain {name!r}: {cure}")
+        raise ScenarioError(f"tuning knows no unit of {law.name}'s gain {name!r}: {unit_cure(name, gain.default)}")
     return gain.unit  # pyright: ignore[reportReturnType]
 
 

@@ -436,7 +436,7 @@ def test_a_law_that_fails_later_is_refused_if_no_gains_mend_it(refused):
 
         return sensor_lost
 
-    refused(lambda: tune("duffing", made(0.0), budget=4, objective=LEAN))
+    refused(lambda: tune("duffing", made(0.0), budget=EVALUATIONS_PER_GAIN, objective=LEAN))
     assert not tune("duffing", made(2.0), budget=8, objective=LEAN).sets[0].failed
 
 
