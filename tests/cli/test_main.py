@@ -17,9 +17,10 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.step_halving import NOTE, StepChange
 from smc_mujoco.cli import main, tables, terminal
 from smc_mujoco.cli import scene as show
-from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.commands import options, runs
 from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw.film import film
@@ -349,6 +350,18 @@ def test_show_of_a_realistic_run_tells_of_friction_too(call, folder):
     assert rows["stick_time"][:2] == ["0.300", "s"]
     assert rows["peak_reaction"][:2] == [tables.number(score(stuck)["peak_reaction"]), "N"]
     assert rows["reaction"][-1] == f"{stuck.reaction[-1, 0]:.3g}"
+
+
+def test_show_says_whether_half_the_step_changes_chattering_or_could_not_be_tried(call, trace, monkeypatch):
+    notes = NOTE, "chattering was not compared with that of half the physics step: this run's law is not here"
+    for change, said in (
+        (StepChange(0.2, 0.0), (True, False)),
+        (None, (False, True)),
+        (StepChange(0.05, 0.05), (False, False)),
+    ):
+        monkeypatch.setattr(runs, "_step_change", lambda trace, change=change: change)
+        words = " ".join(call("show", trace)[1].split())
+        assert tuple(note in words for note in notes) == said
 
 
 def test_show_tells_the_cart_in_metres_and_its_pole_in_radians(call, folder):

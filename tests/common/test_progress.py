@@ -1,5 +1,6 @@
 """Progress in a notebook: a bar in the cell, without a warning, and nothing left of it."""
 
+import contextlib
 import re
 import sys
 import types
@@ -69,6 +70,34 @@ def test_nothing_is_drawn_more_than_five_times_a_second(cell):
         for _ in range(1000):
             bar.advance(1.0)
     assert len(cell) < 10
+
+
+def test_a_terminal_s_bar_vanishes_and_takes_the_time_left_from_two_minutes(monkeypatch):
+    """rich is given; what it is asked is told."""
+    asked = []
+
+    @contextlib.contextmanager
+    def shown(*columns, **options):
+        asked.append(([type(each).__name__ for each in columns], options.pop("console").stderr, options))
+        bar = types.SimpleNamespace(add_task=lambda what, total: (what, total))
+        bar.advance = bar.update = lambda *given, **options: asked.append((given, options))
+        yield bar
+
+    monkeypatch.setattr("rich.progress.Progress", shown)
+    monkeypatch.setattr("rich.console.Console.is_terminal", True)
+    for counted, share in ((True, "MofNCompleteColumn"), (False, "TaskProgressColumn")):
+        with progress.bar("runs", 8.0, counted=counted) as bar:
+            bar.advance(2.0)
+            bar.reached(3.0, 9.0)
+            bar.says("more", 0.5)
+        task, columns = ("runs", 8.0), ["TextColumn", "BarColumn", share, "TimeRemainingColumn"]
+        assert asked == [
+            (columns, True, {"transient": True, "speed_estimate_period": 120.0}),
+            ((task, 2.0), {}),
+            ((task,), {"completed": 3.0, "total": 9.0}),
+            ((task,), {"description": "more", "advance": 0.5}),
+        ]
+        del asked[:]
 
 
 def test_a_terminal_gets_no_html(capsys):

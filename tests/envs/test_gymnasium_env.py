@@ -542,6 +542,6 @@ def test_bad_input_is_one_sentence(refused):
         lambda: BatchEnv("duffing", 2).reset(seed="a"),
         lambda: smc.agent("classical", BatchEnv("duffing", 2)),
         lambda: smc.agent("clasical", PlantEnv("duffing")),
-        lambda: smc.agent("classical", PlantEnv("duffing"))(np.zeros(1)),
+        lambda: smc.agent("classical", PlantEnv("double_pendulum"))(np.zeros(3)),
     ):
         refused(make)

@@ -9,6 +9,8 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.cli.main import main
 from smc_mujoco.control.law import catalogue, known_laws
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.studies import accuracy
 from smc_mujoco.studies.accuracy import load
 
 PERIODS = (4e-3, 2e-3, 1e-3, 5e-4)
@@ -94,6 +96,38 @@ def test_theory_promises_nothing_behind_a_drive():
     assert row.e.theory is None
     assert "no promise behind a drive" in row.why
     assert abs(row.e.order) < 0.5, "the lag, not the period, sets the amplitude"
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({}, ""),
+        ({"actuator": smc.Lag(0.02)}, "no promise behind a drive, which adds to the relative degree"),
+        ({"input_delay": 1e-3}, "no promise with an input delay, or samples that are late or missed"),
+        ({"clock": smc.Clock(jitter=1e-4)}, "no promise with an input delay, or samples that are late or missed"),
+        ({"noise": smc.Noise(velocity=1e-3)}, "no promise with noise or an encoder"),
+        ({"sensor": smc.Encoder(counts=1000)}, "no promise with noise or an encoder"),
+        ({"velocity": "levant"}, "no promise with an estimated velocity"),
+        (
+            {"law": "nested_third_order"},
+            "no promise on a plant of relative degree 2, because the law is for a higher one",
+        ),
+    ],
+)
+def test_theory_assumes_that_samples_are_exact_and_act_at_once(fields, words):
+    assert accuracy._why_no_promise(smc.Scenario(**{"plant": "duffing", "law": "twisting"} | fields)) == words
+
+
+def test_every_period_has_every_start_and_one_run_more_has_half_the_step():
+    given = as_plant("duffing"), smc.condition("fine", physics_step=2.5e-4), "twisting"
+    setup = accuracy._setup(*given, (4e-3, 2e-3), (3, 5), "tuned", 1.5, None)
+    runs = [(one.seed, one.control_period, one.physics_step, one.duration) for one in setup.scenarios]
+    steps = [(seed, period, 2.5e-4, 1.5) for seed in (3, 5) for period in (4e-3, 2e-3)]
+    assert runs == [*steps, (3, 2e-3, 1.25e-4, 1.5)]
+    assert (setup.periods, setup.starts, setup.untuned) == ((4e-3, 2e-3), 2, False)
+    mixed = dataclasses.replace(as_plant("double_pendulum"), mixed=("m", "rad"))
+    with pytest.raises(smc.ScenarioError, match="has driven channels in m and rad: give a plant with one unit"):
+        accuracy._setup(mixed, *given[1:], (4e-3,), (3,), "tuned", 1.5, None)
 
 
 def test_laws_without_tuned_gains_get_their_defaults_with_one_warning():
