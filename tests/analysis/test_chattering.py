@@ -118,6 +118,7 @@ def fitted(scenario, omega):
     return complex(imaginary, real)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "fields",
     [
@@ -234,6 +235,7 @@ def test_amplitude_and_frequency_follow_formulas_runs_and_exponents_of_the_lag(n
 BEHIND_LAG, LATE = {"actuator": smc.Lag(0.01)}, {"input_delay": 0.01}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "plant", "actuator"),
     [
@@ -371,6 +373,7 @@ def relay_with_a_dead_zone(a):
     return relay(a) * math.sqrt(1.0 - (0.01 / a) ** 2) if a > 0.01 else 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "wanted"),  # N at the cycles: 2 p / K
     [

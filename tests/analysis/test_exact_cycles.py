@@ -41,6 +41,7 @@ VECTORS = {  # loop, and its exact amplitude of s and frequency, Hz: of independ
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", VECTORS)
 def test_a_limit_cycle_with_default_steps_is_that_of_the_machine(name):
     loop, amplitude, frequency = VECTORS[name]
@@ -51,6 +52,7 @@ def test_a_limit_cycle_with_default_steps_is_that_of_the_machine(name):
     assert measured(trace.t[late], trace.s[late, 0]) == pytest.approx((amplitude, frequency), rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse_grid")
 @pytest.mark.parametrize("name", VECTORS)
 def test_the_predicted_ranges_hold_the_limit_cycle_of_the_machine(name):

@@ -123,6 +123,7 @@ def test_every_argument_out_of_range_is_refused_by_its_name(refused):
 # smallest lambda
 
 
+@pytest.mark.slow
 @each_plant
 def test_the_measured_smallest_lambda_is_the_one_of_theory_within_one_percent(plant):
     k1 = own(plant).gains["k1"]
@@ -168,6 +169,7 @@ def test_where_sampling_is_too_slow_there_is_no_lambda():
 # critical delay
 
 
+@pytest.mark.slow
 @each_plant
 def test_the_measured_critical_delay_is_the_one_of_theory_within_one_control_period(plant):
     law = own(plant)

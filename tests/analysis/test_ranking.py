@@ -91,6 +91,7 @@ def test_the_ends_are_the_order_statistics_that_the_binomial_distribution_gives(
     assert median_interval(np.arange(1.0, n + 1))[1:3] == (low, high)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "low", "high"), [(5, 1, 5), (20, 6, 15)])
 def test_the_interval_of_a_skewed_sample_covers_as_often_as_its_order_statistics_do(n, low, high):
     rng, runs = np.random.default_rng(n), 1000
@@ -294,6 +295,7 @@ def spreading(laws: int, conditions: int, spread: float, rng: np.random.Generato
     return np.where((shape == "failing") & (rng.random((laws, 1, 24)) < 0.02), INF, scores)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("laws", "conditions", "shape"),
     [(2, 3, "tails"), (2, 3, "failing"), (4, 5, "skew"), (4, 5, "ties")],

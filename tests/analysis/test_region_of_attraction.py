@@ -39,6 +39,7 @@ def fails_far_out(y, gains, memory):
 # verdicts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("plant", "law"),
     [

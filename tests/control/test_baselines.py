@@ -176,6 +176,7 @@ def test_design_linearises_a_plant_at_the_origin():
     np.testing.assert_allclose(design.linearised(smc.plant("duffing", M=2.0, alpha=4.0)), (-2.0, -0.1, 0.5), rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing", "van_der_pol"])
 def test_designed_lqr_moves_a_small_error_as_its_closed_loop_says(plant):
     law = design.lqr(plant, q=(10.0, 1.0), r=0.5)
@@ -190,6 +191,7 @@ def test_designed_lqr_moves_a_small_error_as_its_closed_loop_says(plant):
 # computed torque
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing", "van_der_pol"])
 def test_with_the_model_the_error_of_computed_torque_obeys_its_linear_equation(plant):
     """On the way along a sine, from a wrong start."""

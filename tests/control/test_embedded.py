@@ -211,6 +211,7 @@ APART = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORMS)
 def test_a_form_moves_a_plant_as_the_paper_s_law_does_and_to_where_it_comes_to_rest(name, runs):
     """There exactly, except in fixed point: within two steps of e, 4 / 2^15."""

@@ -177,6 +177,7 @@ def test_an_estimate_of_second_order_is_exact_on_parabolas(name):
     np.testing.assert_allclose(a, 4.0, rtol=0, atol=1e-4 + 5 * L * H)
 
 
+@pytest.mark.slow
 @ESTIMATORS
 def test_defaults_carry_the_paper_s_laws_through_noise_on_every_plant(name):
     """Without a velocity sensor."""
@@ -216,6 +217,7 @@ def test_the_integral_chain_passes_less_noise_than_the_observer_of_its_poles(w):
     assert v < gains_of("extended_state_observer", w=w)[0] / 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("N", [5, 31, 101])
 def test_savitzky_golay_passes_noise_by_its_formula(N):
     v = math.sqrt(12 * (2 * N - 1) * (8 * N - 11) / (N * (N**2 - 1) * (N**2 - 4))) / H
@@ -358,6 +360,7 @@ def test_the_bare_difference_is_of_first_order_on_a_sine():
     np.testing.assert_allclose(errors[:, 0], [5e-3, 5e-4], rtol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "steps"), [(1, [1e-2, 1e-3, 1e-4]), (2, [1e-2, 3e-3, 1e-3]), (3, [3e-2, 1e-2, 3e-3])])
 def test_levant_s_order_on_a_sine_is_its_order(n, steps):
     """O(h^n) for the velocity and O(h^(n-1)) for the acceleration, with L = 1 >= |x^(n+1)|."""
@@ -370,6 +373,7 @@ def test_levant_s_order_on_a_sine_is_its_order(n, steps):
         np.testing.assert_allclose(slopes[1], n - 1, atol=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "most"), [(1, (2.0,)), (2, (2.5, 2.5)), (3, (3.5, 4.5))])
 def test_levant_s_error_under_noise_is_of_the_best_order(n, most):
     """|z_i - x^(i)| <= c_i eps^((n+1-i)/(n+1)) for L = 1, over three decades of eps; c_i measured, equal for all."""

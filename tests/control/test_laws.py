@@ -138,6 +138,7 @@ LOCAL = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("plant", "linear", "lam", "k1"), LOCAL)
 def test_observer_free_is_locally_stable_just_where_its_condition_says(plant, linear, lam, k1):
     """The envelope of a tiny error grows or dies at the rate of the linearisation's slowest root."""

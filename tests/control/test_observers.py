@@ -170,6 +170,7 @@ def test_the_disturbance_observer_takes_any_surface_of_its_degree():
         smc.Scenario(plant="duffing", law="extended_state", surface="linear")
 
 
+@pytest.mark.slow
 @OBSERVERS
 @pytest.mark.parametrize("model", ["none", "nominal"])
 def test_defaults_settle_every_plant_of_the_paper(name, model):

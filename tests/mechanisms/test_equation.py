@@ -122,6 +122,7 @@ def test_every_plant_of_the_study_has_its_equation_here():
     assert set(smc.paper.GAINS) == set(EQUATION)  # the others: test_underactuated.py and test_rig_plants.py
 
 
+@pytest.mark.slow
 @PLANTS
 @pytest.mark.parametrize("law", sorted(SMOOTH))
 def test_seconds_of_the_closed_loop_follow_the_equation(plant, law):

@@ -81,6 +81,7 @@ def states(name, plant, rng):
         yield rng.uniform(-3, 3, plant.n), v, scale * rng.uniform(-1, 1, plant.driven) * plant.limits[0]
 
 
+@pytest.mark.slow
 @PLANTS
 @pytest.mark.parametrize("rough", [False, True], ids=["smooth", "rough"])
 def test_a_thousand_accelerations_are_those_of_the_equation(name, rough):
@@ -114,6 +115,7 @@ def test_nominal_is_the_equation_without_dry_friction(name):
 START = {"furuta": (0.0, 2.6), "servo_axis": 0.1, "acrobot": (0.5, 1.0)}  # the Furuta pendulum about hanging
 
 
+@pytest.mark.slow
 @PLANTS
 def test_two_seconds_of_free_motion_at_2_ms_follow_an_eighth_order_integration(name):
     plant = smc.plant(name, **dict.fromkeys(smc.plant(name).dry, 0.0))

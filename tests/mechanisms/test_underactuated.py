@@ -288,6 +288,7 @@ def test_the_wrong_sign_fails(name):
     assert trace.failure or bound(trace) * max(map(abs, trace.scenario.resolved.x0)) > 1.0
 
 
+@pytest.mark.slow
 @PLANTS
 @pytest.mark.parametrize("factors", [{"M": 0.8}, {"M": 1.2}, {"m": 0.8}, {"m": 1.2}, {"M": 1.2, "m": 1.2, "l": 1.1}])
 def test_masses_off_by_a_fifth_are_borne(name, factors):
@@ -315,6 +316,7 @@ ROUTH = [  # a L, c1, c2
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "gains"), list(zip(itertools.cycle(NAMES), ROUTH)))
 def test_the_motion_on_the_surface_is_stable_exactly_where_its_roots_say(name, gains):
     """S -> 0 does not suffice: with gains beyond the condition S stays at 0 while both joints run away."""

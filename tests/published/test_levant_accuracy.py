@@ -106,6 +106,7 @@ def test_errors_under_noise_have_levant_s_exponents(r):
         check(exponents(eps, errors), (r - np.arange(r)) / r, law, NOISE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("r", [pytest.param(2, marks=pytest.mark.slow), 3])
 def test_errors_in_the_sampling_period_have_levant_s_exponents(r):
     for law, errors in zip(LAWS[r], sliding(r, 0.0), strict=True):
@@ -177,6 +178,7 @@ def differentiation(n, noise):
     return periods, np.reshape(errors, (len(periods), -1, n + 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_differentiators_err_under_noise_with_levant_s_exponents(n):
     periods, errors = differentiation(n, 1.0)
@@ -184,6 +186,7 @@ def test_differentiators_err_under_noise_with_levant_s_exponents(n):
     check(exponents(eps, errors), (n + 1 - np.arange(n + 1)) / (n + 1), f"levant`, order {n}", NOISE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 2])
 def test_differentiators_err_in_the_sampling_period_with_levant_s_exponents(n):
     periods, errors = differentiation(n, 0.0)

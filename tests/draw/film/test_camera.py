@@ -107,6 +107,7 @@ def test_an_own_model_is_in_the_film_s_light(trace):
     assert model.vis.headlight.ambient == pytest.approx((0.42, 0.43, 0.44))
 
 
+@pytest.mark.slow
 @renders
 @pytest.mark.parametrize("machines", [1, 2])
 def test_links_without_a_colour_have_the_law_s_and_other_bodies_their_own(trace, machines):

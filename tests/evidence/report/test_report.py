@@ -126,7 +126,6 @@ def reader(text):
 # one file
 
 
-@pytest.mark.slow
 def test_the_report_is_one_file_under_20_megabytes(made):
     assert made.name == "report.html"
     assert made.stat().st_size < 20e6

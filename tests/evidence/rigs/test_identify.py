@@ -228,6 +228,7 @@ def least_errors(u):
 FAR = {"M": 95.0, "b": 203.0, "cf": 20.4, "offset": -3.2}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("start", "seconds"), [({}, 0.4), pytest.param(FAR, 1.5, marks=pytest.mark.slow)], ids=["near", "95 kg"]
 )

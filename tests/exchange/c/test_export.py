@@ -124,6 +124,7 @@ def test_a_law_written_out_and_read_back_gives_its_own_trace_to_the_last_bit(tra
             np.testing.assert_array_equal(getattr(second, field), getattr(first, field), err_msg=str(name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SINGLE)
 def test_in_single_precision_it_is_the_same_python_in_numpy_s_float32(folder, name):
     law, f = LAWS[name](), np.float32

@@ -208,6 +208,7 @@ def edges(y, gains, memory):
     return np.array([low[0], high[1], sign[2]]), np.where(y.x > y.v, low, high)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "x", [(0.0, -0.0, 0.0), (-0.0, 0.0, -0.0), (math.nan, 1.0, math.nan), (1.0, math.nan, -math.inf)]
 )

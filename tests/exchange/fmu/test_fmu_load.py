@@ -220,6 +220,7 @@ def test_periods_that_do_not_fit_are_said(foreign):
     assert "the FMU steps every 0.01 s and the law runs every 0.003 s: give control_period=0.01" in str(trace.failure)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mode", "said"),
     [

@@ -22,6 +22,8 @@ from smc_mujoco.draw import style
 from smc_mujoco.exchange.live.build import DEFAULT_PLANTS
 from smc_mujoco.mechanisms.plants import van_der_pol
 
+pytestmark = pytest.mark.slow
+
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--enable-unsafe-swiftshader"]
 PHONE = {"width": 390, "height": 844}
@@ -122,7 +124,6 @@ def page(seen):
     return seen.page
 
 
-@pytest.mark.slow
 def test_it_loads_without_network_and_says_nothing(seen):
     seen.page.wait_for_function("live.running()[0].simulation.time > 0.2", timeout=30_000)
     assert seen.said == []
@@ -375,7 +376,6 @@ def test_every_control_has_a_name(page):
     assert nameless == []
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_fits_a_phone(seen, page, scheme):
     wide = page.viewport_size
@@ -392,7 +392,6 @@ def test_it_fits_a_phone(seen, page, scheme):
     page.emulate_media(color_scheme="light")
 
 
-@pytest.mark.slow
 def test_the_page_of_three_plants_is_small(folder):
     sizes = {path.name: len(gzip.compress(path.read_bytes(), 6)) for path in folder.rglob("*") if path.is_file()}
     assert 1e6 < sum(sizes.values()) < MOST

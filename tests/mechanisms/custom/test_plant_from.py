@@ -129,6 +129,7 @@ FOREIGN = {"cartpole": cartpole, "acrobot": acrobot, "reacher": reacher}
 CTRL = {"cartpole": 0.3, "acrobot": 0.4, "reacher": 0.002}  # of each motor of the file
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FOREIGN)
 def test_a_foreign_model_moves_as_its_file_does_in_mujoco(name):
     plant = FOREIGN[name]()

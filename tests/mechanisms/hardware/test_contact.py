@@ -252,6 +252,7 @@ def test_bobs_that_start_on_each_others_sides_start_inside(name):
 # energy
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "kind", "mechanism", "restitution"),
     [(*build, (None, 0.98)[i % 2]) for i, build in enumerate(BUILDS[::2])],
