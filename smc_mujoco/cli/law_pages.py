@@ -82,8 +82,8 @@ def print_lists(console: Console) -> None:
             formula = with_package(parts.formula, known.package(template.name))
             table.add_row(template.name, *degrees, Text(formula), Text(short_source(parts.source)))
         console.print(table, "")
-    one, some = ("smc-mujoco laws NAME", "cyan"), ("smc-mujoco laws --needs continuous,two-gains", "cyan")
-    console.print(Text.assemble("One law in full: ", one, ". Only some laws: ", some))
+    page, some = ("smc-mujoco laws NAME", "cyan"), ("smc-mujoco laws --needs continuous,two-gains", "cyan")
+    console.print(Text.assemble("One law in full: ", page, ". Only some laws: ", some))
 
 
 def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str | None, console: Console) -> None:

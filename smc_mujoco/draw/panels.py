@@ -172,9 +172,9 @@ def small(traces: Sequence[Trace], group: Group) -> list[tuple[Panel, ...]]:
     moving = any(np.ptp(trace.r, axis=0).any() for trace in traces)
     names, rows = ["x", *["e"] * moving, *["u"] * group.driven], []
     for i in (group.channels[k] for k in chosen):
-        one = dataclasses.replace(group, channels=(i,))
-        parts = [group_trace(trace, one) for trace in traces]
-        rows.append(tuple(Panel(name, one, parts, i) for name in names))
+        channel = dataclasses.replace(group, channels=(i,))
+        parts = [group_trace(trace, channel) for trace in traces]
+        rows.append(tuple(Panel(name, channel, parts, i) for name in names))
     return rows
 
 
@@ -184,8 +184,8 @@ def by_channel(panel: Panel) -> list[Panel]:
         return [panel]
     panels = []
     for k, i in enumerate(panel.group.channels):
-        at, one = (dataclasses.replace(panel.group, channels=(j,)) for j in (k, i))
-        panels.append(Panel(panel.quantity, one, [group_trace(trace, at) for trace in panel.traces], i))
+        place, channel = (dataclasses.replace(panel.group, channels=(j,)) for j in (k, i))
+        panels.append(Panel(panel.quantity, channel, [group_trace(trace, place) for trace in panel.traces], i))
     return panels
 
 

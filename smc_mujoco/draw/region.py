@@ -71,7 +71,7 @@ def draw_map(ax, region: Basin) -> None:
 
 def convergence_times(maps: Sequence[Basin]) -> list[float]:
     """Return the run lengths, s, after which states were seen to converge, over all maps."""
-    return sorted({float(at) for one in maps for at in np.unique(one.decided_at[one.outcome == CONVERGES])})
+    return sorted({float(at) for region in maps for at in np.unique(region.decided_at[region.outcome == CONVERGES])})
 
 
 def colour_indices(region: Basin, after: Sequence[float]) -> np.ndarray:

@@ -249,7 +249,7 @@ def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -
     settings = _differing(_settings, trace, alike)
     condition = settings.pop("condition", None)
     if condition is not None:
-        same = _differing(_settings, trace, [one for one in alike if one.scenario.condition == condition])
+        same = _differing(_settings, trace, [run for run in alike if run.scenario.condition == condition])
         settings = {name: value for name, value in settings.items() if name in same or name not in CONDITION_FIELDS}
     machine = {
         f"plant's {name}" if name in trace.scenario.law.gains else name: value
@@ -299,9 +299,9 @@ def _setting(name: str, value: object) -> str:
         return words
     if isinstance(value, int | float):
         return f"{words} = {value:.3g}"
-    if isinstance(value, tuple) and all(isinstance(each, int | float) for each in value):
+    if isinstance(value, tuple) and all(isinstance(part, int | float) for part in value):
         same = len(set(value)) == 1
-        return f"{words} = {short(value[0], 3) if same else ', '.join(short(each, 3) for each in value)}"
+        return f"{words} = {short(value[0], 3) if same else ', '.join(short(part, 3) for part in value)}"
     return f"{words} {value}"
 
 
@@ -441,7 +441,7 @@ def lighter(colour: str) -> str:
 
 def letters_on(colour: str) -> str:
     """Return the colour of letters that have more contrast with a colour, white or ink (WCAG 2.2)."""
-    on, ink, paper = (_luminance(one) + 0.05 for one in (colour, INK, PAPER))
+    on, ink, paper = (_luminance(shade) + 0.05 for shade in (colour, INK, PAPER))
     return INK if on / ink > paper / on else PAPER
 
 

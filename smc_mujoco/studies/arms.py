@@ -195,10 +195,10 @@ def unstable(scenarios: Sequence[Scenario], traces: Sequence[Trace]) -> bool:
 
     The numbers of such runs depend on their step, and say nothing of the arm.
     """
-    halves = [dataclasses.replace(each, physics_step=each.resolved.physics_step / 2.0) for each in scenarios]
+    halves = [dataclasses.replace(s, physics_step=s.resolved.physics_step / 2.0) for s in scenarios]
     errors, finer = (
-        np.array([tip_scores(trace)["rms_error"] if trace.failure is None else math.inf for trace in each])
-        for each in (traces, run(halves))
+        np.array([tip_scores(trace)["rms_error"] if trace.failure is None else math.inf for trace in runs])
+        for runs in (traces, run(halves))
     )
     change = np.abs(finer / errors - 1.0)  # NaN where both fail, which counts as a change
     return not np.median(change) <= MAX_STEP_CHANGE

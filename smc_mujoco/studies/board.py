@@ -427,7 +427,7 @@ def key(boards: Sequence[Board]) -> str:
     """Return what the cells of a table show."""
     words = f"Medians with {100 * boards[0].level:g} % intervals over runs, or over sets of gains that runs share"
     medians = [entry.interval for board in boards if board.metric != SETTLES for entry in board.entries]
-    if any(one.n < MIN_INTERVAL_SAMPLES for one in medians):
+    if any(interval.n < MIN_INTERVAL_SAMPLES for interval in medians):
         words += f"; of fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, and covers less"
     family = max(board.family for board in boards)
     several = f", corrected for {family} comparisons a metric" * (family > 1)

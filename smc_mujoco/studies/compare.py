@@ -83,7 +83,7 @@ class Compared(Tables):
     @property
     def gains(self) -> dict[str, dict[str, Law]]:
         """Plant -> law -> the law with its best gains; `gains["duffing"]["classical"].source` says their source."""
-        return {plant: {one.law.name: one.law for one in laws} for plant, laws in self.candidates.items()}
+        return {plant: {c.law.name: c.law for c in laws} for plant, laws in self.candidates.items()}
 
     @functools.cached_property
     def leaderboard(self) -> Boards:
@@ -172,7 +172,7 @@ class Compared(Tables):
                 yield {
                     **{"plant": "", "condition": ""} | dict(board.group),
                     "law": entry.law,
-                    "gains": ", ".join(dict.fromkeys(one.kind for one in entry.sources)),
+                    "gains": ", ".join(dict.fromkeys(origin.kind for origin in entry.sources)),
                     "metric": board.metric,
                     "unit": board.unit,
                     "median": entry.interval.median,
@@ -297,7 +297,7 @@ def _worst_cases(
         scenario = case(plant, law, "nominal", DURATION if duration is None else duration, starts=trial.starts)
         return trial.attack(f"{plant.name}-{law.name}", scenario, within)
 
-    return {p.name: {one.law.name: attacked(p, one.law) for one in candidates[p.name]} for p in trial.plants}
+    return {p.name: {c.law.name: attacked(p, c.law) for c in candidates[p.name]} for p in trial.plants}
 
 
 def _checked(trial: Trial, laws: Any) -> dict[str, list[Law | Template]]:

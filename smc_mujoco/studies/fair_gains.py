@@ -138,7 +138,7 @@ def _tuned(
 ) -> Candidate:
     """Return a law with gains from `tune`, or from the file of an earlier call; its defaults if it cannot be tuned."""
     usual, default = Objective(), coerce.law(law)
-    conditions = tuple(each for each in usual.conditions if applicable([each.name], [plant], usual.duration))
+    conditions = tuple(c for c in usual.conditions if applicable([c.name], [plant], usual.duration))
     goal = dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
     try:
         (first, *_) = goal.scenarios(plant, default, 0)
@@ -168,8 +168,8 @@ def _candidate(default: Component, tuned: result.Tuned) -> Candidate:
     if tuned.before < tuned.objective:
         default = default.sourced(its.kind, its.search)
         return Candidate(default, (default,), "its defaults, better than those tried")
-    gains = (dict(default.gains) | dict(zip(tuned.bounds, each.gains, strict=True)) for each in tuned.sets)
-    sets = tuple(dataclasses.replace(default, gains=each).sourced(its.kind, its.search) for each in gains)
+    gains = [dict(default.gains) | dict(zip(tuned.bounds, tried.gains, strict=True)) for tried in tuned.sets]
+    sets = tuple(dataclasses.replace(default, gains=values).sourced(its.kind, its.search) for values in gains)
     without_unit = list(search_space.without_unit(default))
     have = "have no unit, so their" if len(without_unit) > 1 else "has no unit, so its"
     words = f"{joined(without_unit)} {have} search is about the defaults and not by the rule"

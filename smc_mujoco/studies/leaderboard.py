@@ -156,7 +156,7 @@ def _family(
         if scores.values:
             ran = paired_runs.scenarios(table, group)
             comparisons.append(_compared(scores, ran, metric, unit, level, relevant, Limits(0.0, 0.0)))
-    return corrected_limits(comparisons, level), sum(len(one.laws) > 1 for one in comparisons) or 1
+    return corrected_limits(comparisons, level), sum(len(comparison.laws) > 1 for comparison in comparisons) or 1
 
 
 def _unit(metric: str, unit: str, scenario: "Scenario | None") -> str:

@@ -204,7 +204,7 @@ class Outcome:
             several = f"{joined(labels)} tied" if len(labels) > 1 else joined(labels) if labels else "none"
             if 1 < len(labels) == len(self.labels):
                 several = f"{_all(labels, self.labels)} tied"
-            values = [value for each in where.values() for value in each]
+            values = [value for of_condition in where.values() for value in of_condition]
             units = {unit or _unit(measure, self.traces[name][labels[0]], group) for name in where if labels}
             size = _range(values, units.pop()) if len(units) == 1 else ""
             sized = f" ({size})" if size else ""

@@ -115,11 +115,10 @@ class Store:
                 parts.append(part.take([self.where[names[i]][1] for i in indices]))
             order = np.argsort(np.concatenate(list(places.values())))
             data = pa.concat_tables(parts).take(order).combine_chunks()
-            for name in sorted({column for one in names for column in changes.get(one, ())}):
+            for name in sorted({column for key in names for column in changes.get(key, ())}):
                 pairs = zip(names, data[name].to_pylist(), strict=True)
-                column = pa.array(
-                    [changes.get(one, {}).get(name, value) for one, value in pairs], data.field(name).type
-                )
+                values = [changes.get(key, {}).get(name, value) for key, value in pairs]
+                column = pa.array(values, data.field(name).type)
                 data = data.set_column(data.column_names.index(name), data.field(name), column)
             return data
 

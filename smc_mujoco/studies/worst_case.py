@@ -296,9 +296,9 @@ def _listed(given: object) -> list[Scenario]:
       ScenarioError: none, or several that differ in more than parameters.
     """
     scenarios: Any = list(given) if isinstance(given, list | tuple) else [given]
-    if not scenarios or not all(isinstance(each, Scenario) for each in scenarios):
+    if not scenarios or not all(isinstance(attacked, Scenario) for attacked in scenarios):
         raise ScenarioError(f"worst_case attacks a Scenario, not {shown(given)}: give smc.Scenario(...)")
-    if len({(each.samples, each.control_period, each.plant.n) for each in scenarios}) > 1:
+    if len({(s.samples, s.control_period, s.plant.n) for s in scenarios}) > 1:
         raise ScenarioError("worst_case attacks one run on several parameter sets: give all the same duration")
     return scenarios
 

@@ -442,7 +442,7 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
         (duffing, held),
         (dataclasses.replace(duffing, build=build), my_spring),
     ):
-        fair_gains._tuned(plant, law, 4, None, folder, None)
+        fair_gains._tuned(plant, law, 4, None, folder, None, False)
     assert asked[0] == asked[1]
     assert len({str(depends) for depends in asked}) == 3
 
@@ -450,12 +450,12 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
 def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(folder, monkeypatch):
     tuned = types.SimpleNamespace(before=1.0, objective=2.0, law=FAST)
     monkeypatch.setattr(fair_gains, "cached", lambda *rest: tuned)
-    own = fair_gains._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None)
+    own = fair_gains._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None, False)
     assert (own.law, own.remark) == (smc.law("observer_free"), "its defaults, better than those tried")
     assert own.law.source.kind == FAST.source.kind
     tuned.before, tuned.bounds = 3.0, FAST.gains
     tuned.sets = [types.SimpleNamespace(gains=tuple(FAST.gains.values())), types.SimpleNamespace(gains=(5.0, 2.5))]
-    found = fair_gains._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None)
+    found = fair_gains._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None, False)
     assert (found.law, found.remark) == (FAST, "")
     assert [found(seed).gains["k1"] for seed in range(3)] == [2.0, 2.5, 2.0]
 

@@ -44,7 +44,7 @@ def _completing(module: str, name: str) -> Callable[[str], list[str]]:
         names = getattr(importlib.import_module(f"smc_mujoco.{module}"), name)
         known: Any = names() if callable(names) else names
         last = re.split("[,+]", incomplete)[-1]
-        return [incomplete + one[len(last) :] for one in known if one.startswith(last)]
+        return [incomplete + word[len(last) :] for word in known if word.startswith(last)]
 
     return complete
 
@@ -234,7 +234,7 @@ def laws(
     from smc_mujoco.control import from_text
 
     known = {law.name: [law] for law in of_rig}
-    return [made for one in names(texts, default) for made in known.get(one) or from_text.laws(one)]
+    return [made for text in names(texts, default) for made in known.get(text) or from_text.laws(text)]
 
 
 def law(text: str) -> "str | Law":
@@ -262,8 +262,8 @@ def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:
     from smc_mujoco.control import source
 
     of_set = source.Source(kind={"default": source.DEFAULT, "study": source.STUDY}.get(gains, source.SHIPPED))
-    named = {one: [of_set] for one in laws if isinstance(one, str)}
-    words = source.in_words(named | {one.name: [one.source] for one in laws if not isinstance(one, str)})
+    named = {law: [of_set] for law in laws if isinstance(law, str)}
+    words = source.in_words(named | {law.name: [law.source] for law in laws if not isinstance(law, str)})
     return f"{words or 'no gains'}, set {gains!r}" if named else words or "no gains"
 
 
@@ -353,13 +353,12 @@ def actuator(text: str) -> "tuple[Drive | Backlash, ...]":
 
     known: dict[str, type[Drive | Backlash]] = {kind.__name__.lower(): kind for kind in [*subclasses(Drive), Backlash]}
     parts = []
-    for one in text.split("+"):
-        name, _, numbers = one.partition(":")
+    for part in text.split("+"):
+        name, _, numbers = part.partition(":")
         kind = find("actuator", name.strip().lower().replace("_", ""), known)
         try:
             parts.append(kind(*map(float, filter(None, numbers.split(",")))))
         except (TypeError, ValueError):
-            raise ScenarioError(
-                f"actuator {shown(one)} cannot be read: write it as lag:0.01, with its numbers"
-            ) from None
+            cure = "write it as lag:0.01, with its numbers"
+            raise ScenarioError(f"actuator {shown(part)} cannot be read: {cure}") from None
     return tuple(parts)

@@ -82,7 +82,7 @@ class Trail:
         steps = np.ceil(2.0 * np.hypot(*np.diff(points, axis=0).T)).astype(int)  # a point each half px
         place = np.concatenate([[0.0], np.cumsum(np.maximum(steps, steps > 0))])
         even = np.arange(int(place[-1]) + 1)
-        dense = np.stack([np.interp(even, place, each) for each in points.T], axis=1)
+        dense = np.stack([np.interp(even, place, axis) for axis in points.T], axis=1)
         at, above = np.interp(even, place, times), np.interp(even, place, seen) > 0.5
         reach = math.ceil(half + 1.0)
         low = np.clip(np.floor(dense.min(axis=0)).astype(int) - reach, 0, size)
@@ -146,7 +146,7 @@ class Overlay:
             windows(trace.t, tip.contacts(trace).push, edges).mean if tip.knows_contacts(trace.scenario) else None
             for trace in traces
         ]
-        sizes = [np.linalg.norm(one, axis=1).max() for one in self.forces if one is not None]
+        sizes = [np.linalg.norm(force, axis=1).max() for force in self.forces if force is not None]
         self.newton = FORCE_ARROW / max(sizes, default=1.0) if max(sizes, default=0.0) else 0.0  # m
         self.blows = [(k, push) for k, trace in enumerate(traces) for push in style.pushes([trace])]
 

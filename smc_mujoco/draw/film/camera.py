@@ -35,7 +35,7 @@ def checked(chosen: Camera | None) -> Camera | None:
             "or (azimuth, elevation, distance) with m"
         )
     angles = number("camera's azimuth", parts[0]), number("camera's elevation", parts[1], low=-90.0, high=90.0)
-    return *angles, *(number("camera's distance", each, above=0.0) for each in parts[2:])
+    return *angles, *(number("camera's distance", distance, above=0.0) for distance in parts[2:])
 
 
 def from_text(text: str) -> Camera:

@@ -65,9 +65,9 @@ class Caption:
         parts = [*(key(traces, scales) if parts is None else parts), *filter(None, [gains])]
         self.key = wrapped(parts, inside - self.note_room, KEY_SIZE * scale)
         self.beside = not row  # machines behind each other have their labels at the left
-        words = [{state.words for state in each if state} for each in states] or [set()] * len(traces)
+        words = [{state.words for state in of_machine if state} for of_machine in states] or [set()] * len(traces)
         letters, margin = BADGE_SIZE * scale, 1.2 * BADGE_SIZE * scale  # px, of a badge, which shows a machine's state
-        badges = [max((style.width(text, letters, bold=True) + margin for text in each), default=0.0) for each in words]
+        badges = [max((style.width(text, letters, bold=True) + margin for text in its), default=0.0) for its in words]
         self.gauges = [gauges(trace.scenario) and not each for trace, each in zip(traces, words, strict=True)]
         badges = [max(wide, STRIP_WIDTH * scale * on) for wide, on in zip(badges, self.gauges, strict=True)]
         height = 1.6 * BADGE_SIZE * scale * any(badges)

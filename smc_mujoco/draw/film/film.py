@@ -209,7 +209,7 @@ def frames(
             picture = stage.render(drawn)
             if over:
                 picture = over.over(picture, frame, stage.find)
-            moods = tuple(each[frame] for each in timelines)
+            moods = tuple(timeline[frame] for timeline in timelines)
             picture = caption.over(picture, time, failed, moods, float(shown.speeds[frame]))
             yield np.concatenate([picture, charts.at(time)])
 
@@ -249,7 +249,7 @@ def framed(
 
 def positions(t: np.ndarray, x: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Return x (K + 1, n) at the times, (times, n), linear between samples; after a failure the last finite one."""
-    return np.stack([np.interp(times, t, each) for each in x.T], axis=1)
+    return np.stack([np.interp(times, t, channel) for channel in x.T], axis=1)
 
 
 def rotors(trace: Trace, edges: np.ndarray) -> np.ndarray:

@@ -102,7 +102,7 @@ def travel_of(runs: Sequence[Trace], edges: np.ndarray) -> np.ndarray:
     travel = np.zeros(len(edges) - 1)
     for trace in runs:
         x = np.clip(trace.x, low, high)  # what has left the world does not count
-        seen = np.stack([np.interp(edges, trace.t, each) for each in x.T], axis=1)
+        seen = np.stack([np.interp(edges, trace.t, channel) for channel in x.T], axis=1)
         travel = np.maximum(travel, (np.abs(np.diff(seen, axis=0)) / size).max(axis=1))
     return travel
 
