@@ -87,6 +87,10 @@ def test_margins_of_a_saturated_law_are_those_of_its_theorem():
         assert margins(weak, feeds, **{"x^4": C / 4}) == pytest.approx(expected | {"coupling": coupling})
         with pytest.raises(checker.Refused, match="the margin of restoring"):
             margins(weak)  # whose spring does not feed the motion
+        strong = {"margin": 1.0 - (A * math.sin(0.5) + 0.5 * B + 0.125 * -C) / (2.3 * math.tanh(0.85)), "at": 0.5}
+        for told in (weak | {"at": -9.0}, strong):
+            with pytest.raises(checker.Refused, match="the place where the law is too weak"):
+                margins(told, feeds, **{"x^4": C / 4})
         for name, value in V.items():
             with pytest.raises(checker.Refused, match=re.escape(f"the coefficient of {name} in V")):
                 margins(weak, **{name: value + 1e-6})

@@ -12,6 +12,7 @@ import time
 import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -645,6 +646,15 @@ def test_the_header_has_the_numbers_of_the_measurement_in_their_order():
     assert tuple(re.findall(r"smc_real (\w+);", one)) == Measurement._fields
     assert tuple(re.findall(r"smc_real (\w+)\[", many)) == joint_law.ARRAYS
     assert len(Measurement._fields) == build.MEASUREMENT_SIZE
+
+
+@pytest.mark.parametrize(
+    ("name", "option"), [(name, name) for name in ("gains", "memory", "timeout")] + [("flags", "flag")]
+)
+def test_at_the_end_of_a_sentence_check_c_has_its_own_options(name, option, call, monkeypatch):
+    refused = mock.Mock(side_effect=smc.ScenarioError(f"memory= is wrong: give {name}="))
+    monkeypatch.setattr("smc_mujoco.exchange.c.load.check", refused)
+    assert call("check-c", "a.c") == (2, "", f"smc-mujoco: memory= is wrong: give --{option}\n")
 
 
 @pytest.mark.slow

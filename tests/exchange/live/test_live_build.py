@@ -61,10 +61,8 @@ def test_what_is_known_of_a_law_is_that_of_the_catalogue(vendor, tmp_path):
     assert duffing["start"] == ["observer_free", "classical"]
 
 
-@pytest.mark.slow
-def test_skins_follow_the_bodies_as_in_mujoco(vendor, tmp_path):
-    skins = facts(smc.live("van_der_pol", out=tmp_path / "page"))["plants"]["van_der_pol"]["skins"]
-    model = smc.plant("van_der_pol").load()
+def test_skins_follow_the_bodies_as_in_mujoco():
+    skins, model = build.known._skins(smc.plant("van_der_pol")), smc.plant("van_der_pol").load()
     data, drawn = mujoco.MjData(model), mujoco.MjvScene(model, 100)
     data.qpos[0] = -1.2
     mujoco.mj_forward(model, data)
