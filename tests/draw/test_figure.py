@@ -309,6 +309,29 @@ def test_chattering_is_drawn_as_its_mean_without_teeth():
     assert np.abs(decimate.smooth(switching, 100) - decimate.smooth(switching + drift, 100)).max() < 0.2
 
 
+def test_chattering_is_six_reversals_close_together_and_reaches_over_short_rests():
+    """For a window of 40 samples: each within 10 of the one before, rests of up to 10, 39 and 40 samples."""
+
+    def parts(*pieces):
+        return [(int(each.start), int(each.stop)) for each in decimate.chattering_parts(np.concatenate(pieces), 40)]
+
+    def switching(count, size=1.0):
+        return np.resize([size, -size], count)
+
+    rest, low, high = np.zeros(50), np.full(50, -1.0), np.ones(50)
+    assert parts(rest[:10], switching(100), rest[:40]) == [(0, 150)]
+    assert parts(rest[:11], switching(100), rest[:41]) == [(11, 111)]
+    assert parts(switching(40), low[:39], switching(40)) == [(0, 119)]
+    assert parts(switching(40), rest[:40], switching(40)) == [(0, 120)]
+    assert parts(switching(40), rest[:41], switching(40)) == [(0, 40), (81, 121)]
+    assert parts(np.repeat(switching(20), 10)) == [(0, 200)]
+    assert parts(np.repeat(switching(20), 11)) == []
+    assert parts(rest, switching(7), high) == [(50, 56)]
+    assert parts(rest, switching(6), low) == []
+    assert parts(high, rest, switching(20, 1.1e-3)) == [(101, 120)]
+    assert parts(high, rest, switching(20, 0.9e-3)) == []
+
+
 def test_what_does_not_chatter_is_drawn_as_it_is():
     t = np.arange(10_001) * 1e-3
     bang = np.where(t < 1.2, -6.0, np.where(t < 2.0, 6.0, np.where(np.arange(10_001) % 2, 6.0, -6.0)))
