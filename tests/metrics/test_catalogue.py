@@ -537,10 +537,18 @@ def test_driven_channels_and_free_joints_are_scored_as_if_each_were_alone():
     found = m.scores(trace)
     assert list(found) == ["driven", "free"]
     assert found["driven"] == alone[0]
-    commanded = {"reaching_time", "max_u", "max_step", "tv", "tv_rate", "energy", "hf_share", *CYCLE}
+    commanded = [metric.name for metric in m.metrics() if metric.command]
     assert found["free"] == {name: value for name, value in alone[1].items() if name not in commanded}
     assert (found["driven"]["settling_time"], found["free"]["settling_time"]) == (0.2, 0.3)
     assert (found["driven"]["overshoot"], found["free"]["overshoot"]) == (0.0, pytest.approx(50.0))
+
+
+def test_what_u_or_s_changes_is_of_the_command():
+    t = clock(1, 1e-3)
+    still = {"t": t, "x": np.cos(t), "force": np.zeros((t.size, 1))}
+    scores = m.score(run(**still, u=np.sin(600 * t) * (2 - t), s=np.exp(-9 * t) + 0.01 * np.sin(60 * t)))
+    changed = {name for name, value in m.score(run(**still)).items() if value != scores[name]}
+    assert changed == {metric.name for metric in m.metrics() if metric.command}
 
 
 def test_scores_are_the_worst_of_cart_and_pole_and_those_with_a_unit_the_carts():
