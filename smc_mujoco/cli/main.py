@@ -5,7 +5,7 @@ import signal
 import sys
 import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated
 
 import typer
@@ -56,8 +56,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if threading.current_thread() is threading.main_thread():  # ends as Ctrl-C does, and leaves no half-written files
         signal.signal(signal.SIGTERM, _end)
     choose_gl()  # before a command imports mujoco, which fails if MUJOCO_GL does not name a backend
-    warnings.showwarning = lambda message, *_, **__: print(f"smc-mujoco: {printable(str(message))}", file=sys.stderr)
+    warnings.showwarning = _showing_once()
     app(arguments, prog_name="smc-mujoco")
+
+
+def _showing_once() -> Callable[..., None]:
+    """Return a showwarning that prints each sentence once, whichever parts of a command repeat it."""
+    shown: set[str] = set()
+
+    def show(message: Warning | str, *_: object, **__: object) -> None:
+        if (sentence := printable(str(message))) not in shown:
+            shown.add(sentence)
+            print(f"smc-mujoco: {sentence}", file=sys.stderr)
+
+    return show
 
 
 def _end(*_: object) -> None:

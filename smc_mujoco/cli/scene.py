@@ -67,12 +67,14 @@ def perform(
     terminal.note(f"{scene.sentence(traces)}\n", "bold", wrap=True)
     with clock("figures"):
         written += figures(scene, traces, out)
-    if filming:
-        with clock("film"):
-            written += film(scene, traces, out, terminal, speed)
-    terminal.print("wrote", style="dim")
-    for file in written:
-        terminal.note(f"  {printable(str(file))}")
+    try:
+        if filming:
+            with clock("film"):
+                written += film(scene, traces, out, terminal, speed)
+    finally:  # also if the film fails or is stopped
+        terminal.print("wrote", style="dim")
+        for file in written:
+            terminal.note(f"  {printable(str(file))}")
 
 
 def _title(scene: Scene, condition: str) -> str:

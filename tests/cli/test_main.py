@@ -22,7 +22,7 @@ from smc_mujoco.cli import main, tables, terminal
 from smc_mujoco.cli import scene as show
 from smc_mujoco.cli.commands import options, runs
 from smc_mujoco.common import gl
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.draw.film import film
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.metrics.catalogue import metrics, score
@@ -325,6 +325,16 @@ def test_with_rendering_turned_off_only_the_film_is_missing(scene, folder):
     (line,) = [line for line in done.stdout.splitlines() if line.startswith("no film: ")]
     assert "MUJOCO_GL" in line
     assert {path.name for path in (folder / "out" / "mine").iterdir()} == TRACES
+
+
+def test_a_film_that_fails_leaves_the_list_of_what_was_written(call, undrawn, scene, folder, monkeypatch):
+    def failing(*_):
+        raise ScenarioError("cannot write mp4: no ffmpeg")
+
+    monkeypatch.setattr(show, "film", failing)
+    answer = call("run", scene, "--out", "out")
+    refused(answer, "cannot write mp4: no ffmpeg")
+    assert all(f"{name}\n" in answer[1].partition("wrote")[2] for name in TRACES)
 
 
 # show
@@ -652,6 +662,18 @@ def test_a_command_ends_with_the_code_and_the_sentence_of_what_it_raises(case, c
     with pytest.raises(SystemExit) as end, terminal.errors_as_sentences():
         raise error
     assert [end.value.code, capfd.readouterr().err] == expected
+
+
+@pytest.mark.filterwarnings("always")
+def test_a_warning_that_parts_of_a_command_repeat_is_printed_once(call, monkeypatch):
+    def late(*_, **__):
+        for words in ("late", "later", "late"):
+            with warnings.catch_warnings():  # which forgets what was shown
+                warnings.warn(words, ScenarioWarning, stacklevel=1)
+        raise SystemExit(0)
+
+    monkeypatch.setattr(main, "app", late)
+    assert call() == (0, "", "smc-mujoco: late\nsmc-mujoco: later\n")
 
 
 # the process around it
