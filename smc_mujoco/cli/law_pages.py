@@ -130,7 +130,7 @@ def print_page(template: Template, console: Console, package: str, text: str) ->
     console.print(Padding(Text(parts.formula, style="bold"), (0, 0, 1, 2)))
     call = ", ".join([f'"{text}"', *(f"{k}={v:g}" for k, v in list(template.defaults.items())[:2])])
     rows = {
-        "gains": "\n".join(_gains(template)),
+        "gains": "\n".join([*_gains(template), *filter(None, [parts.gains])]),
         "conditions": "\n".join(template.conditions) or "none on the gains alone",
         "degree": _degree(template),
         "family": template.family,

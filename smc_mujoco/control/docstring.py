@@ -14,10 +14,11 @@ DISCRETE = re.compile(r"\b(explicit|implicit|discreti[sz]|Euler|bilinear|sampled
 
 
 class Entry(NamedTuple):
-    """The parts of a docstring: name in words, formula, sentences on discretisation, other sentences, source."""
+    """The parts of a docstring: name in words, formula, what the gains are, discretisation, other sentences, source."""
 
     title: str
     formula: str
+    gains: str
     discretisation: str
     known: str
     source: str
@@ -32,10 +33,13 @@ def entry(template: Template) -> Entry:
         head += " " + paragraphs.pop(0)
     title, colon, formula = head.removesuffix(".").partition(": ")
     sentences = [s for p in (*more, *paragraphs) for s in SENTENCE.split(p) if s]
+    gains = [s for s in sentences if s.startswith("Gains: ")]
+    sentences = [s for s in sentences if s not in gains]
     discrete = [s for s in sentences if DISCRETE.search(s)]
     return Entry(
         title=title if colon else "",
         formula=formula if colon else title,
+        gains=" ".join(gains).removeprefix("Gains: "),
         discretisation=" ".join(discrete),
         known=" ".join(s for s in sentences if s not in discrete),
         source=" ".join("".join(source).split()),
