@@ -280,6 +280,7 @@ def test_percent_and_score_weigh_tests_alike_and_parameters_count_levels():
     model = (("a", 1.0, True), ("a", 2.0, False), ("b", 1.0, True), ("b", 2.0, True))
     found = boards.Robustness({"model": model, "delay": (("delay", 0.0, False), ("delay", 1.0, True))})
     assert (found.percent, found.score) == ({"model": 75.0, "delay": 50.0}, 0.625)
+    assert repr(found) == "Robustness(score 0.625, survived: model 75.0 %, delay 50.0 %)"
     assert (found.parameters, found.noise_key) == ({"a": 1, "b": 2}, 0)
 
 

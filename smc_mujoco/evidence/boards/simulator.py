@@ -82,7 +82,7 @@ class Case:
     seed: int = 0
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, repr=False)
 class Robustness:
     """The result of the test.
 
@@ -93,6 +93,10 @@ class Robustness:
 
     survived: Mapping[str, tuple[tuple[str, float, bool], ...]]
     noise_key: int = 0
+
+    def __repr__(self) -> str:
+        tests = ", ".join(f"{test} {percent:.1f} %" for test, percent in self.percent.items())
+        return f"Robustness(score {self.score:.3f}, survived: {tests})"
 
     @property
     def percent(self) -> dict[str, float]:
