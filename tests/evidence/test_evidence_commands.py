@@ -166,7 +166,7 @@ LINES = (
     "certify duffing --json -",
     "claims 3 --gains study,tuned --quick --threads 2",
     "claims --mutants --out all.json --evidence e.json --badge b.svg",
-    "claims 4 --json --quick",
+    "claims 4 --json --quick --out c.json",
     "claims --json --mutants",
     "papers",
     "papers --new mine --check e.json",

@@ -417,15 +417,6 @@ def terminal(monkeypatch):
     return lambda *arguments: CliRunner().invoke(app, list(arguments))
 
 
-@pytest.mark.slow
-def test_the_command_prints_one_json_document(terminal, tmp_path):
-    done = terminal("18", "3", "--gains", "study", "--quick", "--json", "--out", str(tmp_path / "claims.json"))
-    assert done.exit_code == 0, done.output
-    told = json.loads(done.stdout)
-    assert [one["id"] for one in told["claims"]] == ["3", "18"]
-    assert json.loads((tmp_path / "claims.json").read_text()) == told
-
-
 def test_a_folder_is_no_file_to_write(terminal, tmp_path):
     done = terminal("3", "--out", str(tmp_path))
     assert done.exit_code == 2

@@ -330,12 +330,6 @@ def test_values_that_are_only_tried_warn_of_nothing(moved, recwarn):
     assert not [each for each in recwarn if "DCMotor gives at most" in str(each.message)]
 
 
-@pytest.mark.slow
-def test_results_are_drawn(found, tmp_path):
-    assert [path.suffix for path in found.figure(tmp_path / "fit")] == [".svg", ".png"]
-    assert all(path.stat().st_size > 1000 for path in tmp_path.glob("fit.*"))
-
-
 def test_residuals_are_what_was_measured_less_what_was_predicted(tmp_path, monkeypatch, snapshot):
     drawn = []
     monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
