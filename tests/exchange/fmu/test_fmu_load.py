@@ -1,6 +1,7 @@
 """Controllers in FMUs as laws: those of this library come back with the same bits, and others' keep their own steps."""
 
 import gc
+import math
 import os
 import pickle
 import re
@@ -9,6 +10,7 @@ import sys
 import time
 import zipfile
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -21,8 +23,9 @@ from helpers.compiler import needs_compiler  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.cli import main as cli  # noqa: E402
+from smc_mujoco.common.guard import Fault  # noqa: E402
 from smc_mujoco.control.law import Measurement  # noqa: E402
-from smc_mujoco.exchange.fmu import load  # noqa: E402
+from smc_mujoco.exchange.fmu import load, slave  # noqa: E402
 from smc_mujoco.exchange.fmu.slave import Slave  # noqa: E402
 from smc_mujoco.simulation import reference  # noqa: E402
 from smc_mujoco.simulation.reference import gains_of  # noqa: E402
@@ -430,6 +433,28 @@ def test_the_command_ends_in_one_sentence(foreign, capsys):
         (["--constants", "mode=on"], "--constants mode=on is no number: write it as enable=1"),
     ):
         assert_refused(capsys, ["check-fmu", str(foreign), *words], said)
+
+
+@pytest.mark.parametrize(("step", "h"), [(None, 1e-3), (0.02, 0.02)])
+def test_an_fmu_is_tried_on_a_double_integrator_between_walls(step, h, monkeypatch):
+    names = Measurement._fields
+    order = {"folder": "f", "inputs": dict.fromkeys(names, 3), "outputs": ["u"], "fixed": {}, "step": step}
+    made = mock.Mock(**{"step.side_effect": lambda seen, t, h: [8.0 * seen[names.index("e")]]})
+    monkeypatch.setattr(slave, "Slave", lambda *_: made)
+    slave.attempt(order, said := mock.Mock())
+    y = Measurement(*np.transpose([call.args[0] for call in made.step.mock_calls]))
+    known = {"t": h * np.arange(500), "dt": h, "r": 0.1 * np.sin(y.t), "dr": 0.1 * np.cos(y.t), "ddr": -y.r, "a": -y.r}
+    known |= {"e": y.x - y.r, "de": y.v - y.dr, "g": 1.0, "gq": 1.0, "limit": 6.0, "model": 1.0, "q": 0.0}
+    for name, expected in known.items():
+        np.testing.assert_allclose(getattr(y, name), expected, err_msg=name)
+    free, change = np.abs(y.x[1:]) < 3.0, h * np.clip(8.0 * y.e, -6.0, 6.0)[:-1]  # the walls are at 3 m
+    np.testing.assert_allclose(y.v[1:], np.where(free, y.v[:-1] + change, 0.0))
+    np.testing.assert_allclose(y.x[1:], np.where(free, y.x[:-1] + h * y.v[1:], 3.0))
+    assert (y.x[0], y.v[0], free.all()) == (0.5, 0.0, step is None)
+    assert said.mock_calls[2] == mock.call(f"the step from t = {h:g} s")
+    made.step.side_effect = lambda *_: [math.nan]
+    with pytest.raises(Fault, match="u is nan after 1 steps: fix the FMU, or its inputs and parameters"):
+        slave.attempt(order, said)
 
 
 def test_a_slave_says_which_variable_it_could_not_set(foreign, tmp_path):
