@@ -100,6 +100,4 @@ def place(check: Check) -> float:
         return edge
     if over == 0.0 or math.isinf(over):
         return edge
-    decades = math.log10(over / under)
-    decades = min(decades, 0.0) if check.holds else max(decades, 0.0)
-    return min(max(decades, -MAX_DECADES), MAX_DECADES)
+    return min(max(math.log10(over / under), -MAX_DECADES), MAX_DECADES)
