@@ -31,7 +31,7 @@ from smc_mujoco.simulation.trace import ARRAYS, Trace
 COLUMNS = 360  # of pixels of a panel: traces of more samples are drawn as means and ranges
 LAST_SAMPLES = 60  # control samples in the close-up of u
 MIN_CLOSE_UP = 0.02  # least height of the close-up, of the largest |u|, so that it hides round-off; chosen
-MAX_LIGHT = 9  # channels of a network that are drawn one by one
+MAX_DRAWN_CHANNELS = 9  # channels of a network that are drawn one by one
 LASTING_QUANTILE = 0.98  # quantile of |reaction|, or of what an arrow shows: larger values are short peaks; chosen
 MAX_RESTS = 12  # marked in a phase portrait
 POINT_SPACING = 1 / 200  # of points in a phase portrait, as a share of its diagonal
@@ -218,7 +218,7 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
     n = max((len(panel.group.channels) for panel in panels if panel.quantity not in SINGLE), default=1)
     banded = dict.fromkeys(panel.quantity for panel in panels if panel.quantity not in UNBANDED)
     windows = [mean_window(panel.traces) for panel in panels if panel.quantity == "u"]
-    over, single, words = max(filter(None, windows), default=None), len(light(n)), {}
+    over, single, words = max(filter(None, windows), default=None), len(drawn_channels(n)), {}
     for panel in panels:
         gap = max(backlash_gap(trace.scenario) for trace in panel.traces)
         if gap and panel.quantity in ("x", "e"):
@@ -257,7 +257,7 @@ def mean_window(traces: Sequence[Trace]) -> float | None:
     low, high = limits(traces, "u")
     times = []
     for trace in filter(smoothed, traces):
-        lines = trace.u.T[light(trace.u.shape[1])]
+        lines = trace.u.T[drawn_channels(trace.u.shape[1])]
         if any(np.abs(smooth(u, window(trace)) - u).max() > VISIBLE_CHATTERING * (high - low) for u in lines):
             times.append(window(trace) * trace.scenario.control_period)
     return max(times, default=None)
@@ -322,7 +322,7 @@ def over_time(
     lines = [curve(trace, mean, name) for trace, mean in zip(panel.traces, means, strict=True)]
     far = far_off(panel.traces, name)
     widths = [style.points(LEAVING_LINE if k == far else LINE) for k in range(len(lines))]
-    drawn = list(zip(panel.traces, colours, means, lines, alike(panel, lines), widths, strict=True))
+    drawn = list(zip(panel.traces, colours, means, lines, panel_dashes(panel, lines), widths, strict=True))
     for trace, colour, mean, path, dash, width in reversed(drawn):
         y, steps = QUANTITIES[name](trace), "default" if smoothed(trace) or name != "u" else "steps-post"
         if bands and name not in UNBANDED:
@@ -330,7 +330,7 @@ def over_time(
             artists.append(ax.fill_between(e.t, e.low.min(axis=1), e.high.max(axis=1), color=colour, alpha=0.22, lw=0))
         look = {"color": colour, "drawstyle": steps}
         if y.shape[1] > 1:
-            for i in light(y.shape[1]):
+            for i in drawn_channels(y.shape[1]):
                 artists += ax.plot(*curve(trace, y[:, i], name), alpha=0.8, lw=style.points(LIGHT_LINE), **look)
         else:
             artists += ax.plot(*path, lw=width, ls=dash, **look)
@@ -355,7 +355,7 @@ def dotted() -> dict[str, Any]:
     return {"color": style.INK, "lw": style.points(0.9), "ls": (0, (2, 2))}
 
 
-def alike(panel: Panel, lines: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Any]:
+def panel_dashes(panel: Panel, lines: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Any]:
     """Return a style for each line of a panel, see `dashes`."""
     low, high = limits(panel.traces, panel.quantity)
     if panel.quantity == "settling":
@@ -480,7 +480,7 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], rests: Sequ
     """
     drawn = list(zip(traces, colours, rests, phase_dashes(traces), strict=True))
     for trace, colour, samples, dash in reversed(drawn):
-        shown, width = light(trace.x.shape[1]), style.points(LINE if trace.x.shape[1] == 1 else LIGHT_LINE)
+        shown, width = drawn_channels(trace.x.shape[1]), style.points(LINE if trace.x.shape[1] == 1 else LIGHT_LINE)
         for x, v in zip(trace.x.T[shown], trace.v.T[shown], strict=True):
             ax.plot(*thinned(x, v), color=colour, lw=width, ls=dash)
             ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
@@ -567,9 +567,9 @@ def crowded(panel: Panel) -> bool:
     return wide > MAX_BANDS
 
 
-def light(n: int) -> np.ndarray:
+def drawn_channels(n: int) -> np.ndarray:
     """Return the indices of the channels, of n, that are drawn one by one."""
-    return np.unique(np.linspace(0, n - 1, min(n, MAX_LIGHT)).round().astype(int))
+    return np.unique(np.linspace(0, n - 1, min(n, MAX_DRAWN_CHANNELS)).round().astype(int))
 
 
 def thinned(x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
