@@ -139,7 +139,8 @@ def share_interval(share: float, n: int, level: float = 0.95) -> Interval:
     """Return a share of the runs of n seeds, with E. B. Wilson's interval (JASA 22, 1927): not empty for 0 and 1.
 
     The share within a seed lies in [0, 1], so its variance is at most p (1 - p). With n the number of seeds the
-    interval is wide enough, however many runs a seed has and however alike they are.
+    interval is as wide as that of n independent runs, however many runs a seed has and however alike they are. Its
+    coverage is 95 % as a mean over all shares, and for some near 0 and 1 only 83 %, with 6 seeds as with 40.
     """
     number("share", share, low=0.0, high=1.0)
     whole("n", n, 1, 10**9)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from smc_mujoco.analysis.bootstrap import Interval, median_interval, share_interval
 
@@ -30,3 +31,13 @@ def test_an_interval_depends_on_the_seed_of_its_draws():
     found = [[median_interval(values, resamples=99, seed=seed) for values in SAMPLES] for seed in (0, 0, 1)]
     assert found[0] == found[1]
     assert found[0] != found[2]
+
+
+@pytest.mark.parametrize("n", [6, 40])
+def test_a_share_has_the_coverage_that_is_told(n):
+    """Of all shares, by the binomial distribution."""
+    intervals, shares = [share_interval(k / n, n) for k in range(n + 1)], np.linspace(0.0005, 0.9995, 2000)
+    covered = np.array([(one.low <= shares) & (shares <= one.high) for one in intervals])
+    coverage = (binom.pmf(np.arange(n + 1)[:, None], n, shares) * covered).sum(axis=0)
+    assert 0.83 < coverage.min() < 0.86
+    assert coverage.mean() == pytest.approx(0.95, abs=0.01)
