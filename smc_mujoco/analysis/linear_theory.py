@@ -67,7 +67,9 @@ def lam_range(plant: Plant, k1: float, control_period: float) -> tuple[float, fl
 
 
 def critical_delay(plant: Plant, lam: float, k1: float, control_period: float = 0.0) -> float:
-    """Return the input delay in s above which (1) is unstable: 0 if it is unstable without delay, inf if it never is.
+    """Return the input delay in s up to which (1) is stable: 0 if it is unstable without delay, inf if it never is.
+
+    A loop with a stiff spring, K_j > lam k1, may be stable again with a longer delay.
 
     Continuous (control_period 0): the roots of a mode, M s^2 + D s + K + lam (s + k1) exp(-s tau) = 0, cross to the
     right at s = j w where |K - M w^2 + j D w| = lam |j w + k1|. This is a quadratic in w^2 without tau; the phase at w

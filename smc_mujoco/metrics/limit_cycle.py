@@ -17,6 +17,9 @@ There is no limit cycle where
 - the peak may be a harmonic of a larger cycle with fewer than five periods;
 - the oscillation grows or dies: its amplitude differs by more than half from the first to the second half of the
   samples.
+
+Noise that a lightly damped loop filters may look like a cycle for so few periods. Of linear laws, which have none, 12
+of 54 runs show one under a random force, and 1 of 129 under noise of the measurement.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """What an identification gives: quantities with errors and correlations, fits, and notes on what to doubt."""
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,9 +12,10 @@ from smc_mujoco.common.files import write_json
 from smc_mujoco.common.text import joined
 from smc_mujoco.evidence.rigs.records import Record, percent
 from smc_mujoco.evidence.rigs.rig import Fall, Rig
-from smc_mujoco.evidence.rigs.uncertainty import MAX_CORRELATION
+from smc_mujoco.evidence.rigs.uncertainty import BLOCKS, MAX_CORRELATION
 
 POOR_FIT = 80.0  # percent: a fit below this may mean that the search ended in the wrong place; chosen
+PERFECT_FIT = 99.99  # percent: residuals beyond it are the simulation's; chosen
 UNIT_FACTOR = 5.0  # factor between a quantity before and after, beyond which a column may be in another unit; chosen
 FACTOR_TOLERANCE = 0.1  # relative difference up to which such factors count as the same; chosen
 MAX_FIT_LOSS = 0.1  # percent, by which the fit of a whole record may fall without a note; chosen
@@ -43,6 +45,7 @@ class Identified:
     fits_before: tuple[Mapping[str, float], ...]
     predictions: tuple[tuple[Record, Record, np.ndarray], ...]
     evaluations: int
+    independent: float = math.inf
 
     @property
     def notes(self) -> list[str]:
@@ -60,13 +63,7 @@ class Identified:
                 sentences.append(f"{name} is at the end of its range, {value:g} {quantity.unit}".rstrip())
             elif self.errors[name] > abs(value):
                 sentences.append(f"{name} may as well be 0 ({value:.3g} ± {self.errors[name]:.2g})")
-        sentences += self._scale_notes() + self._loss_notes()
-        if (worst := min(min(fit.values()) for fit in self.fits)) < POOR_FIT:
-            poor = f"the twin {worst}" if isinstance(worst, Fall) else f"the worst fit is {worst:.0f} %"
-            sentences.append(
-                f"{poor}: the model lacks something, a column is wrong or in another unit, or "
-                "the search ended in a local minimum; start from other values, with more starts or another seed"
-            )
+        sentences += self._scale_notes() + self._loss_notes() + self._doubts()
         return sentences
 
     def _scale_notes(self) -> list[str]:
@@ -84,6 +81,23 @@ class Identified:
             ]
         changes = [f"{name} is {factor:.3g} times its value before" for name, factor in far.items()]
         return [f"{joined(changes)}: look at the units of the columns, unless the values before were only a guess"]
+
+    def _doubts(self) -> list[str]:
+        """Sentences on residuals that the standard errors do not allow for, and on a poor fit."""
+        sentences = []
+        worst = min(min(fit.values()) for fit in self.fits)
+        if self.independent < BLOCKS[0] and worst < PERFECT_FIT and self.rig.controller is None:
+            sentences.append(
+                f"the residuals are slow, with {self.independent:.0f} independent samples, as where a force was not "
+                "recorded: true errors may be several standard errors"
+            )
+        if worst < POOR_FIT:
+            poor = f"the twin {worst}" if isinstance(worst, Fall) else f"the worst fit is {worst:.0f} %"
+            sentences.append(
+                f"{poor}: the model lacks something, a column is wrong or in another unit, or "
+                "the search ended in a local minimum; start from other values, with more starts or another seed"
+            )
+        return sentences
 
     def _loss_notes(self) -> list[str]:
         """Sentences on whole records that the values before repeat better."""

@@ -75,7 +75,7 @@ def identify(
         twin.refuse_degrees(record, fit)
     with bar(f"identify {twin.name}", 2 * most * (2 * len(names) + 1), shown=progress) as drawn:
         replays, slopes, by_steps = _solved(twin, names, data, starts, seed, most, drawn.advance)
-        errors, correlations = statistics(replays, slopes, by_steps)
+        errors, correlations, independent = statistics(replays, slopes, by_steps)
     values = replays.values(slopes.point)
     fitted = twin.with_values(values, "identified from records")
     states, steps = _starting_states(fitted, data, replays, slopes.point), replays.short_steps
@@ -84,6 +84,7 @@ def identify(
         fits=tuple(fitted.fits(data, states=states, **steps)),
         fits_before=tuple(twin.fits(data, **steps)) if steps else fits_before,
         predictions=tuple(fitted.predictions(data, states=states, **steps)), evaluations=replays.evaluations,
+        independent=independent,
     )  # fmt: skip
 
 

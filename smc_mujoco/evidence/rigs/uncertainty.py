@@ -2,7 +2,9 @@
 
 Standard errors allow for residuals that depend on their neighbours: they come from a jackknife, at first order, that
 leaves out one block of time after the other. The states at the start of the block's piece are found again without it,
-because they share its samples.
+because they share its samples. Blocks must be longer than the residuals' correlation time. Where a force that was not
+recorded moves the machine, no record has enough of them. So a standard error is at least that of least squares with as
+many residuals as are independent of each other. It is still too small then, and a note says so.
 
 A closed loop feeds the noise of its measurement back. If one short transient decides a quantity, the other blocks do
 not show the effect of that noise. So closed loops are also simulated with their own noise and rounding, and a standard
@@ -29,8 +31,8 @@ MIN_POWER = 1e-300  # no residual at all
 SINGULAR_RATIO = 1e-6  # ratio of the slopes' singular values below which quantities cannot be told apart; chosen
 
 
-def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[dict[str, float], np.ndarray]:
-    """Return the standard error of each quantity, and their correlations (p, p), at the solution.
+def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[dict[str, float], np.ndarray, float]:
+    """Return the standard error of each quantity, their correlations (p, p), and `independent`, at the solution.
 
     Args:
       by_steps: errors of the quantities by the steps of their simulation, in their scales, (p,).
@@ -45,15 +47,16 @@ def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[
     if singular[-1] < SINGULAR_RATIO * singular[0]:
         raise _alike(twin.name, (names[i] for i in np.argsort(-np.abs(rows[-1]))[:2]))
     covariance = jackknife(slopes)
-    deviation = np.sqrt(np.diag(covariance))
+    deviation, count = np.sqrt(np.diag(covariance)), independent(slopes)
     with np.errstate(all="ignore"):
         correlations = np.nan_to_num(covariance / np.outer(deviation, deviation))
+    deviation = np.maximum(deviation, by_correlation(slopes, J, count))
     if replays.closed:
         deviation = np.maximum(deviation, _fed_back(replays, slopes.point, J))
     deviation = np.hypot(deviation, by_steps)
     errors = dict(zip(names, (deviation * replays.scales).tolist(), strict=True))
     _refuse_alike(twin.name, replays.values(slopes.point), errors, correlations)
-    return errors, correlations
+    return errors, correlations, count
 
 
 def _refuse_alike(rig: str, values: dict[str, float], errors: dict[str, float], correlations: np.ndarray) -> None:
@@ -92,8 +95,19 @@ def jackknife(slopes: Slopes) -> np.ndarray:
     return (len(moved) - 1) / len(moved) * moved.T @ moved
 
 
+def by_correlation(slopes: Slopes, J: np.ndarray, count: float) -> np.ndarray:
+    """Return the deviation of the solution, (p,), by least squares with `count` samples that are independent."""
+    variance = slopes.cost / max(count * slopes.columns - J.shape[1], 1.0)
+    return np.sqrt(variance * np.diag(np.linalg.pinv(J.T @ J)))
+
+
 def _blocks(slopes: Slopes) -> int:
-    """Return the number of blocks: as many as are independent of each other, within BLOCKS.
+    """Return the number of blocks: as many as are independent of each other, within BLOCKS."""
+    return int(np.clip(independent(slopes) / CORRELATION_TIMES, *BLOCKS))
+
+
+def independent(slopes: Slopes) -> float:
+    """Return how many samples of the residuals are independent of each other: their number over a correlation time.
 
     A correlation time is 1 + 2 (sum of the autocorrelations up to the first one below 0), in samples.
     """
@@ -104,8 +118,7 @@ def _blocks(slopes: Slopes) -> int:
         for correlation in np.fft.irfft(power, axis=0)[: len(rows)].T:
             end = int(np.argmax(correlation < 0.0)) or len(correlation)
             times.append(1.0 + 2.0 * float(correlation[1:end].sum() / max(correlation[0], MIN_POWER)))
-    samples = sum(map(len, slopes.residuals)) / slopes.columns
-    return int(np.clip(samples / (CORRELATION_TIMES * np.median(times)), *BLOCKS))
+    return sum(map(len, slopes.residuals)) / slopes.columns / float(np.median(times))
 
 
 def _normal(r: np.ndarray, J: np.ndarray, S: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -175,6 +175,25 @@ def test_a_jackknife_leaves_out_one_block_after_the_other():
     np.testing.assert_allclose(np.sqrt(np.diag(expected)), noise, rtol=0.35)
 
 
+def test_slow_residuals_widen_standard_errors_where_the_blocks_of_the_jackknife_are_too_short():
+    """Of 40 lines through 400 samples, whose errors last 50 samples, or are independent."""
+    random, J = np.random.default_rng(3), np.column_stack([np.ones(400), np.linspace(-1.0, 1.0, 400)])
+    inverse_normal = np.linalg.inv(J.T @ J)
+    for memory, low, high in ((0.96, 0.7, 1.7), (0.0, 0.7, 1.3)):
+        shares, blocks = [], []
+        for _ in range(40):
+            noise = random.normal(size=400)
+            for k in range(1, 400):
+                noise[k] += memory * noise[k - 1]
+            r = noise - J @ (inverse_normal @ (J.T @ noise))
+            slopes = Slopes(Point(np.zeros(2), np.zeros((1, 0))), [r], [J], [np.zeros((400, 0))], 1, 1)
+            moved = inverse_normal @ (J.T @ noise)
+            shares.append(moved / uncertainty.by_correlation(slopes, J, uncertainty.independent(slopes)))
+            blocks.append(moved / np.sqrt(np.diag(uncertainty.jackknife(slopes))))
+        assert low < np.sqrt(np.mean(np.square(shares))) < high
+        assert (np.sqrt(np.mean(np.square(blocks))) > 2.0) == (memory > 0.0)
+
+
 @pytest.mark.parametrize(("memory", "count"), [(0.0, 400), (0.9, 105), (0.995, 60)])
 def test_blocks_are_as_long_as_residuals_depend_on_each_other(memory, count):
     """Of a residual whose correlation falls by `memory` from sample to sample, in two columns."""

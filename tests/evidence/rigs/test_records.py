@@ -145,6 +145,21 @@ def test_a_fall_is_a_text_in_a_file():
     assert _plain({"x": Fall(8.44), "u": 1.5}) == {"x": "falls at 8.4 s", "u": 1.5}
 
 
+def test_slow_residuals_are_noted_unless_the_fit_is_perfect_or_the_loop_closed():
+    pendulum = smc.rig("simple_pendulum_ak80")
+    value = {"inertia": pendulum.values["inertia"]}
+    found = Identified(
+        rig=pendulum, before=pendulum, values=value, errors={"inertia": 1e-9}, correlations=np.eye(1),
+        fits=({"position": 98.0},), fits_before=({"position": 98.0},), predictions=(), evaluations=1, independent=12.0,
+    )  # fmt: skip
+    assert found.notes == [
+        "the residuals are slow, with 12 independent samples, as where a force was not recorded: true errors may be "
+        "several standard errors"
+    ]
+    for change in ({"independent": 60.0}, {"fits": ({"position": 99.995},)}, {"rig": smc.rig("emps")}):
+        assert not any("slow" in note for note in dataclasses.replace(found, **change)._doubts())
+
+
 def scaled(**factors):
     return {"changes": factors.items()}
 
