@@ -196,9 +196,8 @@ def at_rest(trace: Trace) -> np.ndarray:
 
 def last_part(trace: Trace) -> slice:
     """Return the samples of the last part."""
-    t = trace.t
-    begin = t[-1] - LAST_PART * (1 + ROUNDING) * (t[-1] - t[0])
-    return slice(int(np.searchsorted(t, begin)), None)
+    start, end = trace.t[[0, -1]]
+    return slice(int(np.searchsorted(trace.t, end - LAST_PART * (1 + ROUNDING) * (end - start))), None)
 
 
 def last_exit(t: np.ndarray, magnitude: np.ndarray, band: float) -> float:
@@ -229,8 +228,7 @@ def row_max(a: np.ndarray) -> np.ndarray:
 def turns(y: np.ndarray, threshold: float) -> int:
     """Return how often y (K,) turns back by half its range or more; 0 for a range <= `threshold`."""
     count, direction, low, high = 0, 0, y[0], y[0]
-    swing = float(np.ptp(y)) / 2
-    slopes = np.diff(y)
+    swing, slopes = float(np.ptp(y)) / 2, np.diff(y)
     peaks = np.flatnonzero(slopes[1:] * slopes[:-1] <= 0.0) + 1  # y is monotonic between them
     for value in y[[0, *peaks, -1]].tolist() if 2 * swing > threshold else ():
         low, high = min(low, value), max(high, value)

@@ -211,5 +211,4 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
 
 def worst_joint(trace: Trace, metric: str) -> tuple[str, float]:
     """Return the joint with the largest value of a metric of `joint_scores`, and this value."""
-    values = {name: scores[metric] for name, scores in joint_scores(trace).items()}
-    return max(values.items(), key=lambda pair: pair[1])
+    return max(((name, scores[metric]) for name, scores in joint_scores(trace).items()), key=lambda pair: pair[1])
