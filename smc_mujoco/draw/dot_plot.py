@@ -134,7 +134,7 @@ def _panel(
     """
     height = len(colours) + 1
     sizes = [v for interval in intervals.values() for v in interval[:3] if np.isfinite(v)]
-    if log and sizes and min(sizes) > 0.0 and max(sizes) > 20.0 * min(sizes):
+    if log and sizes and min(sizes) > 0.0 and max(sizes) > style.LOG_RANGE * min(sizes):
         ax.set_xscale("log")
         ax.xaxis.set_minor_formatter(NullFormatter())  # numbers between decades would overlap
     for (j, condition), (k, law) in itertools.product(enumerate(conditions), enumerate(colours)):

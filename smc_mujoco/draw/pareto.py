@@ -21,7 +21,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
 
 PAGE_HEIGHT = 6.4  # inches on a full page
-MIN_VARIATION = 1e-6  # 1/s: smaller ones are drawn here, because the axis is logarithmic
+MIN_VARIATION = 1e-6  # 1/s: smaller ones are drawn here, because the axis may be logarithmic
 MARKS = "osD^vPX"  # one for each law, for readers who see no colours
 
 
@@ -50,7 +50,9 @@ def pareto(
         ax = page.subplots()
         looks = zip(best, itertools.cycle(MARKS), style.law_colours([tuned.law for tuned in best]), strict=False)
         handles = [_front(ax, *look) for look in looks]
-        ax.set(xscale="log", yscale="log")
+        for scale, (low, high) in {"xscale": ax.dataLim.intervalx, "yscale": ax.dataLim.intervaly}.items():
+            if high > style.LOG_RANGE * low:
+                ax.set(**{scale: "log"})
         ax.set_xlabel("tracking: ITAE / |x₀|, summed over conditions (s²)")
         ax.set_ylabel("variation: TV / (u_max T), summed over conditions (1/s)")
         ax.tick_params(which="both", length=0)
@@ -62,7 +64,7 @@ def pareto(
             ax.axhline(limit, **dashed)
             handles.append(Line2D([], [], **dashed, label="from bound to bound at every sample"))
         handles.append(Line2D([], [], color=style.MUTED, marker="o", label="large: chosen gains", **_ring()))
-        pages.set_head(page, width, title or f"{best[0].plant.name}: tracking against variation", handles)
+        pages.set_head(page, width, title or f"{style.plant_name(best[0].plant)}: tracking against variation", handles)
         pages.write(page, paths)
     return page
 

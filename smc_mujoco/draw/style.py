@@ -37,6 +37,7 @@ DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
 # Friction and contact. Chosen from a grid as one of the farthest in CIELAB from the laws' colours, the disturbance's
 # and paper, with any colour blindness (G. M. Machado et al., IEEE TVCG 15(6), 2009).
 REACTION = "#9018F0"
+LOG_RANGE = 20.0  # largest over smallest value above which an axis may be logarithmic; chosen
 WHITE_SHARE = 0.35  # share of white in a law's colour on a dark page: chosen
 MAX_CHROMA = 0.12  # above it, colours are compared by hue and lightness only, see `distance`; chosen
 MIN_DISTANCE = 0.03  # colours closer than this are mistaken for each other, see `distance`; chosen

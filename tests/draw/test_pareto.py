@@ -59,7 +59,6 @@ def test_writes_svg_and_png(pair, tmp_path):
 def test_no_tried_gains_lie_below_the_staircase_and_the_chosen_ones_are_on_it(pair, page, tmp_path):
     pareto(pair, tmp_path / "fronts")
     (ax,) = page[0].axes
-    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
     stairs, rings = ax.lines[0:4:2], ax.lines[1:4:2]
     for tuned, stair, ring in zip(sorted(pair, key=lambda one: one.objective), stairs, rings, strict=True):
         assert stair.get_drawstyle() == "steps-post"
@@ -72,6 +71,14 @@ def test_no_tried_gains_lie_below_the_staircase_and_the_chosen_ones_are_on_it(pa
         assert place[0] + 1e-3 * place[1] == pytest.approx(tuned.objective)
     assert stairs[0].get_marker() != stairs[1].get_marker()
     assert stairs[0].get_color() != stairs[1].get_color()
+
+
+@pytest.mark.parametrize(("largest", "scale"), [(1.2, "linear"), (30.0, "log")])
+def test_an_axis_is_logarithmic_where_values_differ_much(pair, page, tmp_path, largest, scale):
+    gains = pair[0].history[0].gains
+    front = tuple(Evaluation(gains, x, x, y) for x, y in ((1.0, 100.0 * largest), (largest, 100.0)))
+    pareto([dataclasses.replace(pair[0], history=front)], tmp_path / "fronts")
+    assert {page[0].axes[0].get_xscale(), page[0].axes[0].get_yscale()} == {scale}
 
 
 def test_a_law_whose_every_run_failed_is_named_and_one_whose_command_rests_is_drawn(pair, page, tmp_path):
