@@ -189,7 +189,7 @@ class Advice(Tables):
         metrics = [NEEDS[need].metric.name for need, _ in self.blocks]
         floors = zip(metrics, self.comparison.floors.tolist(), strict=True)
         relevant = relevance(self.comparison.relevant, floors, self.plant.unit)
-        return f"{text} Least relevant difference: {relevant}."
+        return f"{text} Ahead: by more than the least relevant difference, {relevant}."
 
     @property
     def samples(self) -> str:

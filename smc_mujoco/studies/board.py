@@ -353,7 +353,12 @@ def size(value: float, metric: str) -> str:
 
 
 def spread(interval: Interval, metric: str) -> str:
-    """Return the ends of an interval, rounded like its median, so that the printed median is within; "" if unknown."""
+    """Return the ends of an interval, rounded like its median, so that the printed median is within.
+
+    "" if they are not known, or both infinite.
+    """
+    if math.isinf(interval.low):
+        return ""
     ends = [size(value, metric) for value in (interval.low, interval.high)]
     return "–".join(ends) if all(ends) else ""
 
@@ -433,8 +438,8 @@ def key(boards: Sequence[Board]) -> str:
     several = f", corrected for {family} comparisons a metric" * (family > 1)
     words += (
         ". Marked: no law is better, and no run failed. A winner is better than every other law in a paired test"
-        f"{several}; how much: by pairs of runs, not by the medians; least relevant difference: "
-        f"{relevance(boards[0].relevant, [(board.metric, board.resolution) for board in boards])}."
+        f"{several}; how much: by pairs of runs, not by the medians; ahead: by more than the least relevant "
+        f"difference, {relevance(boards[0].relevant, [(board.metric, board.resolution) for board in boards])}."
     )
     words += f" {capital(UNTRIED)}." * any(board.by_step for board in boards)
     gains = in_words(sources(boards))
