@@ -379,7 +379,8 @@ def test_feedback_of_a_control_experiment_is_what_its_name_says():
         assert u["linear"] == pytest.approx(1.5 * s, rel=1e-9)
         assert u["clipped"] == pytest.approx(s, rel=1e-9)
     assert law().gains == rows["Riccati"]
-    assert boards.entry("acrobot", "clipped").law.of_channel(0).gains == rows["clipped"]
+    clipped = boards.entry("acrobot", "clipped").law
+    assert (clipped.of_channel(0).gains, clipped.source.kind) == (rows["clipped"], "shipped")
     assert str(boards.entry("acrobot").velocity).startswith("savitzky_golay(")
     assert str(boards.on_board("acrobot", "none").velocity).startswith("measured")
 

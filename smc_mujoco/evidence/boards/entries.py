@@ -31,6 +31,7 @@ from smc_mujoco.common.files import read_json
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.estimator import Estimator, estimator
 from smc_mujoco.control.law import Law, law_function
+from smc_mujoco.control.source import SHIPPED
 from smc_mujoco.control.units import FORCE, Gain
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -58,9 +59,9 @@ def entry(robot: str, feedback: str = "Riccati", **fields: Any) -> Scenario:
       ScenarioError: another robot or feedback.
     """
     law = find("robot of the boards", robot, {"acrobot": acrobot_swing_up, "pendubot": pendubot_swing_up})
-    gains = find("feedback of the entry", feedback, FEEDBACKS)
-    made = on_board(robot, law(**gains), velocity=estimator("savitzky_golay", window=FILTER_READINGS, degree=2))
-    return dataclasses.replace(made, **fields)
+    made = law(**find("feedback of the entry", feedback, FEEDBACKS)).sourced(SHIPPED)
+    filtered = estimator("savitzky_golay", window=FILTER_READINGS, degree=2)
+    return dataclasses.replace(on_board(robot, made, filtered), **fields)
 
 
 def on_board(robot: str, law: Law | Template | str, velocity: Estimator | str = "measured") -> Scenario:
