@@ -36,6 +36,11 @@ def fails_far_out(y, gains, memory):
     return math.nan if abs(y.x) > gains.far else -6.0 * math.tanh(y.de + 3.0 * y.e), y.de
 
 
+@smc.law_function
+def counts_no_turns(y, gains, memory):
+    return -6.0 * math.tanh(y.de + 3.0 * math.sin(y.e)), y.de
+
+
 # verdicts
 
 
@@ -108,6 +113,14 @@ def test_a_law_below_the_smallest_lambda_converges_from_nowhere_else():
     assert (found.outcome == DOES_NOT).all()
 
 
+def test_a_run_that_still_approaches_at_the_end_is_undecided():
+    """The law is stable, with a slow pole at -0.35 /s, and 6 s are too short for it."""
+    slow = base("duffing", smc.law("observer_free", lam=1.98, k1=0.83))
+    assert np.roots([1.0, 0.2 + 1.98, -1.0 + 1.98 * 0.83]).max() == pytest.approx(-0.35, abs=0.005)
+    assert (maps.basin_of(slow, [-1.5, 1.5], [0.0], early=False).outcome == UNDECIDED).all()
+    assert (maps.basin_of(dataclasses.replace(slow, duration=20.0), [-1.5, 1.5], [0.0]).outcome == CONVERGES).all()
+
+
 def test_a_run_that_creeps_away_from_an_unstable_rest_has_not_converged():
     law = smc.law("observer_free", lam=0.23, k1=9.7)  # 0.253 would do
     found = maps.basin_of(base("inverted_pendulum", law, 4.0), [-math.pi, 0.01], [-9.0, 0.0])
@@ -150,9 +163,12 @@ def test_distance_is_measured_from_the_reference(refused):
     refused(lambda: maps.basin_of(dataclasses.replace(held, reference=smc.Sine(0.3, 1.0)), [0.0, 0.6], [0.0, 0.1]))
 
 
-def test_rest_a_turn_away_does_not_converge():
-    found = maps.basin_of(base("inverted_pendulum", smc.law("lqr"), 3.0), [0.0, 2 * math.pi], [0.0])
+def test_rest_a_turn_away_does_not_converge_and_the_way_back_from_there_takes_time():
+    found = maps.basin_of(base("inverted_pendulum", counts_no_turns, 3.0), [0.0, 2 * math.pi], [0.0])
     assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]]
+    for duration, outcome in ((3.0, UNDECIDED), (6.0, CONVERGES)):
+        found = maps.basin_of(base("inverted_pendulum", smc.law("lqr"), duration), [2 * math.pi], [0.0])
+        assert found.outcome.tolist() == [[outcome]]
 
 
 def test_a_run_that_swings_through_the_band_at_the_end_is_undecided():
