@@ -63,12 +63,12 @@ def peeks(y, gains, memory):
 
 @smc.law_function(gains={"k": 5.0})
 def peeks_for_s(y, gains, memory):
-    return -gains.k * (y.de + 3.0 * y.e), y.e if plant_data() is None else float(plant_data().qpos[0])
+    return -gains.k * (y.de + 3.0 * y.e), y.e if (data := plant_data()) is None else float(data.qpos[0])
 
 
 @smc.estimator_function
 def peeking_estimator(y, gains, memory):
-    return y.v if plant_data() is None else float(plant_data().qvel[0])
+    return y.v if (data := plant_data()) is None else float(data.qvel[0])
 
 
 @smc.estimator_function
