@@ -19,7 +19,18 @@ OTHERWISE = {  # flag -> classes that differ: they lack it, or of "slots", have 
         *("Linear", "Comparison", "Basin", "Member", "Network", "Frames", "Certificate", "Levels", "BorrowedData"),
         *("Scenario", "Trace", "Advice", "Compared", "Outcome", "Table", "WorstCase", "StepResponse"),
     },
-    "repr": {"Tuned", "Frames", "Held", "TimeSeries", "Waypoints", "Board", "Advice", "Compared", "StepResponse"},
+    "repr": {
+        "Tuned",
+        "Frames",
+        "Held",
+        "TimeSeries",
+        "Waypoints",
+        "Board",
+        "Advice",
+        "Compared",
+        "StepResponse",
+        "Robustness",
+    },
     "slots": {"Functions", "Packed", "Prepared"},
 }
 POSITIONAL = {  # fields by position, as signals and parts of machines
