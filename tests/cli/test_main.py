@@ -1,5 +1,6 @@
 """What the command line promises: tables that fit, files where they were asked for, one sentence for every mistake."""
 
+import itertools
 import json
 import os
 import re
@@ -17,7 +18,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.step_halving import NOTE, StepChange
+from smc_mujoco.analysis.step_halving import UNTRIED, StepChange
 from smc_mujoco.cli import main, tables, terminal
 from smc_mujoco.cli import scene as show
 from smc_mujoco.cli.commands import options, runs
@@ -139,6 +140,11 @@ def test_list_names_everything_there_is(call):
     assert len(scenes) >= 10
     names = [*smc.plants(), *smc.laws(), *smc.estimators(), *scenes, *smc.paper.CONDITIONS]
     assert [name for name in names if not re.search(rf"(?<![\w]){name}(?![\w])", out)] == []
+    titles = [line.strip() for before, line in itertools.pairwise(["", *out.splitlines()]) if not before and line]
+    assert [title for title in titles if title[0].isupper()] == [
+        *("Plants", "Laws", "Laws of many joints", "Surfaces", "Velocity estimators", "Scenes, for smc-mujoco run"),
+        "Conditions, on inverted_pendulum for 10 s",
+    ]
     assert "…" not in out
     assert max(map(len, out.splitlines())) <= 80
 
@@ -255,7 +261,7 @@ def test_a_failing_law_is_named_and_others_keep_their_scores(call, undrawn, fold
         "@smc.law_function\n"
         "def sour(y, gains, memory):\n"
         "    if y.t > 0.05:\n"
-        "        raise ValueError('sour grapes')\n"
+        "        raise ValueError('sour grapes of a vine')\n"
         "    return 0.0, 0.0\n"
         "common = dict(plant='duffing', duration=0.2)\n"
         "runs = {'bad': smc.Scenario(law=sour(), **common), 'good': smc.Scenario(law='classical', **common)}\n"
@@ -264,7 +270,8 @@ def test_a_failing_law_is_named_and_others_keep_their_scores(call, undrawn, fold
     code, out, err = call("run", "sour.py", "--no-film", "--out", "out")
     assert (code, err) == (0, "")
     told = " ".join(out.split())
-    assert "bad: law 'sour' raised ValueError (sour grapes) in channel 0, at t = 0.051 s" in told
+    assert "bad: law 'sour' raised ValueError (sour grapes of a vine) in channel 0, at t = 0.051 s" in told
+    assert max(map(len, out.splitlines())) <= 80
     assert told.index("good") < told.index("bad: law 'sour'")
     assert tables.number(score(smc.load("out/sour/nominal-good.npz"))["ultimate_bound"]) in told
 
@@ -363,7 +370,9 @@ def test_show_of_a_realistic_run_tells_of_friction_too(call, folder):
 
 
 def test_show_says_whether_half_the_step_changes_chattering_or_could_not_be_tried(call, trace, monkeypatch):
-    notes = NOTE, "chattering was not compared with that of half the physics step: this run's law is not here"
+    marked = "* half the physics step changes it by more than 10 %: give a shorter physics_step"
+    notes = marked, "chattering was not compared with that of half the physics step: this run's law is not here"
+    assert "which may change it by more than 10 %" in UNTRIED
     for change, said in (
         (StepChange(0.2, 0.0), (True, False)),
         (None, (False, True)),
@@ -836,6 +845,16 @@ def test_a_call_is_told_to_end_in_the_main_thread_alone(call, monkeypatch):
     assert told == []
     assert call("--version")[0] == 0
     assert told == [(signal.SIGTERM, main._end)]
+
+
+@pytest.mark.parametrize("ignored", [True, False])
+def test_being_told_to_end_is_ctrl_c_also_where_that_is_ignored(monkeypatch, ignored):
+    given, before = [], signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr(main.signal, "getsignal", lambda number: signal.SIG_IGN if ignored else before)
+    monkeypatch.setattr(main.signal, "signal", lambda *both: given.append(both))
+    with pytest.raises(KeyboardInterrupt):
+        main._end()
+    assert given == [(signal.SIGINT, signal.default_int_handler)] * ignored
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGTERM for a process")

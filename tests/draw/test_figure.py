@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 import re
+import types
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -16,6 +17,7 @@ from smc_mujoco.draw import decimate, panels, style
 from smc_mujoco.draw import figure as draw_figure
 from smc_mujoco.draw.page import FORMATS, files, write
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
+from smc_mujoco.metrics.channel_groups import groups
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.trace import ARRAYS
 
@@ -237,6 +239,26 @@ def test_small_values_are_drawn_in_thousandths_of_their_unit(tmp_path):
     assert "position x (mm)" in text
     assert "control u (N)" in text
     assert " 15 20 position x (mm)" in text.replace("  ", " ")
+
+
+def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told(pair):
+    """Two of the first run, to both sides; the other run has none."""
+    spikes = np.zeros_like(pair[0].u)
+    spikes[100:103], spikes[200] = 900.0, -400.0
+    traces = [dataclasses.replace(one, u=0.0 * one.u + 5.0, reaction=one.reaction * 0.0) for one in pair]
+    hit = [dataclasses.replace(traces[0], reaction=spikes), traces[1]]
+    for shown, label, title in ((hit, True, "|reaction| up to 900 N"), (hit, False, ""), (traces, True, "")):
+        ax = Figure().add_subplot()
+        panel = types.SimpleNamespace(traces=shown, group=groups(pair[0].scenario.plant)[0])
+        panels.clip_impacts(ax, panel, ["r", "b"], label)  # pyright: ignore[reportArgumentType]
+        assert ax.get_title(loc="right") == title
+        marks = [(line.get_color(), line.get_marker(), *line.get_xydata().tolist()) for line in ax.lines]  # pyright: ignore
+        if shown is hit:
+            up, down = pair[0].t[100], pair[0].t[200]
+            assert ax.get_ylim() == pytest.approx((-5.8, 5.8))
+            assert marks == [("r", 2, [up, 5.8]), ("r", 3, [down, -5.8]), ("b", 2), ("b", 3)]
+        else:
+            assert (marks, ax.get_ylim()) == ([], (0.0, 1.0))
 
 
 @pytest.mark.slow

@@ -98,26 +98,6 @@ def test_theory_promises_nothing_behind_a_drive():
     assert abs(row.e.order) < 0.5, "the lag, not the period, sets the amplitude"
 
 
-@pytest.mark.parametrize(
-    ("fields", "words"),
-    [
-        ({}, ""),
-        ({"actuator": smc.Lag(0.02)}, "no promise behind a drive, which adds to the relative degree"),
-        ({"input_delay": 1e-3}, "no promise with an input delay, or samples that are late or missed"),
-        ({"clock": smc.Clock(jitter=1e-4)}, "no promise with an input delay, or samples that are late or missed"),
-        ({"noise": smc.Noise(velocity=1e-3)}, "no promise with noise or an encoder"),
-        ({"sensor": smc.Encoder(counts=1000)}, "no promise with noise or an encoder"),
-        ({"velocity": "levant"}, "no promise with an estimated velocity"),
-        (
-            {"law": "nested_third_order"},
-            "no promise on a plant of relative degree 2, because the law is for a higher one",
-        ),
-    ],
-)
-def test_theory_assumes_that_samples_are_exact_and_act_at_once(fields, words):
-    assert accuracy._why_no_promise(smc.Scenario(**{"plant": "duffing", "law": "twisting"} | fields)) == words
-
-
 def test_every_period_has_every_start_and_one_run_more_has_half_the_step():
     given = as_plant("duffing"), smc.condition("fine", physics_step=2.5e-4), "twisting"
     setup = accuracy._setup(*given, (4e-3, 2e-3), (3, 5), "tuned", 1.5, None)

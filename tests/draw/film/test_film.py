@@ -176,9 +176,13 @@ def test_the_drum_on_a_crane_s_trolley_hides_none_of_its_arrow():
 
 
 @renders
-def test_a_failed_machine_turns_grey_and_stays_where_it_was():
+def test_a_failed_machine_turns_grey_stays_where_it_was_and_has_no_goal(monkeypatch):
     good, bad = runs("inverted_pendulum", laws=LAWS[:2])
+    goals = []
+    monkeypatch.setattr(Stage, "aim", lambda stage, k, r: goals.append((k, r is None or r[0] - traces[k].r[0, 0])))
+    traces = good, bad
     before, after, later = pictures([good, broken(bad, 150)], [0.1, 0.2, 0.3])
+    assert goals == [(0, 0.0), (1, 0.0), *[(0, 0.0), (1, True)] * 2]
     orange = style.law_colour(LAWS[1])
     assert share(before, orange) > 3e-4
     assert share(after, orange) < 0.2 * share(before, orange)  # brass is left
