@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import re
+from collections import Counter
 from types import SimpleNamespace
 
 import numpy as np
@@ -67,6 +68,12 @@ def test_published_criteria_give_their_published_score(row, version):
     assert high - low < 0.007
     if (row.name, row.swing_up_time) not in (("History SAC", 1.00), ("TVLQR", 4.05)):
         assert boards.score(row, version) == pytest.approx(row.score, abs=0.002)
+
+
+def test_a_published_name_is_on_several_boards():
+    boards_of = [*boards.ROBUSTNESS.values(), *(rows for both in boards.SIMULATION.values() for rows in both.values())]
+    names = Counter(row.name for rows in boards_of for row in rows)
+    assert [name for name, count in names.items() if count < 2] == ["DQN LQR"]
 
 
 def test_unrounded_criteria_give_their_unrounded_score():

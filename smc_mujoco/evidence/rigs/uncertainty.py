@@ -146,9 +146,7 @@ def _fed_back(replays: Replays, point: Point, J: np.ndarray) -> np.ndarray:
         for k, trace in enumerate(run(calm + noisy))
     ]
     rows = [replays.relative(pieces[k % len(pieces)], values) for k, values in enumerate(predicted)]
-    size = len(pieces)
-    expected = np.concatenate(rows[:size])
-    changes = [np.concatenate(rows[size * i : size * (i + 1)]) - expected for i in range(1, REPEATS + 1)]
-    moved = np.array([np.linalg.lstsq(J, change, rcond=None)[0] for change in changes])
+    expected, *repeats = np.concatenate(rows).reshape(1 + REPEATS, -1)
+    moved = np.array([np.linalg.lstsq(J, repeat - expected, rcond=None)[0] for repeat in repeats])
     replays.report(1)
     return np.sqrt(np.mean(moved**2, axis=0))

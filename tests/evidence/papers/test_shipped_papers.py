@@ -11,7 +11,7 @@ from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.mutants import survivors
 from smc_mujoco.evidence.audit.paper import paper, shipped
 from smc_mujoco.evidence.papers.acary_2012.claims import observed_twisting_60
-from smc_mujoco.evidence.papers.aldana_lopez_2019.claims import BAND, classical_bound, least_bound
+from smc_mujoco.evidence.papers.aldana_lopez_2019.claims import BAND, classical_bound, general_margins, least_bound
 from smc_mujoco.evidence.papers.huber_2014.claims import implicit_twisting
 from smc_mujoco.evidence.papers.measures import END_SAMPLES, exponent, late, late_step, settled
 from smc_mujoco.evidence.papers.perez_ventura_2017.claims import predicted
@@ -93,6 +93,8 @@ def test_the_least_bound_of_fixed_time_is_the_integral():
         )
         assert least_bound(made) == pytest.approx(integral, rel=1e-6)
         assert classical_bound(made) > integral
+    without = {"A": 1.0, "B": 1.0, "p": 0.5, "q": 2.0, "k": 0.5}  # at the end of what the general formula is for
+    assert general_margins(without) == {"k p < 1": 0.75, "k q > 1": 0.0}
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 import dataclasses
 import html
+import inspect
 import json
 import math
 import re
@@ -23,6 +24,7 @@ from smc_mujoco.evidence.report.plan import Plan
 from smc_mujoco.evidence.report.scores import Place, Score
 from smc_mujoco.evidence.report.stages import Field, Findings, Front
 from smc_mujoco.evidence.rigs.rig import Fall
+from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies.accuracy import AccuracyTable
 from smc_mujoco.studies.worst_case import WorstCase
 
@@ -357,7 +359,9 @@ def test_a_page_says_and_draws_its_findings(findings, snapshot, monkeypatch):
     whole = page.page(findings)
     for plot in PLOT.finditer(whole):
         go.Figure(json.loads(plot[2]))  # which refuses what plotly does not know
-    text = said(whole.partition('<h3 id="definitions">')[0])
+    text, _, defined = map(said, whole.partition('<h3 id="definitions">'))
+    for metric in metrics():
+        assert said(words.pretty(str(inspect.getdoc(metric.formula)).split("\n\n")[-1])) in defined, metric.name
     assert re.sub(r"the package’s \d+ laws", "the package’s laws", text) == snapshot  # a new one needs no new record
 
 

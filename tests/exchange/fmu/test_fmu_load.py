@@ -10,6 +10,7 @@ import sys
 import time
 import zipfile
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -442,7 +443,7 @@ def test_an_fmu_is_tried_on_a_double_integrator_between_walls(step, h, monkeypat
     made = mock.Mock(**{"step.side_effect": lambda seen, t, h: [8.0 * seen[names.index("e")]]})
     monkeypatch.setattr(slave, "Slave", lambda *_: made)
     slave.attempt(order, said := mock.Mock())
-    y = Measurement(*np.transpose([call.args[0] for call in made.step.mock_calls]))
+    y: Any = Measurement(*np.transpose([call.args[0] for call in made.step.mock_calls]))
     known = {"t": h * np.arange(500), "dt": h, "r": 0.1 * np.sin(y.t), "dr": 0.1 * np.cos(y.t), "ddr": -y.r, "a": -y.r}
     known |= {"e": y.x - y.r, "de": y.v - y.dr, "g": 1.0, "gq": 1.0, "limit": 6.0, "model": 1.0, "q": 0.0}
     for name, expected in known.items():
