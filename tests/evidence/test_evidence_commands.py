@@ -176,6 +176,7 @@ LINES = (
     "identify emps a.csv b.csv c.csv --columns x=position --quantities mass,offset --set mass=5 --starts 2 --seed 3",
     "identify duffing a.csv b.csv --json found.json --figure fit",
     "identify emps a.csv --set mass=much",
+    "identify nowhere a.csv",
     "replay emps run.csv --columns x=position",
     "replay emps run.csv --quantities driver,quanser --start 1.5 --duration 6 --figure run --film film.mp4",
     "replay emps run.csv --film film.mp4",

@@ -387,3 +387,9 @@ def test_a_window_is_the_widest_range_of_levels_that_no_cell_spoils_and_the_lowe
     assert its.window() is None
     assert (its.bound(None), its.worth(None, (0.0, 0.0))) == (math.inf, (True, math.inf))
     assert its.bound((-0.5, 1.0)) == 0.0
+
+
+def test_a_law_that_is_bounded_is_too_weak_far_from_a_force_that_grows():
+    terms = {"B": 0.05}  # so weak that the law is stronger wherever the search looks for its margin
+    told = next(maker._restoring(loop("observer_free", terms), [0.0, terms["B"], 0.0, 0.0, 0.0]))
+    assert told["margin"] < 0.0 < told["at"]
