@@ -287,6 +287,7 @@ def test_the_spec_tells_how_long_an_episode_is(named):
         assert steps == environment.spec.max_episode_steps
     assert gymnasium.spec("Duffing-v0").max_episode_steps is None  # which the duration decides
     assert PlantEnv("duffing").spec is None
+    assert PlantEnv("duffing").render() is None
 
 
 def test_a_copy_that_is_over_begins_a_new_episode_and_the_others_go_on():

@@ -132,6 +132,12 @@ def test_a_comment_or_a_line_more_is_no_edit():
     assert written() == written() == written(before="# a comment\n\n")
 
 
+def test_another_order_of_a_class_s_definitions_is_no_edit():
+    one, other = ({"a": 1.0, "b": 2.0}, {"b": 2.0, "a": 1.0})
+    assert fingerprint.of(type("Mine", (), one)) == fingerprint.of(type("Mine", (), other))
+    assert fingerprint.of(type("Mine", (), one)) != fingerprint.of(type("Mine", (), {"a": 2.0, "b": 1.0}))
+
+
 def test_a_key_does_not_depend_on_the_process():
     made = "grid(['duffing'], ['adaptive'], ['noise'], [3], 'study')[0]"
     done = subprocess.run(
