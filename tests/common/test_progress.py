@@ -1,10 +1,10 @@
 """Progress in a notebook: a bar in the cell, without a warning, and nothing left of it."""
 
-import contextlib
 import re
 import sys
 import types
 import warnings
+from unittest.mock import MagicMock, call
 
 import pytest
 
@@ -74,30 +74,21 @@ def test_nothing_is_drawn_more_than_five_times_a_second(cell):
 
 def test_a_terminal_s_bar_vanishes_and_takes_the_time_left_from_two_minutes(monkeypatch):
     """rich is given; what it is asked is told."""
-    asked = []
-
-    @contextlib.contextmanager
-    def shown(*columns, **options):
-        asked.append(([type(each).__name__ for each in columns], options.pop("console").stderr, options))
-        bar = types.SimpleNamespace(add_task=lambda what, total: (what, total))
-        bar.advance = bar.update = lambda *given, **options: asked.append((given, options))
-        yield bar
-
-    monkeypatch.setattr("rich.progress.Progress", shown)
+    monkeypatch.setattr("rich.progress.Progress", rich := MagicMock())
     monkeypatch.setattr("rich.console.Console.is_terminal", True)
     for counted, share in ((True, "MofNCompleteColumn"), (False, "TaskProgressColumn")):
         with progress.bar("runs", 8.0, counted=counted) as bar:
             bar.advance(2.0)
             bar.reached(3.0, 9.0)
             bar.says("more", 0.5)
-        task, columns = ("runs", 8.0), ["TextColumn", "BarColumn", share, "TimeRemainingColumn"]
-        assert asked == [
-            (columns, True, {"transient": True, "speed_estimate_period": 120.0}),
-            ((task, 2.0), {}),
-            ((task,), {"completed": 3.0, "total": 9.0}),
-            ((task,), {"description": "more", "advance": 0.5}),
-        ]
-        del asked[:]
+        columns = [type(each).__name__ for each in rich.call_args.args]
+        assert columns == ["TextColumn", "BarColumn", share, "TimeRemainingColumn"]
+        console = rich.call_args.kwargs["console"]
+        assert rich.call_args.kwargs == {"transient": True, "console": console, "speed_estimate_period": 120.0}
+        assert console.stderr
+    task = (shown := rich.return_value.__enter__.return_value).add_task.return_value
+    asked = call.add_task("runs", total=8.0), call.advance(task, 2.0), call.update(task, completed=3.0, total=9.0)
+    assert shown.mock_calls[-4:] == [*asked, call.update(task, description="more", advance=0.5)]
 
 
 def test_a_terminal_gets_no_html(capsys):
