@@ -34,6 +34,7 @@ class Identified:
         states at the starts are found too.
       predictions: of each record, the predicted columns, the measured columns and their times.
       evaluations: how many parameter sets were simulated.
+      independent: how many samples of the residuals are independent of each other; inf if that is not known.
     """
 
     rig: Rig
