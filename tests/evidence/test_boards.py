@@ -594,6 +594,17 @@ def test_a_law_that_does_not_compile_is_refused():
         Machine(boards.on_board("acrobot", lists()))
 
 
+@pytest.mark.slow
+def test_the_command_shows_this_packages_rows_among_the_published(capsys, tmp_path):
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["board", "acrobot", "--no-robustness", "--figure", str(tmp_path / "a")])
+    assert ended.value.code in (0, None)
+    out = capsys.readouterr().out
+    order = ["trajectory + linear", "History SAC", "mcpilco", "trajectory + sliding"]
+    assert sorted(order, key=out.index) == order
+    assert (tmp_path / "a.svg").exists()
+
+
 UNWRITABLE = ["acrobot", "--no-robustness", "--figure", f"{__file__}/a"]  # in no folder
 
 
