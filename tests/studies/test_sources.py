@@ -68,8 +68,9 @@ def test_a_verdict_says_whether_the_winner_s_gains_were_searched_by_another_rule
 def test_boards_print_the_sources(folder):
     boards = ranked([FAST, at_default(SLOW)], folder)
     for printed in (repr(boards), boards._repr_html_(), boards.to_latex()):
-        assert "slow default" in printed
-        assert "fast yours" in printed
+        words = " ".join(printed.split())  # lines of a terminal may end anywhere
+        assert "slow default" in words
+        assert "fast yours" in words
     assert "slow & default &" in boards.to_latex()
 
 
