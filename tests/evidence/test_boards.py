@@ -121,6 +121,7 @@ def test_a_run_that_stays_down_or_diverges_scores_nothing():
 # the published simulator
 
 
+@pytest.mark.slow
 @ROBOTS
 def test_the_published_simulator_is_mujocos(robot, traces, machines):
     states, torque = machines[robot].simulate(Case())

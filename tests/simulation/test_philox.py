@@ -69,6 +69,7 @@ def test_normals_are_standard_normal():
         assert abs(stats.kurtosis(column)) < 4 * math.sqrt(24 / len(z))
 
 
+@pytest.mark.slow
 def test_pairs_channels_streams_seeds_and_samples_are_independent():
     n, keys = 20_000, itertools.product((0, 1, 2, LARGEST_SEED), (0, 1, 2), (philox.MEASUREMENT, philox.PROCESS))
     series = np.concatenate([draws(*key, n).T for key in keys])

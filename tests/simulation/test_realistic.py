@@ -90,6 +90,7 @@ def test_callback_equals_plain_loop_with_every_part():
         assert_same(trace, reference.run(s))
 
 
+@pytest.mark.slow
 @PLANTS
 def test_callback_equals_plain_loop_in_every_contact_and_mechanism(name):
     """Each of them plain or with a motor, a play and friction in turn."""
@@ -414,6 +415,7 @@ def test_under_friction_a_smooth_law_rests_where_friction_holds_the_rest(name):
     assert far >= 5
 
 
+@pytest.mark.slow
 @TWO
 def test_without_friction_a_smooth_law_does_not_rest_off_balance(name):
     """The claim above is about friction: a tenth of the friction lets go of where more held."""
