@@ -748,7 +748,6 @@ def script(tmp_path_factory):
     return folder, python("scenes/once.py", "--no-film", cwd=folder)
 
 
-@pytest.mark.slow
 def test_a_scene_run_as_a_script_is_executed_once(script):
     _, done = script
     assert done.returncode == 0

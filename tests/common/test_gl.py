@@ -54,7 +54,6 @@ def default() -> tuple[str, str, str]:
     return report()
 
 
-@pytest.mark.slow
 def test_unset_takes_a_backend_without_a_word(default):
     backend, note, _ = default
     assert backend in ("egl", "osmesa", "disabled")

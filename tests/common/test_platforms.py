@@ -34,7 +34,6 @@ def without_module(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(builtins, "__import__", fails)
 
 
-@pytest.mark.slow
 def test_every_text_file_is_read_and_written_as_utf_8():
     """Windows would take its own encoding, in which a text from Linux is another."""
     bare = []
