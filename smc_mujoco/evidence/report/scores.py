@@ -49,8 +49,8 @@ class Score(NamedTuple):
     failed: int
     runs: int
     sample: str
-    floor: float = 0.0
-    barred: bool = False
+    floor: float
+    barred: bool
 
 
 class Place(NamedTuple):

@@ -64,6 +64,7 @@ def scores():
                         runs=6 - j,
                         sample=f"{6 - j} starts",
                         floor={"ultimate_bound": 1e-4, "max_u": 6e-3}.get(metric, 0.0),
+                        barred=False,
                     )
 
 
@@ -373,7 +374,7 @@ def cells(rows, metric="itae"):
             yield Score(
                 plant=PLANTS[k % 2], condition=CONDITIONS[k // 2 % 2], law=law, metric=metric, median=median,
                 low=median, high=median, best=median == 1.0, beaten=median > 1.0, wins=how == "wins", lead="",
-                seeds=6, failed=0, runs=6, sample="6 starts",
+                seeds=6, failed=0, runs=6, sample="6 starts", floor=0.0, barred=False,
             )  # fmt: skip
 
 

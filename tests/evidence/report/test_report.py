@@ -294,7 +294,11 @@ def scores(condition="nominal", plant="duffing", runs=16, **medians):
     level = [law for law, m in medians.items() if m <= min(medians.values()) + 0.1]
     wins = {law: level == [law] and len(medians) > 1 for law in medians}
     return [
-        Score(plant, condition, law, "settling_time", m, m, m, best, not best, wins[law], "", 16, 0, runs, "16 seeds")
+        Score(
+            *(plant, condition, law, "settling_time", m, m, m, best, not best, wins[law], "", 16, 0, runs, "16 seeds"),
+            floor=0.0,
+            barred=False,
+        )
         for law, m in medians.items()
         for best in [law in level]
     ]
