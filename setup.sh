@@ -49,7 +49,7 @@ place=$(head -n 1 .venv/installed 2>/dev/null || true) # none after a broken ins
 if [ -z "$have" ] || [ "$place" != "$(pwd)" ] || { [ -n "${PYTHON:-}" ] && [ "$have" != "$(version "$PYTHON")" ]; }; then
     create
 fi
-if ! wanted | cmp -s - .venv/installed; then
+if [ "$(wanted)" != "$(cat .venv/installed 2>/dev/null)" ]; then
     rm -f .venv/installed # until all is there
     install --only-binary :all: --require-hashes -r requirements.lock
     install --no-build-isolation --no-index -e .

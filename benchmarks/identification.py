@@ -86,9 +86,8 @@ def machines(rng, share=0.0):
     )
     t, u = command(rng, (4, 3, 3, 2))
     M, delta, alpha = SPRING.values()
-    x = smooth(lambda x, v, f: (f - delta * v - alpha * x) / M, 0.1, u + unrecorded(rng, u, share)) + rng.normal(
-        0.0, 1e-4, len(t)
-    )
+    x = smooth(lambda x, v, f: (f - delta * v - alpha * x) / M, 0.1, u + unrecorded(rng, u, share))
+    x += rng.normal(0.0, 1e-4, len(t))
     yield "spring", smc.plant("duffing", **SPRING, beta=0.0), SPRING, {"t": t, "x": x, "u": u}
 
 

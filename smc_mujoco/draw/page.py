@@ -203,7 +203,7 @@ def files(path: str | os.PathLike[str] | None, format: str | None = None) -> lis
     if format is not None and ending in FORMATS and ending != format:
         raise ScenarioError(f"cannot draw to {Path(path).name!r} as {format}: end the name in .{format}")
     several = ("pdf",) if ending == "pdf" else ("svg", "png")
-    return [base.with_name(f"{base.name}.{ending}") for ending in ((format,) if format else several)]
+    return [base.with_name(f"{base.name}.{kind}") for kind in ((format,) if format else several)]
 
 
 def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:

@@ -18,8 +18,8 @@ There is no limit cycle where
 - the oscillation grows or dies: its amplitude differs by more than half from the first to the second half of the
   samples.
 
-Noise that a lightly damped loop filters may look like a cycle for so few periods. Of linear laws, which have none, 12
-of 54 runs show one under a random force, and 1 of 129 under noise of the measurement.
+Noise that a lightly damped loop filters may look like a cycle for so few periods. So runs of linear laws, which have no
+cycle, may show one under a random force.
 """
 
 from __future__ import annotations

@@ -84,7 +84,7 @@ def replay(trace: Trace) -> Replay:
     It takes some seconds, most of them to start two processes.
 
     Raises:
-      ScenarioError: the replay takes too long.
+      ScenarioError: the replay takes too long, or fails in its process.
     """
     return replays([trace])[0]
 
