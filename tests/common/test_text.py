@@ -46,6 +46,9 @@ def test_a_number_has_as_many_digits_as_are_asked_for(value):
 
 def test_a_list_reads_as_a_sentence():
     assert [joined(""), joined("a"), joined("ab"), joined("abc")] == ["", "a", "a and b", "a, b and c"]
+
+
+def test_the_first_letter_becomes_a_capital_and_the_others_stay():
     assert [capital(""), capital("all of LQR"), capital("|e|")] == ["", "All of LQR", "|e|"]
 
 

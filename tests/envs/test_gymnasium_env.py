@@ -287,7 +287,6 @@ def test_the_spec_tells_how_long_an_episode_is(named):
         assert steps == environment.spec.max_episode_steps
     assert gymnasium.spec("Duffing-v0").max_episode_steps is None  # which the duration decides
     assert PlantEnv("duffing").spec is None
-    assert PlantEnv("duffing").render() is None
 
 
 def test_a_copy_that_is_over_begins_a_new_episode_and_the_others_go_on():
@@ -414,6 +413,10 @@ def test_gymnasium_s_benchmarks_run():
     if hasattr(performance, "benchmark_vector_step"):
         many = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=3, changes=SHORT)
         assert performance.benchmark_vector_step(many, target_duration=0.05, seed=0) > 0.0
+
+
+def test_without_a_render_mode_there_is_no_picture():
+    assert PlantEnv("duffing").render() is None
 
 
 @pytest.mark.skipif(bool(gl.missing()), reason=str(gl.missing()))

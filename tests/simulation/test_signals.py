@@ -112,7 +112,7 @@ def test_bounds_of_a_signal_and_of_its_slope_are_reached_and_not_passed():
         d, (bound, slope) = path(signal, times), signal.bounds()
         steepest = np.abs(np.diff(d)).max() / times[1]
         assert np.abs(d).max() == pytest.approx(bound)
-        assert steepest == pytest.approx(slope, rel=1e-3) or steepest > 1e3 < slope == math.inf
+        assert steepest > 1e3 if slope == math.inf else steepest == pytest.approx(slope, rel=1e-3)
 
 
 @pytest.mark.parametrize("signal", EVERY, ids=lambda s: type(s).__name__)
@@ -350,7 +350,11 @@ def test_time_series_that_differ_in_one_number_are_not_equal():
     assert dataclasses.replace(UNEVEN, values=[*UNEVEN.values[:-1], 3.1]) != UNEVEN
     assert dataclasses.replace(UNEVEN, times=[*UNEVEN.times[:-1], 1.4]) != UNEVEN
     assert scenario(disturbance=UNEVEN) == scenario(disturbance=TimeSeries(UNEVEN.times, np.array(UNEVEN.values)))
-    assert {type(x) for x in TimeSeries(np.arange(2), [np.float32(1.0), 2]).times} == {float}
+
+
+def test_numbers_of_a_time_series_are_python_s_floats():
+    series = TimeSeries(np.arange(2), [np.float32(1.0), 2])
+    assert {type(number) for number in (*series.times, *series.values)} == {float}
 
 
 def test_a_time_series_does_not_change_and_shows_itself_in_a_line():

@@ -9,7 +9,6 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.cli.main import main
 from smc_mujoco.control.law import catalogue, known_laws
-from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.studies import accuracy
 from smc_mujoco.studies.accuracy import load
 
@@ -99,15 +98,12 @@ def test_theory_promises_nothing_behind_a_drive():
 
 
 def test_every_period_has_every_start_and_one_run_more_has_half_the_step():
-    given = as_plant("duffing"), smc.condition("fine", physics_step=2.5e-4), "twisting"
-    setup = accuracy._setup(*given, (4e-3, 2e-3), (3, 5), "tuned", 1.5, None)
+    fine = smc.condition("fine", physics_step=2.5e-4)
+    setup = accuracy._setup(smc.plant("duffing"), fine, "twisting", (4e-3, 2e-3), (3, 5), "tuned", 1.5, None)
     runs = [(one.seed, one.control_period, one.physics_step, one.duration) for one in setup.scenarios]
     steps = [(seed, period, 2.5e-4, 1.5) for seed in (3, 5) for period in (4e-3, 2e-3)]
     assert runs == [*steps, (3, 2e-3, 1.25e-4, 1.5)]
     assert (setup.periods, setup.starts, setup.untuned) == ((4e-3, 2e-3), 2, False)
-    mixed = dataclasses.replace(as_plant("double_pendulum"), mixed=("m", "rad"))
-    with pytest.raises(smc.ScenarioError, match="has driven channels in m and rad: give a plant with one unit"):
-        accuracy._setup(mixed, *given[1:], (4e-3,), (3,), "tuned", 1.5, None)
 
 
 def test_laws_without_tuned_gains_get_their_defaults_with_one_warning():
@@ -156,6 +152,10 @@ def test_a_table_reads_as_text_html_data_and_file(tmp_path):
         ({"periods": (1e-3, 1e-3)}, "give two or more different ones in s"),
         ({"periods": (0.0, 1e-3)}, "a period is 0: give a number greater than 0"),
         ({"conditions": "period_10ms"}, "condition 'period_10ms' sets control_period, which accuracy varies"),
+        (
+            {"plants": dataclasses.replace(smc.plant("double_pendulum"), mixed=("m", "rad"))},
+            "double_pendulum has driven channels in m and rad: give a plant with one unit",
+        ),
         ({"laws": "nonsense"}, "nonsense"),
         ({"seeds": 0}, "seeds is 0"),
     ],
