@@ -298,12 +298,6 @@ def test_everything_public_is_explained():
     assert silent == []
 
 
-def test_data_are_frozen_but_for_those_that_change_as_their_work_goes_on():
-    plain = re.compile(r"^@dataclasses\.dataclass(?!\(frozen=True).*\n(?:@.*\n)*class (\w+)", re.MULTILINE)
-    changing = {name for path in FILES for name in plain.findall(path.read_text())}
-    assert changing == {"BorrowedData", "Frames", "Search", "Tip", "_Ledger"}
-
-
 def test_no_file_names_a_folder_of_one_machine():
     folder = re.compile(r"""(?<![\w.}/])/(?:home|root|Users|tmp|work|mnt|opt|var)/[\w.]+|[A-Z]:\\\\Users""")
     found = {label(path): folder.findall(path.read_text()) for path in TEXTS}

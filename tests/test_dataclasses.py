@@ -13,27 +13,19 @@ from smc_mujoco.simulation.signals import Signal
 
 pytestmark = pytest.mark.quick
 
-OTHERWISE = {  # flag -> classes that differ: they lack it, or of "slots", have it
+OTHERWISE = {  # flag -> the classes that lack it; for "slots", those that have it
     "frozen": {"margins.Search", "_Ledger", "Frames", "BorrowedData", "Tip"},
     "eq": {
         *("Linear", "Comparison", "Basin", "Member", "Network", "Frames", "Certificate", "Levels", "BorrowedData"),
         *("Scenario", "Trace", "Advice", "Compared", "Outcome", "Table", "WorstCase", "StepResponse"),
     },
     "repr": {
-        "Tuned",
-        "Frames",
-        "Held",
-        "TimeSeries",
-        "Waypoints",
-        "Board",
-        "Advice",
-        "Compared",
-        "StepResponse",
-        "Robustness",
+        *("Tuned", "Frames", "Held", "TimeSeries", "Waypoints"),
+        *("Board", "Advice", "Compared", "StepResponse", "Robustness"),
     },
     "slots": {"Functions", "Packed", "Prepared"},
 }
-POSITIONAL = {  # fields by position, as signals and parts of machines
+POSITIONAL = {  # made by position, as signals and parts of machines are
     *("Clock", "Wave", "StepChange", "_Ledger", "Member", "Added", "LinearLaw", "File", "Network", "Policy", "Gain"),
     *("Frames", "Audit", "Robustness", "Identified", "Columns", "Piece", "Point", "Slopes", "rig.Part", "Quantity"),
     *("Reached", "FmuLaw", "Source", "BorrowedData", "NominalModel", "UserFields", "UserModel", "Tip", "Condition"),

@@ -107,7 +107,7 @@ def test_errors_under_noise_have_levant_s_exponents(r):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("r", [pytest.param(2, marks=pytest.mark.slow), 3])
+@pytest.mark.parametrize("r", [2, 3])
 def test_errors_in_the_sampling_period_have_levant_s_exponents(r):
     for law, errors in zip(LAWS[r], sliding(r, 0.0), strict=True):
         check(exponents(PERIODS, errors), r - np.arange(r), law, PERIOD)
@@ -179,7 +179,7 @@ def differentiation(n, noise):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n", [pytest.param(1, marks=pytest.mark.slow), 2])
+@pytest.mark.parametrize("n", [1, 2])
 def test_differentiators_err_under_noise_with_levant_s_exponents(n):
     periods, errors = differentiation(n, 1.0)
     eps = (periods / 0.03) ** (n + 1)

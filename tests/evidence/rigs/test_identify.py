@@ -228,9 +228,7 @@ FAR = {"M": 95.0, "b": 203.0, "cf": 20.4, "offset": -3.2}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("start", "seconds"), [({}, 0.4), pytest.param(FAR, 1.5, marks=pytest.mark.slow)], ids=["near", "95 kg"]
-)
+@pytest.mark.parametrize(("start", "seconds"), [({}, 0.4), (FAR, 1.5)], ids=["near", "95 kg"])
 def test_standard_errors_cover_the_truth_from_any_start(start, seconds):
     """The full coverage, three machines and 20 seeds, is in benchmarks/identification.py.
 
