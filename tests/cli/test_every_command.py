@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from helpers.arguments import told
+from helpers.words import words
 from typer.models import OptionInfo
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
 from smc_mujoco.draw import display
-from tests.helpers.arguments import told
-from tests.helpers.words import words
 
 TYPED = ("duffin", "hierarchica", "encode", "vdp_nois", "noise+duffin")  # begun names: what completes them is told
 CALLS = {  # command line -> the functions that it calls, of which the last does the work; not for audits

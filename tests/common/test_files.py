@@ -39,7 +39,6 @@ from smc_mujoco.studies import scene
 from smc_mujoco.studies.cache import cached
 from smc_mujoco.testing import golden
 
-NUMBERS = (math.nan, math.inf, -math.inf, 0.1, -0.0)
 WORDS = st.sampled_from(["NaN", "Infinity", "-Infinity", "'NaN", "''-Infinity", "inf", "nan", "null"])
 LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text() | WORDS
 DATA = st.recursive(LEAVES, lambda inner: st.lists(inner) | st.dictionaries(st.text() | WORDS, inner), max_leaves=20)

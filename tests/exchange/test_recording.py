@@ -6,11 +6,11 @@ import json
 import mujoco
 import numpy as np
 import pytest
+from helpers import arms
 
 import smc_mujoco as smc
 from smc_mujoco.common.extras import MissingPackageError
 from smc_mujoco.exchange import recording
-from tests.helpers import arms
 
 pytest.importorskip("mcap_protobuf")
 from mcap.reader import make_reader

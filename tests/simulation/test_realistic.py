@@ -5,7 +5,6 @@ What one part does on its own stands in test_friction, test_actuators, test_cont
 
 import dataclasses
 import functools
-import importlib
 import itertools
 import math
 import pickle
@@ -25,7 +24,6 @@ from smc_mujoco.simulation.scenario import REALISTIC_STEP
 from smc_mujoco.simulation.signals import PerChannel
 from smc_mujoco.simulation.trace import ARRAYS
 
-runner = importlib.import_module("smc_mujoco.simulation.run")  # smc.run is the function
 PLANTS = pytest.mark.parametrize("name", smc.paper.GAINS)
 TWO = pytest.mark.parametrize("name", ["duffing", "pendulum_network"])
 ONE_JOINT = ["duffing", "inverted_pendulum", "van_der_pol"]

@@ -133,7 +133,7 @@ def test_a_comment_or_a_line_more_is_no_edit():
 
 
 def test_another_order_of_a_class_s_definitions_is_no_edit():
-    one, other = ({"a": 1.0, "b": 2.0}, {"b": 2.0, "a": 1.0})
+    one, other = {"a": 1.0, "b": 2.0}, {"b": 2.0, "a": 1.0}
     assert fingerprint.of(type("Mine", (), one)) == fingerprint.of(type("Mine", (), other))
     assert fingerprint.of(type("Mine", (), one)) != fingerprint.of(type("Mine", (), {"a": 2.0, "b": 1.0}))
 

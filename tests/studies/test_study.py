@@ -21,7 +21,6 @@ from smc_mujoco.studies.run_key import condition
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
 
-ROOT = Path(__file__).parents[2]
 scenario = functools.partial(runs.scenario, duration=0.05)
 
 

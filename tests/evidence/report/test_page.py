@@ -329,7 +329,7 @@ PLOT = re.compile(r'<script type="application/json" data-plot="(.*?)">(.*?)</scr
 
 
 def drawn(plot):
-    """Return a chart's data and layout, a line for each trace, axis and part; of a copy its titles."""
+    """Return a chart's data and layout, a line for each trace, axis and part; of a chart like another its titles."""
     figure = json.loads(plot[2], parse_float=lambda text: float(f"{float(text):.9g}"), parse_constant=pytest.fail)
     if plot[1] != "plot-accuracy":  # the first; all have the same
         figure["layout"].pop("template")

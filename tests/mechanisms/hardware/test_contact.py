@@ -20,7 +20,6 @@ with mjcb.installed(None):  # this import compiles a model
 STEP = 2.5e-4  # s
 G = 9.81  # m/s^2
 OFFERED = [(name, kind) for name, p in sorted(catalogue().items()) for kind in p.contacts if name != "panda"]
-EVERY = pytest.mark.parametrize(("name", "kind"), OFFERED, ids=["-".join(pair) for pair in OFFERED])
 BUILDS = [(*pair, build) for pair in OFFERED for build in ("equation", *catalogue()[pair[0]].mechanisms)]
 STUDIES = [pair for pair in OFFERED if pair[1] != "bobs"]  # bobs in a row need their own places
 CARTS = pytest.mark.parametrize("name", ["duffing", "van_der_pol"])
