@@ -25,8 +25,6 @@ from smc_mujoco.control.law import Law as Law
 from smc_mujoco.control.law import Measurement as Measurement
 from smc_mujoco.control.law import law_function as law_function
 from smc_mujoco.control.law import laws as laws
-from smc_mujoco.control.linear_law import law_from_control as law_from_control
-from smc_mujoco.control.policy import policy as policy
 from smc_mujoco.control.surface import Surface as Surface
 from smc_mujoco.control.surface import surface as surface
 from smc_mujoco.control.surface import surface_function as surface_function
@@ -40,6 +38,7 @@ from smc_mujoco.draw.notebook import frames as frames
 from smc_mujoco.draw.notebook import show as show
 from smc_mujoco.envs import dm_control_env, gymnasium_env, vector_env
 from smc_mujoco.envs.agent import agent as agent
+from smc_mujoco.evidence.accuracy.accuracy import accuracy as accuracy
 from smc_mujoco.evidence.audit.audit import audit as audit
 from smc_mujoco.evidence.audit.audit import claims as claims
 from smc_mujoco.evidence.certificates.certificate import Certificate as Certificate
@@ -54,7 +53,9 @@ from smc_mujoco.exchange.c.export import law_to_c as law_to_c
 from smc_mujoco.exchange.c.load import law_from_c as law_from_c
 from smc_mujoco.exchange.fmu.export import export_fmu as export_fmu
 from smc_mujoco.exchange.fmu.load import law_from_fmu as law_from_fmu
+from smc_mujoco.exchange.linear_law import law_from_control as law_from_control
 from smc_mujoco.exchange.live.build import live as live
+from smc_mujoco.exchange.policy import policy as policy
 from smc_mujoco.mechanisms.custom.plant_from import Channel as Channel
 from smc_mujoco.mechanisms.custom.plant_from import plant_from as plant_from
 from smc_mujoco.mechanisms.fidelity import deviation as deviation
@@ -106,7 +107,6 @@ from smc_mujoco.simulation.trace import Trace as Trace
 from smc_mujoco.simulation.trace import load as load
 from smc_mujoco.simulation.waypoints import Waypoints as Waypoints
 from smc_mujoco.simulation.waypoints import cartesian_path as cartesian_path
-from smc_mujoco.studies.accuracy import accuracy as accuracy
 from smc_mujoco.studies.adviser import which as which
 from smc_mujoco.studies.compare import compare as compare
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis import gains_for, relevant_difference, scaling, step_halving
+from smc_mujoco.analysis import gains_for, relevant_difference, step_halving
 from smc_mujoco.analysis import region_of_attraction as region
 from smc_mujoco.analysis.tuning import objective, result, search, search_space
 from smc_mujoco.analysis.worst_case import search as attack
@@ -16,6 +16,7 @@ from smc_mujoco.analysis.worst_case import uncertainty
 from smc_mujoco.common.files import read_json
 from smc_mujoco.control import gain_sets
 from smc_mujoco.envs import tasks
+from smc_mujoco.evidence.accuracy import scaling
 from smc_mujoco.metrics import catalogue, conventions, limit_cycle, tip
 from smc_mujoco.simulation import clock, conditions, controller, scenario, signals, time_series
 from smc_mujoco.testing import golden, plugin

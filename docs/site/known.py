@@ -28,7 +28,7 @@ OTHERS = {  # title -> names of modules that are no public names
     analysis.tuning.result.Tuned
     analysis.gains_for.Design
     evidence.rigs.identify.Identified
-    studies.accuracy.AccuracyTable
+    evidence.accuracy.accuracy.AccuracyTable
     analysis.chattering.Chattering
     analysis.step_halving.StepChange
     studies.worst_case.WorstCase

@@ -31,7 +31,6 @@ GROUPS = {  # heading in the help -> name -> command; the annexes add theirs
         "tune": analysis.tune,
         "margins": analysis.margins,
         "worst": analysis.worst,
-        "accuracy": analysis.accuracy,
         "basin": analysis.basin,
         "chatter": analysis.chatter,
     },

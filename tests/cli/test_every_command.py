@@ -59,9 +59,9 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "--spread 0.1 --metric peak --gains default --condition noise --duration 2 --budget 9 --seed 3 --out w "
     "--json w.json --threads 2": ["studies.worst_case.worst_case"],
     "worst simple_pendulum_ak80 --gains default": ["studies.worst_case.worst_case"],
-    "accuracy duffing": ["studies.accuracy.accuracy"],
+    "accuracy duffing": ["evidence.accuracy.accuracy.accuracy"],
     "accuracy duffing van_der_pol --law pid --condition sine --periods 0.002,0.001 --seeds 2 --gains default "
-    "--duration 2 --x0 0.4 --spread 0.1 --out a --json a.json --threads 2": ["studies.accuracy.accuracy"],
+    "--duration 2 --x0 0.4 --spread 0.1 --out a --json a.json --threads 2": ["evidence.accuracy.accuracy.accuracy"],
     "basin duffing": ["analysis.region_of_attraction.basin"],
     "basin duffing --law pid --points 3 --gains default --duration 2 --out b --json b.json --condition noise "
     "--threads 2": ["analysis.region_of_attraction.basin"],

@@ -12,14 +12,14 @@ from matplotlib.figure import Figure
 import smc_mujoco as smc
 from smc_mujoco.analysis.chattering import Chattering
 from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
-from smc_mujoco.analysis.scaling import Accuracy, Scaling
 from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.draw import amplitudes, region
 from smc_mujoco.draw.figure import figure, signals
 from smc_mujoco.draw.joints import joints
 from smc_mujoco.draw.nyquist import nyquist
-from smc_mujoco.draw.orders import orders
 from smc_mujoco.draw.pareto import pareto
+from smc_mujoco.evidence.accuracy.orders import orders
+from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.simulation.trace import PLANT_DIVERGED
 

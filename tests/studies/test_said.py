@@ -17,11 +17,12 @@ from helpers.words import words
 import smc_mujoco as smc
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.ranking import Rank
-from smc_mujoco.analysis.scaling import Accuracy, Scaling
 from smc_mujoco.common.tabular import plain
 from smc_mujoco.control import gain_sets
+from smc_mujoco.evidence.accuracy import accuracy as accuracies
+from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable, Run, Setup
+from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
 from smc_mujoco.simulation.conditions import find_condition
-from smc_mujoco.studies import accuracy as accuracies
 from smc_mujoco.studies import (
     arms,
     cache,
@@ -34,7 +35,6 @@ from smc_mujoco.studies import (
     study_replays,
     worst_case,
 )
-from smc_mujoco.studies.accuracy import AccuracyTable, Run, Setup
 from smc_mujoco.studies.needs import NEEDS, Choice, ties
 from smc_mujoco.studies.scene import slug
 from smc_mujoco.studies.worst_case import WorstCase, WorstCases, default_budget

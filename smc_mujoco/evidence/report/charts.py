@@ -17,10 +17,10 @@ from smc_mujoco.evidence.report.words import style
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.margins import Margin
-    from smc_mujoco.analysis.scaling import Accuracy
+    from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
+    from smc_mujoco.evidence.accuracy.scaling import Accuracy
     from smc_mujoco.evidence.report.rigs import Repeated
     from smc_mujoco.evidence.report.stages import Front
-    from smc_mujoco.studies.accuracy import AccuracyTable
 
 KEYS_PER_LINE = 5  # laws in a line of a legend
 # Of logarithmic axes. Plotly writes powers a quarter larger than this size.

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator
 
-from smc_mujoco.analysis.scaling import ORDER_BAND
+from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable, accuracy, load
+from smc_mujoco.evidence.accuracy.scaling import ORDER_BAND
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.plan import GAINS, Report, Work
-from smc_mujoco.studies.accuracy import AccuracyTable, accuracy, load
 from smc_mujoco.studies.cache import cached
 
 CONDITIONS = ("constant", "coulomb")  # a steady force, and dry friction

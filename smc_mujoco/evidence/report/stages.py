@@ -21,6 +21,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.draw.film import film as video
+from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
 from smc_mujoco.evidence.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.papers.gaber import lyapunov, scenarios
@@ -31,7 +32,6 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.grid import grid as make_grid
 from smc_mujoco.simulation.run import run
-from smc_mujoco.studies.accuracy import AccuracyTable
 from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.noise_key import DRAWN, has_user_code
 from smc_mujoco.studies.study import study

@@ -14,7 +14,8 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.analysis.region_of_attraction import Basin
-from smc_mujoco.analysis.scaling import Accuracy, Scaling
+from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
+from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.report import answer, page, rigs, words
 from smc_mujoco.evidence.report.about import About, Gains
@@ -25,7 +26,6 @@ from smc_mujoco.evidence.report.scores import Place, Score
 from smc_mujoco.evidence.report.stages import Field, Findings, Front
 from smc_mujoco.evidence.rigs.rig import Fall
 from smc_mujoco.metrics.catalogue import metrics
-from smc_mujoco.studies.accuracy import AccuracyTable
 from smc_mujoco.studies.worst_case import WorstCase
 
 NEVER, NONE = math.inf, math.nan

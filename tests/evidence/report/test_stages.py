@@ -16,12 +16,12 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco.common import extras
 from smc_mujoco.control import gain_sets
+from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
 from smc_mujoco.evidence.report import about, films, oscillation, paper, precision, rigs, scores, stages, words
 from smc_mujoco.evidence.report import report as make
 from smc_mujoco.evidence.report.plan import FULL, QUICK, Bars, Plan, Work
 from smc_mujoco.evidence.report.scores import Place
 from smc_mujoco.evidence.report.stages import Field
-from smc_mujoco.studies.accuracy import AccuracyTable
 
 
 def test_the_plans_of_the_full_and_the_quick_report_are_as_recorded(snapshot):

@@ -9,8 +9,8 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.cli.main import main
 from smc_mujoco.control.law import catalogue, known_laws
-from smc_mujoco.studies import accuracy
-from smc_mujoco.studies.accuracy import load
+from smc_mujoco.evidence.accuracy import accuracy
+from smc_mujoco.evidence.accuracy.accuracy import load
 
 PERIODS = (4e-3, 2e-3, 1e-3, 5e-4)
 SHORT = {"periods": PERIODS, "seeds": 1, "duration": 8.0}

@@ -13,12 +13,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
-from smc_mujoco.analysis.scaling import QUANTITIES, Accuracy, Scaling
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
 from smc_mujoco.draw.pareto import MARKS
+from smc_mujoco.evidence.accuracy.scaling import QUANTITIES, Accuracy, Scaling
 
 ROW_HEIGHT = 5.2  # inches on a full page, height of the panels of a plant in a condition
 AXIS_NAMES = {"e": "largest |e|", "s": "largest |s|"}

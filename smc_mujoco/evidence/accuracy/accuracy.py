@@ -6,7 +6,7 @@
 
 Runs have no noise. The error of a run is the largest |e|, or |s|, at the control samples of its last 20 %, over all
 driven channels. That is an ultimate bound, as the theorems on accuracy state it: |e| <= C h^r for a control period h.
-`analysis.scaling` determines the exponent r and says which errors do not count. The file of a law states the order that
+`scaling` determines the exponent r and says which errors do not count. The file of a law states the order that
 theory promises, see `law_function`. Theory promises no order if there is a drive, a delay, a sensor or an estimate of
 the velocity between law and mechanism.
 
@@ -26,7 +26,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.analysis.scaling import QUANTITIES, Accuracy, Scaling, scaling
 from smc_mujoco.common.errors import (
     ScenarioError,
     ScenarioWarning,
@@ -48,6 +47,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.source import by_words, kinds, untuned_laws
 from smc_mujoco.draw.style import law_colour
+from smc_mujoco.evidence.accuracy.scaling import QUANTITIES, Accuracy, Scaling, scaling
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import last_part
@@ -112,7 +112,7 @@ class AccuracyTable(Tables, list[Accuracy]):
 
     def plot(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
         """Draw error over control period, both logarithmic; title, size, format and fig are as in `smc.figure`."""
-        from smc_mujoco.draw.orders import orders
+        from smc_mujoco.evidence.accuracy.orders import orders
 
         return orders(self, path, **options)
 

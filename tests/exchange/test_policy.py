@@ -18,8 +18,8 @@ from helpers.episodes import columns, dm_control_suite, driven_by_dm, flat, run_
 
 import smc_mujoco as smc
 from smc_mujoco.common import guard
-from smc_mujoco.control import policy
 from smc_mujoco.control.law import Measurement
+from smc_mujoco.exchange import policy
 from smc_mujoco.studies import run_key
 
 pytestmark = [

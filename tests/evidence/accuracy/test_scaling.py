@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from smc_mujoco.analysis.scaling import fit, scaling
+from smc_mujoco.evidence.accuracy.scaling import fit, scaling
 
 pytestmark = pytest.mark.quick
 
