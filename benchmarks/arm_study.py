@@ -11,7 +11,7 @@ import sys
 import numpy as np
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.bootstrap import median_interval
+from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.studies import arms
 
 SEEDS = range(1, 4 if "--quick" in sys.argv else 13)
@@ -32,7 +32,7 @@ def row(name: str, values: np.ndarray) -> str:
     """A line of the table: median and interval of each column."""
     cells = []
     for each in values.T:
-        median, low, high, _ = median_interval(each)
+        median, low, high, _ = median_of(np.sort(each)[None])
         cells.append(f"{median:.3g} [{low:.3g}, {high:.3g}]")
     return f"| {name} | {' | '.join(cells)} |"
 

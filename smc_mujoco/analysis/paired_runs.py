@@ -1,8 +1,4 @@
-"""Paired runs: the runs of a table in groups, and in each the cells (plant, condition, seed) in which every law ran.
-
-for group in groups(table, by=("plant",)):
-    group.scores(values(table, "itae"))        # `Scores` of the group's laws, for `ranking`
-"""
+"""Paired runs: the runs of a table in groups, and in each the cells (plant, condition, seed) in which every law ran."""
 
 import contextlib
 import dataclasses
@@ -37,7 +33,7 @@ class Columns(Protocol):
         ...
 
     def scenario(self, i: int) -> Scenario:
-        """Return the scenario of row i. Raise ScenarioError if it cannot be restore."""
+        """Return the scenario of row i. Raise ScenarioError if it cannot be restored."""
         ...
 
 
@@ -74,45 +70,24 @@ def failures(table: Columns) -> list[str]:
 
 
 class Scores(NamedTuple):
-    """The scores of a group's laws in the blocks in which a metric applies; empty if there is none.
+    """The scores of a group's laws in the blocks in which a metric applies, law -> (blocks, seeds); empty for none."""
 
-    Attributes:
-      blocks: the numbers of these blocks in the group.
-      values: law -> (blocks, seeds). NaN where not all laws ran, and where every law did the same as with an earlier
-        seed.
-      outcomes, sets: law -> (blocks, seeds), as `Group.outcome` and `Group.sets`.
-    """
-
-    blocks: list[int]
-    values: dict[str, np.ndarray]
-    outcomes: dict[str, np.ndarray]
-    sets: dict[str, np.ndarray]
+    blocks: list[int]  # the numbers of these blocks in the group
+    values: dict[str, np.ndarray]  # NaN where not all laws ran, or every law did the same as with an earlier seed
+    outcomes: dict[str, np.ndarray]  # as `Group.outcome`
+    sets: dict[str, np.ndarray]  # as `Group.sets`
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Group:
-    """The runs that share a plant, a condition, or both.
+    """The runs that share a plant, a condition, or both. Arrays are (laws, blocks, seeds), -1 where there is no run."""
 
-    Attributes:
-      name: the plant or condition that they share, or both, as column -> value.
-      laws: names of the laws that ran.
-      blocks: (plant, condition), in the table's order.
-      rows: (laws, blocks, seeds), the row of each run in the table; -1 where there is no run.
-      outcome: (laws, blocks, seeds), equal for runs of a law that differ only by rounding; -1 where there is no run.
-      sets: (laws, blocks, seeds), equal for runs with the same gains; -1 where there is no run.
-    """
-
-    name: Mapping[str, str]
-    laws: tuple[str, ...]
-    blocks: tuple[tuple[str, str], ...]
-    rows: np.ndarray
-    outcome: np.ndarray
-    sets: np.ndarray
-
-    @property
-    def plants(self) -> int:
-        """The number of plants in the runs."""
-        return len({plant for plant, _ in self.blocks})
+    name: Mapping[str, str]  # the plant or condition that they share, or both, as column -> value
+    laws: tuple[str, ...]  # names of the laws that ran
+    blocks: tuple[tuple[str, str], ...]  # (plant, condition), in the table's order
+    rows: np.ndarray  # the row of each run in the table
+    outcome: np.ndarray  # equal for runs of a law that differ only by rounding
+    sets: np.ndarray  # equal for runs with the same gains
 
     @property
     def common(self) -> np.ndarray:
@@ -125,11 +100,7 @@ class Group:
         return tuple(self.common.sum(axis=1).tolist())
 
     def scores(self, by_row: np.ndarray) -> Scores:
-        """Return the scores of the laws in the blocks in which a metric applies.
-
-        Raises:
-          ScenarioError: the laws share no cell.
-        """
+        """Return the scores of the laws in the blocks in which a metric applies."""
         cube = np.where(self.rows >= 0, by_row[self.rows], np.nan)
         if np.isnan(cube).all():
             return Scores([], {}, {}, {})
@@ -148,11 +119,7 @@ class Group:
 
 
 def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
-    """Return the groups of a table, in the order of its rows; () is the whole table.
-
-    Raises:
-      ScenarioError: no runs, an unknown group, two runs in a cell, or runs of a cell that differ in more than the law.
-    """
+    """Return the groups of a table, in the order of its rows; () is the whole table."""
     by = items_of("by", by)
     for name in by:
         if name not in GROUPS:
@@ -174,8 +141,7 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
 def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return a number for each row, the same for runs with the same gains: 0 if there is no column "scenario".
 
-    Raises:
-      ScenarioError: runs of one plant, condition and seed differ in more than the law.
+    Raise ScenarioError if runs of one plant, condition and seed differ in more than the law.
     """
     try:
         texts = table.column("scenario")
@@ -193,10 +159,9 @@ def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarr
         first_law, expected = first.setdefault(cell, (law, conditions))
         if conditions != expected and (difference := _difference(expected, conditions)):
             what, one, two = difference
-            raise ScenarioError(
-                f"runs of {cell[0]}, {cell[1]}, seed {cell[2]} are not alike: {what} is {shown(one)} under {first_law} "
-                f"and {shown(two)} under {law}: give runs that differ only in the law"
-            )
+            differs = f"{what} is {shown(one)} under {first_law} and {shown(two)} under {law}"
+            where = f"{cell[0]}, {cell[1]}, seed {cell[2]}"
+            raise ScenarioError(f"runs of {where} are not alike: {differs}: give runs that differ only in the law")
     return np.array(sets, np.int64)
 
 
@@ -253,11 +218,7 @@ def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
 
 
 def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[Source, ...]]:
-    """Return law -> where the gains of its runs come from; nothing for a table without these columns.
-
-    Args:
-      rows: indices of the runs; default: all.
-    """
+    """Return law -> where the gains of its runs come from, of some rows or all; {} for a table without the columns."""
     try:
         columns = [np.asarray(table.column(name)) for name in ("law", "source", "search")]
     except ScenarioError:
@@ -273,9 +234,8 @@ def floor(scenario: Scenario | None, unit: str) -> float:
     """Return the difference of two values of a metric in this unit that matters on no machine, however small they are.
 
     For a position it is what the sensor does not resolve: the larger of half a count of the encoder and the standard
-    deviation of the noise. For a share of the initial error it is that of the largest |x0| of a driven channel. For u
-    and its variation it is MIN_COMMAND_SHARE of the bound on u: where friction holds a joint that creeps in the
-    simulation, u varies by less. It is 0 for other units, and for no scenario.
+    deviation of the noise; for a share of the initial error, that over the largest |x0| of a driven channel. For u and
+    its variation it is MIN_COMMAND_SHARE of the bound on u, because u of a joint that friction holds varies by less.
     """
     if scenario is not None and unit in ("{u}", "{u}/s"):
         return MIN_COMMAND_SHARE * max((bound for bound in scenario.limits if math.isfinite(bound)), default=0.0)

@@ -1,16 +1,8 @@
 """Comparison of laws on the runs that they share: which law is better in which block, and places over all blocks.
 
-    comparison = compare({"classical": a, "adaptive": b})  # a, b: (blocks, seeds), lower is better
-    comparison.winners                                 # the winner of each block, or None
-    comparison.best                                    # the laws of each block that no other is better than
-    comparison.effect(0, "classical", "adaptive")      # how much less the one has than the other, with its interval
-
-Blocks are fixed, runs are the sample. inf is the worst value, equal to itself.
-
-The sample. A law's gains are part of it. Where its runs have several sets of gains, runs that share a set are one
-sample, whatever their seeds: three sets are three samples. Where all runs of a law have the same gains, its seeds are
-the sample, and the conclusion holds for these gains. For two laws, runs that are linked by a shared set of either law
-are one sample, whose difference is the median of theirs. A run that repeats the results of both laws is not counted.
+Blocks are fixed, samples are as in `bootstrap`. inf is the worst value, equal to itself. For two laws, runs that are
+linked by a shared set of gains of either law are one sample, whose difference is the median of theirs. A run that
+repeats the results of both laws is not counted.
 
 The test. The difference of two laws in a sample is the logarithm of the ratio of their values. For shares, and where
 3 % of a value is less than what matters (see `paired_runs.floor`), it is the difference of the values. A law is better
@@ -24,9 +16,9 @@ boards. Both are corrected by S. Holm's method (Scandinavian Journal of Statisti
 - Winners. The winner of a block is better than every other law. Its p-value is the largest of those against the others,
   and needs no correction for their number (S. Gutmann, Z. Maymin, Annals of Statistics 15(1), 1987): the error is
   largest where two laws are equal and the others far behind. So the family is the blocks. The probability of any wrong
-  winner is at most 1 - level.
+  winner is at most 5 %.
 - Pairs. The family is all pairs of laws in all blocks. The probability that any law is wrongly called better than
-  another is at most 1 - level, in addition to that of a wrong winner.
+  another is at most 5 %, in addition to that of a wrong winner.
 
 A block without a test has one value of each law, which is no sample. There a law is better if its value is lower by
 more than the least relevant difference. The block belongs to neither family.
@@ -46,47 +38,31 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from smc_mujoco.analysis.bootstrap import confidence, middle
+from smc_mujoco.analysis.bootstrap import LEVEL, middle
 from smc_mujoco.analysis.relevant_difference import RELEVANT, ROUNDING, checked_share, least_difference
 from smc_mujoco.analysis.signed_rank import interval, min_p, p_values
 from smc_mujoco.common.errors import ScenarioError, shown
 
 
 class Rank(NamedTuple):
-    """A law's place among laws, 1 the best; ties share the mean of their places.
+    """A law's place among laws, 1 the best; ties share the mean of their places."""
 
-    Attributes:
-      law: name of the law.
-      mean: mean rank over the blocks, which orders laws and decides nothing.
-      place: place by the number of runs without a value, then by mean rank.
-      best: whether the law is among the best of every block.
-    """
-
-    law: str
-    mean: float
-    place: float
-    best: bool
+    law: str  # its name
+    mean: float  # mean rank over the blocks, which orders laws and decides nothing
+    place: float  # by the number of runs without a value, then by mean rank
+    best: bool  # whether the law is among the best of every block
 
 
 class Effect(NamedTuple):
-    """How a law's values compare with a rival's, in one block.
+    """How a law's values compare with a rival's, in one block."""
 
-    Attributes:
-      value: ratio of the law's values to the rival's, or their difference if not `relative`.
-      low, high: its interval, at the level that the correction leaves for one comparison.
-      relative: whether it is a ratio.
-      ahead: number of samples in which the law is better by more than the least relevant difference.
-      samples: number of samples.
-      sets: whether the samples are sets of gains; otherwise they are seeds.
-    """
-
-    value: float
-    low: float
+    value: float  # ratio of the law's values to the rival's, or their difference if not `relative`
+    low: float  # of its interval, at the level that the correction leaves for one comparison
     high: float
     relative: bool
-    ahead: int
+    ahead: int  # number of samples in which the law is better by more than the least relevant difference
     samples: int
-    sets: bool
+    sets: bool  # whether the samples are sets of gains; otherwise they are seeds
 
 
 class Limits(NamedTuple):
@@ -98,38 +74,20 @@ class Limits(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Comparison:
-    """Laws compared in blocks.
+    """Laws compared in blocks."""
 
-    Attributes:
-      laws: names, in alphabetical order.
-      cells: (laws, blocks, seeds), the scores; NaN where there is no run.
-      shares: whether scores are 0.0 or 1.0, and means are compared instead of medians.
-      floors: (blocks,), lower bound on the least relevant difference.
-      relevant: share of a value that is relevant.
-      level: level of confidence.
-      differences: (blocks, laws, laws, seeds), by how much the second law's value is higher, a number for each sample,
-        then NaN.
-      relative: (blocks, laws, laws), whether differences are logarithms of ratios.
-      shifts: (blocks, laws, laws), the least relevant difference of a law that is better than another.
-      p: (blocks, laws, laws), one-sided p-value, not corrected, that a law is better than another; 1 of itself.
-      sets: (laws, blocks), number of sets of gains of a law's runs.
-      untested: (blocks,), whether a value is no sample, such as a worst case, so that no test is made; p is 0 or 1.
-      limits: of the p-values, after the correction.
-    """
-
-    laws: tuple[str, ...]
-    cells: np.ndarray
-    shares: bool
-    floors: np.ndarray
-    relevant: float
-    level: float
-    differences: np.ndarray
-    relative: np.ndarray
-    shifts: np.ndarray
-    p: np.ndarray
-    sets: np.ndarray
-    untested: np.ndarray
-    limits: Limits
+    laws: tuple[str, ...]  # names, in alphabetical order
+    cells: np.ndarray  # (laws, blocks, seeds), the scores; NaN where there is no run
+    shares: bool  # whether scores are 0.0 or 1.0, and means are compared instead of medians
+    floors: np.ndarray  # (blocks,), lower bound on the least relevant difference
+    relevant: float  # share of a value that is relevant
+    differences: np.ndarray  # (blocks, laws, laws, seeds), second law's value minus the first's by sample, then NaN
+    relative: np.ndarray  # (blocks, laws, laws), whether differences are logarithms of ratios
+    shifts: np.ndarray  # (blocks, laws, laws), the least relevant difference of a law that is better than another
+    p: np.ndarray  # (blocks, laws, laws), one-sided p-value, not corrected, that a law is better; 1 of itself
+    sets: np.ndarray  # (laws, blocks), number of sets of gains of a law's runs
+    untested: np.ndarray  # (blocks,), whether a value is no sample, such as a worst case: p is 0 or 1, without a test
+    limits: Limits  # of the p-values, after the correction
 
     @functools.cached_property
     def centres(self) -> np.ndarray:
@@ -192,10 +150,7 @@ class Comparison:
 
     @functools.cached_property
     def tied(self) -> np.ndarray:
-        """Whether two laws tie, (laws, laws).
-
-        Neither is better in any block, or fails less often there, and no median is relevantly lower.
-        """
+        """Whether of two laws none is better, fails less often or has a relevantly lower median, (laws, laws)."""
         lacking = self.without_value.T
         fails_less = lacking[:, :, None] < lacking[:, None, :]
         differs = np.any(self._relevantly_lower | self.better | fails_less, axis=0)
@@ -203,11 +158,7 @@ class Comparison:
 
     @functools.cached_property
     def undecided(self) -> np.ndarray:
-        """Whether a law is not beaten for want of samples alone, (laws, blocks); False in `untested` blocks.
-
-        The median of another law is relevantly lower, and no more of its runs fail, but the two have too few samples
-        for a test to tell them apart, whatever its result.
-        """
+        """Whether a law is not beaten for want of samples alone, (laws, blocks); False in `untested` blocks."""
         few = np.vectorize(min_p)(self.samples) > self.limits.pair
         few[self.untested] = False
         return np.any(self._relevantly_lower & self._eligible & few, axis=1).T & ~self.beaten
@@ -217,17 +168,8 @@ class Comparison:
         """The laws of each block that are not beaten, with enough samples to tell."""
         return [tuple(np.array(self.laws)[row].tolist()) for row in ~(self.beaten | self.undecided).T]
 
-    @property
-    def pairs(self) -> int:
-        """The number of pairs of laws in all blocks."""
-        return len(self.differences) * math.comb(len(self.laws), 2)
-
     def effect(self, block: int, law: str, rival: str, winner: bool = True) -> Effect:
-        """Return how a law compares with a rival in a block.
-
-        Args:
-          winner: whether the interval has the level of a winner's comparison, or that of one of all pairs.
-        """
+        """Return how a law compares with a rival in a block, at the level of a winner's comparison or of any pair's."""
         a, b = self.laws.index(law), self.laws.index(rival)
         differences, relative = self.differences[block, a, b], bool(self.relative[block, a, b])
         shift = interval(-differences, self.limits.winner if winner else self.limits.pair)
@@ -246,26 +188,18 @@ def compare(
     scores: Mapping[str, ArrayLike],
     floors: ArrayLike = 0.0,
     shares: bool = False,
-    level: float = 0.95,
     outcomes: Mapping[str, ArrayLike] | None = None,
     sets: Mapping[str, ArrayLike] | None = None,
     relevant: float = RELEVANT,
     limits: Limits | None = None,
     untested: ArrayLike = False,
 ) -> Comparison:
-    """Compare every law with every other in every block.
+    """Compare every law with every other in every block; see `Comparison`.
 
-    Args:
-      scores: law -> (blocks, n) or (n,), lower is better, inf for never. NaN where no law has a run.
-      floors: one for all blocks, or one for each, see `Comparison`.
-      shares, level, relevant: see `Comparison`.
-      outcomes: law -> a number per cell, equal if the law had the same result from two seeds. Default: all runs differ.
-      sets: law -> a number per cell, equal if the law had the same gains. Default: one set of gains.
-      limits: of the p-values, where the blocks belong to a larger family. Default: those of these blocks.
-      untested: one for all blocks, or one for each, see `Comparison`.
-
-    Raises:
-      ScenarioError: no laws, or laws with different cells.
+    Scores are law -> (blocks, n) or (n,), lower is better, inf for never, NaN where no law has a run. Floors and
+    `untested` are one for all blocks, or one for each. Outcomes and sets are law -> a number per cell, equal if two
+    seeds gave the same result, or had the same gains; default: all results differ, and all gains are the same. Limits
+    are given where the blocks belong to a larger family.
     """
     laws, cells = _cells(scores)
     blocks, relevant = range(cells.shape[1]), checked_share(relevant)
@@ -292,7 +226,6 @@ def compare(
         shares=shares,
         floors=floors,
         relevant=relevant,
-        level=confidence(level),
         differences=differences,
         relative=relative,
         shifts=shifts,
@@ -301,7 +234,7 @@ def compare(
         untested=untested,
         limits=limits or Limits(0.0, 0.0),
     )
-    return comparison if limits else dataclasses.replace(comparison, limits=corrected_limits([comparison], level))
+    return comparison if limits else dataclasses.replace(comparison, limits=corrected_limits([comparison]))
 
 
 def _stacked(by_law: Mapping[str, ArrayLike], laws: Sequence[str]) -> np.ndarray:
@@ -310,13 +243,7 @@ def _stacked(by_law: Mapping[str, ArrayLike], laws: Sequence[str]) -> np.ndarray
 
 
 def _differences(cells: np.ndarray, relative: np.ndarray, results: np.ndarray | None, sets: np.ndarray) -> np.ndarray:
-    """Return `Comparison.differences` of one block, (laws, laws, seeds).
-
-    Args:
-      cells, sets: (laws, seeds).
-      relative: (laws, laws).
-      results: (laws, seeds), a number for each run's result; None if all runs differ.
-    """
+    """Return `Comparison.differences` of one block, (laws, laws, seeds); cells, sets and results are (laws, seeds)."""
     k, ran = len(cells), ~np.isnan(cells[:1])
     differences = np.full((k, *cells.shape), math.nan)
     for a in range(k - 1):
@@ -356,11 +283,7 @@ def _shifts(centres: np.ndarray, floors: np.ndarray, relative: np.ndarray, relev
 
 
 def _ratios_make_sense(cells: np.ndarray, floor: float, relevant: float) -> np.ndarray:
-    """Return for which laws (laws, laws) the relevant share of both medians is above the floor.
-
-    Args:
-      cells: (laws, seeds), of one block.
-    """
+    """Return for which laws (laws, laws) the relevant share of both medians of a block is above the floor."""
     smallest = middle(cells) * (relevant or RELEVANT) >= max(floor, ROUNDING)
     smallest &= ~np.any(cells < 0, axis=1)
     return smallest[:, None] & smallest
@@ -378,7 +301,7 @@ def _pairwise(law: np.ndarray, rivals: np.ndarray, relative: np.ndarray) -> np.n
 def _by_sample(differences: np.ndarray, sets: np.ndarray, rival_sets: np.ndarray) -> np.ndarray:
     """Return the median difference of each sample, then NaN: runs linked by a set of gains are one sample."""
     runs = np.flatnonzero(~np.isnan(differences))
-    labels = linked(*(numbers[runs].tobytes() for numbers in (sets, rival_sets)))
+    labels = linked(sets[runs], rival_sets[runs])
     if labels is None:
         return differences
     centres = np.full(differences.shape, math.nan)
@@ -389,61 +312,25 @@ def _by_sample(differences: np.ndarray, sets: np.ndarray, rival_sets: np.ndarray
     return centres
 
 
-@functools.lru_cache(maxsize=4096)
-def linked(*sets: bytes) -> tuple[int, ...] | None:
+def linked(*sets: np.ndarray) -> tuple[int, ...] | None:
     """Return a number for each run, the same for runs that share a set of gains, directly or through others.
 
-    A law with one set of gains links nothing. None if no two runs are linked.
-
-    Args:
-      sets: for each law the number of the set of each run, as bytes of int64.
+    Each of `sets` has the number of the set of each run, -1 where there is no run. One that has a single set links
+    nothing. None if no two runs are linked.
     """
-    parent: list[int] | None = None
-    for numbers in (np.frombuffer(one, np.int64) for one in sets):
-        if np.unique(numbers).size < 2:
-            continue
-        parent = parent or list(range(numbers.size))
-        first: dict[int, int] = {}
-        for run, number in enumerate(numbers.tolist()):
-            one, other = _root(parent, run), _root(parent, first.setdefault(number, run))
-            parent[max(one, other)] = min(one, other)
-    if parent is None:
+    from scipy.sparse.csgraph import connected_components
+
+    links = np.eye(sets[0].size, dtype=bool)
+    for numbers in sets:
+        if np.unique(numbers[numbers >= 0]).size > 1:
+            links |= (numbers[:, None] == numbers) & (numbers >= 0)
+    if links.sum() == len(links):
         return None
-    roots = [_root(parent, run) for run in range(len(parent))]
-    labels = {root: k for k, root in enumerate(dict.fromkeys(roots))}
-    return None if len(labels) == len(roots) else tuple(labels[root] for root in roots)
-
-
-def samples_of(sets: np.ndarray) -> tuple[int, ...] | None:
-    """Return the sample of each run of one law, see `linked`.
-
-    Args:
-      sets: (blocks, runs), the number of the set of gains; -1 where there is no run.
-    """
-    return linked(*map(_sets_as_bytes, np.atleast_2d(sets)))
-
-
-def _sets_as_bytes(sets: np.ndarray) -> bytes:
-    """Return the sets of a block as `linked` takes them, where a missing run shares no set."""
-    if np.unique(sets[sets >= 0]).size < 2:
-        return np.zeros(sets.size, np.int64).tobytes()
-    return np.where(sets < 0, -1 - np.arange(sets.size), sets).astype(np.int64).tobytes()
-
-
-def _root(parent: Sequence[int], run: int) -> int:
-    """Return the first run of the group to which a run belongs."""
-    while parent[run] != run:
-        run = parent[run]
-    return run
+    return tuple(connected_components(links, directed=False)[1].tolist())
 
 
 def first_of_kind(outcomes: np.ndarray, exists: np.ndarray) -> np.ndarray:
-    """Return which cells (blocks, seeds) exist and do not repeat the outcomes of an earlier cell of their block.
-
-    Args:
-      outcomes: (laws, blocks, seeds), a number for the result of each law.
-      exists: (blocks, seeds), which cells exist.
-    """
+    """Return which cells (blocks, seeds) exist and do not repeat the outcomes (laws, blocks, seeds) of earlier ones."""
     first = np.zeros(exists.shape, bool)
     for block, of_block in enumerate(exists):
         seeds = np.flatnonzero(of_block)
@@ -451,7 +338,7 @@ def first_of_kind(outcomes: np.ndarray, exists: np.ndarray) -> np.ndarray:
     return first
 
 
-def corrected_limits(comparisons: Sequence[Comparison], level: float = 0.95) -> Limits:
+def corrected_limits(comparisons: Sequence[Comparison]) -> Limits:
     """Return the limits of p-values for comparisons that form one family."""
     pairs, winners = [], []
     for one in comparisons:
@@ -459,7 +346,7 @@ def corrected_limits(comparisons: Sequence[Comparison], level: float = 0.95) -> 
             p, diagonal = one.p[~one.untested], np.eye(len(one.laws), dtype=bool)
             pairs.append(np.minimum(p, p.transpose(0, 2, 1))[:, *np.triu_indices(len(one.laws), 1)].ravel())
             winners.append(np.where(diagonal, 0.0, p).max(axis=2).min(axis=1))
-    error = 1.0 - confidence(level)
+    error = 1.0 - LEVEL
     return Limits(*(_holm(np.concatenate([*each, []]), error / 2) for each in (pairs, winners)))
 
 
@@ -471,8 +358,12 @@ def _holm(p: np.ndarray, error: float) -> float:
 
 
 def ranks(comparison: Comparison) -> list[Rank]:
-    """Return the laws' ranks: those with the fewest runs without a value first, then by mean rank."""
-    mean = block_ranks(comparison).mean(axis=1)
+    """Return the laws' ranks: those with the fewest runs without a value first, then by mean rank.
+
+    In a block, medians that differ by less than the least relevant difference are tied.
+    """
+    by_block = ranked(comparison.centres, comparison.floors, comparison.without_value, comparison.relevant)
+    mean = by_block.mean(axis=1)
     lacking = comparison.without_value.sum(axis=1)
     order = [tuple(row) for row in zip(lacking.tolist(), mean.round(9).tolist(), strict=True)]
     places = [sum(other < one for other in order) + (1 + order.count(one)) / 2 for one in order]
@@ -481,16 +372,8 @@ def ranks(comparison: Comparison) -> list[Rank]:
     return sorted(rows, key=lambda rank: (rank.place, rank.law))
 
 
-def block_ranks(comparison: Comparison) -> np.ndarray:
-    """Return the laws' ranks in each block, (laws, blocks): by runs without a value, then by medians.
-
-    Medians that differ by less than the least relevant difference are tied.
-    """
-    return ranked(comparison.centres, comparison.floors, comparison.without_value, comparison.relevant)
-
-
 def ranked(centres: np.ndarray, floors: np.ndarray, lacking: ArrayLike = 0, relevant: float = RELEVANT) -> np.ndarray:
-    """Return the ranks of laws (laws, blocks) with these medians and numbers of runs without a value."""
+    """Return the ranks of laws in each block (laws, blocks): by numbers of runs without a value, then by medians."""
     lowered = centres - least_difference(centres, floors, relevant)
     lacking = np.broadcast_to(lacking, centres.shape)
     behind = lacking[:, None] > lacking[None]

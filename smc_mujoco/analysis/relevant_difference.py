@@ -1,9 +1,7 @@
 """The least relevant difference of two values of a metric, and differences by rounding.
 
-    exceeds(0.31, 0.30)                                # True: more than 3 % of the larger value
-    exceeds(0.31, 0.30, resolution=0.02)               # False: less than the sensor resolves
-
-All comparisons use the same least relevant difference: `ranking` of laws, and the answers of scenes.
+`ranking` of laws and the answers of scenes use the same one: more than 3 % of the larger value, or what the sensor
+resolves.
 """
 
 import numpy as np
@@ -18,11 +16,8 @@ ROUNDING = 1e-9  # in SI units: smaller differences are a tie, because they depe
 def least_difference(value: ArrayLike, resolution: ArrayLike = 0.0, relevant: float = RELEVANT) -> np.ndarray:
     """Return the least relevant difference between a value >= 0 and a smaller one.
 
-    It is the larger of a share of the value and the resolution. Any difference from inf is relevant.
-
-    Args:
-      resolution: a lower bound in the unit of the value, see `paired_runs.floor`; 0 without one.
-      relevant: the share of the value.
+    It is the larger of a share of the value and the resolution, see `paired_runs.floor`. Any difference from inf is
+    relevant.
     """
     share = relevant * np.where(np.isinf(value), 0.0, np.abs(value))
     return np.maximum(share, np.maximum(resolution, ROUNDING))

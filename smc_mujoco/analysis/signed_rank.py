@@ -1,8 +1,5 @@
 """Wilcoxon's signed-rank test of many paired samples at once, and the interval that belongs to it.
 
-    p_values([[0.1, 0.3, 0.2, 0.4]])                   # [0.0625]: the differences are positive by chance
-    interval([0.1, 0.3, 0.2, 0.4], 0.1)                # 0.25, from 0.15 to 0.35
-
 The test (F. Wilcoxon, Biometrics Bulletin 1(6), 1945) is exact if differences are symmetric about their centre, as
 those of two equal laws are, whatever the distribution: heavy tails, skew and infinite values of the laws change
 nothing. The estimate is the median of the means of all pairs of differences (J. L. Hodges, E. L. Lehmann, Annals of
@@ -32,10 +29,9 @@ class Centre(NamedTuple):
 
 
 def p_values(differences: ArrayLike) -> np.ndarray:
-    """Return the one-sided p-values with which differences (..., n) lie above 0; 1 without a difference.
+    """Return the one-sided p-values with which differences (..., n), NaN for none, lie above 0; 1 without any.
 
-    NaN is a missing difference. A difference of 0 counts as negative. Ties share their ranks, and the distribution is
-    that of the shared ranks.
+    A difference of 0 counts as negative. Ties share their ranks, and the distribution is that of the shared ranks.
     """
     from scipy.stats import rankdata
 
@@ -54,9 +50,9 @@ def p_values(differences: ArrayLike) -> np.ndarray:
 
 
 def interval(differences: ArrayLike, error: float) -> Centre:
-    """Return the centre of differences (n,) and an interval that misses it on either side with probability `error`.
+    """Return the centre of differences (n,), NaN for none, and an interval that misses it on a side by chance `error`.
 
-    NaN is a missing difference. An end is infinite where the sample is too small for `error`.
+    An end is infinite where the sample is too small for `error`.
     """
     known = np.asarray(differences, float)
     known = known[~np.isnan(known)]

@@ -12,7 +12,7 @@ from matplotlib.ticker import NullFormatter
 
 from smc_mujoco.analysis.bootstrap import MIN_INTERVAL_SAMPLES, Interval, median_of, share_interval
 from smc_mujoco.analysis.paired_runs import GROUPS, SETTLES, Columns, groups, sources, values
-from smc_mujoco.analysis.ranking import samples_of
+from smc_mujoco.analysis.ranking import linked
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
@@ -96,7 +96,7 @@ def _intervals(table: Columns, metrics: Sequence[str]) -> dict[tuple[str, str, s
         for metric in metrics:
             scores = group.scores(by_row[metric])
             for law, of_law in scores.values.items():
-                interval = median_of(of_law, samples=samples_of(scores.sets[law]))
+                interval = median_of(of_law, linked(*scores.sets[law]))
                 if metric == SETTLES:
                     interval = share_interval(float((of_law == 0.0).mean()), interval.n)
                 else:

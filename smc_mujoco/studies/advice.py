@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from smc_mujoco.analysis.bootstrap import LEVEL
 from smc_mujoco.analysis.paired_runs import failures
 from smc_mujoco.analysis.ranking import Comparison
 from smc_mujoco.analysis.signed_rank import min_p
@@ -216,7 +217,7 @@ class Advice(Tables):
     def _too_few(self) -> bool:
         """Whether no comparison can tell two laws apart, with the samples that there are."""
         smallest_p = 2 * min_p(int(self.comparison.samples.max()))
-        return not self.comparison.untested.any() and smallest_p > (1 - self.comparison.level) / len(self.blocks)
+        return not self.comparison.untested.any() and smallest_p > (1 - LEVEL) / len(self.blocks)
 
     # the answer
 

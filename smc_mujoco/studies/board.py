@@ -10,7 +10,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from smc_mujoco.analysis.bootstrap import MIN_INTERVAL_SAMPLES, Interval
+from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
 from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, SETTLES
 from smc_mujoco.analysis.ranking import Effect, Rank
 from smc_mujoco.analysis.signed_rank import min_p
@@ -137,7 +137,6 @@ class Board(Tables):
       entries: lowest mean rank first. A median over several plants is NaN if its unit depends on the plant.
       blocks: the same laws on each plant in each condition.
       family: number of blocks of the table for which winners are corrected.
-      level: level of intervals and tests.
       relevant: share of a value that is relevant.
       resolution: the largest lower bound on the least relevant difference, in the unit of the board.
       by_step: whether it is about chattering without RK4, which half the physics step may change.
@@ -149,7 +148,6 @@ class Board(Tables):
     entries: tuple[Entry, ...]
     blocks: tuple[Block, ...]
     family: int
-    level: float
     relevant: float
     resolution: float
     by_step: bool
@@ -262,7 +260,7 @@ class Board(Tables):
     def too_few(self) -> str:
         """The size of the sample in words, if no block has enough samples for a winner; else ""."""
         largest = max(self.blocks, key=lambda block: block.samples)
-        smallest_p, error = 2 * min_p(largest.samples), 1 - self.level
+        smallest_p, error = 2 * min_p(largest.samples), 1 - LEVEL
         if smallest_p <= error / self.family:
             return ""
         compared = f", too few for {self.family} comparisons" if smallest_p <= error else ", too few"
@@ -430,7 +428,7 @@ def _cell(board: Board, entry: Entry) -> Cell:
 
 def key(boards: Sequence[Board]) -> str:
     """Return what the cells of a table show."""
-    words = f"Medians with {100 * boards[0].level:g} % intervals over runs, or over sets of gains that runs share"
+    words = f"Medians with {100 * LEVEL:g} % intervals over runs, or over sets of gains that runs share"
     medians = [entry.interval for board in boards if board.metric != SETTLES for entry in board.entries]
     if any(interval.n < MIN_INTERVAL_SAMPLES for interval in medians):
         words += f"; of fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, and covers less"

@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
-from smc_mujoco.analysis.bootstrap import RESAMPLES, Interval, median_of, share_interval
+from smc_mujoco.analysis.bootstrap import Interval, median_of, share_interval
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns, Group, Scores
-from smc_mujoco.analysis.ranking import Comparison, Limits, compare, corrected_limits, ranks, samples_of
+from smc_mujoco.analysis.ranking import Comparison, Limits, compare, corrected_limits, linked, ranks
 from smc_mujoco.analysis.relevant_difference import RELEVANT
 from smc_mujoco.analysis.step_halving import depends_on_step
-from smc_mujoco.common.errors import ScenarioError, find, shown, whole
+from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies.board import Block, Board, Boards, Entry, Lead
@@ -41,9 +41,6 @@ def leaderboard(
     table: Columns,
     metrics: Sequence[str] = METRICS,
     by: Sequence[str] = ("plant",),
-    level: float = 0.95,
-    resamples: int = RESAMPLES,
-    seed: int = 0,
     defaults: bool = False,
     relevant: float = RELEVANT,
     worst: "Mapping[str, Mapping[str, WorstCase]] | None" = None,
@@ -59,8 +56,6 @@ def leaderboard(
       table: a study's runs, as `smc.Table.read` returns them.
       metrics: names of metrics, for which lower is better, or "settles".
       by: what the runs of a group have in common, of "plant" and "condition"; () for one group of all runs.
-      level: level of confidence.
-      resamples, seed: number of resamples of the bootstrap, and seed of their draws.
       defaults: whether a winner may be named over laws whose gains are their defaults.
       relevant: the least relevant difference, as a share of the larger value. `paired_runs.floor` is its lower bound.
       worst: plant -> law -> its `worst_case`, for a column of the tables.
@@ -72,12 +67,12 @@ def leaderboard(
         raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
     known = {SETTLES: ""} | {name: metric.unit for name, metric in CATALOGUE.items()}
     units = {name: find("metric", name, known) for name in metrics}
-    boards, seed = Boards(), whole("seed", seed, 0, 2**53 - 1)
+    boards = Boards()
     boards.worst, boards.failures = worst or {}, paired_runs.failures(table)
     by_row = {name: paired_runs.values(table, name) for name in units}
     groups = list(paired_runs.groups(table, by))
     every = groups if set(by) == set(paired_runs.GROUPS) else list(paired_runs.groups(table, paired_runs.GROUPS))
-    families = {name: _family(table, every, by_row[name], name, units[name], level, relevant) for name in units}
+    families = {name: _family(table, every, by_row[name], name, units[name], relevant) for name in units}
     for group in groups:
         ran = paired_runs.scenarios(table, group)
         sources = paired_runs.sources(table, group.rows[group.rows >= 0])
@@ -88,10 +83,8 @@ def leaderboard(
             scores = group.scores(by_row[metric])
             if not scores.blocks:
                 continue
-            comparison = _compared(scores, ran, metric, unit, level, relevant, limits)
-            boards.append(
-                _board(group, scores, ran, metric, unit, comparison, untuned, sources, family, resamples, seed)
-            )
+            comparison = _compared(scores, ran, metric, unit, relevant, limits)
+            boards.append(_board(group, scores, ran, metric, unit, comparison, untuned, sources, family))
     return boards
 
 
@@ -100,13 +93,12 @@ def _compared(
     ran: "Sequence[Scenario | None]",
     metric: str,
     unit: str,
-    level: float,
     relevant: float,
     limits: Limits,
 ) -> Comparison:
     """Compare the scores of laws in a metric whose unit is `unit`; `ran` has a scenario of each block of the group."""
     floors = [paired_runs.floor(ran[k], unit) for k in scores.blocks]
-    return compare(scores.values, floors, metric == SETTLES, level, scores.outcomes, scores.sets, relevant, limits)
+    return compare(scores.values, floors, metric == SETTLES, scores.outcomes, scores.sets, relevant, limits)
 
 
 def _board(
@@ -119,8 +111,6 @@ def _board(
     untuned: tuple[str, ...],
     sources: Mapping[str, tuple[Source, ...]],
     family: int,
-    resamples: int,
-    seed: int,
 ) -> Board:
     """Return the board of a comparison, whose limits are corrected for `family` comparisons."""
     if all((scenario := ran[k]) is not None and scenario.voltage_motor for k in scores.blocks):
@@ -133,10 +123,9 @@ def _board(
         group=group.name,
         metric=metric,
         unit=unit,
-        entries=_entries(comparison, scores.sets, sources, mixed, resamples, seed),
+        entries=_entries(comparison, scores.sets, sources, mixed),
         blocks=blocks,
         family=family,
-        level=comparison.level,
         relevant=comparison.relevant,
         resolution=float(comparison.floors.max()),
         by_step=metric.startswith("chattering") and any(map(depends_on_step, filter(None, ran))),
@@ -144,7 +133,7 @@ def _board(
 
 
 def _family(
-    table: Columns, blocks: Sequence[Group], by_row: np.ndarray, metric: str, unit: str, level: float, relevant: float
+    table: Columns, blocks: Sequence[Group], by_row: np.ndarray, metric: str, unit: str, relevant: float
 ) -> tuple[Limits, int]:
     """Return the limits of the p-values of a metric, corrected for all blocks of a table, and the number of these."""
     comparisons = []
@@ -155,8 +144,8 @@ def _family(
             continue
         if scores.values:
             ran = paired_runs.scenarios(table, group)
-            comparisons.append(_compared(scores, ran, metric, unit, level, relevant, Limits(0.0, 0.0)))
-    return corrected_limits(comparisons, level), sum(len(comparison.laws) > 1 for comparison in comparisons) or 1
+            comparisons.append(_compared(scores, ran, metric, unit, relevant, Limits(0.0, 0.0)))
+    return corrected_limits(comparisons), sum(len(comparison.laws) > 1 for comparison in comparisons) or 1
 
 
 def _unit(metric: str, unit: str, scenario: "Scenario | None") -> str:
@@ -207,21 +196,19 @@ def _entries(
     sets: Mapping[str, np.ndarray],
     sources: Mapping[str, tuple[Source, ...]],
     mixed: bool,
-    resamples: int,
-    seed: int,
 ) -> tuple[Entry, ...]:
     """Return the entries of all laws. If `mixed`, values have several units, so there is no median."""
     entries = []
     for rank in ranks(comparison):
         at = comparison.laws.index(rank.law)
-        values, samples = comparison.cells[at], samples_of(sets[rank.law])
+        values, samples = comparison.cells[at], linked(*sets[rank.law])
         n = values.shape[1] if samples is None else max(samples) + 1
         if comparison.shares:
-            interval = share_interval(float(1 - np.nanmean(values, axis=1).mean()), n, comparison.level)
+            interval = share_interval(float(1 - np.nanmean(values, axis=1).mean()), n)
         elif mixed:
             interval = Interval(math.nan, math.nan, math.nan, n)
         else:
-            interval = median_of(values, comparison.level, resamples, seed, samples)
+            interval = median_of(values, samples)
         failed, runs = int(comparison.without_value[at].sum()), int((~np.isnan(values)).sum())
         its = sources.get(rank.law, ())
         entries.append(Entry(law=rank.law, interval=interval, rank=rank, failed=failed, runs=runs, sources=its))

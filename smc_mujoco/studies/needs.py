@@ -10,7 +10,7 @@ import numpy as np
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import Interval, median_of
 from smc_mujoco.analysis.paired_runs import Group, Scores
-from smc_mujoco.analysis.ranking import Rank, samples_of
+from smc_mujoco.analysis.ranking import Rank, linked
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
@@ -84,7 +84,7 @@ class Need:
 
     def median(self, scores: Scores, law: str) -> Interval:
         """Return a law's median over the conditions."""
-        return median_of(scores.values[law], samples=samples_of(scores.sets[law]))
+        return median_of(scores.values[law], linked(*scores.sets[law]))
 
     def below(self, choice: Choice) -> str:
         """Return the text below the median of a law in a table: its interval, if that has a width."""

@@ -202,7 +202,7 @@ def test_latex_has_no_letter_that_an_engine_may_not_know():
     ("options", "stand"),
     [
         ({"metrics": (*METRICS, "settling_time")}, {}),
-        ({"metrics": ["itae", "settling_time"], "level": 0.9, "relevant": 0.5}, {"seeds": 3}),
+        ({"metrics": ["itae", "settling_time"], "relevant": 0.5}, {"seeds": 3}),
         ({"metrics": ["itae", "settles"], "by": ("condition",)}, {"conditions": ("nominal", "noise")}),
         ({"metrics": ["itae"], "by": ()}, {"conditions": tuple("abcde"), "seeds": 6}),
     ],

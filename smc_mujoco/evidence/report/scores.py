@@ -13,7 +13,7 @@ import numpy as np
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.analysis.paired_runs import SETTLES
-from smc_mujoco.analysis.ranking import samples_of
+from smc_mujoco.analysis.ranking import linked
 from smc_mujoco.analysis.relevant_difference import RELEVANT
 from smc_mujoco.evidence.report import words
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -92,7 +92,7 @@ def scores(table: "Table", relevant: float = RELEVANT) -> tuple[Score, ...]:
             by_law = group.scores(by_row[metric])
             for law in sorted(by_law.values, key=order.index):
                 block = blocks[plant, condition, metric]
-                interval = median_of(by_law.values[law], samples=samples_of(by_law.sets[law]))
+                interval = median_of(by_law.values[law], linked(*by_law.sets[law]))
                 wins = block.winner == law
                 score = Score(
                     plant=plant,
