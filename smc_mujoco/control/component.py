@@ -13,14 +13,14 @@ import math
 import re
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
 
 from smc_mujoco.common import errors
-from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown, users_stacklevel, whole
+from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown, unknown, users_stacklevel, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
 from smc_mujoco.control.units import Gain, Unit
@@ -32,40 +32,25 @@ AccuracyOrder = float | Callable[[SimpleNamespace], float]  # a number, or a fun
 
 
 class Rest(NamedTuple):
-    """The linear part of a law that is linear near s = 0.
+    """The linear part of a law that is linear near s = 0."""
 
-    Attributes:
-      linear: gains -> (lam, k1) of u = -lam (e' + k1 e), the law near s = 0. Gains are read by attribute.
-      force: (gains, errors x of shape (k,)) -> the force towards 0 at rest at x, shape (k,).
-    """
-
-    linear: Callable[[SimpleNamespace], tuple[float, float]]
-    force: Callable
+    linear: Callable[[SimpleNamespace], tuple[float, float]]  # gains -> (lam, k1) of u = -lam (e' + k1 e), near s = 0
+    force: Callable  # (gains, errors x of shape (k,)) -> the force towards 0 at rest at x, shape (k,)
 
 
 class Options(TypedDict, total=False):
-    """Options of every decorator; `law_function` explains them."""
+    """Options of the decorators; `law_function` explains them."""
 
     gains: Mapping[str, float | Gain] | None
     memory: int
     positive: Iterable[str]
     nonnegative: Iterable[str]
-    conditions: GainConditions | None
-    label: str
-
-
-class SurfaceOptions(Options, total=False):
-    """Options of `surface_function`."""
-
     relative_degree: int
-
-
-class LawOptions(SurfaceOptions, total=False):
-    """Options of `law_function`."""
-
+    conditions: GainConditions | None
     plants: Iterable[str]
     requires_model: bool
     short: str
+    label: str
     colour: str
     rest: Rest | None
     family: str
@@ -74,10 +59,6 @@ class LawOptions(SurfaceOptions, total=False):
     accuracy: Mapping[str, AccuracyOrder]
     admits: Mapping[str, Callable[[SimpleNamespace], float]]
     joint: bool
-
-
-OPTIONS = {"law": LawOptions, "surface": SurfaceOptions, "estimator": Options}
-OPTION_KEYS = {"accuracy": ("s", "e"), "admits": ("d", "d'")}  # option that is a mapping -> its possible keys
 
 
 class GainWarning(UserWarning):
@@ -124,15 +105,12 @@ class Component:
         return super().__reduce__()
 
     def __post_init__(self):
-        if not isinstance(self.name, str):
-            raise ScenarioError(f"name of a {self.kind} is {shown(self.name)}: give a text")
         gains = {name: _checked_gain(f"{self.name}'s {name}", gain, infinite=True) for name, gain in self.gains.items()}
         object.__setattr__(self, "gains", frozen(gains))
         if self.source.gains != self.gains:  # the gains were replaced
             object.__setattr__(self, "source", Source(kind=YOURS if gains else NONE, gains=self.gains))
         if self.template and (self.template.function is not self.function or self.template.name != self.name):
             object.__setattr__(self, "template", None)  # the function or the name was replaced
-        whole(f"memory of {self.name}", self.memory, 1, 10_000)
 
     def named(self, name: str) -> "Component":
         """Return the same function and gains under another name, to compare two sets of gains of one law.
@@ -147,11 +125,7 @@ class Component:
         return dataclasses.replace(self, name=name, template=template)
 
     def sourced(self, kind: str, search: Search | None = None) -> "Component":
-        """Return the same law with another source of its gains, one of `source.KINDS`; a law without gains has none.
-
-        Raises:
-          ScenarioError: an unknown kind.
-        """
+        """Return the same law with another source of its gains, one of `source.KINDS`; a law without gains has none."""
         source = Source(kind=kind, gains=self.gains, search=search)
         return dataclasses.replace(self, source=source) if self.gains else self
 
@@ -203,12 +177,9 @@ def unit_cure(name: str, default: GainValue) -> str:
 def _checked_gain(name: str, value: object, **limits: Any) -> GainValue:
     """Return a gain, one number or a tuple of one for each channel, checked as `number` checks it."""
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
-        listed = value.tolist() if isinstance(value, np.ndarray) else items_of(name, value)
-        if not isinstance(listed, Sequence) or not listed:
+        if not (listed := items_of(name, value)):
             raise ScenarioError(f"{name} is {shown(value)}: give a number, or one for each driven channel")
         return tuple(number(f"{name}[{i}]", one, **limits) for i, one in enumerate(listed))
-    if isinstance(value, Mapping | Set):
-        raise ScenarioError(f"{name} is {shown(value)}: give a number, or a list with one for each driven channel")
     return number(name, value, **limits)
 
 
@@ -230,33 +201,18 @@ def _unpickled(module: str, qualname: str, gains: dict[str, float], name: str, s
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Template:
-    """A function with the properties that its decorator gives it.
-
-    Attributes:
-      gains: name -> default, unit and range.
-      memory: floats of memory per channel.
-      relative_degree: of the sliding variable that a law needs, or that a surface gives.
-      conditions: condition of a theorem, in words -> function of the gains, read by attribute, that tests it.
-      plants: names of the plants it is for; empty for all plants.
-      requires_model: whether it needs the nominal model.
-      label, short, colour: as in the decorator; "" means automatic, see `smc_mujoco.draw.style`.
-      rest: its linear part; None if it is not linear at rest.
-      family, continuous, finite_time: as in the decorator; `smc_mujoco.control.properties` chooses laws by them.
-      accuracy: as in the decorator; `order` evaluates it.
-      admits: as in the decorator.
-      joint: whether it is a law of many joints.
-    """
+    """A function with the properties that its decorator gives it, see `law_function`."""
 
     kind: str
     name: str
     function: Callable
     gains: Mapping[str, Gain]
-    memory: int
-    relative_degree: int = 1
+    memory: int  # floats per channel
+    relative_degree: int = 1  # of the sliding variable that a law needs, or that a surface gives
     conditions: GainConditions = dataclasses.field(default_factory=dict)
-    plants: tuple[str, ...] = ()
+    plants: tuple[str, ...] = ()  # empty for all plants
     requires_model: bool = False
-    label: str = ""
+    label: str = ""  # this and the next two: "" means automatic, see `smc_mujoco.draw.style`
     short: str = ""
     colour: str = ""
     rest: Rest | None = None
@@ -298,18 +254,7 @@ class Template:
         return self.bind(gains, warn=True)
 
     def bind(self, gains: Mapping[str, float | Sequence[float]], warn: bool = False) -> Component:
-        """Bind the function to these gains, and to the defaults of the others.
-
-        Args:
-          gains: name -> value; of a law also a sequence with a value for each driven channel.
-          warn: whether to warn of gains that violate a condition.
-
-        Raises:
-          ScenarioError: an unknown gain, a value that is not a finite number or out of range.
-
-        Warns:
-          GainWarning: gains violate a condition of the theorem.
-        """
+        """Bind the function to these gains and the defaults of others. Warn of gains that violate a condition."""
         values: dict[str, GainValue] = {**self.defaults}
         for key, value in gains.items():
             if key not in values:
@@ -320,25 +265,15 @@ class Template:
             infinite = bool(np.isinf(gain.default).any())
             values[key] = _checked_gain(f"{self.name}'s {key}", value, above=above, low=low, infinite=infinite)
             if isinstance(values[key], tuple) and (gain.shared or self.kind != "law"):
-                raise ScenarioError(
-                    f"{self.name}'s {key} is {gain_text(values[key])}: give one number for all channels"
-                )
+                text = gain_text(values[key])
+                raise ScenarioError(f"{self.name}'s {key} is {text}: give one number for all channels")
         for words in self.unmet(values) if warn else ():
             text = ", ".join(f"{name} = {gain_text(value)}" for name, value in values.items())
             warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {text}", GainWarning, users_stacklevel())
-        component = Component(
-            kind=self.kind,
-            name=self.name,
-            gains=values,
-            memory=self.memory,
-            function=self.function,
-            relative_degree=self.relative_degree,
-            plants=self.plants,
-            requires_model=self.requires_model,
-            joint=self.joint,
-            shared=tuple(name for name, gain in self.gains.items() if gain.shared),
-            template=self,
-        )
+        same = ("kind", "name", "memory", "function", "relative_degree", "plants", "requires_model", "joint")
+        shared = tuple(name for name, gain in self.gains.items() if gain.shared)
+        properties = {name: getattr(self, name) for name in same}
+        component = Component(gains=values, shared=shared, template=self, **properties)
         return component if gains else component.sourced(DEFAULT)
 
 
@@ -357,8 +292,6 @@ def by_channel(laws: "Sequence[Component]") -> Component:
             fact = "of many joints" if law.joint else f"{law}, with gains by channel,"
             raise ScenarioError(f"the law of channel {i} is {law.name!r}, {fact}: give it a law of one channel")
     source = combined([law.source for law in laws])
-    if all(law == first for law in laws):
-        return dataclasses.replace(first, source=source.with_gains(first.gains))
     if all(law.function is first.function and law.name == first.name for law in laws):
         by_name = {name: tuple(law.gains[name] for law in laws) for name in first.gains}
         gains = {name: values if len(set(values)) > 1 else values[0] for name, values in by_name.items()}
@@ -390,11 +323,7 @@ def _holds(condition: Callable[[SimpleNamespace], bool], gains: SimpleNamespace)
 
 
 def as_gains(gains: object, known: Mapping[str, GainValue] = frozen({})) -> dict[str, Gain]:
-    """Return the gains of a decorator, numbers or Gains, as Gains.
-
-    Args:
-      known: other gains, which come first. `gains` can change their defaults.
-    """
+    """Return the gains of a decorator, numbers or Gains, as Gains, after known ones, whose defaults they can change."""
     if not isinstance(gains, Mapping | None):
         raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
     checked: dict[str, Gain] = {}
@@ -402,9 +331,8 @@ def as_gains(gains: object, known: Mapping[str, GainValue] = frozen({})) -> dict
         if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
             raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
         gain = value if isinstance(value, Gain) else Gain(value)
-        checked[key] = dataclasses.replace(
-            gain, default=_checked_gain(f"default of gain {key}", gain.default, infinite=True)
-        )
+        default = _checked_gain(f"default of gain {key}", gain.default, infinite=True)
+        checked[key] = dataclasses.replace(gain, default=default)
     for key, gain in checked.items():
         if not (gain.unit is None or isinstance(gain.unit, Unit) or callable(gain.unit)):
             raise ScenarioError(f"unit of gain {key} is {shown(gain.unit)}: {unit_cure(key, gain.default)}")
@@ -415,26 +343,10 @@ def as_gains(gains: object, known: Mapping[str, GainValue] = frozen({})) -> dict
 
 def decorated(kind: str, function: Callable | None, options: Mapping) -> "Callable[[Callable], Template] | Template":
     """Return the Template of a function, or its decorator if the function is None."""
-    options = dict(options)
-    if foreign := options.keys() - OPTIONS[kind].__optional_keys__:
-        raise unknown(f"option of {kind}_function", min(foreign), OPTIONS[kind].__optional_keys__)
+    if foreign := options.keys() - Options.__optional_keys__:
+        raise unknown(f"option of {kind}_function", min(foreign), Options.__optional_keys__)
     decorate = template_decorator(kind, **options)
     return decorate if function is None else decorate(function)
-
-
-def _check_options(options: Mapping[str, Any]) -> None:
-    """Raise ScenarioError for wrong options that are read only later, by figures, tables and measurements."""
-    for option in ("label", "short", "family"):
-        if not isinstance(options.get(option, ""), str):
-            raise ScenarioError(f"{option} is {shown(options[option])}: give a text")
-    for option, keys in OPTION_KEYS.items():
-        if not isinstance(value := options.get(option, {}), Mapping) or not value.keys() <= {*keys}:
-            names = " and ".join(map(repr, keys))
-            raise ScenarioError(f"{option} is {shown(value)}: give numbers, or functions of the gains, for {names}")
-    if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(options.get("colour", ""))):
-        raise ScenarioError(f"colour is {shown(options['colour'])}: give one like '#0072B2'")
-    if options.get("finite_time", "") not in FINITE_TIME:
-        raise ScenarioError(f"finite_time is {shown(options['finite_time'])}: give 's', 'e' or ''")
 
 
 def template_decorator(
@@ -446,19 +358,20 @@ def template_decorator(
     relative_degree: int = 1,
     conditions: GainConditions | None = None,
     plants: Iterable[str] = (),
-    **options: object,
+    **options: Any,
 ) -> Callable[[Callable], Template]:
     """Return a decorator that turns a function into a Template."""
     checked = as_gains(gains)
     memory, relative_degree = whole("memory", memory, 1, 10_000), whole("relative_degree", relative_degree, 1, 10)
     if isinstance(plants, str):
         raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")
-    _check_options(options)
+    if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(options.get("colour", ""))):
+        raise ScenarioError(f"colour is {shown(options['colour'])}: give one like '#0072B2'")
+    if options.get("finite_time", "") not in FINITE_TIME:
+        raise ScenarioError(f"finite_time is {shown(options['finite_time'])}: give 's', 'e' or ''")
     for sign, names in (("positive", positive), ("nonnegative", nonnegative)):
         for name in names:
-            if name not in checked:
-                raise unknown(f"gain that is {sign}", name, checked)
-            checked[name] = dataclasses.replace(checked[name], **{sign: True})
+            checked[name] = dataclasses.replace(find(f"gain that is {sign}", name, checked), **{sign: True})
 
     def decorate(function: Callable) -> Template:
         if not callable(function):
@@ -477,7 +390,7 @@ def template_decorator(
             relative_degree=relative_degree,
             conditions=dict(conditions or {}),
             plants=tuple(plants),
-            **options,  # pyright: ignore[reportArgumentType]
+            **options,
         )
 
     return decorate

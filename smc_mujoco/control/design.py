@@ -1,6 +1,5 @@
 """Gains from a plant's nominal f and g, by textbook formulas."""
 
-from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,23 +24,13 @@ def linearised(plant: Plant) -> tuple[float, float, float]:
             f"{plant.name}'s channel {plant.driven} has no actuator, and lqr does not see such a joint: "
             "take the law 'hierarchical', which does"
         )
-    rows = [_channel(plant, i) for i in range(plant.n)]
-    for i, (_, _, b) in enumerate(rows):
-        if b <= 0.0:
-            raise ScenarioError(f"{plant.name}'s channel {i} has no actuator (g = {b:g}): design is for those with one")
+    p, rest, rows = SimpleNamespace(**plant.parameters), np.zeros(plant.n), []
+    for i, moved in enumerate(DIFFERENCE_STEP * np.eye(plant.n)):
+        f = [plant.nominal(x, rest, i, p)[0] for x in (moved, -moved)]
+        f += [plant.nominal(rest, v, i, p)[0] for v in (moved, -moved)]
+        slopes = (f[0] - f[1]) / (2.0 * DIFFERENCE_STEP), (f[2] - f[3]) / (2.0 * DIFFERENCE_STEP)
+        rows.append((*slopes, plant.nominal(rest, rest, i, p)[1]))
     return max(rows)
-
-
-def _channel(plant: Plant, i: int) -> tuple[float, float, float]:
-    p, rest, moved = SimpleNamespace(**plant.parameters), np.zeros(plant.n), np.zeros(plant.n)
-    moved[i] = DIFFERENCE_STEP
-
-    def slope(model: Callable[[np.ndarray], tuple[float, float]]) -> float:
-        return (model(moved)[0] - model(-moved)[0]) / (2.0 * DIFFERENCE_STEP)
-
-    a1 = slope(lambda x: plant.nominal(x, rest, i, p))
-    a2 = slope(lambda v: plant.nominal(rest, v, i, p))
-    return a1, a2, plant.nominal(rest, rest, i, p)[1]
 
 
 def lqr(of: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1.0) -> Law:

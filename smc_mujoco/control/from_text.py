@@ -50,11 +50,7 @@ def law(text: str | Law | Template, **gains: float | Sequence[float]) -> Law:
 
 
 def laws(text: object) -> list[str | Law]:
-    """Return the laws of a text. The name of a law of the library stays a name, which sets of gains need.
-
-    Raises:
-      ScenarioError: as `law`, but a file of Python may have several laws.
-    """
+    """Return the laws of a text. The name of a law of the library stays a name, which sets of gains need."""
     if not isinstance(text, str) or text in known_laws():
         find("law", text, known_laws())
         return [str(text)]
@@ -70,14 +66,7 @@ def laws(text: object) -> list[str | Law]:
 
 
 def component(kind: str, text: str, known: Mapping[str, Template], example: str) -> Component:
-    """Return a component of a catalogue from its name, with gains in brackets or without.
-
-    Args:
-      kind, example: what it is, and a correct text, in an error.
-
-    Raises:
-      ScenarioError: any other text, an unknown name or gain.
-    """
+    """Return a component of a catalogue from its name, with gains in brackets or without. Errors give the example."""
     head, gains = _parts(kind, text, example)
     return find(kind, head, known).bind(gains, warn=True)
 
@@ -89,16 +78,14 @@ def _parts(kind: str, text: str, example: str) -> tuple[str, dict[str, GainValue
         call = matched and ast.parse(f"f({matched['gains'] or ''})", mode="eval").body
         if not matched or not isinstance(call, ast.Call) or call.args:
             raise ValueError
-        return matched["head"], {str(word.arg): _value(word.value) for word in call.keywords}
+        gains: dict[str, GainValue] = {}
+        for word in call.keywords:
+            several = word.value.elts if isinstance(word.value, ast.Tuple | ast.List) else None
+            values = tuple(float(ast.unparse(one)) for one in several or [word.value])
+            gains[str(word.arg)] = values[0] if several is None else values
+        return matched["head"], gains
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ScenarioError(f"{kind} {shown(text)} cannot be read: write it as {example}") from None
-
-
-def _value(node: ast.expr) -> GainValue:
-    """Return a gain from its text: a number, or several in brackets."""
-    if isinstance(node, ast.Tuple | ast.List):
-        return tuple(float(ast.unparse(one)) for one in node.elts)
-    return float(ast.unparse(node))
 
 
 def _with_gains(law: Law, gains: Mapping[str, float | Sequence[float]]) -> Law:
@@ -127,9 +114,7 @@ def _of_tuning(path: str) -> list[Law]:
         law = serialise.law(scenario["law"], scenario["source"])
     if law.function is None:
         gains = ", ".join(f"{name}={value!r}" for name, value in law.gains.items())
-        raise ScenarioError(
-            f"law {law.name} of {path} is your own: give its file with these gains, as FILE.py({gains})"
-        )
+        raise ScenarioError(f"law {law.name} of {path} is your own: give its file with its gains, as FILE.py({gains})")
     return [law]
 
 
@@ -157,16 +142,12 @@ def parsed_gains(text: str, what: str) -> dict[str, Any]:
     """Return the gains in a text such as "lam=6,k1=3 5", with two joints' k1. `what` names the text in errors."""
     parsed: dict[str, GainValue] = {}
     for part in filter(None, (p.strip() for p in text.split(","))):
-        name, equals, value = (word.strip() for word in part.partition("="))
-        if name in parsed:
-            raise ScenarioError(f"{what} is {shown(text)}: give {name} once")
+        name, _, value = (word.strip() for word in part.partition("="))
         try:
             values = tuple(map(float, value.split()))
         except ValueError:
             values = ()
+        if not values or not name.isidentifier() or name in parsed or any(map(math.isnan, values)):
+            raise ScenarioError(f"{what} is {shown(text)}: give names and numbers, each once, such as lam=6,k1=3")
         parsed[name] = values[0] if len(values) == 1 else values
-        if not (equals and name.isidentifier() and values):
-            raise ScenarioError(f"{what} is {shown(text)}: give names and numbers, such as lam=6,k1=3")
-        if any(map(math.isnan, values)):
-            raise ScenarioError(f"{what} is {shown(text)}, and {name} is nan: give it a number")
     return parsed

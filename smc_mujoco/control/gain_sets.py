@@ -17,7 +17,7 @@
 import dataclasses
 import functools
 import inspect
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 
 SETS = ("study", "tuned", "tracking")
+KNOWN_SETS = dict.fromkeys((*SETS, "default"))
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
 # The laws on the report's first page: the four of the paper, two more of its first study, and the first law of each
 # other family in the table of docs/catalogue.md, which was written before any tuning.
@@ -59,14 +60,10 @@ STUDY: dict[str, dict[str, dict[str, float]]] = read_json(file_of("study"))
 def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> Component:
     """Return the law with its gains for a plant, from a set, without warnings of conditions that they violate.
 
-    Args:
-      seed: of a run. Its remainder by the number of sets of gains is the number of the set. Set 0 is the best.
-
-    Raises:
-      ScenarioError: an unknown set, or a set without gains for this law on this plant.
+    The remainder of a run's seed by the number of sets of gains is the number of its set. Set 0 is the best.
     """
     base = find_law(name)
-    find("set of gains", gains, dict.fromkeys((*SETS, "default")))
+    find("set of gains", gains, KNOWN_SETS)
     if gains == "default":
         return base
     plant = as_plant(plant)
@@ -88,49 +85,34 @@ def general() -> tuple[str, ...]:
 
 def general_laws(plants: Sequence[str | Plant], gains: str) -> list[str]:
     """List the general laws that have gains in a set on each of these plants, those of LAWS first."""
-    names, why = [], None
-    for name in general():
-        try:
-            for plant in plants:
-                law(plant, name, gains)
-        except ScenarioError as error:
-            why = error
-        else:
-            names.append(name)
-    if not names and why:
-        raise why
-    return names
+    find("set of gains", gains, KNOWN_SETS)
+    return [name for name in general() if all(in_set(as_plant(plant), name, gains) for plant in plants)]
+
+
+def in_set(plant: Plant, name: str, gains: str) -> bool:
+    """Return whether a set of gains has some for a law on a plant."""
+    try:
+        law(plant, name, gains)
+    except ScenarioError:
+        return False
+    return True
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class TunedGains:
-    """The near-optimal gains of a law on a plant, and the result of their search.
+    """The near-optimal gains of a law on a plant, and the result of their search."""
 
-    Attributes:
-      sets: sets of gains, each name -> value; the best first.
-      objective: J of the best, s^2, see `analysis.tuning.objective`.
-      converged: whether three starts of the search ended within 1 % of the best J; None if it had fewer.
-      ends: best J of each start, s^2.
-      evaluations: number of sets of gains that were evaluated.
-      seed: of the search.
-      at_bound: gain -> "lower" or "upper", for those of the best gains at a bound of the search.
-      front: tracking in s^2 and variation in 1/s of the Pareto front.
-      best: tracking and variation of the best gains, which are on the front.
-      rule: the search, in words.
-      versions: versions of the packages that the numbers depend on.
-    """
-
-    sets: tuple[Mapping[str, float], ...]
-    objective: float
-    converged: bool | None
-    ends: tuple[float, ...]
-    evaluations: int
+    sets: tuple[Mapping[str, float], ...]  # each name -> value; the best first
+    objective: float  # J of the best, s^2, see `analysis.tuning.objective`
+    converged: bool | None  # whether three starts of the search ended within 1 % of the best J; None if it had fewer
+    ends: tuple[float, ...]  # best J of each start, s^2
+    evaluations: int  # number of sets of gains that were evaluated
     seed: int
-    at_bound: Mapping[str, str]
-    front: tuple[tuple[float, float], ...]
-    best: tuple[float, float]
-    rule: str
-    versions: Mapping[str, str]
+    at_bound: Mapping[str, str]  # gain -> "lower" or "upper", for those of the best gains at a bound of the search
+    front: tuple[tuple[float, float], ...]  # tracking in s^2 and variation in 1/s of the Pareto front
+    best: tuple[float, float]  # tracking and variation of the best gains, which are on the front
+    rule: str  # the search, in words
+    versions: Mapping[str, str]  # of the packages that the numbers depend on
 
     @property
     def search(self) -> source.Search:
@@ -170,9 +152,14 @@ def _stored(plant: str, name: str, gains: str) -> TunedGains | None:
     """
     if (stored := _package_gains(gains).get((plant, name))) is not None:
         return stored
-    for folder in _code_folders(plant, name):
+    code = []
+    if catalogue().package(name) and (template := catalogue().get(name)):
+        code.append(template.function)
+    if plants_known().package(plant) and (known_plant := plants_known().get(plant)):
+        code.append(known_plant.build)
+    for folder in (Path(inspect.getfile(function)).parent for function in code):
         if (path := folder / "tuned_gains" / gains / f"{plant}-{name}.json").is_file():
-            return _gains_in_file(path)
+            return _from_record(read_json(path)["record"])
     return None
 
 
@@ -187,24 +174,14 @@ def _package_gains(gains: str) -> dict[tuple[str, str], TunedGains]:
     }
 
 
-@functools.cache
-def _gains_in_file(path: Path) -> TunedGains:
-    """Return the gains in a file that `Tuned.save` wrote."""
-    return _from_record(read_json(path)["record"])
-
-
 def _from_record(record: Mapping[str, Any]) -> TunedGains:
     """Return the gains that `Tuned.record` described."""
     fields = dict(record)
     names = fields.pop("gains")
-    sets = tuple(dict(zip(names, values, strict=True)) for values in fields.pop("sets"))
-    pairs = {"front": tuple(map(tuple, fields.pop("front"))), "best": tuple(fields.pop("best"))}
-    return TunedGains(sets=sets, ends=tuple(fields.pop("ends")), **pairs, **fields)
-
-
-def _code_folders(plant: str, name: str) -> Iterator[Path]:
-    """Yield the code folders of a law and of a plant, if they are from other packages."""
-    if catalogue().package(name) and (template := catalogue().get(name)):
-        yield Path(inspect.getfile(template.function)).parent
-    if plants_known().package(plant) and (known_plant := plants_known().get(plant)):
-        yield Path(inspect.getfile(known_plant.build)).parent
+    fields["sets"] = tuple(dict(zip(names, values, strict=True)) for values in fields["sets"])
+    fields |= {
+        "front": tuple(map(tuple, fields["front"])),
+        "best": tuple(fields["best"]),
+        "ends": tuple(fields["ends"]),
+    }
+    return TunedGains(**fields)

@@ -66,11 +66,7 @@ def stored_dtype(n: int) -> np.dtype:
 
 
 def measurement_of(stored: np.void, dynamics: Any) -> JointMeasurement:
-    """Return the measurement in a record of `stored_dtype`, for the reference loop.
-
-    Args:
-      dynamics: an object with the methods `coriolis` and `jacobian`.
-    """
+    """Return the measurement in a record of `stored_dtype`; `dynamics` has the methods `coriolis` and `jacobian`."""
     t, dt, model = (float(stored[name]) for name in ("t", "dt", "model"))
     return JointMeasurement(t, dt, model, dynamics, *(stored[name] for name in ARRAYS))
 
@@ -128,12 +124,9 @@ def _coriolis(y, w):
 
 
 def jacobian(y):
-    """Return the nominal Jacobian J of the plant's tip, (3, n).
+    """Return the nominal Jacobian J of the plant's tip, (3, n); ValueError without a model or a tip.
 
     J v is the tip's velocity, m/s. J' F is the generalised force of a force F, N, that acts on the tip.
-
-    Raises:
-      ValueError: the law has no model, or the plant no tip.
     """
     return y.dynamics.jacobian()
 

@@ -24,7 +24,7 @@ from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.registry import catalogue_of
 from smc_mujoco.control import joint_law
-from smc_mujoco.control.component import Component, LawOptions, Template, decorated
+from smc_mujoco.control.component import Component, Options, Template, decorated
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
@@ -99,9 +99,9 @@ def power(a, p):
 @overload
 def law_function(function: Callable[..., Any], /) -> Template: ...
 @overload
-def law_function(**options: Unpack[LawOptions]) -> Callable[[Callable[..., Any]], Template]: ...
+def law_function(**options: Unpack[Options]) -> Callable[[Callable[..., Any]], Template]: ...
 def law_function(
-    function: Callable[..., Any] | None = None, /, **options: Unpack[LawOptions]
+    function: Callable[..., Any] | None = None, /, **options: Unpack[Options]
 ) -> Callable[[Callable[..., Any]], Template] | Template:
     """Turn a function (y, gains, memory) -> (u, s) into a law.
 
@@ -159,12 +159,12 @@ def known_laws() -> Catalogue[Template]:
 
 def checked_name(law: Law) -> Law:
     """Return the law. Raise ScenarioError if it is a user's with the name of a law of the catalogue."""
-    known = known_laws().get(law.name) if law.kind == "law" else None
-    if (
-        known is None
-        or law.function in (None, known.function)
-        or _module_and_name(law.function) == _module_and_name(known.function)
-    ):
+    known = known_laws().get(law.name)
+    if known is None or law.function is None:
+        return law
+    # module and name stay the same when the module is loaded again
+    mine, theirs = ((f.__module__, getattr(f, "__qualname__", f)) for f in (law.function, known.function))
+    if mine == theirs:
         return law
     package = known_laws().package(law.name)
     raise ScenarioError(
@@ -173,19 +173,8 @@ def checked_name(law: Law) -> Law:
     )
 
 
-def _module_and_name(function: object) -> tuple[object, object]:
-    """Return the module and the name of a function. They stay the same when the module is loaded again."""
-    return getattr(function, "__module__", None), getattr(function, "__qualname__", function)
-
-
 def law(name: str, **gains: float | Sequence[float]) -> Law:
-    """Return the library's law `name` with these gains. `law(...).named("slow")` gives it another name.
-
-    A gain is one number for all channels, or a sequence with one for each driven channel.
-
-    Raises:
-      ScenarioError: an unknown law or gain, or a gain out of range.
-    """
+    """Return the library's law `name` with these gains: one number for all channels, or one for each driven channel."""
     return find("law", name, known_laws()).bind(gains, warn=True)
 
 

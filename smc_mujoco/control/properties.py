@@ -46,10 +46,6 @@ def searched(law: Template) -> list[str]:
     return [name for name, gain in law.gains.items() if not gain.held]
 
 
-def _max_searched(count: int) -> Callable[[Template], bool]:
-    return lambda law: 0 < len(searched(law)) <= count
-
-
 PROPERTIES: Mapping[str, Property] = {
     "no-velocity": Property("need no velocity", lambda law: not reads(law) & VELOCITY),
     "no-acceleration": Property("need no acceleration", lambda law: "a" not in reads(law)),
@@ -57,8 +53,8 @@ PROPERTIES: Mapping[str, Property] = {
     "continuous": Property("have a continuous u", lambda law: law.continuous),
     "finite-time": Property("bring the error to 0 in finite time", lambda law: law.finite_time == "e"),
     "finite-reaching": Property("bring s or the error to 0 in finite time", lambda law: law.finite_time != ""),
-    "one-gain": Property("have one gain to choose", _max_searched(1)),
-    "two-gains": Property("have at most two gains to choose", _max_searched(2)),
+    "one-gain": Property("have one gain to choose", lambda law: len(searched(law)) == 1),
+    "two-gains": Property("have at most two gains to choose", lambda law: len(searched(law)) in (1, 2)),
 }
 
 
@@ -71,21 +67,10 @@ def families() -> dict[str, list[str]]:
 
 
 def suitable(needs: Iterable[str] = (), family: str | None = None, plant: Plant | str | None = None) -> list[Template]:
-    """Return the laws of the library that have all these properties.
-
-    Args:
-      needs: names in PROPERTIES.
-      family: one of `families`.
-      plant: only laws for this plant.
-
-    Raises:
-      ScenarioError: an unknown name.
-    """
+    """Return the library's laws, or those of a family or for a plant, that have all these PROPERTIES."""
     properties = [find("property of a law", need, PROPERTIES) for need in needs]
-    names = laws(plant)
-    if family is not None:
-        names = [name for name in names if name in find("family of laws", family, families())]
-    templates = [catalogue()[name] for name in names]
+    members = catalogue() if family is None else find("family of laws", family, families())
+    templates = [catalogue()[name] for name in laws(plant) if name in members]
     return [law for law in templates if all(needed.holds(law) for needed in properties)]
 
 

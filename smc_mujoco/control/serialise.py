@@ -24,18 +24,13 @@ def describe(c: Component) -> dict[str, Any]:
 
 
 def law(data: Mapping[str, Any], source: Mapping[str, Any] | None) -> Component:
-    """Return the law that `describe` wrote, with the source of its gains.
-
-    Gains without a source, as in a file written by hand, are the user's.
-    """
-    restored = sources.Source(kind=sources.YOURS) if source is None else sources.restore(source)
-    return _law(data).sourced(restored.kind, restored.search)
-
-
-def _law(data: Mapping[str, Any]) -> Component:
+    """Return the law that `describe` wrote, with the source of its gains: the user, if none is given."""
     if "each" in data:
-        return by_channel([_law(item) for item in data["each"]])
-    return restore(data, "law", known_laws() | _laws_of_evidence(data["module"]))
+        made = by_channel([law(item, source) for item in data["each"]])
+    else:
+        made = restore(data, "law", known_laws() | _laws_of_evidence(data["module"]))
+    restored = sources.Source(kind=sources.YOURS) if source is None else sources.restore(source)
+    return made.sourced(restored.kind, restored.search)
 
 
 def restore(data: Mapping[str, Any], kind: str, known: Catalogue[Template]) -> Component:
@@ -46,14 +41,8 @@ def restore(data: Mapping[str, Any], kind: str, known: Catalogue[Template]) -> C
         if template.function.__module__ == module and {*data["gains"]} <= {*template.gains}:
             component = template.bind(data["gains"])
             return component if component.name == data["name"] else component.named(data["name"])
-    return Component(
-        kind=kind,
-        name=data["name"],
-        gains=dict(data["gains"]),
-        memory=data["memory"],
-        relative_degree=data["degree"],
-        function=None,
-    )
+    stored = {name: data[name] for name in ("name", "gains", "memory")}
+    return Component(kind=kind, relative_degree=data["degree"], function=None, **stored)
 
 
 def _laws_of_evidence(module: str) -> dict[str, Template]:

@@ -8,6 +8,7 @@ A source belongs to one set of gains. A law whose gains are replaced has the sou
 """
 
 import dataclasses
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -16,41 +17,30 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
 
 NONE, DEFAULT, TUNED, SHIPPED, STUDY, YOURS = "none", "default", "tuned here", "shipped", "study", "yours"
-KINDS = (
-    NONE,  # the law has no gains
-    DEFAULT,  # the defaults of the law's own file
-    TUNED,  # result of a search that the user ran
-    SHIPPED,  # those of the package for this plant
-    STUDY,  # those of a published study
-    YOURS,  # given by the user
-)
-
+KINDS = {
+    NONE: "the law has no gains",
+    DEFAULT: "the defaults of the law's own file",
+    TUNED: "result of a search that the user ran",
+    SHIPPED: "those of the package for this plant",
+    STUDY: "those of a published study",
+    YOURS: "given by the user",
+}
 ENDED = {True: "converged", False: "not converged", None: "convergence not tested"}
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Search:
-    """A search for gains.
+    """A search for gains."""
 
-    Attributes:
-      rule: how it searches, in words; its name stands before the first comma, colon or bracket.
-      evaluations: number of sets of gains that it tried.
-      converged: whether its starts agree, see `analysis.tuning`; None if it had too few starts.
-      about_defaults: whether its starts were drawn about the law's defaults, because a gain has no unit.
-    """
-
-    rule: str
-    evaluations: int
-    converged: bool | None = None
-    about_defaults: bool = False
+    rule: str  # how it searches, in words; its name stands before the first comma, colon or bracket
+    evaluations: int  # number of sets of gains that it tried
+    converged: bool | None = None  # whether its starts agree, see `analysis.tuning`; None if it had too few starts
+    about_defaults: bool = False  # whether its starts were drawn about the law's defaults, because a gain has no unit
 
     @property
     def name(self) -> str:
         """The name of the rule."""
-        name = self.rule
-        for mark in ("(", ",", ":", ";"):
-            name = name.partition(mark)[0].rstrip()
-        return name + " about the defaults" * self.about_defaults
+        return re.split("[(,:;]", self.rule)[0].rstrip() + " about the defaults" * self.about_defaults
 
     @property
     def ended(self) -> str:
@@ -63,20 +53,14 @@ class Search:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Source:
-    """Where a set of gains comes from.
+    """Where a set of gains comes from."""
 
-    Attributes:
-      kind: one of KINDS.
-      gains: the set.
-      search: the search that the gains are the result of, or None.
-    """
-
-    kind: str = NONE
-    gains: Mapping[str, Any] = dataclasses.field(default=frozen({}), repr=False)
-    search: Search | None = None
+    kind: str = NONE  # one of KINDS
+    gains: Mapping[str, Any] = dataclasses.field(default=frozen({}), repr=False)  # the set
+    search: Search | None = None  # the search that the gains are the result of
 
     def __post_init__(self):
-        find("source of gains", self.kind, dict.fromkeys(KINDS))
+        find("source of gains", self.kind, KINDS)
 
     def __str__(self) -> str:
         return f"{self.kind} ({self.search})" if self.search else self.kind
@@ -97,9 +81,7 @@ def restore(data: Mapping[str, Any]) -> Source:
 
 def combined(sources: Sequence[Source]) -> Source:
     """Return the source of gains of several sources: the first if all are equal, else the user."""
-    first = sources[0]
-    equal = all((source.kind, source.search) == (first.kind, first.search) for source in sources)
-    return first if equal else Source(kind=YOURS)
+    return sources[0] if len({(source.kind, source.search) for source in sources}) == 1 else Source(kind=YOURS)
 
 
 def kinds(sources: Iterable[Source]) -> str:
@@ -110,42 +92,36 @@ def kinds(sources: Iterable[Source]) -> str:
 def in_words(sources: Mapping[str, Iterable[Source]], short: bool = False) -> str:
     """Return where the gains of laws come from: "gains: shipped (...)", or "gains: a and b default, c yours".
 
-    Args:
-      sources: law -> the sources of its gains; laws without gains are left out.
-      short: whether to leave out the searches.
+    `sources` maps a law to the sources of its gains; laws without gains are left out. `short` leaves out the searches.
     """
     with_gains = {law: [source for source in all_ if source.kind != NONE] for law, all_ in sources.items()}
     words = {law: kinds(of_law) for law, of_law in with_gains.items()}
-    if short:
-        return by_words(words)
-    searches: dict[str, dict[str, list[Search]]] = {}  # kinds -> law -> its searches
-    for law, of_law in with_gains.items():
-        if of_search := [source.search for source in of_law if source.search]:
-            searches.setdefault(words[law], {})[law] = of_search
-    details = {kind: f"{kind} ({_search_text(by_law)})" for kind, by_law in searches.items()}
-    return by_words({law: details.get(kind, kind) for law, kind in words.items()})
+    for kind in () if short else dict.fromkeys(words.values()):
+        of_kind = [law for law in words if words[law] == kind]
+        searches = {law: [source.search for source in with_gains[law] if source.search] for law in of_kind}
+        if any(searches.values()):
+            words |= {law: f"{kind} ({_search_text(searches)})" for law in of_kind if searches[law]}
+    return by_words(words)
 
 
 def _search_text(searches: Mapping[str, Sequence[Search]]) -> str:
     """Return the searches of several laws in words, with the laws whose search did not converge."""
     every = [search for of_law in searches.values() for search in of_law]
-    counts = sorted({search.evaluations for search in every})
-    words = [" or ".join(dict.fromkeys(search.name for search in every))]
-    words.append(f"{' to '.join(map(str, dict.fromkeys([counts[0], counts[-1]])))} evaluations")
-    laws_by_end: dict[str, list[str]] = {}
-    for law, of_law in searches.items():
-        for end in dict.fromkeys(search.ended for search in of_law):
-            laws_by_end.setdefault(end, []).append(law)
-    if len(laws_by_end) == 1:
-        return ", ".join([*words, *laws_by_end])
-    return ", ".join([*words, *(f"{end}: {joined(laws)}" for end, laws in laws_by_end.items() if end != ENDED[True])])
+    counts, ends = sorted({search.evaluations for search in every}), {search.ended for search in every}
+    text = f"{' or '.join(dict.fromkeys(search.name for search in every))}, "
+    text += f"{' to '.join(map(str, dict.fromkeys([counts[0], counts[-1]])))} evaluations"
+    if len(ends) == 1:
+        return f"{text}, {every[0].ended}"
+    for end in (ENDED[False], ENDED[None]):
+        if laws := [law for law, of_law in searches.items() if any(search.ended == end for search in of_law)]:
+            text += f", {end}: {joined(laws)}"
+    return text
 
 
 def untuned_laws(words: Mapping[str, str]) -> list[str]:
     """Return a sentence on laws with default gains that are compared with tuned ones; [] if there are none.
 
-    Args:
-      words: law -> where its gains come from, see `kinds`.
+    `words` maps a law to where its gains come from, see `kinds`.
     """
     default = [law for law, kind in words.items() if DEFAULT in kind.split(", ")]
     tuned = [law for law, kind in words.items() if kind in (TUNED, SHIPPED)]

@@ -11,7 +11,7 @@ from typing import Any, Unpack, overload
 from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.registry import catalogue_of
-from smc_mujoco.control.component import Component, SurfaceOptions, Template, decorated
+from smc_mujoco.control.component import Component, Options, Template, decorated
 
 Surface = Component
 
@@ -19,9 +19,9 @@ Surface = Component
 @overload
 def surface_function(function: Callable[..., Any], /) -> Template: ...
 @overload
-def surface_function(**options: Unpack[SurfaceOptions]) -> Callable[[Callable[..., Any]], Template]: ...
+def surface_function(**options: Unpack[Options]) -> Callable[[Callable[..., Any]], Template]: ...
 def surface_function(
-    function: Callable[..., Any] | None = None, /, **options: Unpack[SurfaceOptions]
+    function: Callable[..., Any] | None = None, /, **options: Unpack[Options]
 ) -> Callable[[Callable[..., Any]], Template] | Template:
     """Turn a function (y, gains, memory) -> (s, v_eq) into a surface.
 

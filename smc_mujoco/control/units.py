@@ -47,24 +47,17 @@ Formula = Callable[[SimpleNamespace], Unit]
 class Gain:
     """A gain of a law, a surface or an estimator.
 
-    Attributes:
-      default: its default value. A law of many joints in C may have a tuple, with one for each joint.
-      unit: a function of all gains, read by attribute, if an exponent among them decides the unit. None: a number
-        without a unit, or an unknown unit; tuning searches it about its default.
-      positive: whether it must be greater than 0.
-      nonnegative: whether it must be at least 0.
-      held: whether tuning leaves it at its default: an initial value, an exponent or the size of a table.
-      over: name of the gain that the law divides it by, b in the force k / b. Tuning then bounds k by u_max b.
-      shared: whether it is one number for all joints in a law of many joints, instead of a vector.
+    Its unit is a function of all gains, read by attribute, if an exponent among them decides it. None: a number without
+    a unit, or an unknown unit; tuning searches it about its default.
     """
 
-    default: float
+    default: float  # a law of many joints in C may have a tuple, with one for each joint
     unit: Unit | Formula | None = None
-    positive: bool = False
-    nonnegative: bool = False
-    held: bool = False
-    over: str | None = None
-    shared: bool = False
+    positive: bool = False  # whether it must be greater than 0
+    nonnegative: bool = False  # whether it must be at least 0
+    held: bool = False  # whether tuning leaves it at its default: an initial value, an exponent or the size of a table
+    over: str | None = None  # the gain that the law divides it by, b in the force k / b: tuning bounds k by u_max b
+    shared: bool = False  # whether it is one number for all joints in a law of many joints, instead of a vector
 
     def unit_at(self, gains: Mapping[str, float]) -> Unit | None:
         """Return the unit at these values of all gains."""

@@ -282,7 +282,7 @@ def _check_names(metrics: Sequence[str], gains: str, out: object) -> None:
     """Raise ScenarioError for an unknown metric or set of gains, or for what is no path of a folder."""
     for name in items_of("metrics", metrics):
         find("metric", name, dict.fromkeys((SETTLES, *CATALOGUE)))
-    find("set of gains", gains, dict.fromkeys((*gain_sets.SETS, "default")))
+    find("set of gains", gains, gain_sets.KNOWN_SETS)
     if not isinstance(out, str | os.PathLike):
         raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
 

@@ -105,20 +105,16 @@ def _known(plant: Plant, law: Component | Template, gains: str) -> Candidate | N
         return _default(law)
     library = plants_known().get(plant.name)
     same_plant = library is not None and library.parameters == plant.parameters
-    if same_plant and catalogue().get(law.name) is law and not plant.unscaled and in_set(plant, law.name, gains):
+    if (
+        same_plant
+        and catalogue().get(law.name) is law
+        and not plant.unscaled
+        and gain_sets.in_set(plant, law.name, gains)
+    ):
         count = 1 if gains == "study" else len(gain_sets.tuned(plant, law.name, gains).sets)
         sets = tuple(gain_sets.law(plant, law.name, gains, seed) for seed in range(count))
         return Candidate(sets[0], sets)
     return _default(law, f"tuning is not possible here: {plant.unscaled.partition(':')[0]}") if plant.unscaled else None
-
-
-def in_set(plant: Plant, name: str, gains: str) -> bool:
-    """Return whether a set of gains has some for a law on a plant."""
-    try:
-        gain_sets.law(plant, name, gains)
-    except ScenarioError:
-        return False
-    return True
 
 
 def _default(law: Component | Template, remark: str = "") -> Candidate:

