@@ -27,7 +27,7 @@ VARYING = {  # in a sentence: members of a catalogue, addresses, and what Python
     re.compile(r"(\(\w+Error, |\(Expecting ).*\)(?=: )"): r"\1...)",
     re.compile(r"((?:Attribute|ZeroDivision)Error \().*\)(?= in )"): r"\1...)",
     re.compile(r"(does not compile: ).*"): r"\1...",
-    re.compile(r"(MuJoCo cannot read .*? \().*?(?=( in <\w+>)?, line \d+\): fix)"): r"\1...",
+    re.compile(r"(MuJoCo cannot read .*? \().*(?=\): fix)"): r"\1...",
 }
 VALUE = re.compile(  # in a refusal
     r"(?<= is )(?:[-+\d.\[({<'\"]|b'|None|True|False|nan|inf|Ellipsis|array|[A-Z]\w*\().*?(?=: )"

@@ -32,7 +32,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 
 SETS = ("study", "tuned", "tracking")
-KNOWN_SETS = dict.fromkeys((*SETS, "default"))
+KNOWN_SETS: Mapping[str, None] = dict.fromkeys((*SETS, "default"))
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
 # The laws on the report's first page: the four of the paper, two more of its first study, and the first law of each
 # other family in the table of docs/catalogue.md, which was written before any tuning.

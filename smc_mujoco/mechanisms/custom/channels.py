@@ -1,20 +1,29 @@
-"""Channels of a user's model: the joints that the user names, checked against the model."""
+"""Channels of a user's model: the joints that the user names, checked against the model, and the motors on them.
+
+A motor of gear 1 replaces the actuator that drives a channel's joint.
+"""
 
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 
 from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
 from smc_mujoco.mechanisms.custom.mjcf import pick
+from smc_mujoco.mechanisms.hardware.part import PASSIVE
 
 MAX_EXCESS = 1e-3  # rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
 UNIT_OF_JOINT = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
 
 Range = tuple[str, float, float]  # joint, least and largest position, rad or m
 SUGGESTED = ("law", "u_max", "reference")  # fields of a Channel that are defaults of scenarios
+ONE_JOINT = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.value)  # transmissions to one joint
+FIXED, NO_BIAS = mujoco.mjtGain.mjGAIN_FIXED.value, mujoco.mjtBias.mjBIAS_NONE.value
+NO_DYNAMICS = mujoco.mjtDyn.mjDYN_NONE.value
+MOTOR_GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot turn off
+CURE = "give smc.Channel(motor=True) for an ideal motor in its place"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -81,13 +90,10 @@ def channel(joint: object, value: object) -> Channel:
         raise ScenarioError(f"motor of channel {joint!r} is {shown(made.motor)}: give True or False")
     if made.partner is None and made.partner_x0 is not None:
         raise ScenarioError(f"channel {joint!r} has a partner_x0 and no partner: give smc.Channel(partner=...) too")
-    numbers = {
-        name: number(f"{name} of channel {joint!r}", getattr(made, name), low=-1e6, high=1e6)
-        for name in ("x0", "partner_x0")
-        if getattr(made, name) is not None
-    }
-    if made.u_max is not None:
-        numbers["u_max"] = number(f"u_max of channel {joint!r}", made.u_max, above=0.0, infinite=True)
+    place: dict[str, Any] = {"low": -1e6, "high": 1e6}
+    limits = {"x0": place, "partner_x0": place, "u_max": {"above": 0.0, "infinite": True}}
+    given = {name: (getattr(made, name), bounds) for name, bounds in limits.items() if getattr(made, name) is not None}
+    numbers = {name: number(f"{name} of channel {joint!r}", x, **bounds) for name, (x, bounds) in given.items()}
     return dataclasses.replace(made, **numbers)
 
 
@@ -122,11 +128,7 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
 def starts(
     model: mujoco.MjModel, joints: list[str], channels: Pairs, keyframe: str | None
 ) -> tuple[dict[str, float], list[Range]]:
-    """Return joint -> x0, rad or m, and the ranges in which positions that the user chose must be.
-
-    x0 comes from the channels, else from the keyframe, else from the model. The model's own x0 may be outside its
-    range, because the user did not choose it, and a scenario can replace it.
-    """
+    """Return joint -> x0, rad or m, of the channels, the keyframe or the model, and ranges of those the user chose."""
     qpos = model.qpos0 if keyframe is None else model.key_qpos[model.key(keyframe).id]
     chosen = {joint: channel.x0 for joint, channel in channels if channel.x0 is not None}
     chosen |= {c.partner: c.partner_x0 for _, c in channels if c.partner is not None and c.partner_x0 is not None}
@@ -138,10 +140,8 @@ def check_ranges(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> No
     """Raise ScenarioError for a start outside a joint's range."""
     for (joint, low, high), x in zip(ranges, x0, strict=False):
         if not low - MAX_EXCESS <= x <= high + MAX_EXCESS:
-            raise ScenarioError(
-                f"x0 of joint {joint!r} of {plant} is {x:g}, outside its range from {low:g} to {high:g}: "
-                "give another x0"
-            )
+            outside = f"outside its range from {low:g} to {high:g}"
+            raise ScenarioError(f"x0 of joint {joint!r} of {plant} is {x:g}, {outside}: give another x0")
 
 
 def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:
@@ -153,3 +153,103 @@ def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:
     flags = mujoco.mjtDisableBit
     off = model.opt.disableflags & (flags.mjDSBL_LIMIT.value | flags.mjDSBL_CONSTRAINT.value)
     return () if off or not any(math.isfinite(low) for _, low, _ in rows) else tuple(rows)
+
+
+class Motor(NamedTuple):
+    """The motor of a channel."""
+
+    joint: str
+    limit: float  # bound on its force, N m or N
+    replaced: tuple[int, ...]  # indices of the actuators that it replaces
+
+
+def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) -> Motor:
+    """Return the motor that drives a joint."""
+    joint_id, wanted = model.joint(joint).id, channel.actuator
+    bounds = [tuple(map(float, model.jnt_actfrcrange[joint_id]))] if model.jnt_actfrclimited[joint_id] else []
+    actuators = [i for i in range(model.nactuator) if model.actuator_trntype[i] in ONE_JOINT]
+    actuators = [i for i in actuators if model.actuator_trnid[i, 0] == joint_id]
+    if channel.motor:
+        if wanted is not None:
+            raise ScenarioError(f"channel {joint!r} has motor=True and actuator {shown(wanted)}: give one of the two")
+        takes, cure = f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange"
+        return Motor(joint, _limit(takes, cure, *bounds, _together(model, actuators)), tuple(actuators))
+    if wanted is not None:
+        chosen = pick(label, "actuator", wanted, [model.actuator(i).name for i in range(model.nactuator)])
+        if chosen not in actuators:
+            raise ScenarioError(f"actuator {wanted!r} of {label} does not drive joint {joint!r} alone: {CURE}")
+        actuators = [chosen]
+    if not actuators:
+        raise ScenarioError(f"no actuator of {label} drives joint {joint!r} alone: {CURE}")
+    names = ", ".join(model.actuator(i).name or f"number {i}" for i in actuators)
+    if len(actuators) > 1:
+        raise ScenarioError(
+            f"joint {joint!r} of {label} has the actuators {names}: name one with Channel(actuator=...)"
+        )
+    if why := _no_motor(model, actuators[0]):
+        raise ScenarioError(f"actuator {names!r} of joint {joint!r} {why}, and a law commands a force: {CURE}")
+    gives = f"actuator {names!r} gives joint {joint!r} of {label}"
+    return Motor(joint, _limit(gives, CURE, *bounds, _of_actuator(model, actuators[0])), tuple(actuators))
+
+
+def _no_motor(model: mujoco.MjModel, i: int) -> str:
+    """Return why an actuator is not a motor; "" if it is one."""
+    if model.actuator_gaintype[i] != FIXED or model.actuator_biastype[i] != NO_BIAS:
+        return "is a servo, a damper or a muscle"
+    if model.actuator_dyntype[i] != NO_DYNAMICS or model.actuator_delay[i]:
+        return "has dynamics or a delay"
+    if model.actuator_armature[i] or model.actuator_damping[i] or model.actuator_dampingpoly[i].any():
+        return "has armature or damping"
+    if 0 <= model.actuator_group[i] <= 30 and model.opt.disableactuator >> int(model.actuator_group[i]) & 1:
+        return "is in a group that actuatorgroupdisable turns off"
+    if not model.actuator_gear[i, 0] * model.actuator_gainprm[i, 0]:
+        return "has gear or gain 0"
+    return ""
+
+
+def _limit(who: str, cure: str, *ranges: tuple[float, ...]) -> float:
+    """Return the largest force that all ranges allow in both directions, N m or N, because |u| has one bound."""
+    low, high = max([-math.inf, *(low for low, _ in ranges)]), min([math.inf, *(high for _, high in ranges)])
+    if not low < 0.0 < high:
+        raise ScenarioError(f"{who} {low:g} to {high:g}, but a law pushes both ways: {cure}")
+    return min(-low, high)
+
+
+def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
+    """Return the least and the largest force of an actuator at its joint, N m or N."""
+    gain, gear = model.actuator_gainprm[i, 0], model.actuator_gear[i, 0]
+    low, high = -math.inf, math.inf
+    clamped = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL.value
+    if model.actuator_ctrllimited[i] and clamped:
+        low, high = sorted(float(gain * end) for end in model.actuator_ctrlrange[i])
+    if model.actuator_forcelimited[i]:
+        lowest, highest = model.actuator_forcerange[i]
+        low, high = (float(min(max(end, lowest), highest)) for end in (low, high))
+    low, high = sorted((float(gear * low), float(gear * high)))
+    return low, high
+
+
+def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[float, float]:
+    """Return the forces that the forceranges of a joint's actuators allow together; no bound if not both ways."""
+    if not actuators or not all(model.actuator_forcelimited[i] for i in actuators):
+        return -math.inf, math.inf
+    ends = [sorted(float(model.actuator_gear[i, 0] * end) for end in model.actuator_forcerange[i]) for i in actuators]
+    low, high = sum(low for low, _ in ends), sum(high for _, high in ends)
+    return (low, high) if low < 0.0 < high else (-math.inf, math.inf)
+
+
+def add_motors(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
+    """Add the channels' motors, in this order, and keep the model's other actuators as passive parts."""
+    replaced = {i for motor in motors for i in motor.replaced}
+    for i, actuator in enumerate(list(spec.actuators)):
+        if i in replaced:
+            spec.delete(actuator)
+        else:
+            actuator.name = f"{PASSIVE}smc:{i}"  # no joint has this name
+    for motor in motors:  # named after joints: names of actuators may be missing
+        made = spec.add_actuator(name=f"u:{motor.joint}", target=motor.joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        made.set_to_motor()
+        limit = motor.limit if math.isfinite(motor.limit) else 0.0
+        made.gear, made.ctrllimited, made.forcelimited = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0), False, limit > 0.0
+        made.ctrlrange, made.forcerange = (0.0, 0.0), (-limit, limit)
+        made.armature, made.damping, made.delay, made.nsample, made.group = 0.0, (0.0, 0.0, 0.0), 0.0, 0, MOTOR_GROUP

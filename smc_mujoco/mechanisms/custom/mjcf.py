@@ -35,9 +35,6 @@ RESERVED = ("smc:", PLAY, ROTOR)  # prefixes of names of this package's parts
 RESERVED_KINDS = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")  # kinds of object that these parts add
 # Parts of names of fields that do not affect the motion, or that MuJoCo computes.
 UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")
-# Prefix of a field's name -> kind of object it belongs to.
-KINDS = {"body": "BODY", "jnt": "JOINT", "geom": "GEOM", "site": "SITE"}
-KINDS |= {"actuator": "ACTUATOR", "tendon": "TENDON", "eq": "EQUALITY"}
 
 _tried: set[str] = set()  # hashes of models that passed
 _lock = threading.Lock()  # held while MuJoCo writes XML with more digits
@@ -46,19 +43,12 @@ process.free_after_fork(_lock)
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """The source of a model: a file, or a text with the files that it names.
+    """The source of a model: a file, or a text with the files that it names."""
 
-    Attributes:
-      path: of the file, absolute; "" for a text.
-      sha256: of the model and all files that it names, 64 hex digits.
-      text: the MJCF, where there is no file.
-      assets: name and content of each file that the text names.
-    """
-
-    path: str
-    sha256: str
-    text: str = ""
-    assets: tuple[tuple[str, bytes], ...] = ()
+    path: str  # of the file, absolute; "" for a text
+    sha256: str  # of the model and all files that it names, 64 hex digits
+    text: str = ""  # the MJCF, where there is no file
+    assets: tuple[tuple[str, bytes], ...] = ()  # name and content of each file that the text names
 
     @property
     def label(self) -> str:
@@ -87,11 +77,7 @@ class Source:
 
 
 def source(model: object, assets: Mapping[str, bytes] | None = None) -> Source:
-    """Coerce the path of a file, the text of one, an MjSpec, or a mjcf.RootElement of dm_control to a Source.
-
-    Args:
-      assets: name -> content of the files that a text names.
-    """
+    """Coerce the path of a file, a text with its assets, an MjSpec, or a mjcf.RootElement of dm_control to a Source."""
     pymjcf = sys.modules.get("dm_control.mjcf")
     text = isinstance(model, str) and model.lstrip().startswith("<")
     if assets is not None and not text:
@@ -125,16 +111,11 @@ def _of_text(text: str, assets: Mapping[str, bytes]) -> Source:
     texts = [text, *(content for name, content in assets.items() if name.lower().endswith(XML))]
     for name in _files(element for content in texts for element in _elements(content)):
         if PurePosixPath(name).name not in given:
-            raise ScenarioError(
-                f"the model names the file {shown(name)}, and a text has no folder to find it in: give "
-                f"assets={{{name!r}: its bytes}}, or the path of the model's file"
-            )
+            cure = f"give assets={{{name!r}: its bytes}}, or the path of the model's file"
+            raise ScenarioError(f"the model names the file {shown(name)}, and a text has no folder: {cure}")
     pairs = tuple(sorted(assets.items()))
-    parts = [
-        text.encode(errors="surrogatepass"),
-        *(part for name, content in pairs for part in (name.encode(), content)),
-    ]
-    return Source("", _sha256(parts), text, pairs)
+    parts = [part for name, content in pairs for part in (name.encode(), content)]
+    return Source("", _sha256([text.encode(errors="surrogatepass"), *parts]), text, pairs)
 
 
 def _of_spec(spec: mujoco.MjSpec) -> Source:
@@ -194,22 +175,13 @@ def _difference(model: mujoco.MjModel, again: mujoco.MjModel) -> str:
     return ""
 
 
-@functools.cache
-def _fields(kind: type) -> tuple[str, ...]:
-    return tuple(name for name in dir(kind) if not name.startswith("_"))
-
-
 def fields(model: mujoco.MjModel) -> list[str]:
     """Return the names of the model's arrays of numbers."""
-    return [name for name in _fields(type(model)) if isinstance(getattr(model, name), np.ndarray)]
+    return [name for name in dir(model) if name[0] != "_" and isinstance(getattr(model, name), np.ndarray)]
 
 
 def tried(source: Source, timeout: float) -> None:
-    """Compile a model in a child process, unless this process has done so before.
-
-    Args:
-      timeout: s.
-    """
+    """Compile a model in a child process within a timeout, s, unless this process has done so before."""
     if source.sha256 in _tried:
         return
     with scratch() as folder, no_room():
@@ -232,36 +204,23 @@ def tried(source: Source, timeout: float) -> None:
 
 def _complaint(source: Source, failed: guard.Failed, timeout: float) -> ScenarioError:
     """Return the error for a model, from its trial."""
-    names = {known.value: known.name for known in signal.Signals}
-    cause = "" if failed.code is None else names.get(-failed.code, f"exit code {failed.code}")
+    names = {-known.value: known.name for known in signal.Signals}
+    cause = "" if failed.code is None else names.get(failed.code, f"exit code {failed.code}")
     too_much = f"more than {guard.MAX_MEMORY / 2**30:g} GiB of memory"
     if cause == "SIGKILL" or re.search(r"unknown exception|bad_alloc|memory|allocat", failed.fault):
         return ScenarioError(f"{source.label} takes MuJoCo {too_much}: make it smaller")
     if failed.fault:
         return broken(source.path or source.label, failed.fault)
-    if failed.code is None:
-        return ScenarioError(
-            f"{source.label} takes MuJoCo more than {timeout:g} s to compile: make it smaller, or give timeout="
-        )
+    if not cause:
+        slow = f"takes MuJoCo more than {timeout:g} s to compile"
+        return ScenarioError(f"{source.label} {slow}: make it smaller, or give timeout=")
     hint = too_much if cause == "SIGABRT" else "a model that attaches itself"
     return ScenarioError(f"{source.label} ends MuJoCo with {cause}, as does {hint}: fix the model")
 
 
 def broken(where: str, error: str) -> ScenarioError:
-    """Return the error for MuJoCo's message about a model, with the line in the file."""
-    text = " ".join(error.split())
-    line = re.search(r"[Ll]ine(?: number=)? ?(\d+)", text)
-    place = f", line {line[1]}" if line and line[1] != "0" else ""
-    if "Include error" in text or (line and not place):  # MuJoCo does not say which file
-        place = f" in a file that it includes{place}"
-    if parsed := re.search(r"XML_ERROR_(\w+)", text):  # from the XML parser
-        element = re.search(r"XMLElement name=(\S+)", text)
-        text = parsed[1].replace("_", " ").lower().replace("parsing", "error in") + (
-            f" <{element[1]}>" if element else ""
-        )
-    text = re.sub(r"^(?:(?:XML )?Error: |Schema violation: |ParseXML: )+|,? ?line \d+$", "", text)
-    text = re.sub(r" Element '(\w+)'$", r" in <\1>", re.sub(r" Element name '.*$", "", text))
-    return ScenarioError(f"MuJoCo cannot read {where} ({text}{place}): fix the file")
+    """Return the error for MuJoCo's message about a model."""
+    return ScenarioError(f"MuJoCo cannot read {where} ({' '.join(error.split())}): fix the file")
 
 
 def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
@@ -273,10 +232,7 @@ def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
 
 
 def digest(path: Path) -> str:
-    """Hash the file and every file that it names (includes, attached models, meshes, textures): SHA-256, 64 hex digits.
-
-    If a name fits several files, all of them are hashed.
-    """
+    """Hash a file and all that it names (includes, attached models, meshes, textures) in any folder: SHA-256, hex."""
     texts, files = [path], {path.resolve(): None}
     names, folders, inner = [], {}, {"": None}
     for text in texts:  # grows as files name further files
@@ -317,40 +273,18 @@ def _modelname(text: str) -> str:
 
 
 def check_model(label: str, model: mujoco.MjModel) -> None:
-    """Raise ScenarioError for NaN or enormous numbers, and for names that this package uses itself."""
-    check_numbers(label, model)
-    for name in [text.decode() for text in model.names.split(b"\0")]:
-        for start in filter(name.startswith, RESERVED):
-            for kind in RESERVED_KINDS:
-                if mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), name) >= 0:
-                    raise ScenarioError(
-                        f"{label} has a {kind.lower()} {name!r}, and names that begin with {start!r} are "
-                        "smc_mujoco's own: give it another"
-                    )
-
-
-def check_numbers(label: str, model: mujoco.MjModel) -> None:
-    """Raise ScenarioError for a number that is NaN, infinite or beyond 1e15 SI units; ranges may be infinite."""
-    named = sorted(fields(model), key=lambda name: name.partition("_")[0] not in KINDS)  # objects with names first
-    arrays = [(name, getattr(model, name)) for name in named]
+    """Raise ScenarioError for wild numbers, ranges may be infinite, and for names that this package uses itself."""
+    arrays = [(name, getattr(model, name)) for name in fields(model)]
     arrays += [(f"opt.{name}", np.atleast_1d(getattr(model.opt, name))) for name in ("gravity", "wind", "density")]
     for field, values in arrays:
         if values.dtype.kind != "f" or any(part in field for part in UNUSED):
             continue
         wrong = np.isnan(values) if field.endswith("range") else ~(np.abs(values) <= MAX_PARAMETER)
         if wrong.any():
-            place = tuple(np.argwhere(wrong)[0])
-            raise ScenarioError(
-                f"{field} of {label} is {values[place]:g}{_where(model, field, int(place[0]))}: "
-                f"give finite numbers of at most {MAX_PARAMETER:g} in its MJCF"
-            )
-
-
-def _where(model: mujoco.MjModel, field: str, i: int) -> str:
-    """Return " at" and the body, joint, ... to which number i of a field belongs; "" if it has no name."""
-    owner = field.partition("_")[0]
-    if owner == "dof":
-        owner, i = "jnt", int(model.dof_jntid[i])
-    kind = KINDS.get(owner, "")
-    name = kind and mujoco.mj_id2name(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), i)
-    return f" at {kind.lower()} {name!r}" if name else ""
+            cure = f"give finite numbers of at most {MAX_PARAMETER:g} in its MJCF"
+            raise ScenarioError(f"{field}[{np.argwhere(wrong)[0][0]}] of {label} is {values[wrong][0]:g}: {cure}")
+    for name in [text.decode() for text in model.names.split(b"\0")]:
+        for kind in RESERVED_KINDS if name.startswith(RESERVED) else ():
+            if mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), name) >= 0:
+                own = f"names that begin with {', '.join(RESERVED)} are smc_mujoco's own"
+                raise ScenarioError(f"{label} has a {kind.lower()} {name!r}, and {own}: give it another")

@@ -13,7 +13,6 @@ masses and inertias, and grav in m/s^2.
 
 import base64
 import dataclasses
-import functools
 import math
 import os
 from collections.abc import Iterable, Mapping
@@ -25,20 +24,10 @@ import numpy as np
 
 from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf
-from smc_mujoco.mechanisms.custom.channels import (
-    UNIT_OF_JOINT,
-    Channel,
-    check,
-    check_ranges,
-    coerce,
-    joints_of,
-    ranges,
-    starts,
-    suggested,
-)
+from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs
 from smc_mujoco.mechanisms.custom.mjcf import Source
-from smc_mujoco.mechanisms.custom.motors import ONE_JOINT, Motor, add_motors, motor_of
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.part import ROTOR, START
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field, Plant, catalogue
@@ -59,7 +48,7 @@ class UserModel:
 
     source: Source
     keyframe: str | None
-    channels: tuple[tuple[str, Channel], ...]
+    channels: Pairs
     motors: tuple[Motor, ...]
     tip: str = ""
 
@@ -68,8 +57,8 @@ class UserModel:
         spec = self.source.read()
         while named := [*spec.tuples, *spec.sensors]:  # tuples may name sensors and motors that are deleted
             spec.delete(named[0])  # MuJoCo 4 also deletes the tuples that name it, so list them again
-        add_motors(spec, self.motors)
-        for joint in joints_of(self.channels):
+        own.add_motors(spec, self.motors)
+        for joint in own.joints_of(self.channels):
             for letter, kind in (("x", mujoco.mjtSensor.mjSENS_JOINTPOS), ("v", mujoco.mjtSensor.mjSENS_JOINTVEL)):
                 spec.add_sensor(name=f"{letter}:{joint}", type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint)
         for key in list(spec.keys):
@@ -92,14 +81,10 @@ class UserModel:
         channels = {joint: dataclasses.asdict(channel) for joint, channel in self.channels}
         data = {"path": self.source.path, "sha256": self.source.sha256, "keyframe": self.keyframe, "channels": channels}
         data |= {"tip": self.tip} if self.tip else {}
-        return data if self.source.path else data | _inside(self.source)
-
-
-@functools.lru_cache(maxsize=32)
-def _inside(source: Source) -> dict:
-    """Return a model's text and the files that it names, as data for JSON."""
-    assets = {name: base64.b64encode(content).decode() for name, content in source.assets}
-    return {"text": source.text, "assets": assets}
+        if not self.source.path:
+            assets = {name: base64.b64encode(content).decode() for name, content in self.source.assets}
+            data |= {"text": self.source.text, "assets": assets}
+        return data
 
 
 @dataclasses.dataclass(frozen=True)
@@ -151,42 +136,35 @@ def plant_from(
     """
     source = mjcf.source(path, assets)
     mjcf.tried(source, errors.number("timeout", timeout, above=0.0, high=MAX_TIMEOUT))
-    return user_plant(source, channels, name, keyframe, tip)
+    if name is not None and catalogue().taken(errors.name("name", name)):  # laws and gains refer to plants by name
+        raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
+    return _plant(source, own.coerce(channels), name, keyframe, tip)
 
 
-def user_plant(
-    source: Source,
-    channels: Mapping[str, Channel | Mapping | None] | Iterable[str],
-    name: str | None,
-    keyframe: str | None,
-    tip: str | None = None,
-    recorded: bool = False,
-) -> Plant:
-    """Return the plant of a model, see `plant_from`. `recorded` skips checks added after a run was recorded."""
+def _plant(source: Source, pairs: Pairs, name: str | None, keyframe: str | None, tip: str | None) -> Plant:
+    """Return the plant of a model, see `plant_from`."""
     label, spec = source.label, source.read()
     model, title = source.compiled(spec), spec.modelname
-    if not recorded:
-        mjcf.check_model(label, model)
-        check_name(name)
-    pairs = coerce(channels)
-    scenarios = suggested(pairs)
+    mjcf.check_model(label, model)
+    scenarios = own.suggested(pairs)
     pairs = tuple((joint, channel.mechanical) for joint, channel in pairs)
-    joints = joints_of(pairs)
-    check(label, model, pairs)
+    joints = own.joints_of(pairs)
+    own.check(label, model, pairs)
     if keyframe is not None:
         mjcf.pick(label, "keyframe", keyframe, [model.key(i).name for i in range(model.nkey)])
     if tip is not None:
         mjcf.pick(label, "site", tip, [model.site(i).name for i in range(model.nsite)])
-    motors = tuple(motor_of(label, model, joint, channel) for joint, channel in pairs)
+    motors = tuple(own.motor_of(label, model, joint, channel) for joint, channel in pairs)
     build = UserModel(source, keyframe, pairs, motors, tip or "")
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields, limits = UserFields(mass, gravity), tuple(motor.limit for motor in motors)
-    units = tuple(UNIT_OF_JOINT[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
-    why_not, plant_name = missing(model, joints, motors), named(label) if name is None else name
-    x0, checked = starts(model, joints, pairs, keyframe)
-    if not recorded:
-        check_ranges(plant_name, checked, [x0[joint] for joint, _, _ in checked])
+    units = tuple(own.UNIT_OF_JOINT[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
+    why_not, file = missing(model, joints, motors), label.removesuffix(".xml")
+    file = label if catalogue().taken(file) else file  # a plant of the library has this name
+    plant_name = file if name is None else name
+    x0, checked = own.starts(model, joints, pairs, keyframe)
+    own.check_ranges(plant_name, checked, [x0[joint] for joint, _, _ in checked])
     return Plant(
         name=plant_name,
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
@@ -205,23 +183,11 @@ def user_plant(
         smooth=smooth(model),
         unmodelled=why_not,
         limits=limits if any(limit < math.inf for limit in limits) else (),
-        ranges=ranges(model, joints),
+        ranges=own.ranges(model, joints),
         tip=tip or "",
         suggested=scenarios,
-        label=title if plant_name == named(label) and title != UNNAMED else "",
+        label=title if plant_name == file and title != UNNAMED else "",
     )
-
-
-def named(label: str) -> str:
-    """Return the file's name without .xml as a plant's name; with .xml if there is a plant of that name."""
-    name = label.removesuffix(".xml")
-    return label if catalogue().taken(name) else name
-
-
-def check_name(name: str | None) -> None:
-    """Raise ScenarioError for the name of another plant, because laws and gains refer to plants by name."""
-    if name is not None and catalogue().taken(errors.name("name", name)):
-        raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
 
 
 def smooth(model: mujoco.MjModel) -> bool:
@@ -251,48 +217,26 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...])
     idle[[actuator for motor in motors for actuator in motor.replaced]] = False
     if np.any(model.actuator_dyntype[idle] == DCMOTOR):
         return "a dcmotor among its other actuators has a current that is not measured: " + WITHOUT_MODEL
-    across = model.ntendon or np.any(~np.isin(model.actuator_trntype[idle], ONE_JOINT))  # may couple trees
+    across = model.ntendon or np.any(~np.isin(model.actuator_trntype[idle], own.ONE_JOINT))  # may couple trees
     near = range(model.nv) if across else np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[channel_dofs]))
-    loose = list(dict.fromkeys(int(model.dof_jntid[dof]) for dof in near if dof not in channel_dofs))
-    return unmeasured(model, loose, len(motors), len(joints) - len(motors)) if loose else ""
-
-
-def unmeasured(model: mujoco.MjModel, loose: list[int], driven: int, partners: int) -> str:
-    """Return why there is no nominal model: these joints, by index, move with the channels and are not measured."""
-    for number in loose:
-        kind = mujoco.mjtJoint(model.jnt_type[number])
-        if kind not in UNIT_OF_JOINT:
-            return f"a {kind.name[6:].lower()} joint moves with its channels, and can be none: {WITHOUT_MODEL}"
-        if not model.joint(number).name:
-            return "a joint without a name moves with its channels: name it, and make it a channel or a partner"
-    moved = set(model.actuator_trnid[np.isin(model.actuator_trntype, ONE_JOINT), 0].tolist())
-    bare = [number for number in loose if number not in moved]
-    partners += len(bare)
-    driven += len(loose) - len(bare)
-    first = model.joint(loose[0]).name
-    problem = f"joint {first!r} moves with its channels and is not measured"
-    if partners not in (0, driven):
-        return (
-            f"{problem}, and of joints without an actuator there are {partners}, of driven ones {driven}, which take "
-            f"one partner each or none: {WITHOUT_MODEL}"
-        )
-    cure = f"a partner with smc.Channel(partner={first!r})" if loose[0] in bare else "a channel"
-    return f"{problem}: make it {cure}, or {WITHOUT_MODEL}"
+    loose = [model.joint(model.dof_jntid[dof]) for dof in near if dof not in channel_dofs]
+    if not loose:
+        return ""
+    named = f"joint {loose[0].name!r}" if loose[0].name else "a joint without a name"
+    cure = "make it a channel, or the partner of one if nothing drives it"
+    return f"{named} moves with its channels and is not measured: {cure}, or {WITHOUT_MODEL}"
 
 
 def restored(data: Mapping, name: str) -> Plant:
     """Return the plant that `UserModel.about` describes."""
     if "text" in data:
-        model = data["text"]
         assets = {name: base64.b64decode(content) for name, content in data["assets"].items()}
+        source = mjcf.source(data["text"], assets)
     else:
-        model, assets = Path(data["path"]), None
+        model = Path(data["path"])
         if not model.is_file():
             raise ScenarioError(f"its model {model} is not there: put it back")
-        if mjcf.digest(model) != data["sha256"]:
-            raise ScenarioError(
-                f"its model {model}, or a file that it names, is another than in the run: put that one back"
-            )
-    return user_plant(
-        mjcf.source(model, assets), data["channels"], name, data["keyframe"], data.get("tip"), recorded=True
-    )
+        source = mjcf.source(model)
+        if source.sha256 != data["sha256"]:
+            raise ScenarioError(f"its model {model}, or a file that it names, has changed since the run: put it back")
+    return _plant(source, own.coerce(data["channels"]), name, data["keyframe"], data.get("tip"))

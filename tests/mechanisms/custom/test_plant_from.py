@@ -26,7 +26,6 @@ from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, prepared
 from smc_mujoco.mechanisms.custom.plant_from import UserModel
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import reference as plain
-from smc_mujoco.simulation import scenario as scenario_module
 from smc_mujoco.studies import run_key
 
 TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)
@@ -733,24 +732,7 @@ def test_a_swing_up_has_half_the_torque_of_its_heaviest_pendulum_and_no_slide(tm
         assert scenario.resolved.u_max == pytest.approx(0.5 * 2.0 * 9.81)
 
 
-# what was recorded
-
-
-def test_a_recorded_run_is_read_whatever_would_be_refused_today(bounded, tmp_path, monkeypatch):
-    """As versions wrote them that looked at neither ranges nor the names of a mass."""
-    with monkeypatch.context() as older:
-        older.setattr(scenario_module, "check_new", lambda s: None)
-        older.setattr(
-            importlib.import_module("smc_mujoco.mechanisms.custom.plant_from"), "check_ranges", lambda *a: None
-        )
-        for name, fields in {"start": {"x0": 1.2}, "names": {"mismatch": {"m": 1.1, "mass": 1.2}}}.items():
-            smc.run(smc.Scenario(plant=bounded(), law="none", duration=0.05, **fields)).save(tmp_path / name)
-        smc.run(smc.Scenario(plant=bounded({"elbow": {"x0": 1.2}}), law="none", duration=0.05)).save(tmp_path / "own")
-    for name, words in {"start": REFUSED, "own": REFUSED, "names": "which are the same parameter of arm"}.items():
-        trace = smc.load(tmp_path / f"{name}.npz")
-        assert trace.x.shape == (51, 1)
-        with pytest.raises(smc.ScenarioError, match=words):
-            dataclasses.replace(trace.scenario, law="classical")
+# conditions
 
 
 def test_conditions_of_a_model_with_motors_are_told_by_what_differs_from_the_nominal_one(arm):
@@ -818,16 +800,9 @@ def test_a_mistake_is_one_sentence(arm, refused):
         refused(lambda given=given: arm(**given))
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("<foo/>", r"unrecognized element in <foo> in a file that it includes"),
-        ("<foo>", r"mismatched element <foo> in a file that it includes, line 3"),
-    ],
-)
-def test_a_broken_file_that_is_included_is_no_line_of_the_file_that_includes_it(arm, tmp_path, text, words):
-    (tmp_path / "part.xml").write_text(f"<mujoco>\n\n{text}</mujoco>")
-    with pytest.raises(smc.ScenarioError, match=rf"MuJoCo cannot read \S*arm.xml \({words}\): fix the file$"):
+def test_a_broken_file_that_is_included_is_one_sentence(arm, tmp_path):
+    (tmp_path / "part.xml").write_text("<mujoco>\n\n<foo></mujoco>")
+    with pytest.raises(smc.ScenarioError, match=r"MuJoCo cannot read \S*arm.xml \(.*\): fix the file$"):
         arm(rest='<include file="part.xml"/>')
 
 
@@ -854,23 +829,11 @@ def test_a_law_gets_no_model_that_there_is_not(arm):
     tied = '<equality><joint joint1="elbow" joint2="shoulder"/></equality>' + ACTUATED
     assert "equality" in arm(rest=tied).unmodelled
     across = '<tendon><fixed><joint joint="elbow" coef="1"/></fixed></tendon>' + ACTUATED  # couples, perhaps
-    assert "a ball joint moves with its channels, and can be none" in arm(rest=across, bodies=BALL).unmodelled
-    slide = '<body><joint type="slide"/><geom size=".1 .1" mass="1"/></body>'
-    assert "a joint without a name moves with" in arm(rest=across, bodies=slide).unmodelled
-    bare = slide.replace("<joint", '<joint name="slide"')
-    assert "there are 1, of driven ones 2," in arm(rest=across, bodies=bare).unmodelled
-    assert "make it a channel, or give a law" in plant.unmodelled
-    assert "make it a partner with smc.Channel(partner='shoulder')" in acrobot_alone().unmodelled
+    assert "a joint without a name moves with" in arm(rest=across, bodies=BALL.replace(' name="ball"', "")).unmodelled
+    assert "make it a channel, or the partner of one if nothing drives it, or give a law" in plant.unmodelled
     wound = '<dcmotor joint="elbow" motorconst="1 1" resistance="1" inductance="0.1 0"/></actuator>'
     channels = {"shoulder": None, "elbow": smc.Channel(actuator="b")}
     assert "dcmotor" in arm(channels, rest=ACTUATED.replace("</actuator>", wound)).unmodelled
-
-
-@pytest.mark.parametrize("partner", [None, "hinge", "hinge2"])
-def test_channels_and_partners_are_not_advised_where_they_do_not_help(partner):
-    """Two poles on one cart, of which one could be a partner."""
-    plant = smc.plant_from(gym("inverted_double_pendulum"), {"slider": smc.Channel(partner=partner)})
-    assert "there are 2, of driven ones 1, which take one partner each or none: give a law without" in plant.unmodelled
 
 
 def test_a_force_on_a_body_is_refused(arm):
@@ -947,9 +910,9 @@ HARM = {  # what the model has, and words of the sentence
     "mass": (
         '<default><geom density="1e300"/></default>'
         '<worldbody><body name="b"><joint/><geom size=".1 .1"/></body></worldbody>',
-        r"body_inertia of arm.xml is \S*e.29\d at body 'b': give finite numbers of at most 1e.15 in its MJCF",
+        r"^\w+\[\d+\] of arm.xml is \S*e\S*: give finite numbers of at most 1e.15 in its MJCF",
     ),
-    "stiffness": ('<default><joint stiffness="1e20"/></default>', "jnt_stiffness of arm.xml is 1e.20 at joint 'shoul"),
+    "stiffness": ('<default><joint stiffness="1e20"/></default>', r"jnt_stiffness\[\d\] of arm.xml is 1e.20: give"),
     "text": (
         '<custom><text name="smc:direct" data="x"/></custom>',
         "arm.xml has a text 'smc:direct', and names that b",
@@ -957,7 +920,7 @@ HARM = {  # what the model has, and words of the sentence
     "body": ('<worldbody><body name="rotor:elbow"/></worldbody>', "a body 'rotor:elbow', and names that begin with"),
     "tendon": (
         '<tendon><fixed name="play:elbow"><joint joint="elbow" coef="1"/></fixed></tendon>',
-        "arm.xml has a tendon 'play:elbow', and names that begin with 'play:' are smc_mujoco's own: give it another",
+        "arm.xml has a tendon 'play:elbow', and names that begin with .*, play:, rotor: are smc_mujoco",
     ),
 }
 
@@ -1115,7 +1078,7 @@ def test_a_trace_loads_back_and_knows_its_file(arm, tmp_path):
     np.testing.assert_array_equal(smc.run(again.scenario).x, trace.x)
     arm(bodies=BALL)
     words = r"the scenario of \S*a.npz cannot be restored, its model \S*arm.xml"
-    with pytest.raises(smc.ScenarioError, match=rf"{words}, or a file that .* than in the run: put that one back$"):
+    with pytest.raises(smc.ScenarioError, match=rf"{words}, or a file .* has changed since the run: put it back$"):
         smc.load(path)
     (tmp_path / "arm.xml").unlink()
     with pytest.raises(smc.ScenarioError, match=rf"{words} is not there: put it back$"):
