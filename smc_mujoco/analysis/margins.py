@@ -16,7 +16,6 @@ from 0, so it tolerates a little more. Theory also gives the constant force, or 
 5 % of its scale. The plant may stop closer to the reference. All searches advance together, a batch of runs per round.
 """
 
-import csv
 import dataclasses
 import math
 import os
@@ -30,7 +29,7 @@ from smc_mujoco.analysis import linear_theory as theory
 from smc_mujoco.analysis import linearisation
 from smc_mujoco.analysis.worst_case.uncertainty import JITTER_SHARES, with_friction, with_jitter
 from smc_mujoco.common.errors import ScenarioError, find
-from smc_mujoco.common.files import read_json, reading, replacing, with_ending, write_json
+from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
@@ -388,15 +387,6 @@ def margins_of(
 def save(margins: Sequence[Margin], path: str | os.PathLike[str]) -> Path:
     """Write margins to a .json file that `load` reads. NaN and infinity are words there, see `files.plain`."""
     return write_json(with_ending(path, ".json"), [dataclasses.asdict(margin) for margin in margins])
-
-
-def save_csv(margins: Sequence[Margin], path: str | os.PathLike[str]) -> Path:
-    """Write margins to a .csv file, a column for each attribute. The one of theory is empty where there is none."""
-    with replacing(path := with_ending(path, ".csv")) as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [field.name for field in dataclasses.fields(Margin)])
-        writer.writeheader()
-        writer.writerows(dataclasses.asdict(margin) for margin in margins)
-    return path
 
 
 def load(path: str | os.PathLike[str]) -> list[Margin]:

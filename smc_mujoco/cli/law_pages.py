@@ -50,11 +50,7 @@ def short_source(source: str) -> str:
 
 
 def print_pages(name: str, console: Console) -> None:
-    """Print a page about one law, surface or estimator of this name, or about each law of a file.
-
-    Raises:
-      ScenarioError: nothing has that name, or what has it cannot be loaded from its package, or from its file.
-    """
+    """Print a page about one law, surface or estimator of this name, or about each law of a file."""
     known = [templates() for templates in CATALOGUES.values()]
     pages = [(templates[name], templates.package(name)) for templates in known if name in templates]
     if not pages and "." in name:
@@ -86,27 +82,18 @@ def print_lists(console: Console) -> None:
     console.print(Text.assemble("One law in full: ", page, ". Only some laws: ", some))
 
 
-def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str | None, console: Console) -> None:
-    """Print a table of the laws that have all these properties, with what distinguishes them.
-
-    Args:
-      needs: names of PROPERTIES.
-      family: only laws of this family; None for any.
-      plant: only laws that suit this plant; None for any.
-
-    Raises:
-      ScenarioError: an unknown property, family or plant.
-    """
-    suitable_laws = suitable(needs, family, plant)
-    filters = [PROPERTIES[need].words for need in needs] + [f"are of the family {family}"] * (family is not None)
+def print_suitable(needs: Sequence[str], plant: Plant | str | None, console: Console) -> None:
+    """Print a table of the laws that have all these PROPERTIES and suit a plant, with what distinguishes them."""
+    suitable_laws = suitable(needs, plant)
+    filters = " and ".join(PROPERTIES[need].words for need in needs)
     machine = plant if plant is None or isinstance(plant, str) else plant.name
-    title = f"{len(suitable_laws)} of {len(laws())} laws" + f" that {' and '.join(filters)}" * bool(filters)
+    title = f"{len(suitable_laws)} of {len(laws())} laws" + f" that {filters}" * bool(filters)
     title += f" for {machine}" * (machine is not None)
     if "no-velocity" in needs:
         text = 'Every law runs without a velocity sensor if the scenario estimates the velocity: velocity="levant".'
         console.print(text, highlight=False)
     if not suitable_laws:
-        console.print(f"{title}: leave out a need, --family or --plant", highlight=False)
+        console.print(f"{title}: leave out a need, or --plant", highlight=False)
         return
     columns = Column("name", no_wrap=True, style="cyan"), "family", "u", "arrives", "gains to choose"
     table = titled(title, *columns, show_edge=False, padding=(0, 2, 0, 0), pad_edge=False)
@@ -119,12 +106,7 @@ def print_suitable(needs: Sequence[str], family: str | None, plant: Plant | str 
 
 
 def print_page(template: Template, console: Console, package: str, text: str) -> None:
-    """Print everything about one law, surface or estimator.
-
-    Args:
-      package: that it is from; "" for this one.
-      text: its name, or its file.
-    """
+    """Print everything about a law, surface or estimator of a package, "" for this one; `text` is its name or file."""
     parts, is_law = entry(template), template.kind == "law"
     console.print(Text.assemble((template.name, "bold cyan"), f"  {parts.title}", (f"  {template.kind}", "dim")))
     console.print(Padding(Text(parts.formula, style="bold"), (0, 0, 1, 2)))

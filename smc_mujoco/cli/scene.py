@@ -30,18 +30,8 @@ def perform(
     terminal: Terminal,
     export: Sequence[str],
     question: str,
-    speed: float | None,
 ) -> None:
-    """Run a scene: print its question, scores and answer; write its traces, figures and film to the folder `out`.
-
-    Args:
-      filming: whether to film the scene.
-      threads: simulations at once; None for one per core.
-      clock: measures the time of each part.
-      export: formats in which traces are written besides .npz.
-      question: printed first; "" for none.
-      speed: playback speed of the film; None to choose it by the motion.
-    """
+    """Run a scene: print its question, scores and answer; write its traces, figures and film to the folder `out`."""
     if question:
         terminal.note(f"{question}\n", "bold", wrap=True)
     try:
@@ -70,7 +60,7 @@ def perform(
     try:
         if filming:
             with clock("film"):
-                written += film(scene, traces, out, terminal, speed)
+                written += film(scene, traces, out, terminal)
     finally:  # also if the film fails or is stopped
         terminal.print("wrote", style="dim")
         for file in written:
@@ -130,10 +120,10 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
     return written
 
 
-def film(scene: Scene, traces: Traces, out: Path, terminal: Terminal, speed: float | None) -> list[Path]:
+def film(scene: Scene, traces: Traces, out: Path, terminal: Terminal) -> list[Path]:
     """Film the scene's filmed condition and return the file; if nothing can render, print why and return []."""
     runs, path, title = traces[scene.film], out / f"{slug(scene.film)}.mp4", _title(scene, scene.film)
-    return filmed(list(runs.values()), path, [*map(style.label, runs)], title, terminal, speed, scene.camera)
+    return filmed(list(runs.values()), path, [*map(style.label, runs)], title, terminal, scene.camera)
 
 
 def filmed(
@@ -142,7 +132,6 @@ def filmed(
     names: Sequence[str] | None,
     title: str,
     terminal: Terminal,
-    speed: float | None = None,
     camera: Camera | None = None,
 ) -> list[Path]:
     """Film runs with a progress bar and return the file; if nothing can render, print why and return []."""
@@ -152,4 +141,4 @@ def filmed(
         terminal.note(sentence, "yellow")
     if video.missing():
         return []
-    return [video.film(runs, path, names, title, speed=speed, camera=camera)]
+    return [video.film(runs, path, names, title, camera=camera)]

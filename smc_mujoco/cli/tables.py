@@ -26,7 +26,6 @@ from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.chattering import Chattering
-    from smc_mujoco.analysis.gains_for import Design
     from smc_mujoco.analysis.margins import Margin
     from smc_mujoco.analysis.step_halving import StepChange
 
@@ -72,10 +71,7 @@ def plain(*columns: Column | str, **options: Any) -> Table:
 
 
 def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
-    """Return a table for each group of channels, with a line for each run and a column for each metric.
-
-    If there are several groups, the titles name them.
-    """
+    """Return a table for each group of channels, with a line for each run and a column for each metric."""
     style.same_plant(list(traces.values()))
     scenario = next(iter(traces.values())).scenario
     values = {label: metric_scores(trace) for label, trace in traces.items() if trace.diverged_at is None}
@@ -132,13 +128,9 @@ def headings(scenario: Scenario) -> dict[Group, str]:
 
 
 def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> list[Table]:
-    """Return a table for each metric, with a line for each label and a column for each condition.
+    """Return a table for each metric that applies, with a line for each label and a column for each condition.
 
     If there is only one condition, there is one table, with a column for each metric.
-
-    Args:
-      names: of the metrics. Those that apply to none of the plants are left out.
-      traces: condition -> label -> trace.
     """
     scenarios = (trace.scenario for runs in traces.values() for trace in runs.values())
     plants = dict.fromkeys((scenario.plant, scenario.efforts[0]) for scenario in scenarios)
@@ -191,13 +183,7 @@ def _label(label: str, trace: Trace) -> Text:
 
 
 def trace_summary(trace: Trace, change: StepChange | None = None) -> list[Table]:
-    """Return a table for each group of channels: every metric of one trace, with its unit and its meaning.
-
-    Metrics of realistic parts appear only if the scenario has such parts.
-
-    Args:
-      change: what half the physics step changes in the run's chattering; None if that is not known.
-    """
+    """Return a table for each group of channels: every metric of one trace, with its unit and its meaning."""
     mark = change.mark if change else ""
     values, tables = metric_scores(trace), []
     for group, heading in headings(trace.scenario).items():
@@ -264,14 +250,7 @@ def chattering(
     measured: Sequence[tuple[float, float]],
     changes: Sequence[StepChange],
 ) -> Table:
-    """Return predicted and measured limit cycles, a line for each scenario.
-
-    Args:
-      channel: the driven channel.
-      cycles: the predictions.
-      measured: amplitude of s in its unit, and frequency in Hz.
-      changes: what half the physics step changes in the runs.
-    """
+    """Return predicted and measured limit cycles of a channel (amplitude of s, Hz), a line for each scenario."""
     plant = scenarios[0].plant
     last = "coupling" if plant.driven > 1 else "third"
     heads = [f"s ({plant.units[channel]}/s)", "measured", "Hz", "measured", "±", last]
@@ -291,13 +270,3 @@ def chattering(
 def _share(share: float) -> str:
     """Return a share in percent; "" for NaN."""
     return "" if math.isnan(share) else f"{100 * share:.0f} %" if share <= 1.0 else "> 100 %"
-
-
-def designs(designs: Sequence[Design], unit: str) -> Table:
-    """Return the gains of each design, and the constant disturbance, in `unit`, that it tolerates."""
-    table = titled("largest gains", "law", "gains", Column(f"tolerates ({unit})", justify="right"))
-    for design in designs:
-        law = Text(design.law.name, style=style.law_colour(design.law.name))
-        gains = ", ".join(f"{name}={number(gain)}" for name, gain in design.law.gains.items() if math.isfinite(gain))
-        table.add_row(law, gains, number(design.disturbance))
-    return table

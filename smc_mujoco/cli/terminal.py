@@ -3,7 +3,6 @@
 import contextlib
 import os
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -46,21 +45,11 @@ def _fail(sentence: str, code: int = 2) -> None:
 
 
 class Terminal(Console):
-    """The console of a command, which also measures its time. It prints brackets as they are, not as markup.
+    """The console of a command, which also measures its time. It prints brackets as they are, not as markup."""
 
-    Args:
-      prints: name of a result file that goes to stdout instead of to a folder; all else then goes to stderr. "" for
-        none.
-
-    Attributes:
-      printed: a temporary path for that file, or None. The command writes it there; `wrote` prints and deletes it.
-    """
-
-    def __init__(self, prints: str = ""):
-        super().__init__(stderr=bool(prints), markup=False, emoji=False)
+    def __init__(self):
+        super().__init__(markup=False, emoji=False)
         self.start = time.perf_counter()
-        self._folder = tempfile.TemporaryDirectory() if prints else None
-        self.printed = Path(self._folder.name) / prints if self._folder else None
 
     @property
     def seconds(self) -> float:
@@ -72,13 +61,9 @@ class Terminal(Console):
         self.print(text, style=style, soft_wrap=not wrap, highlight=False)
 
     def wrote(self, *files: Path) -> None:
-        """Print the names of files that were written, but the content of the file `printed`."""
+        """Print the names of files that were written."""
         for file in files:
-            if self._folder and file == self.printed:
-                print(file.read_text(encoding="utf-8"), end="")
-                self._folder.cleanup()
-            else:
-                self.note(f"wrote {printable(str(file))}")
+            self.note(f"wrote {printable(str(file))}")
 
 
 class Clock:

@@ -1,7 +1,7 @@
 """What laws need and promise, to choose laws by.
 
-    suitable(["continuous", "two-gains"], family="terminal")     # templates of laws
-    reads(smc.law("pid").template)                               # {"e", "de", ...}: what the law measures
+    suitable(["continuous", "two-gains"])     # templates of laws
+    reads(smc.law("pid").template)            # {"e", "de", ...}: what the law measures
 
 Most properties are derived from the law's code. Continuity and finite time follow from theory alone, so the law's
 decorator states them. Tests compare both kinds with what the law does.
@@ -66,11 +66,10 @@ def families() -> dict[str, list[str]]:
     return dict(sorted(members.items()))
 
 
-def suitable(needs: Iterable[str] = (), family: str | None = None, plant: Plant | str | None = None) -> list[Template]:
-    """Return the library's laws, or those of a family or for a plant, that have all these PROPERTIES."""
+def suitable(needs: Iterable[str] = (), plant: Plant | str | None = None) -> list[Template]:
+    """Return the laws of the library, or those for a plant, that have all these PROPERTIES."""
     properties = [find("property of a law", need, PROPERTIES) for need in needs]
-    members = catalogue() if family is None else find("family of laws", family, families())
-    templates = [catalogue()[name] for name in laws(plant) if name in members]
+    templates = [catalogue()[name] for name in laws(plant)]
     return [law for law in templates if all(needed.holds(law) for needed in properties)]
 
 

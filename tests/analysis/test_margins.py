@@ -1,6 +1,5 @@
 """Margins: what is found is a boundary, the first one from below, and theory's where there is one."""
 
-import csv
 import dataclasses
 import importlib
 import json
@@ -280,19 +279,6 @@ def test_margins_survive_their_file(found, tmp_path):
     assert math.isnan(rough.value)
     assert rough.theory == math.inf
     json.loads(path.read_text(), parse_constant=pytest.fail)
-
-
-def test_a_csv_file_of_margins_has_a_row_for_each(found, tmp_path, refused):
-    path = margins.save_csv([*found, ROUGH], tmp_path / "margins.csv")
-    with path.open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    for row, margin in zip(rows, [*found, ROUGH], strict=True):
-        assert {name: row[name] for name in ("plant", "law", "kind", "unit")} == {
-            name: getattr(margin, name) for name in ("plant", "law", "kind", "unit")
-        }
-        assert row["value"] == str(margin.value)
-        assert row["theory"] == ("" if margin.theory is None else str(margin.theory))
-    refused(lambda: margins.save_csv([], tmp_path / "margins.json"))
 
 
 def test_what_holds_no_margins_is_refused(tmp_path, refused):

@@ -23,45 +23,42 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "laws": ["cli.law_pages.print_lists"],
     "laws pid": ["cli.law_pages.print_pages"],
     "laws --needs continuous,two-gains": ["cli.law_pages.print_suitable"],
-    "laws --family terminal": ["cli.law_pages.print_suitable"],
     "laws --plant duffing": ["cli.law_pages.print_suitable"],
     "run duffing": ["cli.scene.perform"],
-    "run duffing --out there --no-film --speed 2 --camera 1,2,3 --seed 7 --threads 2 --export csv,mat": [
-        "cli.scene.perform"
-    ],
+    "run duffing --out there --no-film --camera 1,2,3 --seed 7 --threads 2 --export csv,mat": ["cli.scene.perform"],
     "view duffing": ["draw.viewer.watch"],
     "view vdp_noise --condition noise --label super_twisting": ["draw.viewer.watch"],
     "compare": ["studies.compare.compare"],
     "compare duffing,van_der_pol --law pid,classical --condition noise --seeds 3 --no-tune --worst --quick "
-    "--gains default --duration 2 --x0 0.4 --spread 0.1 --relevant 0.05 --defaults --out there --figure f "
-    "--latex t.tex --executor dask://a:1 --traces all --fresh --noise-key 5 --threads 2": ["studies.compare.compare"],
+    "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --out there --figure f "
+    "--latex t.tex --executor dask://a:1 --traces all --noise-key 5 --threads 2": ["studies.compare.compare"],
     "compare --law all": ["studies.compare.compare"],
     "compare --law all --gains default duffing": ["studies.compare.compare"],
     "compare --rig simple_pendulum_ak80 --seeds 1": ["studies.study.study", "studies.leaderboard.leaderboard"],
-    "compare --rig simple_pendulum_ak80 --law pid --seeds 1 --duration 2 --x0 0.4 --spread 0.1 --out there --fresh "
+    "compare --rig simple_pendulum_ak80 --law pid --seeds 1 --duration 2 --x0 0.4 --out there "
     "--executor dask://a:1 --threads 2 --defaults --relevant 0.05 --noise-key 0": [
         "studies.study.study",
         "studies.leaderboard.leaderboard",
     ],
     "which duffing": ["studies.adviser.which"],
-    "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 --x0 0.4 --spread 0.1 "
-    "--relevant 0.05 --out there --defaults --noise-key 5 --disturbance 2 --threads 2": ["studies.adviser.which"],
+    "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 --x0 0.4 "
+    "--relevant 0.05 --out there --defaults --disturbance 2 --threads 2": ["studies.adviser.which"],
     "tune duffing pid": ["analysis.tuning.search.tune"],
-    "tune duffing pid --objective tracking --budget 7 --seed 3 --out there.json --front f --chattering 0.02 "
-    "--condition noise --x0 0.4 --spread 0.1 --threads 2": ["analysis.tuning.search.tune"],
+    "tune duffing pid --objective tracking --budget 7 --seed 3 --out there.json "
+    "--condition noise --x0 0.4 --threads 2": ["analysis.tuning.search.tune"],
     "margins": ["analysis.margins.margins"],
     "margins --quick": ["analysis.margins.margins"],
-    "margins duffing --law pid --kinds delay,mass --gains default --quick --condition noise --x0 0.4 --out m.csv "
+    "margins duffing --law pid --kinds delay,mass --gains default --quick --condition noise --x0 0.4 "
     "--json m.json --threads 2": ["analysis.margins.margins"],
     "worst duffing": ["studies.worst_case.worst_case"],
-    "worst duffing --law pid --disturbance 2 --slope 3 --position-noise 0.01 --velocity-noise 0.02 --hold 0.1 "
-    "--delay 0:0.01 --jitter 0.002 --mass 0.7:1.3 --friction 0:0.1 --friction-scale 0.5:2 --parameter alpha=0.8:1.2 "
-    "--spread 0.1 --metric peak --gains default --condition noise --duration 2 --budget 9 --seed 3 --out w "
+    "worst duffing --law pid --disturbance 2 "
+    "--bound slope=3,position_noise=0.01,delay=0:0.01,mass=0.7:1.3,alpha=0.8:1.2 "
+    "--metric peak --gains default --condition noise --duration 2 --budget 9 --seed 3 --out w "
     "--json w.json --threads 2": ["studies.worst_case.worst_case"],
     "worst simple_pendulum_ak80 --gains default": ["studies.worst_case.worst_case"],
     "accuracy duffing": ["evidence.accuracy.accuracy.accuracy"],
     "accuracy duffing van_der_pol --law pid --condition sine --periods 0.002,0.001 --seeds 2 --gains default "
-    "--duration 2 --x0 0.4 --spread 0.1 --out a --json a.json --threads 2": ["evidence.accuracy.accuracy.accuracy"],
+    "--duration 2 --x0 0.4 --out a --json a.json --threads 2": ["evidence.accuracy.accuracy.accuracy"],
     "basin duffing": ["analysis.region_of_attraction.basin"],
     "basin duffing --law pid --points 3 --gains default --duration 2 --out b --json b.json --condition noise "
     "--threads 2": ["analysis.region_of_attraction.basin"],
@@ -69,9 +66,7 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "chatter duffing --law pid --actuator lag:0.01 --condition noise --gains default --duration 2": [
         "simulation.grid.case"
     ],
-    "chatter duffing --law pid --amplitude 0.1 --frequency 5 --channel 1 --out c --json c.json --threads 2": [
-        "analysis.gains_for.design"
-    ],
+    "chatter duffing --law pid --channel 1 --out c --json c.json --threads 2": ["analysis.chattering.chattering"],
     "live": ["exchange.live.build.live"],
     "live duffing furuta --law pid --law classical --out there": ["exchange.live.build.live"],
     "export-c pid": ["exchange.c.export.law_to_c"],
@@ -92,12 +87,12 @@ COMMANDS = {name: (group, command) for group, commands in main.GROUPS.items() fo
 
 PRINTED = [  # command lines that are run to their ends
     "show one.npz --export csv,mat",
-    "margins duffing --law classical,pid --kinds delay --quick --out m.csv --json m.json",
+    "margins duffing --law classical,pid --kinds delay --quick --json m.json",
     "worst duffing --law classical --budget 3 --duration 0.2 --gains default --out w.pdf --json w.json",
     "accuracy duffing --law classical --periods 0.004,0.002 --seeds 1 --duration 0.5 --out a.pdf --json a.json",
     "basin duffing --law classical --points 2 --duration 0.1 --out b.pdf --json b.json",
     "chatter duffing --law super_twisting --actuator lag:0.01 --gains default --duration 0.2 --out c.pdf --json c.json",
-    "tune duffing classical --budget 2 --condition nominal --out t.json --front f.pdf",
+    "tune duffing classical --budget 2 --condition nominal --out t.json",
     "compare duffing --law classical,pid --gains default --condition nominal --seeds 1 --duration 0.1 --out c "
     "--figure f.pdf --latex f.tex",
     "compare --rig simple_pendulum_ak80 --law classical --seeds 1 --duration 0.1 --noise-key 0 --out r",

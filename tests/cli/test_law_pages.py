@@ -83,16 +83,13 @@ def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
     assert f"{len(lines)} of {len(laws())} {words}" in flat(out)
 
 
-def test_laws_of_a_family_and_of_a_plant(call):
-    names = [line.split()[0] for line in call("laws", "--family", "terminal")[1].splitlines() if line.strip()]
-    assert {"terminal", "nonsingular_terminal", "nonsingular_fast_terminal"} <= set(names)
-    assert "twisting" not in names
+def test_laws_of_a_plant(call):
     assert "hierarchical" in call("laws", "--plant", "overhead_crane")[1]
 
 
 def test_where_no_law_suits_it_says_so(call):
     out = flat(call("laws", "--needs", "one-gain")[1])
-    assert out == f"0 of {len(laws())} laws that have one gain to choose: leave out a need, --family or --plant"
+    assert out == f"0 of {len(laws())} laws that have one gain to choose: leave out a need, or --plant"
     assert 'velocity="levant"' in flat(call("laws", "--needs", "no-velocity")[1])
 
 
@@ -100,7 +97,6 @@ def test_where_no_law_suits_it_says_so(call):
     ("words", "sentence"),
     [
         (("--needs", "smooth"), "unknown property of a law 'smooth': choose from continuous, "),
-        (("--family", "termnal"), "unknown family of laws 'termnal': did you mean 'terminal'?"),
         (("--plant", "dufing"), "did you mean 'duffing'?"),
         (("pid", "--needs", "continuous"), "laws pid shows one law: leave it out, or leave out --needs"),
     ],

@@ -85,8 +85,7 @@ def test_margins_and_cycles_are_told_with_their_limits(snapshot):
             amplitude=math.nan, frequency=math.nan, uncertainty=math.nan, coupling=1.5, third_harmonic=1.01
         ),
     ]
-    design: Any = SimpleNamespace(law=smc.law("super_twisting"), disturbance=0.5)
-    shown = [tables.margins("delay", found), tables.designs([design], "N")]
+    shown = [tables.margins("delay", found)]
     for plant, count in (("duffing", 2), ("double_pendulum", 1)):
         scenarios = [smc.Scenario(plant=plant, law=law) for law in ("pid", "classical")][:count]
         measured = [(0.125, 4.5), (math.nan, math.nan)][:count]

@@ -139,8 +139,6 @@ def test_laws_are_chosen_by_all_that_is_asked():
     assert "lqr" in names("two-gains")  # its weight r and its plant are held
     assert {"none"} == {"none", "pid", "classical"} & {*names("no-velocity")}
     assert {"none"} == {"none", "hierarchical"} & {*names("no-model", plant="cart_pole")}
-    assert {"terminal"} == {"terminal", "twisting"} & {*names(family="terminal")}
-    assert "terminal" not in names("continuous", family="terminal")
 
 
 def test_every_law_is_in_one_family():
@@ -148,16 +146,9 @@ def test_every_law_is_in_one_family():
     assert {"disturbance_observer", "extended_state"} <= {*families()["disturbance-observer"]}
 
 
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        ({"needs": ["smooth"]}, "unknown property of a law 'smooth'"),
-        ({"family": "terminals"}, "did you mean 'terminal'"),
-    ],
-)
-def test_an_unknown_property_or_family_is_named(options, sentence):
-    with pytest.raises(smc.ScenarioError, match=sentence):
-        suitable(**options)
+def test_an_unknown_property_is_named():
+    with pytest.raises(smc.ScenarioError, match="unknown property of a law 'smooth'"):
+        suitable(["smooth"])
 
 
 def test_a_property_is_said_as_recorded(snapshot):

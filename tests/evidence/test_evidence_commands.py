@@ -93,7 +93,7 @@ def half_done(scenario, report):
     return f"robustness of {scenario}"
 
 
-def audited(about, ids, sets, quick, threads, table, report):
+def audited(about, ids, sets, quick, threads, report):
     report(1)
     save = lambda path: path  # noqa: E731
     return SimpleNamespace(claims=Claims(one for one in CLAIMS if one.id in (ids or "34")), save=save, badge=save)
@@ -158,15 +158,14 @@ STUBS = {  # of each command: the functions replaced, and what they give
 LINES = (
     "board acrobot --figure a --film b.mp4",
     "board pendubot --no-robustness",
-    "certify duffing --disturbance 2 --worst --out d.json --json e.json --figure f",
+    "certify duffing --disturbance 2 --worst --out d.json --figure f",
     "certify duffing --law pid --condition noise --gains default --slope 3",
     "certify",
     "certify duffing --check d.json",
     "certify duffing --worst",
-    "certify duffing --json -",
     "claims 3 --gains study,tuned --quick --threads 2",
-    "claims --mutants --out all.json --evidence e.json --badge b.svg",
-    "claims 4 --json --quick --out c.json",
+    "claims --mutants --evidence e.json --badge b.svg",
+    "claims 4 --json --quick",
     "claims --json --mutants",
     "papers",
     "papers --new mine --check e.json",

@@ -1,7 +1,6 @@
 """smc-mujoco tune, margins, worst, basin, chatter: one question about laws on a plant, by many runs."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +13,7 @@ from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
-    from smc_mujoco.analysis.gains_for import Design
+    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
     from smc_mujoco.control.law import Law
     from smc_mujoco.simulation.scenario import Scenario
 
@@ -39,13 +38,8 @@ def tune(
     out: Annotated[
         Path | None, typer.Option(metavar="FILE.json", help="Also write gains, history and provenance to a file.")
     ] = None,
-    front: Annotated[Path | None, options.picture("error against variation")] = None,
-    chattering: Annotated[
-        float | None, typer.Option(help="Largest predicted amplitude of s, in its unit, in the first condition.")
-    ] = None,
     condition: options.Conditions = None,
     x0: options.X0 = None,
-    spread: options.Spread = None,
     threads: options.Threads = None,
 ) -> None:
     """Find a law's gains on a plant by a rule that is the same for every law.
@@ -61,20 +55,14 @@ def tune(
         from smc_mujoco.analysis.tuning import search
         from smc_mujoco.common.files import with_ending, writable
 
-    writable(out, front)
-    path, terminal = out and with_ending(out, ".json"), Terminal()
-    tries, tested, start = budget or search.BUDGET, options.conditions(condition) or None, options.starts(x0, spread)
-    tuned = search.tune(options.plant(plant), law, tries, seed, objective, threads, True, tested, start, chattering)
+    writable(out and with_ending(out, ".json"))
+    terminal, start = Terminal(), options.starts(x0)
+    tries, tested = budget or search.BUDGET, options.conditions(condition) or None
+    tuned = search.tune(options.plant(plant), law, tries, seed, objective, threads, True, tested, start)
     terminal.print(tuned)
     terminal.note(f"{terminal.seconds:.0f} s", "dim")
-    if path:
-        terminal.wrote(tuned.save(path))
-    if front:
-        from smc_mujoco.draw.page import files
-        from smc_mujoco.draw.pareto import pareto
-
-        pareto([tuned], front)
-        terminal.wrote(*files(front))
+    if out:
+        terminal.wrote(tuned.save(out))
 
 
 @errors_as_sentences()
@@ -93,7 +81,6 @@ def margins(
     ] = False,
     condition: options.Condition = "nominal",
     x0: options.X0 = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="Also write the table to a file.")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
@@ -108,27 +95,25 @@ def margins(
     Example: smc-mujoco margins duffing --law observer_free,classical --kinds delay
     """
     with delay_ctrl_c():
-        from smc_mujoco.analysis.margins import KINDS, save, save_csv
+        from smc_mujoco.analysis.margins import KINDS, save
         from smc_mujoco.analysis.margins import margins as search
         from smc_mujoco.cli import tables
-        from smc_mujoco.common.files import with_ending
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
         from smc_mujoco.simulation.conditions import PLANTS
 
-    json, terminal = options.json_file(json, out and with_ending(out, ".csv"))
+    terminal = Terminal()
+    options.check_files(json)
     machines = [options.plant(text) for text in options.names(plants, QUICK_MARGINS["plants"] if quick else PLANTS)]
     chosen = options.laws(law, QUICK_MARGINS["laws"] if quick else gain_sets.LAWS)
     kind = options.names(kinds, QUICK_MARGINS["kinds"] if quick else KINDS)
     with bar("margins") as progress:
-        start = options.starts(x0, None)
+        start = options.starts(x0)
         results = search(machines, chosen, kind, gains, quick, threads, progress.reached, condition, start)
     for name in kind:
         terminal.print(tables.margins(name, [margin for margin in results if margin.kind == name]))
     words = f"{counted(len(results), 'margin')}, {options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s"
     terminal.note(words, "dim", wrap=True)
-    if out:
-        terminal.wrote(save_csv(results, out))
     if json:
         terminal.wrote(save(results, json))
 
@@ -142,23 +127,15 @@ def worst(
         ),
     ],
     law: options.Laws = None,
-    disturbance: Annotated[float, typer.Option(help="Bound on |d|, N or N m, on every driven joint.")] = 0.0,
-    slope: Annotated[float | None, typer.Option(help="Bound on |d'|, per second; default: d may jump.")] = None,
-    position_noise: Annotated[float, typer.Option(help="Bound on errors of measured positions, rad or m.")] = 0.0,
-    velocity_noise: Annotated[float, typer.Option(help="Bound on errors of measured velocities, per second.")] = 0.0,
-    hold: Annotated[float, typer.Option(help="How long each error of measurement lasts, s.")] = 0.05,
-    delay: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Input delay, s, as 0:0.01.")] = None,
-    jitter: Annotated[float, typer.Option(help="Largest delay of a control sample, s.")] = 0.0,
-    mass: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Factor on the mass, as 0.7:1.3.")] = None,
-    friction: Annotated[str | None, typer.Option(metavar="LOW:HIGH", help="Dry friction, N or N m, as 0:0.1.")] = None,
-    friction_scale: Annotated[
-        str | None, typer.Option(metavar="LOW:HIGH", help="Factor on the friction that there is, as 0.5:2.")
+    disturbance: options.Disturbance = None,
+    bound: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME=BOUND,...",
+            help="Other bounds of `smc.Uncertainty`, as delay=0:0.01 (s), mass=0.7:1.3 (a factor) or "
+            "position_noise=0.01, and the ranges of other parameters of the plant, as payload=0:2.",
+        ),
     ] = None,
-    parameter: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=LOW:HIGH", help="Another parameter, as alpha=0.8:1.2. May be repeated."),
-    ] = None,
-    spread: Annotated[float, typer.Option(help="How far x0 may be off, as a share of it.")] = 0.0,
     metric: Annotated[str, typer.Option(help="The metric to make large, any of `smc.score`.")] = "rms_error",
     gains: options.Gains = "tuned",
     condition: options.Condition = "nominal",
@@ -173,34 +150,25 @@ def worst(
 ) -> None:
     """Find the worst that can happen to laws within bounds that you give: an adversary instead of random seeds.
 
-    You say only what is uncertain: a bound on the disturbance, ranges of mass, delay and friction. By default, it is
-    what the plant declares, such as an arm's payload, or else a disturbance up to a sixth of what the weakest drive
-    gives. Of a rig, such as qube_servo, the adversary also chooses one of its parameter sets.
-
-    The search is the same for every law: constant forces, forces that switch with the sign of s, of e or of its rate,
-    waves at the frequency of the loop, all corners of the ranges, and an evolution from the worst of these. There may
-    be worse than what it finds.
+    You say only what is uncertain. By default, it is what the plant declares, such as an arm's payload, or else a
+    disturbance up to a sixth of what the weakest drive gives. Of a rig, such as qube_servo, the adversary also chooses
+    one of its parameter sets. The search is the same for every law, and there may be worse than what it finds.
 
     The column "worst found" has the error of the worst run, the column "median" that of as many random runs within the
     bounds. Laws are ordered by the worst. A line below the table says where the bounds go beyond the theorem of a law.
     The law of your file has its default gains: tune it first (`smc-mujoco tune`).
 
-    Example: smc-mujoco worst duffing --law classical,super_twisting,observer_free --disturbance 2 --mass 0.7:1.3
+    Example: smc-mujoco worst duffing --law classical,super_twisting,observer_free --disturbance 2 --bound mass=0.7:1.3
 
-    Example: smc-mujoco worst panda --law computed_torque_sliding --gains default --parameter payload=0:2
+    Example: smc-mujoco worst panda --law computed_torque_sliding --gains default --bound payload=0:2
     """
     with delay_ctrl_c():
-        from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
         from smc_mujoco.common.files import write_json
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.worst_case import WorstCases, worst_case
 
-    json, terminal = options.json_file(json, *files(out))
-    ranges = {"delay": delay, "mass": mass, "friction": friction, "friction_scale": friction_scale}
-    noise = {"position_noise": position_noise, "velocity_noise": velocity_noise, "jitter": jitter}
-    bounds = {"disturbance": disturbance, "slope": slope, "x0": spread} | noise | _ranges(ranges, parameter or ())
-    set_bounds: dict[str, Any] = {name: bound for name, bound in bounds.items() if bound}
-    within = Uncertainty(hold=hold, **set_bounds) if set_bounds else None
+    terminal, within = Terminal(), _within(disturbance, bound)
+    options.check_files(json, *files(out))
     chosen, cases = _attacked_cases(plant, law, condition, duration, gains)
     results = WorstCases(worst_case(runs, metric, within, budget, seed, threads, progress=True) for runs in cases)
     terminal.print(results)
@@ -212,13 +180,23 @@ def worst(
         terminal.wrote(*files(out))
 
 
-def _ranges(ranges: Mapping[str, str | None], parameters: Sequence[str]) -> dict[str, Any]:
-    """Return the fields of an Uncertainty from texts such as "0.7:1.3", and from those of --parameter."""
-    pairs = [text.partition("=") for text in parameters]
-    return {
-        "parameters": {name: options.low_and_high(f"--parameter {name}", text) for name, _, text in pairs},
-        **{name: options.low_and_high(f"--{name.replace('_', '-')}", text) for name, text in ranges.items() if text},
-    }
+def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | None":
+    """Return the class of the options --disturbance and --bound; None if neither is given."""
+    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+
+    known = [field.name for field in dataclasses.fields(Uncertainty)]
+    fields: dict[str, Any] = {} if disturbance is None else {"disturbance": disturbance}
+    for name, text in options.pairs(bounds, "--bound", "mass=0.7:1.3").items():
+        try:
+            low, *high = map(float, text.split(":"))
+        except ValueError:
+            raise ScenarioError(f"--bound {name}={text} cannot be read: write it as mass=0.7:1.3") from None
+        value = (low, *high) if high else low
+        if name in known:
+            fields[name] = value
+        else:
+            fields.setdefault("parameters", {})[name] = value
+    return Uncertainty(**fields) if fields else None
 
 
 def _attacked_cases(
@@ -243,9 +221,7 @@ def _attacked_cases(
 @errors_as_sentences()
 def basin(
     plant: options.PlantName,
-    law: Annotated[
-        str, typer.Option(autocompletion=options.LAWS, help=f"A law. {options.GAINS_HELP}")
-    ] = "observer_free",
+    law: options.OneLaw = "observer_free",
     points: Annotated[int, typer.Option(min=2, help="Number of positions, and of velocities.")] = 50,
     gains: options.Gains = "tuned",
     duration: Annotated[float, typer.Option(help="Duration of the longest runs, s.")] = 10.0,
@@ -269,9 +245,8 @@ def basin(
         from smc_mujoco.draw.page import files
         from smc_mujoco.draw.region import draw
 
-    pictures = files(out)
-    json, terminal = options.json_file(json, *pictures)
-    chosen = options.law(law)
+    terminal, pictures, chosen = Terminal(), files(out), options.law(law)
+    options.check_files(json, *pictures)
     with bar(f"{law} on {plant}") as progress:
         region = search(
             options.plant(plant), chosen, (points, points), gains=gains, duration=duration, threads=threads,
@@ -299,14 +274,6 @@ def chatter(
     condition: options.Condition = "nominal",
     gains: options.Gains = "tuned",
     channel: Annotated[int, typer.Option(min=0, help="The driven channel.")] = 0,
-    amplitude: Annotated[
-        float | None,
-        typer.Option(min=1e-12, help="Take the largest gains whose predicted amplitude of s stays below this."),
-    ] = None,
-    frequency: Annotated[
-        float | None,
-        typer.Option(min=1e-3, help="Take the largest gains whose predicted frequency, Hz, stays below this."),
-    ] = None,
     duration: Annotated[float, typer.Option(min=0.1, help="Duration of the runs that measure it, s.")] = 8.0,
     out: Annotated[Path | None, options.picture("Nyquist plots and runs")] = None,
     json: options.Json = None,
@@ -315,18 +282,11 @@ def chatter(
     """Predict how much laws chatter, by harmonic balance, and measure it in runs.
 
     If a law switches and the actuator lags, the loop oscillates without end. Frequency and amplitude follow from the
-    law's describing function N and the response L of the linearised mechanism: N L = 1. The column "±" is how far
-    the predicted amplitude or frequency may be off. There are two reasons: s has harmonics, and the cycle may be locked
-    to the control samples, which shifts the instant at which the law switches. A star marks a run whose amplitude or
-    frequency changes by more than 10 % with half the physics step. The column "third" is the third harmonic over the
-    first.
-
-    If the plant has several driven channels, the column "coupling" is how far this channel's command moves another
-    channel, over how far it moves this one. The prediction is for a single channel. It fails if the coupling is not
-    small, because the channels then oscillate together.
-
-    With --amplitude or --frequency, the gains of each law are scaled in proportion until the prediction meets the
-    bound. Then the constant disturbance that they tolerate is measured.
+    law's describing function N and the response L of the linearised mechanism: N L = 1. The column "±" is how far the
+    prediction may be off: s has harmonics, and the cycle may be locked to the control samples. A star marks a run that
+    changes by more than 10 % with half the physics step. The column "third" is the third harmonic over the first. If
+    the plant has several driven channels, the column "coupling" is how far this channel's command moves another one,
+    over how far it moves this one: the prediction is for a single channel, and fails if the coupling is not small.
 
     Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --out chatter
     """
@@ -341,14 +301,10 @@ def chatter(
         from smc_mujoco.simulation.grid import case
         from smc_mujoco.simulation.run import run
 
-    pictures = files(out)
-    json, terminal = options.json_file(json, *pictures)
-    chosen = options.laws(law, gain_sets.LAWS)
+    terminal, pictures, chosen = Terminal(), files(out), options.laws(law, gain_sets.LAWS)
+    options.check_files(json, *pictures)
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
     cases = [case(options.plant(plant), law, condition, duration, gains, changes=fields) for law in chosen]
-    designs = []
-    if amplitude is not None or frequency is not None:
-        cases, designs = _designed(cases, amplitude, frequency, channel, terminal)
     with bar("chattering") as progress:
         cycles = []
         for done, scenario in enumerate(cases):
@@ -357,8 +313,6 @@ def chatter(
         traces = run(cases, threads=threads)
         measured, changes = [channel_cycle(trace, channel) for trace in traces], step_halving(traces, channel, threads)
     terminal.print(tables.chattering(cases, channel, cycles, measured, changes))
-    if designs:
-        terminal.print(tables.designs(designs, cases[0].efforts[channel]))
     terminal.note("assumed: " + "; ".join(shared_assumptions(cycles)), wrap=True)
     terminal.note(f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim", wrap=True)
     if json:
@@ -368,22 +322,3 @@ def chatter(
 
         nyquist(cases, out, channel, cycles, traces, changes=changes)
         terminal.wrote(*pictures)
-
-
-def _designed(
-    cases: "Sequence[Scenario]", amplitude: float | None, frequency: float | None, channel: int, terminal: Terminal
-) -> "tuple[list[Scenario], list[Design]]":
-    """Return the cases whose laws have gains for the bounds, with these gains, and the gains; name the other laws."""
-    from smc_mujoco.analysis.gains_for import design
-
-    designed, designs = [], []
-    for scenario in cases:
-        try:
-            designs.append(design(scenario, amplitude, frequency, channel))
-        except ScenarioError as error:
-            terminal.note(f"{scenario.law.name} is left out: {error}", "yellow", wrap=True)
-        else:
-            designed.append(dataclasses.replace(scenario, law=designs[-1].law))
-    if not designs:
-        raise ScenarioError("no law has such gains: give a larger --amplitude or --frequency")
-    return designed, designs

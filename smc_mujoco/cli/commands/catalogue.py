@@ -63,14 +63,8 @@ def laws(
             "finite-time (of the error), finite-reaching (of s), one-gain, two-gains (at most)."
         ),
     ] = None,
-    family: Annotated[
-        str | None, typer.Option(help="Only laws of a family, such as terminal, adaptive or super-twisting.")
-    ] = None,
     plant: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PLANT", autocompletion=options.PLANTS, help="Only laws for a plant, or FILE.xml:joint+joint."
-        ),
+        str | None, typer.Option(metavar="PLANT", autocompletion=options.PLANTS, help="Only laws that suit a plant.")
     ] = None,
 ) -> None:
     """Show all laws, surfaces and velocity estimators, or one in full: formula, gains, conditions, source.
@@ -78,8 +72,8 @@ def laws(
     The column deg is the relative degree of the variable that a law drives to zero: 1 for a sliding variable s, of any
     surface of degree 1; 2 for the error e and its rate; 3 for e and two rates.
 
-    With --needs, --family or --plant the table has the laws that suit, and what distinguishes them. The command
-    "smc-mujoco which" compares such laws on a plant, and advises one.
+    With --needs or --plant the table has the laws that suit, and what distinguishes them. The command "smc-mujoco
+    which" compares such laws on a plant, and advises one.
 
     Example: smc-mujoco laws super_twisting
 
@@ -91,12 +85,12 @@ def laws(
         from smc_mujoco.cli import law_pages
         from smc_mujoco.common.errors import ScenarioError
 
-    filtered = (needs, family, plant) != (None, None, None)
+    filtered = needs is not None or plant is not None
     if name is not None and filtered:
-        raise ScenarioError(f"laws {name} shows one law: leave it out, or leave out --needs, --family and --plant")
+        raise ScenarioError(f"laws {name} shows one law: leave it out, or leave out --needs and --plant")
     if filtered:
         chosen = None if plant is None else options.plant(plant)
-        law_pages.print_suitable(options.names(needs), family, chosen, Terminal())
+        law_pages.print_suitable(options.names(needs), chosen, Terminal())
     elif name is None:
         law_pages.print_lists(Terminal())
     else:

@@ -13,7 +13,6 @@ import typer
 from smc_mujoco.common.errors import ScenarioError, find, shown
 
 if TYPE_CHECKING:
-    from smc_mujoco.cli.terminal import Terminal
     from smc_mujoco.control.law import Law
     from smc_mujoco.mechanisms.hardware.backlash import Backlash
     from smc_mujoco.mechanisms.hardware.drives import Drive
@@ -34,11 +33,7 @@ def picture(contents: str) -> Any:
 
 
 def _completing(module: str, name: str) -> Callable[[str], list[str]]:
-    """Return a shell's function that completes the last name of a text such as "a,b" or "a+b".
-
-    Args:
-      module, name: where the names to choose from are, or the function that returns them.
-    """
+    """Return a shell's function that completes a text such as "a,b" or "a+b" with a module's names, or a function's."""
 
     def complete(incomplete: str) -> list[str]:
         names = getattr(importlib.import_module(f"smc_mujoco.{module}"), name)
@@ -54,10 +49,7 @@ CONDITIONS, SCENES = _completing("simulation.conditions", "NAMED"), _completing(
 
 Columns = Annotated[
     str | None,
-    typer.Option(
-        metavar="NAME=COLUMN,...",
-        help="Columns whose names in the files differ from the rig's, as theta=arm_angle,plant_input=voltage.",
-    ),
+    typer.Option(metavar="NAME=COLUMN,...", help="Columns whose names differ from the rig's, as theta=arm_angle."),
 ]
 Conditions = Annotated[
     list[str] | None,
@@ -79,9 +71,11 @@ Condition = Annotated[
         help='The condition of all runs, as encoder, noise+encoder or "worn gear: friction=Coulomb(0.05)".',
     ),
 ]
-Defaults = Annotated[
-    bool, typer.Option("--defaults", help="Name a winner also over laws whose gains are their defaults.")
+Defaults = Annotated[bool, typer.Option("--defaults", help="Name a winner also over laws with default gains.")]
+Disturbance = Annotated[
+    float | None, typer.Option(min=0.0, help="Bound on |d|, N or N m; default that of the plant or the condition.")
 ]
+Folder = Annotated[Path, typer.Option(metavar="FOLDER", help="For gains and runs; the same command continues there.")]
 GainValues = Annotated[
     str, typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's defaults.")
 ]
@@ -89,17 +83,11 @@ Gains = Annotated[str, typer.Option(help="Set of gains: tuned, study, tracking o
 Joints = Annotated[
     int | None, typer.Option(help="Number of joints of a law of many joints; default that of the values of a gain.")
 ]
-Json = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE.json|-", help="Also write the result to a .json file; - prints it, tables go to stderr."
-    ),
-]
+Json = Annotated[Path | None, typer.Option(metavar="FILE.json", help="Also write the result to a file.")]
+OneLaw = Annotated[str, typer.Option("--law", autocompletion=LAWS, help=f"A law. {GAINS_HELP}")]
 LawText = Annotated[
     str,
-    typer.Argument(
-        metavar="LAW|FILE", autocompletion=LAWS, help="A law, as pid or pid(kp=50, ki=1), or a file with one."
-    ),
+    typer.Argument(metavar="LAW|FILE", autocompletion=LAWS, help="As pid or pid(kp=50, ki=1), or a file with a law."),
 ]
 Laws = Annotated[
     list[str] | None,
@@ -111,6 +99,9 @@ Laws = Annotated[
         show_default=False,
     ),
 ]
+NoiseKey = Annotated[
+    int | None, typer.Option(min=0, help="Key of the noise, to repeat a table; default: a number drawn now.")
+]
 Plants = Annotated[
     list[str] | None,
     typer.Argument(
@@ -120,28 +111,20 @@ Plants = Annotated[
         show_default=False,
     ),
 ]
-Quick = Annotated[bool, typer.Option("--quick", help="Less of everything: a first answer in a minute or two.")]
-NoiseKey = Annotated[
-    int | None,
-    typer.Option(min=0, help="Key of the noise, to repeat a table; 0: public seeds; default: a number drawn now."),
-]
 PlantName = Annotated[
     str,
     typer.Argument(
         metavar="PLANT",
         autocompletion=PLANTS,
-        help="A plant from `smc-mujoco list`, or FILE.xml:joint+joint for your own model.",
+        help="A plant from `smc-mujoco list`, or FILE.xml:joint+joint for yours.",
     ),
 ]
+Quick = Annotated[bool, typer.Option("--quick", help="Less of everything: a first answer in a minute or two.")]
 Relevant = Annotated[
-    float | None,
-    typer.Option("--relevant", help="Least relevant difference, as a share of the larger value; default 0.03."),
+    float, typer.Option("--relevant", help="Least relevant difference, as a share of the larger value.")
 ]
 SceneName = Annotated[
     str, typer.Argument(metavar="SCENE", autocompletion=SCENES, help="A scene from `smc-mujoco list`, or a scene file.")
-]
-Spread = Annotated[
-    float | None, typer.Option("--spread", help="How far starts vary about x0, as a fraction of it; default 0.2.")
 ]
 Threads = Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")]
 X0 = Annotated[float | None, typer.Option("--x0", help="Where runs start, rad or m; default the plant's own start.")]
@@ -157,11 +140,7 @@ def joints_as_option() -> Iterator[None]:
 
 
 def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> list[str]:
-    """Return the names in a text such as "a,b", or in several, or the default if there is none.
-
-    Raises:
-      ScenarioError: a text without a name.
-    """
+    """Return the names in a text such as "a,b", or in several, or the default if there is none."""
     if texts is None:
         return list(default)
     parts = []
@@ -173,31 +152,15 @@ def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> lis
     return parts
 
 
-def json_file(json: Path | None, *others: Path | None) -> "tuple[Path | None, Terminal]":
-    """Return the file for --json, and the console of the command, which prints that file for "-".
-
-    Args:
-      others: files that the command writes besides. All are checked now, before minutes are spent.
-    """
-    from smc_mujoco.cli.terminal import Terminal
+def check_files(json: Path | None, *others: Path | None) -> None:
+    """Check the file of --json, and the other files of a command, before minutes are spent."""
     from smc_mujoco.common.files import with_ending, writable
 
-    terminal = Terminal(prints="result.json" * (str(json) == "-"))
-    path = terminal.printed or (json and with_ending(json, ".json"))
-    writable(*others, path)
-    return path, terminal
+    writable(json and with_ending(json, ".json"), *others)
 
 
 def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
-    """Return name -> value from the text of an option, such as "theta=arm_angle,t=time"; {} for None.
-
-    Args:
-      option: its name in an error.
-      example: a correct text in an error.
-
-    Raises:
-      ScenarioError: a pair lacks its name or its value.
-    """
+    """Return name -> value from the text of an option, such as "theta=arm_angle,t=time"; {} for None."""
     values = {}
     for pair in names(text):
         name, _, value = (part.strip() for part in pair.partition("="))
@@ -208,7 +171,7 @@ def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
 
 
 def numbers(text: str | None, option: str, example: str) -> dict[str, float]:
-    """Return name -> number from the text of an option; arguments and errors as in `pairs`."""
+    """Return name -> number from the text of an option, as `pairs`."""
     values = {}
     for name, value in pairs(text, option, example).items():
         try:
@@ -226,11 +189,7 @@ def columns(text: str | None) -> dict[str, str]:
 def laws(
     texts: str | Sequence[str] | None, default: Sequence[str] = (), of_rig: "Sequence[Law]" = ()
 ) -> "list[str | Law]":
-    """Return the laws in a text such as "pid,slow: classical(k=2),gains.json,my_law.py"; see `control.from_text`.
-
-    Args:
-      of_rig: the laws of a rig, which come before others of their names.
-    """
+    """Return the laws in texts, see `control.from_text`. Those of a rig come before others of their names."""
     from smc_mujoco.control import from_text
 
     known = {law.name: [law] for law in of_rig}
@@ -238,11 +197,7 @@ def laws(
 
 
 def law(text: str) -> "str | Law":
-    """Return the one law in a text. The name of a law of the library stays a name.
-
-    Raises:
-      ScenarioError: there are several.
-    """
+    """Return the one law in a text. The name of a law of the library stays a name."""
     from smc_mujoco.control import from_text
 
     laws_of_text = from_text.laws(text)
@@ -252,9 +207,8 @@ def law(text: str) -> "str | Law":
 def law_with(text: str, gains: str) -> "Law":
     """Return the law in a text with the gains of the option --gains."""
     from smc_mujoco.control import from_text
-    from smc_mujoco.control.from_text import parsed_gains
 
-    return from_text.law(text, **parsed_gains(gains, "--gains"))
+    return from_text.law(text, **from_text.parsed_gains(gains, "--gains"))
 
 
 def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:
@@ -275,11 +229,7 @@ def plant(text: str) -> "str | Plant":
 
 
 def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
-    """Return the conditions of the option --condition: names, as a,b, texts and files.
-
-    Raises:
-      ScenarioError: an unknown name, or a text or file that cannot be read.
-    """
+    """Return the conditions of the option --condition: names, as a,b, texts and files."""
     from smc_mujoco.simulation.conditions import find_condition, from_file
 
     chosen = []
@@ -317,36 +267,15 @@ def compared_laws(
     return laws(texts)
 
 
-def low_and_high(option: str, text: str) -> tuple[float, float]:
-    """Return the ends of a range such as "0.7:1.3".
-
-    Raises:
-      ScenarioError: the text is no range.
-    """
-    try:
-        low, high = map(float, text.split(":"))
-    except ValueError:
-        raise ScenarioError(f"{option} is {text!r}: give the lowest and the highest, as 0.7:1.3") from None
-    return low, high
-
-
-def starts(x0: float | None, spread: float | None) -> "Starts | None":
-    """Return the initial states of runs, or None if neither option is set."""
+def starts(x0: float | None) -> "Starts | None":
+    """Return the initial states of the option --x0; None for each plant's own."""
     from smc_mujoco.simulation import initial_states
 
-    if x0 is None and spread is None:
-        return None
-    return initial_states.starts(x0, initial_states.SPREAD if spread is None else spread)
+    return None if x0 is None else initial_states.starts(x0)
 
 
 def actuator(text: str) -> "tuple[Drive | Backlash, ...]":
-    """Return a drive or gear from "lag:0.01", or several from "dcmotor+lag:0.01".
-
-    The numbers of a part are in the order of its fields.
-
-    Raises:
-      ScenarioError: an unknown part, or numbers that it does not take.
-    """
+    """Return a drive or gear from "lag:0.01", or several from "dcmotor+lag:0.01"; numbers are in the fields' order."""
     from smc_mujoco.common.registry import subclasses
     from smc_mujoco.mechanisms.hardware.backlash import Backlash
     from smc_mujoco.mechanisms.hardware.drives import Drive
@@ -359,6 +288,5 @@ def actuator(text: str) -> "tuple[Drive | Backlash, ...]":
         try:
             parts.append(kind(*map(float, filter(None, numbers.split(",")))))
         except (TypeError, ValueError):
-            cure = "write it as lag:0.01, with its numbers"
-            raise ScenarioError(f"actuator {shown(part)} cannot be read: {cure}") from None
+            raise ScenarioError(f"actuator {shown(part)} cannot be read: write it as lag:0.01") from None
     return tuple(parts)

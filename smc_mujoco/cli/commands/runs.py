@@ -26,22 +26,9 @@ def run(
         Path, typer.Option(metavar="FOLDER", help="For results; each scene has a folder of its name in it.")
     ] = Path("videos"),
     film: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
-    speed: Annotated[
-        float | None,
-        typer.Option(
-            min=0.01,
-            max=100.0,
-            help="Playback speed of the film, 1 for real time; default: slow motion where things move fast, and faster"
-            " where they rest.",
-        ),
-    ] = None,
     camera: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME|AZIMUTH,ELEVATION[,DISTANCE]",
-            help="Camera of the film: one of the model, or a direction in degrees and a distance in m; default the"
-            " scene's.",
-        ),
+        typer.Option(metavar="NAME|AZIMUTH,ELEVATION[,DISTANCE]", help="The film's: of the model, or degrees and m."),
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers; default the scene's.")] = None,
     threads: options.Threads = None,
@@ -53,8 +40,7 @@ def run(
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film.
 
-    Exported traces have every number to the last bit, and its unit. Units are in the first line of csv ("t [s],x
-    [m],..."), in the struct units of mat, and in the metadata of each column of parquet, as "unit".
+    Exported traces have every number to the last bit, and its unit.
 
     Example: smc-mujoco run duffing --no-film --out results --export csv,parquet
     """
@@ -73,7 +59,7 @@ def run(
     if camera is not None:
         scene = dataclasses.replace(scene, camera=from_text(camera))
     terminal, folder = Terminal(), out / path.stem
-    perform(scene, folder, film, threads, clock, terminal, endings, scenes.question(path), speed)
+    perform(scene, folder, film, threads, clock, terminal, endings, scenes.question(path))
     if timing:
         terminal.note(str(clock), "dim")
 
@@ -84,10 +70,7 @@ def show(
     figure: Annotated[Path | None, options.picture("it")] = None,
     export: Annotated[
         str | None,
-        typer.Option(
-            metavar="FORMAT,...|FILE",
-            help="Also write its columns, with units, as csv, mat, mcap or parquet beside TRACE, or to the FILE.",
-        ),
+        typer.Option(metavar="FORMAT,...", help="Also write it as csv, mat, mcap or parquet, beside TRACE."),
     ] = None,
 ) -> None:
     """Show a trace: what was run, how it went, and its scores.
@@ -99,11 +82,9 @@ def show(
         from smc_mujoco.cli import tables
         from smc_mujoco.simulation.trace import formats, load
 
-    files = [] if export is None else [Path(export)]
-    if export is not None and "." not in export and Path(export).name == export:
-        files = [trace.with_suffix(f".{ending}") for ending in formats(export)]
+    endings = () if export is None else formats(export)
     loaded, terminal = load(trace), Terminal()
-    written = [loaded.export(file) for file in files]
+    written = [loaded.export(trace.with_suffix(f".{ending}")) for ending in endings]
     if figure:
         from smc_mujoco.draw.figure import figure as draw
         from smc_mujoco.draw.page import files as drawn

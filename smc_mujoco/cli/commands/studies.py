@@ -1,11 +1,11 @@
 """smc-mujoco compare, which: questions that many runs of many laws answer."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from smc_mujoco.analysis.relevant_difference import RELEVANT
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError, printable
@@ -14,8 +14,7 @@ from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.initial_states import Starts
-    from smc_mujoco.simulation.scenario import Scenario
-    from smc_mujoco.studies.board import Boards
+    from smc_mujoco.studies.compare import Compared
     from smc_mujoco.studies.table import Table
 
 
@@ -36,28 +35,20 @@ def which(
     seeds: Annotated[int, typer.Option(min=1, help="Runs of a law in each condition, each from another start.")] = 24,
     duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 5, with --quick 3.")] = None,
     x0: options.X0 = None,
-    spread: options.Spread = None,
-    relevant: options.Relevant = None,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="For gains and runs; a later call reuses them.")] = Path(
-        "which"
-    ),
+    relevant: options.Relevant = RELEVANT,
+    out: options.Folder = Path("which"),
     defaults: options.Defaults = False,
-    noise_key: options.NoiseKey = None,
-    disturbance: Annotated[
-        float | None, typer.Option(help="For robust: bound on |d|, N or N m; default that of `smc-mujoco worst`.")
-    ] = None,
+    disturbance: options.Disturbance = None,
     threads: options.Threads = None,
 ) -> None:
     """Advise a law for a plant: which to use, with which gains, why, the second choice, and how sure that is.
 
     All laws that suit the plant are compared. Their gains are those that the package has for it, or else they are tuned
     now by the same rule, which takes some seconds for each law. They run from the same starts, with the same noise, and
-    with all sets of gains that their tuning may end with. The rules are those of `compare`: a law is better only if its
-    values are lower by more than the least relevant difference, in a paired test that is corrected for all comparisons.
-    If no law is better than another, the answer says so. If you stop the command, it continues when you start it again.
+    with all sets of gains that their tuning may end with. The rules are those of `compare`. If no law is better than
+    another, the answer says so. If you stop the command, it continues when you start it again.
 
-    For the need robust, an adversary attacks each law within a bound on the disturbance, and the worst runs are
-    compared, see `smc-mujoco worst`. The answer also gives the median of random disturbances.
+    For the need robust, an adversary attacks each law within --disturbance, see `smc-mujoco worst`.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --needs calm,fast
 
@@ -66,15 +57,13 @@ def which(
     Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition "worn: sensor=Encoder(counts=4096)" --needs accurate
     """
     with delay_ctrl_c():
-        from smc_mujoco.analysis.relevant_difference import RELEVANT
         from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
         from smc_mujoco.studies.adviser import which as advise
 
-    terminal, tested, start = Terminal(), options.conditions(condition) or None, options.starts(x0, spread)
+    terminal, tested, start = Terminal(), options.conditions(condition) or None, options.starts(x0)
     advice = advise(
         options.plant(plant), tested, options.names(needs), options.laws(law) or None, seeds, duration, start, out,
-        quick, threads, progress=True, defaults=defaults, relevant=RELEVANT if relevant is None else relevant,
-        noise_key="drawn" if noise_key is None else noise_key,
+        quick, threads, progress=True, defaults=defaults, relevant=relevant,
         within=None if disturbance is None else Uncertainty(disturbance=disturbance),
     )  # fmt: skip
     terminal.print(advice)
@@ -87,106 +76,90 @@ def compare(
     plants: options.Plants = None,
     law: options.Laws = None,
     condition: options.Conditions = None,
-    seeds: Annotated[
-        int, typer.Option(min=1, help="Runs of a law on each plant in each condition, each from another start.")
-    ] = 16,
+    seeds: Annotated[int, typer.Option(min=1, help="Runs of a law on each plant in each condition.")] = 16,
     tune: Annotated[bool, typer.Option(help="Whether to tune laws that have no gains for a plant.")] = True,
     worst: Annotated[bool, typer.Option("--worst", help="Also search the worst case of each law.")] = False,
     quick: options.Quick = False,
     gains: options.Gains = "tuned",
     duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 10, --quick 3.")] = None,
     x0: options.X0 = None,
-    spread: options.Spread = None,
-    relevant: options.Relevant = None,
+    relevant: options.Relevant = RELEVANT,
     defaults: options.Defaults = False,
-    out: Annotated[
-        Path, typer.Option(metavar="FOLDER", help="For gains and runs; the same command continues there.")
-    ] = Path("compared"),
+    out: options.Folder = Path("compared"),
     figure: Annotated[Path | None, options.picture("the medians")] = None,
     latex: Annotated[Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")] = None,
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
-    traces: Annotated[
-        str, typer.Option(help="Traces to save: none, all, or worst (the worst run per plant and condition).")
-    ] = "none",
-    fresh: Annotated[bool, typer.Option("--fresh", help="Discard the runs that are in the folder.")] = False,
-    rig: Annotated[
-        str | None,
-        typer.Option(help="A real machine, with its parameter sets, in place of plants, conditions and gains."),
-    ] = None,
+    traces: Annotated[str, typer.Option(help="Traces to save: none, all, or worst (of each condition).")] = "none",
+    rig: Annotated[str | None, typer.Option(help="A machine, whose parameter sets replace plants, conditions.")] = None,
     noise_key: options.NoiseKey = None,
     threads: options.Threads = None,
 ) -> None:
     """Compare laws on plants in conditions: tune what has no gains, run, and say which law is better, and how sure.
 
     A law with gains in brackets keeps them. Any other law, that of your file too, has the gains of the package for the
-    plant, or is tuned by the same rule, which takes some seconds for each law on each plant. Tables name the source of
-    every gain, and no winner is named over laws with default gains, unless you ask for it with --defaults.
+    plant, or is tuned by the same rule, which takes some seconds for each law on each plant. Gains and runs are kept in
+    the folder --out: you can stop the command at any time, and continue by starting it again. No law can know the
+    noise, and one run of each of your laws is replayed: a law must get its commands from its measurements alone.
 
-    Gains and runs are kept in the folder: you can stop the command at any time, and continue by starting it again. The
-    table results.parquet has only the runs of the last command, so give each comparison its own --out.
-
-    The noise is keyed with a number that is drawn when the runs begin, so that no law can know it, and one run of each
-    of your laws on each plant in each condition is replayed: a law must get its commands from its measurements alone.
-
-    --law all compares every general law. With --rig the machine's parameter sets take the place of the conditions, and
-    a line for each metric says if one law wins on all of them.
+    --law all compares every general law. With --rig a line for each metric says if one law wins on all of its sets.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition friction,encoder
 
     Example: smc-mujoco compare arm.xml:shoulder --x0 0.5 --law pid,classical --figure arm --latex arm.tex
     """
     with delay_ctrl_c():
-        from smc_mujoco.analysis.relevant_difference import RELEVANT
-        from smc_mujoco.common.files import writable
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.compare import compare as run
-        from smc_mujoco.studies.leaderboard import leaderboard
-        from smc_mujoco.studies.study import study
 
-    terminal, pictures = Terminal(), files(figure)
-    relevant = RELEVANT if relevant is None else relevant
-    writable(*pictures, latex)
-    start, key = options.starts(x0, spread), "drawn" if noise_key is None else noise_key
+    terminal, key, start = Terminal(), "drawn" if noise_key is None else noise_key, options.starts(x0)
     if rig is not None:
         if plants or condition or gains != "tuned" or worst or figure or latex:
-            raise ScenarioError(
-                "--rig brings its own plant, parameter sets and gains: leave out the plants, --condition, --gains, "
-                "--worst, --figure and --latex"
-            )
-        scenarios, verdict = _on_rig(rig, law, seeds, duration, start)
-        table = study(scenarios, out, not fresh, executor, threads, progress=True, noise_key=key, replay=True)
-        boards = leaderboard(table, defaults=defaults, relevant=relevant)
-        terminal.print(boards)
-        terminal.note(verdict(boards))
-        _finish(table, out, terminal)
+            others = "the plants, --condition, --gains, --worst, --figure and --latex"
+            raise ScenarioError(f"--rig brings its own plant, parameter sets and gains: leave out {others}")
+        _compare_on_rig(rig, law, seeds, duration, start, relevant, defaults, out, executor, key, threads, terminal)
         return
+    options.check_files(None, latex, *files(figure))
     machines = [options.plant(text) for text in options.names(plants)]
     comparison = run(
         options.compared_laws(law, machines, gains), machines or None, options.conditions(condition) or None, seeds,
         tune, worst, executor, out=out, duration=duration, starts=start, gains=gains, quick=quick, defaults=defaults,
-        relevant=relevant, traces=traces, fresh=fresh, noise_key=key, threads=threads,
+        relevant=relevant, traces=traces, noise_key=key, threads=threads,
     )  # fmt: skip
+    _show(comparison, figure, latex, terminal)
+    _finish(comparison.table, out, terminal)
+
+
+def _show(comparison: "Compared", figure: Path | None, latex: Path | None, terminal: Terminal) -> None:
+    """Print a comparison, and write its figure and its tables."""
+    from smc_mujoco.draw.page import files
+
     terminal.print(comparison)
     if latex:
         comparison.to_latex(latex)
         terminal.wrote(latex)
-    if pictures:
+    if figure:
         comparison.plot(figure)
-        terminal.wrote(*pictures)
-    _finish(comparison.table, out, terminal)
+        terminal.wrote(*files(figure))
 
 
-def _on_rig(
-    rig: str, law: list[str] | None, seeds: int, duration: float | None, starts: "Starts | None"
-) -> "tuple[list[Scenario], Callable[[Boards], str]]":
-    """Return the runs of laws over the parameter sets of a rig, and what says if one law wins on all sets."""
+def _compare_on_rig(
+    rig: str, law: list[str] | None, seeds: int, duration: float | None, starts: "Starts | None", relevant: float,
+    defaults: bool, out: Path, executor: str, key: int | str, threads: int | None, terminal: Terminal,
+) -> None:  # fmt: skip
+    """Compare laws over the parameter sets of a rig, and say if one law wins on all sets."""
     from smc_mujoco.common import annexes
-    from smc_mujoco.studies.study import FULL
+    from smc_mujoco.studies.leaderboard import leaderboard
+    from smc_mujoco.studies.study import FULL, study
 
     ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
     machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
     chosen, length = options.laws(law, of_rig=machine.laws) or None, FULL.duration if duration is None else duration
-    return ensemble.runs(machine, chosen, seeds, "default", length, starts), ensemble.verdict
+    scenarios = ensemble.runs(machine, chosen, seeds, "default", length, starts)
+    table = study(scenarios, out, True, executor, threads, progress=True, noise_key=key, replay=True)
+    boards = leaderboard(table, defaults=defaults, relevant=relevant)
+    terminal.print(boards)
+    terminal.note(ensemble.verdict(boards))
+    _finish(table, out, terminal)
 
 
 def _finish(table: "Table", out: Path, terminal: Terminal) -> None:

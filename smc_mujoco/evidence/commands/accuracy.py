@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import errors_as_sentences
+from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
@@ -28,7 +28,6 @@ def accuracy(
     gains: options.Gains = "tuned",
     duration: Annotated[float, typer.Option(help="Duration of the runs, s.")] = 10.0,
     x0: options.X0 = None,
-    spread: options.Spread = None,
     out: Annotated[Path | None, options.picture("error over period")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
@@ -51,15 +50,13 @@ def accuracy(
     with delay_ctrl_c():
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
-        from smc_mujoco.control.law import laws as known
         from smc_mujoco.draw.page import files
         from smc_mujoco.evidence.accuracy.accuracy import accuracy as measure
 
-    pictures = files(out)
-    json, terminal = options.json_file(json, *pictures)
-    machines = [options.plant(text) for text in options.names(plants)]
-    chosen = known(machines[0]) if law == ["all"] else options.laws(law, gain_sets.LAWS)
-    h, start = _periods(periods), options.starts(x0, spread)
+    terminal, pictures = Terminal(), files(out)
+    options.check_files(json, *pictures)
+    machines, chosen = [options.plant(text) for text in options.names(plants)], options.laws(law, gain_sets.LAWS)
+    h, start = _periods(periods), options.starts(x0)
     with bar("accuracy") as progress:
         table = measure(chosen, machines, h, condition, seeds, gains, duration, start, threads, progress.reached)
     terminal.print(table)

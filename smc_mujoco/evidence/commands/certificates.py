@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import errors_as_sentences
+from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.text import capital
@@ -23,55 +23,39 @@ METRIC = "ultimate_bound"  # largest |x| in the last fifth of a run
 def certify(
     plant: Annotated[
         str | None,
-        typer.Argument(
-            metavar="PLANT", autocompletion=options.PLANTS, help="A plant from `smc-mujoco list`.", show_default=False
-        ),
+        typer.Argument(metavar="PLANT", autocompletion=options.PLANTS, help="A plant from `smc-mujoco list`."),
     ] = None,
-    law: Annotated[
-        str,
-        typer.Option(
-            metavar="LAW", autocompletion=options.LAWS, help="A law, as pid or boundary_layer(k=5, c=2, phi=0.5)."
-        ),
-    ] = "observer_free",
-    disturbance: Annotated[
-        float | None, typer.Option(min=0.0, help="Bound of |d|, N or N m; default that of the condition.")
-    ] = None,
-    slope: Annotated[
-        float | None, typer.Option(min=0.0, help="Bound of |d'|, per second, for super_twisting; default: d may jump.")
-    ] = None,
+    law: options.OneLaw = "observer_free",
+    disturbance: options.Disturbance = None,
+    slope: Annotated[float | None, typer.Option(min=0.0, help="Bound on |d'|, per s; default: d may jump.")] = None,
     condition: options.Condition = "nominal",
     gains: options.Gains = "tuned",
     out: Annotated[Path | None, typer.Option(metavar="FILE.json", help="Also write the certificate to a file.")] = None,
     figure: Annotated[Path | None, options.picture("the state plane, with a run")] = None,
-    worst: Annotated[
-        bool, typer.Option("--worst", help="Also search for the worst d within its bound, some 10 s, and draw its run.")
-    ] = False,
+    worst: Annotated[bool, typer.Option("--worst", help="Also find and draw the worst d.")] = False,
     check: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.json", help="Instead, prove the certificate in a file again. Exit code 2 if not."),
+        Path | None, typer.Option(metavar="FILE.json", help="Instead, prove the certificate in a file again.")
     ] = None,
-    json: options.Json = None,
 ) -> None:
     """Prove what a law does on a plant: from where it comes to rest, and how far a bounded disturbance pushes it.
 
     The plant is its equation, integrated exactly, and the law acts at every instant. The command prints each theorem
-    with its conditions and their margins, also where they fail, and what the theorem leaves out of your machine: the
-    sampling, delay, noise, dry friction. A checker of its own, which shares no code with what made the certificate,
-    has proven it in ball arithmetic before it is shown; `--check FILE.json` runs that checker again.
+    with its conditions and their margins, also where they fail, and what it leaves out of your machine: the sampling,
+    delay, noise, dry friction. A checker of its own has proven it in ball arithmetic before it is shown; --check runs
+    that checker again, with exit code 2 if a statement is not proven.
 
     Example: smc-mujoco certify duffing --law observer_free --disturbance 2 --out duffing.json --figure duffing.png
 
     Example: smc-mujoco certify --check duffing.json
     """
     with delay_ctrl_c():
-        from smc_mujoco.common.files import with_ending, write_json
         from smc_mujoco.draw.page import files
         from smc_mujoco.evidence.certificates.certificate import Certificate
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.simulation.run import run
 
-    pictures = files(figure)
-    json, terminal = options.json_file(json, out and with_ending(out, ".json"), *pictures)
+    terminal, pictures = Terminal(), files(figure)
+    options.check_files(out, *pictures)
     scenario = worst_run = None
     if check:
         if plant:
@@ -87,15 +71,10 @@ def certify(
     for sentence in made.sentences:
         terminal.note(f"{capital(sentence)}.", "bold", wrap=True)
     if worst_run:
-        unit = made.data["unit"]
-        terminal.note(
-            f"Worst found in {worst_run.tried} runs of this machine: it ends in |x| = {worst_run.value:.3g} {unit}.",
-            "bold",
-        )
+        end = f"it ends in |x| = {worst_run.value:.3g} {made.data['unit']}"
+        terminal.note(f"Worst found in {worst_run.tried} runs of this machine: {end}.", "bold")
     if out:
         terminal.wrote(made.save(out))
-    if json:
-        terminal.wrote(write_json(json, made.data))
     if figure:
         shown = worst_run.scenario if worst_run else scenario
         made.figure(figure, run([shown]) if shown and shown.plant.n == 1 else ())

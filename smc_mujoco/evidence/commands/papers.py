@@ -19,52 +19,29 @@ if TYPE_CHECKING:
 @errors_as_sentences()
 def claims(
     ids: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="ID", help="Numbers of claims, as 3 18; by default all.", show_default=False),
+        list[str] | None, typer.Argument(metavar="ID", help="Of claims, as 3 18; by default all.", show_default=False)
     ] = None,
     gains: Annotated[str | None, typer.Option(help="Sets of gains, as a,b; default all of the paper's.")] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Coarser grids and shorter runs, as each claim says; one set of gains.")
-    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Coarser grids and shorter runs; one set of gains.")] = False,
     paper: Annotated[
-        str | None,
-        typer.Option(metavar="NAME|FOLDER", help="A paper of `smc-mujoco papers`, or a folder; default Gaber's."),
+        str | None, typer.Option(metavar="NAME|FOLDER", help="A paper of `smc-mujoco papers`; default Gaber's.")
     ] = None,
-    table: Annotated[
-        Path | None, typer.Option(help="results.parquet of `smc-mujoco compare`; its runs are not repeated.")
-    ] = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="Print one JSON document instead of tables, like --json - elsewhere.")
-    ] = False,
-    out: Annotated[Path | None, typer.Option(help="Also write that JSON document to a file.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
     evidence: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.json", help="Also write claims, runs, numbers, thresholds and verdicts, sealed."),
+        Path | None, typer.Option(metavar="FILE.json", help="Also write runs, numbers and verdicts, sealed.")
     ] = None,
-    badge: Annotated[
-        Path | None, typer.Option(metavar="FILE.svg", help="Also write a badge: the paper's own sentences by verdict.")
-    ] = None,
-    mutants: Annotated[
-        bool,
-        typer.Option(
-            "--mutants",
-            help="Check that the audit can fail: list claims that no broken law loses. Exit code 1 if there are any.",
-        ),
-    ] = False,
+    badge: Annotated[Path | None, typer.Option(metavar="FILE.svg", help="Also write a badge of the verdicts.")] = None,
+    mutants: Annotated[bool, typer.Option("--mutants", help="List claims that no broken law loses.")] = False,
     threads: options.Threads = None,
 ) -> None:
     """Audit a paper's claims: measure each against the threshold that was fixed for it before any run.
 
     Under a set of gains a claim is supported if all its sentences hold, refuted if none does, and partly supported
-    otherwise. If the verdict depends on the set of gains, the table says so. One counter-example refutes a universal
-    claim. What is said of some gains is "not shown" where a search finds no example. Claims that you name are shown in
-    full, with every check. All of Gaber's, the default, take minutes.
+    otherwise. One counter-example refutes a universal claim. What is said of some gains is "not shown" where a search
+    finds no example. Claims that you name are shown in full. All of Gaber's, the default, take minutes.
 
-    Totals are of the paper's own sentences. What is derived from them is listed apart, and so are questions beside the
-    paper, which have answers and no verdicts.
-
-    The file of --evidence has the hashes of each claim's runs, their numbers, thresholds and verdicts, and a seal. A
-    second audit with the same versions writes the same file, to the last bit.
+    A second audit with the same versions writes the same file of --evidence, to the last bit. With --mutants the exit
+    code is 1 if an audit of some claim cannot fail.
 
     Example: smc-mujoco claims 3 18 --gains tuned
 
@@ -72,32 +49,22 @@ def claims(
     """
     with delay_ctrl_c():
         from smc_mujoco.common.errors import ScenarioError
-        from smc_mujoco.common.files import replacing, with_ending, writable
+        from smc_mujoco.common.files import with_ending, writable
         from smc_mujoco.common.progress import bar
         from smc_mujoco.evidence.audit.audit import DEFAULT_PAPER, audit, document, evaluations
         from smc_mujoco.evidence.audit.paper import paper as find_paper
         from smc_mujoco.evidence.commands import tables
-        from smc_mujoco.studies.table import Table
 
-    terminal = Terminal()
-    about = find_paper(paper or DEFAULT_PAPER)
+    terminal, about = Terminal(), find_paper(paper or DEFAULT_PAPER)
     sets = None if gains is None else options.names(gains)
-    known = None if table is None else Table.read(table)
-    if evidence and known:
-        raise ScenarioError("--evidence needs runs that the audit makes itself: leave out --table")
     if mutants and json:
         raise ScenarioError("--mutants prints sentences: leave out --json")
-    writable(out, evidence and with_ending(evidence, ".json"), badge and with_ending(badge, ".svg"))
+    writable(evidence and with_ending(evidence, ".json"), badge and with_ending(badge, ".svg"))
     with bar("claims", evaluations(ids or None, sets, quick, about), counted=True) as drawn:
-        done = audit(about, ids or None, sets, quick, threads, table=known, report=drawn.advance)
+        done = audit(about, ids or None, sets, quick, threads, report=drawn.advance)
     written = [path for path in (evidence and done.save(evidence), badge and done.badge(badge)) if path]
-    text = document(done.claims)
-    if out:
-        with replacing(out) as file:
-            file.write_text(text + "\n", encoding="utf-8")
-        written.append(out)
     if json:
-        print(text)
+        print(document(done.claims))
         return
     tables.print_claims(done.claims, terminal, full=bool(ids))
     kept = _kept(about, ids or None, sets, quick, threads, done.claims, terminal) if mutants else {}

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from smc_mujoco.analysis.relevant_difference import RELEVANT
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import errors_as_sentences
 from smc_mujoco.common.errors import printable
@@ -33,7 +34,7 @@ def report(
         str | None,
         typer.Option(metavar="NAME|FOLDER", help="Instead of the study, audit a paper of `smc-mujoco papers`."),
     ] = None,
-    relevant: options.Relevant = None,
+    relevant: options.Relevant = RELEVANT,
     threads: options.Threads = None,
 ) -> None:
     """Compute the whole study, in about 20 minutes, and write it as one HTML file: which controller, where, how sure.
@@ -54,7 +55,7 @@ def report(
         from smc_mujoco.evidence.report import paper as of_paper
         from smc_mujoco.evidence.report import report as make
 
-    if paper and (seeds or records or law or relevant is not None):
+    if paper and (seeds or records or law or relevant != RELEVANT):
         raise ScenarioError("--seeds, --law, --records and --relevant belong to the study: leave them out with --paper")
     if paper:
         path = of_paper.report(paper, out, quick, threads, progress=True)

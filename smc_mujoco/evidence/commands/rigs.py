@@ -49,8 +49,8 @@ def identify(
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.mechanisms.plant import catalogue as plants
 
-    json, terminal = options.json_file(json, figure)
-    named = options.columns(columns)
+    terminal, named = Terminal(), options.columns(columns)
+    options.check_files(json, figure)
     identified = find(
         as_plant(options.plant(rig)) if rig not in rigs() and (rig in plants() or ".xml" in rig) else rig,
         [load(file, named) for file in files],

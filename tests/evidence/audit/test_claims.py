@@ -418,7 +418,8 @@ def terminal(monkeypatch):
 
 
 def test_a_folder_is_no_file_to_write(terminal, tmp_path):
-    done = terminal("3", "--out", str(tmp_path))
+    (tmp_path / "folder.json").mkdir()
+    done = terminal("3", "--evidence", str(tmp_path / "folder.json"))
     assert done.exit_code == 2
     assert "it is a folder" in done.stderr
 
