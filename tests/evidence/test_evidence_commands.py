@@ -119,8 +119,6 @@ STUBS = {  # of each command: the functions replaced, and what they give
         "evidence.boards.board": ROWS,
         "evidence.boards.robustness": half_done,
         "evidence.boards.robustness_board": TESTS,
-        "evidence.boards.verdict": ("mine is first of two, " * 5)[:-2],
-        "evidence.boards.comparison": ("a second is worse, " * 6)[:-2],
         "draw.figure.figure": None,
         "cli.scene.filmed": [Path("film.mp4")],
     },

@@ -29,7 +29,5 @@ from smc_mujoco.evidence.boards.simulator import robustness as robustness
 from smc_mujoco.evidence.boards.standings import KEY as KEY
 from smc_mujoco.evidence.boards.standings import NAME as NAME
 from smc_mujoco.evidence.boards.standings import board as board
-from smc_mujoco.evidence.boards.standings import comparison as comparison
 from smc_mujoco.evidence.boards.standings import experiments as experiments
 from smc_mujoco.evidence.boards.standings import robustness_board as robustness_board
-from smc_mujoco.evidence.boards.standings import verdict as verdict

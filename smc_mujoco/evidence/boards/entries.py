@@ -19,7 +19,7 @@ surface of least quadratic cost).
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -114,14 +114,9 @@ def _along(robot: str) -> Template:
         s += (SQ[i] + part * (SQ[j] - SQ[i])) * q + (SDQ[i] + part * (SDQ[j] - SDQ[i])) * dq
         return U[i] + middle * (U[j] - U[i]) - gains.k * math.tanh(s / gains.phi), s
 
-    return _named(law, robot)
-
-
-def _named(law: Callable, robot: str) -> Template:
-    """Return the template of a law under the name by which files and other processes find it."""
-    law.__name__ = law.__qualname__ = f"{robot}_swing_up"
+    law.__name__ = law.__qualname__ = f"{robot}_swing_up"  # by which files and other processes find it
     law.__doc__ = f"Swing-up and balance of the {robot} along an optimised trajectory: u = u* - k tanh(s / phi)."
-    decorate = law_function(
+    return law_function(
         gains={name: Gain(value, FORCE, positive=True) for name, value in FEEDBACKS["Riccati"].items()},
         conditions={"k > phi / 2": lambda g: g.k > g.phi / 2.0},
         memory=1,
@@ -130,8 +125,7 @@ def _named(law: Callable, robot: str) -> Template:
         label="Trajectory under a Riccati law",
         short="TR",
         colour="#D55E00",
-    )
-    return decorate(law)
+    )(law)
 
 
 acrobot_swing_up = _along("acrobot")

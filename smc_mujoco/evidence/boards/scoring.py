@@ -31,17 +31,10 @@ from smc_mujoco.simulation.trace import Trace
 
 MIN_TIP_HEIGHT = 0.9  # of the length of both links, which the tip must exceed
 # Criterion -> weight and norm in version 1, norm in version 2.
-V1 = {
-    "swing_up_time": (0.2, 10.0),
-    "max_torque": (0.1, 6.0),
-    "energy": (0.1, 100.0),
-    "integrated_torque": (0.1, 60.0),
-    "torque_cost": (0.1, 360.0),
-    "torque_smoothness": (0.2, 12.0),
-    "velocity_cost": (0.2, 1000.0),
-}
+V1 = {"swing_up_time": (0.2, 10.0), "max_torque": (0.1, 6.0), "energy": (0.1, 100.0), "integrated_torque": (0.1, 60.0)}
+V1 |= {"torque_cost": (0.1, 360.0), "torque_smoothness": (0.2, 12.0), "velocity_cost": (0.2, 1000.0)}
 V2 = {"swing_up_time": 20.0, "energy": 60.0, "torque_cost": 20.0, "torque_smoothness": 0.1, "velocity_cost": 400.0}
-VERSION_CRITERIA = {"v1": tuple(V1), "v2": tuple(V2)}  # -> the criteria that count
+VERSIONS = {"v1": V1, "v2": V2}
 ROBOTS = ("acrobot", "pendubot")
 
 
@@ -62,6 +55,11 @@ class Criteria(NamedTuple):
         return math.isfinite(self.swing_up_time)
 
 
+def shoulder_first(robot: str) -> list[int]:
+    """Return the channels of shoulder and elbow. Raise ScenarioError for another plant than pendubot and acrobot."""
+    return find("robot of the boards", robot, {"acrobot": [1, 0], "pendubot": [0, 1]})
+
+
 def criteria(trace: Trace) -> Criteria:
     """Return the criteria of a run of pendubot or acrobot; all are inf for a run that diverged.
 
@@ -72,33 +70,14 @@ def criteria(trace: Trace) -> Criteria:
     joints = shoulder_first(plant.name)
     if trace.failure is not None:
         return Criteria(*[math.inf] * len(Criteria._fields))
-    q, v, u = trace.x[:, joints], trace.v[:, joints], trace.u[:, 0]
-    return of_arrays(trace.t, q, v, u, plant.name, plant.parameters["l1"])
-
-
-def shoulder_first(robot: str) -> list[int]:
-    """Return the channels of shoulder and elbow. Raise ScenarioError for another plant than pendubot and acrobot."""
-    return find("robot of the boards", robot, {"acrobot": [1, 0], "pendubot": [0, 1]})
-
-
-def of_arrays(t: np.ndarray, q: np.ndarray, v: np.ndarray, u: np.ndarray, robot: str, l1: float = 0.2) -> Criteria:
-    """Return the criteria of a run as arrays.
-
-    Args:
-      t: times, s, (N,).
-      q, v: angles from hanging and their rates, shoulder and elbow, rad and rad/s, (N, 2).
-      u: torque of the driven joint, N m, (N,).
-      robot: "pendubot" or "acrobot".
-      l1: length of the upper link, m.
-    """
-    driven = shoulder_first(robot).index(0)
+    q, v, u, t, l1 = trace.x[:, joints], trace.v[:, joints], trace.u[:, 0], trace.t, plant.parameters["l1"]
     tip = -l1 * np.cos(q[:, 0]) - L2 * np.cos(q[:, 0] + q[:, 1])
     low = np.flatnonzero(tip[1:-1] <= MIN_TIP_HEIGHT * (l1 + L2)) + 1  # as published: first and last left out
     first = low[-1] + 1 if len(low) else 1
     step, torque = np.diff(t), np.abs(u[:-1])
     return Criteria(
         swing_up_time=float(t[first]) if first < len(t) - 1 else math.inf,
-        energy=float(np.sum(np.abs(np.diff(q[:, driven])) * torque)),
+        energy=float(np.sum(np.abs(np.diff(trace.x[:, 0])) * torque)),
         max_torque=float(np.abs(u).max()),
         integrated_torque=float(np.sum(torque * step)),
         torque_cost=float(np.sum(torque**2 * step)),
@@ -113,9 +92,9 @@ def score(of: Trace | Mapping[str, Any] | Criteria | Row, version: str = "v2") -
     Raises:
       ScenarioError: an unknown version, a criterion that is missing, or another plant.
     """
-    wanted = find("version of the boards", version, VERSION_CRITERIA)
+    wanted = find("version of the boards", version, VERSIONS)
     measured = criteria(of) if isinstance(of, Trace) else of
-    values = dict(measured) if isinstance(measured, Mapping) else measured._asdict()
+    values: Mapping[str, Any] = measured if isinstance(measured, Mapping) else measured._asdict()
     for name in wanted:
         if values.get(name) is None:
             raise ScenarioError(f"criterion {name} of board {version} is missing in {shown(values)}: give a number")

@@ -46,6 +46,8 @@ UPRIGHT_TOLERANCES = (0.35, 0.35, 1.0, 1.0)  # rad, rad, rad/s, rad/s, of uprigh
 LEVELS, REPEATS, PROFILES, PULSES = 21, 10, 50, 3
 MIN_PULSE_GAP, PULSE_WIDTH, PULSE_AMPLITUDE = 1.0, (0.05, 0.1), (0.5, 5.0)  # s between pulses, s, N m
 SCALED_PARAMETERS = {"m1r1": "r1", "I1": "I1", "m2r2": "r2", "m2": "m2", "I2": "I2"}  # what is scaled -> the parameter
+MODEL_LEVELS = {"Ir": (0.0, 1e-4)} | dict.fromkeys(SCALED_PARAMETERS, (0.75, 1.25))  # parameter -> ends of its values
+MODEL_LEVELS |= {"b1": (-0.1, 0.1), "b2": (-0.1, 0.1), "cf1": (-0.2, 0.2), "cf2": (-0.2, 0.2)}
 MEASUREMENT_SIZE = len(Measurement._fields)
 T, DT, LIMIT, USES_MODEL, X, V, E, DE, Q, DQ, F, G, FQ, GQ = (  # places in a measurement
     Measurement._fields.index(name)
@@ -56,43 +58,26 @@ TESTS = ("model", "velocity_noise", "torque_noise", "torque_response", "delay", 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Case:
-    """A machine that differs from the model.
+    """A machine that differs from the model."""
 
-    Attributes:
-      test: one of TESTS.
-      name: the parameter that differs in the test "model", else the test.
-      value: its level.
-      parameters: parameter of the double pendulum -> its true value, where it differs.
-      velocity_noise, torque_noise: standard deviations, rad/s and N m.
-      response: r of the motor.
-      delay: of the measurement, in control periods.
-      pulses: centre, s, standard width, s, and amplitude, N m, of each pulse on the driven joint.
-      seed: of the noise.
-    """
-
-    test: str = ""
-    name: str = ""
-    value: float = 0.0
-    parameters: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    velocity_noise: float = 0.0
-    torque_noise: float = 0.0
-    response: float = 1.0
-    delay: int = 0
-    pulses: tuple[tuple[float, float, float], ...] = ()
-    seed: int = 0
+    test: str = ""  # one of TESTS
+    name: str = ""  # the parameter that differs in the test "model", else the test
+    value: float = 0.0  # its level
+    parameters: Mapping[str, float] = dataclasses.field(default_factory=dict)  # true values, where they differ
+    velocity_noise: float = 0.0  # standard deviation, rad/s
+    torque_noise: float = 0.0  # standard deviation, N m
+    response: float = 1.0  # r of the motor
+    delay: int = 0  # of the measurement, in control periods
+    pulses: tuple[tuple[float, float, float], ...] = ()  # centre s, standard width s, amplitude N m, driven joint
+    seed: int = 0  # of the noise
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Robustness:
-    """The result of the test.
+    """The result of the test: percent of survived levels of each test, and the score, their mean in 0 .. 1."""
 
-    Attributes:
-      survived: the levels of each test: (name, value) -> whether the law survived it.
-      noise_key: of the random numbers; a scenario with it repeats them. 0: those of `SEED` alone.
-    """
-
-    survived: Mapping[str, tuple[tuple[str, float, bool], ...]]
-    noise_key: int = 0
+    survived: Mapping[str, tuple[tuple[str, float, bool], ...]]  # test -> (name, level, whether the law survived it)
+    noise_key: int = 0  # of the random numbers, which a scenario with it repeats; 0: those of SEED alone
 
     def __repr__(self) -> str:
         tests = ", ".join(f"{test} {percent:.1f} %" for test, percent in self.percent.items())
@@ -108,43 +93,29 @@ class Robustness:
         """The overall robustness score, in 0 .. 1: the mean over the tests."""
         return sum(self.percent.values()) / (100.0 * len(self.survived))
 
-    @property
-    def parameters(self) -> dict[str, int]:
-        """Parameter -> how many of its 21 values the law survived."""
-        names = dict.fromkeys(name for name, *_ in self.survived["model"])
-        return {name: sum(ok for other, _, ok in self.survived["model"] if other == name) for name in names}
-
 
 def cases(key: int = 0) -> list[Case]:
     """Return every run of the test, in order, with the pulses of a noise key. Runs of one level stand together."""
-    ramp, listed = np.linspace(0.75, 1.25, LEVELS), list[Case]()
+    listed = list[Case]()
 
-    def model(name: str, value: float, **parameters: float) -> None:
-        listed.append(Case(test="model", name=name, value=value, parameters=parameters))
+    def levels(low: float, high: float) -> list[float]:
+        return np.linspace(low, high, LEVELS).tolist()
 
-    for value in np.linspace(0.0, 1e-4, LEVELS):
-        model("Ir", float(value), Ir=float(value))
-    for name, parameter in SCALED_PARAMETERS.items():
-        for factor in map(float, ramp):
-            changed = {parameter: factor * MODEL_1_1[parameter]}
-            model(name, factor, **changed)
-    for name, largest in (("b1", 0.1), ("b2", 0.1), ("cf1", 0.2), ("cf2", 0.2)):
-        for value in map(float, np.linspace(-largest, largest, LEVELS)):
-            model(name, value, **{name: value})
-    for test, largest in (("velocity_noise", 0.5), ("torque_noise", 1.1)):
-        for level, value in enumerate(map(float, np.linspace(0.0, largest, LEVELS))):
-            for repeat in range(REPEATS):
-                noise: dict[str, Any] = {test: value}
-                listed.append(Case(test=test, name=test, value=value, seed=level * REPEATS + repeat, **noise))
-    for value in map(float, np.linspace(0.1, 2.0, LEVELS)):
-        listed.append(Case(test="torque_response", name="torque_response", value=value, response=value))
-    for periods in range(LEVELS):
-        listed.append(Case(test="delay", name="delay", value=periods * STEP, delay=periods))
+    for name, ends in MODEL_LEVELS.items():
+        parameter = SCALED_PARAMETERS.get(name, name)
+        unit = MODEL_1_1[parameter] if name in SCALED_PARAMETERS else 1.0
+        cases_of = [(value, {parameter: unit * value}) for value in levels(*ends)]
+        listed += [Case(test="model", name=name, value=value, parameters=changed) for value, changed in cases_of]
+    for test, most in (("velocity_noise", 0.5), ("torque_noise", 1.1)):
+        for seed, value in enumerate(np.repeat(levels(0.0, most), REPEATS).tolist()):
+            noise: dict[str, Any] = {test: value}
+            listed.append(Case(test=test, name=test, value=value, seed=seed, **noise))
+    test = "torque_response"
+    listed += [Case(test=test, name=test, value=value, response=value) for value in levels(0.1, 2.0)]
+    listed += [Case(test="delay", name="delay", value=count * STEP, delay=count) for count in range(LEVELS)]
     rng = np.random.default_rng([SEED, key])
-    for profile in range(PROFILES):
-        pulses = _pulses(rng)
-        listed.append(Case(test="perturbations", name="perturbations", value=float(profile), pulses=pulses))
-    return listed
+    test = "perturbations"
+    return listed + [Case(test=test, name=test, value=float(k), pulses=_pulses(rng)) for k in range(PROFILES)]
 
 
 def _pulses(rng: np.random.Generator) -> tuple[tuple[float, float, float], ...]:
@@ -172,15 +143,13 @@ def robustness(scenario: Scenario, report: Callable[[float, float], None] | None
     if not scenario.noise_key and has_user_code(scenario):
         scenario = dataclasses.replace(scenario, noise_key=draw_key())
     machine, todo = Machine(scenario), cases(scenario.noise_key)
-    ends = list[bool]()
-    for done, case in enumerate(todo):
-        ends.append(upright(machine.simulate(case)[0][-1]))
-        if report is not None:
-            report(done + 1, len(todo))
-    survived: dict[str, list[tuple[str, float, bool]]] = {test: [] for test in TESTS}
     levels: dict[tuple[str, str, float], list[bool]] = {}
-    for case, end in zip(todo, ends, strict=True):
-        levels.setdefault((case.test, case.name, case.value), []).append(end)
+    for done, case in enumerate(todo, 1):
+        ended = upright(machine.simulate(case)[0][-1])
+        levels.setdefault((case.test, case.name, case.value), []).append(ended)
+        if report is not None:
+            report(done, len(todo))
+    survived = {test: list[tuple[str, float, bool]]() for test in TESTS}
     for (test, name, value), results in levels.items():
         survived[test].append((name, value, sum(results) > len(results) / 2))
     return Robustness({test: tuple(rows) for test, rows in survived.items()}, scenario.noise_key)
@@ -206,7 +175,6 @@ class Machine:
                 "surface, reference and feedforward"
             )
         law, velocity = scenario.law.of_channel(0), resolved.velocity
-        self.name = law.name
         try:
             self.law, self.estimator = cfunctions.compile_component(law), cfunctions.compile_component(velocity)
         except NotCompilable as error:
@@ -234,7 +202,7 @@ class Machine:
                 self.limit, self.uses_model, noise, pulse, case.response, case.delay, states, torque,
             )  # fmt: skip
         if raised:
-            raise ScenarioError(f"law {self.name!r} raised an exception in the robustness test; run it in a scenario")
+            raise ScenarioError("the law raised an exception in the robustness test: run it in a scenario")
         return states, torque
 
 

@@ -39,7 +39,7 @@ def board(
     terminal = Terminal()
     rows = boards.experiments(robot)
     writable(figure, film and with_ending(film, ".mp4"))
-    traces, results = dict(zip(rows, run(list(rows.values())), strict=True)), None
+    traces = dict(zip(rows, run(list(rows.values())), strict=True))
     terminal.print(tables.board(robot, boards.board(traces), rows))
     if robustness:
         with bar(f"robustness of {robot}") as drawn:
@@ -48,9 +48,6 @@ def board(
                 for i, (name, scenario) in enumerate(rows.items())
             }
         terminal.print(tables.board(robot, boards.robustness_board(robot, results), rows))
-    trace = traces[boards.NAME]
-    terminal.note(f"{boards.verdict(robot, trace, results[boards.NAME] if results else None)}.", "bold", wrap=True)
-    terminal.note(f"{boards.comparison(traces, results)}.\n", "bold", wrap=True)
     terminal.note(f"{boards.KEY}.", "dim", wrap=True)
     terminal.note(f"published rows: {boards.SOURCE}; {terminal.seconds:.0f} s", "dim", wrap=True)
     title = f"{robot.capitalize()}: swing-up and balance"
@@ -58,7 +55,7 @@ def board(
         from smc_mujoco.draw.figure import figure as draw
         from smc_mujoco.draw.page import files
 
-        draw([trace], figure, title=title)
+        draw([traces[boards.NAME]], figure, title=title)
         terminal.wrote(*files(figure))
     if film:
-        terminal.wrote(*filmed([trace], film, None, title, terminal))
+        terminal.wrote(*filmed([traces[boards.NAME]], film, None, title, terminal))
