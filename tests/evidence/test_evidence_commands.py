@@ -65,6 +65,7 @@ def identified(count):
         fits_before=({"x": 99.0, "u": 81.5}, *fits[1:count]),
         predictions=((columns, columns, t),) * count,
         evaluations=41,
+        independent=100.0,
     )
 
 
@@ -106,7 +107,7 @@ def repeated(name):
     twin.fit, twin.idle = (lambda _: {"x": 99.04, "u": 1.25}), (lambda _: {"x": -0.04, "u": 0.0})
     twin.fits = lambda _: [{"x": Fall(8.44), "u": -20.0}]
     twin.predictions = lambda _: [(f"{name} predicted", "measured", "times")]
-    twin.replay = lambda record, start, duration, rounded: f"{name} from {start} for {duration}, rounded {rounded}"
+    twin.replay = lambda record, start, duration: f"{name} from {start} for {duration}"
     twin.measured = lambda record, start, duration: f"measured from {start} for {duration}"
     return twin
 

@@ -124,7 +124,7 @@ def replay(
         _, measured, t = predictions["twin"]
         terminal.wrote(*residual_figure(title, t, measured, predicted, fits, twin.units, figure))
     if film:
-        repeated = run([shown.replay(record, start, duration, rounded=False) for shown in twins.values()])
+        repeated = run([shown.replay(record, start, duration) for shown in twins.values()])
         traces = [twin.measured(record, start, duration), *repeated]
         since = float(record[twin.columns.time][0]) + (twin.start if start is None else start)
         title += f", from {since:.6g} s of the record" * bool(since)

@@ -30,41 +30,28 @@ def runs(
 ) -> list[Scenario]:
     """Return scenarios of every law on every parameter set from every seed. The set is the condition.
 
-    Args:
-      rig: a rig with an ensemble.
-      laws: laws or their names; a name of one of the rig's laws means that one. None: the rig's laws.
-      seeds, gains, duration: as in `smc.grid`.
-      starts: as in `smc.grid`; None: within 20 % of the rig's x0.
-
-    Raises:
-      ScenarioError: a rig without an ensemble or, if none are given, without laws; arguments that `smc.grid` refuses.
+    A name of one of the rig's `laws`, the default, means that one. `seeds`, `gains`, `duration` and `starts` are as in
+    `smc.grid`, by default within 20 % of the rig's x0.
     """
     if not rig.ensemble:
         raise ScenarioError(
             f"{rig.name} has only one parameter set: choose a rig with an ensemble, such as qube_servo, or identify it "
             "from records and draw other sets with Identified.drawn"
         )
-    shipped = {law.name: law for law in rig.laws}
-    given = rig.laws if laws is None else laws
+    shipped, given = {law.name: law for law in rig.laws}, rig.laws if laws is None else laws
     if not (chosen := [shipped.get(law, law) if isinstance(law, str) else law for law in given]):
         raise ScenarioError(f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)")
     scenarios, around = [], starts or Starts(x0=rig.x0)
     for name, member in rig.members().items():
-        fields: dict[str, Any] = member.machine(Values(**member.values))
-        kept = {key: value for key, value in fields.items() if key not in BY_STARTS}
-        plant = kept.pop("plant")
-        base = grid([plant], chosen, ["nominal"], seeds, gains, duration, around)
-        free: dict[str, Any] = {"u_max": None, "physics_step": None} | kept
+        fields: dict[str, Any] = {"u_max": None, "physics_step": None} | member.machine(Values(**member.values))
+        free = {key: value for key, value in fields.items() if key not in BY_STARTS}
+        base = grid([free.pop("plant")], chosen, ["nominal"], seeds, gains, duration, around)
         scenarios += [dataclasses.replace(scenario, **free).named(name) for scenario in base]
     return scenarios
 
 
 def verdict(boards: Sequence[Any]) -> str:
-    """Return a line for each metric: whether one law wins on every parameter set.
-
-    Args:
-      boards: of `smc.leaderboard`, whose conditions are the sets.
-    """
+    """Return a line for each metric of `smc.leaderboard`: whether one law wins on every parameter set."""
     return "\n".join(f"{board.metric}: {sentence(board)}" for board in boards)
 
 

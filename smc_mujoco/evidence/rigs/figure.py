@@ -26,13 +26,8 @@ def residual_figure(
 ) -> list[Path]:
     """Draw each column of a record, measured and predicted, beside its residuals. Write PATH.svg and PATH.png.
 
-    Args:
-      t: times, s, (K,).
-      predicted, fits: name of a twin -> what it predicts, and its fit of each column, percent.
-      units: column -> its unit.
-
-    Returns:
-      The paths of both files.
+    `t`: times, s, (K,). `predicted`, `fits`: name of a twin -> what it predicts, and its fit of each column, percent.
+    `units`: of the columns.
     """
     paths = pages.files(Path(path).with_suffix(""))
     colours = dict(zip(predicted, itertools.cycle(color_sequences["petroff10"]), strict=False))

@@ -1,7 +1,7 @@
 """What an identification gives: quantities with errors and correlations, fits, and notes on what to doubt."""
 
 import dataclasses
-import math
+import itertools
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -17,7 +17,6 @@ from smc_mujoco.evidence.rigs.uncertainty import BLOCKS, MAX_CORRELATION
 POOR_FIT = 80.0  # percent: a fit below this may mean that the search ended in the wrong place; chosen
 PERFECT_FIT = 99.99  # percent: residuals beyond it are the simulation's; chosen
 UNIT_FACTOR = 5.0  # factor between a quantity before and after, beyond which a column may be in another unit; chosen
-FACTOR_TOLERANCE = 0.1  # relative difference up to which such factors count as the same; chosen
 MAX_FIT_LOSS = 0.1  # percent, by which the fit of a whole record may fall without a note; chosen
 
 
@@ -25,47 +24,34 @@ MAX_FIT_LOSS = 0.1  # percent, by which the fit of a whole record may fall witho
 class Identified:
     """The quantities of a rig that were found from records, and how well they fit.
 
-    Attributes:
-      rig: the rig with the values found.
-      before: the rig with the values before.
-      values, errors: quantity -> value found, and its standard error.
-      correlations: of the errors, (p, p), in the order of `values`.
-      fits, fits_before: `Rig.fit` of each record after and before, in an open loop with short steps; for `fits` the
-        states at the starts are found too.
-      predictions: of each record, the predicted columns, the measured columns and their times.
-      evaluations: how many parameter sets were simulated.
-      independent: how many samples of the residuals are independent of each other; inf if that is not known.
+    Fits are those of `Rig.fit`, in an open loop with short steps; for `fits` the states at the starts are found too.
     """
 
-    rig: Rig
-    before: Rig
-    values: Mapping[str, float]
-    errors: Mapping[str, float]
-    correlations: np.ndarray
-    fits: tuple[Mapping[str, float], ...]
+    rig: Rig  # with the values found
+    before: Rig  # with the values before
+    values: Mapping[str, float]  # quantity -> value found
+    errors: Mapping[str, float]  # quantity -> its standard error
+    correlations: np.ndarray  # of the errors, (p, p), in the order of `values`
+    fits: tuple[Mapping[str, float], ...]  # of each record
     fits_before: tuple[Mapping[str, float], ...]
-    predictions: tuple[tuple[Record, Record, np.ndarray], ...]
-    evaluations: int
-    independent: float = math.inf
+    predictions: tuple[tuple[Record, Record, np.ndarray], ...]  # predicted columns, measured ones, and their times
+    evaluations: int  # how many parameter sets were simulated
+    independent: float  # how many samples of the residuals are independent of each other
 
     @property
     def notes(self) -> list[str]:
         """Sentences on what the records cannot determine, and on a poor fit."""
-        names, sentences = list(self.values), []
-        for i, second in enumerate(names):
-            for j, first in enumerate(names[:i]):
-                if abs(self.correlations[i, j]) > MAX_CORRELATION:
-                    sentences.append(
-                        f"{first} and {second} cannot be told apart (correlation {self.correlations[i, j]:.3f})"
-                    )
+        sentences = []
+        for (i, second), (j, first) in itertools.product(enumerate(self.values), repeat=2):
+            if j < i and abs(correlation := self.correlations[i, j]) > MAX_CORRELATION:
+                sentences.append(f"{first} and {second} cannot be told apart (correlation {correlation:.3f})")
         for name, value in self.values.items():
             quantity = self.rig.quantities[name]
             if value in (quantity.least, quantity.most):
                 sentences.append(f"{name} is at the end of its range, {value:g} {quantity.unit}".rstrip())
             elif self.errors[name] > abs(value):
                 sentences.append(f"{name} may as well be 0 ({value:.3g} ± {self.errors[name]:.2g})")
-        sentences += self._scale_notes() + self._loss_notes() + self._doubts()
-        return sentences
+        return sentences + self._scale_notes() + self._loss_notes() + self._doubts()
 
     def _scale_notes(self) -> list[str]:
         """Sentences on quantities that cannot be negative and are far from their values before."""
@@ -73,15 +59,9 @@ class Identified:
         positive = {name: q.value for name, q in before.items() if q.least >= 0.0 and q.value > 0.0}
         factors = {name: self.values[name] / value for name, value in positive.items()}
         far = {name: factor for name, factor in factors.items() if not 1.0 / UNIT_FACTOR < factor < UNIT_FACTOR}
-        if not far:
-            return []
-        middle = float(np.median(list(far.values())))
-        if len(far) > 1 and all(abs(factor / middle - 1.0) < FACTOR_TOLERANCE for factor in far.values()):
-            return [
-                f"{joined(list(far))} are {middle:.3g} times what they were before: look at the unit of the command"
-            ]
         changes = [f"{name} is {factor:.3g} times its value before" for name, factor in far.items()]
-        return [f"{joined(changes)}: look at the units of the columns, unless the values before were only a guess"]
+        cure = "look at the units of the columns, unless the values before were only a guess"
+        return [f"{joined(changes)}: {cure}"] if far else []
 
     def _doubts(self) -> list[str]:
         """Sentences on residuals that the standard errors do not allow for, and on a poor fit."""
@@ -115,12 +95,7 @@ class Identified:
     def drawn(self, count: int = 8, seed: int = 0) -> Rig:
         """Return the rig with an ensemble of other parameter sets that the records allow, for rankings over them.
 
-        Args:
-          count: number of sets. They are drawn from the normal distribution of the errors, and cut to the ranges.
-          seed: of the draws.
-
-        Raises:
-          ScenarioError: count or seed is out of range.
+        They are drawn from the normal distribution of the errors, and cut to the ranges.
         """
         whole("count", count, 1, 1000)
         names, rng = list(self.values), np.random.default_rng(whole("seed", seed, 0, 2**53 - 1))
@@ -138,36 +113,18 @@ class Identified:
 
     def save(self, path: str | Path) -> Path:
         """Write values, errors, correlations and fits to a JSON file. Return its path."""
-        quantities = {
-            name: {"value": value, "error": self.errors[name], "unit": self.rig.quantities[name].unit}
-            for name, value in self.values.items()
-        }
-        return write_json(
-            Path(path),
-            {
-                "rig": self.rig.name, "quantities": quantities, "correlations": self.correlations.tolist(),
-                "fits": list(map(_plain, self.fits)), "fits_before": list(map(_plain, self.fits_before)),
-            },
-        )  # fmt: skip
+        known = self.rig.quantities
+        quantities = {n: {"value": v, "error": self.errors[n], "unit": known[n].unit} for n, v in self.values.items()}
+        about = {"rig": self.rig.name, "quantities": quantities, "correlations": self.correlations.tolist()}
+        for name, fits in (("fits", self.fits), ("fits_before", self.fits_before)):
+            about[name] = [{k: str(v) if isinstance(v, Fall) else v for k, v in fit.items()} for fit in fits]
+        return write_json(Path(path), about)
 
     def figure(self, path: str | Path, record: int = 0) -> list[Path]:
-        """Draw measured and predicted columns of a record, and their residuals, as PATH.svg and PATH.png.
-
-        Args:
-          path: of the figure.
-          record: index of the record.
-
-        Returns:
-          The paths of both files.
-        """
+        """Draw measured and predicted columns of a record, and their residuals, as PATH.svg and PATH.png."""
         from smc_mujoco.evidence.rigs.figure import residual_figure
 
         whole("record", record, 0, len(self.fits) - 1)
         predicted, measured, t = self.predictions[record]
         fits = {"twin": self.fits[record]}
         return residual_figure(self.rig.label, t, measured, {"twin": predicted}, fits, self.rig.units, path)
-
-
-def _plain(fit: Mapping[str, float]) -> dict[str, float | str]:
-    """Return a fit for a JSON file, with a fall as text."""
-    return {name: str(value) if isinstance(value, Fall) else value for name, value in fit.items()}

@@ -6,7 +6,7 @@ A record is a mapping from names of columns to arrays, with one value for each c
 import dataclasses
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -32,29 +32,17 @@ RESOLUTION = 1e-6  # s, to which the period of an open-loop record is rounded
 
 @dataclasses.dataclass(frozen=True)
 class Columns:
-    """Names of a record's columns.
+    """Names of a record's columns."""
 
-    Attributes:
-      time: s.
-      x: position of each channel, rad or m.
-      u: command, in the unit of the rig's u.
-      reference: of the driven joint, if the loop is closed.
-      feedforward: what is added to the controller's u; records may lack it.
-      others: references of the other joints; records may lack them.
-      state: positions, then velocities of all channels, without noise and offset; only simulated runs have them.
-      offset: what is subtracted from each channel's column to get the plant's x; empty for 0.
-      torque: of each joint, for records whose torques are predicted from the motion; x then has these joints.
-    """
-
-    time: str = "t"
-    x: tuple[str, ...] = ("x",)
-    u: str = "u"
-    reference: str = "reference"
-    feedforward: str = "feedforward"
-    others: tuple[str, ...] = ()
-    state: tuple[str, ...] = ()
-    offset: tuple[float, ...] = ()
-    torque: tuple[str, ...] = ()
+    time: str = "t"  # s
+    x: tuple[str, ...] = ("x",)  # position of each channel, rad or m; or of each joint that has a torque
+    u: str = "u"  # command, in the unit of the rig's u
+    reference: str = "reference"  # of the driven joint, if the loop is closed
+    feedforward: str = "feedforward"  # what is added to the controller's u; records may lack it
+    others: tuple[str, ...] = ()  # references of the other joints; records may lack them
+    state: tuple[str, ...] = ()  # positions, then velocities, without noise and offset; only simulated runs have them
+    offset: tuple[float, ...] = ()  # what is subtracted from each channel's column to get the plant's x; empty for 0
+    torque: tuple[str, ...] = ()  # of each joint, for records whose torques are predicted from the motion
 
     def needed(self, closed: bool) -> tuple[str, ...]:
         """Return the columns that a record must have, of a closed loop also the reference."""
@@ -62,28 +50,23 @@ class Columns:
         return self.time, *self.x, *command
 
     @property
-    def angles(self) -> tuple[str, ...]:
-        """Columns that may be in degrees."""
-        return *self.x, self.reference, *self.others
+    def references(self) -> tuple[str, ...]:
+        """References of the joints, the driven one first."""
+        return self.reference, *self.others
 
     @property
     def known(self) -> tuple[str, ...]:
         """All columns that a replay may read."""
-        return tuple(dict.fromkeys((*self.needed(True), self.reference, self.feedforward, *self.others, *self.state)))
+        return tuple(dict.fromkeys((*self.needed(True), *self.references, self.feedforward, *self.state)))
 
 
 def load(path: str | os.PathLike[str], names: Mapping[str, str] | None = None) -> Record | Trace:
-    """Return the columns of a CSV or npz file, or a saved trace.
-
-    Args:
-      path: a CSV file whose first line names the columns, an npz file with an array for each column, or a saved trace.
-      names: the rig's name of a column -> its name in the file, for columns whose names differ.
-
-    Raises:
-      ScenarioError: no such file, not a file of columns, or an unknown column.
-    """
+    """Return the columns of a CSV or npz file, or a saved trace. `names`: the rig's name of a column -> the file's."""
     with reading(path, "record", "give the path of a CSV file, or of an npz file with arrays by column") as file:
-        columns = _npz(file) if file.suffix == ".npz" else None
+        columns = None
+        if file.suffix == ".npz":
+            with file.open("rb") as opened, np.load(opened) as arrays:
+                columns = {} if "about" in arrays else dict(arrays)
     if columns is None:
         columns = _csv(file)
     elif not columns:
@@ -95,12 +78,6 @@ def load(path: str | os.PathLike[str], names: Mapping[str, str] | None = None) -
     return columns
 
 
-def _npz(file: Path) -> Record:
-    """Return the columns of an npz file; none if it is a saved trace."""
-    with file.open("rb") as opened, np.load(opened) as arrays:
-        return {} if "about" in arrays else {name: arrays[name] for name in arrays}
-
-
 def _csv(file: Path) -> Record:
     """Return the columns of a CSV file. A cell that is empty, or not a number, is NaN."""
     rows = [row for _, row in csv_rows(file)]
@@ -108,10 +85,9 @@ def _csv(file: Path) -> Record:
         count = "no lines" if not rows else "only 1 line"
         raise ScenarioError(f"{file} has {count}: give a first line with the columns' names, and samples")
     heads = [name.split("[")[0].strip().lstrip("# ") for name in rows[0]]
-    if wrong := next((i for i, row in enumerate(rows) if len(row) != len(heads)), None):
-        raise ScenarioError(
-            f"{file}, line {wrong + 1}: {len(rows[wrong])} cells for {len(heads)} columns: give one for each"
-        )
+    for number, row in enumerate(rows, 1):
+        if len(row) != len(heads):
+            raise ScenarioError(f"{file}, line {number}: {len(row)} cells for {len(heads)} columns: give one for each")
     values = np.array([[_cell(cell) for cell in row] for row in rows[1:]])
     return {name: values[:, i] for i, name in enumerate(heads)}
 
@@ -140,21 +116,19 @@ def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:
 def of_trace(trace: Trace, columns: Columns) -> Record:
     """Return a run as a record with a rig's columns."""
     offset, feedforward = columns.offset or (0.0,) * len(columns.x), trace.scenario.feedforward
-    record = {columns.time: trace.t, columns.u: trace.u[:, 0]}
+    record = {columns.time: trace.t, columns.u: trace.u[:, 0], columns.reference: trace.r[:, 0]}
     for (name, x), zero in zip(positions(trace, columns, noisy=True).items(), offset, strict=True):
         record[name] = x + zero
     added = [0.0 if feedforward is None else evaluate(feedforward, t)[0] for t in trace.t]
     record |= dict(zip(columns.state, np.column_stack([trace.x, trace.v]).T, strict=False))
-    return record | {columns.reference: trace.r[:, 0], columns.feedforward: np.array(added)}
+    return record | {columns.feedforward: np.array(added)}
 
 
 def checked(record: Mapping[str, Any], columns: Columns, period: float | None, rig: str) -> Record:
-    """Return the record's known columns as float arrays, (K,) each.
+    """Return the record's known columns as float arrays, (K,) each. `rig`: its name, for errors.
 
-    Args:
-      period: s, of the rig's controller, at which a closed loop must be recorded. None for an open loop, whose columns
-        are interpolated at the record's own median step.
-      rig: its name, for errors.
+    `period`: s, of the rig's controller, at which a closed loop must be recorded. None for an open loop, whose columns
+    are interpolated at the record's own median step.
     """
     if not isinstance(record, Mapping):
         raise ScenarioError(f"record is {shown(record)}: give a mapping of columns, such as numpy.load(file)")
@@ -169,10 +143,8 @@ def checked(record: Mapping[str, Any], columns: Columns, period: float | None, r
     t = data[columns.time]
     for name, values in data.items():
         if len(values) != len(t):
-            raise ScenarioError(
-                f"column {name} of {rig} has {len(values)} samples and {columns.time} has {len(t)}: "
-                "give as many of each"
-            )
+            counts = f"{len(values)} samples and {columns.time} has {len(t)}"
+            raise ScenarioError(f"column {name} of {rig} has {counts}: give as many of each")
     step = _checked_step(t, period, rig)
     if period is None:
         even = t[0] + step * np.arange(int((t[-1] - t[0]) / step + 1e-6) + 1)
@@ -186,13 +158,13 @@ def _checked_step(t: np.ndarray, period: float | None, rig: str) -> float:
     """Return the median step of a record's times, s. Refuse times that a replay cannot use."""
     if len(t) < 2:
         raise ScenarioError(f"the record of {rig} has {len(t)} samples: give at least two")
-    back = np.flatnonzero(np.diff(t) <= 0.0)
+
+    def at(sample: int) -> str:
+        return f"{sample}, from {t[sample]:.6g} s to {t[sample + 1]:.6g} s"
+
+    back, step = np.flatnonzero(np.diff(t) <= 0.0), step_of(t)
     if len(back):
-        raise ScenarioError(
-            f"time of {rig} runs backward at sample {back[0] + 1}, from {t[back[0]]:.6g} s to {t[back[0] + 1]:.6g} s: "
-            "give times that increase"
-        )
-    step = step_of(t)
+        raise ScenarioError(f"time of {rig} runs backward after sample {at(back[0])}: give times that increase")
     if step > MAX_PERIOD:
         raise ScenarioError(
             f"the record of {rig} is sampled every {step:g} s and lasts {t[-1] - t[0]:g} s: give time in s (a column "
@@ -205,10 +177,7 @@ def _checked_step(t: np.ndarray, period: float | None, rig: str) -> float:
         )
     gaps = np.flatnonzero(np.diff(t) > (MAX_GAP if period is None else MAX_GAP_CLOSED) * step)
     if len(gaps):
-        raise ScenarioError(
-            f"the record of {rig} has a gap after sample {gaps[0]}, from {t[gaps[0]]:.6g} s to {t[gaps[0] + 1]:.6g} s: "
-            "fill it in, or cut the record there"
-        )
+        raise ScenarioError(f"the record of {rig} has a gap after sample {at(gaps[0])}: fill it in, or cut it there")
     return step
 
 
@@ -232,9 +201,9 @@ def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
     try:
         array = np.asarray(values, float)
     except (TypeError, ValueError, OverflowError):
-        raise ScenarioError(f"column {name} of {rig} is {shown(values)}: give numbers") from None
+        array = np.empty((0, 0))
     if array.ndim != 1:
-        raise ScenarioError(f"column {name} of {rig} has the shape {array.shape}: give one number a sample")
+        raise ScenarioError(f"column {name} of {rig} is {shown(values)}: give one number a sample")
     wrong = np.flatnonzero(~np.isfinite(array))
     if len(wrong):
         raise ScenarioError(
@@ -267,10 +236,11 @@ def rate(values: np.ndarray, period: float, order: int = 1) -> np.ndarray:
     return np.asarray(savgol_filter(values, 2 * STATE_SAMPLES + 1, 3, deriv=order, delta=period))
 
 
-def in_radians(record: Mapping[str, Any], columns: Columns, names: Sequence[str]) -> Record:
-    """Return the record with some columns converted from degrees to radians."""
-    angles = {name: np.deg2rad(np.asarray(record[name], float)) for name in names if name in record}
-    return {name: np.asarray(record[name]) for name in columns.known if name in record} | angles
+def in_radians(record: Mapping[str, Any], columns: Columns) -> Record:
+    """Return the record with its angles converted from degrees to radians."""
+    angles = (*columns.x, *columns.references)
+    known = {name: np.asarray(record[name]) for name in columns.known if name in record}
+    return {name: np.deg2rad(values) if name in angles else values for name, values in known.items()}
 
 
 def percent(fit: Mapping[str, float]) -> str:

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioWarning
-from smc_mujoco.evidence.rigs import records
+from smc_mujoco.evidence.rigs import inverse, records
 from smc_mujoco.evidence.rigs.records import Record
 from smc_mujoco.evidence.rigs.rig import Part, Quantity, Rig
 from smc_mujoco.simulation.run import run
@@ -38,47 +38,34 @@ SINGULAR_RATIO = 1e-6  # ratio of singular values below which states at the star
 
 @dataclasses.dataclass(frozen=True)
 class Piece:
-    """A part of a record that is compared with its replay.
+    """A part of a record that is compared with its replay."""
 
-    Attributes:
-      record: index of the record.
-      part: what its replay takes from the record; None if torques are predicted.
-      skipped: samples at its start that are not compared.
-      measured: the columns compared, (N,) each.
-      spread: norm of each whole column about its mean, of which residuals are parts.
-      scales: units of the free states, (s,).
-    """
-
-    record: int
-    part: Part | None
-    skipped: int
-    measured: Record
-    spread: Mapping[str, float]
-    scales: np.ndarray
+    record: int  # its index
+    part: Part | None  # what its replay takes from the record; None if torques are predicted
+    skipped: int  # samples at its start that are not compared
+    measured: Record  # the columns compared, (N,) each
+    spread: Mapping[str, float]  # norm of each whole column about its mean, of which residuals are parts
+    scales: np.ndarray  # units of the free states, (s,)
 
 
 @dataclasses.dataclass(frozen=True)
 class Point:
-    """A point of the search: quantities in their scales, (p,), and moves of each piece's free states, (pieces, s)."""
+    """A point of the search."""
 
-    values: np.ndarray
-    states: np.ndarray
+    values: np.ndarray  # quantities in their scales, (p,)
+    states: np.ndarray  # moves of each piece's free states, (pieces, s)
 
 
 @dataclasses.dataclass(frozen=True)
 class Slopes:
-    """Residuals of each piece at a point, (N,), and their derivatives by quantities (N, p) and by its states (N, s).
-
-    The rows of a piece are its samples in the order of time, each with all `columns` that are compared. The pieces are
-    of `records` records.
-    """
+    """Residuals of each piece at a point, in the order of time, each sample with all columns, and their derivatives."""
 
     point: Point
-    residuals: list[np.ndarray]
-    by_values: list[np.ndarray]
-    by_states: list[np.ndarray]
-    columns: int
-    records: int
+    residuals: list[np.ndarray]  # (N,) of each piece
+    by_values: list[np.ndarray]  # derivatives by the quantities, (N, p)
+    by_states: list[np.ndarray]  # derivatives by the piece's states, (N, s)
+    columns: int  # that are compared
+    records: int  # of which these are pieces
 
     def freed(self, rows: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return rows of each piece, (N,) or (N, p), without the part that states at its start can cause."""
@@ -130,20 +117,15 @@ class Replays:
         self, twin: Rig, names: list[str], data: Sequence[Mapping[str, Any]], closed: bool,
         report: Callable[[int], None] = lambda count: None, whole: bool = False,
     ):  # fmt: skip
-        """Cut the records into pieces.
+        """Cut the records of a rig into pieces, to find the quantities `names`, (p,).
 
-        Args:
-          twin: the rig; its values stay for quantities that are not in `names`.
-          names: of the quantities, (p,).
-          data: the records.
-          closed: whether each record is replayed as a whole, by the rig's own controller. Otherwise its pieces of the
-            rig's `window` are replayed under the recorded command.
-          report: is called with the number of replays of all records after a batch.
-          whole: whether records are replayed as a whole in an open loop, too.
+        If `closed`, each record is replayed as a whole, by the rig's own controller; else its pieces of the rig's
+        `window` under the recorded command, or the `whole` record. `report` is called with the number of replays of all
+        records after a batch.
         """
         self.twin, self.names, self.data, self.closed, self.report = twin, names, data, closed, report
         self.whole = whole or closed or not twin.window
-        known = [twin.quantities[name] for name in names]
+        self.known = known = [twin.quantities[name] for name in names]
         self.scales = np.array([_scale(quantity) for quantity in known])
         self.low = np.array([quantity.least for quantity in known]) / self.scales
         self.high = np.array([quantity.most for quantity in known]) / self.scales
@@ -164,8 +146,7 @@ class Replays:
 
     def values(self, point: Point) -> dict[str, float]:
         """Return the quantities at a point, cut to their ranges."""
-        known = [self.twin.quantities[name] for name in self.names]
-        cut = np.clip(point.values * self.scales, [q.least for q in known], [q.most for q in known])
+        cut = np.clip(point.values * self.scales, [q.least for q in self.known], [q.most for q in self.known])
         return dict(zip(self.names, cut.tolist(), strict=True))
 
     def rig(self, point: Point) -> Rig:
@@ -205,7 +186,7 @@ class Replays:
         self.evaluations += len(points)
         rigs = [self.rig(point) for point in points]
         if self.twin.dynamics is not None:
-            predictions = [[predicted for predicted, _, _ in rig.predictions(list(self.data))] for rig in rigs]
+            predictions = [[predicted for predicted, _, _ in rig.predictions(self.data)] for rig in rigs]
         else:
             predictions = self._replayed(rigs, points, self.steps)
         self.report(len(points))
@@ -224,7 +205,7 @@ class Replays:
         if self.closed or self.twin.columns.state or self.twin.dynamics is not None:
             return False  # simulated runs have the errors of the scenario's own steps, too
         rig = self.rig(point)
-        if not (plain := rig.repeated(self._part(0), rounded=False)).realistic:
+        if not (plain := rig.repeated(self._part(0))).realistic:
             return False
         self.steps = _steps(plain, 0)
         plain_steps, coarse, fine = (
@@ -236,11 +217,6 @@ class Replays:
         ]
         return True
 
-    def again(self, slopes: Slopes, point: Point) -> Slopes:
-        """Return the residuals at a point with derivatives that are already known, from nearby."""
-        (residuals,) = self.residuals([point])
-        return dataclasses.replace(slopes, point=point, residuals=residuals)
-
     @property
     def short_steps(self) -> dict[str, Any]:
         """Integrator and step of exact replays without corrections; none for the scenario's own."""
@@ -249,9 +225,7 @@ class Replays:
         return self.steps | {"physics_step": self.steps["physics_step"] / 2**SLOPE_HALVINGS}
 
     def sharpened(self, slopes: Slopes) -> Slopes:
-        """Return slopes with derivatives from shorter steps, if replays are corrected."""
-        if not self.corrections:
-            return slopes
+        """Return slopes with derivatives from shorter steps."""
         steps, self.steps = self.steps, self.short_steps
         sharp = self.slopes(slopes.point)
         self.steps = steps
@@ -262,7 +236,7 @@ class Replays:
         with warnings.catch_warnings():  # about values that are only tried
             warnings.simplefilter("ignore", ScenarioWarning)
             scenarios = [
-                rig.repeated(self._part(k), rounded=False, state=self.state(point, k), **fields)
+                rig.repeated(self._part(k), state=self.state(point, k), **fields)
                 for rig, point in zip(rigs, points, strict=True)
                 for k in range(len(self.pieces))
             ]
@@ -304,7 +278,7 @@ class Replays:
         """Return the pieces of record i."""
         twin, data = self.twin, self.twin.checked(self.data[i])
         if twin.dynamics is not None:
-            measured = twin.measured_torques(self.data[i])
+            measured = inverse.measured(data, twin.columns)
             spread = {name: _norm(values) for name, values in measured.items()}
             return [Piece(i, None, 0, measured, spread, np.zeros(0))]
         period, t = twin.step(data), data[twin.columns.time]

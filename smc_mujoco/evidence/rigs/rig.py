@@ -38,30 +38,19 @@ FALL_RANGES = 2.0  # ranges of a measured joint, beyond which the twin of a clos
 
 @dataclasses.dataclass(frozen=True)
 class Quantity:
-    """A number of a rig.
+    """A number of a rig."""
 
-    Attributes:
-      value: in SI units.
-      unit: such as "kg m^2" or "V s/rad"; "" for none.
-      source: where the number comes from: a publication and its licence, or the records it was identified from.
-      least, most: range that identification keeps to.
-    """
-
-    value: float
-    unit: str
-    source: str
-    least: float = -np.inf
+    value: float  # SI
+    unit: str  # such as "kg m^2" or "V s/rad"; "" for none
+    source: str  # a publication and its licence, or the records it was identified from
+    least: float = -np.inf  # ends of the range that identification keeps to
     most: float = np.inf
 
 
 class Fall(float):
-    """The fit of a closed loop that the twin cannot hold: minus infinity, which prints as "falls at 8.4 s".
+    """The fit of a closed loop that the twin cannot hold: minus infinity, which prints as "falls at 8.4 s"."""
 
-    Attributes:
-      time: s of the record, when a joint is first further from the measured one than that joint's whole range.
-    """
-
-    time: float
+    time: float  # s of the record, when a joint is first further from the measured one than that joint's whole range
 
     def __new__(cls, time: float) -> "Fall":
         made = super().__new__(cls, -np.inf)
@@ -79,38 +68,22 @@ class Fall(float):
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """What a replay takes from a record, whatever the quantities of the rig.
+    """What a replay takes from a record, whatever the quantities of the rig."""
 
-    Attributes:
-      fields: of the replay's Scenario: law, duration, signals.
-      state: measured positions and velocities at the start, (2n,).
-      first: index of its first sample.
-      largest_u: of the recorded command, in the unit of u.
-      zero: quantities that the record determines, see `Rig.zero`.
-    """
-
-    fields: Mapping[str, Any]
-    state: np.ndarray
-    first: int
-    largest_u: float
-    zero: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    fields: Mapping[str, Any]  # of the replay's Scenario: law, duration, signals
+    state: np.ndarray  # measured positions and velocities at the start, (2n,)
+    largest_u: float  # of the recorded command, in the unit of u
+    zero: Mapping[str, float]  # quantities that the record determines, see `Rig.zero`
 
 
 @dataclasses.dataclass(frozen=True)
 class Reached:
-    """How well a parameter set fits records that the package does not contain. Tests check it if they have them.
+    """How well a parameter set fits records that the package does not contain. Tests check it if they have them."""
 
-    Attributes:
-      quantities: "identified", the name of a published set, or "do nothing", see `Rig.idle`.
-      records: which records, and what the values are, such as their medians.
-      values: column or joint -> value, in `unit`.
-      unit: "%" of `Rig.fit`, or that of a residual rms.
-    """
-
-    quantities: str
-    records: str
-    values: Mapping[str, float]
-    unit: str = "%"
+    quantities: str  # "identified", the name of a published set, or "do nothing", see `Rig.idle`
+    records: str  # which records, and what the values are, such as their medians
+    values: Mapping[str, float]  # column or joint -> value
+    unit: str = "%"  # of `Rig.fit`, or that of a residual rms
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -118,17 +91,15 @@ class Rig:
     """A real machine.
 
     Attributes:
-      name: as in `smc.rigs()`.
-      label: what it is, in a line.
+      name, label: as in `smc.rigs()`, and what it is, in a line.
       quantities: name -> Quantity.
-      machine: function of the quantities, by name, that returns fields of a Scenario: plant, actuator, sensor, control
-        period and so on.
+      machine: function of the quantities, by name, that returns fields of a Scenario: plant, actuator, sensor, ...
       controller: the rig's own law, if it is known. Closed-loop records are replayed with it.
       columns: names of its records' columns.
       commands: function of a record and the index of the start, that returns what the rig adds to its controller's u
         from there on, (K,). None: only the column of the feedforward, if there is one.
       zero: function of the quantities, by name, and a record that returns quantities which differ between records,
-        such as angles from where an encoder was switched on. None: there are none.
+        such as angles from where an encoder was switched on.
       start, score_from: s after a record's first sample, at which a replay starts, and from which its fit counts.
       dynamics: function of the quantities, by name, that returns a plant with the joints of the record, for records
         whose torques are predicted from the measured motion. None: records are replayed.
@@ -159,7 +130,7 @@ class Rig:
     ensemble: tuple[Mapping[str, float], ...] = ()
     laws: tuple[Law, ...] = ()
     x0: tuple[float, ...] | None = None
-    reached: tuple["Reached", ...] = ()
+    reached: tuple[Reached, ...] = ()
     about: str = ""
 
     def __post_init__(self) -> None:
@@ -175,15 +146,7 @@ class Rig:
         return {name: quantity.value for name, quantity in self.quantities.items()}
 
     def with_values(self, values: Mapping[str, float], source: str = "given") -> "Rig":
-        """Return the rig with other values of some quantities.
-
-        Args:
-          values: quantity -> value, SI units.
-          source: where the values come from.
-
-        Raises:
-          ScenarioError: an unknown quantity, or a value out of its range.
-        """
+        """Return the rig with other values of some quantities, SI units, that come from a source."""
         changed = dict(self.quantities)
         for name, value in values.items():
             known = find(f"quantity of {self.name}", name, changed)
@@ -203,10 +166,10 @@ class Rig:
         return {"set 1": self} | sets
 
     def scenario(self, law: Law | str | None = None, **fields: Any) -> Scenario:
-        """Return a Scenario of the machine.
+        """Return a Scenario of the machine under a law, by default the rig's own controller.
 
         Args:
-          law: the law; None: the rig's own controller.
+          law: the law.
           fields: fields of a Scenario that replace the rig's.
 
         Raises:
@@ -217,38 +180,27 @@ class Rig:
         controlled: dict[str, Any] = {"law": law or self.controller}
         return Scenario(**self.machine(Values(**self.values)) | controlled | fields)
 
-    def replay(
-        self,
-        record: Mapping[str, Any],
-        start: float | None = None,
-        duration: float | None = None,
-        rounded: bool = True,
-        closed: bool = True,
-        state: np.ndarray | None = None,
-    ) -> Scenario:
+    def replay(self, record: Mapping[str, Any], start: float | None = None, duration: float | None = None) -> Scenario:
         """Return the scenario that repeats a record from its measured state on.
 
         With the rig's own controller the loop is closed: only references and feedforward come from the record, and u is
-        the controller's. Without one, the recorded command is the feedforward of the law "none".
+        the controller's. Without one, the recorded command is the feedforward of the law "none". The encoder does not
+        round, because the sample in which a count changes cannot be predicted.
 
         Args:
           record: column -> values, (K,); see `columns`.
           start: s after the first sample; None: the rig's `start`.
           duration: s; None: to the end of the record.
-          rounded: whether the encoder rounds to counts. The sample in which a count changes cannot be predicted, so
-            `fit` leaves rounding out by default.
-          closed: whether to close the loop if the controller is known; else the recorded command is replayed.
-          state: positions and velocities at the start, as in the columns of `checked`, (2n,); None: those measured.
 
         Raises:
           ScenarioError: a start before the record, fewer than 50 samples to repeat, or what `fit` raises of a record.
         """
-        return self.repeated(self.part(record, start, duration, closed), rounded, state)
+        return self.repeated(self.part(record, start, duration))
 
     def part(
         self, record: Mapping[str, Any], start: float | None = None, duration: float | None = None, closed: bool = True
-    ) -> "Part":
-        """Return what a replay takes from a record. Arguments and errors are those of `replay`."""
+    ) -> Part:
+        """Return what a replay takes from a record. If not `closed`, it has the recorded command in any case."""
         if self.dynamics is not None:
             raise ScenarioError(f"records of {self.name} are not replayed, as their torques are predicted: use fit")
         data = self.checked(record)
@@ -258,11 +210,7 @@ class Rig:
         if duration is not None:
             shortest = round(records.MIN_SAMPLES * period, 9)
             last = min(last, first + round(number("duration", duration, low=shortest) / period))
-        if last - first < records.MIN_SAMPLES:
-            raise ScenarioError(
-                f"the record of {self.name} lasts {len(data[self.columns.time]) * period:.3g} s, too short to repeat "
-                f"it from {first * period:g} s on: give at least {(first + records.MIN_SAMPLES + 1) * period:.3g} s"
-            )
+        self.long_enough(data, last - first >= records.MIN_SAMPLES, "repeat", first + records.MIN_SAMPLES + 1)
         times = (period * np.arange(last + 1 - first)).tolist()
 
         def signal(values: np.ndarray) -> TimeSeries:
@@ -279,15 +227,22 @@ class Rig:
         largest = float(np.abs(data[self.columns.u][first : last + 1]).max())
         state = np.concatenate(records.state(data, self.columns, period, first))
         zero = self.zero(Values(**self.values), data) if self.zero else {}
-        return Part(fields=fields, state=state, first=first, largest_u=largest, zero=zero)
+        return Part(fields=fields, state=state, largest_u=largest, zero=zero)
 
-    def repeated(self, part: "Part", rounded: bool = True, state: np.ndarray | None = None, **changes: Any) -> Scenario:
+    def long_enough(self, data: Record, enough: bool, what: str, samples: int) -> None:
+        """Refuse a record that is too short to repeat or to score."""
+        if not enough:
+            period, count = self.step(data), len(data[self.columns.time])
+            raise ScenarioError(
+                f"the record of {self.name} lasts {count * period:.3g} s, too short to {what} it: give at least "
+                f"{samples * period:.3g} s"
+            )
+
+    def repeated(self, part: Part, rounded: bool = False, state: np.ndarray | None = None, **changes: Any) -> Scenario:
         """Return the scenario that repeats a part of a record.
 
-        Args:
-          part: of the record.
-          rounded, state: as in `replay`.
-          changes: fields of the Scenario that differ.
+        `rounded`: whether the encoder rounds to counts. `state`: at the start, (2n,), in place of the measured one.
+        `changes`: fields of the Scenario that differ.
         """
         fields = self.machine(Values(**self.values | dict(part.zero)))
         sensor = fields.get("sensor")
@@ -302,14 +257,11 @@ class Rig:
         return Scenario.recorded(**fields | dict(part.fields) | {"x0": tuple(x - bias), "v0": tuple(v)} | changes)
 
     def measured(self, record: Mapping[str, Any], start: float | None = None, duration: float | None = None) -> Trace:
-        """Return a record as a trace of the machine, for figures and films beside those of twins.
+        """Return a record as a trace of the machine, for figures and films beside those of twins; see `replay`.
 
         x and u are measured, v follows from cubics through the positions, and what was not measured is 0.
-
-        Args:
-          record, start, duration: as in `replay`, whose scenario the trace has.
         """
-        scenario = self.replay(record, start, duration, rounded=False)
+        scenario = self.replay(record, start, duration)
         data, period, n = self.checked(record), scenario.control_period, scenario.plant.n
         first, count = round((self.start if start is None else start) / period), scenario.samples
         part = slice(first, first + count + 1)
@@ -321,11 +273,9 @@ class Rig:
         u[:, 0] = data[self.columns.u][part]
         if self.columns.reference in data:
             r[:, 0] = data[self.columns.reference][part]
-        t, zero = period * np.arange(count + 1), np.zeros((count + 1, n))
-        return Trace(
-            t=t, x=x, v=v, u=u, applied=u.copy(), s=zero, d=zero.copy(), r=r, force=zero.copy(), reaction=zero.copy(),
-            scenario=scenario,
-        )  # fmt: skip
+        zero: dict[str, Any] = {name: np.zeros((count + 1, n)) for name in ("s", "d", "force", "reaction")}
+        t = period * np.arange(count + 1)
+        return Trace(t=t, x=x, v=v, u=u, applied=u.copy(), r=r, **zero, scenario=scenario)
 
     @property
     def needed(self) -> tuple[str, ...]:
@@ -358,9 +308,6 @@ class Rig:
         """Return the rig that repeats some records, and the records as columns.
 
         For traces, that rig has their law and starts at their start.
-
-        Raises:
-          ScenarioError: traces of several laws or of another plant, or traces and columns.
         """
         traces = [record for record in many if isinstance(record, Trace)]
         if not traces:
@@ -380,7 +327,7 @@ class Rig:
         )  # fmt: skip
         return rig, [records.of_trace(trace, rig.columns) for trace in traces]
 
-    def fit(self, record: Source, rounded: bool = False) -> dict[str, float]:
+    def fit(self, record: Source) -> dict[str, float]:
         """Return how well the twin repeats a record: 100 (1 - |y - yhat| / |y - mean y|), percent.
 
         The norms are over all samples from `score_from` on. 100 is perfect, 0 is as good as the mean.
@@ -388,7 +335,6 @@ class Rig:
         Args:
           record: column -> values, (K,), such as a loaded npz file, see `columns`; or a trace, of which all samples
             count.
-          rounded: whether the prediction is rounded to counts of the encoder.
 
         Returns:
           Name -> percentage, for each joint's column and, in a closed loop, "u". If torques are predicted, for each
@@ -399,47 +345,26 @@ class Rig:
             angles in degrees.
         """
         rig, data = self.reading([record])
-        fit = rig.fits(data, rounded)[0]
+        fit = rig.fits(data)[0]
         rig.refuse_degrees(data[0], fit)
         return fit
 
     def refuse_degrees(self, record: Mapping[str, Any], fit: Mapping[str, float]) -> None:
-        """Raise ScenarioError if a record has degrees in place of radians.
-
-        It has if it fits far better after all its angles, those of a joint, or the references are converted to radians.
-        A record that fits well as it is, by `fit`, is not simulated again.
-        """
+        """Raise ScenarioError if a record, with this fit, fits far better after its angles are converted to radians."""
         if min(fit.values()) >= 100.0 - RADIANS_GAIN or "rad" not in self.scenario("none").plant.units:
             return
-        joints, references = self.columns.x, (self.columns.reference, *self.columns.others)
-        pairs = [(x, *references[i : i + 1]) for i, x in enumerate(joints)]
-        sets = (self.columns.angles, *((name,) for name in (*joints, *references)), *pairs, references)
-        there = [tuple(name for name in names if name in record) for names in sets]
-        suspects = [names for names in dict.fromkeys(there) if names]
-        others = self.fits([records.in_radians(record, self.columns, names) for names in suspects])
-        best = max(range(len(suspects)), key=lambda i: min(others[i].values()))
-        if min(others[best].values()) > max(RADIANS_GAIN, min(fit.values()) + RADIANS_GAIN):
-            which = "angles" if best == 0 else f"values of {' and '.join(suspects[best])}"
+        other = self.fits([records.in_radians(record, self.columns)])[0]
+        if min(other.values()) > max(RADIANS_GAIN, min(fit.values()) + RADIANS_GAIN):
             raise ScenarioError(
-                f"the {which} of the record of {self.name} look like degrees, as it fits by "
-                f"{records.percent(others[best])} with them in radians and by {records.percent(fit)} as they are: "
-                "give radians"
+                f"the angles of the record of {self.name} look like degrees, as it fits by {records.percent(other)} "
+                f"with them in radians and by {records.percent(fit)} as they are: give radians"
             )
 
     def fits(
-        self,
-        many: list[Mapping[str, Any]],
-        rounded: bool = False,
-        states: Sequence[np.ndarray | None] | None = None,
-        **changes: Any,
+        self, many: Sequence[Mapping[str, Any]], states: Sequence[np.ndarray | None] | None = None, **changes: Any
     ) -> list[dict[str, float]]:
-        """Return `fit` of several records, simulated in one batch, without the check for degrees.
-
-        Args:
-          states: positions and velocities at the start of each, as in `replay`; None: those measured.
-          changes: fields of the replays that differ, such as their physics step.
-        """
-        predictions = self.predictions(many, rounded, states, **changes)
+        """Return `fit` of several records, simulated in one batch, without the check for degrees; see `predictions`."""
+        predictions = self.predictions(many, states, **changes)
         fits = [percentages(*prediction[:2]) for prediction in predictions]
         if self.controller is not None:
             for fit, (predicted, measured, t) in zip(fits, predictions, strict=True):
@@ -448,37 +373,31 @@ class Rig:
         return [{"u" if name == self.columns.u else name: value for name, value in fit.items()} for fit in fits]
 
     def predictions(
-        self,
-        many: list[Mapping[str, Any]],
-        rounded: bool = False,
-        states: Sequence[np.ndarray | None] | None = None,
-        **changes: Any,
+        self, many: Sequence[Mapping[str, Any]], states: Sequence[np.ndarray | None] | None = None, **changes: Any
     ) -> list[tuple[Record, Record, np.ndarray]]:
         """Return the predicted columns, the measured columns and their times of each record, from `score_from` on.
 
-        Arguments are those of `fits`.
+        `states`: at the start of each, (2n,), in place of the measured ones. `changes`: fields of the replays that
+        differ, such as their physics step.
         """
-        data, time = [self.checked(record) for record in many], self.columns.time
+        data, names = [self.checked(record) for record in many], self.columns
         if self.dynamics is not None:
+            plant = self.dynamics(Values(**self.values))
             return [
-                (self.torques(record), self.measured_torques(record), inverse.times(columns, self.columns))
-                for record, columns in zip(many, data, strict=True)
+                (inverse.torques(plant, one, names), inverse.measured(one, names), inverse.times(one, names))
+                for one in data
             ]
         pairs = zip(many, states or [None] * len(many), strict=True)
-        traces = run([self.repeated(self.part(record), rounded, state, **changes) for record, state in pairs])
+        traces = run([self.repeated(self.part(record), state=state, **changes) for record, state in pairs])
         replayed = []
         for columns, trace in zip(data, traces, strict=True):
             period = trace.scenario.control_period
             first, after = round(self.score_from / period), round((self.score_from - self.start) / period)
-            if len(trace.t) < after + records.MIN_SAMPLES:
-                seconds = (first + records.MIN_SAMPLES) * period
-                raise ScenarioError(
-                    f"the record of {self.name} lasts {len(columns[time]) * period:.3g} s, too short to score it from "
-                    f"{self.score_from:g} s on: give at least {seconds:.3g} s"
-                )
+            enough = len(trace.t) >= after + records.MIN_SAMPLES
+            self.long_enough(columns, enough, "score", first + records.MIN_SAMPLES)
             predicted = {name: values[after:] for name, values in self.predicted(trace).items()}
             parts = {name: columns[name][first : first + len(values)] for name, values in predicted.items()}
-            replayed.append((predicted, parts, columns[time][first : first + len(trace.t) - after]))
+            replayed.append((predicted, parts, columns[names.time][first : first + len(trace.t) - after]))
         return replayed
 
     def idle(self, record: Mapping[str, Any]) -> dict[str, float]:
@@ -489,18 +408,14 @@ class Rig:
         """
         data, columns = self.checked(record), self.columns
         if self.dynamics is not None:
-            measured = self.measured_torques(record)
+            measured = inverse.measured(data, columns)
             return percentages({name: np.zeros_like(values) for name, values in measured.items()}, measured)
         first = round(self.score_from / self.step(data))
         measured = {name: data[name][first:] for name in columns.x}
         if self.period is None:
             return percentages({name: np.full_like(values, values[0]) for name, values in measured.items()}, measured)
-        references = (columns.reference, *columns.others)
-        zero = np.zeros(len(data[columns.time]))
-        predicted = {
-            name: data.get(references[i] if i < len(references) else "", zero)[first:]
-            for i, name in enumerate(columns.x)
-        }
+        references, zero = dict(zip(columns.x, columns.references, strict=False)), np.zeros(len(data[columns.time]))
+        predicted = {name: data.get(references.get(name, ""), zero)[first:] for name in columns.x}
         predicted["u"], measured["u"] = data.get(columns.feedforward, zero)[first:], data[columns.u][first:]
         return percentages(predicted, measured)
 
@@ -508,16 +423,6 @@ class Rig:
         """Return the columns of a record that a replay gives, (K,) each, without the columns' offset."""
         by_column = records.positions(trace, self.columns)
         return by_column | ({} if trace.scenario.law.name == "none" else {self.columns.u: trace.u[:, 0]})
-
-    def torques(self, record: Mapping[str, Any]) -> Record:
-        """Return the torque of each joint that a record's measured motion takes, below 5 Hz, N m."""
-        if self.dynamics is None:
-            raise ScenarioError(f"records of {self.name} are replayed, and their torques are not predicted: use fit")
-        return inverse.torques(self.dynamics(Values(**self.values)), self.checked(record), self.columns)
-
-    def measured_torques(self, record: Mapping[str, Any]) -> Record:
-        """Return the recorded torque of each joint at the same times, through the same filter, N m."""
-        return inverse.measured(self.checked(record), self.columns)
 
 
 def percentages(predicted: Record, measured: Record) -> dict[str, float]:

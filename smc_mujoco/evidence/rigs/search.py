@@ -35,10 +35,8 @@ GOOD_FIT = 97.0  # percent: fit of the pieces beyond which a start needs no riva
 def search(replays: Replays, starts: int, seed: int, most: int) -> Slopes:
     """Return the slopes at the least squares near the best of several starts, the rig's own values first.
 
-    Args:
-      starts: largest number of starts, of which further ones are only tried while none fits well.
-      seed: of the random ones.
-      most: largest number of steps from the best start.
+    Further starts, of which the random ones have a `seed`, are only tried while none fits well. `most`: largest number
+    of steps from the best start.
     """
     reached = [refine(replays, replays.start, min(most, ROUGH_STEPS))]
     if reached[0].fit < GOOD_FIT and (point := _by_torques(replays)):
@@ -109,7 +107,8 @@ def accurate(replays: Replays, slopes: Slopes) -> tuple[Slopes, np.ndarray]:
     for halvings in range(2, MAX_HALVINGS + 1):
         before = slopes
         replays.correct(before.point, halvings)
-        slopes = replays.again(before, before.point)
+        (residuals,) = replays.residuals([before.point])
+        slopes = dataclasses.replace(before, residuals=residuals)
         slopes = slopes.stepped(_moved(replays, slopes, 0.0) - slopes.point.values)
         moved = np.abs(slopes.point.values - before.point.values)
         if np.all(moved <= NEGLIGIBLE_MOVE * np.sqrt(np.diag(jackknife(slopes)))):

@@ -12,7 +12,6 @@ error is at least the deviation that these cause.
 """
 
 import dataclasses
-from collections.abc import Iterable
 
 import numpy as np
 
@@ -34,10 +33,9 @@ SINGULAR_RATIO = 1e-6  # ratio of the slopes' singular values below which quanti
 def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[dict[str, float], np.ndarray, float]:
     """Return the standard error of each quantity, their correlations (p, p), and `independent`, at the solution.
 
-    Args:
-      by_steps: errors of the quantities by the steps of their simulation, in their scales, (p,).
+    `by_steps`: errors of the quantities by the steps of their simulation, in their scales, (p,).
     """
-    names, twin = replays.names, replays.twin
+    names = replays.names
     J = np.concatenate(slopes.freed(slopes.by_values))
     sizes = np.linalg.norm(J, axis=0)
     for name, size in zip(names, sizes, strict=True):
@@ -45,7 +43,11 @@ def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[
             raise ScenarioError(f"nothing in the records depends on {name}: leave it out, or give other records")
     _, singular, rows = np.linalg.svd(J / sizes, full_matrices=False)
     if singular[-1] < SINGULAR_RATIO * singular[0]:
-        raise _alike(twin.name, (names[i] for i in np.argsort(-np.abs(rows[-1]))[:2]))
+        alike = " and ".join(names[i] for i in np.argsort(-np.abs(rows[-1]))[:2])
+        raise ScenarioError(
+            f"the records of {replays.twin.name} cannot tell {alike} apart: leave one out, or give a longer record or "
+            "one of a richer motion, or look at its units and columns"
+        )
     covariance = jackknife(slopes)
     deviation, count = np.sqrt(np.diag(covariance)), independent(slopes)
     with np.errstate(all="ignore"):
@@ -55,27 +57,7 @@ def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[
         deviation = np.maximum(deviation, _fed_back(replays, slopes.point, J))
     deviation = np.hypot(deviation, by_steps)
     errors = dict(zip(names, (deviation * replays.scales).tolist(), strict=True))
-    _refuse_alike(twin.name, replays.values(slopes.point), errors, correlations)
     return errors, correlations, count
-
-
-def _refuse_alike(rig: str, values: dict[str, float], errors: dict[str, float], correlations: np.ndarray) -> None:
-    """Raise ScenarioError for two quantities of which only a sum is known: neither is above its standard error."""
-    names = list(values)
-    unknown = np.array([errors[name] > abs(value) for name, value in values.items()])
-    pairs = np.triu(np.abs(correlations), 1) * np.outer(unknown, unknown)
-    i, j = np.unravel_index(int(pairs.argmax()), pairs.shape)
-    if pairs[i, j] > MAX_CORRELATION:
-        two = names[i], names[j]
-        raise _alike(rig, (f"{name} ({values[name]:.3g} ± {errors[name]:.2g})" for name in two))
-
-
-def _alike(rig: str, quantities: Iterable[str]) -> ScenarioError:
-    """Return the error that the records of a rig cannot tell some quantities apart."""
-    return ScenarioError(
-        f"the records of {rig} cannot tell {' and '.join(quantities)} apart: leave one out, or give a longer record or "
-        "one of a richer motion, or look at its units and columns"
-    )
 
 
 def jackknife(slopes: Slopes) -> np.ndarray:
@@ -134,10 +116,10 @@ def _fed_back(replays: Replays, point: Point, J: np.ndarray) -> np.ndarray:
     """
     rig, pieces = replays.rig(point), replays.pieces
     known = [(piece.part, replays.state(point, k)) for k, piece in enumerate(pieces) if piece.part is not None]
-    calm = [rig.repeated(part, rounded=False, state=state) for part, state in known]
+    calm = [rig.repeated(part, state=state) for part, state in known]
     noise = [records.noise(rig.checked(replays.data[piece.record]), rig.columns) for piece in pieces]
     noisy = [
-        dataclasses.replace(rig.repeated(part, state=state), noise=Noise(noise[k]), seed=repeat)
+        dataclasses.replace(rig.repeated(part, True, state), noise=Noise(noise[k]), seed=repeat)
         for repeat in range(REPEATS)
         for k, (part, state) in enumerate(known)
     ]

@@ -153,7 +153,7 @@ def test_the_replay_is_the_controllers_own_command(record):
     [
         ({"start": -1.0}, "start is -1: give at least 0"),
         ({"duration": 0.01}, "duration is 0.01: give at least 0.1"),
-        ({"start": 10.0}, "too short to repeat it from 10 s on: give at least 10.1 s"),
+        ({"start": 10.0}, "too short to repeat it: give at least 10.1 s"),
     ],
 )
 def test_a_part_outside_of_the_record_gets_one_sentence(part, sentence, record):
@@ -190,16 +190,13 @@ def changed(record, name, at, value):
         (lambda r: changed(r, "alpha", 100, np.nan), "column alpha of qube_servo is nan at sample 100, one of 1"),
         (lambda r: r | {"alpha": ["a"] * 3501}, "column alpha of qube_servo is ['a', "),
         (lambda r: r | {"alpha": r["alpha"][:-1]}, "column alpha of qube_servo has 3500 samples and t has 3501"),
-        (lambda r: changed(r, "t", 7, 0.0), "time of qube_servo runs backward at sample 7, from 0.012 s to 0 s"),
+        (lambda r: changed(r, "t", 7, 0.0), "time of qube_servo runs backward after sample 6, from 0.012 s to 0 s"),
         (lambda r: r | {"t": r["t"] * 0.5}, "is sampled every 0.001 s and the rig's controller runs every 0.002 s"),
         (lambda r: {k: v[::2] for k, v in r.items()}, "is sampled every 0.004 s and the rig's controller runs every"),
         (lambda r: {k: np.delete(v, 9) for k, v in r.items()}, "has a gap after sample 8, from 0.016 s to 0.02 s"),
-        (lambda r: {k: v[:800] for k, v in r.items()}, "lasts 1.6 s, too short to repeat it from 2 s on: give at"),
-        (lambda r: {k: v[:1500] for k, v in r.items()}, "lasts 3 s, too short to score it from 4 s on: give at least"),
+        (lambda r: {k: v[:800] for k, v in r.items()}, "lasts 1.6 s, too short to repeat it: give at least 2.1"),
+        (lambda r: {k: v[:1500] for k, v in r.items()}, "lasts 3 s, too short to score it: give at least 4.1 s"),
         (lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "alpha", "target_theta")}, "look like degrees"),
-        (lambda r: r | {"alpha": np.rad2deg(r["alpha"])}, "the values of alpha of the record of qube_servo look like"),
-        (lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "target_theta")}, "values of theta and target_theta of"),
-        (lambda r: r | {"target_theta": np.rad2deg(r["target_theta"])}, "the values of target_theta of the record of"),
         (lambda r: "record.csv", "record is 'record.csv': give a mapping of columns"),
     ],
 )  # fmt: skip
@@ -232,7 +229,7 @@ def test_a_record_is_a_trace_of_what_was_measured(record):
     np.testing.assert_array_equal(trace.u[:, 0], record["plant_input"][part])
     np.testing.assert_array_equal(trace.r[:, 0], record["target_theta"][part])
     np.testing.assert_allclose(trace.v[:, 0], np.gradient(record["theta"], 2e-3)[part], atol=0.02)
-    assert trace.scenario == QUBE.replay(record, 3.0, 1.0, rounded=False)
+    assert trace.scenario == QUBE.replay(record, 3.0, 1.0)
 
 
 def test_a_machine_that_does_nothing_follows_its_references(record):
