@@ -95,9 +95,10 @@ def half_done(scenario, report):
 
 
 def audited(about, ids, sets, quick, threads, report):
-    report(1)
+    report(1, 2)
     save = lambda path: path  # noqa: E731
-    return SimpleNamespace(claims=Claims(one for one in CLAIMS if one.id in (ids or "34")), save=save, badge=save)
+    claims = Claims(one for one in CLAIMS if one.id in (ids or "34"))
+    return SimpleNamespace(claims=claims, paper=about, save=save, badge=save)
 
 
 def repeated(name):
@@ -129,7 +130,10 @@ STUBS = {  # of each command: the functions replaced, and what they give
         "studies.worst_case.worst_case": FOUND,
         "simulation.run.run": ["a trace"],
     },
-    "claims": {"evidence.audit.audit.audit": audited, "evidence.audit.mutants.survivors": lambda *_: {"3": "kept"}},
+    "claims": {
+        "evidence.audit.audit.audit": audited,
+        "evidence.audit.mutants.survivors": lambda *_, **__: {"3": "kept"},
+    },
     "papers": {
         "evidence.audit.paper.new": [Path("mine/paper.toml"), Path("mine/claims.py")],
         "evidence.audit.paper.papers": {"small": SimpleNamespace(authors="A. B", title="C", contents="3 claims")},

@@ -24,7 +24,7 @@ from smc_mujoco.evidence.audit.verdict import Beside, Check, Claim, Claims, Evid
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
-    from smc_mujoco.evidence.audit.runs import Result, Runs, Substitute, Used
+    from smc_mujoco.evidence.audit.runs import Result, Runs, Used
     from smc_mujoco.studies.table import Table
 
 DEFAULT_PAPER = "gaber"  # the paper that the suite was built for
@@ -33,21 +33,13 @@ CURE = "return measure -> number, or measure -> {case: number}"
 
 @dataclasses.dataclass(frozen=True)
 class Audit:
-    """An audit of a paper.
-
-    Attributes:
-      paper: the paper as it was read.
-      claims: with their verdicts, in the order of the paper's file.
-      quick: whether less was looked at, as each claim says.
-      used: claim -> set of gains -> key -> run that the claim rests on.
-      sealable: whether all of it was run here, with the laws as they are.
-    """
+    """An audit of a paper."""
 
     paper: Paper
-    claims: Claims
-    quick: bool
-    used: Mapping[str, Mapping[str, Mapping[str, Used]]]
-    sealable: bool
+    claims: Claims  # with their verdicts, in the order of the paper's file
+    quick: bool  # whether less was looked at, as each claim says
+    used: Mapping[str, Mapping[str, Mapping[str, Used]]]  # claim -> set of gains -> key -> run that it rests on
+    sealable: bool  # whether all of it was run here
 
     def save(self, path: str | Path) -> Path:
         """Write the evidence to a .json file: claim -> runs -> numbers -> threshold -> verdict, sealed by a hash.
@@ -87,8 +79,7 @@ def audit(
     threads: int | None = None,
     *,
     table: Table | None = None,
-    substitute: Substitute | None = None,
-    report: Callable[[int], None] = lambda done: None,
+    report: Callable[[int, int], None] = lambda done, whole: None,
 ) -> Audit:
     """Audit a paper: measure each claim against its threshold, and keep what every verdict rests on.
 
@@ -101,33 +92,32 @@ def audit(
       quick: less, as each claim says: coarser grids, shorter runs.
       threads: simulations at once; None for one per available core.
       table: of a study, whose runs are then not made again.
-      substitute: law's name -> function that makes its mutant, to see whether the audit can fail.
-      report: called with 1 as each claim is done under a set of gains, `evaluations` times in all.
+      report: called with how many claims are done, each under each set of gains, and how many there are.
 
     Raises:
       ScenarioError: an unknown paper, id or set of gains, or something is wrong with a file of the paper.
     """
     from smc_mujoco.evidence.audit.runs import Runs, of_table
 
-    audited = as_paper(paper)
-    # a table has runs of the laws as they are, not of their mutants
-    rows: dict[str, Result] = {} if table is None or substitute else of_table(table)
+    audited = paper if isinstance(paper, Paper) else find_paper(paper)
+    rows = {} if table is None else of_table(table)
     shared: dict[str, Result] = {}
-    entries = wanted(audited, only)
+    entries, names = wanted(audited, only), sets(audited, gains, quick)
     evidence: dict[str, dict[str, Evidence]] = {entry.id: {} for entry in entries}
     used: dict[str, dict[str, dict[str, Used]]] = {entry.id: {} for entry in entries}
-    for name in sets(audited, gains, quick):
-        runs = Runs(audited, name, quick, substitute, threads, rows, shared)
-        for entry in sorted(entries, key=lambda entry: entry.late):
+    late_last = sorted(entries, key=lambda entry: entry.late)
+    for k, name in enumerate(names):
+        runs = Runs(audited, name, quick, None, threads, rows, shared)
+        for done, entry in enumerate(late_last, 1 + k * len(entries)):
             its_runs = runs.of(entry)
             evidence[entry.id][name] = measure(entry, its_runs)
             used[entry.id][name] = its_runs.used
-            report(1)
+            report(done, len(entries) * len(names))
     if quick:
         instead = {entry.id: f"; here, quickly, {entry.quick}" if entry.quick else "" for entry in entries}
         entries = [dataclasses.replace(entry, measured=entry.measured + instead[entry.id]) for entry in entries]
     verdicts = Claims(judged(entry, evidence[entry.id]) for entry in entries)
-    return Audit(audited, verdicts, quick, used, table is None and not substitute)
+    return Audit(audited, verdicts, quick, used, table is None)
 
 
 def claims(
@@ -135,19 +125,11 @@ def claims(
     only: Iterable[str | int] | None = None,
     gains: str | Sequence[str] | None = None,
     quick: bool = False,
-    substitute: Substitute | None = None,
     threads: int | None = None,
-    report: Callable[[int], None] = lambda done: None,
     paper: str | Path | Paper = DEFAULT_PAPER,
 ) -> Claims:
     """Return the verdicts on a paper's claims, with the numbers behind them; arguments and errors as of `audit`."""
-    options: dict[str, Any] = {"table": table, "substitute": substitute, "report": report}
-    return audit(paper, only, gains, quick, threads, **options).claims
-
-
-def as_paper(paper: str | Path | Paper) -> Paper:
-    """Return a paper, from itself, its name or its folder."""
-    return paper if isinstance(paper, Paper) else find_paper(paper)
+    return audit(paper, only, gains, quick, threads, table=table).claims
 
 
 def wanted(paper: Paper, only: Iterable[str | int] | None) -> list[Entry]:
@@ -162,7 +144,7 @@ def wanted(paper: Paper, only: Iterable[str | int] | None) -> list[Entry]:
 
 
 def sets(paper: Paper, gains: str | Sequence[str] | None, quick: bool) -> list[str]:
-    """Return the sets of gains that `claims` takes for these arguments; refuse an unknown one."""
+    """Return the sets of gains that `audit` takes for these arguments; refuse an unknown one."""
     if gains is None:
         return list(paper.quick_sets if quick else paper.sets)
     names = [gains] if isinstance(gains, str) else items_of("gains", gains)
@@ -171,17 +153,6 @@ def sets(paper: Paper, gains: str | Sequence[str] | None, quick: bool) -> list[s
     if not names:
         raise ScenarioError(f"no set of gains is given: choose from {', '.join(paper.sets)}")
     return names
-
-
-def evaluations(
-    only: Iterable[str | int] | None = None,
-    gains: str | Sequence[str] | None = None,
-    quick: bool = False,
-    paper: str | Path | Paper = DEFAULT_PAPER,
-) -> int:
-    """Return how often `claims` reports, for a progress bar."""
-    audited = as_paper(paper)
-    return len(wanted(audited, only)) * len(sets(audited, gains, quick))
 
 
 def document(claims: Sequence[Claim]) -> str:
@@ -232,10 +203,9 @@ def _evidence(entry: Entry, returned: Any, checked: Collection[str]) -> Iterator
         if not values.get(threshold.measure):
             cure = f"its measures are {', '.join(str(one) for one, cases in values.items() if cases) or 'none'}"
             raise ScenarioError(f"it returns no {threshold.measure!r}, of which holds_if is: {cure}")
-        yield from threshold.evidence(values[threshold.measure])
-    with_threshold = {threshold.measure for threshold in entry.thresholds}
+        yield from threshold.evidence(values.pop(threshold.measure))
     for measure, cases in values.items():
-        for case, value in cases.items() if measure not in with_threshold else ():
+        for case, value in cases.items():
             yield Beside(f"{case}: {measure}" if case else measure, value)
 
 

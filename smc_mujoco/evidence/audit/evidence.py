@@ -19,8 +19,7 @@ from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, to_json
 from smc_mujoco.common.version import __version__
-from smc_mujoco.evidence.audit.paper import Paper, shipped
-from smc_mujoco.evidence.audit.runs import Used
+from smc_mujoco.evidence.audit.paper import TEXT_FIELDS, Paper, shipped
 from smc_mujoco.evidence.audit.verdict import totals
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation.scenario import Scenario
@@ -34,23 +33,20 @@ HASHED_SUFFIXES = (".py", ".toml", ".xml")  # of a paper's files that count
 def document(audit: Any) -> dict[str, Any]:
     """Return the evidence of an audit as plain data, with its seal."""
     if not audit.sealable:
-        raise ScenarioError("evidence is of runs that the audit made itself: leave out the table and the substitutes")
+        raise ScenarioError("evidence is of runs that the audit made itself: leave out the table")
     names: dict[str, str] = {}  # key of a run -> its name in the file
     runs: dict[str, Any] = {}
-    for used in (runs for sets in audit.used.values() for runs in sets.values()):
-        for key, run in used.items():
-            name = names[key] = names.get(key) or portable_key(run.scenario)
-            if name not in runs:
-                runs[name] = _run(run.scenario)
-            runs[name] |= _results(run)
+    for key, run in (item for sets in audit.used.values() for used in sets.values() for item in used.items()):
+        name = names[key] = names.get(key) or portable_key(run.scenario)
+        if name not in runs:
+            runs[name] = _run(run.scenario)
+        runs[name] |= {what: hashed for what, hashed in (("scores", run.scores), ("trace", run.trace)) if hashed}
     sealed = [claim for claim in audit.claims if not audit.paper.claims[claim.id].varies]
     data = {
         "format": FORMAT,
         "paper": {
             "name": audit.paper.name,
-            **{
-                field: getattr(audit.paper, field) for field in ("title", "authors", "source", "read", "access", "note")
-            },
+            **{name: getattr(audit.paper, name) for name in TEXT_FIELDS},
             "files": files(audit.paper),
         },
         "software": {
@@ -120,8 +116,3 @@ def _run(scenario: Scenario) -> dict[str, Any]:
         "duration": scenario.duration,
         "seed": scenario.seed,
     }
-
-
-def _results(used: Used) -> dict[str, str]:
-    """Return the hashes of what was taken from a run."""
-    return {name: value for name, value in (("scores", used.scores), ("trace", used.trace)) if value}

@@ -35,16 +35,7 @@ def figure(
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
 ) -> Figure | SubFigure:
-    """Draw the checks of claims as multiples of their thresholds.
-
-    Args:
-      claims: with their verdicts.
-      title: of the figure.
-      path, size, format, fig: as in `smc.figure`.
-
-    Raises:
-      ScenarioError: no claims, or as `smc.figure`.
-    """
+    """Draw the checks of claims as multiples of their thresholds; options as of `smc.figure`."""
     if not claims:
         raise ScenarioError("no claims to draw: give at least one")
     paths = pages.files(path, format)
@@ -96,8 +87,6 @@ def place(check: Check) -> float:
     """Return the place of a check: log10 of the multiple of what is asked, at most MAX_DECADES from 0."""
     over, under = (check.value, check.limit) if check.relation in ("<", "<=") else (check.limit, check.value)
     edge = -MAX_DECADES if check.holds else MAX_DECADES
-    if math.isnan(over) or math.isnan(under) or under <= 0.0 or over < 0.0 or math.isinf(under):
-        return edge
-    if over == 0.0 or math.isinf(over):
+    if not (0.0 < over < math.inf and 0.0 < under < math.inf):
         return edge
     return min(max(math.log10(over / under), -MAX_DECADES), MAX_DECADES)

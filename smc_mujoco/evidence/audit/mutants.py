@@ -7,23 +7,19 @@ not write about such a law, so a claim that holds under every mutant measures so
 claim, the claim's field `immune` says why.
 """
 
+import functools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.control.component import Component
-from smc_mujoco.evidence.audit.audit import as_paper, measure, sets, wanted
+from smc_mujoco.evidence.audit.audit import measure, sets, wanted
 from smc_mujoco.evidence.audit.paper import Entry, Paper
+from smc_mujoco.evidence.audit.paper import paper as find_paper
 from smc_mujoco.evidence.audit.runs import Result, Runs
-from smc_mujoco.evidence.audit.variants import forgetful, relay, reversed_gain, zero_gain
+from smc_mujoco.evidence.audit.variants import variant
 from smc_mujoco.evidence.audit.verdict import Evidence, sentences
 
-MUTANTS: dict[str, Callable[[Component], Component]] = {
-    "wrong sign": reversed_gain,
-    "zero gain": zero_gain,
-    "no memory": forgetful,
-    "relay": relay,
-}
+MUTANTS = {"wrong sign": "reversed", "zero gain": "zero", "no memory": "forgetful", "relay": "relay"}
 KEPT, BLIND = "kept by every mutant", "not supported, and no mutant changes its numbers"
 
 
@@ -33,7 +29,7 @@ def survivors(
     gains: str | Sequence[str] | None = None,
     quick: bool = True,
     threads: int | None = None,
-    report: Callable[[int], None] = lambda done: None,
+    report: Callable[[int, int], None] = lambda done, whole: None,
 ) -> dict[str, str]:
     """Return claim -> KEPT or BLIND, for the claims that no mutant of their first law loses. There should be none.
 
@@ -43,18 +39,16 @@ def survivors(
 
     Args:
       paper, only, gains, quick, threads: as of `smc.audit`.
-      report: called with the number of evaluations done since its last call; the sum is `evaluations`. An evaluation is
-        one claim, set of gains and mutant. Those of a claim that is lost already count as done.
+      report: called with how many of the laws are done, the law itself and each of its mutants, and how many there are.
     """
-    audited = as_paper(paper)
-    tested = {entry.id: entry for entry in wanted(audited, only) if not entry.immune}
-    kept = dict(tested)
+    audited = paper if isinstance(paper, Paper) else find_paper(paper)
+    kept = {entry.id: entry for entry in wanted(audited, only) if not entry.immune}
     names = sets(audited, gains, quick)
 
     def measured(entries: Iterable[Entry], law: str, mutant: str) -> Iterator[tuple[str, str, Evidence | None]]:
         """Yield claim, set of gains, and evidence; None as evidence if the claim's function cannot measure a mutant."""
         shared: dict[str, Result] = {}
-        replaced = {law: MUTANTS[mutant]} if mutant else None
+        replaced = {law: functools.partial(variant, name=MUTANTS[mutant])} if mutant else None
         for name in names:
             runs = Runs(audited, name, quick, replaced, threads, None, shared)
             for entry in sorted(entries, key=lambda entry: entry.late):
@@ -64,33 +58,20 @@ def survivors(
                     if not mutant:
                         raise
                     yield entry.id, name, None
-                report(1)
 
     intact = {(id, name): evidence for id, name, evidence in measured(kept.values(), "", "")}
     holding = {
         id: any(any(sentences(intact[id, name] or [], entry.quantifier).values()) for name in names)
         for id, entry in kept.items()
     }
-    for mutant in MUTANTS:
-        report((len(tested) - len(kept)) * len(names))
+    for done, mutant in enumerate(MUTANTS, 1):
+        report(done, 1 + len(MUTANTS))
         for law in sorted({first_law(entry) for entry in kept.values()}):
             about = [entry for entry in kept.values() if first_law(entry) == law]
             for id, name, evidence in measured(about, law, mutant):
                 if id in kept and lost(kept[id], intact[id, name] or [], evidence, holding[id]):
                     del kept[id]
     return {id: KEPT if holding[id] else BLIND for id in kept}
-
-
-def evaluations(
-    paper: str | Path | Paper,
-    only: Iterable[str | int] | None = None,
-    gains: str | Sequence[str] | None = None,
-    quick: bool = True,
-) -> int:
-    """Return the number of evaluations that `survivors` reports, for a progress bar."""
-    audited = as_paper(paper)
-    tested = [entry for entry in wanted(audited, only) if not entry.immune]
-    return len(tested) * len(sets(audited, gains, quick)) * (1 + len(MUTANTS))
 
 
 def first_law(entry: Entry) -> str:

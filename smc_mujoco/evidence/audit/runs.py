@@ -14,16 +14,16 @@ import hashlib
 import itertools
 import math
 from collections import ChainMap
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.files import from_json
 from smc_mujoco.control.component import Component
-from smc_mujoco.evidence.audit.paper import Entry, Paper, duration_of
+from smc_mujoco.evidence.audit.paper import Entry, Paper
 from smc_mujoco.evidence.audit.verdict import Check, Threshold, check
 from smc_mujoco.metrics.catalogue import metrics
-from smc_mujoco.simulation.conditions import Condition
+from smc_mujoco.simulation.conditions import DURATION, Condition
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import ARRAYS, Trace
@@ -63,16 +63,7 @@ class Used(NamedTuple):
 
 
 class Runs:
-    """Runs of a paper under one set of gains, made when they are needed and kept by their scenario's key.
-
-    Attributes:
-      paper: whose plants, laws, conditions and gains they have.
-      gains: the set, one of the paper's.
-      quick: whether a claim measures less: coarser grids, shorter runs.
-      threads: simulations at once.
-      used: key -> run that the claim has used.
-      checked: measures whose thresholds the claim's function has asked for, see `check`.
-    """
+    """Runs of a paper under one set of gains, made when they are needed and kept by their scenario's key."""
 
     def __init__(
         self,
@@ -84,10 +75,16 @@ class Runs:
         table: dict[str, Result] | None = None,
         shared: dict[str, Result] | None = None,
     ):
-        self.paper, self.gains, self.quick, self.threads = paper, gains, quick, threads
-        self.used: dict[str, Used] = {}
-        self.checked: set[str] = set()
-        self._entry: Entry | None = None
+        self.paper, self.gains, self.threads = paper, gains, threads
+        self.quick = quick  # whether a claim measures less: coarser grids, shorter runs
+        self.used: dict[str, Used] = {}  # key -> run that the claim has used
+        self.checked: set[str] = set()  # measures whose thresholds the claim's function has asked for, see `check`
+        self.plants: tuple[str, ...] = ()  # names of the claim's plants
+        self.laws: tuple[str, ...] = ()  # names of the claim's laws
+        self.conditions: tuple[str, ...] = ("nominal",)  # names of the claim's conditions
+        self.values: Mapping[str, Any] = {}  # the claim's numbers, such as the levels of a sweep
+        self.thresholds: dict[str, Threshold] = {}  # of the claim, by measure
+        self._fields: Mapping[str, Any] = {}  # of the claim's scenarios
         self._searched: dict[str, dict[str, float]] = {}  # law -> gains in place of the set's
         self._substitute = substitute or {}
         self._table = table or {}
@@ -97,7 +94,10 @@ class Runs:
     def of(self, entry: Entry) -> "Runs":
         """Return these runs as a claim sees them: with its names and fields, and none used yet."""
         runs = copy.copy(self)
-        runs._entry, runs.used, runs.checked = entry, {}, set()
+        runs.used, runs.checked = {}, set()
+        runs.plants, runs.laws, runs.conditions = entry.plants, entry.laws, entry.conditions or ("nominal",)
+        runs.values, runs._fields = entry.values, entry.fields
+        runs.thresholds = {threshold.measure: threshold for threshold in entry.thresholds}
         return runs
 
     def at(self, law: str, gains: Mapping[str, float], quick: bool) -> "Runs":
@@ -109,49 +109,19 @@ class Runs:
     def on(self, plant: str) -> "Runs":
         """Return the claim's runs on one of its plants; they count as used by the claim."""
         runs = copy.copy(self)
-        runs._entry = self._entry and dataclasses.replace(self._entry, plants=(plant,))
+        runs.plants = (plant,)
         return runs
-
-    @property
-    def plants(self) -> tuple[str, ...]:
-        """Names of the claim's plants."""
-        return self._entry.plants if self._entry else ()
 
     @property
     def plant(self) -> str:
         """Name of the plant of a claim that has one."""
         return self.plants[0]
 
-    @property
-    def laws(self) -> tuple[str, ...]:
-        """Names of the claim's laws."""
-        return self._entry.laws if self._entry else ()
-
-    @property
-    def conditions(self) -> tuple[str, ...]:
-        """Names of the claim's conditions; the nominal one if it names none."""
-        return (self._entry.conditions if self._entry else ()) or ("nominal",)
-
-    @property
-    def thresholds(self) -> dict[str, Threshold]:
-        """The claim's thresholds, by measure."""
-        return {threshold.measure: threshold for threshold in (self._entry.thresholds if self._entry else ())}
-
-    @property
-    def values(self) -> Mapping[str, Any]:
-        """The claim's numbers, such as the levels of a sweep."""
-        return self._entry.values if self._entry else {}
-
     def check(self, measure: str, what: str, value: float, times: float = 1.0, sentence: str = "") -> Check:
-        """Return the check of a number against the threshold of a measure, `holds_if` in the paper's file.
+        """Return the check of what was measured against the threshold of a measure, `holds_if` in the paper's file.
 
         A function returns checks instead of numbers if a limit depends on runs, or if it has a name for each number.
-
-        Args:
-          measure: of `holds_if`.
-          what: was measured.
-          times: what the limit is a multiple of: "<= 1.1" and a rival's time mean at most 1.1 times that time.
-          sentence: of the claim that it is about; default: that of the threshold.
+        The limit is a multiple of `times`: "<= 1.1" and a rival's time mean at most 1.1 times that time.
         """
         threshold = find("threshold", measure, self.thresholds)
         self.checked.add(measure)
@@ -178,10 +148,11 @@ class Runs:
         The fields are the paper's, the condition's, the claim's and then the changes. A change of `plant` may have
         other parameters or another size; the gains stay those of the named plant.
         """
-        paper, entry = self.paper, self._entry
+        paper, its = self.paper, self._fields
         machine = paper.plant(plant)
-        conditioned = paper.condition(condition).on(machine, duration_of(paper, entry, changes))
-        fields: dict[str, Any] = {"plant": machine, **paper.fields, **conditioned, **(entry.fields if entry else {})}
+        duration = {"duration": DURATION, **paper.fields, **its, **changes}["duration"]
+        fields: dict[str, Any] = {"plant": machine, **paper.fields}
+        fields |= {**paper.condition(condition).on(machine, duration), **its}
         if "law" not in changes:
             fields["law"] = self.law(plant, law_name)
         scenario = Scenario(**fields | changes)
@@ -194,17 +165,16 @@ class Runs:
 
     def scores(self, scenarios: Iterable[Scenario]) -> list[Scores]:
         """Return every metric of every scenario, in order; a run that fails has inf in every metric."""
-        plants: Hashes = {}
-        wanted = [(_key(scenario, plants), scenario) for scenario in scenarios]
+        wanted = self._keyed(scenarios)
         new = {name: scenario for name, scenario in wanted if name not in self._known}
         names = list(new)
         for index, trace in stream(list(new.values()), self.threads):
             law = trace.scenario.law
             self._known[names[index]] = Result.of(law.name, law.gains, result_columns(trace))
-        self._used |= {name: self._known[name] for name, _ in wanted}
         for name, scenario in wanted:
-            hashed = _hash_of_scores(self._known[name].scores)
-            self.used[name] = self.used.get(name, Used(scenario))._replace(scores=hashed)
+            self._used[name] = result = self._known[name]
+            text = ",".join(f"{metric}={float(value).hex()}" for metric, value in sorted(result.scores.items()))
+            self.used[name] = self.used.get(name, Used(scenario))._replace(scores=_hash(text.encode()))
         return [self._known[name].scores for name, _ in wanted]
 
     def score(self, plant: str, law_name: str, condition: str = "nominal") -> Scores:
@@ -213,13 +183,17 @@ class Runs:
 
     def traces(self, scenarios: Iterable[Scenario]) -> list[Trace]:
         """Return the traces of scenarios, in order; they are not kept."""
-        wanted: Sequence[Scenario] = list(scenarios)
-        traces = dict(stream(wanted, self.threads))
-        plants: Hashes = {}
-        for i, scenario in enumerate(wanted):
-            name = _key(scenario, plants)
-            self.used[name] = self.used.get(name, Used(scenario))._replace(trace=_hash_of_trace(traces[i]))
+        wanted = self._keyed(scenarios)
+        traces = dict(stream([scenario for _, scenario in wanted], self.threads))
+        for i, (name, scenario) in enumerate(wanted):
+            hashed = _hash(*(getattr(traces[i], array).tobytes() for array in ARRAYS))
+            self.used[name] = self.used.get(name, Used(scenario))._replace(trace=hashed)
         return [traces[i] for i in range(len(wanted))]
+
+    def _keyed(self, scenarios: Iterable[Scenario]) -> list[tuple[str, Scenario]]:
+        """Return scenarios with their keys, without the name of their condition, which changes nothing in a run."""
+        plants: Hashes = {}
+        return [(key(scenario.named(None), plants=plants), scenario) for scenario in scenarios]
 
     def traced(self, scenarios: Mapping[Name, Scenario]) -> dict[Name, Trace]:
         """Return name -> trace of named scenarios, such as those of `grid`."""
@@ -235,18 +209,9 @@ def of_table(table: "Table") -> dict[str, Result]:
     return {row["hash"]: Result.of(row["law"], from_json(row["gains"]), row) for row in table.rows()}
 
 
-def _key(scenario: Scenario, plants: Hashes) -> str:
-    """Return the key of a run without the name of its condition, which changes nothing in it."""
-    return key(scenario.named(None), plants=plants)
-
-
-def _hash_of_scores(scores: Scores) -> str:
-    text = ",".join(f"{name}={float(value).hex()}" for name, value in sorted(scores.items()))
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def _hash_of_trace(trace: Trace) -> str:
+def _hash(*parts: bytes) -> str:
+    """Return the hash of some bytes, 16 hex digits."""
     digest = hashlib.sha256()
-    for name in ARRAYS:
-        digest.update(getattr(trace, name).tobytes())
+    for part in parts:
+        digest.update(part)
     return digest.hexdigest()[:16]

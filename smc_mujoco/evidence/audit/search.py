@@ -29,18 +29,16 @@ Bounds = Mapping[str, tuple[float, float]]
 
 
 class Tried(NamedTuple):
-    """Gains, the evidence at them, and how far they are from deciding: whether all checks hold, and the least slack."""
+    """Gains, and the evidence at them."""
 
     gains: Gains
     evidence: Evidence
-    rank: tuple[bool, float]
 
-    @classmethod
-    def of(cls, gains: Gains, evidence: Evidence) -> "Tried":
-        """Return what a claim gave with these gains: first whether all its checks hold, then the least slack."""
-        checks = [check for check in evidence if isinstance(check, Check)]
-        rank = all(check.holds for check in checks), min((check.slack for check in checks), default=math.inf)
-        return cls(gains, evidence, rank)
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """How far they are from deciding: whether all checks hold, and the least slack."""
+        checks = [check for check in self.evidence if isinstance(check, Check)]
+        return all(check.holds for check in checks), min((check.slack for check in checks), default=math.inf)
 
 
 def decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence]) -> Evidence:
@@ -63,7 +61,7 @@ def _decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], pre
 
     def decides(gains: Gains, quick: bool) -> bool:
         """Try gains, and return whether they decide: a counter-example to "all", or an example of "some"."""
-        tried = Tried.of(gains, measure(runs.at(law, gains, quick or runs.quick)))
+        tried = Tried(gains, measure(runs.at(law, gains, quick or runs.quick)))
         (quickly if quick else in_full).append(tried)
         return tried.rank[0] != (entry.over == "all")
 
@@ -85,16 +83,11 @@ def _decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], pre
 
 
 class Theorem:
-    """What a paper asks of the gains of a claim's first law.
-
-    Attributes:
-      allowed: bounds and margins, from [allowed.LAW].
-      rest: all gains of the law, as the set has them.
-    """
+    """What a paper asks of the gains of a claim's first law."""
 
     def __init__(self, entry: Entry, runs: Runs):
         self.allowed: Allowed = runs.paper.allowed[entry.laws[0]]
-        self.rest: Mapping[str, float] = runs.paper.law(entry.plants[0], entry.laws[0], runs.gains).gains
+        self.rest: Mapping[str, float] = runs.paper.law(entry.plants[0], entry.laws[0], runs.gains).gains  # all of it
         self._failed = lambda error: failed(runs.paper, entry, error)
 
     def points(self, bounds: Bounds, count: int) -> Iterator[Gains]:

@@ -49,17 +49,16 @@ RELATIONS: dict[str, Callable[[float, float], bool]] = {
 
 
 class Check(NamedTuple):
-    """A measured number against its limit: `value relation limit`. It is about one sentence of a claim."""
+    """A measured number against its limit: `value relation limit`."""
 
     what: str
     value: float
     relation: str
     limit: float
     holds: bool
-    sentence: str = ""
+    sentence: str = ""  # of the claim, that it is about
 
     def __str__(self) -> str:
-        """Return the check in a line: what was measured, and what the claim asks for."""
         limit = f"{self.relation} {measured(self.limit, self.what)}"
         return f"{self.what} = {measured(self.value, self.what)} ({limit} asked)"
 
@@ -114,22 +113,15 @@ class Threshold(NamedTuple):
 
     It is `relation limit`, or a distance from `low` .. `high` that is at most `limit`. The measure is a number that the
     claim's function returns, or several numbers of one kind: one for each plant, law or level.
-
-    Attributes:
-      measure: the name of the number.
-      text: the threshold as it was written.
-      relation, limit: required of the number itself, or of its distance from the range.
-      low, high: the range; equal for "2 +- 0.1". None for a limit.
-      sentence: which of the claim's sentences it is about.
     """
 
     measure: str
-    text: str
+    text: str  # as it was written
     relation: str
     limit: float
-    low: float | None = None
-    high: float | None = None
-    sentence: str = ""
+    low: float = math.nan  # with `high` the range, equal for "2 +- 0.1"; NaN for a limit
+    high: float = math.nan
+    sentence: str = ""  # of the claim, that it is about
 
     @classmethod
     def read(cls, measure: str, text: object, sentence: str = "") -> "Threshold":
@@ -146,23 +138,20 @@ class Threshold(NamedTuple):
         return cls(measure, words, "<=", 0.0, float(match[1]), float(match[2]), sentence)
 
     def __str__(self) -> str:
-        """Return the measure and what is asked of it."""
-        return f"{self.measure} {self.text}" if self.low is None else f"{self.measure} is {self.text}"
+        return f"{self.measure} {self.text}" if math.isnan(self.low) else f"{self.measure} is {self.text}"
 
     def distance(self, value: float) -> float:
         """Return how far a number is from the range; NaN for NaN."""
-        if self.low is None or self.high is None:
-            raise ScenarioError(f"the threshold of {self.measure!r} is {self.text!r}, which has no range: {CURE}")
         return math.nan if math.isnan(value) else max(self.low - value, value - self.high, 0.0)
 
     def evidence(self, values: Mapping[str, float]) -> Iterator[Check | Beside]:
-        """Yield a check for each number, by the name of its case; "" for a number without a case.
+        """Yield a check for each case -> number; "" for a number without a case.
 
         For a range the check is of the distance from it, and the number stands beside.
         """
         for case, value in values.items():
             what = f"{case}: {self.measure}" if case else self.measure
-            if self.low is None or self.high is None:
+            if math.isnan(self.low):
                 yield check(what, value, self.relation, self.limit, self.sentence)
                 continue
             of = f"{self.low:g}" if self.low == self.high else f"{self.low:g} to {self.high:g}"
@@ -172,37 +161,21 @@ class Threshold(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Statement:
-    """What the paper claims, and how it is measured.
-
-    Attributes:
-      id: its number in the list of claims.
-      text: what the paper says, in a few words.
-      where: the section of the paper.
-      measured: what is run, and what is measured on it.
-      holds_if: the threshold, in words.
-      note: what a reader must know to judge the numbers.
-      quantifier: UNIVERSAL, EXISTENTIAL, or NAMED: about the plants and conditions that it names, and no others.
-      whose: PAPER, a sentence of the paper; DERIVED from one; or OURS, a question beside it.
-      how: how it was derived, or why it is asked.
-      read: what was read of the place where it stands, one of `paper.READ_PARTS`.
-      over: "all" or "some" gains that the paper allows; "" if the paper's gains are known, or none matter.
-      instead: what the author may claim instead, where the claim does not hold: a theorem or a measured bound.
-      shown_by: the command that shows it.
-    """
+    """What the paper claims, and how it is measured."""
 
     id: str
-    text: str
-    where: str
-    measured: str
-    holds_if: str
-    note: str = ""
-    quantifier: str = NAMED
-    whose: str = PAPER
-    how: str = ""
-    read: str = ""
-    over: str = ""
-    instead: str = ""
-    shown_by: str = ""
+    text: str  # what the paper says, in a few words
+    where: str  # section of the paper
+    measured: str  # what is run, and what is measured on it
+    holds_if: str  # the threshold, in words
+    note: str = ""  # what a reader must know to judge the numbers
+    quantifier: str = NAMED  # UNIVERSAL, EXISTENTIAL, or about the plants and conditions that it names, and no others
+    whose: str = PAPER  # PAPER, a sentence of the paper; DERIVED from one; or OURS, a question beside it
+    how: str = ""  # it was derived, or why it is asked
+    read: str = ""  # what was read of the place where it stands, one of `paper.READ_PARTS`
+    over: str = ""  # "all" or "some" gains that the paper allows; "" if the paper's gains are known, or none matter
+    instead: str = ""  # what the author may claim instead, where it does not hold: a theorem or a measured bound
+    shown_by: str = ""  # the command that shows that
 
     @property
     def source(self) -> str:
@@ -212,21 +185,13 @@ class Statement:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Claim(Statement):
-    """A claim and its verdict. Besides the attributes of a `Statement` it has:
+    """A claim and its verdict."""
 
-    Attributes:
-      verdict: over all sets of gains, one of VERDICTS; of a question one of ANSWERS.
-      numbers: set of gains -> what was measured -> {"value", "relation", "limit", "holds"}; inf is "never".
-      beside: set of gains -> what else was measured -> its value, which decides nothing.
-      verdicts: set of gains -> verdict.
-      flips: whether the verdict depends on the set.
-    """
-
-    verdict: str
-    numbers: dict[str, dict[str, dict[str, Any]]]
-    beside: dict[str, dict[str, float]]
-    verdicts: dict[str, str]
-    flips: bool
+    verdict: str  # over all sets of gains, one of VERDICTS; of a question one of ANSWERS
+    numbers: dict[str, dict[str, dict[str, Any]]]  # set of gains -> what was measured -> fields of a Check
+    beside: dict[str, dict[str, float]]  # set of gains -> what else was measured -> its value, which decides nothing
+    verdicts: dict[str, str]  # set of gains -> verdict
+    flips: bool  # whether the verdict depends on the set
 
     def checks(self, gains: str) -> list[Check]:
         """Return the checks under a set of gains."""
@@ -335,24 +300,15 @@ def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     overall, flips, sentence = combined(verdicts, statement.quantifier, answers, statement.over)
     if answers:
         overall, verdicts = answers[overall], {name: answers[kind] for name, kind in verdicts.items()}
-    shared = {field.name: getattr(statement, field.name) for field in dataclasses.fields(Statement)}
-    return Claim(
-        **shared | {"note": " ".join(filter(None, (statement.note, sentence)))},
-        verdict=overall,
-        numbers={name: _numbers(some) for name, some in evidence.items()},
-        beside={
-            name: {b.what: float(b.value) for b in some if isinstance(b, Beside)} for name, some in evidence.items()
-        },
-        verdicts=verdicts,
-        flips=flips,
-    )
-
-
-def _numbers(evidence: Evidence) -> dict[str, dict[str, Any]]:
-    """Return the checks by what they measure."""
-    names = [one.what for one in evidence]
-    for what in names:
-        if names.count(what) > 1:
+    numbers: dict[str, dict[str, dict[str, Any]]] = {name: {} for name in evidence}
+    beside: dict[str, dict[str, float]] = {name: {} for name in evidence}
+    for name, what, one in ((name, one.what, one) for name, some in evidence.items() for one in some):
+        if what in numbers[name] or what in beside[name]:
             raise ScenarioError(f"a claim measures {what!r} twice: name the two apart")
-    checks = {one.what: one._asdict() for one in evidence if isinstance(one, Check)}
-    return {what: {name: value for name, value in one.items() if name != "what"} for what, one in checks.items()}
+        if isinstance(one, Beside):
+            beside[name][what] = float(one.value)
+        else:
+            numbers[name][what] = {field: value for field, value in one._asdict().items() if field != "what"}
+    shared = {field.name: getattr(statement, field.name) for field in dataclasses.fields(Statement)}
+    shared["note"] = " ".join(filter(None, (statement.note, sentence)))
+    return Claim(**shared, verdict=overall, numbers=numbers, beside=beside, verdicts=verdicts, flips=flips)

@@ -1,6 +1,5 @@
 """smc-mujoco claims, papers: audits of the claims of papers."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,8 +11,7 @@ from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 if TYPE_CHECKING:
-    from smc_mujoco.evidence.audit.paper import Paper
-    from smc_mujoco.evidence.audit.verdict import Claim
+    from smc_mujoco.evidence.audit.audit import Audit
 
 
 @errors_as_sentences()
@@ -51,7 +49,7 @@ def claims(
         from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import with_ending, writable
         from smc_mujoco.common.progress import bar
-        from smc_mujoco.evidence.audit.audit import DEFAULT_PAPER, audit, document, evaluations
+        from smc_mujoco.evidence.audit.audit import DEFAULT_PAPER, audit, document
         from smc_mujoco.evidence.audit.paper import paper as find_paper
         from smc_mujoco.evidence.commands import tables
 
@@ -60,14 +58,15 @@ def claims(
     if mutants and json:
         raise ScenarioError("--mutants prints sentences: leave out --json")
     writable(evidence and with_ending(evidence, ".json"), badge and with_ending(badge, ".svg"))
-    with bar("claims", evaluations(ids or None, sets, quick, about), counted=True) as drawn:
-        done = audit(about, ids or None, sets, quick, threads, report=drawn.advance)
+    asked = about, ids or None, sets, quick, threads
+    with bar("claims", counted=True) as drawn:
+        done = audit(*asked, report=drawn.reached)
     written = [path for path in (evidence and done.save(evidence), badge and done.badge(badge)) if path]
     if json:
         print(document(done.claims))
         return
     tables.print_claims(done.claims, terminal, full=bool(ids))
-    kept = _kept(about, ids or None, sets, quick, threads, done.claims, terminal) if mutants else {}
+    kept = mutants and _kept(done, asked, terminal)
     notes = [f"{terminal.seconds:.0f} s", "quick: coarser grids than the claims say" * quick]
     notes.append(f"wrote {printable(', '.join(map(str, written)))}" if written else "")
     terminal.note("; ".join(filter(None, notes)), "dim")
@@ -75,27 +74,22 @@ def claims(
         raise SystemExit(1)
 
 
-def _kept(
-    paper: "Paper",
-    ids: list[str] | None,
-    sets: list[str] | None,
-    quick: bool,
-    threads: int | None,
-    claims: "Sequence[Claim]",
-    terminal: Terminal,
-) -> dict[str, str]:
-    """Return and print the claims that no mutant loses, as `survivors`, and print those that cannot be lost."""
-    from smc_mujoco.common.progress import bar
-    from smc_mujoco.evidence.audit.mutants import evaluations, survivors
+def _kept(done: "Audit", asked: tuple, terminal: Terminal) -> bool:
+    """Print the claims that no mutant loses, and those that cannot be lost; return whether there are any of the first.
 
-    with bar("mutants", evaluations(paper, ids, sets, quick), counted=True) as drawn:
-        kept = survivors(paper, ids, sets, quick, threads, drawn.advance)
+    `asked`: the first arguments of `survivors`.
+    """
+    from smc_mujoco.common.progress import bar
+    from smc_mujoco.evidence.audit.mutants import survivors
+
+    with bar("mutants", counted=True) as drawn:
+        kept = survivors(*asked, report=drawn.reached)
     lines = [f"claim {id} is {why}" for id, why in kept.items()]
     terminal.note("\n".join(lines) or "Every claim is lost by a mutant of its law, or says why it cannot be.")
-    for entry in [paper.claims[claim.id] for claim in claims]:
+    for entry in [done.paper.claims[claim.id] for claim in done.claims]:
         if entry.immune:
             terminal.note(f"claim {entry.id} cannot be lost: {entry.immune}", wrap=True)
-    return kept
+    return bool(kept)
 
 
 @errors_as_sentences()

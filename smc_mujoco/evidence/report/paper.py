@@ -12,8 +12,7 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import number
 from smc_mujoco.common.version import __version__
 from smc_mujoco.evidence.audit import badge, evidence
-from smc_mujoco.evidence.audit.audit import Audit, audit, evaluations
-from smc_mujoco.evidence.audit.paper import paper as find_paper
+from smc_mujoco.evidence.audit.audit import Audit, audit
 from smc_mujoco.evidence.audit.verdict import ANSWERS, VERDICTS, summary
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.page import TEMPLATES, environment, uri
@@ -48,9 +47,9 @@ def report(
     """
     if why := extras.missing("report", "a report", "jinja2"):
         raise extras.MissingPackageError(why)
-    about, folder = find_paper(paper), Path(out)
-    with bar("claims", evaluations(None, None, quick, about), shown=progress, counted=True) as drawn:
-        done = audit(about, quick=quick, threads=threads, report=drawn.advance)
+    folder = Path(out)
+    with bar("claims", shown=progress, counted=True) as drawn:
+        done = audit(paper, quick=quick, threads=threads, report=drawn.reached)
     document = evidence.document(done)
     write_json(folder / "evidence.json", document)
     done.badge(folder / "badge.svg")

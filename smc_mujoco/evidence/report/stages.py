@@ -22,8 +22,8 @@ from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.draw.film import film as video
 from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
-from smc_mujoco.evidence.audit import audit
-from smc_mujoco.evidence.audit.verdict import Claim
+from smc_mujoco.evidence.audit.audit import audit
+from smc_mujoco.evidence.audit.verdict import Claim, Claims
 from smc_mujoco.evidence.papers.gaber import lyapunov, scenarios
 from smc_mujoco.evidence.report import about, films, oscillation, precision, rigs, scores, words
 from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
@@ -80,7 +80,7 @@ class Findings:
 
     scores: tuple[Score, ...]
     places: tuple[Place, ...]
-    claims: tuple[Claim, ...]
+    claims: Sequence[Claim]
     fields: tuple[Field, ...]
     fronts: tuple[Front, ...]
     worst: tuple[WorstCase, ...]
@@ -153,17 +153,18 @@ def grid(work: Work) -> Table:
         )
 
 
-def judged_claims(work: Work, table: Table) -> tuple[Claim, ...]:
+def judged_claims(work: Work, table: Table) -> Claims:
     """Return the claims with their verdicts; the table's runs are not made again."""
     plan = work.plan
-    total = audit.evaluations(plan.claims, None, plan.quick)
-    with work.bars.stage("claims", f"{total} judgements", total) as bar:
+    with work.bars.stage("claims", "quick" * plan.quick) as bar:
         return cached(
             work.folder / "claims.json",
             [plan.claims, plan.quick, plan.plants, plan.laws, plan.conditions, plan.seeds, plan.duration],
-            lambda: tuple(audit.claims(table, plan.claims, None, plan.quick, None, work.threads, bar.advance)),
+            lambda: (
+                audit(only=plan.claims, quick=plan.quick, threads=work.threads, table=table, report=bar.reached).claims
+            ),
             lambda claims, path: write_json(path, [dataclasses.asdict(claim) for claim in claims]),
-            lambda path: tuple(Claim(**entry) for entry in read_json(path)),
+            lambda path: Claims(Claim(**entry) for entry in read_json(path)),
         )
 
 

@@ -15,10 +15,10 @@ from smc_mujoco.analysis.linear_theory import lam_range
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.audit import audit
 from smc_mujoco.evidence.audit import runs as claim_runs
-from smc_mujoco.evidence.audit.audit import claims, evaluations
+from smc_mujoco.evidence.audit.audit import claims, measure
 from smc_mujoco.evidence.audit.paper import Entry, paper
 from smc_mujoco.evidence.audit.runs import Runs
-from smc_mujoco.evidence.audit.variants import forgetful, relay, reversed_gain, squeezed, with_gains, zero_gain
+from smc_mujoco.evidence.audit.variants import VARIANTS, variant, with_gains
 from smc_mujoco.evidence.audit.verdict import (
     EXISTENTIAL,
     NAMED,
@@ -233,9 +233,10 @@ def test_late_claims_come_last_and_every_one_is_reported(only):
     order, told = [], []
     late = dataclasses.replace(entry("1"), late=True, evidence=lambda runs: order.append("1") or [YES])
     only(late, dataclasses.replace(entry("2"), evidence=lambda runs: order.append("2") or [YES]))
-    assert [one.id for one in claims(gains=["study", "tuned"], report=told.append)] == ["1", "2"]
+    made = audit.audit(gains=["study", "tuned"], report=lambda done, whole: told.append((done, whole)))
+    assert [one.id for one in made.claims] == ["1", "2"]
     assert order == ["2", "1", "2", "1"]
-    assert sum(told) == evaluations(gains=["study", "tuned"]) == 4
+    assert told == [(done, 4) for done in range(1, 5)]
 
 
 # runs
@@ -244,6 +245,10 @@ def test_late_claims_come_last_and_every_one_is_reported(only):
 @pytest.fixture
 def runs():
     return Runs(GABER, "study", quick=True)
+
+
+def substituted(name):
+    return {OURS: lambda law: variant(law, name)}
 
 
 def short(runs, name="duffing", **changes):
@@ -292,9 +297,9 @@ def test_a_change_of_plant_keeps_the_gains_of_its_name(runs):
 
 
 def test_a_mutant_stands_for_its_law_alone():
-    runs = Runs(GABER, "study", substitute={OURS: zero_gain})
+    runs = Runs(GABER, "study", substitute=substituted("zero"))
     law = Runs(GABER, "study").law("duffing", OURS)
-    assert runs.law("duffing", OURS) == dataclasses.replace(zero_gain(law), name=OURS)
+    assert runs.law("duffing", OURS) == dataclasses.replace(variant(law, "zero"), name=OURS)
     assert runs.law("duffing", "classical") == Runs(GABER, "study").law("duffing", "classical")
 
 
@@ -303,7 +308,7 @@ def test_a_mutant_stands_for_its_law_alone():
 
 def test_an_input_gain_multiplies_the_command_at_each_sample(runs):
     law = runs.law("duffing", OURS)
-    made = (law, reversed_gain(law), zero_gain(law), squeezed(law))
+    made = (law, *(variant(law, name) for name in ("reversed", "zero", "squeezed")))
     traces = runs.traces([short(runs, law=one) for one in made])
     for trace, gain in zip(
         traces, (lambda x: 1.0, lambda x: -1.0, lambda x: 0.0, lambda x: 1 / (1 + x**2)), strict=True
@@ -315,13 +320,13 @@ def test_an_input_gain_multiplies_the_command_at_each_sample(runs):
 
 def test_each_variant_of_each_law_has_its_own_file_in_numba_s_cache():
     laws = [smc.law(name) for name in ("classical", "pid")]
-    made = [vary(law) for law in laws for vary in (reversed_gain, zero_gain, squeezed, relay, forgetful)]
+    made = [variant(law, name) for law in laws for name in VARIANTS]
     assert len({getattr(variant.function, "__qualname__", "") for variant in made}) == len(made)
 
 
 def test_an_input_gain_multiplies_what_the_actuator_gives_and_not_what_the_law_asks_for(runs):
     strong = with_gains(runs.law("duffing", OURS), lam=26.0)  # of which 6 N come
-    (trace,) = runs.traces([short(runs, law=squeezed(strong))])
+    (trace,) = runs.traces([short(runs, law=variant(strong, "squeezed"))])
     asked = -26.0 * np.tanh(trace.v + strong.gains["k1"] * trace.x)
     np.testing.assert_allclose(trace.u, np.clip(asked, -6.0, 6.0) / (1.0 + trace.x**2), rtol=1e-12)
 
@@ -388,7 +393,8 @@ def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory():
 
 @pytest.mark.slow
 def test_a_law_without_effect_stabilises_what_hangs_alone():
-    found = measured.smallest_stable(about(("duffing", "pendulum_network"), quick=True, substitute={OURS: zero_gain}))
+    runs = about(("duffing", "pendulum_network"), quick=True, substitute=substituted("zero"))
+    found = measured.smallest_stable(runs)
     assert found == {"duffing": math.inf, "pendulum_network": measured.MIN_LAMBDA}
 
 
@@ -403,7 +409,8 @@ def test_the_same_audit_twice_gives_the_same():
 @pytest.mark.slow
 def test_the_wrong_sign_converges_just_where_the_plant_has_it_too():
     assert claims(only=["21"], gains="study")[0].verdict == REFUTED
-    assert claims(only=["21"], gains="study", substitute={OURS: reversed_gain})[0].verdict == SUPPORTED
+    runs = Runs(GABER, "study", substitute=substituted("reversed")).of(GABER.claims["21"])
+    assert verdict(measure(GABER.claims["21"], runs)) == SUPPORTED
 
 
 # the command

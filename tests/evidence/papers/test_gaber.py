@@ -17,7 +17,7 @@ from smc_mujoco.control.law import law_function
 from smc_mujoco.evidence.audit.audit import claims, measure
 from smc_mujoco.evidence.audit.paper import paper
 from smc_mujoco.evidence.audit.runs import Runs
-from smc_mujoco.evidence.audit.variants import reversed_gain, with_gains, zero_gain
+from smc_mujoco.evidence.audit.variants import variant, with_gains
 from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED, Beside, Check, verdict
 from smc_mujoco.evidence.papers.gaber import claims as measured
 from smc_mujoco.evidence.papers.gaber import lyapunov, timing
@@ -502,7 +502,9 @@ def test_delay_tolerance_is_more_than_each_rivals(ours, rivals, expected):
 
 def test_theory_of_a_delay_is_told_of_the_law_and_not_of_its_mutant():
     assert measured.critical_delay(Runs(GABER, "study"), "duffing") == pytest.approx(0.178, abs=0.002)
-    assert math.isnan(measured.critical_delay(Runs(GABER, "study", substitute={OURS: zero_gain}), "duffing"))
+    assert math.isnan(
+        measured.critical_delay(Runs(GABER, "study", substitute={OURS: lambda law: variant(law, "zero")}), "duffing")
+    )
 
 
 # table I
@@ -613,8 +615,8 @@ def test_real_runs_give_the_verdicts_of_the_first_gains():
 @pytest.mark.slow
 def test_a_broken_law_loses_its_claims():
     ids = ["29", "35", "38", "45", "50", "57"]
-    found = claims(only=ids, gains="study", substitute={OURS: reversed_gain})
-    assert {one.id: one.verdict for one in found} == dict.fromkeys(ids, REFUTED)
+    runs = Runs(GABER, "study", substitute={OURS: lambda law: variant(law, "reversed")})
+    assert {id: judged(runs, id) for id in ids} == dict.fromkeys(ids, REFUTED)
 
 
 def test_the_timed_loop_calls_a_law_with_each_state_and_its_four_arrays(monkeypatch):

@@ -486,7 +486,7 @@ def test_what_is_there_is_not_computed_again(made, folder, monkeypatch):
     for name in (
         "analysis.region_of_attraction.basin",
         "analysis.margins.margins",
-        "evidence.audit.audit.claims",
+        "evidence.report.stages.audit",
         "evidence.report.films.film",
         "studies.executors.result_columns",
     ):

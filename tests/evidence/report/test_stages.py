@@ -153,7 +153,7 @@ STAGES = {  # stage -> the function that does its work for one item, and what th
     "all_margins": ("evidence.report.stages.margin_search.margins", lambda *_, **__: []),
     "margins_by_set": ("evidence.report.stages.margin_search.margins", lambda *_, **__: []),
     "all_basins": ("evidence.report.stages.regions.basin", lambda *_, **__: Listed()),
-    "judged_claims": ("evidence.report.stages.audit.claims", lambda *_: []),
+    "judged_claims": ("evidence.report.stages.audit", lambda *_, **__: SimpleNamespace(claims=[])),
 }
 GIVEN = {"margins_by_set": [()], "judged_claims": ["the table"]}  # what the stages before have made
 SMALL = dataclasses.replace(

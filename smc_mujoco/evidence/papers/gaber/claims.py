@@ -19,7 +19,7 @@ from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.control.law import Measurement, catalogue, command, law_function, sliding
 from smc_mujoco.control.law import law as find_law
-from smc_mujoco.evidence.audit.variants import reversed_gain, squeezed, with_gains
+from smc_mujoco.evidence.audit.variants import variant, with_gains
 from smc_mujoco.evidence.audit.verdict import Beside, check, ratio
 from smc_mujoco.evidence.papers.gaber import lyapunov
 from smc_mujoco.evidence.papers.gaber.scenarios import CONTROL_PERIOD, LAWS, U_MAX
@@ -256,7 +256,8 @@ def compensates(runs):
     apart = {}
     for plant in runs.plants:
         law = runs.law(plant, OURS)
-        apart[plant] = deviation(*runs.traces([runs.scenario(plant, OURS, law=one) for one in (law, squeezed(law))]))
+        both = [runs.scenario(plant, OURS, law=one) for one in (law, variant(law, "squeezed"))]
+        apart[plant] = deviation(*runs.traces(both))
     return {"max |x - x'| / |x0|": apart}
 
 
@@ -417,7 +418,7 @@ def converging(runs, lams, starts):
 
 def any_gain(runs):
     """Claim 21: g smooth and non-zero suffices."""
-    laws = {name: reversed_gain(runs.law(name, OURS)) for name in runs.plants}
+    laws = {name: variant(runs.law(name, OURS), "reversed") for name in runs.plants}
     return comes_to_rest(runs, {name: runs.scenario(name, OURS, law=law) for name, law in laws.items()})
 
 
