@@ -1,32 +1,101 @@
-"""Linear theory of the paper's law at rest: smallest lambda, critical delay, steady error.
+"""Linear theory of laws that are linear at rest: smallest lambda, critical delay, steady error, tolerated force.
 
     plant = smc.plant("inverted_pendulum")
-    smallest_lam(plant, k1=9.7)                                # 0.253
-    critical_delay(plant, lam=4.4, k1=9.7)                     # s, continuous control
-    critical_delay(plant, lam=4.4, k1=9.7, control_period=1e-3)    # s, sampled and held, as in a run
-    steady_error(plant, lam=4.4, k1=9.7, d=0.2)                # rad
+    smallest_lam(plant, k1=9.7)                                     # 0.253
+    critical_delay(plant, lam=4.4, k1=9.7, control_period=1e-3)     # s, sampled and held, as in a run
+    steady_error(plant, lam=4.4, k1=9.7, d=0.2)                     # rad
 
-At rest the plant is M x'' = -K x - D x' + u + d (`linear`) and u = -lam tanh(x' + k1 x) is -lam (x' + k1 x), so that
+At rest the plant is M x'' = -K x - D x' + u + d, x (n,), with M = 1/g, K = -(df/dx)/g (n, n) and D = -(df/dv)/g of its
+nominal f and g. M and D are the same on every channel and K is symmetric. So its eigenvectors divide the plant into n
+modes that differ only in their stiffness K_j. u = -lam tanh(x' + k1 x) is -lam (x' + k1 x) there, so that
 
-    M x'' + (D + lam) x' + (K + lam k1) x = d,                                                          (1)
+    M x'' + (D + lam) x' + (K + lam k1) x = d.                                                          (1)
 
-in n modes that differ only in their stiffness K_j. Each result below is that of the worst mode. A law with a boundary
-layer has the same form near s = 0, with lam = k/phi and k1 = c (`linearisation.linear_gains`). Laws that switch have no
-linear part, and no theory here.
+Each result below is that of the worst mode. A law with a boundary layer has the same form near s = 0, with lam = k/phi
+and k1 = c (`linear_gains`). Laws that switch have no linear part, and no theory here.
 Source: Routh-Hurwitz for (1), the paper's stability claim is "any lambda > 0"; the crossings of a delay after
 K. L. Cooke & Z. Grossman, J. Math. Anal. Appl. 86:592, 1982; sampling after Astrom & Wittenmark, Computer-Controlled
 Systems, 1997, chapter 2; the rest derived here.
 """
 
+import dataclasses
+import functools
 import math
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 
-from smc_mujoco.analysis.linearisation import DISPLACEMENTS, Linear, linear, restoring_force, rising_part, sampled_mode
-from smc_mujoco.common.errors import number
+from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.control.design import DIFFERENCE_STEP
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
+
+EQUALITY_TOLERANCE = 1e-6  # relative: smaller differences count as none
+MAX_DISPLACEMENT = 10.0  # rad or m, chosen: beyond the first maximum of every restoring force here
+DISPLACEMENTS = np.geomspace(1e-7, MAX_DISPLACEMENT, 4000)  # rad or m, of `restoring_force`: steps of 0.5 %
+
+
+# linearisation
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Linear:
+    """A plant at rest: inertia M and damping D of every channel, stiffness K (n, n); SI units."""
+
+    inertia: float
+    damping: float
+    stiffness: np.ndarray
+
+    @functools.cached_property
+    def modes(self) -> np.ndarray:
+        """The stiffnesses of the modes, (n,), smallest first; a negative one is unstable by itself."""
+        return np.linalg.eigvalsh(self.stiffness)
+
+
+@functools.lru_cache(maxsize=64)
+def linear(plant: Plant) -> Linear:
+    """Linearise the nominal plant at x = x' = 0. Raise ScenarioError if (1) does not hold for it."""
+    if plant.unmodelled:
+        raise ScenarioError(f"{plant.name} has no nominal model: {plant.unmodelled}")
+    n, p = plant.n, SimpleNamespace(**plant.parameters)
+    rest = np.zeros(n)
+    g = np.array([plant.nominal(rest, rest, i, p)[1] for i in range(n)])
+    if plant.underactuated or plant.mixed or g.min() <= 0.0 or np.ptp(g) > EQUALITY_TOLERANCE * g.max():
+        raise ScenarioError(f"{plant.name} has no theory here: give a plant with equal joints and an actuator on each")
+
+    def slopes(at: Callable[[np.ndarray, int], float]) -> np.ndarray:
+        """Return -d f_i / d z_j / g, (n, n), by central differences."""
+        steps = DIFFERENCE_STEP * np.eye(n)
+        return np.array([[(at(-z, i) - at(z, i)) / (2.0 * DIFFERENCE_STEP * g[i]) for z in steps] for i in range(n)])
+
+    stiffness = slopes(lambda x, i: plant.nominal(x, rest, i, p)[0])
+    damping = slopes(lambda v, i: plant.nominal(rest, v, i, p)[0])
+    d, small = damping[0, 0], EQUALITY_TOLERANCE * (1.0 + np.abs(stiffness).max())
+    if np.abs(damping - d * np.eye(n)).max() > small or np.abs(stiffness - stiffness.T).max() > small:
+        raise ScenarioError(f"{plant.name} has no theory here: give a plant whose joints are coupled only by springs")
+    return Linear(inertia=float(1.0 / g[0]), damping=float(d), stiffness=(stiffness + stiffness.T) / 2.0)
+
+
+def linear_gains(law: Law) -> tuple[float, float] | None:
+    """Return lam and k1 of u = -lam (e' + k1 e), the law near s = 0; None if it is not linear there."""
+    rest = law.template and law.template.rest
+    return rest.linear(SimpleNamespace(**law.gains)) if rest else None
+
+
+@functools.lru_cache(maxsize=1024)
+def sampled_mode(at: Linear, stiffness: float, h: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return E (2, 2) and Gamma (2,) of a mode sampled with period h: z+ = z + E z + Gamma u, z = (x, x').
+
+    E is the change over a sample, not the usual Phi = 1 + E, in which rounding would hide the change over a short h.
+    """
+    from scipy.linalg import expm
+
+    rates, block = np.array([[0.0, 1.0], [-stiffness / at.inertia, -at.damping / at.inertia]]), np.zeros((4, 4))
+    block[:2, :2], block[:2, 2:] = rates * h, np.eye(2) * h
+    integral = expm(block)[:2, 2:]  # of exp(rates t) over h
+    return rates @ integral, integral[:, 1] / at.inertia
+
 
 # stability
 
@@ -46,9 +115,8 @@ def smallest_lam(plant: Plant, k1: float) -> float:
 def lam_range(plant: Plant, k1: float, control_period: float) -> tuple[float, float]:
     """Return the range of lam in which the sampled loop without delay is stable; (inf, inf) if there is none.
 
-    Over a sample a mode moves exactly by z+ = z + E z + Gamma u, with z = (x, x') and u = -lam (k1, 1) z. Jury's
-    conditions, with t and d the trace and determinant of the closed loop's E, are d > 0, t + d < 0 and 4 + 2 t + d > 0,
-    all affine in lam.
+    u = -lam (k1, 1) z in `sampled_mode`. Jury's conditions, with t and d the trace and determinant of the closed loop's
+    E, are d > 0, t + d < 0 and 4 + 2 t + d > 0, all affine in lam.
     """
     k1, at = number("k1", k1, low=0.0), linear(plant)
     low, high = 0.0, math.inf
@@ -66,58 +134,35 @@ def lam_range(plant: Plant, k1: float, control_period: float) -> tuple[float, fl
     return (float(low), float(high)) if low < high else (math.inf, math.inf)
 
 
-def critical_delay(plant: Plant, lam: float, k1: float, control_period: float = 0.0) -> float:
+def critical_delay(plant: Plant, lam: float, k1: float, control_period: float) -> float:
     """Return the input delay in s up to which (1) is stable: 0 if it is unstable without delay, inf if it never is.
 
-    A loop with a stiff spring, K_j > lam k1, may be stable again with a longer delay.
-
-    Continuous (control_period 0): the roots of a mode, M s^2 + D s + K + lam (s + k1) exp(-s tau) = 0, cross to the
-    right at s = j w where |K - M w^2 + j D w| = lam |j w + k1|. This is a quadratic in w^2 without tau; the phase at w
-    then gives tau. Holding the input over h acts like an additional delay of h/2.
-
-    Sampled (control_period h): with a delay of m periods the equation is 1 + z^-m N(w) / det(w - E) = 0, with w = z - 1
-    and N = lam (k1, 1) adj(w - E) Gamma. |N| = |det| on the circle |z| = 1 is a quadratic in y = |w|^2 / 2. The phase
+    With a delay of m periods h the equation of a mode is 1 + z^-m N(w) / det(w - E) = 0, with w = z - 1 and
+    N = lam (k1, 1) adj(w - E) Gamma. |N| = |det| on the circle |z| = 1 is a quadratic in y = |w|^2 / 2. The phase
     gives an m that is not whole: the loop is stable for all whole numbers below it, and unstable at the next. A loop
-    whose gain is above 1 at the highest frequency, z = -1, tolerates less than one period.
+    whose gain is above 1 at the highest frequency, z = -1, tolerates less than one period. A loop with a stiff spring,
+    K_j > lam k1, may be stable again with a longer delay.
     """
     lam, k1 = number("lam", lam, low=0.0), number("k1", k1, low=0.0)
-    at, h = linear(plant), number("control_period", control_period, low=0.0)
-    if h:
-        low, high = lam_range(plant, k1, h)
-        return min(_sampled_crossing(at, k, lam, k1, h) for k in at.modes) if low < lam < high else 0.0
-    return min(_crossing(at, k, lam, k1) for k in at.modes) if lam > smallest_lam(plant, k1) else 0.0
+    at, h = linear(plant), number("control_period", control_period, above=0.0)
+    low, high = lam_range(plant, k1, h)
+    return min(_crossing(at, stiffness, lam, k1, h) for stiffness in at.modes) if low < lam < high else 0.0
 
 
-def _crossing(at: Linear, stiffness: float, lam: float, k1: float) -> float:
-    """Return the delay at which a mode first becomes unstable, s."""
-    m, d, k = at.inertia, at.damping, stiffness
-    delays = [math.inf]
-    for square in _roots(m * m, d * d - 2.0 * m * k - lam * lam, k * k - (lam * k1) ** 2):
-        if square > 0.0:
-            w = math.sqrt(square)
-            turned = np.angle(-lam * (k1 + 1j * w) / (k - m * w * w + 1j * d * w))  # = w tau, modulo a turn
-            delays.append(turned % math.tau / w)
-    return float(min(delays))
-
-
-def _sampled_crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> float:
+def _crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> float:
     """Return the delay at which a sampled mode first becomes unstable, s."""
     e, gamma = sampled_mode(at, stiffness, h)
     t, d, row = np.trace(e), np.linalg.det(e), lam * np.array([k1, 1.0])
     n1, n0 = row @ gamma, -row @ _adjugate(e) @ gamma  # adj(w - E) = w - adj(E)
     periods = [1.0] if n0 - 2.0 * n1 >= 4.0 + 2.0 * t + d else [math.inf]
     # |w^2 - t w + d|^2 = |n1 w + n0|^2 where |w|^2 = 2 y and w + conj(w) = -2 y
-    for y in _roots(4.0 * (1.0 + t + d), 2.0 * (t * t + t * d - 2.0 * d - n1 * n1 + n1 * n0), d * d - n0 * n0):
-        if 0.0 < y <= 2.0:
+    equation = 4.0 * (1.0 + t + d), 2.0 * (t * t + t * d - 2.0 * d - n1 * n1 + n1 * n0), d * d - n0 * n0
+    for root in np.roots(equation):
+        if abs(root.imag) <= 1e-9 * abs(root) and 0.0 < (y := float(root.real)) <= 2.0:
             w = complex(-y, math.sqrt(y * (2.0 - y)))
             turned = np.angle(-(n1 * w + n0) / (w * w - t * w + d)) % math.tau
             periods.append(turned / (2.0 * math.asin(math.sqrt(y / 2.0))))
     return float(h * min(periods))
-
-
-def _roots(a: float, b: float, c: float) -> list[float]:
-    """Return the real roots of a z^2 + b z + c."""
-    return [float(z.real) for z in np.roots([a, b, c]) if abs(z.imag) <= 1e-9 * abs(z)]
 
 
 def _adjugate(m: np.ndarray) -> np.ndarray:
@@ -128,14 +173,31 @@ def _adjugate(m: np.ndarray) -> np.ndarray:
 
 
 def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
-    """Return |x| at rest of (1) under a constant d on every channel, worst channel, rad or m.
-
-    For one joint it is |d| / (lam k1 + K).
-    """
+    """Return |x| at rest of (1) under a constant d on every channel, worst channel, rad or m: |d| / (lam k1 + K)."""
     lam, k1, d = number("lam", lam, low=0.0), number("k1", k1, low=0.0), number("d", d)
-    at = linear(plant)
-    loop = at.stiffness + lam * k1 * np.eye(plant.n)
+    loop = linear(plant).stiffness + lam * k1 * np.eye(plant.n)
     return float(np.abs(np.linalg.solve(loop, np.full(plant.n, d))).max())
+
+
+def restoring_force(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.ndarray], np.ndarray] | None:
+    """Return the force of law and plant that pulls every channel back from the same x > 0, as a function of x, (k,).
+
+    It is in N or N m; None for a law without linear part.
+    """
+    rest, gains = law.template and law.template.rest, SimpleNamespace(**law.gains)
+    if not rest:
+        return None
+    linear(plant)  # raises for a plant without linear theory
+    p, v = SimpleNamespace(**plant.parameters), np.zeros(plant.n)
+    ratios = [plant.nominal(np.full(plant.n, 1.0), v, i, p) for i in range(plant.n)]
+    if np.ptp([f / g for f, g in ratios]) > EQUALITY_TOLERANCE * (1.0 + abs(ratios[0][0] / ratios[0][1])):
+        raise ScenarioError(f"{plant.name} has no theory at rest: give a plant with equal joints")
+
+    def force(x: np.ndarray) -> np.ndarray:
+        nominal = [plant.nominal(np.full(plant.n, each), v, 0, p) for each in x]
+        return np.minimum(rest.force(gains, x), u_max) - np.array([f / g for f, g in nominal])
+
+    return force
 
 
 def tolerated_force(plant: Plant, law: Law, max_error: float, u_max: float = math.inf) -> float | None:
@@ -144,20 +206,16 @@ def tolerated_force(plant: Plant, law: Law, max_error: float, u_max: float = mat
     It is in N or N m, max_error in rad or m; None for a law without linear part. Dry friction up to this level cannot
     hold the plant further out, but it may stop it closer to 0.
     """
+    from scipy.optimize import minimize_scalar
+
     force = restoring_force(plant, law, u_max)
     if force is None:
         return None
     max_error = number("max_error", max_error, above=0.0)
-    place, highest = _peak(force, rising_part(force).size)
-    return max(highest if max_error >= place else float(force(np.array([max_error]))[0]), 0.0)
-
-
-def _peak(force: Callable[[np.ndarray], np.ndarray], size: int) -> tuple[float, float]:
-    """Return the place and the size of the maximum of a force that rises over the first `size` of DISPLACEMENTS."""
-    from scipy.optimize import minimize_scalar
-
+    falls = np.flatnonzero(np.diff(np.r_[0.0, force(DISPLACEMENTS)]) < 0.0)
+    size = falls[0] if falls.size else DISPLACEMENTS.size  # of the DISPLACEMENTS up to the force's first maximum
     ends = DISPLACEMENTS[max(size - 2, 0)], DISPLACEMENTS[min(size, DISPLACEMENTS.size - 1)]
     peak = minimize_scalar(
         lambda x: -float(force(np.array([x]))[0]), bounds=ends, method="bounded", options={"xatol": 1e-9 * ends[1]}
     )
-    return float(peak.x), -float(peak.fun)
+    return max(-float(peak.fun) if max_error >= peak.x else float(force(np.array([max_error]))[0]), 0.0)

@@ -26,7 +26,6 @@ from typing import TypeVar
 import numpy as np
 
 from smc_mujoco.analysis import linear_theory as theory
-from smc_mujoco.analysis import linearisation
 from smc_mujoco.analysis.worst_case.uncertainty import JITTER_SHARES, with_friction, with_jitter
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
@@ -191,7 +190,7 @@ def _doubling_levels(largest: float) -> tuple[float, ...]:
 
 def _critical_delay(base: Scenario) -> float | None:
     estimated = base.resolved.velocity.name != "measured"
-    lam_k1 = None if base.actuator or estimated else linearisation.linear_gains(base.law)  # not in the theory
+    lam_k1 = None if base.actuator or estimated else theory.linear_gains(base.law)  # not in the theory
     return None if lam_k1 is None else theory.critical_delay(base.plant, *lam_k1, base.control_period)
 
 

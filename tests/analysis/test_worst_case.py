@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.worst_case import strategies
-from smc_mujoco.analysis.worst_case.search import Search
-from smc_mujoco.analysis.worst_case.strategies import RELAY_SIGNALS, loop_frequency, recorded_force
+from smc_mujoco.analysis.worst_case import search as attack
+from smc_mujoco.analysis.worst_case.search import RELAY_SIGNALS, Search, loop_frequency, recorded_force
 from smc_mujoco.analysis.worst_case.uncertainty import Members, default_class, outside
 from smc_mujoco.control import gain_sets
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -202,15 +201,18 @@ def test_a_weighted_sum_sees_two_signals_as_equally_large(monkeypatch):
     signals = {"s": 5.0 * np.sin(3.0 * t), "rate": 2.0 * np.sin(5.0 * t), "error": 0.3 * np.cos(5.0 * t)}
     for still in ("", "s"):
         seen = signals | ({still: 0.0 * t} if still else {})
-        monkeypatch.setattr(strategies, "relay_signals", lambda trace, seen=seen: seen)
-        *pairs, (kind, last) = strategies.weighted_sums(None, 2.0, 0.1)
+        monkeypatch.setattr(attack, "relay_signals", lambda trace, seen=seen: seen)
+        searcher = Search(Members([scenario(duration=0.1)], CLASSES["slope"]), CATALOGUE["rms_error"], 9, 1, print)
+        *pairs, last = searcher._weighted_sums(None)
         size = {name: signal.std() for name, signal in signals.items()}
-        assert kind == "sign of e' and s"
-        assert (last.rate * size["rate"], last.s) == pytest.approx((1.0, 1.0 / (1.0 if still else size["s"])))
-        weights = np.array([(one.rate * size["rate"], one.error * size["error"]) for _, one in pairs])
-        leads = np.array(strategies.PHASE_LEADS)
+        assert last.member.kind == "sign of e' and s"
+        assert (last.relay.rate * size["rate"], last.relay.s) == pytest.approx(
+            (1.0, 1.0 / (1.0 if still else size["s"]))
+        )
+        weights = np.array([(one.rate * size["rate"], one.error * size["error"]) for _, one, _ in pairs])
+        leads = np.array(attack.PHASE_LEADS)
         assert weights == pytest.approx(np.column_stack([np.cos(leads), np.sin(leads)]))
-        assert {(one.amplitude, one.slope) for _, one in (*pairs, ("", last))} == {(2.0, 0.1)}
+        assert {(one.amplitude, one.slope) for _, one, _ in (*pairs, last)} == {(2.0, 8e-3)}
 
 
 def line(case, tried):

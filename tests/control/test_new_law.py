@@ -43,7 +43,7 @@ CODE = """
 import importlib, json, sys
 importlib.import_module("smc_mujoco.control.laws").__path__.append(sys.argv[1])
 import smc_mujoco as smc
-from smc_mujoco.analysis import linearisation, margins
+from smc_mujoco.analysis import linear_theory, margins
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.properties import families
@@ -63,7 +63,7 @@ for name in ("brand_new", "plain_one"):
         "short": words.short(name),
         "colour": style.law_colours([trace.scenario.law])[0],
         "colours": style.law_colours([*smc.laws()]),
-        "linear": linearisation.linear_gains(smc.law(name)),
+        "linear": linear_theory.linear_gains(smc.law(name)),
     }
 print(json.dumps(found))
 """

@@ -12,7 +12,9 @@ A search tries the same in the same order, whatever its budget:
    at the bound.
 
 A larger budget only continues a search, so it is never less bad. A search also ends when a run fails, because nothing
-is worse. The force of a relay is recorded and replayed, so every member is an ordinary scenario.
+is worse. The force of a relay is recorded and replayed, so every member is an ordinary scenario. Forces are over their
+bound, one number for each control sample. The error of a linear loop is a convex function of the force, so the worst
+force jumps between its bounds, as most of these do.
 """
 
 import dataclasses
@@ -23,7 +25,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smc_mujoco.analysis.worst_case import strategies
 from smc_mujoco.analysis.worst_case.uncertainty import Member, Members
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.metrics.conventions import Metric, by_group
@@ -38,50 +39,41 @@ FORCE_KNOTS = 32  # in an evolution; chosen
 KNOT_DEVIATION = 0.5  # first standard deviation of a knot, over the bound; chosen
 GENERATIONS = 4  # of an evolution, before the next one begins with the worst member so far; chosen
 FAILED_KEY = math.inf, math.inf
+SIGNS = 1.0, -1.0
+RELAY_SIGNALS = {"sign of s": "s", "sign of e": "error", "sign of e'": "rate"}  # strategy -> signal that a relay sees
+PHASE_LEADS = (-1.2, -0.6, 0.6, 1.2)  # rad, of weighted sums of e' and e before e'; chosen
+SWITCH_TIMES = (0.25, 0.5, 0.75)  # of a force that switches once, as shares of a run; chosen
+EARLY_SWITCH_TIMES = (1 / 32, 1 / 16, 1 / 8)  # the same while the loop still moves from its start; chosen
+FREQUENCY_RATIOS = (0.5, 0.8, 1.0, 1.25, 2.0)  # frequencies of waves over that of the loop; chosen
+MAX_FREQUENCY_SHARE = 0.1  # of the control frequency: a faster oscillation of the loop is chattering; chosen
 
 
 class Case(NamedTuple):
-    """A member to run.
-
-    Attributes:
-      relay: makes its force; None if the member has its force.
-      origin: number of the member from which changes led to this one; -1 for a new one.
-    """
+    """A member to run."""
 
     member: Member
-    relay: Relay | None = None
-    origin: int = -1
+    relay: Relay | None = None  # makes its force; None if the member has its force
+    origin: int = -1  # number of the member from which changes led to this one; -1 for a new one
 
 
 class Tried(NamedTuple):
-    """A member that was run.
-
-    Attributes:
-      key: its metric, then its rms error, which decides between equal metrics.
-      origin: as in `Case`; a new member is its own origin.
-    """
+    """A member that was run."""
 
     member: Member
-    key: tuple[float, float]
-    origin: int
+    key: tuple[float, float]  # its metric, then its rms error, which decides between equal metrics
+    origin: int  # as in `Case`; a new member is its own origin
 
 
 class Search:
-    """A search among the members of a class.
-
-    Attributes:
-      tried: every member that was run, in order.
-      runs: number of runs so far.
-      swing: the first run under a relay of e', or without a force, from which the loop's frequency is read.
-    """
+    """A search among the members of a class."""
 
     def __init__(
         self, members: Members, metric: Metric, budget: int, threads: int | None, report: Callable[[int], None]
     ):
         self.members, self.metric, self.budget, self.threads, self.report = members, metric, budget, threads, report
-        self.tried: list[Tried] = []
+        self.tried: list[Tried] = []  # every member that was run, in order
         self.runs = 0
-        self.swing: Trace | None = None
+        self.swing: Trace | None = None  # the first run under a relay of e', or without a force: tells the frequency
 
     @property
     def worst(self) -> Tried:
@@ -114,12 +106,11 @@ class Search:
             if self.swing is None and (relay.rate > 0.0 if relay else not self.members.forced):
                 self.swing = trace
             if relay:
-                member = dataclasses.replace(member, force=strategies.recorded_force(trace, relay, member.force))
+                member = dataclasses.replace(member, force=recorded_force(trace, relay, member.force))
+                if relay.slope or relay.start or trace.scenario.clock.jitter:
+                    replays.append(Case(member))  # the recorded force differs a little from that of the relay
+                    continue
             tried[i] = Tried(member, self._key(trace), first + i if origin < 0 else origin)
-            exact = relay is None or not (relay.slope or relay.start or trace.scenario.clock.jitter)
-            if not exact:  # the recorded force differs a little from that of the relay
-                replays.append(Case(member))
-                tried[i] = None
         done = [one for one in tried if one]
         self.tried += done
         return done + (self.run(replays) if replays else [])
@@ -134,23 +125,20 @@ class Search:
     def _simple(self) -> Iterator[list[Case]]:
         """Yield constant forces and relays, with the constants of the class in the middle of their ranges."""
         if self.members.forced:
-            steady = [self._forced(*one) for one in strategies.constants(self.members.samples)]
-            relays = strategies.relays(self.members.within.disturbance, self.members.slope)
-            yield [*steady, *(Case(self.members.bare.named(kind), relay) for kind, relay in relays)]
+            signals = itertools.product(RELAY_SIGNALS.items(), SIGNS)
+            relays = [self._relayed(kind, sign, **{signal: 1.0}) for (kind, signal), sign in signals]
+            yield [*(self._forced("constant", force) for force in self._constants()), *relays]
 
     def _at_loop_frequency(self) -> Iterator[list[Case]]:
         """Yield what suits the frequency at which the loop swings, with the constants in the middle as well."""
-        within, slope, bare = self.members.within, self.members.slope, self.members.bare
-        if self.members.forced and self.swing:
-            relays = [*strategies.weighted_sums(self.swing, within.disturbance, slope)]
-            forces = [*strategies.single_switches(self.members.samples), *strategies.waves(self.swing)]
-            yield [*(Case(bare.named(kind), relay) for kind, relay in relays), *(self._forced(*one) for one in forces)]
-        if self.members.times:
-            base = bare if not self.members.forced else self.worst.member
+        members = self.members
+        if members.forced and self.swing:
+            yield [*self._weighted_sums(self.swing), *self._single_switches(), *self._waves(self.swing)]
+        if members.times:
+            base = self.worst.member if members.forced else members.bare
             if self.swing is None:
-                yield [Case(bare.named("no error"))]
-            times, hold = self.members.times, self.members.hold
-            errors = strategies.measurement_errors(self.swing, times, hold) if self.swing else ()
+                yield [Case(members.bare.named("no error"))]
+            errors = measurement_errors(self.swing, members.times, members.hold) if self.swing else ()
             yield [Case(dataclasses.replace(base, noise=noise, kind=kind)) for kind, noise in errors]
 
     def _driven(self) -> Iterator[list[Case]]:
@@ -159,14 +147,42 @@ class Search:
             worst, end = self.worst, self.members.samples * self.members.h
             kind, then = worst.member.kind, "sign of e'"
             member = worst.member.named(kind if kind == then else f"{kind}, then {then}")
-            starts = [share * end for share in strategies.SWITCH_TIMES]
-            relays = [Relay(self.members.within.disturbance, rate=1.0, start=start) for start in starts]
+            relays = [Relay(self.members.within.disturbance, rate=1.0, start=share * end) for share in SWITCH_TIMES]
             yield [Case(member, relay, worst.origin) for relay in relays]
+
+    def _relayed(self, kind: str, sign: float = 1.0, **weights: float) -> Case:
+        """Return a member under a relay with these weights of what it sees."""
+        relay = Relay(sign * self.members.within.disturbance, **weights, slope=self.members.slope)
+        return Case(self.members.bare.named(kind), relay)
 
     def _forced(self, kind: str, force: np.ndarray) -> Case:
         """Return a member with a force, limited to the class."""
-        bare = self.members.bare.named(kind)
-        return Case(dataclasses.replace(bare, force=self.members.limited(force)))
+        return Case(dataclasses.replace(self.members.bare, kind=kind, force=self.members.limited(force)))
+
+    def _constants(self) -> list[np.ndarray]:
+        return [np.full(self.members.samples + 1, sign) for sign in SIGNS]
+
+    def _single_switches(self) -> Iterator[Case]:
+        """Yield forces that change their sign once: in the first swing, or when an integral has settled."""
+        samples = self.members.samples
+        for share, sign in itertools.product((*SWITCH_TIMES, *EARLY_SWITCH_TIMES), SIGNS):
+            yield self._forced("one switch", np.where(np.arange(samples + 1) < share * samples, sign, -sign))
+
+    def _weighted_sums(self, trace: Trace) -> Iterator[Case]:
+        """Yield relays of weighted sums of e' and e, or of e' and s: both are equally large in a run."""
+        sizes = {name: float(np.nan_to_num(part).std()) or 1.0 for name, part in relay_signals(trace).items()}
+        for lead in PHASE_LEADS:
+            weights = {"rate": math.cos(lead) / sizes["rate"], "error": math.sin(lead) / sizes["error"]}
+            yield self._relayed("sign of e' and e", **weights)
+        yield self._relayed("sign of e' and s", rate=1.0 / sizes["rate"], s=1.0 / sizes["s"])
+
+    def _waves(self, trace: Trace) -> Iterator[Case]:
+        """Yield square waves and sines about the frequency at which a loop swings under a relay of e'."""
+        phase = 2.0 * math.pi * loop_frequency(trace) * trace.t
+        for pitch in FREQUENCY_RATIOS:
+            yield self._forced("square wave", np.where(np.sin(pitch * phase) >= 0.0, 1.0, -1.0))
+        for shift in (0.0, 0.5 * math.pi):
+            yield self._forced("sine", np.sin(phase + shift))
 
     def _corners(self) -> Iterator[list[Case]]:
         """Yield the corners of the constants, spread evenly over all of them if there are more than MAX_CORNERS."""
@@ -182,7 +198,7 @@ class Search:
             if not self.members.forced:
                 yield [Case(corner)]
                 continue
-            steady = [dataclasses.replace(corner, force=f) for _, f in strategies.constants(self.members.samples)]
+            steady = [dataclasses.replace(corner, force=force) for force in self._constants()]
             relay = Relay(self.members.within.disturbance, rate=1.0, slope=self.members.slope)
             yield [*map(Case, steady), Case(corner, relay)]
 
@@ -199,11 +215,10 @@ class Search:
         for one in sorted(self.tried, key=lambda one: one.key, reverse=True):
             best.setdefault(one.origin, one)
         parents = list(best.values())[: len(CHANGES_PER_PARENT)]
-        counts = [*CHANGES_PER_PARENT[1 : len(parents)]]
-        counts = [BATCH_MEMBERS - sum(counts), *counts]
+        counts = CHANGES_PER_PARENT[1 : len(parents)]
         return [
             Case(self.members.changed(parent.member, rng), origin=parent.origin)
-            for parent, count in zip(parents, counts, strict=True)
+            for parent, count in zip(parents, (BATCH_MEMBERS - sum(counts), *counts), strict=True)
             for _ in range(count)
         ]
 
@@ -227,3 +242,44 @@ class Search:
             ranks = {i: float(rank) for rank, i in enumerate(order)}
             if len(keys) == BATCH_MEMBERS:
                 evolution.tell([(points[i], ranks[i]) for i in range(BATCH_MEMBERS)])
+
+
+def relay_signals(trace: Trace) -> dict[str, np.ndarray]:
+    """Return what a relay sees of channel 0 at the control samples: "s", "rate" and "error", (samples + 1,) each."""
+    r = trace.r[:, 0]
+    dr = np.diff(r, prepend=r[:1]) / trace.scenario.control_period
+    return {"s": trace.s[:, 0], "rate": trace.v[:, 0] - dr, "error": trace.x[:, 0] - r}
+
+
+def recorded_force(trace: Trace, relay: Relay, before: np.ndarray) -> np.ndarray:
+    """Return the force of a relay over its bound during a run, (samples + 1,). After a failure it keeps its value.
+
+    `before` is the force until the relay starts, (samples + 1,); (0,) for a relay that starts at 0.
+    """
+    parts = relay_signals(trace)
+    aim = relay.s * parts["s"] + relay.rate * parts["rate"] + relay.error * parts["error"]
+    goals = np.where(np.nan_to_num(aim) > 0.0, relay.amplitude, -relay.amplitude)
+    if relay.slope:
+        force = 0.0
+        for i, goal in enumerate(goals.tolist()):
+            force += min(max(goal - force, -relay.slope), relay.slope)
+            goals[i] = force
+    goals /= abs(relay.amplitude)
+    return np.where(trace.t < relay.start, before, goals) if relay.start else goals
+
+
+def loop_frequency(trace: Trace) -> float:
+    """Return the frequency at which a loop swings under a relay of e', Hz."""
+    late = np.nan_to_num(trace.x[:, 0] - trace.r[:, 0])[len(trace.t) // 4 :]
+    swings = max(1.0, np.count_nonzero(np.diff(late > late.mean())) / 2.0)
+    return min(swings / (0.75 * float(trace.t[-1])), MAX_FREQUENCY_SHARE / trace.scenario.control_period)
+
+
+def measurement_errors(trace: Trace, times: int, hold: int) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield errors of position and velocity, (2, times), each for `hold` samples: constant, and as a loop swings."""
+    for signs in itertools.product(SIGNS, repeat=2):
+        yield "constant error", np.repeat(np.reshape(signs, (2, 1)), times, axis=1)
+    for part in relay_signals(trace).values():
+        signs = np.where(np.nan_to_num(part[: times * hold : hold]) > 0.0, 1.0, -1.0)
+        for sign in SIGNS:
+            yield "error that switches", sign * np.array([signs, signs])

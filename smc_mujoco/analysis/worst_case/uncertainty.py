@@ -84,12 +84,11 @@ class Uncertainty:
         put = vars(self).update  # the class is frozen
         for name in ("disturbance", "position_noise", "velocity_noise", "jitter", "x0"):
             put({name: number(f"Uncertainty's {name}", getattr(self, name), low=0.0)})
-        put(hold=number("Uncertainty's hold", self.hold, above=0.0))
-        if self.slope is not None:
-            put(slope=number("Uncertainty's slope", self.slope, above=0.0))
-        put(delay=_range("delay", self.delay, 0.0), friction=_range("friction", self.friction, 0.0))
-        put(mass=_range("mass", self.mass, 0.0, strict=True))
-        put(friction_scale=_range("friction_scale", self.friction_scale, 0.0))
+        for name in ("hold", "slope"):
+            if getattr(self, name) is not None:
+                put({name: number(f"Uncertainty's {name}", getattr(self, name), above=0.0)})
+        for name in ("delay", "mass", "friction", "friction_scale"):
+            put({name: _range(name, getattr(self, name), 0.0, strict=name == "mass")})
         if not isinstance(self.parameters, Mapping):
             raise ScenarioError(f"Uncertainty's parameters are {shown(self.parameters)}: give a range for each name")
         ranges = {str(name): _range(name, value, -math.inf) for name, value in self.parameters.items()}
@@ -122,10 +121,9 @@ class Uncertainty:
 
 
 def default_class(scenario: Scenario) -> Uncertainty:
-    """Return the class of a scenario for which none is given.
+    """Return the class of a scenario without a given one: what its plant declares, and friction varies by half of it.
 
-    It is what the plant declares, or else a disturbance up to a sixth of the force of the weakest drive. Friction, if
-    there is some, varies by half of it.
+    If the plant declares nothing: a disturbance up to a sixth of the force of the weakest drive.
     """
     declared = scenario.plant.uncertain
     return Uncertainty(
@@ -176,19 +174,12 @@ def _range(name: str, value: object, lower_bound: float, strict: bool = False) -
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Member:
-    """One choice within the bounds of a class, see the module.
+    """One choice within the bounds of a class, see the module."""
 
-    Attributes:
-      shares: (constants,).
-      force: (samples + 1,), or (0,) without a disturbance.
-      noise: (2, times); times is 0 without noise.
-      kind: the strategy that made it.
-    """
-
-    shares: np.ndarray
-    force: np.ndarray
-    noise: np.ndarray
-    kind: str = ""
+    shares: np.ndarray  # (constants,)
+    force: np.ndarray  # (samples + 1,), or (0,) without a disturbance
+    noise: np.ndarray  # (2, times); times is 0 without noise
+    kind: str = ""  # the strategy that made it
 
     def named(self, kind: str) -> "Member":
         """Return this member as one of another strategy."""
@@ -198,15 +189,10 @@ class Member:
 class Members:
     """The members of a class around one scenario, or around the same scenario on several parameter sets.
 
-    Attributes:
-      constants: name -> function of a scenario and a share in [0, 1] that returns the scenario with this constant. The
-        first, "set", returns another scenario, where there are several.
-      ends: the shares that a corner of the class may have, for each constant.
-      slope: largest change of the disturbance between two samples, N or N m; 0: it may jump.
-      bare: the member without force or noise, with the first set, and its other constants in the middle.
-
-    Raises:
-      ScenarioError: the plant does not have what the class changes.
+    `constants` are functions of a scenario and a share in [0, 1] that return the scenario with one of its constants.
+    The first chooses another scenario, where there are several. `ends` are the shares that a corner of the class may
+    have, for each constant. `bare` is the member without force or noise, with the first set, and its other constants
+    in the middle.
     """
 
     def __init__(self, scenarios: Sequence[Scenario], within: Uncertainty):
@@ -214,9 +200,9 @@ class Members:
         self.scenario, self.within, self.h = scenario, within, scenario.control_period
         self.samples = scenario.samples
         self.forced = within.disturbance > 0.0
-        self.slope = 0.0 if within.slope is None else within.slope * self.h
-        sets: dict[str, SetConstant] = {"set": lambda _, share: scenarios[min(int(share * count), count - 1)]}
-        self.constants = (sets if count > 1 else {}) | dict(_constants(scenario, within))
+        self.slope = 0.0 if within.slope is None else within.slope * self.h  # N or N m a sample; 0: d may jump
+        sets: list[SetConstant] = [lambda _, share: scenarios[min(int(share * count), count - 1)]]
+        self.constants = (sets if count > 1 else []) + list(_constants(scenario, within))
         self.ends = [[0.0, 1.0] for _ in self.constants]
         self.hold = max(1, round(within.hold / self.h))  # samples that an error of measurement lasts
         self.times = -(-self.samples // self.hold) if within.position_noise or within.velocity_noise else 0
@@ -233,7 +219,7 @@ class Members:
     def with_constants(self, shares: np.ndarray) -> Scenario:
         """Return the scenario with constants of the class."""
         scenario = self.scenario
-        for set_constant, share in zip(self.constants.values(), shares.tolist(), strict=True):
+        for set_constant, share in zip(self.constants, shares.tolist(), strict=True):
             scenario = set_constant(scenario, share)
         return scenario
 
@@ -244,23 +230,16 @@ class Members:
             force = np.where(np.arange(len(force)) * self.h < relay.start, force, 0.0)
         signals = ([self.signal(force)] if force.any() else []) + ([relay] if relay else [])
         scenario = dataclasses.replace(scenario, disturbance=(*scenario.disturbance, *signals))
-        if self.times:
-            noise = dataclasses.replace(scenario.noise, **self.errors(member.noise))
-            scenario = dataclasses.replace(scenario, noise=noise)
-        return scenario
-
-    def errors(self, noise: np.ndarray) -> dict[str, Signal]:
-        """Return the signals of a member's errors of measurement."""
+        if not self.times:
+            return scenario
         bounds = {"position_error": self.within.position_noise, "velocity_error": self.within.velocity_noise}
         t = (np.arange(self.times + 1) * self.hold * self.h).tolist()
-        rows = zip(bounds.items(), noise, strict=True)
-        return {name: Held(t, [*(bound * row).tolist(), 0.0]) for (name, bound), row in rows if bound}
+        rows = zip(bounds.items(), member.noise, strict=True)
+        errors = {name: Held(t, [*(bound * row).tolist(), 0.0]) for (name, bound), row in rows if bound}
+        return dataclasses.replace(scenario, noise=dataclasses.replace(scenario.noise, **errors))
 
     def signal(self, values: np.ndarray) -> Signal:
-        """Return values at the control samples as a signal: steps if fewer than half of them change and may jump.
-
-        Else it has straight lines between the samples.
-        """
+        """Return values at the samples as a signal: steps if few of them change and may jump, else straight lines."""
         change = np.diff(values)
         steps = not self.slope and 2 * np.count_nonzero(change) < len(change)
         bends = change != 0.0 if steps else np.abs(np.diff(change)) > ROUNDING * np.abs(values).max()
@@ -296,9 +275,8 @@ class Members:
             return dataclasses.replace(member, force=self.limited(mutated_signal(member.force, rng)))
         if what == 1:
             return dataclasses.replace(member, noise=np.array([mutated_signal(row, rng) for row in member.noise]))
-        moves = rng.normal(0.0, CONSTANT_DEVIATION, len(self.constants)) * (
-            rng.random(len(self.constants)) < MOVE_PROBABILITY
-        )
+        moves = rng.normal(0.0, CONSTANT_DEVIATION, len(self.constants))
+        moves = moves * (rng.random(len(self.constants)) < MOVE_PROBABILITY)
         return dataclasses.replace(member, shares=np.clip(member.shares + moves, 0.0, 1.0))
 
     def size(self, knots: int) -> int:
@@ -306,10 +284,7 @@ class Members:
         return len(self.constants) + knots * (self.forced + 2 * (self.times > 0))
 
     def moved(self, member: Member, z: np.ndarray, knots: int) -> Member:
-        """Return a member moved by numbers z, (size,): those of its constants, then those of the knots of its signals.
-
-        Straight lines between the knots are added to the force, or to both errors of measurement.
-        """
+        """Return a member moved by z, (size,): its constants, then knots of lines that are added to its signals."""
         m, rows = len(self.constants), np.reshape(z[len(self.constants) : self.size(knots)], (-1, knots))
         shares, at = np.clip(member.shares + CONSTANT_DEVIATION * z[:m], 0.0, 1.0), np.linspace(0.0, 1.0, knots)
 
@@ -339,25 +314,25 @@ def mutated_signal(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 SetConstant = Callable[[Scenario, float], Scenario]
 
 
-def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[tuple[str, SetConstant]]:
-    """Yield the name of each constant that may differ, and the function that sets it to a share of its range."""
+def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[SetConstant]:
+    """Yield, for each constant that may differ, the function that sets it to a share of its range."""
     if within.delay != (0.0, 0.0):
-        yield "delay", _of_range(_multiples("delay", within.delay, scenario.resolved.physics_step), _with_delay)
+        yield _of_range(_multiples("delay", within.delay, scenario.resolved.physics_step), _with_delay)
     if within.jitter:
         _, jitter = _multiples("jitter", (0.0, within.jitter), scenario.control_period / JITTER_SHARES)
-        yield "jitter", _of_range((0.0, jitter / scenario.control_period), with_jitter)
+        yield _of_range((0.0, jitter / scenario.control_period), with_jitter)
     for name, bounds in {"mass": within.mass, **within.parameters}.items():
         if bounds != (1.0, 1.0):
-            yield name, _of_range(bounds, functools.partial(_with_factor, name=name))
+            yield _of_range(bounds, functools.partial(_with_factor, name=name))
     if within.friction_scale != (1.0, 1.0):
         if not (scenario.friction or _dry(scenario.plant)):
             cure = "give it some, such as friction=smc.Coulomb(0.1), or a class with friction=(0.0, 0.1)"
             raise ScenarioError(f"friction_scale of {scenario.plant.name}, which has no friction here: {cure}")
-        yield "friction x", _of_range(within.friction_scale, _with_friction_scale)
+        yield _of_range(within.friction_scale, _with_friction_scale)
     if within.friction != (0.0, 0.0):
-        yield "friction", _of_range(within.friction, with_friction)
+        yield _of_range(within.friction, with_friction)
     for i in range(scenario.plant.n if within.x0 else 0):
-        yield f"x0[{i}]", _of_range((-within.x0, within.x0), functools.partial(_with_start, i=i))
+        yield _of_range((-within.x0, within.x0), functools.partial(_with_start, i=i))
 
 
 def _of_range(bounds: Range, put: SetConstant) -> SetConstant:
@@ -367,11 +342,7 @@ def _of_range(bounds: Range, put: SetConstant) -> SetConstant:
 
 
 def _multiples(name: str, bounds: Range, step: float) -> Range:
-    """Return the lowest and the highest multiple of a step, s, within bounds.
-
-    Raises:
-      ScenarioError: there is none but 0.
-    """
+    """Return the lowest and the highest multiple of a step, s, within bounds; ScenarioError for none but 0."""
     low = math.ceil(bounds[0] / step - MULTIPLE_TOLERANCE) * step
     high = math.floor(bounds[1] / step + MULTIPLE_TOLERANCE) * step
     if high < max(low, step):

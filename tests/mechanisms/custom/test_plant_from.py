@@ -13,7 +13,7 @@ import pytest
 from helpers.episodes import dm_control_suite, driven_by_dm, run_of
 
 import smc_mujoco as smc
-from smc_mujoco.analysis import linearisation
+from smc_mujoco.analysis import linear_theory
 from smc_mujoco.common import process
 from smc_mujoco.common.files import slug
 from smc_mujoco.common.frozen import frozen
@@ -604,7 +604,7 @@ def test_laws_and_designs_say_what_they_miss_in_a_model(arm):
         smc.ScenarioError, match=r"acrobot\.xml's channel 1 has no actuator, and lqr does not see such a joint"
     ):
         design.lqr(acrobot())
-    for of in (design.lqr, linearisation.linear):
+    for of in (design.lqr, linear_theory.linear):
         with pytest.raises(smc.ScenarioError, match="arm has no nominal model: joint 'shoulder' moves with"):
             of(arm(["elbow"]))
 
