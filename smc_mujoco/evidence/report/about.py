@@ -35,26 +35,16 @@ class Gains(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class About:
-    """How the report was computed; templates/method.jinja has the sentences.
-
-    Attributes:
-      plan: how much of everything.
-      runs, failed: number of runs of the grid, and of those that failed.
-      seeds: number of seeds of a cell of the grid, the largest where cells differ.
-      sources: where the gains of the grid's laws come from, in words.
-      versions: package -> version.
-      spent: stage -> s of this call; less where results were there already.
-      no_film: why there are no films, or None.
-    """
+    """How the report was computed; templates/method.jinja has the sentences."""
 
     plan: Plan
-    runs: int
-    failed: int
-    seeds: int
-    sources: str
-    versions: Mapping[str, str]
-    spent: Mapping[str, float]
-    no_film: str | None = None
+    runs: int  # of the grid
+    failed: int  # of these
+    seeds: int  # of a cell of the grid, the largest number where cells differ
+    sources: str  # where the gains of the grid's laws come from, in words
+    versions: Mapping[str, str]  # of packages
+    spent: Mapping[str, float]  # stage -> s of this call; less where results were there already
+    no_film: str | None = None  # why there are no films
 
     @property
     def left_out(self) -> list[str]:

@@ -5,52 +5,35 @@ Everything here is counted from `Findings.scores`.
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.relevant_difference import ROUNDING
 from smc_mujoco.common.text import every, joined
+from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
+from smc_mujoco.evidence.accuracy.scaling import ORDER_BAND
 from smc_mujoco.evidence.audit.verdict import totals
 from smc_mujoco.evidence.report import words
-from smc_mujoco.evidence.report.scores import Place, Score
+from smc_mujoco.evidence.report.scores import Score
 from smc_mujoco.studies.adviser import MIN_SETTLED
 from smc_mujoco.studies.worst_case import WorstCase, WorstCases
 
 if TYPE_CHECKING:
     from smc_mujoco.evidence.report.stages import Findings
 
-MAX_NAMED_LAWS = 3  # laws in a sentence
-
 Cells = dict[tuple[str, str, str], list[Score]]  # (plant, condition, metric) -> a score for each law
 
 
-class Standing(NamedTuple):
-    """How often a law leads among `of` cells: `best` counts ties with the best, `alone` counts wins.
-
-    `lost`: in how many another law is better.
-    """
-
-    law: str
-    best: int
-    alone: int
-    lost: int
-    of: int
-
-
 class Pick(NamedTuple):
-    """The law to take for a metric on a plant, or on all plants, over the conditions.
+    """The law to take for a metric on a plant, or on all plants, over the conditions."""
 
-    `law`: "" where all laws are level. `median`: of the conditions' medians, NaN over all plants. `wins`, `losses`: as
-    of a `Place`. `level`: the other laws that lose no more cells.
-    """
-
-    law: str
-    median: float
-    wins: int
+    law: str  # "" where all laws are level
+    median: float  # of the conditions' medians, NaN over all plants
+    wins: int  # as of a `Place`, with losses and of
     losses: int
     of: int
-    level: tuple[str, ...]
+    level: tuple[str, ...]  # the other laws that lose no more cells
 
     @property
     def sure(self) -> str:
@@ -64,22 +47,19 @@ class Pick(NamedTuple):
 
 
 class Loss(NamedTuple):
-    """A cell in which another law is better than the paper's.
-
-    `median`, `rival`: medians of the paper's law and of the best law. `times`: their ratio; where the rival's is less
-    than the least difference that counts, the ratio to that difference, a lower bound (`rounded`). `settles`: whether
-    the best law settles there: a law that hardly acts may be calm, and never arrive.
-    """
+    """A cell in which another law is better than the paper's."""
 
     metric: str
     plant: str
     condition: str
-    median: float
-    rival: float
-    law: str
-    times: float
-    rounded: bool
-    settles: bool
+    median: float  # of the paper's law
+    rival: float  # median of the best law
+    law: str  # the best one
+    times: (
+        float  # ratio of the medians; where the rival's is below the least difference that counts, to that difference
+    )
+    rounded: bool  # whether it is, so that the ratio is a lower bound
+    settles: bool  # whether the best law settles there: a law that hardly acts may be calm, and never arrive
 
 
 def cells(scores: Sequence[Score]) -> Cells:
@@ -106,27 +86,6 @@ def settles(by_cell: Cells, plant: str, condition: str, law: str) -> bool:
     return all(s.median < math.inf for s in by_cell.get((plant, condition, "settling_time"), ()) if s.law == law)
 
 
-def standings(findings: "Findings", metric: str) -> list[Standing]:
-    """Return how often each law leads, and how often another law is better, most wins first."""
-    by_cell = {key: scores for key, scores in cells(findings.scores).items() if key[2] == metric}
-    best = Counter(law for key in by_cell for law in leaders(by_cell, *key))
-    alone = Counter(winner(by_cell, *key) for key in by_cell)
-    lost = Counter(s.law for scores in by_cell.values() for s in scores if s.beaten)
-    rows = [Standing(law, best[law], alone[law], lost[law], len(by_cell)) for law in findings.laws]
-    return sorted(rows, key=lambda row: (-row.alone, row.lost, -row.best))
-
-
-def everywhere(findings: "Findings", metric: str) -> dict[str, list[str]]:
-    """Return law -> the conditions in which it wins on every plant, of those with two plants or more."""
-    by_cell = cells(findings.scores)
-    conditions: dict[str, list[str]] = {}
-    for condition in findings.conditions:
-        winners = [winner(by_cell, *key) for key in by_cell if key[1:] == (condition, metric)]
-        if len(winners) > 1 and winners[0] and len(set(winners)) == 1:
-            conditions.setdefault(winners[0], []).append(words.condition(condition))
-    return conditions
-
-
 def undecided(by_cell: Cells, metrics: Sequence[str]) -> tuple[int, int]:
     """Return how many comparisons have no winner, and how many comparisons there are."""
     winners = [winner(by_cell, *key) for key in by_cell if key[2] in metrics]
@@ -147,12 +106,6 @@ def losses(by_cell: Cells, metrics: Sequence[str]) -> list[Loss]:
             arrives = settles(by_cell, plant, condition, best.law)
             lost.append(Loss(metric, plant, condition, score.median, best.median, best.law, times, rounded, arrives))
     return sorted(lost, key=lambda loss: -loss.times)
-
-
-def overall(findings: "Findings", metric: str) -> list[Place]:
-    """Return the laws' places over all runs, best first."""
-    rows = [place for place in findings.places if place.metric == metric and not place.plant]
-    return sorted(rows, key=lambda place: (place.failed, place.mean))
 
 
 def pick(findings: "Findings", metric: str, plant: str = "") -> Pick | None:
@@ -203,11 +156,10 @@ def _both(case: WorstCase) -> str:
 
 def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
     """Return the paper's verdict in one line: how its law does, and how many of its claims hold."""
-    of_paper = [row for metric in metrics for row in standings(findings, metric) if row.law == words.PAPER_LAW]
-    parts = []
-    if of_paper:
-        of, lost, alone = (sum(getattr(row, name) for row in of_paper) for name in ("of", "lost", "alone"))
-        parts.append(f"its observer-free law is beaten in {lost} of {of} comparisons and wins in {alone or 'none'}")
+    own = [s for s in findings.scores if s.law == words.PAPER_LAW and s.metric in metrics]
+    lost, wins, parts = sum(s.beaten for s in own), sum(s.wins for s in own) or "none", []
+    if own:
+        parts.append(f"its observer-free law is beaten in {lost} of {len(own)} comparisons and wins in {wins}")
     if counts := totals(findings.claims):
         verdicts = joined(f"{n} {'are' if n != 1 else 'is'} {said}" for said, n in counts.items())
         parts.append(f"of its {sum(counts.values())} checked claims, {verdicts}")
@@ -216,52 +168,17 @@ def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
 
 def first(findings: "Findings", metrics: Sequence[str]) -> str:
     """Return whether there is one best law."""
-    standing = [standings(findings, metric) for metric in metrics]
-    winners = [{row.law for row in rows if row.alone == row.of} for rows in standing]
-    unbeaten = [{row.law for row in rows if row.best == row.of} for rows in standing]
-    if winner := set.intersection(*winners) if winners else set():
-        return f"{words.law(winner.pop())} wins in every respect compared here, on every plant in every condition."
-    if common := set.intersection(*unbeaten) if unbeaten else set():
-        if len(common) == len(findings.laws):
+    by_cell = {key: scores for key, scores in cells(findings.scores).items() if key[2] in metrics}
+    best = Counter(law for key in by_cell for law in leaders(by_cell, *key))
+    wins = Counter(winner(by_cell, *key) for key in by_cell)
+    if winners := [law for law in findings.laws if by_cell and wins[law] == len(by_cell)]:
+        return f"{words.law(winners[0])} wins in every respect compared here, on every plant in every condition."
+    if unbeaten := [law for law in sorted(findings.laws) if by_cell and best[law] == len(by_cell)]:
+        if len(unbeaten) == len(findings.laws):
             return "No law can be called the best: in every respect compared here, all laws are level."
-        names = joined([words.law(law) for law in sorted(common)])
+        names = joined(map(words.law, unbeaten))
         return f"No law can be called the best; none is better than {names} anywhere, in any respect compared here."
     return "No law is the best in every respect, nor in every condition: it depends on what is asked, and where."
-
-
-def leads(findings: "Findings", metric: str) -> str:
-    """Return who leads on a metric: in every cell, else on every plant, else in how many cells."""
-    standing, what = standings(findings, metric), words.metric(metric)
-    top = standing[0]
-    if top.alone == top.of:
-        return f"{words.law(top.law)} wins on {what} in every one of {top.of} cells."
-    if not top.alone:
-        level = [words.law(row.law) for row in standing if row.best == row.of]
-        unbeaten = f"; none is better than {joined(level)} in any" if 0 < len(level) <= MAX_NAMED_LAWS else ""
-        return f"no winner on {what} in any of {top.of} cells{unbeaten}."
-    plants = [
-        f"{words.law(law)} wins on every plant under {joined(names)}"
-        for law, names in everywhere(findings, metric).items()
-    ]
-    by_cell = cells(findings.scores)
-    unsettled = Counter(
-        law
-        for key in by_cell
-        if key[2] == metric and (law := winner(by_cell, *key)) and not settles(by_cell, *key[:2], law)
-    )
-    wins = [
-        f"{words.law(row.law)} wins in {row.alone}"
-        + f" (never settling in {unsettled[row.law]} of them)" * bool(unsettled[row.law])
-        + f" and loses in {row.lost or 'none'}"
-        for row in standing[:MAX_NAMED_LAWS]
-        if row.alone
-    ]
-    nobody = top.of - sum(row.alone for row in standing)
-    return (
-        f"no law wins on {what} in {every(top.of)} cells. "
-        f"{'; '.join(plants) + '. ' if plants else ''}{'; '.join(wins)}; "
-        f"in {nobody or 'none'} no law wins."
-    )
 
 
 def rest(findings: "Findings", metrics: Sequence[str]) -> list[str]:
@@ -285,7 +202,7 @@ def _sure(findings: "Findings", metrics: Sequence[str]) -> str:
 
 def _settled(findings: "Findings") -> str:
     """Return what share of runs settles, and how many failed; a run that does not settle may still be calm."""
-    share = {place.law: place.median for place in overall(findings, "settles")}
+    share = {place.law: place.median for place in findings.places if place.metric == SETTLES and not place.plant}
     if not share:
         return ""
     worst, best = min(share, key=share.__getitem__), max(share, key=share.__getitem__)
@@ -294,3 +211,15 @@ def _settled(findings: "Findings") -> str:
         text = f"{words.law(worst)} settles least often, in {100 * share[worst]:.0f} % of its runs; a run that does "
         text += "not settle may still be calm"
     return f"{text}. {findings.about.failed or 'None'} of {findings.about.runs} runs failed."
+
+
+def orders(table: AccuracyTable) -> Iterator[str]:
+    """Yield a sentence for each plant and condition: how many laws have the promised order."""
+    for title, rows in table.groups.items():
+        promised = [row.s for row in rows if row.s.theory is not None]
+        kept = sum(order.as_promised for order in promised)
+        plant, _, condition = title.partition(", ")
+        yield (
+            f"{words.plant(plant)}, {condition}: the order of s is within {ORDER_BAND:g} of theory’s for {kept} of "
+            f"{len(promised)} laws."
+        )

@@ -26,40 +26,30 @@ POSTER_TIME = 0.5  # s
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Curve:
-    """One channel of a trace in few points: x(t), the line of u, and the band between the extremes of u.
-
-    t, x: (k,). tu, u: the line, a mean where u chatters. tb, low, high: the band's windows.
-    """
+    """One channel of a trace in few points: x(t), the line of u, and the band between the extremes of u."""
 
     law: str
-    t: np.ndarray
+    t: np.ndarray  # (k,), of x
     x: np.ndarray
-    tu: np.ndarray
+    tu: np.ndarray  # of the line of u, a mean where u chatters
     u: np.ndarray
-    tb: np.ndarray
+    tb: np.ndarray  # windows of the band
     low: np.ndarray
     high: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Scene:
-    """Runs of one plant in one condition, side by side: curves of the channel that starts farthest out.
-
-    Attributes:
-      unit: of x.
-      seconds: duration of the film.
-      film: WebM, or None.
-      poster: a picture of the film as JPEG, or None.
-    """
+    """Runs of one plant in one condition, side by side: curves of the channel that starts farthest out."""
 
     plant: str
     condition: str
-    unit: str
+    unit: str  # of x
     u_max: float
     curves: tuple[Curve, ...]
-    film: bytes | None = None
-    poster: bytes | None = None
-    seconds: float = 0.0
+    film: bytes | None = None  # WebM
+    poster: bytes | None = None  # a picture of the film as JPEG
+    seconds: float = 0.0  # duration of the film
 
 
 def curve(trace: Trace) -> Curve:
@@ -76,14 +66,7 @@ def curve(trace: Trace) -> Curve:
 
 
 def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whole: None) -> tuple[bytes, bytes]:
-    """Return a film of the traces as WebM, and a picture of it as JPEG.
-
-    Args:
-      report: called with the number of frames written, and of all.
-
-    Raises:
-      ScenarioError: nothing renders here, or ffmpeg cannot write.
-    """
+    """Return a film of the traces as WebM, and a picture of it as JPEG."""
     shown, poster = pace.clock(traces, FPS), io.BytesIO()
     count = len(shown.times)
     with scratch() as folder:

@@ -13,7 +13,6 @@ from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.metrics.limit_cycle import NO_CYCLE, channel_cycle
 from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.run import run
-from smc_mujoco.studies.cache import cached
 
 LAG = 0.01  # s, of the actuator
 DURATION = 8.0  # s, of the runs
@@ -22,24 +21,17 @@ PREDICTED = ("amplitude", "frequency", "third_harmonic", "uncertainty")  # field
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Oscillation:
-    """The limit cycle of s of one law on one plant; NaN where there is none.
-
-    Attributes:
-      amplitude, frequency: predicted, in the unit of s and in Hz.
-      measured_amplitude, measured_frequency: of a run.
-      third_harmonic, uncertainty: how good the prediction is, see `Chattering`.
-      marked: whether half the physics step changes the run's numbers by more than 10 %.
-    """
+    """The limit cycle of s of one law on one plant; NaN where there is none."""
 
     plant: str
     law: str
-    amplitude: float
-    frequency: float
-    measured_amplitude: float
+    amplitude: float  # predicted, in the unit of s
+    frequency: float  # predicted, Hz
+    measured_amplitude: float  # of a run
     measured_frequency: float
-    third_harmonic: float
+    third_harmonic: float  # as the next how good the prediction is, see `Chattering`
     uncertainty: float
-    marked: bool
+    marked: bool  # whether half the physics step changes the run's numbers by more than 10 %
 
     @property
     def error(self) -> float:
@@ -49,18 +41,17 @@ class Oscillation:
 
 def oscillations(work: Work) -> tuple[Oscillation, ...]:
     """Return the limit cycles of all laws on all plants behind a lagging actuator, plant by plant."""
-    plan = work.plan
-
-    def compute(plant: str, report: Report) -> list[Oscillation]:
-        return cached(
-            work.folder / f"chattering-{plant}.json",
-            [plan.laws, LAG, DURATION, GAINS],
-            lambda: _on(plant, plan.laws, work.threads, report),
-            lambda rows, path: write_json(path, [dataclasses.asdict(row) for row in rows]),
-            lambda path: [Oscillation(**entry) for entry in read_json(path)],
-        )
-
-    return tuple(row for rows in work.each("chattering", "plants", plan.plants, compute) for row in rows)
+    laws = work.plan.laws
+    by_plant = work.kept(
+        "chattering",
+        "plants",
+        [(plant,) for plant in work.plan.plants],
+        [laws, LAG, DURATION, GAINS],
+        lambda plant, report: _on(plant, laws, work.threads, report),
+        lambda rows, path: write_json(path, [dataclasses.asdict(row) for row in rows]),
+        lambda path: [Oscillation(**entry) for entry in read_json(path)],
+    )
+    return tuple(row for rows in by_plant for row in rows)
 
 
 def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) -> list[Oscillation]:

@@ -21,7 +21,7 @@ from smc_mujoco.control.law import laws
 from smc_mujoco.draw import style
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.evidence.report import answer, charts, maps, oscillation, precision, rigs, words
+from smc_mujoco.evidence.report import answer, charts, maps, oscillation, rigs, words
 from smc_mujoco.evidence.report.plan import GAINS
 from smc_mujoco.evidence.report.stages import Findings
 from smc_mujoco.mechanisms.plant import catalogue as plants
@@ -83,7 +83,6 @@ def page(findings: Findings) -> str:
         "maps": maps,
         "rigs": rigs,
         "oscillation": oscillation,
-        "precision": precision,
         "link": link,
         "uri": uri,
         "plants": plants(),

@@ -11,6 +11,7 @@ from smc_mujoco.analysis.relevant_difference import RELEVANT
 from smc_mujoco.common import progress
 from smc_mujoco.evidence.accuracy.accuracy import DEFAULT_SEEDS, PERIODS
 from smc_mujoco.evidence.papers.gaber import scenarios
+from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.study import FULL as GRID
 from smc_mujoco.studies.study import QUICK as QUICK_GRID
 from smc_mujoco.studies.study import Extent
@@ -24,51 +25,30 @@ Report = Callable[[float, float], None]  # called with the work done and the who
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Plan(Extent):
-    """How much of everything: the extent of the grid, and the rest.
+    """How much of everything: the extent of the grid, and the rest."""
 
-    Attributes:
-      quick: whether margins and claims are quick.
-      relevant: the least relevant difference, see `leaderboard`.
-      kinds: of margins, searched for all plants and laws.
-      attacked: plants on which an adversary searches the worst case of each law.
-      attacks: runs of its search; None for 10 s of processor time a law and plant.
-      compared: kinds of margins that are searched under every set of gains.
-      basins: plants with maps of their regions of attraction: on 2 cores a map of 1000 states takes 12 s.
-      basin_laws: laws of these maps.
-      points: of a map, across and up.
-      region: the longest run of a map, s.
-      claims: ids of claims to judge; None for all.
-      scenes: (plant, condition) of the traces and films.
-      filmed: how many of the scenes are filmed.
-      scene_laws: laws side by side in a scene.
-      scene: duration of traces and films, s.
-      rigs: machines whose laws are compared on all their parameter sets.
-      accurate: plants on which accuracy is measured without noise.
-      periods: control periods of that, s.
-      accuracy_starts: initial states of that.
-    """
-
-    quick: bool
+    quick: bool  # whether margins and claims are quick
     conditions: tuple[str, ...] = GRID.conditions
     seeds: int = GRID.seeds
-    relevant: float = RELEVANT
-    kinds: tuple[str, ...] = ("delay", "disturbance", "friction", "mass", "noise")
-    attacked: tuple[str, ...] = scenarios.PLANTS
-    attacks: int | None = None
-    compared: tuple[str, ...] = ("disturbance",)
+    relevant: float = RELEVANT  # the least relevant difference, see `leaderboard`
+    kinds: tuple[str, ...] = ("delay", "disturbance", "friction", "mass", "noise")  # of margins of all plants and laws
+    attacked: tuple[str, ...] = scenarios.PLANTS  # on which an adversary searches the worst case of each law
+    attacks: int | None = None  # runs of its search; None for 10 s of processor time a law and plant
+    compared: tuple[str, ...] = ("disturbance",)  # kinds of margins that are searched under every set of gains
+    # With maps of their regions of attraction: on 2 cores a map of 1000 states takes 12 s.
     basins: tuple[str, ...] = ("inverted_pendulum", "van_der_pol", "duffing")
     basin_laws: tuple[str, ...] = scenarios.LAWS
-    points: tuple[int, int] = (32, 32)
-    region: float = scenarios.DURATION
-    claims: tuple[str, ...] | None = None
-    scenes: tuple[tuple[str, str], ...] = tuple((plant, "nominal") for plant in scenarios.PLANTS)
-    filmed: int = len(scenarios.PLANTS)
-    scene_laws: tuple[str, ...] = scenarios.LAWS
-    scene: float = 5.0
-    rigs: tuple[str, ...] = ("qube_servo", "simple_pendulum_ak80")
-    accurate: tuple[str, ...] = ("duffing",)
-    periods: tuple[float, ...] = PERIODS
-    accuracy_starts: int = DEFAULT_SEEDS
+    points: tuple[int, int] = (32, 32)  # of a map, across and up
+    region: float = scenarios.DURATION  # the longest run of a map, s
+    claims: tuple[str, ...] | None = None  # to judge; None for all
+    scenes: tuple[tuple[str, str], ...] = tuple((plant, "nominal") for plant in scenarios.PLANTS)  # traces and films
+    filmed: int = len(scenarios.PLANTS)  # how many of the scenes are filmed
+    scene_laws: tuple[str, ...] = scenarios.LAWS  # side by side in a scene
+    scene: float = 5.0  # duration of traces and films, s
+    rigs: tuple[str, ...] = ("qube_servo", "simple_pendulum_ak80")  # whose laws are compared on all parameter sets
+    accurate: tuple[str, ...] = ("duffing",)  # plants on which accuracy is measured without noise
+    periods: tuple[float, ...] = PERIODS  # control periods of that, s
+    accuracy_starts: int = DEFAULT_SEEDS  # initial states of that
 
 
 FULL = Plan(quick=False)
@@ -90,14 +70,11 @@ QUICK = Plan(
 
 
 class Bars:
-    """Progress on the terminal: a bar for each stage, then a line with its time; or nothing.
-
-    `spent`: stage -> s.
-    """
+    """Progress on the terminal: a bar for each stage, then a line with its time; or nothing."""
 
     def __init__(self, shown: bool):
         self.shown = shown
-        self.spent: dict[str, float] = {}
+        self.spent: dict[str, float] = {}  # stage -> s
 
     @contextlib.contextmanager
     def stage(self, name: str, what: str = "", whole: float | None = None, bar: bool = True) -> Iterator[progress.Bar]:
@@ -127,3 +104,21 @@ class Work:
                 results.append(compute(item, lambda done, total, k=k: bar.reached(k + done / (total or 1), len(items))))
                 bar.reached(k + 1, len(items))
         return results
+
+    def kept(
+        self,
+        stage: str,
+        unit: str,
+        items: Sequence[tuple[str, ...]],
+        depends: object,
+        make: Callable[..., T],
+        save: Callable[[T, Path], object],
+        load: Callable[[Path], T],
+    ) -> list[T]:
+        """Return make(*item, report) for each item of a stage, kept in the file STAGE-ITEM.json, see `cached`."""
+
+        def compute(item: tuple[str, ...], report: Report) -> T:
+            path = self.folder / f"{'-'.join((stage, *item))}.json"
+            return cached(path, depends, lambda: make(*item, report), save, load)
+
+        return self.each(stage, unit, items, compute)

@@ -3,12 +3,13 @@
 import dataclasses
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, printable
+from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import capital
 from smc_mujoco.control.source import in_words
 from smc_mujoco.evidence.report import words
@@ -62,22 +63,15 @@ class Machine:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Repeated:
-    """A record that the twin repeated.
-
-    Attributes:
-      rig, name: of the machine, and of the record's file.
-      fits: the twin’s quantities, published ones, or "do nothing" -> column -> percent.
-      t: s, (K,); measured, twin: column -> values, (K,), in few points.
-      why: why it could not be repeated, "" where it was.
-    """
+    """A record that the twin repeated."""
 
     rig: Rig
-    name: str
-    fits: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
-    t: np.ndarray = dataclasses.field(default_factory=lambda: np.empty(0))
-    measured: Mapping[str, np.ndarray] = dataclasses.field(default_factory=dict)
-    twin: Mapping[str, np.ndarray] = dataclasses.field(default_factory=dict)
-    why: str = ""
+    name: str  # of the record's file
+    fits: Mapping[str, Mapping[str, float]] = frozen({})  # quantities, or "do nothing" -> column -> percent
+    t: Sequence[float] | np.ndarray = ()  # s, (K,), in few points
+    measured: Mapping[str, np.ndarray] = frozen({})  # column -> values, (K,)
+    twin: Mapping[str, np.ndarray] = frozen({})
+    why: str = ""  # why it could not be repeated
 
 
 def machines(work: Work) -> tuple[Machine, ...]:

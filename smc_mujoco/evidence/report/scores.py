@@ -17,7 +17,6 @@ from smc_mujoco.analysis.ranking import linked
 from smc_mujoco.analysis.relevant_difference import RELEVANT
 from smc_mujoco.evidence.report import words
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.studies.board import Board
 from smc_mujoco.studies.leaderboard import leaderboard
 
 if TYPE_CHECKING:
@@ -25,14 +24,7 @@ if TYPE_CHECKING:
 
 
 class Score(NamedTuple):
-    """A law's median in a cell over the seeds, with its 95 % interval; inf is never.
-
-    `best`: no other law is better there, and no run failed, see `ranking`; several laws may be. `beaten`: another law
-    is better, or runs failed; neither where samples are too few to tell. `wins`: it is better than every other, `lead`
-    says by how much. `seeds`: of the runs, `runs`: how many of them are distinct, `sample`: the size of the sample in
-    words, `failed`: how many runs failed. `floor`: see `paired_runs.floor`. `barred`: no winner is named
-    there, over laws with default gains.
-    """
+    """A law's median in a cell over the seeds, with its 95 % interval; inf is never."""
 
     plant: str
     condition: str
@@ -41,39 +33,30 @@ class Score(NamedTuple):
     median: float
     low: float
     high: float
-    best: bool
-    beaten: bool
-    wins: bool
-    lead: str
-    seeds: int
-    failed: int
-    runs: int
-    sample: str
-    floor: float
-    barred: bool
+    best: bool  # no other law is better there, and no run failed, see `ranking`; several laws may be
+    beaten: bool  # another law is better, or runs failed; neither where samples are too few to tell
+    wins: bool  # it is better than every other
+    lead: str  # by how much it wins
+    seeds: int  # of the runs
+    failed: int  # runs
+    runs: int  # distinct ones
+    sample: str  # its size in words
+    floor: float  # see `paired_runs.floor`
 
 
 class Place(NamedTuple):
-    """A law's place in a metric over all cells of a plant, or of all plants, where `plant` is "".
-
-    `mean`: its mean rank over the cells, 1 is the best. `failed`: how many of its runs failed or have no value; laws
-    with fewer come first. `best`: no law is better in any cell. `median`: of the cells' medians, NaN where units
-    differ; of "settles" the share of runs that settle. `wins`, `losses`: in how many of the `of` cells it wins, and in
-    how many another law is better, it has runs that fail, or samples are too few to tell. `why`: why there is no
-    winner, "" if there can be one.
-    """
+    """A law's place in a metric over all cells of a plant, or of all plants, where `plant` is ""."""
 
     plant: str
     metric: str
     law: str
-    mean: float
-    failed: int
-    best: bool
-    median: float
-    wins: int
-    losses: int
-    of: int
-    why: str
+    mean: float  # rank over the cells, 1 is the best
+    failed: int  # runs that failed or have no value; laws with fewer come first
+    best: bool  # no law is better in any cell
+    median: float  # of the cells' medians, NaN where units differ; of "settles" the share of runs that settle
+    wins: int  # cells
+    losses: int  # cells in which another law is better, it has runs that fail, or samples are too few to tell
+    of: int  # cells
 
 
 def scores(table: "Table", relevant: float = RELEVANT) -> tuple[Score, ...]:
@@ -111,7 +94,6 @@ def scores(table: "Table", relevant: float = RELEVANT) -> tuple[Score, ...]:
                     runs=block.runs,
                     sample=block.sample,
                     floor=paired_runs.floor(ran, CATALOGUE[metric].unit),
-                    barred=bool(block.barred),
                 )
                 rows.append(score)
     return tuple(rows)
@@ -119,48 +101,31 @@ def scores(table: "Table", relevant: float = RELEVANT) -> tuple[Score, ...]:
 
 def places(table: "Table", relevant: float = RELEVANT) -> tuple[Place, ...]:
     """Return every law's place in each metric that the overview ranks, by plant and over all plants."""
-    boards = leaderboard(table, words.RANKED_METRICS, by=("plant",), relevant=relevant)
-    in_blocks = [place for board in boards for place in _places(board)]
     by_law: dict[tuple[str, str], list[Place]] = {}
-    for place in in_blocks:
-        by_law.setdefault((place.metric, place.law), []).append(place)
-    blocks = {
-        metric: max(len(of_law) for (name, _), of_law in by_law.items() if name == metric) for metric, _ in by_law
-    }
-    return (*in_blocks, *(_overall(of_law) for (metric, _), of_law in by_law.items() if len(of_law) == blocks[metric]))
-
-
-def _places(board: Board) -> list[Place]:
-    return [
-        Place(
-            plant=board.group["plant"],
-            metric=board.metric,
-            law=entry.law,
-            mean=entry.rank.mean,
-            failed=entry.failed,
-            best=entry.rank.best,
-            median=entry.interval.median,
-            wins=len(board.wins(entry.law)),
-            losses=sum(entry.law not in block.best for block in board.blocks),
-            of=len(board.blocks),
-            why=board.why,
-        )
-        for entry in board.entries
-    ]
+    for board in leaderboard(table, words.RANKED_METRICS, by=("plant",), relevant=relevant):
+        for entry in board.entries:
+            place = Place(
+                plant=board.group["plant"],
+                metric=board.metric,
+                law=entry.law,
+                mean=entry.rank.mean,
+                failed=entry.failed,
+                best=entry.rank.best,
+                median=entry.interval.median,
+                wins=len(board.wins(entry.law)),
+                losses=sum(entry.law not in block.best for block in board.blocks),
+                of=len(board.blocks),
+            )
+            by_law.setdefault((board.metric, entry.law), []).append(place)
+    most = {metric: max(len(its) for (name, _), its in by_law.items() if name == metric) for metric, _ in by_law}
+    on_plants = [place for its in by_law.values() for place in its]
+    return (*on_plants, *(_overall(its) for (metric, _), its in by_law.items() if len(its) == most[metric]))
 
 
 def _overall(by_plant: Sequence[Place]) -> Place:
     """Return a law's place over all plants, from its places on each; every cell weighs the same."""
     first, cells = by_plant[0], [place.of for place in by_plant]
     mean, median = np.average([(place.mean, place.median) for place in by_plant], axis=0, weights=cells).tolist()
-    return first._replace(
-        plant="",
-        mean=mean,
-        failed=sum(place.failed for place in by_plant),
-        best=all(place.best for place in by_plant),
-        median=median if first.metric == SETTLES else math.nan,
-        wins=sum(place.wins for place in by_plant),
-        losses=sum(place.losses for place in by_plant),
-        of=sum(cells),
-        why=first.why if len({place.why for place in by_plant}) == 1 else "",
-    )
+    sums = {name: sum(getattr(place, name) for place in by_plant) for name in ("failed", "wins", "losses", "of")}
+    median = median if first.metric == SETTLES else math.nan
+    return first._replace(plant="", mean=mean, best=all(place.best for place in by_plant), median=median, **sums)

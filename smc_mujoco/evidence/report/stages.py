@@ -21,11 +21,12 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.draw.film import film as video
-from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
+from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable, accuracy
+from smc_mujoco.evidence.accuracy.accuracy import load as load_accuracy
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
 from smc_mujoco.evidence.papers.gaber import lyapunov, scenarios
-from smc_mujoco.evidence.report import about, films, oscillation, precision, rigs, scores, words
+from smc_mujoco.evidence.report import about, films, oscillation, rigs, scores, words
 from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.evidence.report.scores import Place, Score
 from smc_mujoco.mechanisms.plant import plant as find_plant
@@ -38,6 +39,7 @@ from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import DURATION, WorstCase, cached_worst_case
 
+ACCURACY_CONDITIONS = ("constant", "coulomb")  # a steady force, and dry friction
 FIELD_POINTS = 121  # of a map of V', along each axis
 SURFACE_TOLERANCE = 1e-6  # |s| up to this is s = 0, as in the claim on V'
 
@@ -55,13 +57,13 @@ class Front:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Field:
-    """V' = s s' on the state plane under the paper's law; x (nx,), v (nv,), vdot (nv, nx), s (nv, nx)."""
+    """V' = s s' on the state plane under the paper's law."""
 
     plant: str
-    x: np.ndarray
-    v: np.ndarray
-    vdot: np.ndarray
-    s: np.ndarray
+    x: np.ndarray  # (nx,)
+    v: np.ndarray  # (nv,)
+    vdot: np.ndarray  # (nv, nx)
+    s: np.ndarray  # (nv, nx)
 
     @property
     def rises(self) -> np.ndarray:
@@ -76,7 +78,7 @@ class Field:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Findings:
-    """Everything that a report shows. `by_set`: set of gains -> the margins that are searched under every set."""
+    """Everything that a report shows."""
 
     scores: tuple[Score, ...]
     places: tuple[Place, ...]
@@ -85,7 +87,7 @@ class Findings:
     fronts: tuple[Front, ...]
     worst: tuple[WorstCase, ...]
     margins: tuple[Margin, ...]
-    by_set: Mapping[str, tuple[Margin, ...]]
+    by_set: Mapping[str, tuple[Margin, ...]]  # set of gains -> the margins that are searched under every set
     oscillations: tuple[oscillation.Oscillation, ...]
     accuracies: AccuracyTable
     basins: tuple[Basin, ...]
@@ -94,20 +96,23 @@ class Findings:
     scenes: tuple[films.Scene, ...]
     about: about.About
 
+    def _names(self, what: str) -> list[str]:
+        return list(dict.fromkeys(getattr(score, what) for score in self.scores))
+
     @property
     def plants(self) -> list[str]:
         """The plants in the order of the grid."""
-        return list(dict.fromkeys(score.plant for score in self.scores))
+        return self._names("plant")
 
     @property
     def laws(self) -> list[str]:
         """The laws in the order of the grid."""
-        return list(dict.fromkeys(score.law for score in self.scores))
+        return self._names("law")
 
     @property
     def conditions(self) -> list[str]:
         """The conditions in the order of the grid."""
-        return list(dict.fromkeys(score.condition for score in self.scores))
+        return self._names("condition")
 
 
 def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Path | None = None) -> Findings:
@@ -119,8 +124,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
     worst, margins = worst_cases(work), all_margins(work)
     by_set, basins, scenes = margins_by_set(work, margins), all_basins(work), all_scenes(work)
     machines = rigs.machines(work)
-    oscillations = oscillation.oscillations(work)
-    accuracies = precision.accuracies(work)
+    oscillations, accurate = oscillation.oscillations(work), accuracies(work)
     no_film = video.missing() if plan.filmed else None
     with bars.stage("statistics"):
         return Findings(
@@ -133,7 +137,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
             margins=margins,
             by_set=by_set,
             oscillations=oscillations,
-            accuracies=accuracies,
+            accuracies=accurate,
             basins=basins,
             machines=machines,
             repeated=repeated,
@@ -203,40 +207,53 @@ def _margins(
     work: Work, stage: str, gains: str, laws: Mapping[str, tuple[str, ...]], kinds: tuple[str, ...]
 ) -> tuple[Margin, ...]:
     """Return margins of kinds under a set of gains; `laws`: plant -> laws."""
-
-    def compute(plant: str, report: Report) -> list[Margin]:
-        names, quick = laws[plant], work.plan.quick
-        return cached(
-            work.folder / f"{stage}-{plant}.json",
-            [names, kinds, quick, gains],
-            lambda: margin_search.margins(
-                [plant], names, kinds, gains=gains, quick=quick, threads=work.threads, report=report
-            ),
-            margin_search.save,
-            margin_search.load,
-        )
-
-    return tuple(margin for margins in work.each(stage, "plants", list(laws), compute) for margin in margins)
+    quick, threads, search = work.plan.quick, work.threads, margin_search.margins
+    by_plant = work.kept(
+        stage,
+        "plants",
+        [(plant,) for plant in laws],
+        [laws, kinds, quick, gains],
+        lambda plant, report: search(
+            [plant], laws[plant], kinds, gains=gains, quick=quick, threads=threads, report=report
+        ),
+        margin_search.save,
+        margin_search.load,
+    )
+    return tuple(margin for margins in by_plant for margin in margins)
 
 
 def all_basins(work: Work) -> tuple[Basin, ...]:
     """Return the maps of regions of attraction, one for each plant and law."""
     plan = work.plan
+    options = {"gains": GAINS, "duration": plan.region, "threads": work.threads}
+    maps = work.kept(
+        "regions",
+        "maps",
+        [(plant, law) for plant in plan.basins for law in plan.basin_laws],
+        [plan.points, plan.region, GAINS],
+        lambda plant, law, report: regions.basin(plant, law, plan.points, **options, report=report),
+        Basin.save,
+        regions.load,
+    )
+    return tuple(maps)
 
-    def compute(pair: tuple[str, str], report: Report) -> Basin:
-        plant, law = pair
-        return cached(
-            work.folder / f"region-{plant}-{law}.json",
-            [plan.points, plan.region, GAINS],
-            lambda: regions.basin(
-                plant, law, plan.points, gains=GAINS, duration=plan.region, threads=work.threads, report=report
-            ),
-            Basin.save,
-            regions.load,
-        )
 
-    pairs = [(plant, law) for plant in plan.basins for law in plan.basin_laws]
-    return tuple(work.each("regions", "maps", pairs, compute))
+def accuracies(work: Work) -> AccuracyTable:
+    """Return the accuracy of all laws on the plan's plants, condition by condition."""
+    plan = work.plan
+    asked = plan.periods, plan.accuracy_starts
+    tables = work.kept(
+        "accuracy",
+        "tables",
+        [(plant, condition) for plant in plan.accurate for condition in ACCURACY_CONDITIONS],
+        [plan.laws, *asked, GAINS],
+        lambda plant, condition, report: accuracy(
+            plan.laws, plant, asked[0], condition, asked[1], GAINS, threads=work.threads, report=report
+        ),
+        AccuracyTable.save,
+        load_accuracy,
+    )
+    return AccuracyTable(row for rows in tables for row in rows)
 
 
 def all_scenes(work: Work) -> tuple[films.Scene, ...]:

@@ -297,7 +297,6 @@ def scores(condition="nominal", plant="duffing", runs=16, **medians):
         Score(
             *(plant, condition, law, "settling_time", m, m, m, best, not best, wins[law], "", 16, 0, runs, "16 seeds"),
             floor=0.0,
-            barred=False,
         )
         for law, m in medians.items()
         for best in [law in level]
@@ -311,16 +310,7 @@ def told(findings, *cells):
 
 
 def sentences(findings, metrics):
-    leads = [answer.leads(findings, metric) for metric in metrics]
-    return " ".join([answer.first(findings, metrics), *leads, *answer.rest(findings, metrics)])
-
-
-def test_a_win_of_a_law_that_never_settles_says_so(findings):
-    settling = [*scores(adaptive=math.inf, classical=1.0), *scores("noise", adaptive=2.0, classical=1.0)]
-    calm = [s for name in ("nominal", "noise", "sine") for s in scores(name, adaptive=1.0, classical=3.0)]
-    calm = [s._replace(metric="tv_rate", wins=s.wins and s.condition != "sine") for s in calm]
-    few = dataclasses.replace(findings, scores=(*settling, *calm))
-    assert "Adaptive wins in 2 (never settling in 1 of them) and loses in none" in answer.leads(few, "tv_rate")
+    return " ".join([answer.first(findings, metrics), *answer.rest(findings, metrics)])
 
 
 def test_a_law_that_is_level_with_one_that_seldom_settles_keeps_it_from_winning(findings):
@@ -348,7 +338,6 @@ def test_places_over_all_plants_count_the_cells_that_a_law_wins(made, folder):
     assert {p.law: (p.mean, p.wins, p.losses, p.of, p.best) for p in own} == {
         p.law: (p.mean, p.wins, p.losses, p.of, p.best) for p in overall
     }
-    assert {p.why for p in overall} <= {"2 seeds, too few", "2 sets of gains, too few"}
     assert {p.of for p in overall} == {2}
 
 
@@ -371,9 +360,7 @@ def test_where_the_papers_law_loses_is_listed_worst_first():
 
 
 def test_the_answer_tells_who_settles_least_and_how_many_runs_failed(findings):
-    share = [
-        Place("", "settles", law, 1.0, 0, True, of, 0, 0, 1, "") for law, of in (("classical", 0.5), ("adaptive", 1))
-    ]
+    share = [Place("", "settles", law, 1.0, 0, True, of, 0, 0, 1) for law, of in (("classical", 0.5), ("adaptive", 1))]
     few = dataclasses.replace(
         findings, places=tuple(share), about=dataclasses.replace(findings.about, runs=40, failed=3)
     )
@@ -383,7 +370,7 @@ def test_the_answer_tells_who_settles_least_and_how_many_runs_failed(findings):
 
 
 def place(law, losses=0, wins=0, mean=1.0, metric="itae", median=1.0, plant="duffing"):
-    return Place(plant, metric, law, mean, 0, not losses, median, wins, losses, 4, "")
+    return Place(plant, metric, law, mean, 0, not losses, median, wins, losses, 4)
 
 
 def picked(findings, *places):

@@ -17,7 +17,7 @@ import smc_mujoco as smc
 from smc_mujoco.common import extras
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
-from smc_mujoco.evidence.report import about, films, oscillation, paper, precision, rigs, scores, stages, words
+from smc_mujoco.evidence.report import about, films, oscillation, paper, rigs, scores, stages, words
 from smc_mujoco.evidence.report import report as make
 from smc_mujoco.evidence.report.plan import FULL, QUICK, Bars, Plan, Work
 from smc_mujoco.evidence.report.scores import Place
@@ -129,13 +129,10 @@ def test_a_place_over_all_plants_weighs_every_cell_the_same():
         wins=2,
         losses=0,
         of=3,
-        why="a",
     )
-    two = one._replace(plant="van_der_pol", mean=2.0, failed=2, best=False, median=1.0, wins=1, losses=4, of=9, why="b")
+    two = one._replace(plant="van_der_pol", mean=2.0, failed=2, best=False, median=1.0, wins=1, losses=4, of=9)
     both = scores._overall([one, two])
-    assert both == one._replace(
-        plant="", mean=1.75, failed=3, best=False, median=0.875, wins=3, losses=4, of=12, why=""
-    )
+    assert both == one._replace(plant="", mean=1.75, failed=3, best=False, median=0.875, wins=3, losses=4, of=12)
     assert np.isnan(scores._overall([one._replace(metric="itae")]).median)
 
 
@@ -189,7 +186,7 @@ def test_findings_are_what_the_stages_give_in_their_order(tmp_path, monkeypatch,
     done, bars = [], Bars(False)
     names = (
         "rigs.repeated grid judged_claims worst_cases all_margins margins_by_set all_basins all_scenes rigs.machines "
-        "oscillation.oscillations precision.accuracies scores.scores scores.places fields fronts about.about"
+        "oscillation.oscillations accuracies scores.scores scores.places fields fronts about.about"
     )
 
     def stub(name):
@@ -239,15 +236,15 @@ def test_what_the_grid_was_is_told(monkeypatch):
 
 
 def test_accuracy_is_of_each_condition_with_the_plan_s_periods(tmp_path, monkeypatch):
-    calls = noted(monkeypatch, "evidence.report.precision.accuracy", lambda *_, **__: AccuracyTable())
-    assert precision.accuracies(work(tmp_path, SMALL)) == []
+    calls = noted(monkeypatch, "evidence.report.stages.accuracy", lambda *_, **__: AccuracyTable())
+    assert stages.accuracies(work(tmp_path, SMALL)) == []
     expected = [(SMALL.laws, "duffing", SMALL.periods, one, 1, "tuned") for one in ("constant", "coulomb")]
     assert [given for given, _ in calls] == expected
     assert all(options["threads"] == 3 for _, options in calls)
-    assert names(tmp_path) == [f"accuracy-duffing-{one}.json" for one in precision.CONDITIONS]
-    precision.accuracies(work(tmp_path, SMALL))
+    assert names(tmp_path) == [f"accuracy-duffing-{one}.json" for one in stages.ACCURACY_CONDITIONS]
+    stages.accuracies(work(tmp_path, SMALL))
     assert len(calls) == 2  # read from their files
-    precision.accuracies(work(tmp_path, dataclasses.replace(SMALL, accuracy_starts=2)))
+    stages.accuracies(work(tmp_path, dataclasses.replace(SMALL, accuracy_starts=2)))
     assert len(calls) == 4
 
 
