@@ -2,7 +2,6 @@
 
 import copy
 import dataclasses
-import functools
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -14,7 +13,7 @@ import numpy as np
 from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.extras import extra
-from smc_mujoco.common.files import read_json, reading, to_json, with_ending, write_json
+from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.text import number
 from smc_mujoco.evidence.certificates import loops
 from smc_mujoco.mechanisms.plant import EFFORT
@@ -42,31 +41,20 @@ THEOREMS = {  # theorem -> what it says
 }
 
 
+class Condition(NamedTuple):
+    """A condition of a theorem."""
+
+    theorem: str
+    name: str  # as in the certificate's data
+    margin: float  # by how much it holds, negative where it fails
+    unit: str  # of the margin; "" for a share
+    words: str  # what it asks, or what it means that it fails
+    holds: bool
+
+
 def holds(name: str, margin: float) -> bool:
     """Return whether a condition holds with a margin. At 0 all do but "reaching", which asks for more."""
     return margin > 0.0 or (margin == 0.0 and name != "reaching")
-
-
-class Condition(NamedTuple):
-    """A condition of a theorem.
-
-    Attributes:
-      theorem, name: of a part of the certificate, and of the condition, as in its data.
-      margin: by how much it holds, negative where it fails.
-      unit: of the margin; "" for a share.
-      words: what it asks, or what it means that it fails.
-    """
-
-    theorem: str
-    name: str
-    margin: float
-    unit: str
-    words: str
-
-    @property
-    def holds(self) -> bool:
-        """Whether the condition holds with this margin."""
-        return holds(self.name, self.margin)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -138,14 +126,12 @@ class Certificate:
     @property
     def conditions(self) -> tuple[Condition, ...]:
         """All conditions of the theorems."""
-        x, F = self.data["unit"], EFFORT[self.data["unit"]]
-        made = []
-        for part in self.data["parts"]:
-            for row in part["conditions"]:
-                unit, asks, fails = CONDITIONS[row["name"]]
-                unit = unit.replace("x", x).replace("F", F)
-                words = asks if holds(row["name"], row["margin"]) else fails
-                made.append(Condition(part["theorem"], row["name"], row["margin"], unit, words))
+        x, made = self.data["unit"], []
+        for theorem, row in ((part["theorem"], row) for part in self.data["parts"] for row in part["conditions"]):
+            unit, asks, fails = CONDITIONS[row["name"]]
+            unit, there = unit.replace("x", x).replace("F", EFFORT[x]), holds(row["name"], row["margin"])
+            words = asks if there else fails
+            made.append(Condition(theorem, row["name"], row["margin"], unit, words, there))
         return tuple(made)
 
     @property
@@ -175,10 +161,8 @@ class Certificate:
             outside = "; the scenario's start is not among them" * bool(failing)
             return f"proven by level sets: {wide} {ends} {under}{outside}"
         if failing:
-            why = ", ".join(
-                f"{row.name} {number(row.margin)} {row.unit}".strip() + f" ({row.words})" for row in failing
-            )
-            return f"not proven by {theorem}: {why}"
+            margins = [f"{row.name} {number(row.margin)} {row.unit}".strip() + f" ({row.words})" for row in failing]
+            return f"not proven by {theorem}: {', '.join(margins)}"
         if theorem == "saturated PD":
             near = ", exponentially in the end" * any(row.name == "local" for row in self.conditions)
             return f"proven by saturated PD: without d every start comes to rest at 0{near}"
@@ -195,28 +179,24 @@ class Certificate:
         return f"proven by super-twisting: from a set in {where} s = 0 is reached, {under}{rate}"
 
     def _widest(self, part: Mapping[str, Any]) -> float:
-        """Return the largest x at rest up to which all lie in the region."""
+        """Return the largest x at rest up to which all lie in the level sets."""
         x = np.linspace(0.0, part["x"][-1], 2001)
-        outside = ~self.contains(x, np.zeros_like(x), part)
+        outside = self.level(x, np.zeros_like(x)) > part["outer"]
         return float(x[max(int(np.argmax(outside)) - 1, 0)]) if outside.any() else float(x[-1])
 
-    def contains(self, x: Any, v: Any, part: Mapping[str, Any] | None = None) -> np.ndarray:
+    def contains(self, x: Any, v: Any) -> np.ndarray:
         """Return which states lie in the region from which all come to rest or into the bound.
 
         Args:
           x, v: positions and velocities, arrays of one shape, rad or m and per second; w of super_twisting is 0.
-          part: one of the theorems' data; by default all theorems that speak of d within its bound.
         """
         x, v = np.asarray(x, float), np.asarray(v, float)
-        if part is None:
-            regions = [self.contains(x, v, other) for other in self.data["parts"] if other["theorem"] != "saturated PD"]
-            everywhere = np.full(x.shape, self.stable and not self.data["disturbance"])
-            return functools.reduce(np.logical_or, regions, everywhere)
-        if part["theorem"] == "level sets":
-            return self.level(x, v) <= part["outer"]
-        if part["theorem"] == "reaching" and part["holds"] and part["S"]:
-            return (np.abs(x) <= part["X"]) & (np.abs(v + self.data["law"]["gains"]["c"] * x) <= part["S"])
-        return np.zeros(x.shape, bool)
+        inside = np.full(x.shape, self.stable and not self.data["disturbance"])
+        if part := self._part("level sets"):
+            inside |= self.level(x, v) <= part["outer"]
+        if (part := self._part("reaching", holding=True)) and part["S"]:
+            inside |= (np.abs(x) <= part["X"]) & (np.abs(v + self.data["law"]["gains"]["c"] * x) <= part["S"])
+        return inside
 
     def level(self, x: Any, v: Any) -> np.ndarray:
         """Return W of "level sets" at states, 1 outside of its grid; see `contains` for the arguments."""
@@ -239,9 +219,8 @@ class Certificate:
         return loops.loop_of(self.data)[0].c
 
     def _part(self, theorem: str, holding: bool = False) -> Mapping[str, Any] | None:
-        return next(
-            (part for part in self.data["parts"] if part["theorem"] == theorem and (part["holds"] or not holding)), None
-        )
+        parts = [part for part in self.data["parts"] if part["theorem"] == theorem and (part["holds"] or not holding)]
+        return parts[0] if parts else None
 
     def check(self) -> None:
         """Prove it again by the checker, in ball arithmetic.
@@ -258,10 +237,6 @@ class Certificate:
             checker.check(copy.deepcopy(dict(self.data)))
         except checker.Refused as why:
             raise ScenarioError(f"the certificate is refused: not proven is {why}") from None
-
-    def to_json(self) -> str:
-        """Return it as JSON, the text of its file."""
-        return to_json(self.data)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write a .json file that `Certificate.load` and the checker read."""

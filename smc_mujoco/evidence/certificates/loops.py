@@ -24,21 +24,15 @@ ONE_JOINT_TERMS: dict[str, Callable[[Any], tuple[float, ...]]] = {
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Loop:
-    """A loop of one channel, as functions of arrays in SI units.
+    """A loop of one channel, as functions of arrays in SI units."""
 
-    Attributes:
-      M: mass; c: slope of the surface, 1/s; d0: bound of |d|.
-      phi, D, sigma: force of the plant, its damping, and the law's force.
-      steep: sigma'(0); infinite for a law that switches.
-    """
-
-    M: float
-    c: float
-    d0: float
-    phi: Function
-    D: Function
-    sigma: Function
-    steep: float
+    M: float  # mass
+    c: float  # slope of the surface, 1/s
+    d0: float  # bound of |d|
+    phi: Function  # force of the plant
+    D: Function  # its damping
+    sigma: Function  # the law's force
+    steep: float  # sigma'(0); infinite for a law that switches
 
     @property
     def switches(self) -> bool:
@@ -84,15 +78,8 @@ def _loop(M: float, terms: list[float], law: SimpleNamespace, u_max: float | Non
         kp, kd = linear_gains(law)
         top = law.k if law.name == "boundary_layer" else top
         sigma, steep, c = (lambda s: np.clip(kd * s, -top, top)), kd, kp / kd
-    return Loop(
-        M=M,
-        c=c,
-        d0=d0,
-        phi=lambda x: A * np.sin(x) + x * (B + C * x * x),
-        D=lambda x: E + F * x * x,
-        sigma=sigma,
-        steep=steep,
-    )
+    phi, D = (lambda x: A * np.sin(x) + x * (B + C * x * x)), (lambda x: E + F * x * x)
+    return Loop(M=M, c=c, d0=d0, phi=phi, D=D, sigma=sigma, steep=steep)
 
 
 def linear_gains(law: SimpleNamespace) -> tuple[float, float]:

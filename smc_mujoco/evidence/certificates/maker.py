@@ -193,14 +193,13 @@ def _part(theorem: str, conditions: list[dict], **data: Any) -> dict:
     return {"theorem": theorem, "holds": proven, "conditions": conditions} | data
 
 
-def _condition(name: str, margin: Any, **data: Any) -> dict:
-    return {"name": name, "margin": float(margin)} | data
+def _told(margins: dict[str, Any]) -> list[dict]:
+    return [{"name": name, "margin": float(margin)} for name, margin in margins.items()]
 
 
 def _judged(theorem: str, data: dict, judge: Judge) -> dict:
     """Return a theorem with the margins that the checker derives from its data."""
-    margins = judge(theorem, data) or {}  # what is refused here is refused as a whole in the end
-    return _part(theorem, [_condition(name, margin) for name, margin in margins.items()], **data)
+    return _part(theorem, _told(judge(theorem, data) or {}), **data)  # what is refused here is so as a whole in the end
 
 
 def _saturated(document: dict, loop: Loop, terms: list[float], judge: Judge) -> dict:
@@ -210,7 +209,8 @@ def _saturated(document: dict, loop: Loop, terms: list[float], judge: Judge) -> 
     V["springs"] = document["plant"]["parameters"].get("kc", 0.0) / 2.0
     for told in _restoring(loop, terms):
         if margins := judge("saturated PD", {"V": V, "conditions": [None, told]}):
-            conditions = [_condition(*pair) if pair[0] != told["name"] else told for pair in margins.items()]
+            derived = _told(margins | {"restoring": told["margin"]})
+            conditions = [told if one["name"] == "restoring" else one for one in derived]
             return _part("saturated PD", conditions, V=V)
     raise ScenarioError("found no boxes that prove that the law is stronger than the plant: give other gains")
 
@@ -225,12 +225,13 @@ def _restoring(loop: Loop, terms: list[float]) -> Iterator[dict]:
     smallest = min(1.0, float(share.min()), 1.0 if loop.switches else 1.0 - (A + B) / (loop.steep * loop.c))
     if smallest < 0.0 or C > 0.0 or (C == 0.0 and B > 0.0):
         at = float(x[share.argmin()]) if share.min() < 0.0 else _far(loop)
-        yield _condition("restoring", _share(loop, at), at=at)
+        yield {"name": "restoring", "margin": _share(loop, at), "at": at}
         return
     margin = smallest - MARGIN_SHARE * max(abs(smallest), 0.1) * (smallest < 1.0)
     for count in BOX_COUNTS:
         edges = [float(f"{edge:.9g}") for edge in tail * np.linspace(0.0, 1.0, count + 1) ** 2]
-        yield _condition("restoring", margin, boxes=[*map(list, itertools.pairwise(edges)), [edges[-1], None]])
+        boxes = [*map(list, itertools.pairwise(edges)), [edges[-1], None]]
+        yield {"name": "restoring", "margin": float(margin), "boxes": boxes}
 
 
 def _far(loop: Loop) -> float:
@@ -262,7 +263,7 @@ def _start(scenario: Scenario, loop: Loop) -> tuple[float, float]:
 
 def _levels(room: float, levels: search.Levels, scenario: Scenario, start: tuple[float, float]) -> dict:
     """Return the levels of W as data."""
-    conditions = [_condition("actuator", room), _condition("start", levels.outer - _cell(levels, *start))]
+    conditions = _told({"actuator": room, "start": levels.outer - _cell(levels, *start)})
     data = {"x": levels.x.tolist(), "s": levels.s.tolist(), "W": levels.W.tolist()}
     data |= {"start": [scenario.resolved.x0[0], scenario.resolved.v0[0]]} | ({"P": list(levels.P)} if levels.P else {})
     return _part("level sets", conditions, **data, inner=levels.inner, outer=levels.outer, bound=levels.bound)

@@ -21,8 +21,9 @@ from scipy.optimize import brentq
 from smc_mujoco.evidence.certificates.loops import Loop
 from smc_mujoco.simulation.cfunctions import cached
 
+# Says of a cell (x0, x1, s0, s1), and of W at its corners 00, 10, 01, 11, whether W surely falls there.
 Proven = Callable[[tuple[float, ...], tuple[float, ...]], bool]
-Attracts = Callable[[np.ndarray], bool]
+Attracts = Callable[[np.ndarray], bool]  # says of P whether z' P z surely falls where it is at most 1
 CELLS, TARGET_CELLS = 110, 8.0  # on each side of 0, in x and in s, and in half a target: chosen
 SWEEPS, SWEEP_TOLERANCE = 500, 1e-9  # of a solution
 SMOOTHING_COUNTS = (2, 8, 24)  # of W, which blunt its edges: chosen
@@ -90,21 +91,15 @@ def _attracted(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | Non
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Levels:
-    """A bilinear W on nodes (x, s), x >= 0: W(-x, -s) = W(x, s). It falls between its levels inner and outer.
+    """A bilinear W on nodes (x, s), x >= 0: W(-x, -s) = W(x, s). It falls between its levels inner and outer."""
 
-    Attributes:
-      x, s: nodes, (n,) and (2 n - 1,); W: its values there, (n, 2 n - 1).
-      inner, outer: the levels; bound: the largest |x| in cells that the inner level reaches.
-      P: of the form on the inner set without disturbance, (3,): z' P z = P0 x^2 + 2 P1 x s + P2 s^2; or None.
-    """
-
-    x: np.ndarray
-    s: np.ndarray
-    W: np.ndarray
-    inner: float
-    outer: float
-    bound: float
-    P: tuple[float, float, float] | None
+    x: np.ndarray  # (n,)
+    s: np.ndarray  # (2 n - 1,)
+    W: np.ndarray  # (n, 2 n - 1)
+    inner: float  # level
+    outer: float  # level
+    bound: float  # the largest |x| in cells that the inner level reaches
+    P: tuple[float, float, float] | None  # of z' P z = P0 x^2 + 2 P1 x s + P2 s^2 on the inner set without disturbance
 
 
 def levels(
@@ -117,12 +112,8 @@ def levels(
 ) -> Levels | None:
     """Return the levels with the smallest bound, or the largest region without disturbance; None if the search fails.
 
-    Args:
-      reach: largest |x| of the grid.
-      start: (x, s); levels that contain it are preferred.
-      proven: says of a cell, (x0, x1, s0, s1), and of W at its corners 00, 10, 01, 11, whether W surely falls there.
-      attracts: says of P whether z' P z surely falls where it is at most 1.
-      target: half-widths in x and s of a box to reach, for a law that switches.
+    Levels that contain the start are preferred. `target`: half-widths in x and s of a box to reach, for a law that
+    switches.
     """
     P = form(loop, reach, attracts)
     if P is None and (target is None or not min(target)):
@@ -142,9 +133,10 @@ def levels(
             tried.append((grid, grid.window()))
     for grid, window in sorted(tried, key=lambda pair: pair[0].worth(pair[1], start)):
         if window and grid.bound(window) and (window := grid.surely(window, proven)):
-            inner_form = None if loop.d0 or P is None else (float(P[0, 0]), float(P[0, 1]), float(P[1, 1]))
-            inner, outer, bound = _inner(window), float(f"{window[1] - 2e-6:.6f}"), grid.bound(window)
-            return Levels(x=grid.x, s=s, W=grid.W, inner=inner, outer=outer, bound=bound, P=inner_form)
+            numbers = None if loop.d0 or P is None else (float(P[0, 0]), float(P[0, 1]), float(P[1, 1]))
+            outer = float(f"{window[1] - 2e-6:.6f}")
+            inner, bound = _inner(window), grid.bound(window)
+            return Levels(x=grid.x, s=s, W=grid.W, inner=inner, outer=outer, bound=bound, P=numbers)
     return None
 
 

@@ -365,8 +365,7 @@ def test_the_inner_set_lies_where_s_0_is_reached_on_both_sides(side, monkeypatch
 
 
 def test_any_number_that_changes_breaks_the_seal():
-    text = certificate("duffing").to_json()
-    data = json.loads(text)
+    data = copy.deepcopy(certificate("duffing").data)
     data["parts"][0]["conditions"][1]["boxes"][3][1] *= 1.0 + 1e-9
     with pytest.raises(checker.Refused, match="seal"):
         checker.check(data)
