@@ -68,52 +68,32 @@ Cell = tuple[np.ndarray, np.ndarray]  # the lowest and the highest logs of ampli
 class Chattering:
     """A predicted limit cycle of one channel. If none is predicted, its numbers are NaN; the ranges may be known.
 
-    Attributes:
-      amplitude: of the sliding variable s, half its range, in its unit.
-      amplitude_x: of the position, rad or m.
-      amplitude_u: of the command, half its range, in its unit: N m, N or V.
-      frequency: Hz.
-      power: mean square of s', (amplitude omega)^2 / 2 with the first harmonic of s. For s' = u + d it is the mean
-        square of the delivered force per unit of mass.
-      threshold_x: amplitude of the position of the largest unstable cycle within this one, rad or m; 0 without one. A
-        smaller oscillation does not grow into this one.
-      third_harmonic: third harmonic of s over the first; NaN for two samples in a period. If it is large, the law does
-        not see a sine, and the prediction is rough.
-      samples: control samples in a period.
-      amplitude_range, frequency_range: smallest and largest amplitude and frequency of a cycle that is locked to the
-        samples, see `Loop.phases`. They are widened by factors that were calibrated by exact integration: 95 % of
-        random loops are within the ranges. The largest amplitude includes the change of s by one count of an encoder.
-        If the balance has no solution but the law switches, a locked cycle is possible, and these are its ranges.
-      coupling: largest amplitude of another driven channel under this channel's command, over amplitude_x; 0 for a
-        single channel. If it is not small, the channels oscillate together, and the prediction for one fails.
-      gain, response: N and L at the cycle, complex.
-      assumptions: what was left out or is doubtful, in sentences.
+    The two ranges are those of cycles that are locked to the samples, see `Loop.phases`. They are widened by factors
+    that were calibrated by exact integration: 95 % of random loops are within them. The largest amplitude includes the
+    change of s by one count of an encoder. If the balance has no solution but the law switches, a locked cycle is
+    possible, and these are its ranges.
     """
 
-    amplitude: float = math.nan
-    amplitude_x: float = math.nan
-    amplitude_u: float = math.nan
-    frequency: float = math.nan
-    power: float = math.nan
-    threshold_x: float = 0.0
-    third_harmonic: float = math.nan
-    samples: float = math.nan
+    amplitude: float = math.nan  # of the sliding variable s, half its range, in its unit
+    amplitude_x: float = math.nan  # of the position, rad or m
+    amplitude_u: float = math.nan  # of the command, half its range: N m, N or V
+    frequency: float = math.nan  # Hz
+    power: float = math.nan  # mean square of s', (amplitude omega)^2 / 2 with the first harmonic of s
+    threshold_x: float = 0.0  # amplitude of x, rad or m, of the largest unstable cycle within this one; 0 without one
+    third_harmonic: float = math.nan  # of s over its first; if large, the prediction is rough; NaN for two samples
     amplitude_range: tuple[float, float] = (math.nan, math.nan)
-    frequency_range: tuple[float, float] = (math.nan, math.nan)
-    coupling: float = math.nan
-    gain: complex = complex(math.nan)
-    response: complex = complex(math.nan)
-    assumptions: tuple[str, ...] = ()
+    frequency_range: tuple[float, float] = (math.nan, math.nan)  # Hz
+    coupling: float = math.nan  # of another driven channel's x, over amplitude_x; if large, the prediction fails
+    gain: complex = complex(math.nan)  # N at the cycle
+    response: complex = complex(math.nan)  # L at the cycle
+    assumptions: tuple[str, ...] = ()  # what was left out or is doubtful, in sentences
 
     def __bool__(self) -> bool:
         return not math.isnan(self.frequency)
 
     @property
     def uncertainty(self) -> float:
-        """Largest relative distance of an end of the two ranges from the predicted amplitude or frequency.
-
-        It is inf if no limit cycle is predicted but one is possible, and NaN if none is possible.
-        """
+        """Largest relative distance of an end of the ranges from what is predicted; inf where only ranges are known."""
         if not self:
             return math.nan if math.isnan(self.amplitude_range[1]) else math.inf
         pairs = ((self.amplitude_range, self.amplitude), (self.frequency_range, self.frequency))
@@ -147,11 +127,7 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
 
 
 def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chattering:
-    """Return what `chattering` returns for a scenario.
-
-    Args:
-      ranges: False to leave the ranges of a predicted cycle NaN, which is faster.
-    """
+    """Return what `chattering` returns for a scenario; without the ranges of a predicted cycle it is faster."""
     if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < scenario.plant.driven:
         raise ScenarioError(f"channel is {shown(channel)}: give 0 to {scenario.plant.driven - 1}")
     loop = Loop(scenario, channel)
@@ -177,10 +153,7 @@ def _other_cycles(loop: Loop, others: Sequence[Balance]) -> Iterator[str]:
 
 
 def _threshold(loop: Loop, one: Balance, unstable: Sequence[Balance]) -> float:
-    """Return the amplitude of x of the largest unstable cycle within a stable one, 0 without one.
-
-    Only those count whose L has the phase of the stable one, without a turn more or less.
-    """
+    """Return the amplitude of x of the largest unstable cycle within a stable one in the same turn of L, or 0."""
     smaller = [other for other in unstable if other[0] < one[0]]
     *turns, turn = _turns(loop, [*smaller, one])
     return max((a for (a, _), other in zip(smaller, turns, strict=True) if round(other - turn) == 0), default=0.0)
@@ -198,8 +171,7 @@ def switches(loop: Loop) -> bool:
 def _locked_ranges(loop: Loop, assumptions: tuple[str, ...]) -> Chattering:
     """Return the ranges of a cycle that is locked to the samples, of a law that switches.
 
-    Such a law switches at most half a control period later than on average. So the cycle is not larger and not slower
-    than that of the same loop with half a control period more delay.
+    It switches at most half a control period later than on average: the cycle is that of as much more delay, or less.
     """
     control_period = loop.scenario.control_period
     later = loop.later(0.5 * control_period)
@@ -216,10 +188,7 @@ def _locked_ranges(loop: Loop, assumptions: tuple[str, ...]) -> Chattering:
 
 
 def cycles(loop: Loop) -> tuple[list[Balance], list[Balance]]:
-    """Return the stable and the other solutions of N L = 1 up to half the sampling frequency.
-
-    Of two solutions in one cell of the finest grid both may be missed.
-    """
+    """Return the stable and the other solutions of N L = 1; of two in one finest cell both may be missed."""
     balances: list[Balance] = []
     for cells in _starts(loop):
         one = next((balance for cell in cells if (balance := _balanced(loop, *cell))), None)
@@ -237,8 +206,8 @@ def _distance(one: Balance, other: Balance) -> float:
 def _starts(loop: Loop) -> Iterator[list[Cell]]:
     """Yield groups of neighbouring cells of a fine grid whose images under N L wind around 1: one has a solution.
 
-    A cell of the coarse grid is cut into four, again and again, where N L may be 1 in it. N is that of few samples,
-    whose places make the image of some neighbours wind, too, in turns to the left and to the right.
+    A coarse cell is cut into four, again and again, where N L may be 1 in it. N is that of few samples, whose places
+    make the image of some neighbours wind, too, in turns to the left and to the right.
     """
     from scipy.ndimage import label
 
@@ -276,8 +245,7 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
 def _may_balance(products: np.ndarray, sides: np.ndarray) -> np.ndarray:
     """Return whether N L, given at the corners of cells (K, 4), may be 1 in each cell, (K,).
 
-    Size and phase may be outside those of the corners by a share of their range, of the `sides` in the logs of omega
-    and amplitude, or of the noise of few samples.
+    Size and phase may be outside those of the corners by a share of their range, of the cell's sides, or of the noise.
     """
     sizes = np.log(np.maximum(np.abs(products), SMALLEST))
     margins = CELL_MARGIN * np.maximum(np.ptp(sizes, axis=1), max(sides[1], COARSE_NOISE))
@@ -339,11 +307,9 @@ def _bisected(excess: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high:
 
 
 def _nearest_cycle(loop: Loop, wave: Wave, shift: float) -> Wave | None:
-    """Return the nearest cycle of a law that acts later, which is not faster, or earlier, which is not slower, or None.
+    """Return the cycle nearest to `wave` of a law that acts `shift` rad earlier, or later if negative, or None.
 
-    Args:
-      wave: the cycle of the law as it is.
-      shift: rad at the cycle's omega; negative for a later law.
+    A later law is not faster, an earlier one not slower.
     """
     later = loop.later(-shift / wave.omega)
     stable, _ = cycles(later)
@@ -376,10 +342,9 @@ def _of_two_samples(loop: Loop) -> list[Balance]:
 
 
 def _stable(loop: Loop, balances: Sequence[Balance]) -> list[Balance]:
-    """Return the stable cycles.
+    """Return the cycles at which a larger oscillation decays (Loeb's criterion), in a slower one's turn of L.
 
-    A cycle is stable if a larger oscillation decays (Loeb's criterion) and the phase of L has not lost a whole turn
-    since a slower cycle of that kind. A delay gives a row of such cycles, of which only the slowest is stable.
+    A delay gives a row of such cycles, with a turn of phase between them, of which only the slowest is stable.
     """
     decaying = sorted((one for one in balances if _decays(loop, *one)), key=lambda one: one[1])
     turns = _turns(loop, decaying)
@@ -459,7 +424,6 @@ def _prediction(
         power=wave.rate**2 / 2.0,
         threshold_x=threshold,
         third_harmonic=wave.third,
-        samples=math.tau / wave.omega / loop.scenario.control_period,
         amplitude_range=(min(sizes) / AMPLITUDE_FACTOR, max(sizes) * AMPLITUDE_FACTOR + loop.s_of_one_count),
         frequency_range=(min(omegas) / FREQUENCY_FACTOR / math.tau, min(fastest, nyquist)),
         coupling=coupling,
@@ -497,17 +461,7 @@ def save(
     changes: Sequence[StepChange],
     path: str | os.PathLike[str],
 ) -> Path:
-    """Write predictions and measurements to a .json file. Return its path.
-
-    Args:
-      scenarios, cycles: the scenarios, and the predicted cycle of each.
-      measured: amplitude of s in its unit and frequency in Hz, measured in a run of each scenario.
-      changes: relative changes of these in a run with half the physics step.
-      path: of the file.
-
-    Raises:
-      ScenarioError: the file cannot be written.
-    """
+    """Write predicted cycles of scenarios, measured amplitudes of s and frequencies, and their changes, as JSON."""
     rows = [
         {"plant": one.plant.name, "law": one.law.name, "gains": dict(one.law.gains)}
         | {name: value for name, value in vars(cycle).items() if name not in ("gain", "response")}

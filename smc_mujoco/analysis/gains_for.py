@@ -43,20 +43,15 @@ SPEEDS = tuple(10.0 ** (0.1 * k) for k in range(-10, 11))
 class Design:
     """Gains that were chosen by predicted chattering.
 
-    Attributes:
-      law: the law with these gains.
-      chattering: predicted for it.
-      disturbance: the largest constant force that it tolerates in both directions, N m or N, in runs of 10 s: see
-        `smc.margins`. A force that changes may be worse: see `smc.worst_case`. NaN if it does not hold the plant even
-        without one.
-      size, speed: q and w, over the gains that were given.
+    `disturbance` is the largest constant force that the law tolerates in both directions, see `smc.margins`. A force
+    that changes may be worse: see `smc.worst_case`.
     """
 
     law: Component
     chattering: Chattering
-    disturbance: float
-    size: float
-    speed: float
+    disturbance: float  # N m or N, in runs of 10 s; NaN if the law does not hold the plant even without one
+    size: float  # q, over the gains that were given
+    speed: float  # w, over the gains that were given
 
 
 def gains_for(
@@ -122,17 +117,14 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
         chosen = scaled(size, speed)
         predicted = predict(chosen, channel)
         if frequency is not None and predicted.frequency > frequency:
+            found = f"{base.law.name} of amplitude {amplitude:g} oscillates at {predicted.frequency:.3g} Hz"
             raise ScenarioError(
-                f"{base.law.name} of amplitude {amplitude:g} oscillates at {predicted.frequency:.3g} Hz, above the "
-                f"wanted {frequency:g}: give a larger frequency, or another amplitude"
+                f"{found}, above the wanted {frequency:g}: give a larger frequency, or another amplitude"
             )
         (tolerated,) = margins.margins_of([dataclasses.replace(chosen, duration=DURATION)], ["disturbance"])
     if math.isnan(tolerated.value):
-        warnings.warn(
-            f"{base.law.name} with these gains does not hold {base.plant.name}, even without a disturbance",
-            ScenarioWarning,
-            users_stacklevel(),
-        )
+        words = f"{base.law.name} with these gains does not hold {base.plant.name}, even without a disturbance"
+        warnings.warn(words, ScenarioWarning, users_stacklevel())
     law = chosen.law.sourced(source.TUNED, source.Search(rule=RULE, evaluations=predictions, converged=True))
     return Design(law=law, chattering=predicted, disturbance=tolerated.value, size=size, speed=speed)
 
@@ -142,9 +134,8 @@ def _best_speed(
 ) -> float:
     """Return, of the SPEEDS whose predicted frequency is at most the wanted one, that which allows the largest forces.
 
-    The frequency is taken for size 1. It does not depend on the size on a linear mechanism, and is not monotone in the
-    speed. A speed without a limit cycle counts only below the first speed with one: above it, the law has become too
-    fast for the actuator.
+    The frequency is that of size 1, and is not monotone in the speed. A speed without a limit cycle counts only below
+    the first speed with one: above it, the law has become too fast for the actuator.
     """
     speeds = [speed for speed in SPEEDS if speed**2 <= headroom * (1.0 + SIZE_TOLERANCE)]
     if not speeds:
@@ -192,11 +183,10 @@ def _force_headroom(base: Scenario) -> float:
 
 
 def _largest_size(predicted: Callable[[float], float], wanted: float, limit: float) -> float:
-    """Return the largest scale up to `limit` whose predicted amplitude is at most the wanted one.
+    """Return the largest scale up to `limit` whose predicted amplitude, NaN for no cycle, is at most the wanted one.
 
-    The search begins at the original gains and moves in steps until the amplitude, NaN for no limit cycle, crosses the
-    wanted one. If a limit cycle is lost on the way up, the law has become too large for the actuator, and that counts
-    as crossing. The amplitude is in proportion to the scale for most laws, so that the first guess is often right.
+    If a limit cycle is lost on the way up, the law has become too large for the actuator, and that counts as too large
+    an amplitude. That is in proportion to the scale for most laws, so that the first guess is often right.
     """
     limit = min(limit, MAX_SIZE_RATIO)
     low, high, oscillates = 0.0, math.inf, False

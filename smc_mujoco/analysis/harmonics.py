@@ -5,11 +5,10 @@
     wave = loop.wave(0.01, omega)         # what the law returns for e = 0.01 sin(omega t)
     wave.gain                             # complex, unit of u per rad or m
 
-A limit cycle is where gain times response is 1. The response is that of MuJoCo's model, linearised about rest by finite
-differences, with drives, back-EMF, springs and joints without an actuator. The gain is that of the compiled law, with
-its estimator and its surface, at its control period, under an excitation: an error that oscillates for some periods.
-There is no approximation but that this error is a sine. Play between rotor and joint is a second nonlinear element. Its
-describing function is that of two free masses, see `play`, and multiplies the gain.
+The response is that of MuJoCo's model, linearised about rest by finite differences, with drives, back-EMF, springs and
+joints without an actuator. The gain is that of the compiled law, with its estimator and its surface, at its control
+period, under an excitation: an error that oscillates for some periods. There is no approximation but that this error is
+a sine. Play between rotor and joint is a second nonlinear element, see `play`, and multiplies the gain.
 """
 
 import copy
@@ -18,6 +17,7 @@ import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -56,27 +56,16 @@ FREE_MASS = 0.0, 1.0, 0.0, 0.0  # f and g at rest, and the derivatives of f with
 
 @dataclasses.dataclass(frozen=True)
 class Wave:
-    """What a law returns for e = amplitude sin(omega t).
+    """What a law returns for e = amplitude sin(omega t), plus the harmonics that the mechanism lets through."""
 
-    Attributes:
-      amplitude: of e, rad or m.
-      omega: rad/s.
-      gain: first harmonic of u over that of e, complex, unit of u per rad or m, times the describing function of play.
-        Here e has the harmonics that the mechanism lets through.
-      third: third harmonic of s over the first.
-      s, u: half the range of the sliding variable and of u, with the harmonics that the mechanism lets through.
-      rate: amplitude of the first harmonic of s, times omega.
-      drift: relative change of the gain from the first to the second half of the excitation.
-    """
-
-    amplitude: float
-    omega: float
-    gain: complex
-    third: float
-    s: float
-    u: float
-    rate: float
-    drift: float
+    amplitude: float  # of the first harmonic of e, rad or m
+    omega: float  # rad/s
+    gain: complex  # first harmonic of u over that of e, unit of u per rad or m, times the describing function of play
+    third: float  # third harmonic of s over the first
+    s: float  # half the range of the sliding variable
+    u: float  # half the range of u
+    rate: float  # amplitude of the first harmonic of s, times omega
+    drift: float  # relative change of the gain from the first to the second half of the excitation
 
 
 class Loop:
@@ -86,9 +75,8 @@ class Loop:
         self.scenario, self.channel, self.delay, s = scenario, channel, 0.0, scenario.resolved
         plant = s.plant
         if not s.clock.regular:
-            raise ScenarioError(
-                "chattering is predicted for samples that are on time: leave the clock out, or measure it in a run"
-            )
+            cure = "leave the clock out, or measure it in a run"
+            raise ScenarioError(f"chattering is predicted for samples that are on time: {cure}")
         for joint, low, high in plant.ranges:
             if not low <= 0.0 <= high:
                 raise ScenarioError(
@@ -157,8 +145,7 @@ class Loop:
     def _solve(self, omega: complex) -> np.ndarray:
         """Return the amplitudes of MuJoCo's state at control samples, positions before velocities, per unit of u.
 
-        A sine that is sampled and held has images at omega + 2 pi m / control_period. Those are summed that differ at
-        the physics steps.
+        A sine that is sampled and held has images at omega + 2 pi m / control_period, which are summed.
         """
         s = self.scenario.resolved
         count = round(s.control_period / self.step)
@@ -188,11 +175,7 @@ class Loop:
         return self.controller(0, fixed, motion, self.nominal_models, self.controller.memories())
 
     def _gain(self, amplitude: float, omega: float, max_samples: float = MAX_SAMPLES_PER_PERIOD) -> complex:
-        """Return the first harmonic of u over that of e = amplitude sin(omega t), times that of play, see `Wave`.
-
-        Args:
-          max_samples: largest number of samples in a period.
-        """
+        """Return the first harmonic of u over that of e = amplitude sin(omega t), times that of play, see `Wave`."""
         _, u, _ = self._excited([amplitude], omega, max_samples)
         return self._gain_of(_first(u, self._clock(omega, max_samples, 0.0).against), amplitude, omega)
 
@@ -264,7 +247,7 @@ class Loop:
         """Return omega t, u and s of the samples after memories have settled, for an error of these harmonics.
 
         The error is the sum of Re(amplitude_n exp(j n omega t)). It starts at its largest value, so that integrals of
-        odd functions of it have no mean. `position` is the time of the first sample, in control periods.
+        odd functions of it have no mean. The first sample is at `position`, in control periods.
         """
         clock = self._clock(omega, max_samples, position)
         motion = []
@@ -285,7 +268,6 @@ class Loop:
         return clock.angles, np.clip(u[clock.first :], -limit, limit), s[clock.first :]
 
     def _clock_of(self, omega: float, max_samples: float, position: float) -> "Clock":
-        """Return the times of an excitation's samples."""
         period = math.tau / omega
         h = max(self.scenario.resolved.control_period, period / max_samples)
         periods = min(max(math.ceil(EXCITATION_SAMPLES * max_samples * h / period), MIN_PERIODS), MAX_PERIODS)
@@ -296,22 +278,14 @@ class Loop:
         return Clock(h, turns, first, angles, np.exp(-1j * angles))
 
 
-@dataclasses.dataclass(frozen=True)
-class Clock:
-    """The times of an excitation's samples.
+class Clock(NamedTuple):
+    """The times of an excitation's samples."""
 
-    Attributes:
-      h: from one sample to the next, s.
-      turns: exp(j omega t) of all samples, complex, (K,).
-      first: number of samples in which memories settle.
-      angles: omega t of the others, rad, and `against`, exp(-j omega t), complex.
-    """
-
-    h: float
-    turns: np.ndarray
-    first: int
-    angles: np.ndarray
-    against: np.ndarray
+    h: float  # from one sample to the next, s
+    turns: np.ndarray  # exp(j omega t) of all samples, complex, (K,)
+    first: int  # number of samples in which memories settle
+    angles: np.ndarray  # omega t of the others, rad
+    against: np.ndarray  # exp(-j omega t) of the others, complex
 
 
 class Controller:
@@ -338,14 +312,11 @@ class Controller:
         models: Sequence[tuple[float, ...]],
         memories: list[np.ndarray],
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return u and s, each (K,), for samples of a motion.
+        """Return u and s, each (K,), for samples of a motion, of which `first` is the first, counted from time 0.
 
-        Args:
-          first: number of the first sample, counted from time 0.
-          fixed: field of a measurement -> its value in all samples; `DT` is the time from one to the next, s.
-          motion: x and v of the channel, each (K,), rad or m and per s; then those of the joint that it moves, if any.
-          models: of the channel and of that joint, as `Loop._nominal_model` returns them.
-          memories: of estimator, surface and law. They change.
+        `fixed` has fields of a measurement with their values in all samples; `motion` has x and v of the channel, each
+        (K,), then those of the joint that it moves, if any; `models` is as `Loop._nominal_model` returns it for these.
+        The memories of estimator, surface and law change.
         """
         x, v, q, dq = motion if len(motion) == 4 else (*motion, np.empty(0), np.empty(0))
         start, of_joint = np.zeros(len(FIELDS)), models[1] if len(motion) == 4 else (0.0,) * 4
@@ -367,8 +338,7 @@ def transition(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return A (n, n) and B (n, nu) of a physics step without any integrator's error, linearised at `data`.
 
-    The state is positions, velocities and activations, then what the drives of an `actuator` give, see `_behind`. Its
-    rates are linearised, and A and B are their exponentials.
+    The state is positions, velocities and activations, then what the drives of an `actuator` give, see `_behind`.
     """
     from scipy.linalg import expm
 
@@ -435,11 +405,8 @@ def play(amplitude: float, gap: float) -> complex:
     Rotor m1 and joint m2 are free masses, with plastic impacts, under u = sin(omega t). The rotor leaves its flank when
     u changes its sign. It moves alone until the angle c with c - sin c = play m1 omega^2 / |u|. There it hits the other
     flank and gives the joint the impulse 1 - cos c, which u has given it since. As x has the amplitude
-    |play(...) u| / ((m1 + m2) omega^2), c depends on amplitude over gap alone.
-
-    Args:
-      amplitude: of the joint's x, rad or m.
-      gap: of the play, times m1 / (m1 + m2): how far the joint moves while the rotor crosses, rad or m.
+    |play(...) u| / ((m1 + m2) omega^2), c depends on amplitude over gap alone. `gap` is that of the play, times
+    m1 / (m1 + m2): how far the joint moves while the rotor crosses, rad or m.
     """
     if gap == 0.0:
         return 1.0 + 0.0j
@@ -460,20 +427,18 @@ def _play_at(c: float) -> complex:
 
 
 def _harmonic(values: np.ndarray, angles: np.ndarray) -> complex:
-    """Return the complex amplitude of sin(angle) in samples, through a Hann window, which rejects other waves."""
+    """Return the complex amplitude of sin(angle) in samples."""
     return _first(values, np.exp(-1j * angles))
 
 
 def _first(values: np.ndarray, against: np.ndarray) -> complex:
-    """Return the complex amplitude of sin(angle) in samples, where exp(-j angle) is known."""
+    """Return the complex amplitude of sin(angle), given exp(-j angle): a Hann window of sum 1 rejects other waves."""
     return complex(2j * ((_window(len(values)) * values) @ against))
 
 
 @functools.lru_cache(maxsize=64)
 def _window(count: int) -> np.ndarray:
-    """Return the Hann window, of sum 1."""
-    window = np.hanning(count)
-    return window / window.sum()
+    return np.hanning(count) / np.hanning(count).sum()
 
 
 @cfunctions.cached

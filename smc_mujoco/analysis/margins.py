@@ -1,9 +1,5 @@
 """Margins: the largest delay, disturbance, friction, mass ratio, noise and jitter that a law tolerates on a plant.
 
-    for margin in margins(["duffing"], ["observer_free", "classical"], ["delay"]):
-        print(margin.law, margin.value, margin.unit, margin.theory)
-    margins_of([smc.Scenario(plant="duffing", law=my_law)], ["noise"])        # your own law
-
 A run tolerates a level if it does not fail and its ultimate bound after 10 s is at most 5 % of its scale
 (`conventions`). Then the envelope has shrunk, as the paper's claim on delay requires, because it starts at the scale.
 The search tries up to nine levels from small to large. Then it halves the interval below the FIRST level that is not
@@ -50,6 +46,7 @@ TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bo
 VELOCITY_NOISE_RATIO = 5.0  # 1/s, noise of the velocity over that of the position: that of the study's sensor
 MAX_FORCE = 6.0  # N or N m: the study's u_max; no actuator there holds a larger force
 MAX_MASS_RATIO, MAX_NOISE = 64.0, 2.048  # mass ratio; rad or m: chosen, far above tolerated levels
+FORCES, NOISES = (tuple(largest * 2.0 ** (i - 8) for i in range(9)) for largest in (MAX_FORCE, MAX_NOISE))
 DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s
 FINE, COARSE = 0.02, 0.1  # resolution of a full and of a quick search, of the level
 QUANTA = {FINE: 1, COARSE: 5}  # the same in quanta, for levels that are multiples of one, such as control periods
@@ -64,21 +61,13 @@ Key = TypeVar("Key")
 
 @dataclasses.dataclass(kw_only=True)
 class Search:
-    """The search for the largest tolerated level below the first one that is not tolerated.
+    """The search for the largest tolerated level below the first one that is not tolerated."""
 
-    Attributes:
-      levels: levels tried first, from small to large, up to the first that is not tolerated.
-      resolution: function of the largest tolerated level that returns the interval at which the search ends.
-      rounded: function that returns the nearest level that a run can have.
-      low: largest level known to be tolerated; at first the level without any effect.
-      high: smallest level known not to be tolerated; inf until there is one.
-    """
-
-    levels: Sequence[float]
-    resolution: Callable[[float], float]
-    rounded: Callable[[float], float] = float
-    low: float = 0.0
-    high: float = math.inf
+    levels: Sequence[float]  # tried first, from small to large, up to the first that is not tolerated
+    resolution: Callable[[float], float]  # largest tolerated level -> the interval at which the search ends
+    rounded: Callable[[float], float] = float  # level -> the nearest one that a run can have
+    low: float = 0.0  # largest level known to be tolerated; at first the level without any effect
+    high: float = math.inf  # smallest level known not to be tolerated; inf until there is one
 
     @property
     def next(self) -> float | None:
@@ -100,12 +89,7 @@ class Search:
 def find_boundaries(
     searches: Mapping[Key, Search], tolerated: Callable[[list[tuple[Key, float]]], Iterable[bool]]
 ) -> None:
-    """Advance searches together until all are done.
-
-    Args:
-      tolerated: function of (key, level) pairs, one per search that continues. It returns whether each level is
-        tolerated.
-    """
+    """Advance searches together until all are done; `tolerated` judges a level of each search that continues."""
     while tried := [(key, level) for key, search in searches.items() if (level := search.next) is not None]:
         for (key, level), good in zip(tried, tolerated(tried), strict=True):
             setattr(searches[key], "low" if good else "high", level)
@@ -116,28 +100,16 @@ def find_boundaries(
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Kind:
-    """A kind of margin: something that a law tolerates up to some level.
+    """A kind of margin: something that a law tolerates up to some level."""
 
-    Attributes:
-      label: name in tables and figures.
-      unit: {x} stands for the unit of x, {u} for that of u.
-      levels: levels tried first, from small to large.
-      put: function of a scenario and a level that returns the scenario with this level.
-      none: level without any effect.
-      signed: whether a level is tolerated only if minus the level is, too.
-      quantum: function of a scenario that returns the number of which a level is a multiple; 0: any level.
-      theory: function that returns the largest level by linear theory, None if there is no theory; it may refuse the
-        plant.
-    """
-
-    label: str = ""
-    unit: str
-    levels: tuple[float, ...]
-    put: Callable[[Scenario, float], Scenario]
-    none: float = 0.0
-    signed: bool = False
-    quantum: Callable[[Scenario], float] = lambda base: 0.0
-    theory: Callable[[Scenario], float | None] = lambda base: None
+    label: str  # in tables and figures
+    unit: str  # {x} stands for the unit of x, {u} for that of u
+    levels: tuple[float, ...]  # tried first, from small to large
+    put: Callable[[Scenario, float], Scenario]  # the scenario with a level
+    none: float = 0.0  # the level without any effect
+    signed: bool = False  # whether a level is tolerated only if minus the level is, too
+    quantum: Callable[[Scenario], float] = lambda base: 0.0  # of which a level is a multiple; 0: any level
+    theory: Callable[[Scenario], float | None] = lambda base: None  # largest level by linear theory, if there is any
 
     def unit_for(self, x: str) -> str:
         """Return the unit for positions in x, "rad" or "m"."""
@@ -183,11 +155,6 @@ def tolerates(trace: Trace) -> bool:
     return all(bound(part) <= TOLERATED_ERROR * scale(part) for part in by_group(trace).values())
 
 
-def _doubling_levels(largest: float) -> tuple[float, ...]:
-    """Return nine levels, each twice the one before."""
-    return tuple(largest * 2.0 ** (i - 8) for i in range(9))
-
-
 def _critical_delay(base: Scenario) -> float | None:
     estimated = base.resolved.velocity.name != "measured"
     lam_k1 = None if base.actuator or estimated else theory.linear_gains(base.law)  # not in the theory
@@ -205,6 +172,10 @@ def _with_mass(base: Scenario, level: float) -> Scenario:
     return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level})
 
 
+def _with_noise(base: Scenario, level: float) -> Scenario:
+    return dataclasses.replace(base, noise=Noise(position=level, velocity=VELOCITY_NOISE_RATIO * level))
+
+
 MARGIN_KINDS: dict[str, Kind] = {
     "delay": Kind(
         label="input delay",
@@ -217,14 +188,12 @@ MARGIN_KINDS: dict[str, Kind] = {
     "disturbance": Kind(
         label="constant disturbance",
         unit="{u}",
-        levels=_doubling_levels(MAX_FORCE),
+        levels=FORCES,
         put=lambda base, level: dataclasses.replace(base, disturbance=(*base.disturbance, Constant(level))),
         signed=True,
         theory=_tolerated_force,
     ),
-    "friction": Kind(
-        label="dry friction", unit="{u}", levels=_doubling_levels(MAX_FORCE), put=with_friction, theory=_tolerated_force
-    ),
+    "friction": Kind(label="dry friction", unit="{u}", levels=FORCES, put=with_friction, theory=_tolerated_force),
     "mass": Kind(
         label="mass",
         unit="1",
@@ -235,7 +204,7 @@ MARGIN_KINDS: dict[str, Kind] = {
     "noise": Kind(
         label="position noise",
         unit="{x}",
-        levels=_doubling_levels(MAX_NOISE),
+        levels=NOISES,
         put=lambda base, level: dataclasses.replace(
             base, noise=Noise(position=level, velocity=VELOCITY_NOISE_RATIO * level)
         ),
@@ -262,27 +231,16 @@ KINDS = ("delay", "disturbance", "friction", "mass", "noise")  # those of the re
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Margin:
-    """The largest level of one kind that one law tolerates on one plant.
+    """The largest level of one kind that one law tolerates on one plant."""
 
-    Attributes:
-      plant, law: their names.
-      kind: one of MARGIN_KINDS.
-      value: largest tolerated level below the first one tried that is not. NaN if the run without it fails already. If
-        equal to `searched`, all that were tried are tolerated.
-      unit: unit of value, resolution, searched and theory.
-      resolution: a level that is not tolerated is at most this much larger.
-      searched: largest level of the search.
-      theory: the margin by linear theory, or None.
-    """
-
-    plant: str
-    law: str
-    kind: str
-    value: float
-    unit: str
-    resolution: float
-    searched: float
-    theory: float | None
+    plant: str  # its name
+    law: str  # its name
+    kind: str  # one of MARGIN_KINDS
+    value: float  # largest tolerated level below the first one tried that is not; NaN if the run without it fails
+    unit: str  # of value, resolution, searched and theory
+    resolution: float  # a level that is not tolerated is at most this much larger
+    searched: float  # largest level of the search; if it is the value, all that were tried are tolerated
+    theory: float | None  # the margin by linear theory
 
     @property
     def open(self) -> bool:
@@ -339,15 +297,8 @@ def margins_of(
     threads: int | None = None,
     report: Report = lambda done, whole: None,
 ) -> list[Margin]:
-    """Return the margins of any scenarios. A search changes nothing but its level.
-
-    Args:
-      resolution: FINE or COARSE. The other arguments are as in `margins`.
-    """
-    for kind in kinds:
-        find("kind of margin", kind, MARGIN_KINDS)
-    find("resolution", str(resolution), {str(known): known for known in QUANTA})
-    cells = [(base, MARGIN_KINDS[kind]) for base in bases for kind in kinds]
+    """Return the margins of any scenarios, as `margins` does; the resolution is FINE or COARSE."""
+    cells = [(base, find("kind of margin", kind, MARGIN_KINDS)) for base in bases for kind in kinds]
     searches = [kind.search(base, resolution) for base, kind in cells]
     going = dict(enumerate(searches))
     done = 0
@@ -389,10 +340,6 @@ def save(margins: Sequence[Margin], path: str | os.PathLike[str]) -> Path:
 
 
 def load(path: str | os.PathLike[str]) -> list[Margin]:
-    """Read the margins that `save` wrote.
-
-    Raises:
-      ScenarioError: no such file, or not a file of margins.
-    """
+    """Read the margins that `save` wrote."""
     with reading(path, "file of margins", "give a .json file that margins.save wrote") as file:
         return [Margin(**entry) for entry in read_json(file)]

@@ -1,10 +1,5 @@
 """Regions of attraction: from which initial states (x, v) a law brings a plant to rest at its reference.
 
-    region = basin("inverted_pendulum", "observer_free", points=(50, 50))
-    region.share                                            # of the states that converge, 0 to 1
-    basin_of(smc.Scenario(plant="duffing", law=my_law), x, v)     # your own law
-    region.save("map.json"); load("map.json")
-
 All channels of a network start from the same state. x is not wrapped: a pendulum at rest a turn away has not converged.
 
 The rule. X and V are the largest |x| and |v| of the grid, and e = x - r is the error. A run is in the band while
@@ -66,27 +61,17 @@ CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Basin:
-    """The outcome of every initial state of a grid.
+    """The outcome of every initial state of a grid."""
 
-    Attributes:
-      plant, law: their names.
-      x, v: the grid's positions (nx,) and velocities (nv,), in the plant's unit and per second.
-      outcome: 1 converges, 0 undecided, -1 does not, (nv, nx) int8.
-      decided_at: duration of the run that decided, s, (nv, nx); the whole duration if undecided.
-      unit: of x, "rad" or "m".
-      duration: s, of the longest runs.
-      source: where the law's gains come from, a kind of `control.source`.
-    """
-
-    plant: str
-    law: str
-    x: np.ndarray
-    v: np.ndarray
-    outcome: np.ndarray
-    decided_at: np.ndarray
-    unit: str
-    duration: float
-    source: str = NONE
+    plant: str  # its name
+    law: str  # its name
+    x: np.ndarray  # (nx,), positions of the grid, in the plant's unit
+    v: np.ndarray  # (nv,), velocities of the grid, per second
+    outcome: np.ndarray  # (nv, nx) int8: 1 converges, 0 undecided, -1 does not
+    decided_at: np.ndarray  # (nv, nx), duration of the run that decided, s; the whole duration if undecided
+    unit: str  # of x, "rad" or "m"
+    duration: float  # s, of the longest runs
+    source: str = NONE  # where the law's gains come from, a kind of `control.source`
 
     @property
     def share(self) -> float:
@@ -152,28 +137,17 @@ def basin_of(
     report: Report = lambda done, needed: None,
     early: bool = True,
 ) -> Basin:
-    """Map the region of attraction of any scenario. Its runs differ only in their initial state.
-
-    Args:
-      early: whether to decide states early; False runs all of them to the end. The other arguments are as in `basin`.
-
-    Raises:
-      ScenarioError: channels with different units, a reference that moves, an empty grid, or a duration too short for
-        the rule.
-    """
+    """Map the region of attraction of any scenario as `basin` does; unless `early`, all states run to the end."""
     if base.plant.mixed:
-        raise ScenarioError(
-            f"{base.plant.name} has channels in m and rad, which cannot start from the same state: map another plant"
-        )
+        words = "has channels in m and rad, which cannot start from the same state: map another plant"
+        raise ScenarioError(f"{base.plant.name} {words}")
     if moving := [one for one in base.references if not isinstance(one, Constant)]:
         raise ScenarioError(f"a map shows what comes to rest, and {shown(moving[0])} moves: give a constant reference")
     horizons = HORIZONS if early else HORIZONS[-1:]
     shortest = math.ceil(MIN_SAMPLES / horizons[0])
     if base.samples < shortest:
-        raise ScenarioError(
-            f"duration {base.duration:g} s is too short to tell what comes to rest: "
-            f"give at least {shortest * base.control_period:g} s"
-        )
+        cure = f"give at least {shortest * base.control_period:g} s"
+        raise ScenarioError(f"duration {base.duration:g} s is too short to tell what comes to rest: {cure}")
     x, v = _axis("x", x), _axis("v", v)
     outcome = np.full((v.size, x.size), UNDECIDED, np.int8)
     decided_at = np.full(outcome.shape, base.duration)
@@ -238,11 +212,7 @@ def _approaches(squares: np.ndarray) -> bool:
 
 
 def load(path: str | os.PathLike[str]) -> Basin:
-    """Read the map that `Basin.save` wrote.
-
-    Raises:
-      ScenarioError: no such file, or not a map.
-    """
+    """Read the map that `Basin.save` wrote."""
     kinds = {"x": float, "v": float, "decided_at": float, "outcome": np.int8}
     with reading(path, "map", "give a .json file that Basin.save wrote") as file:
         fields: dict[str, Any] = read_json(file)

@@ -1,8 +1,4 @@
-"""The linear model of a mechanism: A and B of its rates, from MuJoCo.
-
-G = smc.state_space("cart_pole")        # a control.StateSpace, u -> positions of the channels
-gain, *_ = control.lqr(G, Q, R)
-"""
+"""The linear model of a mechanism: A and B of its rates, from MuJoCo."""
 
 from typing import TYPE_CHECKING
 
@@ -69,11 +65,7 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
 
 
 def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: np.ndarray, name: str) -> None:
-    """Set the commands that hold a mechanism at rest.
-
-    Raises:
-      ScenarioError: there are none.
-    """
+    """Set the commands that hold a mechanism at rest; raise ScenarioError if there are none."""
     b = rates(model, data)[model.nv : 2 * model.nv, 2 * model.nv + model.na :][:, driven]
     mujoco.mj_forward(model, data)
     data.ctrl[driven] -= np.linalg.lstsq(b, data.qacc)[0]
@@ -86,8 +78,7 @@ def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: np.ndarray, name: 
 def rates(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     """Return the derivatives of the rates of positions, velocities and activations, linearised at `data`.
 
-    Returns:
-      Rows: those rates; columns: positions, velocities, activations, commands. Rows of the commands are 0.
+    They are rows; columns are positions, velocities, activations and commands. Rows of the commands are 0.
     """
     nv, n, step = model.nv, 2 * model.nv + model.na, float(model.opt.timestep)
     point = data.qpos.copy(), data.qvel.copy(), data.act.copy(), data.ctrl.copy()

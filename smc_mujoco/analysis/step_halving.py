@@ -1,8 +1,6 @@
 """Whether the chattering of a run is the machine's: the same runs with half the physics step.
 
-    changes = smc.step_halving([trace])       # one StepChange for each trace
-    changes[0].marked                         # True: half the step changes amplitude or frequency by more than 10 %
-
+True in `smc.step_halving([trace])[0].marked` says that half the step changes amplitude or frequency by more than 10 %.
 It costs one more run of twice the steps for each trace. Nothing is run unless this is called.
 """
 
@@ -26,12 +24,7 @@ UNTRIED = (
 
 @dataclasses.dataclass(frozen=True)
 class StepChange:
-    """What half the physics step changes in the limit cycle of s of a run.
-
-    Attributes:
-      amplitude, frequency: relative changes; 0 if there is no limit cycle with either step, and inf if there is one
-        with only one of them.
-    """
+    """What half the physics step changes in the limit cycle of s of a run, relative; inf if one step has no cycle."""
 
     amplitude: float
     frequency: float
@@ -52,11 +45,6 @@ def depends_on_step(scenario: Scenario) -> bool:
     return scenario.resolved.integrator != "RK4"
 
 
-def halved(scenario: Scenario) -> Scenario:
-    """Return the scenario with half the physics step."""
-    return dataclasses.replace(scenario, physics_step=0.5 * scenario.resolved.physics_step)
-
-
 def step_halving(traces: Sequence[Trace], channel: int | None = None, threads: int | None = None) -> list[StepChange]:
     """Return what half the physics step changes in the limit cycles of runs.
 
@@ -65,7 +53,9 @@ def step_halving(traces: Sequence[Trace], channel: int | None = None, threads: i
       channel: whose s is compared. Default: the one with the largest limit cycle.
       threads: as in `run`.
     """
-    again = run([halved(trace.scenario) for trace in traces], threads=threads)
+    scenarios = [trace.scenario for trace in traces]
+    halved = [dataclasses.replace(one, physics_step=0.5 * one.resolved.physics_step) for one in scenarios]
+    again = run(halved, threads=threads)
 
     def cycle(trace: Trace) -> tuple[float, float]:
         return largest_cycle(trace) if channel is None else channel_cycle(trace, channel)

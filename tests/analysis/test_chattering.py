@@ -265,7 +265,7 @@ def test_an_estimator_of_the_velocity_is_in_the_prediction():
 def test_a_relay_without_an_actuator_chatters_from_sample_to_sample():
     scenario = smc.Scenario(plant="inverted_pendulum", law="power_rate", actuator=smc.DCMotor(), x0=0.02, duration=3.0)
     cycle = chattering(scenario)
-    assert cycle.samples == pytest.approx(2.0)
+    assert cycle.frequency * scenario.control_period == pytest.approx(0.5)
     assert cycle.amplitude == pytest.approx(measured(smc.run(scenario))[0], rel=0.02)
 
 
@@ -331,7 +331,7 @@ def test_what_a_prediction_leaves_out_is_said(snapshot):
 def test_a_file_of_predictions_has_what_was_predicted_and_measured(tmp_path, snapshot):
     run = smc.Scenario(plant="duffing", law=smc.law("classical", k=2.0, c=3.0))
     sure = Chattering(
-        amplitude=0.5, amplitude_x=0.1, amplitude_u=2.0, frequency=20.0, power=3.0, third_harmonic=0.01, samples=50.0,
+        amplitude=0.5, amplitude_x=0.1, amplitude_u=2.0, frequency=20.0, power=3.0, third_harmonic=0.01,
         amplitude_range=(0.25, 0.6), frequency_range=(18.0, 21.0), coupling=0.0, gain=1.0 - 2.0j, response=0.25 + 0.5j,
         assumptions=("about rest",),
     )  # fmt: skip

@@ -32,7 +32,7 @@ def found():
 
 
 def kind_of(put, levels=(1.0, 2.0, 4.0), none=0.0):
-    return margins.Kind(unit="{u}", levels=levels, put=put, none=none)
+    return margins.Kind(label="push", unit="{u}", levels=levels, put=put, none=none)
 
 
 def pushed(level):

@@ -44,28 +44,16 @@ FAILURE_COST = 1e9  # s^2; larger ITAE / |x0| count as this, which needs |x0| < 
 class Objective:
     """J as data. Tunings can be compared only if their objectives are equal.
 
-    Attributes:
-      conditions: names, or your own conditions; each is one run of a candidate.
-      starts: initial states of the runs, see `smc.starts`.
-      weight: w, s^3.
-      duration: of a run, s.
-      control_period: s.
-      chattering: largest predicted amplitude of the limit cycle of s of the first channel, in its unit, in the first
-        condition, see `smc.chattering`. Gains that exceed it cost more than any others. None: chattering costs its
-        variation only.
-      u_max: bound on |u|, the same for every law, N or N m. Default, as in a grid: 6, or for your own model the limit
-        of its strongest motor.
-
-    Raises:
-      ScenarioError: an unknown condition, or a number out of range.
+    `chattering` is the largest predicted amplitude of the limit cycle of s of the first channel, in its unit, in the
+    first condition, see `smc.chattering`. None: chattering costs its variation only.
     """
 
-    conditions: tuple[Condition, ...] = CONDITIONS
-    starts: Starts = DEFAULT_STARTS
-    weight: float = 1e-3
-    duration: float = DURATION
-    control_period: float = CONTROL_PERIOD
-    u_max: float | None = None
+    conditions: tuple[Condition, ...] = CONDITIONS  # names, or your own; each is one run of a candidate
+    starts: Starts = DEFAULT_STARTS  # initial states of the runs
+    weight: float = 1e-3  # w, s^3
+    duration: float = DURATION  # of a run, s
+    control_period: float = CONTROL_PERIOD  # s
+    u_max: float | None = None  # bound on |u|, the same for every law, N or N m; default: as in a grid
     chattering: float | None = None
 
     def __post_init__(self):
@@ -92,11 +80,7 @@ class Objective:
         return values | {"conditions": list(map(str, self.conditions)), "starts": dataclasses.asdict(self.starts)}
 
     def scenarios(self, plant: Plant | str, law: Component, seed: int) -> list[Scenario]:
-        """Return one run for each condition. Every candidate gets the same initial states and the same noise.
-
-        Raises:
-          ScenarioError: a condition in which the plant starts at 0.
-        """
+        """Return one run for each condition. Every candidate gets the same initial states and the same noise."""
         common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
         first = Scenario(plant=plant, law=law, **common)
         fields = [one.on(first.plant, self.duration) for one in self.conditions]
@@ -125,21 +109,16 @@ class Objective:
         return tracking, metrics.tv(trace) / (bound * self.duration)
 
     def excess(self, case: Scenario) -> float:
-        """Return what predicted chattering costs, s^2: 0 up to the bound, above it in proportion to the amplitude.
-
-        Where a limit cycle is possible though none is predicted, its largest possible amplitude counts.
-        """
+        """Return what predicted chattering costs, s^2: 0 up to the bound, above it in proportion to the amplitude."""
         if self.chattering is None:
             return 0.0
         from smc_mujoco.analysis.chattering import predict
 
         cycle = predict(case, ranges=False)
-        amplitude = cycle.amplitude if cycle else cycle.amplitude_range[1]
-        return (
-            2.0 * FAILURE_COST * len(self.conditions) * amplitude / self.chattering
-            if amplitude > self.chattering
-            else 0.0
-        )
+        amplitude = cycle.amplitude if cycle else cycle.amplitude_range[1]  # the largest possible if none is predicted
+        if not amplitude > self.chattering:
+            return 0.0
+        return 2.0 * FAILURE_COST * len(self.conditions) * amplitude / self.chattering
 
 
 def restore(data: Mapping[str, Any]) -> Objective:

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +12,6 @@ import numpy as np
 
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, restore
 from smc_mujoco.analysis.tuning.search_space import (
-    HALF_WIDTH,
     ROUNDING_TOLERANCE,
     Box,
     actuator_limits,
@@ -20,9 +19,10 @@ from smc_mujoco.analysis.tuning.search_space import (
     box,
     without_unit,
 )
-from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.tabular import Tables, Tabular
+from smc_mujoco.common.text import counted
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component
@@ -58,41 +58,23 @@ class Evaluation(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True, repr=False)
 class Tuned(Tables):
-    """A law's best gains, and how they were tuned.
+    """A law's best gains, and how they were tuned."""
 
-    Attributes:
-      law: the law with the best gains.
-      objective: their objective J, s^2.
-      history: the accurate evaluations of the search, in order.
-      screened: number of cheap evaluations, with which starts were chosen.
-      ends: best J of each start, s^2.
-      before: J of the law's original gains, which the search does not use, s^2.
-      plant: the plant.
-      definition: the objective, with its conditions and u_max.
-      rule: the search, in words.
-      budget: largest number of sets of gains that could be evaluated.
-      seed: seed of search and noise.
-      scales: the plant's X, F, M and T, SI units.
-      bounds: gain -> lowest, highest, by the rule; starts are drawn from this box.
-      searched: the wider bounds of the search, up to a decade beyond the box.
-      versions: versions of the packages that the numbers depend on.
-    """
-
-    law: Component
-    objective: float
-    history: tuple[Evaluation, ...]
-    screened: int
-    ends: tuple[float, ...]
-    before: float
+    law: Component  # with the best gains
+    objective: float  # their objective J, s^2
+    history: tuple[Evaluation, ...]  # the accurate evaluations of the search, in order
+    screened: int  # number of cheap evaluations, with which starts were chosen
+    ends: tuple[float, ...]  # best J of each start, s^2
+    before: float  # J of the law's original gains, which the search does not use, s^2
     plant: Plant
-    definition: Objective
-    rule: str
-    budget: int
-    seed: int
-    scales: dict[str, float]
-    bounds: Box
-    searched: Box
-    versions: dict[str, str]
+    definition: Objective  # with its conditions and u_max
+    rule: str  # the search, in words
+    budget: int  # largest number of sets of gains that could be evaluated
+    seed: int  # of search and noise
+    scales: dict[str, float]  # the plant's X, F, M and T, SI units
+    bounds: Box  # gain -> lowest, highest, by the rule; starts are drawn from this box
+    searched: Box  # the wider bounds of the search, up to a decade beyond the box
+    versions: dict[str, str]  # of the packages that the numbers depend on
 
     def __repr__(self) -> str:
         return f"Tuned({self.plant.name}, {self.law}, objective={self.objective:.4g}, {self.verdict})"
@@ -102,24 +84,21 @@ class Tuned(Tables):
         """One table, a line for each gain: its value, the bounds of its search, and whether it is at one of them."""
         rows = []
         for name, (low, high) in self.searched.items():
-            remarks = [f"at its {self.at_bound[name]} bound"] if name in self.at_bound else []
-            remarks += ["beyond the box of the starts"] if name in self.beyond_box else []
-            rows.append((name, f"{self.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", ", ".join(remarks)))
+            remark = f"at its {self.at_bound[name]} bound" if name in self.at_bound else ""
+            rows.append((name, f"{self.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", remark))
         notes = (
             str(self.definition),
-            f"{self.verdict}; {len(self.near_optimal)} near-optimal set{'s' * (len(self.near_optimal) > 1)}",
+            f"{self.verdict}; {counted(len(near_optimal(self.history)), 'near-optimal set')}",
             f"objective {self.objective:.4g} s², with the law's own gains {self.before:.4g} s²; "
-            f"{self.evaluations} set{'s' * (self.evaluations > 1)} of gains, seed {self.seed}",
+            f"{counted(self.evaluations, 'set')} of gains, seed {self.seed}",
         )
         return [Tabular(headings=HEADINGS, rows=rows, title=f"{self.law.name} on {self.plant.name}", notes=notes)]
 
     def sourced(self) -> "Tuned":
         """Return the tuning with a law that names this search as the source of its gains."""
+        about_defaults = bool(without_unit(self.law))
         search = source.Search(
-            rule=self.rule,
-            evaluations=self.evaluations,
-            converged=self.converged,
-            about_defaults=bool(without_unit(self.law)),
+            rule=self.rule, evaluations=self.evaluations, converged=self.converged, about_defaults=about_defaults
         )
         return dataclasses.replace(self, law=self.law.sourced(source.TUNED, search))
 
@@ -131,23 +110,11 @@ class Tuned(Tables):
     @property
     def at_bound(self) -> dict[str, str]:
         """Gain -> "lower" or "upper", if it is within 2 % of a bound of the search, or at the actuator's limit."""
-        return at_bound(self.gains, self.searched) | {
-            name: "upper"
-            for name, limit in self._actuator_limits.items()
-            if self.gains[name] >= limit * (1.0 - ROUNDING_TOLERANCE)
-        }
-
-    @property
-    def _actuator_limits(self) -> dict[str, float]:
-        """The actuator's limit on gains that the law divides by another one."""
-        u_max = self.definition.u_max
-        limits = actuator_limits(self.law, self.law.gains, math.inf if u_max is None else u_max)
-        return {name: limit for name, limit in limits.items() if name in self.bounds}
-
-    @property
-    def beyond_box(self) -> list[str]:
-        """Gains outside the box from which starts are drawn."""
-        return [name for name, (low, high) in self.bounds.items() if not low <= self.gains[name] <= high]
+        u_max = math.inf if self.definition.u_max is None else self.definition.u_max
+        limits = actuator_limits(self.law, self.law.gains, u_max)
+        tight = 1.0 - ROUNDING_TOLERANCE
+        full = {name: "upper" for name, gain in self.gains.items() if gain >= limits.get(name, math.inf) * tight}
+        return at_bound(self.gains, self.searched) | full
 
     @property
     def evaluations(self) -> int:
@@ -170,18 +137,13 @@ class Tuned(Tables):
         return f"{'converged' if self.converged else 'not converged'}: {ended}"
 
     @property
-    def near_optimal(self) -> list[Evaluation]:
-        """Every evaluation within 3 % of the best J, best first."""
-        return near_optimal(self.history)
-
-    @property
     def sets(self) -> list[Evaluation]:
         """24, 12, 6, 3 or 1 near-optimal evaluations, whose gains runs use in turn: the best, then the others.
 
         They cover the near-optimal gains: each is the one that is farthest, in log gains, from those taken before.
         Then those after the best are shuffled, so that the first few are not the most extreme ones.
         """
-        near = self.near_optimal
+        near = near_optimal(self.history)
         logs = np.log10([one.gains for one in near])
         taken, distances = [0], np.linalg.norm(logs - logs[0], axis=1)
         while len(taken) < next(count for count in SET_COUNTS if count <= len(near)):
@@ -232,11 +194,7 @@ class Tuned(Tables):
 
 
 def load(path: str | os.PathLike[str]) -> Tuned:
-    """Read the tuning that `Tuned.save` wrote.
-
-    Raises:
-      ScenarioError: no such file, or not a tuning.
-    """
+    """Read the tuning that `Tuned.save` wrote."""
     with reading(path, "tuning", "give a .json file that Tuned.save wrote") as file:
         data = read_json(file)
         scenario = serialise.restore(data["scenario"])
@@ -273,49 +231,24 @@ def near_optimal(history: Sequence[Evaluation]) -> list[Evaluation]:
 
 
 def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
-    """Return the tunings, best first, if all were made in the same way.
-
-    Raises:
-      ScenarioError: one has another rule, plant, objective, budget, seed, versions or width of bounds than the first,
-        or spent more than its budget.
-    """
-    tuned = list(tuned)
-    if not tuned or not all(isinstance(one, Tuned) for one in tuned):
-        raise ScenarioError(f"cannot compare {shown(tuned)}: give a list of tunings")
-    first = tuned[0]
+    """Return the tunings, best first. Raise ScenarioError unless all were made in the same way, by the rule."""
+    if not tuned:
+        raise ScenarioError("cannot compare []: give a list of tunings")
     for one in tuned:
-        if difference := next(_differences(one, first), ""):
-            raise ScenarioError(f"laws tuned {difference}: tune them in the same way")
+        law, cannot = one.law.name, "cannot be compared"
+        for field in COMPARED_FIELDS:
+            if (value := getattr(one, field)) != (other := getattr(tuned[0], field)):
+                name = field.replace("definition", "objective")
+                words = f"unequal {name} {cannot}, {law} has {value}, {tuned[0].law.name} {other}"
+                raise ScenarioError(f"laws tuned with {words}: tune them in the same way")
+        if one.evaluations > one.budget:
+            words = f"more than their budget {cannot}, {law} evaluated {one.evaluations} of {one.budget}"
+            raise ScenarioError(f"laws tuned with {words}: tune them in the same way")
+        for gain, ends in box(one.law, one.scales).items() if one.law.template else ():  # of a law that is known here
+            if not np.allclose(one.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
+                words = f"{cannot}, {law}'s {gain} was searched in {one.bounds.get(gain)}, not in {ends}"
+                raise ScenarioError(f"laws tuned within unequal bounds {words}: tune them in the same way")
     return sorted(tuned, key=lambda one: one.objective)
-
-
-def _differences(tuned: Tuned, first: Tuned) -> Iterator[str]:
-    """Yield in what a tuning was not made as the first one, or as the rule says, in words."""
-    law, cannot = tuned.law.name, "cannot be compared"
-    for field in COMPARED_FIELDS:
-        if (value := getattr(tuned, field)) != (other := getattr(first, field)):
-            name = field.replace("definition", "objective")
-            yield f"with unequal {name} {cannot}, {law} has {value}, {first.law.name} {other}"
-    if tuned.evaluations > tuned.budget:
-        yield f"with more than their budget {cannot}, {law} evaluated {tuned.evaluations} of {tuned.budget}"
-    for gain, ends in _bounds(tuned).items():
-        if not np.allclose(tuned.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
-            where = f"{law}'s {gain} was searched in {tuned.bounds.get(gain)}, not in {ends}"
-            yield f"within unequal bounds {cannot}, {where}"
-    for gain, limit in tuned._actuator_limits.items():
-        if (value := tuned.gains[gain]) > limit * (1.0 + ROUNDING_TOLERANCE):
-            yield f"beyond their actuator {cannot}, {law}'s {gain} is {value:g}, and its actuator gives {limit:g}"
-
-
-def _bounds(tuned: Tuned) -> Box:
-    """Return the bounds by the rule. For a law that cannot be loaded here, only their width is checked."""
-    if tuned.law.template:
-        return box(tuned.law, tuned.scales)
-    one_sided = 10.0**HALF_WIDTH  # of a force, which is searched up to u_max
-    return {
-        gain: (low, low * (one_sided if high / low < 2.0 * one_sided else one_sided**2))
-        for gain, (low, high) in tuned.bounds.items()
-    }
 
 
 def versions() -> dict[str, str]:

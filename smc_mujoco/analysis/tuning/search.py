@@ -1,9 +1,5 @@
 """Gains by one rule for every law: same actuator bound, objective, budget and search space.
 
-    tuned = tune("duffing", "classical", seed=0)                 # Tuned(law, objective, history)
-    tuned.save("duffing-classical.json")
-    compare([tuned, tune("duffing", "observer_free")])           # best first; refuses tunings made in different ways
-
 The search has several starts, each independent of the others and of gains that someone tuned before. A start has 64
 evaluations for each gain:
 
@@ -31,6 +27,7 @@ a shorter one. `objective` defines what is minimised.
 import dataclasses
 import warnings
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -148,38 +145,25 @@ def tune(
         ledger = _Ledger(goal, cases, tuple(box), bound, budget, threads, progress_bar.advance)
         searched = search_space.widened(law, box)
         ends = _search(ledger, box, searched, seed, failure)
-    tuned = _result(ledger, ends, before, seed, scales, box, searched)
+    tuned = _result(ledger, ends=ends, before=before, seed=seed, scales=scales, bounds=box, searched=searched)
     _warn_of_result(tuned, chatters=bool(ledger.excess(tuple(tuned.gains.values()))))
     return tuned.sourced()
 
 
-def _result(
-    ledger: "_Ledger",
-    ends: tuple[float, ...],
-    before: float,
-    seed: int,
-    scales: dict[str, float],
-    box: Box,
-    searched: Box,
-) -> Tuned:
-    """Return the result of a search whose evaluations are in the ledger."""
+def _result(ledger: "_Ledger", **fields: Any) -> Tuned:
+    """Return the result of a search whose evaluations are in the ledger, with its other fields."""
     best, case = min(ledger.evaluations, key=lambda e: e.objective), ledger.cases[0]
     return Tuned(
         law=_with_gains(case.law, ledger.names, best.gains),
         objective=best.objective,
         history=tuple(ledger.evaluations),
         screened=ledger.screened,
-        ends=ends,
-        before=before,
         plant=case.plant,
         definition=ledger.goal,
         rule=RULE,
         budget=ledger.budget,
-        seed=seed,
-        scales=scales,
-        bounds=box,
-        searched=searched,
         versions=versions(),
+        **fields,
     )
 
 
@@ -187,15 +171,11 @@ def _warn_of_result(tuned: Tuned, chatters: bool) -> None:
     """Warn if a search ends with gains that are worse than the law's own, or chatter more than is wanted."""
     tried = f"tried for {tuned.law.name} on {tuned.plant.name}"
     if tuned.objective > tuned.before:
-        _warn(
-            f"no set of gains {tried} is better than the law's own, with an objective of {tuned.objective:.3g} s² "
-            f"instead of {tuned.before:.3g} s²: give a larger budget"
-        )
+        values = f"an objective of {tuned.objective:.3g} s² instead of {tuned.before:.3g} s²"
+        _warn(f"no set of gains {tried} is better than the law's own, with {values}: give a larger budget")
     if chatters:
-        _warn(
-            f"all gains {tried} are predicted to chatter with more than {tuned.definition.chattering:g}: give a larger "
-            "budget, or a larger chattering"
-        )
+        words = f"to chatter with more than {tuned.definition.chattering:g}"
+        _warn(f"all gains {tried} are predicted {words}: give a larger budget, or a larger chattering")
 
 
 def _failure_of_law(traces: Sequence[Trace]) -> str:
@@ -216,10 +196,8 @@ def _without_unit_warning(law: Component) -> str:
     """Return the warning of a law with gains of unknown unit, which are searched about their defaults."""
     names = list(search_space.without_unit(law))
     have, whose = ("have", "their defaults") if len(names) > 1 else ("has", "its default")
-    return (
-        f"{law.name}'s {joined(names)} {have} no unit, and so a search about {whose} in place of the rule of all laws: "
-        + unit_cure(names[0], law.gains[names[0]])
-    )
+    search = f"no unit, and so a search about {whose} in place of the rule of all laws"
+    return f"{law.name}'s {joined(names)} {have} {search}: {unit_cure(names[0], law.gains[names[0]])}"
 
 
 @dataclasses.dataclass
@@ -281,10 +259,8 @@ class _Ledger:
     def excess(self, gains: tuple[float, ...]) -> float:
         """Return what a candidate's predicted chattering costs, s^2. Each candidate is predicted once."""
         if gains not in self.excesses:
-            case = self.cases[0]
-            self.excesses[gains] = self.goal.excess(
-                dataclasses.replace(case, law=_with_gains(case.law, self.names, gains))
-            )
+            law = _with_gains(self.cases[0].law, self.names, gains)
+            self.excesses[gains] = self.goal.excess(dataclasses.replace(self.cases[0], law=law))
         return self.excesses[gains]
 
 
@@ -303,15 +279,10 @@ def _with_gains(law: Component, names: Sequence[str], values: Sequence[float]) -
 
 
 def _search(ledger: _Ledger, box: Box, searched: Box, seed: int, failure: str) -> tuple[float, ...]:
-    """Make starts until they have converged or the budget is spent, and return the best J of each, s^2.
+    """Make starts in a box until they have converged or the budget is spent, and return the best J of each, s^2.
 
-    Bad gains may make the numbers of a law overflow, and others may cure that. So a law that fails with its own gains
-    is refused only after a whole start in which every run fails.
-
-    Args:
-      box: from which starts are drawn.
-      searched: the wider box in which they go on.
-      failure: how the law fails in every run with its own gains; "" if it does not.
+    Bad gains may make the numbers of a law overflow, and others may cure that. So a law whose own gains fail in every
+    run is refused, with this failure, only after a whole start in which every run fails.
     """
     ends: list[float] = []
     whole_start = EVALUATIONS_PER_GAIN * len(box)

@@ -14,13 +14,11 @@ for the b of each candidate. The law declares this with `Gain(2.0, ACCELERATION,
 divides by the plant's g instead, and its k is declared as a force. Gains k and b are tuned without the model: with it,
 the force k / g may be larger than u_max where g is less than b.
 
-A law declares the unit of each gain, and which gains the search leaves as they are. A gain of unknown unit is searched
-over as many decades about its default:
+A law declares the unit of each gain, and which gains the search leaves as they are: initial values, exponents, table
+sizes, a plant's parameters, filters and number formats of a processor. A gain of unknown unit is searched over as many
+decades about its default:
 
     @smc.law_function(gains={"lam": Gain(6.0, FORCE), "k1": Gain(2.5, RATE), "order": Gain(2.0, held=True)})
-
-The search leaves initial values, exponents, table sizes, a plant's parameters, filters and number formats of a
-processor as they are. If an exponent is a gain, the unit of the factor before the power is a function of the gains.
 
 With these units a law behaves the same in every system of units (tests/analysis/tuning/test_search_space.py). Some laws
 contain a number with a unit, such as the width 1 of tanh(s): their gains have the units that leave this number
@@ -55,11 +53,7 @@ def _gain(law: Component, name: str) -> Gain:
 
 
 def unit(law: Component, name: str) -> Unit | None:
-    """Return the unit of a law's gain; None for a gain that is not searched and has none.
-
-    Raises:
-      ScenarioError: the unit is not known.
-    """
+    """Return the unit of a law's gain; None for a gain that is not searched and has none."""
     gain = _gain(law, name)
     if gain.unit is None and not gain.held:
         raise ScenarioError(f"tuning knows no unit of {law.name}'s gain {name!r}: {unit_cure(name, gain.default)}")
@@ -79,14 +73,9 @@ def unit_size(law: Component, name: str, scales: Mapping[str, float]) -> float:
 
 
 def scales(plant: Plant, u_max: float, with_model: bool, reach: float | None = None) -> dict[str, float]:
-    """Return the plant's X, F, M and T in SI units.
+    """Return the plant's X, F, M and T in SI units, for a law with or without the nominal model.
 
-    Args:
-      with_model: whether the law has the nominal model; then F is an acceleration.
-      reach: X, rad or m. Default: max |x0| of the plant.
-
-    Raises:
-      ScenarioError: x0 is 0, g is not positive, channels have different units, or a joint has no actuator.
+    `reach` is X, rad or m. Default: max |x0| of the plant.
     """
     if plant.unscaled:
         raise ScenarioError(f"cannot tune on {plant.name}: {plant.unscaled}")
@@ -101,11 +90,7 @@ def scales(plant: Plant, u_max: float, with_model: bool, reach: float | None = N
 
 
 def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Return gain -> lowest and highest start of the search, for all gains of a law that are searched.
-
-    Raises:
-      ScenarioError: a gain of unknown unit whose default is not positive, or no gain to tune.
-    """
+    """Return gain -> lowest and highest start of the search, for all gains of a law that are searched."""
     bounds = {}
     if not law.uniform:
         raise ScenarioError(f"tuning needs gains that all channels share, not {law}: give one number for each gain")
