@@ -78,10 +78,10 @@ from smc_mujoco.metrics.catalogue import score as score
 from smc_mujoco.metrics.catalogue import scores as scores
 from smc_mujoco.metrics.tip import joint_scores as joint_scores
 from smc_mujoco.metrics.tip import tip_scores as tip_scores
-from smc_mujoco.simulation.clock import Clock as Clock
 from smc_mujoco.simulation.conditions import condition as condition
 from smc_mujoco.simulation.grid import grid as grid
 from smc_mujoco.simulation.initial_states import starts as starts
+from smc_mujoco.simulation.perturbations import Clock as Clock
 from smc_mujoco.simulation.perturbations import Jump as Jump
 from smc_mujoco.simulation.perturbations import Noise as Noise
 from smc_mujoco.simulation.run import PlainLoopWarning as PlainLoopWarning
@@ -103,10 +103,10 @@ from smc_mujoco.simulation.signals import Sine as Sine
 from smc_mujoco.simulation.signals import Step as Step
 from smc_mujoco.simulation.time_series import Held as Held
 from smc_mujoco.simulation.time_series import TimeSeries as TimeSeries
+from smc_mujoco.simulation.time_series import Waypoints as Waypoints
+from smc_mujoco.simulation.time_series import cartesian_path as cartesian_path
 from smc_mujoco.simulation.trace import Trace as Trace
 from smc_mujoco.simulation.trace import load as load
-from smc_mujoco.simulation.waypoints import Waypoints as Waypoints
-from smc_mujoco.simulation.waypoints import cartesian_path as cartesian_path
 from smc_mujoco.studies.adviser import which as which
 from smc_mujoco.studies.compare import compare as compare
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard

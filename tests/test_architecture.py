@@ -282,7 +282,7 @@ def explained_elsewhere(path: Path, node: ast.FunctionDef | ast.ClassDef) -> boo
     decorators = {ast.unparse(decorator) for decorator in node.decorator_list}
     if path.parent.name in CATALOGUES or "overload" in decorators:
         return True
-    return node.name in ("value", "edit", "fields", "structure")  # of a signal, of a part
+    return node.name in ("value", "bounds", "parameters", "edit", "fields", "structure")  # of a signal, of a part
 
 
 def test_everything_public_is_explained():

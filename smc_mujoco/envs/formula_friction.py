@@ -77,4 +77,4 @@ class FormulaFriction:
         self.__init__(*pickled["arguments"])
         for i, numbers in enumerate(pickled["states"]):
             self.states(i)[:] = numbers
-        self.records["failure"] = np.where(pickled["failed"], state.FRICTION_RAISED, state.FINE)
+        self.records["failure"] = np.where(pickled["failed"], state.RAISED, state.FINE)

@@ -8,11 +8,9 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.control import joint_law
-from smc_mujoco.control.component import Component
-from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.mechanisms.plant import Values, field_array
-from smc_mujoco.simulation import callback, controller, reference, state
+from smc_mujoco.mechanisms.plant import field_array
+from smc_mujoco.simulation import callback, reference, state
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.prepare import Packed, Prepared, pack
 from smc_mujoco.simulation.scenario import Resolved
@@ -110,9 +108,7 @@ class ScenarioBatch:
     def run_alive(self, action: Callable[[np.ndarray], None], calls: int) -> None:
         """Apply an action to the simulations that still run, and mark those that fail.
 
-        Args:
-          action: a function of their indices.
-          calls: how often MuJoCo should call the callback in each.
+        The action is a function of their indices; MuJoCo should call the callback `calls` times in each.
         """
         records = self.records
         alive = np.flatnonzero(records["failure"] == state.FINE).astype(np.int32)
@@ -136,97 +132,47 @@ class ScenarioBatch:
         """Return the Trace of simulation i."""
         code, step = int(self.records["failure"][i]), int(self.records["failed_step"][i])
         failure = None if code == state.FINE else self.failure(i, code)
-        if failure is None and (self.model.npair or self.scenarios[i].plant.own) and self.lost_contacts(i):
-            failure, step = LOST_CONTACTS, 0
+        if failure is None and (self.model.npair or self.scenarios[i].plant.own):
+            warnings = self.batch.get_data(i, self.scratch).warning
+            if any(warnings[kind].number for kind in FULL_WARNINGS):
+                failure, step = LOST_CONTACTS, 0
         return from_log(self.prepared[i].scenario, self.logs[i], step, failure)
-
-    def lost_contacts(self, i: int) -> bool:
-        """Return whether MuJoCo left out contacts of simulation i because its memory for them was full."""
-        warnings = self.batch.get_data(i, self.scratch).warning
-        return any(warnings[kind].number for kind in FULL_WARNINGS)
 
     def failure(self, i: int, code: int) -> str:
         """Return the failure of simulation i in words."""
+        if code == state.DIVERGED:
+            return self.errors.get(i, reference.PLANT_DIVERGED)
+        if code == state.INTERRUPTED:
+            return reference.INTERRUPTED
         scenario = self.scenarios[i]
-        if state.NOT_FINITE <= code < state.INTERRUPTED:
-            if failure := repeated_failure(scenario, self.records[i], self.packed[i]):
-                return failure
-            if in_python := reference.run(scenario).failure:
-                return in_python.rpartition(", at t = ")[0]
-        law, estimator = f"law {scenario.law.name!r}", f"estimator {scenario.velocity.name!r}"
-        return {
-            state.DIVERGED: self.errors.get(i, reference.PLANT_DIVERGED),
-            state.NOT_FINITE: f"{law} returned NaN, inf or a command above {controller.MAX_CONTROL:g}",
-            state.DISTURBANCE_NOT_FINITE: "the disturbance became NaN or inf",
-            state.ESTIMATOR_RAISED: f"{estimator} raised an exception",
-            state.REFERENCE_RAISED: "a reference raised an exception",
-            state.FEEDFORWARD_RAISED: f"feedforward {type(scenario.feedforward).__name__} raised an exception",
-            state.NOMINAL_RAISED: f"the nominal model of {scenario.plant.name} raised an exception",
-            state.LAW_RAISED: f"{law} raised an exception",
-            state.DISTURBANCE_RAISED: "a disturbance raised an exception",
-            state.INTERRUPTED: reference.INTERRUPTED,
-            state.FRICTION_RAISED: f"friction {type(scenario.formula_friction).__name__} raised an exception",
-            state.SURFACE_RAISED: f"surface {scenario.surface and scenario.surface.name!r} raised an exception",
-        }[code]
+        of_law = code in (state.LAW_RAISED, state.NOT_FINITE)
+        if of_law and (told := law_failure(scenario, self.records[i], self.packed[i])):
+            return told
+        told = reference.run(scenario).failure
+        return told.rpartition(", at t = ")[0] if told else "a function of the run failed, though not in Python"
 
 
-def repeated_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
-    """Call the function that failed again, in Python, and return its exception in words.
+def law_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
+    """Call the law that failed again, in Python, and return its exception, or its u and s in the record, in words.
 
     Compiled functions have no text of an exception. The inputs are those in the record, so the text depends only on the
-    run. Return None if the function does not fail again, because it had already changed its memory.
+    run. Return None if the law does not raise again, because it had already changed its memory.
     """
-    n, i, t = s.plant.n, int(record["seen"]["i"]), float(record["instant"]["t"])
-
-    def memory(function: np.ndarray, size: int) -> np.ndarray:
-        return state.view(packed.numbers, int(function["memory"]), (n, size)).copy()
-
-    def call(c: Component, y: tuple) -> None:
-        function = reference.PythonComponent(c, n)
-        function.memory = memory(record[c.kind], c.memory)
-        function(i, y)
-
-    try:
-        match int(record["failure"]):
-            case state.ESTIMATOR_RAISED:
-                call(s.velocity, Reading(*record["reading"].tolist()))
-            case state.SURFACE_RAISED if s.surface is not None:
-                call(s.surface, Measurement(*record["y"].tolist()))
-            case state.LAW_RAISED | state.NOT_FINITE as code:
-                u, sliding = call_law(s, record, packed, memory(record["law"], s.law.memory))
-                if code == state.NOT_FINITE:
-                    return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {i}"
-            case state.REFERENCE_RAISED:
-                for signal in s.references:
-                    reference.evaluate(signal, t)
-            case state.FEEDFORWARD_RAISED if s.feedforward is not None:
-                reference.evaluate(s.feedforward, t)
-            case state.NOMINAL_RAISED:
-                places = (int(record["seen"][name]) for name in ("x", "v", "u"))
-                x, v, u = (state.view(packed.numbers, place, (n,)).copy() for place in places)
-                reference.nominal(s.plant, x, v, i, Values(**s.plant.parameters), u)
-            case state.DISTURBANCE_RAISED | state.DISTURBANCE_NOT_FINITE:
-                loop = record["instant"][["e", "de", "s"]].tolist()
-                for j, signal in enumerate(s.disturbance):
-                    memories = memory(packed.disturbances[j]["function"], signal.memory)
-                    for channel in range(n if signal.random else 1):
-                        noise = s.noise_seed, channel, s.noise_stream(j)
-                        reference.evaluate(signal, t, memories[channel], *(loop if signal.sees else noise))
-    except reference.Failure as failure:
-        return str(failure)
-    return None
-
-
-def call_law(s: Resolved, record: np.ndarray, packed: Packed, memory: np.ndarray) -> tuple[float, float]:
-    """Call the law that failed again. Return the u and s in the record, from the call that failed."""
     n, i, width = s.plant.n, int(record["seen"]["i"]), int(record["width"])
     function = reference.PythonComponent(s.law, n)
-    function.memory = memory
-    if s.law.joint:
-        dtype = joint_law.stored_dtype(n)
-        stored = state.view(packed.numbers, int(record["joint"]["head"]), (dtype.itemsize // 8,)).copy().view(dtype)[0]
-        function.call_joint(joint_law.measurement_of(stored, reference.NominalDynamics(s, stored["x"], stored["v"])))
-    else:
-        function(i, Measurement(*record["y"].tolist()))
+    function.memory = state.view(packed.numbers, int(record["law"]["memory"]), (n, s.law.memory)).copy()
+    try:
+        if s.law.joint:
+            dtype = joint_law.stored_dtype(n)
+            numbers = state.view(packed.numbers, int(record["joint"]["head"]), (dtype.itemsize // 8,))
+            stored = numbers.copy().view(dtype)[0]
+            dynamics = reference.NominalDynamics(s, stored["x"], stored["v"])
+            function.call_joint(joint_law.measurement_of(stored, dynamics))
+        else:
+            function(i, Measurement(*record["y"].tolist()))
+    except reference.Failure as failure:
+        return str(failure)
+    if record["failure"] == state.LAW_RAISED:
+        return None
     u, sliding = state.view(packed.numbers, int(record["commands"]), (2, width))[:, i % width].tolist()
-    return u, sliding
+    return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {i}"

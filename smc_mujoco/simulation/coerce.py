@@ -5,18 +5,16 @@ already. It raises ScenarioError, one sentence with the field, the value and the
 """
 
 import itertools
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown, whole
+from smc_mujoco.common.errors import ScenarioError, number, shown, unknown, whole
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Component, Template, by_channel
-from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Law
-from smc_mujoco.control.surface import Surface
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import Lag
@@ -27,7 +25,6 @@ from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.perturbations import parameter_factors
 from smc_mujoco.simulation.signals import Constant, PerChannel, Signal
 
-P = TypeVar("P", bound=Part)
 T = TypeVar("T")
 
 INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
@@ -40,9 +37,14 @@ ByChannel = Mapping[str, T] | Sequence[T]  # joint -> value, or values in the or
 Laws = Law | Template | str | ByChannel[Law | Template | str]
 
 
+def plant(name: str, value: object, s: Any) -> Plant:
+    """Return a plant, from itself or its name."""
+    return as_plant(value)
+
+
 def law(value: Law | Template | str) -> Law:
     """Return a law, from itself, its template or its text."""
-    return component("law", from_text.law(value) if isinstance(value, str) else value)
+    return _component("law", from_text.law(value) if isinstance(value, str) else value)
 
 
 def laws(name: str, value: Laws | None, s: Any) -> Law:
@@ -53,9 +55,27 @@ def laws(name: str, value: Laws | None, s: Any) -> Law:
     return by_channel([law(item) for item in one_per_channel(name, value, s.plant)])  # pyright: ignore[reportArgumentType]
 
 
-def plant(name: str, value: object, s: Any) -> Plant:
-    """Return a plant, from itself or its name."""
-    return as_plant(value)
+def surface(name: str, value: object, s: Any) -> Any:
+    """Return a surface, from itself, its template or its text, as "linear(c=3)"."""
+    if isinstance(value, str):
+        return from_text.component(name, value, surfaces(), "linear(c=3)")
+    return None if value is None else _component("surface", value)
+
+
+def velocity(name: str, value: object, s: Any) -> Any:
+    """Return an estimator, from itself, its template or its text, as "levant(L=4800)"."""
+    if isinstance(value, str):
+        return from_text.component("velocity estimator", value, estimators(), "levant(L=4800)")
+    return None if value is None else _component("estimator", value)
+
+
+def _component(kind: str, value: object) -> Component:
+    """Return a component of one kind, from itself or its template."""
+    value = value() if isinstance(value, Template) else value
+    if isinstance(value, Component) and value.kind == kind:
+        return value
+    field = "velocity" if kind == "estimator" else kind
+    raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), your own {kind}, or a name")
 
 
 def real(**limits: Any) -> Callable[[str, float, Any], float]:
@@ -95,52 +115,23 @@ def one_per_channel(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
 def bound(name: str, value: float | ByChannel[float] | None, s: Any) -> float | tuple[float, ...] | None:
     """Return the bound on |u| of all channels, or of each driven one if they differ."""
     value = value.tolist() if isinstance(value, np.ndarray) else value
-    if not isinstance(value, Mapping | list | tuple):
-        return None if value is None else number(name, value, above=0.0, infinite=True)
-    joints = list(value) if isinstance(value, Mapping) else range(s.plant.driven)
-    bounds = tuple(
-        number(f"{name}[{shown(joint)}]", item, above=0.0, infinite=True)
-        for joint, item in zip(joints, one_per_channel(name, value, s.plant), strict=True)
-    )
+    if value is None:
+        return None
+    items = one_per_channel(name, value, s.plant) if isinstance(value, Mapping | list | tuple) else [value]
+    bounds = tuple(number(name, item, above=0.0, infinite=True) for item in items)
     return bounds[0] if len(set(bounds)) == 1 else bounds
-
-
-def surface(name: str, value: Surface | Template | str | None, s: Any) -> Surface | None:
-    """Return a surface, from itself, its template or its text, as "linear(c=3)"."""
-    if isinstance(value, str):
-        return from_text.component(name, value, surfaces(), "linear(c=3)")
-    return None if value is None else component("surface", value)
-
-
-def velocity(name: str, value: Estimator | Template | str | None, s: Any) -> Estimator | None:
-    """Return an estimator, from itself, its template or its text, as "levant(L=4800)"."""
-    if isinstance(value, str):
-        return from_text.component("velocity estimator", value, estimators(), "levant(L=4800)")
-    return None if value is None else component("estimator", value)
-
-
-def component(kind: str, value: object) -> Component:
-    """Return a component of one kind, from itself or its template."""
-    value = value() if isinstance(value, Template) else value
-    if isinstance(value, Component) and value.kind == kind:
-        return value
-    field = "velocity" if kind == "estimator" else kind
-    raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), your own {kind}, or a name")
 
 
 def state(name: str, value: float | Sequence[float] | None, s: Any) -> tuple[float, ...] | None:
     """Return n positions or velocities, from n numbers or one. Beyond MAX_STATE a run would have diverged."""
+    value = value.tolist() if isinstance(value, np.ndarray) else value
     if value is None:
         return None
-    if isinstance(value, Mapping | Set):
-        raise ScenarioError(f"{name} is {shown(value)}: give one number, or a list of one for each channel")
-    value = value.tolist() if isinstance(value, np.ndarray) else value
-    is_sequence = isinstance(value, Iterable) and not isinstance(value, str | bytes)
-    values, n = items_of(name, value) if is_sequence else [value], s.plant.n  # pyright: ignore[reportArgumentType]
+    values = list(value) if isinstance(value, Sequence) and not isinstance(value, str | bytes) else [value]
+    n = s.plant.n
     if len(values) not in (1, n):
         raise ScenarioError(f"{name} has {len(values)} values for {n} channels: give one number or {n}")
-    values = values if len(values) == n else values * n
-    return tuple(number(name, item, low=-MAX_STATE, high=MAX_STATE) for item in values)
+    return tuple(number(name, item, low=-MAX_STATE, high=MAX_STATE) for item in values * (n // len(values)))
 
 
 def physics_step(name: str, value: float | None, s: Any) -> float | None:
@@ -184,6 +175,18 @@ def instance(kind: type[T], example: str, default: Any = None) -> Callable[[str,
     return convert
 
 
+def several(kind: type[T], example: str) -> Callable[[str, object, Any], tuple[T, ...]]:
+    """Return the converter of a field with values of a class, from one, several or None."""
+
+    def convert(name: str, value: object, s: Any) -> tuple[T, ...]:
+        for item in (items := as_tuple(value)):
+            if not isinstance(item, kind):
+                raise ScenarioError(f"{name} is {shown(item)}: give one such as {example}, or several, or None")
+        return items
+
+    return convert
+
+
 def mismatch(name: str, value: Mapping[str, float] | None, s: Any) -> Mapping[str, float]:
     """Return parameter factors; None means no factors."""
     return parameter_factors(name, {} if value is None else value)
@@ -215,31 +218,21 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
     return items[0] if all(item == items[0] for item in items) else PerChannel(tuple(items))
 
 
-def disturbance(name: str, value: Signal | Sequence[Signal] | None, s: Any) -> tuple[Signal, ...]:
-    """Return signals, from one, several or None."""
-    items = as_tuple(value)
-    for item in items:
-        if not isinstance(item, Signal):
-            raise ScenarioError(f"{name} is {shown(item)}: give a signal such as smc.Sine(amplitude=0.2, omega=5.0)")
-    return items
-
-
 def contact(name: str, value: Contact | str | None, s: Any) -> Contact:
     """Return a contact that the plant offers, from itself or its kind; None means "none"."""
     value = "none" if value is None else value
     contact = Contact(value) if isinstance(value, str) else value
     if not isinstance(contact, Contact):
-        raise ScenarioError(
-            f"{name} is {shown(contact)}: give smc.Contact(...) or one of {', '.join(['none', *s.plant.contacts])}"
-        )
+        kinds = ", ".join(["none", *s.plant.contacts])
+        raise ScenarioError(f"{name} is {shown(contact)}: give smc.Contact(...) or one of {kinds}")
     contact.check(s.plant)
     return contact
 
 
 def friction(name: str, value: Friction | Sequence[Friction] | None, s: Any) -> tuple[Friction, ...]:
     """Return frictions sorted by kind, from one, several or None. No two are of a kind, at most one has bristles."""
-    items = parts(name, value, Friction, "smc.Coulomb(0.05)")
-    check_kinds_differ(name, items, [type(part).__name__ for part in items])
+    items = several(Friction, "smc.Coulomb(0.05)")(name, value, s)
+    _check_kinds_differ(name, items)
     if len(bristles := [part for part in items if part.bristles]) > 1:
         first, second = (type(part).__name__ for part in bristles[:2])
         raise ScenarioError(f"{name} has {first} and {second}, which both model bristles: give one")
@@ -248,32 +241,19 @@ def friction(name: str, value: Friction | Sequence[Friction] | None, s: Any) -> 
 
 def actuator(name: str, value: Actuator | Sequence[Actuator] | None, s: Any) -> tuple[Actuator, ...]:
     """Return at most two drives in the given order and after them a Backlash, from one, several or None."""
-    items = parts(name, value, Actuator, "smc.Lag(0.01)")
+    items = several(Actuator, "smc.Lag(0.01)")(name, value, s)
     drives = [part for part in items if part.drives]
-    check_kinds_differ(name, items, [type(part).__name__ for part in items if not part.drives])
-    if len(drives) > 2:
-        raise ScenarioError(f"{name} has {len(drives)} drives, {shown(items)}: give one, or two in series")
-    if len(drives) == 2 and not isinstance(drives[0], Lag):
-        raise ScenarioError(
-            f"{name} has {shown(drives[0])} before {shown(drives[1])}, but the first of two drives in series must be "
-            f"a Lag: give one drive, or (smc.Lag(0.01), another)"
-        )
+    _check_kinds_differ(name, [part for part in items if not part.drives])
+    if len(drives) > 2 or (len(drives) == 2 and not isinstance(drives[0], Lag)):
+        raise ScenarioError(f"{name} has the drives {shown(drives)}: give one drive, or (smc.Lag(0.01), another)")
     return tuple(sorted(items, key=lambda part: not part.drives))
 
 
-def parts(name: str, value: object, kind: type[P], example: str) -> tuple[P, ...]:
-    """Return parts of one kind, from one, several or None."""
-    items = as_tuple(value)
-    for item in items:
-        if not isinstance(item, kind):
-            raise ScenarioError(f"{name} is {shown(item)}: give one such as {example}, or several, or None")
-    return items
-
-
-def check_kinds_differ(name: str, items: tuple[Part, ...], kinds: list[str]) -> None:
+def _check_kinds_differ(name: str, items: Sequence[Part]) -> None:
     """Raise ScenarioError for two parts of the same kind."""
+    kinds = [type(part).__name__ for part in items]
     if twice := [kind for kind in kinds if kinds.count(kind) > 1]:
-        raise ScenarioError(f"{name} has a {twice[0]} twice, {shown(items)}: give one")
+        raise ScenarioError(f"{name} has a {twice[0]} twice: give one")
 
 
 def as_tuple(value: object) -> tuple[Any, ...]:

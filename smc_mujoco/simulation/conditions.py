@@ -44,10 +44,9 @@ from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation import coerce
-from smc_mujoco.simulation.clock import Clock
-from smc_mujoco.simulation.perturbations import Jump, Noise
+from smc_mujoco.simulation.perturbations import Clock, Jump, Noise
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Constant, OrnsteinUhlenbeck, Pulse, Recorded, Signal, Sine, Step
+from smc_mujoco.simulation.signals import Constant, OrnsteinUhlenbeck, Pulse, Signal, Sine, Step
 
 Fields = Mapping[str, Any]
 Recipe = Fields | Callable[[Plant, float], Fields]  # fields, or a function of plant and duration that returns them
@@ -56,7 +55,7 @@ MAX_JOINED = 20  # conditions in one name: chosen
 GRID_FIELDS = ("plant", "law", "model", "surface", "seed", "noise_key", "duration")  # that a grid sets itself
 CONDITION_FIELDS = [name for name in Scenario.fields() if name not in GRID_FIELDS]
 ADDITIVE_FIELDS = ("disturbance", "friction", "actuator")  # their values add up when conditions are joined
-ABSTRACT = (Part, Friction, Actuator, Drive, Signal, Recorded)  # classes that a text cannot name
+ABSTRACT = (Part, Friction, Actuator, Drive, Signal)  # classes that a text cannot name
 CONSTANTS = {"inf": math.inf, "pi": math.pi}
 
 # The suite's defaults, under which its plants and laws are compared.

@@ -4,7 +4,7 @@ At the first stage of a control sample, for each channel:
 
     sensors -> noise, encoder -> velocity estimator -> law -> saturation -> delay buffer
 
-A sample may come late in its period, or be missed, see clock.py. The log then repeats the command of the sample before.
+A sample may come late in its period, or be missed, see `Clock`. The log then repeats the command of the sample before.
 At the first stage of a physics step, the command whose delay has passed goes to ctrl, through lags and rate limits. At
 every stage, disturbance(t) goes to xfrc_applied. A friction by a formula follows, at the first stage.
 Each sample is logged with the mean forces since the last one.
@@ -29,7 +29,7 @@ from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.joint_law import head_at
 from smc_mujoco.mechanisms.hardware.drives import rippled
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED
-from smc_mujoco.simulation import clock, philox
+from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.channels import channel_at, lever
 from smc_mujoco.simulation.state import disturbance_at, function_at, log_at, state_at
@@ -49,13 +49,7 @@ Arrays = namedtuple(
 
 @njit(error_model="numpy")
 def control(address, sim, data):
-    """Do one callback of one simulation.
-
-    Args:
-      address: of its record.
-      sim: the record.
-      data: Arrays of its mjData.
-    """
+    """Do one callback of one simulation."""
     calls = sim.calls
     sim.calls = calls + 1
     if sim.failure != record.FINE:
@@ -90,9 +84,25 @@ def control(address, sim, data):
 
 
 @njit(error_model="numpy", inline="always")
+def _late(sim, k):
+    """Return by how many physics steps sample k is late."""
+    if sim.jitter == 0 or k == 0 or k == sim.samples - 1:
+        return 0
+    return int(philox.uniform(sim.seed, 0, philox.JITTER, k) * (sim.jitter + 1))
+
+
+@njit(error_model="numpy", inline="always")
+def _missed(sim, k):
+    """Return whether sample k does not run."""
+    if sim.missed == 0.0 or k == 0 or k == sim.samples - 1:
+        return False
+    return philox.uniform(sim.seed, 0, philox.MISSED, k) < sim.missed
+
+
+@njit(error_model="numpy", inline="always")
 def _sample(address, sim, data, k, within):
     """Run the law at sample k, if the sample comes in this physics step, `within` steps into its period."""
-    late, missed = clock.late(sim, k), clock.missed(sim, k)
+    late, missed = _late(sim, k), _missed(sim, k)
     if within == 0 and (late != 0 or missed):
         _repeat_command(sim, k)
     if within != late or missed:
@@ -178,7 +188,7 @@ def _measure(address, sim, data, k, t):
         reading.x, reading.v = _read_sensor(sim, state, i, position, velocity, j, channel.hinge_body >= 0)
         sim.seen.i = i
         if _call(sim.estimator, i, address + record.READING_AT, address + record.ESTIMATE_AT) != 0:
-            return record.ESTIMATOR_RAISED
+            return record.RAISED
         x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
     return record.FINE
 
@@ -192,10 +202,9 @@ def _evaluate_model(address, sim, i):
 
 @njit(error_model="numpy")
 def update_law(address, sim, k, t):
-    """Run the law at sample k, at time t, s: once for each driven channel, or once for all. Return a failure code.
+    """Run the law at sample k, at time t, s: once for each driven channel, or once for all.
 
-    The commands go into the delay buffer, and u, s and r into the log. A channel's nominal model may depend on the new
-    commands of the channels before it.
+    A channel's nominal model may depend on the new commands of the channels before it.
     """
     n, width, last_u, limits, feedforward = sim.n, sim.width, pointer(sim.seen.u), pointer(sim.limits), 0.0
     joint, commands = sim.joint.head != 0, pointer(sim.commands)
@@ -204,7 +213,7 @@ def update_law(address, sim, k, t):
     sim.instant.t = t
     if sim.feedforward.address != 0:
         if _call(sim.feedforward, 0, address + record.INSTANT_AT, address + record.MOTION_AT) != 0:
-            return record.FEEDFORWARD_RAISED
+            return record.RAISED
         feedforward = sim.motion.value
     for first in range(0, sim.driven, width):
         failure = _measure_joints(address, sim, k, t) if joint else _measure_channel(address, sim, k, t, first)
@@ -241,23 +250,20 @@ def _evaluate_reference(address, sim, k, i):
 
 @njit(error_model="numpy", inline="always")
 def _measure_channel(address, sim, k, t, i):
-    """Write into the record what the law of channel i reads at sample k, at time t, s.
-
-    The nominal model has the force of channel i's drive, gain u - drag v, in place of u.
-    """
+    """Write what the law of channel i reads into the record; the nominal model has the drive's gain u - drag v as u."""
     if _evaluate_reference(address, sim, k, i) != 0:
-        return record.REFERENCE_RAISED
+        return record.RAISED
     y, x, v, a, motion, model = sim.y, pointer(sim.seen.x), pointer(sim.seen.v), pointer(sim.a), sim.motion, sim.model
     y.t, y.dt, y.r, y.dr, y.ddr = t, sim.period, motion.value, motion.rate, motion.acceleration
     y.q, y.dq, y.fq, y.gq = 0.0, 0.0, 0.0, 0.0
     partner = i + sim.driven  # a joint without actuator, which moves with channel i
     if partner < sim.n:
         if _evaluate_model(address, sim, partner) != 0:
-            return record.NOMINAL_RAISED
+            return record.RAISED
         y.q, y.dq = x[partner], v[partner]
         y.fq, y.gq = model.f - sim.drive_drag * v[i] * model.g, sim.drive_gain * model.g
     if _evaluate_model(address, sim, i) != 0:
-        return record.NOMINAL_RAISED
+        return record.RAISED
     y.f, y.g = model.f - sim.drive_drag * v[i] * model.g, sim.drive_gain * model.g
     y.x, y.v = x[i], v[i]
     y.e, y.de = y.x - y.r, y.v - y.dr
@@ -266,7 +272,7 @@ def _measure_channel(address, sim, k, t, i):
     y.has_surface, y.s, y.v_eq = 0.0, 0.0, 0.0
     if sim.surface.address != 0:
         if _call(sim.surface, i, address + record.MEASUREMENT_AT, address + record.SLIDING_AT) != 0:
-            return record.SURFACE_RAISED
+            return record.RAISED
         y.has_surface, y.s, y.v_eq = 1.0, sim.sliding.s, sim.sliding.v_eq
     return record.FINE
 
@@ -280,7 +286,7 @@ def _measure_joints(address, sim, k, t):
     head.dynamics = address + record.HANDLE_AT if sim.handle.coriolis != 0.0 else 0
     for i in range(n):
         if _evaluate_reference(address, sim, k, i) != 0:
-            return record.REFERENCE_RAISED
+            return record.RAISED
         x, v, a = pointer(seen.x)[i], pointer(seen.v)[i], pointer(sim.a)[i]
         pointer(y.x)[i], pointer(y.v)[i] = x, v
         pointer(y.e)[i], pointer(y.de)[i] = x - motion.value, v - motion.rate
@@ -303,7 +309,7 @@ def _measure_dynamics(address, sim):
     if sim.dynamics.address == 0:
         failure = _separate_equations(address, sim, M, h, g)
     elif _call(sim.dynamics, 0, address + record.SEEN_AT, sim.joint.M) != 0:
-        failure = record.NOMINAL_RAISED
+        failure = record.RAISED
     for i in range(n * n):
         M[i] /= sim.drive_gain
     for i in range(n):
@@ -322,7 +328,7 @@ def _separate_equations(address, sim, M, h, g):
             v[i] = measured[i] if moving else 0.0
         for i in range(n):
             if _evaluate_model(address, sim, i) != 0:
-                return record.NOMINAL_RAISED
+                return record.RAISED
             M[(n + 1) * i] = 1.0 / sim.model.g
             if moving:
                 h[i] = -sim.model.f / sim.model.g
@@ -337,7 +343,7 @@ def _separate_equations(address, sim, M, h, g):
 def _actuate(sim, data, step):
     """Give the command whose delay has passed at a physics step, if there is one, to the actuators."""
     past = step - sim.delay
-    if past >= 0 and past % sim.steps == clock.late(sim, past // sim.steps):
+    if past >= 0 and past % sim.steps == _late(sim, past // sim.steps):
         buffer = pointer(sim.delay_buffer + 8 * sim.n * (past // sim.steps % sim.delay_slots))
         for i in range(sim.n):
             state_at(sim.states, i).delayed = buffer[i]
@@ -412,7 +418,7 @@ def _apply_pushes(address, sim, data):
         signal = disturbance_at(sim.disturbances, j)
         if signal.body >= 0:
             if _call(signal.function, 0, address + record.INSTANT_AT, address + record.MOTION_AT) != 0:
-                return record.DISTURBANCE_RAISED
+                return record.RAISED
             for k in range(3):
                 data.xfrc_applied[signal.body + k] += sim.motion.value * signal.peak[k]
     return record.FINE
@@ -431,10 +437,7 @@ def _add_force(data, channel, force, cartesian):
 
 @njit(error_model="numpy")
 def _evaluate_feedback(address, sim, data, signal, i, k):
-    """Write into the record the force of a disturbance that sees the loop: a new one at sample k, the last if k < 0.
-
-    Return 1 if it raised, or 0.
-    """
+    """Write the force of a disturbance that sees the loop into the record: a new one at sample k, the last if k < 0."""
     if i > 0 or k < 0:
         sim.motion.value = pointer(signal.function.memory)[0]
         return 0
@@ -447,14 +450,11 @@ def _evaluate_feedback(address, sim, data, signal, i, k):
 
 @njit(error_model="numpy")
 def _apply_disturbances(address, sim, data, t, k):
-    """Apply the sum of the disturbances at time t, s, to the body of each channel, or to its joint in a user's model.
-
-    At the first stage of control sample k, `k` is its number, at other stages -1.
-    """
+    """Apply the sum of the disturbances at time t, s; `k` is -1 but at the first stage of control sample k."""
     instant, motion = sim.instant, sim.motion
     instant.t, instant.seed = t, sim.seed
     if _apply_pushes(address, sim, data) != record.FINE:
-        return record.DISTURBANCE_RAISED
+        return record.RAISED
     for j in range(sim.disturbance_count):
         signal = disturbance_at(sim.disturbances, j)
         instant.stream = signal.stream
@@ -470,7 +470,7 @@ def _apply_disturbances(address, sim, data, t, k):
             else:
                 raised = 0
             if raised != 0:
-                return record.DISTURBANCE_RAISED
+                return record.RAISED
             _add_force(data, channel, motion.value, signal.cartesian != 0)
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
@@ -505,7 +505,7 @@ def _apply_friction(address, sim, data):
         inputs.load += data.qfrc_constraint[joint] + _generalised_disturbance(data, channel)
         sim.seen.i = i
         if _call(function, 0, address + record.FRICTION_INPUT_AT, address + record.FRICTION_OUTPUT_AT) != 0:
-            return record.FRICTION_RAISED
+            return record.RAISED
         f, low, high = outputs.f, outputs.low, outputs.high
         if state.stuck == 0.0:
             slows = abs(v) < STICKING_SPEED and abs(v) <= abs(state.speed)

@@ -15,7 +15,6 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.frozen import frozen
 from smc_mujoco.mechanisms.hardware import encoder
 from smc_mujoco.mechanisms.hardware.part import ROTOR, Part, initial_pose, joint_ids
 from smc_mujoco.mechanisms.plant import compiled_for_runs, field_array
@@ -45,32 +44,12 @@ def structure(scenario: Scenario) -> Hashable:
     return plant.build, plant.fields, plant.n, edits, of_parts, scenario.readings, *stepping
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class Mechanism:
-    """What scenarios of one structure share.
+    """What scenarios of one structure share."""
 
-    Attributes:
-      model: the base model, without the values of a scenario and without scenery.
-      channels: the indices of the channels in it, (n,) CHANNEL.
-    """
-
-    def __init__(self, model: mujoco.MjModel, channels: np.ndarray):
-        self.model, self.channels = model, channels
-        self._free_starts: set[Hashable] = set()
-
-    def check_start(self, scenario: Scenario) -> None:
-        """Raise ScenarioError if a scenario starts inside an obstacle or beyond it.
-
-        The path from the plant's default start, or from 0 if that is not free, must cross no obstacle, because the
-        mechanism could not get to a start beyond a stop.
-        """
-        if scenario.contact.kind == "none":
-            return
-        inputs = scenario.plant, scenario.contact, scenario.resolved.x0, frozen(scenario.factors(0))
-        if inputs not in self._free_starts:
-            model = copy.copy(self.model)
-            put_values(model, self.model, scenario, 0)
-            _check_start(model, scenario)
-            self._free_starts.add(inputs)
+    model: mujoco.MjModel  # the base model, without the values of a scenario and without scenery
+    channels: np.ndarray  # the indices of the channels in it, (n,) CHANNEL
 
 
 _mechanisms: weakref.WeakValueDictionary[Hashable, Mechanism] = weakref.WeakValueDictionary()  # by structure
@@ -124,11 +103,7 @@ def compile_model(scenario: Scenario, nuserdata: int = 0, scenery: bool = True) 
     """Return the base model of a scenario's structure: compiled, without the scenario's values.
 
     It is not for pictures. Its procedural textures have a few pixels, because MuJoCo paints them at each compilation,
-    in three quarters of its time.
-
-    Args:
-      nuserdata: length of mjData.userdata.
-      scenery: whether it has what `without_scenery` deletes. Users' models always do: a fixed part may be a floor.
+    in three quarters of its time. Users' models always keep their scenery: a fixed part may be a floor.
     """
     edited, resolved = spec(scenario), scenario.resolved
     if not (scenery or scenario.plant.direct):
@@ -150,10 +125,7 @@ def with_values(base: mujoco.MjModel, scenario: Scenario, step: int = 0) -> mujo
 
 
 def put_values(model: mujoco.MjModel, base: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
-    """Write the field values of a scenario into a copy of the base model, and return them.
-
-    The caller calls mj_setConst.
-    """
+    """Write a scenario's field values into a copy of the base model, for which the caller calls mj_setConst."""
     values = field_values(base, scenario, step)
     for name, value in values.items():
         field_array(model, name)[:] = value
@@ -189,8 +161,15 @@ def put_initial_state(model: mujoco.MjModel, data: mujoco.MjData, scenario: Scen
         encoder.remember(model, data)
 
 
-def _check_start(model: mujoco.MjModel, scenario: Scenario) -> None:
-    """Do what `Mechanism.check_start` says, with a model that has the scenario's values."""
+def check_start(base: mujoco.MjModel, scenario: Scenario) -> None:
+    """Raise ScenarioError if a scenario starts inside an obstacle, or beyond a stop, where no path leads.
+
+    The path from the plant's default start, or from 0 if that is not free, must cross no obstacle.
+    """
+    if scenario.contact.kind == "none":
+        return
+    model = copy.copy(base)
+    put_values(model, base, scenario, 0)
     data, qpos = mujoco.MjData(model), initial_state(model, scenario)[0]
     inside, beyond = _overlap(model, data, qpos), None
     moves_around = scenario.plant.tip  # an arm: the straight line in its joints may cross what the arm goes around

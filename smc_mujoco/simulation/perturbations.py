@@ -1,11 +1,22 @@
-"""Measurement noise, and jumps of the plant's parameters during a run."""
+"""Measurement noise, jumps of the plant's parameters during a run, and the controller's clock.
+
+A real-time task is woken every control period T, some time after it should be. Sample k runs at
+
+    t_k = k T + late_k,    late_k uniform among the physics steps from 0 to `jitter`,
+
+or not at all: then the last command stays, and neither estimator nor law sees that sample. The first sample and the
+last one are on time. Which samples are late or missed depends on the seed and k alone.
+"""
 
 import dataclasses
+import math
 from collections.abc import Mapping
 
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.frozen import Frozen, frozen
 from smc_mujoco.simulation.signals import PerChannel, Signal
+
+MAX_MISSED = 0.99  # probability; chosen: of a hundred samples one runs
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,3 +69,39 @@ def parameter_factors(name: str, value: object) -> Frozen[float]:
     if not isinstance(value, Mapping):
         raise ScenarioError(f"{name} is {shown(value)}: give parameter names with their factors, such as {{'M': 1.3}}")
     return frozen({str(key): number(f"{name} of {key}", factor) for key, factor in value.items()})
+
+
+@dataclasses.dataclass(frozen=True)
+class Clock:
+    """The timer of the controller. A sensor with a clock of its own is an `Encoder` with a `period`.
+
+    Attributes:
+      jitter: s, the largest delay of a sample; shorter than the control period. Each sample is late by a whole number
+        of physics steps, all equally probable. The law reads the true time in `y.t` and the nominal period in `y.dt`,
+        as on a machine whose task does not measure its period.
+      missed: probability that a sample is missed, 0 .. 0.99. The last command then stays.
+    """
+
+    jitter: float = 0.0
+    missed: float = 0.0
+
+    def __post_init__(self):
+        object.__setattr__(self, "jitter", number("Clock's jitter", self.jitter, low=0.0))
+        object.__setattr__(self, "missed", number("Clock's missed", self.missed, low=0.0, high=MAX_MISSED))
+
+    @property
+    def regular(self) -> bool:
+        """Whether all samples run, and on time."""
+        return not (self.jitter or self.missed)
+
+    def jitter_steps(self, physics_step: float) -> int:
+        """Return the largest delay of a sample in physics steps."""
+        return math.floor(self.jitter / physics_step + 1e-6)
+
+    def check(self, control_period: float, physics_step: float) -> None:
+        """Raise ScenarioError for a jitter that reaches the next sample, or is shorter than a physics step."""
+        if self.jitter and not 1 <= self.jitter_steps(physics_step) < round(control_period / physics_step):
+            raise ScenarioError(
+                f"Clock's jitter is {self.jitter:g} s: give at least a physics step, {physics_step:g} s, and less than "
+                f"the control period, {control_period:g} s, and missed=... for samples that do not run"
+            )

@@ -11,7 +11,6 @@ import math
 from collections.abc import Hashable, Mapping
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
@@ -23,9 +22,9 @@ from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, native_cori
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import Native
 from smc_mujoco.simulation import cfunctions, state
-from smc_mujoco.simulation.model import Mechanism, mechanism, with_values
+from smc_mujoco.simulation.model import Mechanism, check_start, mechanism, with_values
 from smc_mujoco.simulation.scenario import Resolved, Scenario
-from smc_mujoco.simulation.signals import PerChannel, Push, Recorded, Signal
+from smc_mujoco.simulation.signals import PerChannel, Push, Signal
 
 IDEAL_SENSOR = Encoder(counts=math.inf)
 DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData without channels, and per channel; measured
@@ -49,21 +48,13 @@ class Functions:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Prepared:
-    """A scenario that is ready to run.
+    """A scenario that is ready to run."""
 
-    Attributes:
-      scenario: the scenario, not resolved.
-      functions: its compiled functions; None if one of them does not compile.
-      why_not: what does not compile, in one sentence.
-      mechanism: its compiled model and channels, which scenarios of the same structure share.
-      key: equal for scenarios that can share a Batch.
-    """
-
-    scenario: Scenario
-    functions: Functions | None
-    why_not: str
+    scenario: Scenario  # not resolved
+    functions: Functions | None  # None if one of them does not compile
+    why_not: str  # what does not compile, in one sentence
     mechanism: Mechanism
-    key: Hashable
+    key: Hashable  # equal for scenarios that can share a Batch
 
     @property
     def bytes(self) -> int:
@@ -78,35 +69,21 @@ class Prepared:
 
 
 def prepare(scenario: object) -> Prepared:
-    """Return a scenario with its functions and its mechanism compiled.
-
-    Raises:
-      ScenarioError: it is not a Scenario, it came from a file without the code of its functions, or it starts inside an
-        obstacle or beyond it.
-    """
+    """Return a scenario with its functions and its mechanism compiled, after a check of its start and its code."""
     if isinstance(scenario, Prepared):
         return scenario
     if not isinstance(scenario, Scenario):
         raise ScenarioError(f"cannot run {shown(scenario)}: give a smc.Scenario")
-    _check_code(scenario)
+    for part in (*scenario.law.parts, scenario.surface, scenario.resolved.velocity):
+        if part is not None and part.function is None:
+            raise ScenarioError(f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}")
     shared = mechanism(scenario)
-    shared.check_start(scenario)
+    check_start(shared.model, scenario)
     key = shared, scenario.control_period, scenario.samples
     try:
         return Prepared(scenario, _compile(scenario.resolved), "", shared, key)
     except NotCompilable as error:
         return Prepared(scenario, None, str(error), shared, key)
-
-
-def _check_code(scenario: Scenario) -> None:
-    """Raise ScenarioError if a function of a scenario came from a file without its code."""
-    for part in (*scenario.law.parts, scenario.surface, scenario.resolved.velocity):
-        if part is not None and part.function is None:
-            raise ScenarioError(f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}")
-    signals = *scenario.references, scenario.feedforward, *scenario.disturbance, *scenario.noise.errors
-    for signal in signals:
-        if isinstance(signal, Recorded):
-            raise ScenarioError(f"signal {signal.kind!r} came from a file without its code: give the signal")
 
 
 def _compile(s: Resolved) -> Functions:
@@ -137,29 +114,20 @@ def references(s: Resolved) -> tuple[Signal, ...]:
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Packed:
-    """The arrays whose addresses are in a simulation's record. They must exist as long as the simulation.
+    """The arrays whose addresses are in a simulation's record. They must exist as long as the simulation."""
 
-    Attributes:
-      numbers: gains, memories and all else that is float64.
-      disturbances: (m,) DISTURBANCE.
-      laws, references: those of the driven channels, (driven,) FUNCTION; (0,) if all channels have the same.
-      frictions: by a formula, (n,) FUNCTION, or (0,).
-      nominal: the data of a nominal model that MuJoCo computes, or None.
-    """
-
-    numbers: np.ndarray
-    disturbances: np.ndarray
-    laws: np.ndarray
-    references: np.ndarray
-    frictions: np.ndarray
-    nominal: Any
+    numbers: np.ndarray  # gains, memories and all else that is float64
+    disturbances: np.ndarray  # (m,) DISTURBANCE
+    laws: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
+    references: np.ndarray  # likewise
+    frictions: np.ndarray  # by a formula, (n,) FUNCTION, or (0,)
+    nominal: Any  # the data of a nominal model that MuJoCo computes, or None
 
 
 def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
     """Return a simulation's record, as a tuple for an array of SIMULATION, and the arrays that it points to.
 
-    Args:
-      log: (K + 1, n) LOG, written at samples. It must outlive the run, as `prepared` must.
+    The log, (K + 1, n) LOG, is written at samples. It and `prepared` must outlive the run.
     """
     s, mechanism, buffer = prepared.scenario.resolved, prepared.mechanism, state.Buffer()
     nominal = _native_nominal(s)
@@ -171,15 +139,14 @@ def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
         values[shared] = tables[name][0]
         tables[name] = tables[name] if len(tables[name]) > 1 else []
     numbers = buffer.array()
-    kinds = {name: state.DISTURBANCE if name == "disturbances" else state.FUNCTION for name in tables}
-    arrays = {
-        name: np.array([buffer.as_tuple(kinds[name], row) for row in rows], kinds[name])
-        for name, rows in tables.items()
-    }
+    arrays = {}
+    for name, rows in tables.items():
+        kind = state.DISTURBANCE if name == "disturbances" else state.FUNCTION
+        arrays[name] = np.array([buffer.as_tuple(kind, row) for row in rows], kind)
     values |= {name: state.address(array) for name, array in arrays.items() if len(array)}
     values |= {"n": s.plant.n, "driven": s.plant.driven, "nq": mechanism.model.nq, "nv": mechanism.model.nv}
-    values |= {"samples": len(log), "disturbance_count": len(arrays["disturbances"]), "log": state.address(log)}
-    values["channels"] = state.address(mechanism.channels)
+    values |= {"samples": len(log), "disturbance_count": len(s.disturbance)}
+    values |= {"channels": state.address(mechanism.channels), "log": state.address(log)}
     return buffer.as_tuple(state.SIMULATION, values), Packed(numbers, **arrays, nominal=nominal)
 
 
@@ -206,9 +173,9 @@ def _tables(prepared: Prepared, buffer: state.Buffer) -> dict[str, list[dict[str
         "references": [_signal(compiled, signal, buffer) for compiled, signal in signals],
         "frictions": _frictions(prepared, buffer),
         "disturbances": [
-            _push(d, prepared.mechanism.model)
-            | {"function": _signal(compiled, d, buffer, n)}
-            | {"stream": s.noise_stream(i), "cartesian": d.cartesian, "sees": d.sees}
+            {"function": _signal(compiled, d, buffer, n), "stream": s.noise_stream(i)}
+            | {"cartesian": d.cartesian, "sees": d.sees, "peak": (d.x, d.y, d.z) if isinstance(d, Push) else (0.0,) * 3}
+            | {"body": 6 * prepared.mechanism.model.body(d.body).id if isinstance(d, Push) else -1}
             for i, (compiled, d) in disturbances
         ],
     }
@@ -273,24 +240,19 @@ def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
     n, width = s.plant.n, s.plant.n if s.law.joint else 1
     late = bool(s.clock.jitter_steps(s.physics_step))  # a late command may take effect after the next sample began
     slots = s.delay_steps // s.steps + 1 + late
+    states = np.zeros(n, state.CHANNEL_STATE)  # at the start of a run
+    if s.drive_step is not None:
+        states["first"], states["second"] = s.drive_step.start(np.array(s.v0))
     return {
         "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")},
         "a": buffer.reserve(n),
         "width": width,
         "commands": buffer.reserve(2 * width),
-        "states": buffer.put(_states(s)),
+        "states": buffer.put(states.view(float).tolist()),
         "limits": buffer.put(s.limits),
         "delay_slots": slots,
         "delay_buffer": buffer.reserve(slots * n),
     }
-
-
-def _states(s: Resolved) -> list[float]:
-    """Return the channels' states at the start of a run."""
-    states = np.zeros(s.plant.n, state.CHANNEL_STATE)
-    if s.drive_step is not None:
-        states["first"], states["second"] = s.drive_step.start(np.array(s.v0))
-    return states.view(float).tolist()
 
 
 def _joint_measurement(
@@ -321,13 +283,6 @@ def _native_nominal(s: Resolved) -> Native | None:
         return None
     at_rest = "g" in read_by(s.law.function)
     return s.plant.nominal.native_dynamics(s.plant.parameters, s.plant.tip, at_rest=at_rest)
-
-
-def _push(disturbance: Signal, model: mujoco.MjModel) -> dict[str, Any]:
-    """Return the fields of a DISTURBANCE that only a `Push` uses."""
-    if not isinstance(disturbance, Push):
-        return {"body": -1, "peak": (0.0, 0.0, 0.0)}
-    return {"body": 6 * model.body(disturbance.body).id, "peak": (disturbance.x, disturbance.y, disturbance.z)}
 
 
 def _frictions(prepared: Prepared, buffer: state.Buffer) -> list[dict[str, int]]:

@@ -9,6 +9,7 @@ import copy
 import dataclasses
 import functools
 import hashlib
+import itertools
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,7 +19,6 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, users_stacklevel
-from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.control.component import Template, gain_text
 from smc_mujoco.control.estimator import Estimator, estimator
@@ -26,7 +26,6 @@ from smc_mujoco.control.law import Law, fits
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
-from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, drive_step
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
@@ -34,9 +33,8 @@ from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Nominal
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
-from smc_mujoco.simulation.clock import Clock
 from smc_mujoco.simulation.coerce import MAX_SEED, MIN_TIME
-from smc_mujoco.simulation.perturbations import Jump, Noise
+from smc_mujoco.simulation.perturbations import Clock, Jump, Noise
 from smc_mujoco.simulation.philox import PROCESS
 from smc_mujoco.simulation.signals import Impulse, OrnsteinUhlenbeck, PerChannel, Push, Signal
 
@@ -52,8 +50,6 @@ MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 MAX_ANGLE = 3.0 * math.pi  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
 MAX_DEGREES = 720.0  # chosen; a number above this is not taken for degrees
-MAX_SPEED = 100.0  # rad/s: chosen, 16 turns a second
-MAX_BACKLASH = 0.5  # rad: chosen, 29 degrees of play
 MIN_PERCENT = 10.0  # factor of a mismatch: chosen; multiples of five from here on may be percent
 MAX_CONDITION_NUMBER = 1e12  # of a mass matrix; chosen: its inverse has 4 digits
 MAX_INPUT_DELAY = 1.0  # s: chosen; no plant here tolerates as much, so a longer one may be in ms
@@ -122,9 +118,8 @@ class Scenario:
       ScenarioError: a value out of its range, or values that do not fit together, in one sentence.
 
     Warns:
-      ScenarioWarning: a value that may be in another unit: a start, reference, phase, v0 or Backlash in degrees, a
-        mismatch in percent, a delay in ms; or a DCMotor that cannot hold a joint where it starts, though a force of
-        u_max could.
+      ScenarioWarning: a value that may be in another unit: a start or a reference in degrees, a mismatch in percent,
+        a delay in ms; or a DCMotor that cannot hold a joint where it starts, though a force of u_max could.
     """
 
     # converted in this order
@@ -142,7 +137,7 @@ class Scenario:
     feedforward: Signal | None = field(
         coerce.instance(Signal, "one signal, such as smc.TimeSeries(times, values)"), None
     )
-    disturbance: tuple[Signal, ...] = field(coerce.disturbance, None)
+    disturbance: tuple[Signal, ...] = field(coerce.several(Signal, "smc.Sine(amplitude=0.2, omega=5.0)"), None)
     noise: Noise = field(coerce.instance(Noise, "smc.Noise(position=..., velocity=...)", Noise()), None)
     input_delay: float = field(coerce.input_delay, 0.0)
     clock: Clock = field(coerce.instance(Clock, "smc.Clock(jitter=..., missed=...)", Clock()), None)
@@ -196,15 +191,14 @@ class Scenario:
     def __post_init__(self) -> None:
         self._convert()
         check(self.resolved)
-        check_new(self.resolved)
+        check_ranges(self.plant.name, self.plant.ranges, self.resolved.x0)
+        check_inertia(self.resolved)
+        for doubt in itertools.islice(_doubts(self.resolved), 1):
+            warnings.warn(doubt, ScenarioWarning, users_stacklevel())
 
     @classmethod
     def recorded(cls, **fields: Any) -> "Scenario":
-        """Make the scenario of a recorded run, without the rules and warnings of `check_new`.
-
-        Raises:
-          ScenarioError: values that cannot be run.
-        """
+        """Make the scenario of a recorded run, without warnings and without rules that may have come since."""
         scenario = object.__new__(cls)
         vars(scenario).update({f.name: fields.get(f.name, f.default) for f in dataclasses.fields(cls)})
         scenario._convert()
@@ -452,16 +446,6 @@ def check(s: Resolved) -> None:
     check_mechanism(s)
 
 
-def check_new(s: Resolved) -> None:
-    """Raise ScenarioError, or warn, for what only recorded runs may have."""
-    check_ranges(s.plant.name, s.plant.ranges, s.x0)
-    check_inertia(s)
-    check_names(s)
-    warn_of_degrees(s)
-    warn_of_units(s)
-    warn_of_weak_motors(s)
-
-
 def check_clock(s: Resolved) -> None:
     """Check that the delay is a whole number of steps, the jump is within the run, and the trace fits into memory."""
     delay = s.input_delay / s.physics_step
@@ -545,16 +529,11 @@ def check_law(s: Resolved) -> None:
 
 
 def check_surface(surface: Surface, law: Law) -> None:
-    """Check that a surface suits a law."""
-    if law.relative_degree > 1:
+    """Check that surface and law both have a sliding variable of relative degree 1."""
+    if not law.relative_degree == surface.relative_degree == 1:
         raise ScenarioError(
-            f"law {law.name!r} acts on the error and its rates, and takes no surface such as {surface.name!r}: "
-            "leave the surface out, or give a law of relative degree 1"
-        )
-    if surface.relative_degree != law.relative_degree:
-        raise ScenarioError(
-            f"law {law.name!r} needs a sliding variable of relative degree {law.relative_degree}, "
-            f"and surface {surface.name!r} has {surface.relative_degree}: give another surface, or leave it out"
+            f"surface {surface.name!r} has relative degree {surface.relative_degree}, and law {law.name!r} "
+            f"{law.relative_degree}: leave the surface out, or give a surface and a law of relative degree 1"
         )
 
 
@@ -599,15 +578,6 @@ def check_inertia(s: Resolved) -> None:
             )
 
 
-def check_names(s: Resolved) -> None:
-    """Check that no parameter is named twice, once by its own name and once as the mass."""
-    for name, factors in (("mismatch", s.mismatch), ("Jump", s.jump.factors if s.jump else {})):
-        twice = "mass" in factors and s.plant.mass in factors and s.plant.mass != "mass"
-        if twice:
-            both = f"{s.plant.mass} {factors[s.plant.mass]:g} and mass {factors['mass']:g}"
-            raise ScenarioError(f"{name} has {both}, which are the same parameter of {s.plant.name}: give one of them")
-
-
 def check_mechanism(s: Resolved) -> None:
     """Check that the integrator suits the parts, and that mechanism and contact suit the parameters at any time."""
     if s.integrator == "RK4" and (states := [p for p in s.friction if p.stateful]):
@@ -619,15 +589,15 @@ def check_mechanism(s: Resolved) -> None:
     for part in s.friction:
         part.check(s.plant)
     for step in (0, s.samples * s.steps):
-        check_parameters(s.plant, s.mechanism, frozen(s.factors(step)))
-        check_contact(s.contact, s.plant, s.factors(step))
-
-
-def check_parameters(plant: Plant, name: str, factors: Mapping[str, float]) -> None:
-    """Raise ScenarioError for parameter factors that the plant's mechanism cannot have."""
-    values = plant.values(factors)
-    if name != "equation":
-        list(plant.mechanisms[name].fields(mechanism_model(plant, name), values))  # raises for them
+        values = s.plant.values(s.factors(step))  # raises for those that the plant cannot have
+        if s.mechanism != "equation":
+            list(s.plant.mechanisms[s.mechanism].fields(mechanism_model(s.plant, s.mechanism), values))  # raises, too
+        for name, value in s.plant.placed.items() if s.contact.kind != "none" else ():
+            if (present := getattr(values, name)) != value:
+                raise ScenarioError(
+                    f"the obstacles of contact {s.contact.kind!r} of {s.plant.name} are placed for {name} = {value:g}, "
+                    f"and {name} is {present:g}: leave {name} as it is"
+                )
 
 
 @functools.lru_cache(maxsize=16)
@@ -638,75 +608,26 @@ def mechanism_model(plant: Plant, name: str) -> mujoco.MjModel:
     return compiled(spec)
 
 
-def check_contact(contact: Contact, plant: Plant, factors: Mapping[str, float]) -> None:
-    """Raise ScenarioError if a parameter differs from the value for which the obstacles are placed."""
-    for name, value in plant.placed.items() if contact.kind != "none" else ():
-        present = getattr(plant.values(factors), name)
-        if present != value:
-            raise ScenarioError(
-                f"the obstacles of contact {contact.kind!r} of {plant.name} are placed for {name} = {value:g}, and "
-                f"{name} is {present:g}: leave {name} as it is"
-            )
-
-
-def warn_of_degrees(s: Resolved) -> None:
-    """Warn of a start or a reference's amplitude of several turns. Ramps and time series may have as many."""
-    amplitudes = tuple(signal.parameters().get("amplitude", 0.0) for signal in s.references)
+def _doubts(s: Resolved) -> Iterator[str]:
+    """Yield a sentence about each number that may be in degrees, percent or ms, and each motor that is too weak."""
+    amplitudes = [signal.parameters().get("amplitude", 0.0) for signal in s.references]  # ramps may have many turns
     for what, values in (("x0", s.x0), ("the reference's amplitude", amplitudes)):
         for unit, value in zip(s.plant.units, values, strict=False):
             if unit == "rad" and MAX_ANGLE < abs(value) <= MAX_DEGREES:
-                warnings.warn(
-                    f"{what} is {value:g} rad, {abs(value) / math.tau:.1f} turns: if it is {value:g} degrees, give "
-                    f"math.radians({value:g})",
-                    ScenarioWarning,
-                    users_stacklevel(),
-                )
-                return
-
-
-def warn_of_units(s: Resolved) -> None:
-    """Warn of the first number that is probably in another unit: percent, ms or degrees."""
-    for fact, cure in _other_units(s):
-        warnings.warn(f"{fact}: {cure}", ScenarioWarning, users_stacklevel())
-        return
-
-
-def _other_units(s: Resolved) -> Iterator[tuple[str, str]]:
-    """Yield a sentence about each suspicious number, and what to give instead."""
+                fact = f"{what} is {value:g} rad, {abs(value) / math.tau:.1f} turns"
+                yield f"{fact}: if it is {value:g} degrees, give math.radians({value:g})"
     for name, factor in s.mismatch.items():
         if name not in s.plant.added and MIN_PERCENT <= factor <= 100.0 and factor % 5.0 == 0.0:
-            yield (
-                f"mismatch makes {name} {factor:g} times the nominal one",
-                f"if it is {factor:g} % more, give {1 + factor / 100:g}",
-            )
+            fact = f"mismatch makes {name} {factor:g} times the nominal one"
+            yield f"{fact}: if it is {factor:g} % more, give {1 + factor / 100:g}"
     if s.input_delay >= MAX_INPUT_DELAY:
-        yield f"input_delay is {s.input_delay:g} s", f"if it is {s.input_delay:g} ms, give {s.input_delay / 1e3:g}"
-    for signal in (*dict.fromkeys(s.references), *s.disturbance):
-        phase = signal.parameters().get("phase", 0.0)
-        if MAX_ANGLE < abs(phase) <= MAX_DEGREES:
-            yield f"a phase is {phase:g} rad", f"if it is {phase:g} degrees, give math.radians({phase:g})"
-    for unit, v in zip(s.plant.units, s.v0, strict=True):
-        if unit == "rad" and MAX_SPEED < abs(v) <= 10 * MAX_DEGREES:
-            yield f"v0 is {v:g} rad/s", f"if it is {v:g} degrees per second, give math.radians({v:g})"
-    for part in s.actuator:
-        if isinstance(part, Backlash) and part.gap > MAX_BACKLASH and "rad" in s.plant.units[: s.plant.driven]:
-            fact = f"Backlash has a gap of {part.gap:g} rad"
-            yield fact, f"if it is {part.gap:g} degrees, give math.radians({part.gap:g})"
-
-
-def warn_of_weak_motors(s: Resolved) -> None:
-    """Warn of a DC motor that cannot hold a joint where it starts, though a force of u_max could."""
-    p, at_rest = s.plant.values({}), np.zeros(s.plant.n)
+        yield f"input_delay is {s.input_delay:g} s: if it is {s.input_delay:g} ms, give {s.input_delay / 1e3:g}"
     for motor in [part for part in s.actuator if isinstance(part, DCMotor)]:
         for i, limit in enumerate(s.limits):
             with np.errstate(all="ignore"):
-                f, g = s.plant.nominal(np.array(s.x0), at_rest, i, p)
+                f, g = s.plant.nominal(np.array(s.x0), np.zeros(s.plant.n), i, s.plant.values({}))
             need = abs(f) / abs(g) if g else 0.0
             if motor.stall < need and (need <= limit or motor.unit):
-                warnings.warn(
-                    f"DCMotor gives at most {motor.stall:.3g} {s.plant.efforts[i]} at rest, and channel {i} of "
-                    f"{s.plant.name} needs {need:.3g} to hold its start: give the motor more gear, voltage or current",
-                    ScenarioWarning,
-                    users_stacklevel(),
-                )
-                return
+                fact = f"DCMotor gives at most {motor.stall:.3g} {s.plant.efforts[i]} at rest, and channel {i} of "
+                fact += f"{s.plant.name} needs {need:.3g} to hold its start"
+                yield f"{fact}: give the motor more gear, voltage or current"

@@ -2,9 +2,9 @@
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
-from typing import Any, TypeVar
+from typing import Any
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.fingerprint import arithmetic
@@ -19,14 +19,12 @@ from smc_mujoco.mechanisms.hardware import backlash, drives, friction, servos  #
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.simulation import time_series, waypoints  # noqa: F401  # whose signals a file may name
-from smc_mujoco.simulation.clock import Clock
-from smc_mujoco.simulation.perturbations import Jump, Noise
+from smc_mujoco.simulation import time_series  # noqa: F401  # whose signals a file may name
+from smc_mujoco.simulation.perturbations import Clock, Jump, Noise
 from smc_mujoco.simulation.scenario import Resolved, Scenario
-from smc_mujoco.simulation.signals import PerChannel, Recorded, Signal
+from smc_mujoco.simulation.signals import PerChannel, Signal
 
 RESOLVED = tuple(Resolved.__annotations__)  # fields that are None if left out, with a default that `resolved` has
-T = TypeVar("T")
 
 
 def describe(scenario: Scenario) -> dict:
@@ -44,16 +42,15 @@ def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
     """Return the value of a scenario's field as plain data."""
     match value:
         case Plant():
-            return _plant(value)
+            data = {"name": value.name, "n": value.n, "module": value.build.__module__} | dict(value.parameters)
+            return data | ({"mjcf": value.build.about()} if isinstance(value.build, UserModel) else {})
         case Component():
             return components.describe(value)
-        case Recorded():
-            return {"kind": value.kind, "module": value.module, "values": value.parameters()}
         case PerChannel():
             return {"each": [_data(signal) for signal in value.signals]}
         case Signal() | Part():
             values = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if f.init}
-            return dict(zip(("kind", "module"), _name_and_module(type(value)), strict=True)) | {"values": values}
+            return {"kind": type(value).__name__, "module": type(value).__module__, "values": values}
         case Noise() | Clock() | Jump():
             return {name: _data(item) for name, item in vars(value).items() if item is not None}
         case Mapping():
@@ -71,9 +68,9 @@ def _versions() -> dict[str, str]:
 
 
 def restore(data: dict) -> Scenario:
-    """Return the scenario that `describe` wrote. A law or signal that is not installed here has no code."""
+    """Return the scenario that `describe` wrote. A law that is not installed here has no code."""
     fields = {name: data[name] for name in Scenario.fields()}
-    fields |= {name: restored(fields[name]) for name, restored in RESTORERS.items() if fields.get(name)}
+    fields |= {name: RESTORERS.get(name, _restored)(value) for name, value in fields.items() if value}
     fields["law"] = components.law(data["law"], data.get("source"))
     exact = Scenario.recorded(**fields)
     with_defaults = Scenario.recorded(**fields | dict.fromkeys(data.get("left_out", ())))
@@ -81,9 +78,18 @@ def restore(data: dict) -> Scenario:
     return scenario.named(data.get("condition"))
 
 
-def _plant(plant: Plant) -> dict:
-    data = {"name": plant.name, "n": plant.n, "module": plant.build.__module__} | dict(plant.parameters)
-    return data | ({"mjcf": plant.build.about()} if isinstance(plant.build, UserModel) else {})
+def _restored(data: Any) -> Any:
+    """Return the signal or the part that plain data describe, several of them, or other data as they are."""
+    if isinstance(data, list):
+        return tuple(map(_restored, data))
+    if isinstance(data, dict) and "each" in data:
+        return PerChannel(tuple(map(_restored, data["each"])))
+    if not isinstance(data, dict) or "kind" not in data:
+        return data
+    kinds = {(kind.__name__, kind.__module__): kind for base in (Signal, Part) for kind in subclasses(base)}
+    if (kind := kinds.get((data["kind"], data["module"]))) is None:
+        raise ScenarioError(f"{data['kind']!r} is unknown here: first import {data['module']}, which defines it")
+    return kind(**{name: tuple(value) if isinstance(value, list) else value for name, value in data["values"].items()})
 
 
 def _restore_plant(data: dict) -> Plant:
@@ -97,55 +103,12 @@ def _restore_plant(data: dict) -> Plant:
     return find_plant(name, **plant)
 
 
-def _restore_signal(data: dict) -> Signal:
-    if "each" in data:
-        return PerChannel(tuple(map(_restore_signal, data["each"])))
-    kind, values = _kinds(Signal).get((data["kind"], data["module"])), _values(data)
-    return kind(**values) if kind else Recorded(data["kind"], data["module"], values)
-
-
-def _restore_noise(data: dict) -> Noise:
-    values: dict = {name: _restore_signal(item) if isinstance(item, dict) else item for name, item in data.items()}
-    return Noise(**values)
-
-
-def _restore_part(data: dict) -> Part:
-    kind = _kinds(Part).get((data["kind"], data["module"]))
-    if kind is None:
-        raise ScenarioError(f"part {data['kind']!r} is unknown here: first import {data['module']}, which defines it")
-    return kind(**_values(data))
-
-
-def _restore_parts(data: Sequence[dict]) -> tuple[Part, ...]:
-    return tuple(map(_restore_part, data))
-
-
-def _values(data: dict) -> dict:
-    """Return the values of the fields of a part or signal, with tuples for JSON's lists."""
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in data["values"].items()}
-
-
-def _kinds(base: type[T]) -> dict[tuple[str, str], type[T]]:
-    """Return every class derived from a base, also users' classes, by its name and module."""
-    return {_name_and_module(kind): kind for kind in subclasses(base)}
-
-
-def _name_and_module(kind: type) -> tuple[str, str]:
-    return kind.__name__, kind.__module__
-
-
-RESTORERS: Mapping[str, Callable[[Any], Any]] = {  # field -> inverse of `_data`; other fields are plain data
+RESTORERS: Mapping[str, Callable[[Any], Any]] = {  # field -> inverse of `_data`, if not `_restored`
     "plant": _restore_plant,
+    "law": lambda data: data,
     "velocity": lambda data: components.restore(data, "estimator", estimators()),
     "surface": lambda data: components.restore(data, "surface", surfaces()),
-    "reference": _restore_signal,
-    "feedforward": _restore_signal,
-    "disturbance": lambda data: tuple(map(_restore_signal, data)),
-    "noise": _restore_noise,
+    "noise": lambda data: Noise(**{name: _restored(item) for name, item in data.items()}),
     "clock": lambda data: Clock(**data),
     "jump": lambda data: Jump(**data),
-    "friction": _restore_parts,
-    "contact": _restore_part,
-    "actuator": _restore_parts,
-    "sensor": _restore_part,
 }

@@ -14,14 +14,13 @@ disturbance.
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
 from numba import njit
 
 from smc_mujoco.common.errors import ScenarioError, number, shown
-from smc_mujoco.common.frozen import frozen
 from smc_mujoco.simulation import philox
 
 EARLY = 1.0 - 1e-15  # factor on a switching time, because sums of decimal times differ from it by an ulp or two
@@ -30,31 +29,22 @@ SINUSOIDS = 32  # of band-limited noise; chosen: its kurtosis is 3 - 3/64, 1.6 %
 
 @dataclasses.dataclass(frozen=True)
 class Signal:
-    """Base of all signals, which checks that every parameter is a finite number. The attributes are class attributes.
+    """Base of all signals, which checks that every parameter is a finite number.
 
-    Attributes:
-      memory: floats of state in each channel.
-      positive, natural: names of parameters that must be > 0, and >= 0.
-      random: whether `value` takes memory, seed, channel and stream.
-      series: whether `value` takes data.
-      sees: whether `value` takes e, its rate and s. It is called once a control sample; the force then stays.
-      rows: of the data of a series.
-      cartesian: whether it is a force on a body, N, instead of a force on the joint: a horizontal one on the body of
-        each channel, or that of a `Push`.
-      data: the array of a series, (rows, N) float64, C-contiguous.
-      value: static method that returns the value and its first and second derivative.
+    The class attribute `cartesian` says that it is a force on a body, N, instead of a force on the joint: a horizontal
+    one on the body of each channel, or that of a `Push`.
     """
 
-    memory: ClassVar[int] = 0
-    positive: ClassVar[tuple[str, ...]] = ()
-    natural: ClassVar[tuple[str, ...]] = ()
-    random: ClassVar[bool] = False
-    series: ClassVar[bool] = False
-    sees: ClassVar[bool] = False
-    rows: ClassVar[int] = 2
+    memory: ClassVar[int] = 0  # floats of state in each channel
+    positive: ClassVar[tuple[str, ...]] = ()  # names of parameters that must be > 0
+    natural: ClassVar[tuple[str, ...]] = ()  # names of parameters that must be >= 0
+    random: ClassVar[bool] = False  # whether `value` takes memory, seed, channel and stream
+    series: ClassVar[bool] = False  # whether `value` takes data
+    sees: ClassVar[bool] = False  # whether `value` takes e, de and s, once a control sample; the force then stays
+    rows: ClassVar[int] = 2  # of the data
     cartesian: ClassVar[bool] = False
-    data: ClassVar[np.ndarray]
-    value: ClassVar[Callable[..., tuple[float, float, float]]]
+    data: ClassVar[np.ndarray]  # of a series, (rows, N) float64, C-contiguous
+    value: ClassVar[Callable[..., tuple[float, float, float]]]  # static: value, first and second derivative
 
     def __post_init__(self):
         for name, value in self.parameters().items():
@@ -78,12 +68,8 @@ class PerChannel(Signal):
 
     signals: tuple[Signal, ...]
 
-    def __post_init__(self):
-        pass
-
     def parameters(self) -> dict[str, float]:
-        """Return no parameters: each signal has its own."""
-        return {}
+        return {}  # each signal has its own
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,7 +79,6 @@ class Constant(Signal):
     amplitude: float = 0.0
 
     def bounds(self) -> tuple[float, float]:
-        """Return bounds of |d| and |d'|."""
         return abs(self.amplitude), 0.0
 
     @staticmethod
@@ -110,7 +95,6 @@ class Sine(Signal):
     phase: float = 0.0
 
     def bounds(self) -> tuple[float, float]:
-        """Return bounds of |d| and |d'|."""
         return abs(self.amplitude), abs(self.amplitude * self.omega)
 
     @staticmethod
@@ -128,7 +112,6 @@ class Step(Signal):
     time: float = 0.0
 
     def bounds(self) -> tuple[float, float]:
-        """Return bounds of |d| and |d'|."""
         return abs(self.amplitude), math.inf
 
     @staticmethod
@@ -166,7 +149,6 @@ class MinimumJerk(Signal):
     positive = ("duration",)
 
     def bounds(self) -> tuple[float, float]:
-        """Return bounds of |d| and |d'|."""
         return abs(self.amplitude), 1.875 * abs(self.amplitude) / self.duration
 
     @staticmethod
@@ -188,7 +170,6 @@ class Pulse(Signal):
     positive = ("width",)
 
     def bounds(self) -> tuple[float, float]:
-        """Return bounds of |d| and |d'|."""
         return abs(self.amplitude), math.inf
 
     @staticmethod
@@ -275,7 +256,6 @@ class Push(Signal):
         super().__post_init__()
 
     def parameters(self) -> dict[str, float]:
-        """Return parameter name -> value."""
         return {name: getattr(self, name) for name in ("x", "y", "z", "time", "width")}
 
     @staticmethod
@@ -314,7 +294,6 @@ class Relay(Signal):
     sees = True
 
     def bounds(self) -> tuple[float, float]:
-        """Return bounds of |d| and |d'|."""
         return abs(self.amplitude), math.inf
 
     @staticmethod
@@ -401,19 +380,3 @@ def _band_limited(t, sigma, low, high, memory, seed, channel, stream):
     for i in range(SINUSOIDS):
         total += math.cos(memory[i] * t + memory[SINUSOIDS + i])
     return sigma * math.sqrt(2.0 / SINUSOIDS) * total
-
-
-@dataclasses.dataclass(frozen=True)
-class Recorded(Signal):
-    """A signal from a file, of a class that is not installed here. It has no function and cannot run."""
-
-    kind: str
-    module: str
-    values: Mapping[str, float]
-
-    def __post_init__(self):
-        object.__setattr__(self, "values", frozen(self.values))
-
-    def parameters(self) -> dict[str, float]:
-        """Parameter name -> value, as recorded."""
-        return dict(self.values)

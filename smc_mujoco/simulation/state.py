@@ -122,11 +122,8 @@ simulation_at, state_at, log_at, disturbance_at, function_at = map(
     )
 )  # fmt: skip
 
-# Values of `failure`.
-(
-    FINE, DIVERGED, NOT_FINITE, DISTURBANCE_NOT_FINITE, ESTIMATOR_RAISED, REFERENCE_RAISED, NOMINAL_RAISED, LAW_RAISED,
-    DISTURBANCE_RAISED, SURFACE_RAISED, FEEDFORWARD_RAISED, FRICTION_RAISED, INTERRUPTED,
-) = range(13)  # fmt: skip
+# Values of `failure`. RAISED: another function than the law raised an exception.
+FINE, DIVERGED, NOT_FINITE, LAW_RAISED, RAISED, DISTURBANCE_NOT_FINITE, INTERRUPTED = range(7)
 
 
 class Index(int):

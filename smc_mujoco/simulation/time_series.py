@@ -1,4 +1,4 @@
-"""A user's time series as a signal, from numbers or from a CSV file, which is checked cell by cell."""
+"""Signals through points in time: of numbers, of a CSV file, of waypoints, and of a tip's path in space."""
 
 import dataclasses
 import math
@@ -11,11 +11,17 @@ from numba import njit
 
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.common.files import csv_rows
+from smc_mujoco.mechanisms.hardware.part import joint_names
+from smc_mujoco.mechanisms.inverse_kinematics import Tip, solve
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.signals import EARLY, Signal
 
 MAX_GAP_STEPS = 1.5  # longest step over the median step; chosen: a logger's jitter is below, a missing row above
 NAME_WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\]]*)\]")  # name of a column
 SECOND_SPELLINGS = ("s", "sec", "second", "seconds")
+KNOT_SPACING = 0.01  # s, of a path in space; chosen: between knots the tip leaves its path by micrometres
+MAX_KNOTS = 1_000_000  # of a path in space: minutes of computing
 
 
 @njit(error_model="numpy")
@@ -76,30 +82,40 @@ class TimeSeries(Signal):
         return {}
 
     @classmethod
-    def from_csv(cls, path: str | os.PathLike[str], column: str | None = None, time: str | None = None) -> "TimeSeries":
+    def from_csv(cls, path: str | os.PathLike[str], column: str | None = None) -> "TimeSeries":
         """Return the series in a CSV file: a row per time, at a nearly constant rate.
 
         Commas separate the cells, or semicolons, beside which a comma is a decimal point.
 
         Args:
-          path: the file. Its first row may name the columns; otherwise they are time and value. A name may have a unit,
-            "d [N m]", as Trace.export writes it, which `column` and `time` may leave out.
-          column: name of the column of values. Default: the first besides time.
-          time: name of the column of times, s. Default: "t" or "time", else the first.
+          path: the file. Its first row may name the columns, perhaps with a unit: "d [N m]", as Trace.export writes it.
+            Times, s, are in the column "t" or "time", else in the first.
+          column: name of the column of values, with its unit or without. Default: the first besides time.
 
         Raises:
           ScenarioError: there is no such file or column, times are not in s or do not increase, a cell is empty or not
             a finite number, or a step of time is longer than 1.5 median steps. The error names the line.
         """
         rows = csv_rows(path)
-        if not rows:
-            raise ScenarioError(f"{path} is empty: give a CSV file with the columns t and a value")
-        places, body = _columns(path, rows, column, time)
-        names = {i: rows[0][1][i] if body is not rows else f"column {i + 1}" for i in places}
-        times, values = ([_cell(path, line, names[i], row[i]) for line, row in body] for i in places)
+        if not rows or len(rows[0][1]) < 2:
+            raise ScenarioError(f"{path} has no two columns: give time and value, with commas between")
+        names = rows[0][1]
+        if all(math.isnan(_number(name)) for name in names):
+            rows = rows[1:]
+        else:
+            names = [f"column {i + 1}" for i in range(len(names))]
+        places = _columns(path, names, column)
+        for line, row in rows:
+            if len(row) != len(names):
+                raise ScenarioError(f"{path}, line {line}: {len(row)} cells for {len(names)} columns: give as many")
+            for i in places:
+                if not math.isfinite(_number(row[i])):
+                    cure = "give a finite number, or cut the file there"
+                    raise ScenarioError(f"{path}, line {line}: {names[i]} is {shown(row[i])}: {cure}")
+        times, values = ([float(row[i]) for _, row in rows] for i in places)
 
         def where(i: int) -> str:
-            return f"line {body[i][0]}"
+            return f"line {rows[i][0]}"
 
         _check(str(path), times, values, where)
         steps = np.diff(times)
@@ -137,6 +153,56 @@ class Held(TimeSeries):
         return data[1, last_before(data, t, data.shape[1], EARLY)], 0.0, 0.0
 
 
+@dataclasses.dataclass(frozen=True, repr=False)
+class Waypoints(TimeSeries):
+    """The minimum-jerk motion through the points (times, values), at rest before the first and after the last.
+
+    No other function through them, at rest at both ends, has a smaller integral of the squared jerk: it is the spline
+    of fifth degree whose fourth derivative is continuous. It does not stop at inner points. With two points it is
+    `MinimumJerk`.
+    Source: I. J. Schoenberg, "Spline functions and the problem of graduation", Proc. Natl. Acad. Sci. 52(4):947, 1964.
+
+    Attributes:
+      times: (N,), s, increasing, N >= 2.
+      values: (N,), rad or m.
+    """
+
+    rows = 4  # times, values and the spline's first and second derivative there
+
+    def _data(self) -> np.ndarray:
+        from scipy.interpolate import make_interp_spline
+
+        rest = [(1, 0.0), (2, 0.0)]
+        spline = make_interp_spline(self.times, self.values, k=5, bc_type=(rest, rest))
+        data = np.array([self.times, self.values, spline(self.times, 1), spline(self.times, 2)])
+        data[2:, [0, -1]] = 0.0
+        return data
+
+    @staticmethod
+    def value(t, p, data):
+        last = data.shape[1] - 1
+        if t <= data[0, 0]:
+            return data[1, 0], 0.0, 0.0
+        if t >= data[0, last]:
+            return data[1, last], 0.0, 0.0
+        low = last_before(data, t, last, 1.0)
+        high = low + 1
+        # quintic through both ends: r = r0 + v0 T a + a0 T^2 a^2 / 2 + c3 a^3 + c4 a^4 + c5 a^5, a = (t - t0) / T
+        T = data[0, high] - data[0, low]
+        a = (t - data[0, low]) / T
+        v0, v1 = data[2, low] * T, data[2, high] * T
+        a0, a1 = data[3, low] * T * T, data[3, high] * T * T
+        # what is missing at the end, in position, velocity and acceleration, without c3, c4 and c5
+        dr_end, dv_end, da_end = data[1, high] - data[1, low] - v0 - 0.5 * a0, v1 - v0 - a0, a1 - a0
+        c3 = 10.0 * dr_end - 4.0 * dv_end + 0.5 * da_end
+        c4 = -15.0 * dr_end + 7.0 * dv_end - da_end
+        c5 = 6.0 * dr_end - 3.0 * dv_end + 0.5 * da_end
+        r = data[1, low] + a * (v0 + a * (0.5 * a0 + a * (c3 + a * (c4 + a * c5))))
+        dr = v0 + a * (a0 + a * (3.0 * c3 + a * (4.0 * c4 + a * 5.0 * c5)))
+        ddr = a0 + a * (6.0 * c3 + a * (12.0 * c4 + a * 20.0 * c5))
+        return r, dr / T, ddr / (T * T)
+
+
 def _floats(what: str, items: object) -> tuple[float, ...]:
     """Return a user's sequence of finite numbers as floats."""
     if isinstance(items, np.ndarray):
@@ -165,51 +231,78 @@ def _check(what: str, times: Sequence[float], values: Sequence[float], where: Ca
         )
 
 
-def _columns(
-    path: str | os.PathLike[str], rows: list[tuple[int, list[str]]], column: str | None, time: str | None
-) -> tuple[tuple[int, int], list[tuple[int, list[str]]]]:
-    """Return the indices of the columns of times and values, and the rows below the header."""
-    names = rows[0][1]
-    if len(names) < 2:
-        raise ScenarioError(f"{path} has one column in its first line: give two, time and value, with commas between")
-    for line, row in rows:
-        if len(row) != len(names):
-            raise ScenarioError(f"{path}, line {line}: {len(row)} cells for {len(names)} columns: give one for each")
-    if all(not name or _is_number(name) for name in names):
-        if named := column or time:
-            raise ScenarioError(
-                f"{path} has no header to find {shown(named)} in: write the columns' "
-                "names in its first line, or leave out column and time"
-            )
-        return (0, 1), rows
-    places: dict[str, int] = {}
-    for spellings in (names, [NAME_WITH_UNIT.sub(r"\1", name) for name in names]):
-        for i, name in enumerate(spellings):
-            places.setdefault(name, i)
-    if time is None:
-        time = next((name for name in ("t", "time") if name in places), names[0])
-    if not isinstance(time, str) or time not in places:
-        raise unknown(f"time column of {path}", time, names)
-    if column is not None and (not isinstance(column, str) or column not in places):
+def _columns(path: str | os.PathLike[str], names: list[str], column: str | None) -> tuple[int, int]:
+    """Return the indices of the columns of times and values; `column` may leave out the unit in a name."""
+    plain = [NAME_WITH_UNIT.sub(r"\1", name) for name in names]
+    at = next((plain.index(name) for name in ("t", "time") if name in plain), 0)
+    if (unit := NAME_WITH_UNIT.fullmatch(names[at])) and unit[2] not in SECOND_SPELLINGS:
+        raise ScenarioError(f"time column {names[at]!r} of {path} is not in seconds: give times in s")
+    if column is None:
+        return at, int(at == 0)
+    if column not in (*names, *plain):
         raise unknown(f"column of {path}", column, names)
-    i = places[time]
-    if (unit := NAME_WITH_UNIT.fullmatch(names[i])) and unit[2] not in SECOND_SPELLINGS:
-        raise ScenarioError(f"time column {names[i]!r} of {path} is not in seconds: give times in s")
-    return (i, int(i == 0) if column is None else places[column]), rows[1:]
+    return at, (names if column in names else plain).index(column)
 
 
-def _cell(path: str | os.PathLike[str], line: int, name: str, cell: str) -> float:
-    """Return the number in a cell."""
-    if not cell:
-        raise ScenarioError(f"{path}, line {line}: {name} is empty: fill it in, or cut the file there")
-    if not _is_number(cell) or not math.isfinite(float(cell)):
-        raise ScenarioError(f"{path}, line {line}: {name} is {shown(cell)}: give a finite number")
-    return float(cell)
-
-
-def _is_number(cell: str) -> bool:
+def _number(cell: str) -> float:
+    """Return the number in a cell, NaN for any other text."""
     try:
-        float(cell)
+        return float(cell)
     except ValueError:
-        return False
-    return True
+        return math.nan
+
+
+def cartesian_path(
+    plant: Plant | str,
+    times: Sequence[float],
+    points: Sequence[Sequence[float]],
+    site: str | None = None,
+    body: str | None = None,
+    orientation: Sequence[float] | None = None,
+    x0: Sequence[float] | None = None,
+) -> list[Waypoints]:
+    """Return a reference for each channel's joint, on which a tip moves through points in space with minimum jerk.
+
+    Inverse kinematics computes the joints' positions every 10 ms: least squares with MuJoCo's Jacobians, damped near
+    singular poses. If an arm has more joints than the task needs, each solution is the one nearest to the one before.
+    Then a closed path of the tip may not close in the joints.
+
+    Args:
+      plant: a plant or its name; its nominal model is used.
+      times: (N,), s, increasing.
+      points: (N, 3), m, in the world.
+      site, body: name of the site or body whose origin is the tip; one of them.
+      orientation: of the tip all along, a quaternion (w, x, y, z) in the world; None: any.
+      x0: positions at which the search begins, one for each channel; None: the plant's.
+
+    Raises:
+      ScenarioError: an unknown plant, site or body, numbers out of range, or a point out of reach.
+    """
+    plant = as_plant(plant)
+    if plant.free:
+        raise ScenarioError(f"{plant.name} has joints without an actuator: a path in space needs all of them driven")
+    if (site is None) == (body is None):
+        model = plant.load()
+        example = f"site={plant.tip!r}" if plant.tip else f"body={model.body(model.nbody - 1).name!r}"
+        raise ScenarioError(f"site is {shown(site)} and body is {shown(body)}: give one of them, such as {example}")
+    try:
+        array = np.asarray(points, float)
+    except (TypeError, ValueError, OverflowError):  # no numbers, or rows of unequal lengths
+        array = np.empty(0)
+    if array.shape != (len(times), 3):
+        raise ScenarioError(
+            f"points are {shown(points)}: give a position (x, y, z) in m for each of {len(times)} times"
+        )
+    path = [Waypoints(times, array[:, i].tolist()) for i in range(3)]
+    first, last = path[0].times[0], path[0].times[-1]
+    steps = (last - first) / KNOT_SPACING
+    if steps > MAX_KNOTS:
+        raise ScenarioError(f"times span {last - first:g} s: give a path of {MAX_KNOTS * KNOT_SPACING:g} s at most")
+    knots = np.linspace(first, last, max(2, int(np.ceil(steps - 1e-9)) + 1))
+    positions = np.array([[Waypoints.value(t, None, axis.data)[0] for axis in path] for t in knots])
+    start = plant.x0 if x0 is None else tuple(number("x0", x) for x in x0)
+    if len(start) != plant.n:
+        raise ScenarioError(f"x0 has {len(start)} values for {plant.n} channels: give {plant.n}")
+    tip = Tip(plant, joint_names(plant), site, body, orientation)
+    joints = solve(tip, positions, start)
+    return [Waypoints(knots.tolist(), joints[:, i].tolist()) for i in range(plant.n)]

@@ -23,8 +23,8 @@ from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Push
+from smc_mujoco.simulation.time_series import Waypoints, cartesian_path
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.simulation.waypoints import Waypoints, cartesian_path
 
 NOISE = Noise(position=1e-5, velocity=1e-3)  # rad, rad/s: chosen, as of an encoder and a filtered difference
 SWAY = (0.3, 0.25, 0.3, 0.35, 0.4, 0.4, 0.5)  # rad: amplitude of each joint's sway, chosen for speeds up to 1 rad/s

@@ -11,11 +11,10 @@ from mujoco.introspect import ast_nodes, structs
 
 import smc_mujoco as smc
 from smc_mujoco.simulation import callback
-from smc_mujoco.simulation import offsets as layout
 
 pytestmark = pytest.mark.quick
 
-FIELDS = layout.Offsets._fields[1:]
+FIELDS = callback.Offsets._fields[1:]
 SCENARIO = smc.Scenario(plant="duffing", law="classical", duration=0.05)
 
 
@@ -57,8 +56,8 @@ def position(fields, name):
 
 def test_offsets_are_where_the_live_arrays_are(live):
     model, data = live
-    offsets = layout.checked_offsets(model, data)
-    assert offsets == layout.offsets()
+    offsets = callback.checked_offsets(model, data)
+    assert offsets == callback.offsets()
     assert ctypes.c_int64.from_address(model._address + offsets.nuserdata).value == 17
     for name in FIELDS:
         assert (
@@ -75,14 +74,14 @@ def test_an_array_at_another_s_place_is_refused(monkeypatch, live, name):
         return fields
 
     doctored(monkeypatch, "mjData", swap)
-    with pytest.raises(layout.LayoutError, match=rf"does not have mjData\.{name} at byte"):
-        layout.checked_offsets(*live)
+    with pytest.raises(callback.LayoutError, match=rf"does not have mjData\.{name} at byte"):
+        callback.checked_offsets(*live)
 
 
 def test_a_field_less_is_refused(monkeypatch, live):
     doctored(monkeypatch, "mjData", lambda fields: fields[1:])
-    with pytest.raises(layout.LayoutError, match=r"does not have mjData\.qpos at byte"):
-        layout.checked_offsets(*live)
+    with pytest.raises(callback.LayoutError, match=r"does not have mjData\.qpos at byte"):
+        callback.checked_offsets(*live)
 
 
 def test_two_arrays_that_change_places_are_refused(monkeypatch, live):
@@ -92,8 +91,8 @@ def test_two_arrays_that_change_places_are_refused(monkeypatch, live):
         return fields
 
     doctored(monkeypatch, "mjData", swap)
-    with pytest.raises(layout.LayoutError, match="qpos"):
-        layout.checked_offsets(*live)
+    with pytest.raises(callback.LayoutError, match="qpos"):
+        callback.checked_offsets(*live)
 
 
 def test_arrays_in_another_order_are_refused(monkeypatch, live):
@@ -104,8 +103,8 @@ def test_arrays_in_another_order_are_refused(monkeypatch, live):
         return fields
 
     doctored(monkeypatch, "mjData", turn)
-    with pytest.raises(layout.LayoutError):
-        layout.checked_offsets(*live)
+    with pytest.raises(callback.LayoutError):
+        callback.checked_offsets(*live)
 
 
 @pytest.mark.parametrize("name", ["qpos", "sensordata"])
@@ -115,8 +114,8 @@ def test_an_array_that_is_gone_is_refused(monkeypatch, live, name):
         return fields
 
     doctored(monkeypatch, "mjData", remove)
-    with pytest.raises(layout.LayoutError):
-        layout.checked_offsets(*live)
+    with pytest.raises(callback.LayoutError):
+        callback.checked_offsets(*live)
 
 
 def test_a_shifted_model_is_refused(monkeypatch, live):
@@ -124,8 +123,8 @@ def test_a_shifted_model_is_refused(monkeypatch, live):
         return [dataclasses.replace(fields[0], name="extra"), *fields]
 
     doctored(monkeypatch, "mjModel", insert)
-    with pytest.raises(layout.LayoutError, match="nuserdata"):
-        layout.checked_offsets(*live)
+    with pytest.raises(callback.LayoutError, match="nuserdata"):
+        callback.checked_offsets(*live)
 
 
 def test_an_unknown_type_is_refused(monkeypatch, live):
@@ -133,15 +132,15 @@ def test_an_unknown_type_is_refused(monkeypatch, live):
         return [dataclasses.replace(fields[0], name="extra", type=ast_nodes.ValueType(name="quaternion_t")), *fields]
 
     doctored(monkeypatch, "mjData", insert)
-    with pytest.raises(layout.LayoutError, match=r"^mujoco 3\.\S+ has .* C type .*quaternion_t.*: install mujoco 3"):
-        layout.checked_offsets(*live)
+    with pytest.raises(callback.LayoutError, match=r"^mujoco 3\.\S+ has .* C type .*quaternion_t.*: install mujoco 3"):
+        callback.checked_offsets(*live)
 
 
 def test_nothing_is_installed_when_the_layout_is_wrong(monkeypatch):
     doctored(monkeypatch, "mjModel", lambda fields: [dataclasses.replace(fields[0], name="extra"), *fields])
-    layout.offsets.cache_clear()
+    callback.offsets.cache_clear()
     callback.callback.cache_clear()
-    with pytest.raises(layout.LayoutError), callback.installed():
+    with pytest.raises(callback.LayoutError), callback.installed():
         pass
     assert mujoco.get_mjcb_control() is None
     monkeypatch.undo()
@@ -215,7 +214,7 @@ def test_a_run_puts_a_users_own_callback_back(native):
     """A Python callback makes MuJoCo's model compiler fail: no model may be built while it is installed."""
     own = counting()[0] if native else lambda model, data: None
     alone = smc.run(SCENARIO)
-    layout.offsets.cache_clear()  # as in a fresh process
+    callback.offsets.cache_clear()  # as in a fresh process
     callback.callback.cache_clear()
     mujoco.set_mjcb_control(own)
     try:
