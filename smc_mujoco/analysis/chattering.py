@@ -463,11 +463,9 @@ def save(
 ) -> Path:
     """Write predicted cycles of scenarios, measured amplitudes of s and frequencies, and their changes, as JSON."""
     rows = [
-        {"plant": one.plant.name, "law": one.law.name, "gains": dict(one.law.gains)}
-        | {name: value for name, value in vars(cycle).items() if name not in ("gain", "response")}
-        | {"uncertainty": cycle.uncertainty}
+        {"plant": one.plant.name, "law": one.law.name, "gains": dict(one.law.gains), **vars(cycle)}
         | {"gain": [cycle.gain.real, cycle.gain.imag], "response": [cycle.response.real, cycle.response.imag]}
-        | {"measured_amplitude": amplitude, "measured_frequency": frequency}
+        | {"uncertainty": cycle.uncertainty, "measured_amplitude": amplitude, "measured_frequency": frequency}
         | {"half_step_changes": vars(change), "marked": change.marked}
         for one, cycle, (amplitude, frequency), change in zip(scenarios, cycles, measured, changes, strict=True)
     ]

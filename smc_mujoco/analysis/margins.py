@@ -47,6 +47,8 @@ VELOCITY_NOISE_RATIO = 5.0  # 1/s, noise of the velocity over that of the positi
 MAX_FORCE = 6.0  # N or N m: the study's u_max; no actuator there holds a larger force
 MAX_MASS_RATIO, MAX_NOISE = 64.0, 2.048  # mass ratio; rad or m: chosen, far above tolerated levels
 FORCES, NOISES = (tuple(largest * 2.0 ** (i - 8) for i in range(9)) for largest in (MAX_FORCE, MAX_NOISE))
+MASS_RATIOS = tuple(np.geomspace(1.0, MAX_MASS_RATIO, 10)[1:].tolist())
+JITTERS = tuple(i / JITTER_SHARES for i in range(1, JITTER_SHARES))  # of the control period
 DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s
 FINE, COARSE = 0.02, 0.1  # resolution of a full and of a quick search, of the level
 QUANTA = {FINE: 1, COARSE: 5}  # the same in quanta, for levels that are multiples of one, such as control periods
@@ -98,7 +100,7 @@ def find_boundaries(
 # the kinds of margins
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@dataclasses.dataclass(frozen=True)
 class Kind:
     """A kind of margin: something that a law tolerates up to some level."""
 
@@ -110,10 +112,6 @@ class Kind:
     signed: bool = False  # whether a level is tolerated only if minus the level is, too
     quantum: Callable[[Scenario], float] = lambda base: 0.0  # of which a level is a multiple; 0: any level
     theory: Callable[[Scenario], float | None] = lambda base: None  # largest level by linear theory, if there is any
-
-    def unit_for(self, x: str) -> str:
-        """Return the unit for positions in x, "rad" or "m"."""
-        return self.unit.format(x=x, u=EFFORT[x])
 
     def scenarios(self, base: Scenario, level: float) -> list[Scenario]:
         """Return the scenarios that tell whether a level is tolerated."""
@@ -134,11 +132,9 @@ class Kind:
 
     def expected(self, base: Scenario) -> float | None:
         """Return the largest level by linear theory; None if there is none for the law, the plant or the condition."""
-        late = not base.clock.regular
-        if late or base.disturbance or base.friction or base.mismatch or base.jump or base.sensor:  # not in the theory
-            return None
-        if base.feedforward or base.resolved.model == "nominal" or base.resolved.reference != REST:
-            return None
+        changed = base.disturbance or base.friction or base.mismatch or base.jump or base.sensor or base.feedforward
+        if changed or not base.clock.regular or base.resolved.model == "nominal" or base.resolved.reference != REST:
+            return None  # not in the theory
         try:
             return self.theory(base)
         except ScenarioError:
@@ -176,52 +172,30 @@ def _with_noise(base: Scenario, level: float) -> Scenario:
     return dataclasses.replace(base, noise=Noise(position=level, velocity=VELOCITY_NOISE_RATIO * level))
 
 
+def _with_delay(base: Scenario, level: float) -> Scenario:
+    return dataclasses.replace(base, input_delay=level)
+
+
+def _with_force(base: Scenario, level: float) -> Scenario:
+    return dataclasses.replace(base, disturbance=(*base.disturbance, Constant(level)))
+
+
+def _with_missed(base: Scenario, level: float) -> Scenario:
+    return dataclasses.replace(base, clock=dataclasses.replace(base.clock, missed=level))
+
+
 MARGIN_KINDS: dict[str, Kind] = {
     "delay": Kind(
-        label="input delay",
-        unit="s",
-        levels=DELAYS,
-        put=lambda base, level: dataclasses.replace(base, input_delay=level),
-        quantum=lambda base: base.control_period,
-        theory=_critical_delay,
+        "input delay", "s", DELAYS, _with_delay, quantum=lambda base: base.control_period, theory=_critical_delay
     ),
-    "disturbance": Kind(
-        label="constant disturbance",
-        unit="{u}",
-        levels=FORCES,
-        put=lambda base, level: dataclasses.replace(base, disturbance=(*base.disturbance, Constant(level))),
-        signed=True,
-        theory=_tolerated_force,
-    ),
-    "friction": Kind(label="dry friction", unit="{u}", levels=FORCES, put=with_friction, theory=_tolerated_force),
-    "mass": Kind(
-        label="mass",
-        unit="1",
-        levels=tuple(float(factor) for factor in np.geomspace(1.0, MAX_MASS_RATIO, 10)[1:]),
-        put=_with_mass,
-        none=1.0,
-    ),
-    "noise": Kind(
-        label="position noise",
-        unit="{x}",
-        levels=NOISES,
-        put=lambda base, level: dataclasses.replace(
-            base, noise=Noise(position=level, velocity=VELOCITY_NOISE_RATIO * level)
-        ),
-    ),
+    "disturbance": Kind("constant disturbance", "{u}", FORCES, _with_force, signed=True, theory=_tolerated_force),
+    "friction": Kind("dry friction", "{u}", FORCES, with_friction, theory=_tolerated_force),
+    "mass": Kind("mass", "1", MASS_RATIOS, _with_mass, none=1.0),
+    "noise": Kind("position noise", "{x}", NOISES, _with_noise),
     "jitter": Kind(
-        label="largest delay of a sample, of the control period",
-        unit="1",
-        levels=tuple(i / JITTER_SHARES for i in range(1, JITTER_SHARES)),
-        put=with_jitter,
-        quantum=lambda base: 1.0 / JITTER_SHARES,
+        "largest delay of a sample, of the control period", "1", JITTERS, with_jitter, quantum=lambda base: JITTERS[0]
     ),
-    "missed": Kind(
-        label="share of missed samples",
-        unit="1",
-        levels=tuple(i / 10 for i in range(1, 10)),
-        put=lambda base, level: dataclasses.replace(base, clock=dataclasses.replace(base.clock, missed=level)),
-    ),
+    "missed": Kind("share of missed samples", "1", tuple(i / 10 for i in range(1, 10)), _with_missed),
 }
 KINDS = ("delay", "disturbance", "friction", "mass", "noise")  # those of the report, and the default
 
@@ -325,7 +299,7 @@ def margins_of(
             law=base.law.name,
             kind=kinds[i % len(kinds)],
             value=search.low if i in going else math.nan,
-            unit=kind.unit_for(base.plant.unit),
+            unit=kind.unit.format(x=base.plant.unit, u=EFFORT[base.plant.unit]),
             resolution=search.high - search.low if search.high < math.inf else 0.0,
             searched=search.levels[-1],
             theory=kind.expected(base),

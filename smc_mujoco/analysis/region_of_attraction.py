@@ -135,16 +135,14 @@ def basin_of(
     v: Sequence[float] | np.ndarray,
     threads: int | None = None,
     report: Report = lambda done, needed: None,
-    early: bool = True,
 ) -> Basin:
-    """Map the region of attraction of any scenario as `basin` does; unless `early`, all states run to the end."""
+    """Map the region of attraction of any scenario as `basin` does."""
     if base.plant.mixed:
         words = "has channels in m and rad, which cannot start from the same state: map another plant"
         raise ScenarioError(f"{base.plant.name} {words}")
     if moving := [one for one in base.references if not isinstance(one, Constant)]:
         raise ScenarioError(f"a map shows what comes to rest, and {shown(moving[0])} moves: give a constant reference")
-    horizons = HORIZONS if early else HORIZONS[-1:]
-    shortest = math.ceil(MIN_SAMPLES / horizons[0])
+    shortest = math.ceil(MIN_SAMPLES / HORIZONS[0])
     if base.samples < shortest:
         cure = f"give at least {shortest * base.control_period:g} s"
         raise ScenarioError(f"duration {base.duration:g} s is too short to tell what comes to rest: {cure}")
@@ -152,9 +150,9 @@ def basin_of(
     outcome = np.full((v.size, x.size), UNDECIDED, np.int8)
     decided_at = np.full(outcome.shape, base.duration)
     undecided, done = list(np.ndindex(*outcome.shape)), 0.0
-    for i, horizon in enumerate(horizons):
+    for i, horizon in enumerate(HORIZONS):
         shortened = dataclasses.replace(base, duration=horizon * base.duration)
-        needed = done + len(undecided) * base.work * sum(horizons[i:])
+        needed = done + len(undecided) * base.work * sum(HORIZONS[i:])
         size, left = max(32, int(BATCH_BYTES / (72 * (shortened.samples + 1) * shortened.plant.n))), []
         for begin in range(0, len(undecided), size):
             batch = undecided[begin : begin + size]
@@ -221,10 +219,7 @@ def load(path: str | os.PathLike[str]) -> Basin:
 
 
 def _axis(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
-    try:
-        axis = np.array(values, float)
-    except (TypeError, ValueError, OverflowError):
-        axis = np.array(np.nan)
+    axis = np.array(values, float)
     if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all():
         raise ScenarioError(f"{name} is {shown(values)}: give one or more finite numbers")
     return axis

@@ -11,8 +11,7 @@ import numpy as np
 
 from smc_mujoco.analysis.bootstrap import LEVEL
 from smc_mujoco.analysis.paired_runs import failures
-from smc_mujoco.analysis.ranking import Comparison
-from smc_mujoco.analysis.signed_rank import min_p
+from smc_mujoco.analysis.ranking import Comparison, min_p
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, every, joined
 from smc_mujoco.control.component import Component

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
 from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, SETTLES
-from smc_mujoco.analysis.ranking import Effect, Rank
-from smc_mujoco.analysis.signed_rank import min_p
+from smc_mujoco.analysis.ranking import Effect, Rank, min_p
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Cell, Tables, Tabular

@@ -129,12 +129,9 @@ class Tuned(Tables):
     @property
     def verdict(self) -> str:
         """Whether the search has converged, in words."""
-        if self.converged is None:
-            return f"{len(self.ends)} of the {AGREEING_STARTS} starts that convergence needs"
-        best = min(self.ends)
-        agreeing = sum(end <= best * (1.0 + AGREEMENT_TOLERANCE) for end in self.ends)
-        ended = f"{agreeing} of {len(self.ends)} starts end within {100 * AGREEMENT_TOLERANCE:g} % of the best"
-        return f"{'converged' if self.converged else 'not converged'}: {ended}"
+        agreeing = sum(end <= min(self.ends) * (1.0 + AGREEMENT_TOLERANCE) for end in self.ends)
+        near = f"starts within {100 * AGREEMENT_TOLERANCE:g} % of the best: {agreeing} of {len(self.ends)}"
+        return f"{source.ENDED[self.converged]}, {near}"
 
     @property
     def sets(self) -> list[Evaluation]:

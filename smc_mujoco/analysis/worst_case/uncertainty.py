@@ -93,16 +93,11 @@ class Uncertainty:
             raise ScenarioError(f"Uncertainty's parameters are {shown(self.parameters)}: give a range for each name")
         ranges = {str(name): _range(name, value, -math.inf) for name, value in self.parameters.items()}
         put(parameters=frozen(ranges))
-        if not self.free:
+        bounds = self.disturbance, self.position_noise, self.velocity_noise, self.jitter, self.x0
+        ends = self.delay, self.mass, self.friction, self.friction_scale, *self.parameters.values()
+        if not any(bounds) and not any(low < high for low, high in ends):
             cure = "give a bound, such as disturbance=2.0"
             raise ScenarioError(f"Uncertainty allows nothing but the scenario itself: {cure}")
-
-    @property
-    def free(self) -> bool:
-        """Whether the class has more than one member."""
-        bounds = self.disturbance, self.position_noise, self.velocity_noise, self.jitter, self.x0
-        ranges = self.delay, self.mass, self.friction, self.friction_scale, *self.parameters.values()
-        return any(bounds) or any(low < high for low, high in ranges)
 
     def words(self, plant: Plant) -> str:
         """Return the class as a line of text, such as "|d| <= 2 N, mass x 0.7 to 1.3"."""
