@@ -179,7 +179,7 @@ def about(name: str, parameter: inspect.Parameter, info: Any) -> str:
 
 
 def test_the_calls_above_have_every_option_of_their_commands():
-    beside = {"--timing", "--serve", "--port"}  # for what is done after the work, or instead of it
+    beside = {"--timing"}  # for what is done after the work, or instead of it
     for name, (_, command) in COMMANDS.items():
         words = {word.partition("=")[0] for line in CALLS if line.split()[0] == name for word in line.split()}
         options = [{*names.split("/")} for names in parameters(command) if names.startswith("-")] if words else []

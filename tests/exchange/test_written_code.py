@@ -1,6 +1,5 @@
 """What the files of written laws say beside their code: other tests run that, in C, in FMUs and in JavaScript."""
 
-import html
 import re
 import zipfile
 
@@ -30,19 +29,14 @@ def recorded(text: str) -> str:
     return text.replace(smc.__version__, "VERSION").replace(header, "HEADER")
 
 
-def page(text: str) -> str:
-    """Return the words of a page, a row of its table in a line."""
-    return html.unescape(re.sub(r"<[^>]*>", "", re.sub(r"</t[dh]><t[dh][^>]*>", " | ", text))).strip()
-
-
 @pytest.mark.parametrize("name", FMUS)
 def test_what_the_files_of_an_fmu_say_is_as_recorded(name, tmp_path, snapshot):
-    """Their page and the comments of their code; of one FMU, also its XML files and the names of all."""
+    """The comments of their code; of one FMU, also its XML files and the names of all."""
     law, given = FMUS[name]
     with zipfile.ZipFile(smc.export_fmu(law, tmp_path / "a.fmu", binary=False, **given)) as archive:
         texts = {one: recorded(archive.read(one).decode()) for one in archive.namelist()}
     written = [text for one, text in texts.items() if one.endswith(("controller.c", "controller.h", "or.c", "ce.c"))]
-    said = [page(texts["documentation/index.html"]), *(each for text in written for each in COMMENT.findall(text))]
+    said = [each for text in written for each in COMMENT.findall(text)]
     assert "\n".join(said) == snapshot
     if name == "one joint":
         description = re.sub(r"\{[0-9a-f-]{36}\}", "{TOKEN}", texts["modelDescription.xml"])

@@ -43,10 +43,6 @@ class CLaw(AtAddress):
     """A law in C: called by its address in the callback, and through ctypes in the reference loop.
 
     Two laws are equal if their machine code is. It follows from file, headers, flags and compiler.
-
-    Attributes:
-      joints: for how many joints it is; 0 for a law of one channel.
-      sizes: number of gains and of memory slots.
     """
 
     def __init__(self, path: Path, symbol: str, file: Path, doc: str | None):
@@ -61,16 +57,12 @@ class CLaw(AtAddress):
             self._arithmetic = Arithmetic()
             self._trampoline = _trampoline(self.address, self._arithmetic)
             self.address = self._trampoline.address
-        self.sizes = 0, 1
+        self.sizes = 0, 1  # number of gains, and of memory slots
         self.__name__ = re.sub(r"\W", "_", path.stem)
         self.__module__, self.__doc__ = path.name, doc
 
     def __call__(self, y: Any, gains: Sequence[Any], memory: np.ndarray) -> tuple[Any, Any]:
-        """Return u and s, two vectors of a law of many joints.
-
-        Args:
-          y: a Measurement, or a JointMeasurement.
-        """
+        """Return u and s, two vectors of a law of many joints. `y`: a Measurement, or a JointMeasurement."""
         if not self.joints:
             u, s = self._out(y, gains, memory, 2)
             return u, s
@@ -165,11 +157,7 @@ def law_from_c(
     flags: Sequence[str] = (),
     isolate: bool = False,
     timeout: float = 10.0,
-    positive: Iterable[str] = (),
-    nonnegative: Iterable[str] = (),
-    degree: int | None = None,
     plants: Iterable[str] = (),
-    modelled: bool | None = None,
 ) -> Template:
     """Load your own law in C. It runs in MuJoCo's control callback at the speed of the built-in laws.
 
@@ -187,9 +175,7 @@ def law_from_c(
         one sentence that says where the law crashes, hangs, returns NaN, reads gains without a name, writes beyond its
         memory or keeps state elsewhere.
       timeout: s, for each of compilation, set-up and trial.
-      positive, nonnegative, plants: as in `smc.law_function`.
-      degree, modelled: relative_degree and requires_model of `smc.law_function`. Default: smc_law_degree and
-        smc_law_modelled of the file.
+      plants: as in `smc.law_function`.
 
     Returns:
       A Template. Called with gains it returns the Law of a Scenario: `law_from_c("my_law.c")(lam=5.0)`. It does not
@@ -206,15 +192,13 @@ def law_from_c(
     if name is not None:
         errors.name("name", name)
     library = _library(source, symbol, flags, timeout)
-    about = _about(library, gains, memory, degree, modelled)
+    about = _about(library, gains, memory)
     if isolate:
         _try(library, about)
     law = CLaw(library.path, symbol, library.file, _first_comment(library.path))
     law.set_up(len(about.gains), about.memory, name)
     words = {"requires_model": about.modelled, "joint": bool(about.joints)}
-    return template_decorator(
-        "law", about.gains, about.memory, positive, nonnegative, about.degree, None, plants, **words
-    )(law)
+    return template_decorator("law", about.gains, about.memory, (), (), about.degree, None, plants, **words)(law)
 
 
 def _try(library: sandbox.Library, about: "About") -> list[str]:
@@ -225,19 +209,12 @@ def _try(library: sandbox.Library, about: "About") -> list[str]:
 
 
 def check(
-    source: Path,
-    gains: Mapping[str, float] | None,
-    memory: int | None,
-    symbol: str,
-    flags: Sequence[str],
+    source: Path, gains: Mapping[str, float] | None, memory: int | None, symbol: str, flags: Sequence[str],
     timeout: float,
-) -> Iterator[str]:
-    """Try a law without loading it, and yield lines: warnings, limits of the trial, gains and memory.
-
-    Arguments and errors are those of `law_from_c`.
-    """
+) -> Iterator[str]:  # fmt: skip
+    """Try a law without loading it, and yield lines: warnings, limits of the trial, gains and memory."""
     library = _library(source, symbol, (*build.WARNING_FLAGS, *flags) if source.suffix == ".c" else flags, timeout)
-    about = _about(library, gains, memory, None, None)
+    about = _about(library, gains, memory)
     yield from library.warnings
     yield from _try(library, about)
     gains_text = ", ".join(f"{name} = {gain_text(gain.default)}" for name, gain in about.gains.items()) or "none"
@@ -247,8 +224,6 @@ def check(
 
 def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: float) -> sandbox.Library:
     """Return the library of a law, compiled from a .c file or copied. Arguments and errors as in `law_from_c`."""
-    if not isinstance(source, str | Path):
-        raise ScenarioError(f"cannot take a law from {shown(source)}: give the path of a .c file, or of a .so")
     if sys.platform == "win32":
         raise ScenarioError(
             f"cannot take a law from {shown(str(source))} on Windows: run smc_mujoco on Linux, or in WSL"
@@ -283,13 +258,7 @@ class About(NamedTuple):
     joints: int
 
 
-def _about(
-    library: sandbox.Library,
-    gains: Mapping[str, float | Gain] | None,
-    memory: int | None,
-    degree: int | None,
-    modelled: bool | None,
-) -> About:
+def _about(library: sandbox.Library, gains: Mapping[str, float | Gain] | None, memory: int | None) -> About:
     """Return the properties of a library's law: the arguments, or else what the file states."""
     facts, file = sandbox.load(library), library.path.name
     joints = facts.get("smc_mujoco_joints", 0)
@@ -314,8 +283,8 @@ def _about(
     return About(
         named,
         whole("memory", max(facts.get("smc_law_memory", DEFAULT_MEMORY), 1) if memory is None else memory, 1, 10_000),
-        whole("degree", (facts.get("smc_law_degree") or 1) if degree is None else degree, 1, 3),
-        bool(facts.get("smc_law_modelled")) if modelled is None else modelled,
+        whole("degree", facts.get("smc_law_degree") or 1, 1, 3),
+        bool(facts.get("smc_law_modelled")),
         joints,
     )
 

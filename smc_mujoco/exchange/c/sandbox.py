@@ -48,31 +48,18 @@ FRAME_LINE = re.compile(r"^ +#\d+ .* in \S+ (?P<file>.+?):(?P<line>\d+)(?::\d+)?
 
 
 class Library(NamedTuple):
-    """A law's library, not loaded into this process.
+    """A law's library, not loaded into this process."""
 
-    Attributes:
-      file: the library, compiled or copied.
-      path: the user's file.
-      symbol: name of the law's function.
-      flags: additional compiler flags.
-      timeout: of a trial, s.
-      warnings: of the compiler.
-    """
-
-    file: Path
-    path: Path
-    symbol: str
-    flags: Sequence[str]
-    timeout: float
-    warnings: Sequence[str] = ()
+    file: Path  # the library, compiled or copied
+    path: Path  # the user's file
+    symbol: str  # name of the law's function
+    flags: Sequence[str]  # additional, of the compiler
+    timeout: float  # of a trial, s
+    warnings: Sequence[str] = ()  # of the compiler
 
 
 def load(library: Library) -> dict[str, Any]:
-    """Load, set up and unload a library in a separate process, and return the constants that describe its law.
-
-    Raises:
-      ScenarioError: the process crashed, did not end in time, or found a fault.
-    """
+    """Load, set up and unload a library in a separate process, and return the constants that describe its law."""
     return _run(library, None)
 
 
@@ -86,12 +73,8 @@ def call(
 ) -> list[str]:
     """Call a law in a separate process, then with sanitizers. Return sentences on checks that were not possible.
 
-    Args:
-      fields: names of the numbers in a measurement, or of the arrays in one of many joints.
-      gains: values of the gains. With many joints, each is one number, or one for each joint.
-      memory: number of state variables.
-      modelled: whether the law needs the nominal model.
-      joints: number of joints of a law of many joints; 0 for one channel.
+    `fields`: names of the numbers in a measurement, or of the arrays in one of many `joints`. `gains`: each is one
+    number, or one for each joint.
     """
     from smc_mujoco.control.component import gain_at
     from smc_mujoco.exchange.c import build
@@ -199,14 +182,9 @@ def doubles(values) -> ctypes.Array:
 class Requests:
     """C functions that compute what a law of many joints asks for. They are valid as long as this object lives.
 
-    Args:
-      joints: their number.
-      coriolis: a list w -> the numbers of C(x, v) w.
-      jacobian: returns the numbers of the tip's Jacobian by rows, or raises ValueError if there is none.
-
-    Attributes:
-      address: of a table with the addresses of both functions and of their parameters, and with the force per unit of
-        u.
+    `coriolis`: a list w -> the numbers of C(x, v) w. `jacobian` returns the numbers of the tip's Jacobian by rows, or
+    raises ValueError if there is none. `address` is that of a table with the addresses of both functions and of their
+    parameters, and with the force per unit of u.
     """
 
     def __init__(self, joints: int, coriolis: Callable, jacobian: Callable):
@@ -256,11 +234,9 @@ class Fenced:
 class Trial:
     """Runs of a law on a double integrator x'' = u for each channel, and calls far outside of them.
 
-    Args:
-      law, library: as returned by `entry`.
-      order: fields, memory, modelled and joints as in `call`; "channels", their number; "gains", each gain's
-        number for each channel; "data" and "anchor", the static data and the law's address in the file.
-      calls: an open file for the gains and the measurement of each call, which `replay.c` reads.
+    `order`: fields, memory, modelled and joints as in `call`; "channels", their number; "gains", each gain's number for
+    each channel; "data" and "anchor", the static data and the law's address in the file. `calls`: an open file for the
+    gains and the measurement of each call, which `replay.c` reads.
     """
 
     def __init__(self, law, library, order, calls):

@@ -19,21 +19,12 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from smc_mujoco.control import units
 from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
-from smc_mujoco.control.units import (
-    ACCELERATION,
-    FORCE,
-    FORCE_PER_SPEED,
-    INERTIA,
-    INPUT_GAIN,
-    POSITION,
-    SPEED,
-    TIME,
-    Unit,
-)
+from smc_mujoco.control.units import FORCE, POSITION, SPEED, TIME, Unit
 from smc_mujoco.exchange.c import export
 from smc_mujoco.exchange.c.translate import JOINTS, plain
 from smc_mujoco.simulation.controller import MAX_CONTROL
@@ -46,11 +37,11 @@ COMMON_INPUTS: dict[str, tuple[Unit | None, str]] = {
     "v": (SPEED, "measured velocity"),
     "r": (POSITION, "reference"),
     "dr": (SPEED, "first derivative of the reference"),
-    "ddr": (ACCELERATION, "second derivative of the reference"),
+    "ddr": (units.ACCELERATION, "second derivative of the reference"),
 }
 CHANNEL_INPUTS: dict[str, tuple[Unit | None, str]] = {
-    "f": (ACCELERATION, "nominal f of x'' = f + g u, at the measured x and v"),
-    "g": (INPUT_GAIN, "nominal g of x'' = f + g u, at the measured x and v"),
+    "f": (units.ACCELERATION, "nominal f of x'' = f + g u, at the measured x and v"),
+    "g": (units.INPUT_GAIN, "nominal g of x'' = f + g u, at the measured x and v"),
     "q": (None, "measured position of the joint without actuator that this one moves"),
     "dq": (None, "velocity of the joint without actuator"),
     "fq": (None, "nominal fq of q'' = fq + gq u"),
@@ -59,8 +50,8 @@ CHANNEL_INPUTS: dict[str, tuple[Unit | None, str]] = {
 JOINT_INPUTS: dict[str, tuple[Unit | None, str]] = {
     "h": (FORCE, "nominal h of M x'' + h = u, at the measured x and v"),
     "g": (FORCE, "nominal gravity and springs, at the measured x"),
-    "M": (INERTIA, "nominal mass matrix of M x'' + h = u, at the measured x"),
-    "C": (FORCE_PER_SPEED, "nominal matrix of Coriolis forces C v, M' - 2 C skew-symmetric"),
+    "M": (units.INERTIA, "nominal mass matrix of M x'' + h = u, at the measured x"),
+    "C": (units.FORCE_PER_SPEED, "nominal matrix of Coriolis forces C v, M' - 2 C skew-symmetric"),
     "J": (None, "nominal Jacobian of the tip, in the world: its velocity is J v"),
 }
 MODEL_INPUTS = {"f", "g", "fq", "gq", "M", "h"}  # of the nominal model; C and J are what coriolis and jacobian need
@@ -75,46 +66,28 @@ UNREACHED = re.compile(r"(if \(\w+->model == 0\.0\) \{\s*return [^;]*;\s*\}).*?^
 
 
 class Variable(NamedTuple):
-    """A variable of the FMU.
+    """A variable of the FMU."""
 
-    Attributes:
-      name: in modelDescription.xml.
-      kind: a smc_kind of smc_fmu.h, such as SMC_INPUT.
-      description: in words.
-      unit: None if it has none, or if that is unknown.
-      start: its value at the start.
-      minimum: the smallest value that can be set; -inf for any value.
-      positive: whether it must be greater than 0.
-    """
-
-    name: str
-    kind: str
-    description: str
-    unit: Unit | None = None
+    name: str  # in modelDescription.xml
+    kind: str  # a smc_kind of smc_fmu.h, such as SMC_INPUT
+    description: str  # in words
+    unit: Unit | None = None  # None if it has none, or if that is unknown
     start: float = 0.0
-    minimum: float = -math.inf
-    positive: bool = False
+    minimum: float = -math.inf  # the smallest value that can be set
+    positive: bool = False  # whether it must be greater than 0
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Controller:
-    """A law with all that it needs to control one joint, or many.
-
-    Attributes:
-      law, surface, estimator: components; None for the law's own surface, or a measured velocity.
-      period: control period, s.
-      u_max: bound on |u| of each joint; may be infinite.
-      modelled: whether the law reads the nominal model.
-      joints: how many joints a law of many joints has; 0 for a law of one channel.
-    """
+    """A law with all that it needs to control one joint, or many."""
 
     law: Law
-    surface: Surface | None
-    estimator: Estimator | None
-    period: float
-    u_max: tuple[float, ...]
-    modelled: bool
-    joints: int = 0
+    surface: Surface | None  # None: the law's own
+    estimator: Estimator | None  # None: a measured velocity
+    period: float  # control period, s
+    u_max: tuple[float, ...]  # bound on |u| of each joint; may be infinite
+    modelled: bool  # whether the law reads the nominal model
+    joints: int = 0  # of a law of many joints; 0 for a law of one channel
 
     @property
     def places(self) -> tuple[str, ...]:

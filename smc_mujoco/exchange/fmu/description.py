@@ -1,6 +1,5 @@
-"""modelDescription.xml, buildDescription.xml and the page of documentation of an FMU."""
+"""modelDescription.xml and buildDescription.xml of an FMU."""
 
-import html
 import math
 import xml.etree.ElementTree as xml
 from collections.abc import Iterable, Sequence
@@ -23,21 +22,6 @@ VARIABLE_ROLES = {
     "SMC_CONSTANT": ("local", "constant", "exact"),
     "SMC_STATE": ("local", "discrete", "exact"),
 }
-PAGE_HTML = """<!DOCTYPE html>
-<html lang="en">
-<head><meta charset="utf-8"><title>{name}</title></head>
-<body style="font-family: sans-serif; max-width: 50em; margin: 2em auto; line-height: 1.4">
-<h1>{name}</h1>
-<p>{summary}.</p>
-<p>The law runs at t = start + k dt, dt = {period:g} s, on the inputs as they are set at that time, and u is held in
-between. With Event Mode, u follows the inputs without delay. Without it, the u that is read after a step is computed
-from the inputs that were set before the step, so an importer that applies it after the step has a delay of one step.
-Gains can be changed while it runs. The sources need a C99 compiler and nothing else. modelDescription.xml has the
-unit, the start and the meaning of each variable.</p>
-<p>Written by smc_mujoco {version}.</p>
-</body>
-</html>
-"""
 
 
 def unit_name(unit: Unit, joint: str) -> str:
@@ -71,25 +55,16 @@ def model_description(
 ) -> str:
     """Return modelDescription.xml of an FMU for Co-Simulation, with the units of a hinge or a slide."""
     root = xml.Element(
-        "fmiModelDescription",
-        fmiVersion="3.0",
-        modelName=controller.law.name,
-        instantiationToken=token,
-        description=summary(controller),
-        generationTool=f"smc_mujoco {__version__}",
+        "fmiModelDescription", fmiVersion="3.0", modelName=controller.law.name, instantiationToken=token,
+        description=summary(controller), generationTool=f"smc_mujoco {__version__}",
         license="use without restriction, without warranty; the headers of FMI under the 2-clause BSD licence",
         variableNamingConvention="structured",
-    )
+    )  # fmt: skip
     xml.SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=identifier,
-        canGetAndSetFMUState="true",
-        canSerializeFMUState="true",
-        canHandleVariableCommunicationStepSize="true",
-        hasEventMode="true",
+        root, "CoSimulation", modelIdentifier=identifier, canGetAndSetFMUState="true", canSerializeFMUState="true",
+        canHandleVariableCommunicationStepSize="true", hasEventMode="true",
         fixedInternalStepSize=repr(controller.period),
-    )
+    )  # fmt: skip
     units = xml.SubElement(root, "UnitDefinitions")
     for unit in dict.fromkeys(v.unit for v in listed if v.unit is not None and any(v.unit)):
         definition = xml.SubElement(units, "Unit", name=unit_name(unit, joint))
@@ -154,9 +129,3 @@ def summary(controller: Controller) -> str:
     parts += [f"surface {controller.surface}"] if controller.surface else []
     parts += [f"velocity estimator {controller.estimator}"] if controller.estimator else []
     return f"Sliding-mode controller: {', '.join(parts)}; every {controller.period:g} s"
-
-
-def page(controller: Controller) -> str:
-    """Return documentation/index.html."""
-    name, about = html.escape(controller.law.name), html.escape(summary(controller))
-    return PAGE_HTML.format(name=name, summary=about, period=controller.period, version=__version__)

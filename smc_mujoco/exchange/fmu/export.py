@@ -178,7 +178,6 @@ def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str
     files |= {name: (FOLDER / "headers" / name).read_text(encoding="utf-8") for name in FMI_HEADERS}
     return {
         "modelDescription.xml": description.model_description(listed, controller, identifier, token, joint),
-        "documentation/index.html": description.page(controller),
         "sources/buildDescription.xml": description.build_description(compiled, identifier),
         **{f"sources/{name}": text for name, text in files.items()},
     }

@@ -70,29 +70,17 @@ class Running(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class FmuLaw(Uncompiled):
-    """The function of a law in an FMU. Two are equal if the content of the file and the settings are.
+    """The function of a law in an FMU. Two are equal if the content of the file and the settings are."""
 
-    Attributes:
-      path: of the .fmu file.
-      digest: of its bytes.
-      name: of the law.
-      inputs: pairs of our name and the FMU's name for each input.
-      outputs: the FMU's name of u, and of s if it has s.
-      constants: pairs of the FMU's name and the value for each input that does not change.
-      parameters: the FMU's names of its gains.
-      period: of its steps, s; None for the control period.
-      once: whether a process can have only one instance.
-    """
-
-    path: str = dataclasses.field(compare=False)
-    digest: str
-    name: str
-    inputs: tuple[tuple[str, str], ...]
-    outputs: tuple[str, ...]
-    constants: tuple[tuple[str, float], ...]
-    parameters: tuple[str, ...]
-    period: float | None
-    once: bool = False
+    path: str = dataclasses.field(compare=False)  # of the .fmu file
+    digest: str  # of its bytes
+    name: str  # of the law
+    inputs: tuple[tuple[str, str], ...]  # our name and the FMU's
+    outputs: tuple[str, ...]  # the FMU's name of u, and of s if it has s
+    constants: tuple[tuple[str, float], ...]  # the FMU's name and the value of inputs that do not change
+    parameters: tuple[str, ...]  # the FMU's names of its gains
+    period: float | None  # of its steps, s; None for the control period
+    once: bool = False  # whether a process can have only one instance
 
     why = "is an FMU, called from Python: several times slower than a law that compiles, and on one core"
 
@@ -140,12 +128,7 @@ class FmuLaw(Uncompiled):
 
 
 def steps(period: float | None, dt: float) -> tuple[int, float]:
-    """Return after how many control periods the FMU steps, and how long each of its steps is, s.
-
-    Args:
-      period: of the FMU's steps, s; None for the control period.
-      dt: control period, s.
-    """
+    """Return after how many control periods of dt the FMU with a period steps, and how long each of its steps is, s."""
     if period is None:
         return 1, dt
     slower, faster = period / dt, dt / period
@@ -244,10 +227,7 @@ def law_from_fmu(
 
 
 def check(path: str | os.PathLike[str], timeout: float, **settings: Any) -> Iterator[str]:
-    """Try an FMU as a law, and yield lines: what its variables mean, its step, its gains.
-
-    Arguments and errors are those of `law_from_fmu`.
-    """
+    """Try an FMU as a law, and yield lines: what its variables mean, its step, its gains."""
     template = law_from_fmu(path, timeout=timeout, **settings)
     law: FmuLaw = template.function  # pyright: ignore[reportAssignmentType]
     yield "inputs   " + ", ".join(f"{theirs} is {ours}" for ours, theirs in law.inputs)
@@ -316,15 +296,7 @@ def _description(file: Path, digest: str) -> Any:
 def _meanings(
     file: str, known: Mapping[str, Any], chosen: Mapping[str, str], constants: Mapping[str, float]
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Return our name -> the FMU's, for its inputs and for its outputs.
-
-    Args:
-      known: name -> variable of the FMU.
-      chosen, constants: `variables` and `constants` of `law_from_fmu`.
-    """
-    for what, value in (("variables", chosen), ("constants", constants)):
-        if not isinstance(value, Mapping):
-            raise ScenarioError(f"{what} is {shown(value)}: give a dict, such as variables={{'x': 'theta'}}")
+    """Return our name -> the FMU's, for its inputs and for its outputs, of the `known` variables by name."""
     ins, outs = ([n for n, v in known.items() if v.causality == side] for side in ("input", "output"))
     for ours, theirs in chosen.items():
         if ours not in (*INPUT_FIELDS, *OUTPUTS):
@@ -342,7 +314,13 @@ def _meanings(
             f"if one channel does not need the input, hold it by constants={{{joints[0]!r}: 0.0}}"
         )
     if strange := [n for n in ins if n not in {*inputs.values(), *constants}]:
-        raise _without_meaning(file, strange, known)
+        first = strange[0]
+        meaning = f"say which it is, variables={{'x': {first!r}}} (--variables x={first}), or "
+        raise ScenarioError(
+            f"{file} has inputs that mean nothing that a law measures, {', '.join(strange)}: "
+            f"{meaning * (known[first].type in REAL_TYPES)}hold each, constants={{{first!r}: 0.0}} "
+            f"(--constants {first}=0)"
+        )
     outputs = {ours: theirs for ours, theirs in chosen.items() if ours in OUTPUTS}
     outputs |= _by_name([n for n in outs if n not in taken], [n for n in OUTPUTS if n not in chosen])
     if not outs:
@@ -361,19 +339,6 @@ def _meanings(
             need = need if types is REAL_TYPES else "number: export it without this input"
             raise ScenarioError(f"{theirs!r} of {file} is not one {need}")
     return inputs, {ours: outputs[ours] for ours in OUTPUTS if ours in outputs}
-
-
-def _without_meaning(file: str, strange: Sequence[str], known: Mapping[str, Any]) -> ScenarioError:
-    """Return the error for inputs of an FMU that are nothing a law measures. Only real ones can be given a meaning."""
-    some, names = len(strange) > 1, ", ".join(map(repr, strange))
-    what = f"inputs {names} of {file} mean" if some else f"input {names} of {file} means"
-    real = [name for name in strange if known[name].type in REAL_TYPES][:1]
-    meaning = [
-        f"say what {'they are' if some else 'it is'}, variables={{'x': {n!r}}} (--variables x={n}), or" for n in real
-    ]
-    last = strange[-1]
-    hold = f"hold {'them' if some else 'it'}, constants={{{last!r}: 0.0}} (--constants {last}=0)"
-    return ScenarioError(" ".join([f"{what} nothing that a law measures:", *meaning, hold]))
 
 
 def _by_name(theirs: Iterable[str], ours: Iterable[str]) -> dict[str, str]:
@@ -418,12 +383,8 @@ def _period(about: Any) -> float | None:
 
 def _try(law: FmuLaw, gains: Iterable[float], timeout: float) -> None:
     """Try an FMU in a separate process, with these gains."""
-    order = {
-        "folder": str(extracted(law.path, law.digest)),
-        "inputs": dict(law.inputs),
-        "outputs": law.outputs,
-        "step": law.period,
-    }
+    folder = str(extracted(law.path, law.digest))
+    order = {"folder": folder, "inputs": dict(law.inputs), "outputs": law.outputs, "step": law.period}
     try:
         tried(slave.__name__, order | {"fixed": law.fixed(gains)}, timeout)
     except Failed as failed:

@@ -25,13 +25,10 @@ class Group(NamedTuple):
 
 
 class Slave:
-    """An instance of an FMU, initialised at a time.
+    """An instance of the FMU in a folder, initialised at a time `start`, s.
 
-    Args:
-      folder: with the extracted FMU.
-      inputs, outputs: names of its variables, in the order of the values of `step`.
-      fixed: name -> value of its parameters and of inputs that do not change.
-      start: the time, s.
+    `inputs`, `outputs`: names of its variables, in the order of the values of `step`. `fixed`: name -> value of its
+    parameters and of inputs that do not change.
     """
 
     def __init__(

@@ -5,11 +5,7 @@ import os
 import re
 import subprocess
 import sys
-import urllib.request
-from concurrent.futures import ThreadPoolExecutor
-from http.server import ThreadingHTTPServer
 from pathlib import Path
-from unittest import mock
 
 import mujoco
 import numpy as np
@@ -161,35 +157,6 @@ def test_what_the_page_cannot_have_is_one_sentence(vendor, tmp_path, monkeypatch
     assert sentence in " ".join(said.split())
     assert len(said.splitlines()) == 1
     assert not (tmp_path / "live").exists()
-
-
-def test_the_page_is_served_to_this_machine(tmp_path, monkeypatch, capsys):
-    (tmp_path / "index.html").write_text("the page")
-    monkeypatch.setattr(build, "live", lambda *_: tmp_path / "index.html")
-    got = []
-
-    def one_visit(server):
-        with ThreadPoolExecutor() as pool:
-            visit = pool.submit(urllib.request.urlopen, f"http://127.0.0.1:{server.server_port}/", timeout=10)
-            server.handle_request()
-            got.append((server.server_address[0], visit.result().read()))
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(ThreadingHTTPServer, "serve_forever", one_visit)
-    with pytest.raises(SystemExit) as ended:
-        main.main(["live", "--serve", "--port", "0"])
-    said = capsys.readouterr()
-    assert (ended.value.code, said.err, got) == (0, "", [("127.0.0.1", b"the page")])
-    assert re.search(r"^open http://127\.0\.0\.1:\d+/ \(Ctrl-C ends it\)$", said.out, re.MULTILINE)
-
-
-def test_a_port_that_is_taken_is_one_sentence(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(build, "live", lambda *_: tmp_path / "index.html")
-    monkeypatch.setattr(ThreadingHTTPServer, "server_bind", mock.Mock(side_effect=OSError(98, "taken")))
-    with pytest.raises(SystemExit) as ended:
-        main.main(["live", "--serve", "--port", "8123"])
-    refused = "smc-mujoco: cannot serve at port 8123 (taken): give another --port\n"
-    assert (ended.value.code, capsys.readouterr().err) == (2, refused)
 
 
 @pytest.mark.slow
