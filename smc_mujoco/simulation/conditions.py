@@ -37,7 +37,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
-from smc_mujoco.mechanisms.hardware.drives import DCMotor, Drive, Lag
+from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
@@ -55,7 +55,7 @@ MAX_JOINED = 20  # conditions in one name: chosen
 GRID_FIELDS = ("plant", "law", "model", "surface", "seed", "noise_key", "duration")  # that a grid sets itself
 CONDITION_FIELDS = [name for name in Scenario.fields() if name not in GRID_FIELDS]
 ADDITIVE_FIELDS = ("disturbance", "friction", "actuator")  # their values add up when conditions are joined
-ABSTRACT = (Part, Friction, Actuator, Drive, Signal)  # classes that a text cannot name
+ABSTRACT = (Part, Friction, Actuator, Signal)  # classes that a text cannot name
 CONSTANTS = {"inf": math.inf, "pi": math.pi}
 
 # The suite's defaults, under which its plants and laws are compared.

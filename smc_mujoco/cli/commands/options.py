@@ -14,8 +14,7 @@ from smc_mujoco.common.errors import ScenarioError, find, shown
 
 if TYPE_CHECKING:
     from smc_mujoco.control.law import Law
-    from smc_mujoco.mechanisms.hardware.backlash import Backlash
-    from smc_mujoco.mechanisms.hardware.drives import Drive
+    from smc_mujoco.mechanisms.hardware.part import Actuator
     from smc_mujoco.mechanisms.plant import Plant
     from smc_mujoco.simulation import conditions as named
     from smc_mujoco.simulation.initial_states import Starts
@@ -274,13 +273,13 @@ def starts(x0: float | None) -> "Starts | None":
     return None if x0 is None else initial_states.starts(x0)
 
 
-def actuator(text: str) -> "tuple[Drive | Backlash, ...]":
+def actuator(text: str) -> "tuple[Actuator, ...]":
     """Return a drive or gear from "lag:0.01", or several from "dcmotor+lag:0.01"; numbers are in the fields' order."""
     from smc_mujoco.common.registry import subclasses
-    from smc_mujoco.mechanisms.hardware.backlash import Backlash
-    from smc_mujoco.mechanisms.hardware.drives import Drive
+    from smc_mujoco.mechanisms.hardware import backlash, drives  # noqa: F401
+    from smc_mujoco.mechanisms.hardware.part import Actuator
 
-    known: dict[str, type[Drive | Backlash]] = {kind.__name__.lower(): kind for kind in [*subclasses(Drive), Backlash]}
+    known: dict[str, type[Actuator]] = {kind.__name__.lower(): kind for kind in subclasses(Actuator)}
     parts = []
     for part in text.split("+"):
         name, _, numbers = part.partition(":")

@@ -8,16 +8,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.mechanisms.hardware.part import (
-    HARD_SOLIMP,
-    HARD_SOLREF,
-    PLAY,
-    ROTOR,
-    Actuator,
-    driven,
-    driven_ids,
-    drives,
-)
+from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, PLAY, ROTOR, Actuator, driven_ids, drives
 from smc_mujoco.mechanisms.plant import Field
 
 BRASS = (0.80, 0.62, 0.28, 1.0)
@@ -55,7 +46,8 @@ class Backlash(Actuator):
         rigid = compiled(spec.copy())
         pose = mujoco.MjData(rigid)
         mujoco.mj_kinematics(rigid, pose)
-        for actuator, joint in list(zip(drives(spec), driven(spec), strict=True)):
+        for actuator in drives(spec):
+            joint = spec.joint(actuator.target)
             _add_rotor(spec, joint, rigid, pose)
             play = spec.add_tendon(name=PLAY + joint.name, limited=True, range=(-1.0, 1.0))
             play.solref_limit, play.solimp_limit = HARD_SOLREF, HARD_SOLIMP
@@ -82,13 +74,9 @@ def _add_rotor(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, rigid: mujoco.MjMode
     parent = rigid.body_parentid[body]
     frame = pose.xmat[parent].reshape(3, 3)
     anchor, axis = frame.T @ (pose.xanchor[i] - pose.xpos[parent]), frame.T @ pose.xaxis[i]
-    rotor = joint.parent.parent.add_body(
-        name=ROTOR + joint.name,
-        pos=anchor,
-        mass=1e-9,  # all inertia is in the joint's armature, so that it weighs nothing
-        inertia=(1e-13, 1e-13, 1e-13),
-        explicitinertial=True,
-    )
+    # all inertia is in the joint's armature, so that it weighs nothing
+    light = {"mass": 1e-9, "inertia": (1e-13, 1e-13, 1e-13), "explicitinertial": True}
+    rotor = joint.parent.parent.add_body(name=ROTOR + joint.name, pos=anchor, **light)
     rotor.add_joint(name=ROTOR + joint.name, type=joint.type, axis=axis)
     if joint.type == mujoco.mjtJoint.mjJNT_HINGE:
         arm = frame.T @ (pose.xipos[body] - pose.xanchor[i])
@@ -99,12 +87,5 @@ def _add_rotor(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, rigid: mujoco.MjMode
         ends = (*face, *(face + 0.16 * away))
     else:
         ends = (0.0, -0.05, 0.155, 0.0, 0.05, 0.155)  # across the cart's top
-    rotor.add_geom(
-        name=ROTOR + joint.name,
-        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-        fromto=ends,
-        size=(0.008, 0.0, 0.0),
-        rgba=BRASS,
-        contype=0,
-        conaffinity=0,
-    )
+    look = {"fromto": ends, "size": (0.008, 0.0, 0.0), "rgba": BRASS, "contype": 0, "conaffinity": 0}
+    rotor.add_geom(name=ROTOR + joint.name, type=mujoco.mjtGeom.mjGEOM_CAPSULE, **look)

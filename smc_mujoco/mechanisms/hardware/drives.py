@@ -39,12 +39,7 @@ COGGING = slice(0, 2)  # of actuator_biasprm: amplitude, N m at the joint, and p
 
 
 @dataclasses.dataclass(frozen=True)
-class Drive(Actuator):
-    """Base of drives."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Lag(Drive):
+class Lag(Actuator):
     """First-order lag, tau f' = u - f, from f = 0. The mean force over each physics step is exact for a held u.
 
     Two in series, `actuator=(Lag(mu), Lag(mu))`, are the parasitic actuator of the literature, u / (mu p + 1)^2: exact
@@ -68,7 +63,7 @@ class Lag(Drive):
 
 
 @dataclasses.dataclass(frozen=True)
-class RateLimit(Drive):
+class RateLimit(Actuator):
     """A force that follows u no faster than `rate`, from 0: f(t + h) = u clipped to f(t) +- rate h.
 
     The mean force over each physics step is exact for a held u. Behind a Lag it errs in the steps in which the force
@@ -92,7 +87,7 @@ class RateLimit(Drive):
 
 
 @dataclasses.dataclass(frozen=True)
-class DCMotor(Drive):
+class DCMotor(Actuator):
     """Motor and gearbox on a voltage amplifier: V = scale u, the voltage whose stall torque is u; or V = u.
 
         L i' = V - R i - gear k v        |V| <= voltage; x, v: of the joint
@@ -158,16 +153,12 @@ class DCMotor(Drive):
         self.check_numbers("inductance", "rotor_inertia", "cogging", "poles", "ripple", low=0.0)
         self.check_numbers("brush", "brush_2", low=-MAX_PARAMETER)
         if self.ripple and self.delay:
-            raise ScenarioError(
-                f"DCMotor has ripple {self.ripple:g} and inductance {self.inductance:g} H: its ripple is that of a "
-                "current without delay: give inductance=0"
-            )
+            both = f"ripple {self.ripple:g} and inductance {self.inductance:g} H"
+            raise ScenarioError(f"DCMotor has {both}, and ripple is of a current without delay: give inductance=0")
         self.check_numbers("voltage", "current", above=0.0, high=math.inf, infinite=True)
         if not self.constant >= MIN_CONSTANT or not self.resistance / self.constant <= MAX_PARAMETER:
-            raise ScenarioError(
-                f"DCMotor's gear {self.gear:g} times torque_constant {self.torque_constant:g} N m/A is too weak for a "
-                f"resistance of {self.resistance:g} ohm: give a stronger motor"
-            )
+            weak = f"gear {self.gear:g} times torque_constant {self.torque_constant:g} N m/A is too weak"
+            raise ScenarioError(f"DCMotor's {weak} for a resistance of {self.resistance:g} ohm: give a stronger motor")
 
     @property
     def constant(self) -> float:
@@ -196,12 +187,9 @@ class DCMotor(Drive):
         return min(self.voltage * self.constant / self.resistance, self.constant * self.current)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
+        kind, constants = int(mujoco.mjtCtrlInput.mjINPUT_VOLTAGE), (self.constant, self.constant)
         for actuator in drives(spec):
-            actuator.set_to_dcmotor(
-                motorconst=(self.constant, self.constant),
-                resistance=self.resistance,
-                ctrlspec=int(mujoco.mjtCtrlInput.mjINPUT_VOLTAGE),
-            )
+            actuator.set_to_dcmotor(motorconst=constants, resistance=self.resistance, ctrlspec=kind)
             actuator.ctrllimited, actuator.ctrlrange = True, (-1.0, 1.0)
             actuator.forcelimited, actuator.forcerange = True, (-1.0, 1.0)
 
@@ -211,7 +199,7 @@ class DCMotor(Drive):
         share, voltage = 1.0, math.inf if self.ripple else self.voltage  # `rippled` bounds it before the ripple
         if self.delay:  # the callback simulates the winding, and bounds its voltage
             rk4 = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
-            share, voltage = winding_step(model.opt.timestep / self.delay, rk4).share, math.inf
+            share, voltage = winding_step(model.opt.timestep / self.delay, rk4)[1], math.inf
         yield Field("actuator_gainprm", (ids, WINDING), (share * self.resistance, share * self.constant))
         yield Field("actuator_biasprm", (ids, COGGING), (self.gear * self.cogging, self.gear * self.poles))
         yield Field("actuator_ctrlrange", ids, (-voltage, voltage))
@@ -230,33 +218,22 @@ class DriveStep(NamedTuple):
 
     `first` is the output of the first lag. `second` is that of the second lag, or the force behind a RateLimit, or the
     torque of a winding's current, plus `drag` times the speed. All are in the unit of u, in which a winding's torque is
-    that of a rotor at rest. All factors without a unit are shares of a state's distance from u.
-
-    Attributes:
-      force_first, force_second: of `first` and `second` in the mean force over the step.
-      first_left: of `first` in itself at the end of the step.
-      second_first, second_left: of `first` and `second` in `second` at the end of the step.
-      lagged: 1 with a lag, 0 without one.
-      reach: largest change of the force in a step, in the unit of u; 0 without a RateLimit.
-      voltage: bound on a winding's voltage, in the unit of u; 0 without a winding.
-      drag, force_drag, second_drag: of a winding, for the speed v at the start of the step, in the unit of u: what it
-        takes from `second` to make it the torque, from the mean force beside MuJoCo's own share of the drag, and from
-        `second` at the end of the step.
-      ripple and all after it: of a DCMotor, see `rippled`; ripple 0 for an even torque.
+    that of a rotor at rest. All factors without a unit are shares of a state's distance from u. v: the speed at the
+    start of the step.
     """
 
-    force_first: float = 0.0
-    force_second: float = 0.0
-    first_left: float = 0.0
-    second_first: float = 0.0
-    second_left: float = 0.0
-    lagged: float = 0.0
-    reach: float = 0.0
-    voltage: float = 0.0
-    drag: float = 0.0
-    force_drag: float = 0.0
-    second_drag: float = 0.0
-    ripple: float = 0.0
+    force_first: float = 0.0  # of `first` in the mean force over the step
+    force_second: float = 0.0  # of `second` in it
+    first_left: float = 0.0  # of `first` in itself at the end of the step
+    second_first: float = 0.0  # of `first` in `second` at the end of the step
+    second_left: float = 0.0  # of `second` in itself there
+    lagged: float = 0.0  # 1 with a lag, 0 without one
+    reach: float = 0.0  # largest change of the force in a step, in the unit of u; 0 without a RateLimit
+    voltage: float = 0.0  # bound on a winding's voltage, in the unit of u; 0 without a winding
+    drag: float = 0.0  # of a winding, times v, in the unit of u: what it takes from `second` to make it the torque
+    force_drag: float = 0.0  # the same: from the mean force, beside MuJoCo's own share of the drag
+    second_drag: float = 0.0  # the same: from `second` at the end of the step
+    ripple: float = 0.0  # this and all after it: of a DCMotor, see `rippled`; 0 for an even torque
     turns: float = 0.0
     angle: float = 0.0
     angle_2: float = 0.0
@@ -331,43 +308,32 @@ def _wound(made: DriveStep, motor: DCMotor, a: float, step: float, rk4: bool) ->
     one that gives its end. So both are exact, unless the supply's bound cuts the lag's output within the step.
     """
     b = step / motor.delay
-    winding, left = winding_step(b, rk4), math.exp(-b)
+    (drag, share), left = winding_step(b, rk4), math.exp(-b)
     passed = 0.0 if a == math.inf else _passed(a, b)
     emf = motor.constant / motor.scale
     return made._replace(
-        force_first=(made.force_first - passed / b) / winding.drag,
-        force_second=1.0 - winding.drag,
+        force_first=(made.force_first - passed / b) / drag,
+        force_second=1.0 - drag,
         second_first=passed / -math.expm1(-b),
         second_left=left,
         voltage=motor.voltage / motor.scale,
-        drag=winding.drag * emf,
-        force_drag=(winding.drag - winding.share) * emf,
-        second_drag=(-math.expm1(-b) - winding.drag) * emf,
+        drag=drag * emf,
+        force_drag=(drag - share) * emf,
+        second_drag=(-math.expm1(-b) - drag) * emf,
     )
 
 
-class WindingStep(NamedTuple):
-    """Effect of the speed on a winding in a physics step, in which it changes linearly.
+def winding_step(b: float, rk4: bool) -> tuple[float, float]:
+    """Return the effect of the speed, which changes linearly, on a winding in a physics step of b time constants.
 
-    Attributes:
-      drag: weight of a constant speed in the mean torque, and of the speed's change in the torque at the end.
-      share: what MuJoCo gets of the drag of a motor without inductance, so that the speed's change in the step has its
-        effect on the mean torque.
-    """
-
-    drag: float
-    share: float
-
-
-def winding_step(b: float, rk4: bool) -> WindingStep:
-    """Return the effect of the speed in a physics step of b time constants.
-
-    A change of the speed by 1 in the step has the effect `late` on the mean torque. RK4 gives a drag the mean speed, so
-    half of the change, and implicit integrators give it the speed at the end.
+    The first number is the weight of a constant speed in the mean torque, and of the speed's change in the torque at
+    the end. The second is the share of the drag of a motor without inductance that MuJoCo gets, so that the speed's
+    change in the step has its effect on the mean torque. A change by 1 has the effect `late` there. RK4 gives a drag
+    the mean speed, so half of the change, and implicit integrators give it the speed at the end.
     """
     drag = 1.0 - _mean(b)
     late = b / 6.0 - b**2 / 24.0 if b < SHORT_STEP else 0.5 - drag / b
-    return WindingStep(drag, max(2.0 * late if rk4 else late, MIN_SHARE))
+    return drag, max(2.0 * late if rk4 else late, MIN_SHARE)
 
 
 def _mean(a: float) -> float:

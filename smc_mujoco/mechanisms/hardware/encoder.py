@@ -69,16 +69,13 @@ class Encoder(Part):
         """Raise ScenarioError for a time that is not a whole number of physics steps, or too many delayed readings."""
         number("step", step, above=0.0)
         if self.delay / (self.period or step) > MAX_READINGS:
-            raise ScenarioError(
-                f"Encoder's delay {self.delay:g} s is more than {MAX_READINGS:,} readings long: give a shorter one"
-            )
+            long = f"{self.delay:g} s is more than {MAX_READINGS:,} readings long"
+            raise ScenarioError(f"Encoder's delay {long}: give a shorter one")
         for name, time in (("delay", self.delay), ("period", self.period or 0.0)):
             count = time / step
             if math.isinf(count) or abs(count - round(count)) > 1e-6 or 0.0 < count < 0.5:
-                raise ScenarioError(
-                    f"Encoder's {name} {time:g} s is not a whole number of physics steps of {step:g} s: "
-                    "give a physics_step that divides it"
-                )
+                steps = f"a whole number of physics steps of {step:g} s: give a physics_step that divides it"
+                raise ScenarioError(f"Encoder's {name} {time:g} s is not {steps}")
 
     def fields(self, model):
         """Yield the fields of delay and period of every channel's two sensors."""
@@ -99,9 +96,7 @@ def remember(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     for sensor in sensor_ids(model):
         count = int(model.sensor_history[sensor, 0])
         interval = float(model.sensor_interval[sensor, 0]) or model.opt.timestep
-        joint, position = model.sensor_objid[sensor], mujoco.mjtSensor.mjSENS_JOINTPOS
-        value = data.qpos[model.jnt_qposadr[joint]]
-        if model.sensor_type[sensor] != position:
-            value = data.qvel[model.jnt_dofadr[joint]]
+        joint, position = model.sensor_objid[sensor], model.sensor_type[sensor] == mujoco.mjtSensor.mjSENS_JOINTPOS
+        value = data.qpos[model.jnt_qposadr[joint]] if position else data.qvel[model.jnt_dofadr[joint]]
         times, values = interval * np.arange(-count, 0.0), np.full((count, 1), value)
         mujoco.mj_initSensorHistory(model, data, sensor, times, values, -interval - EARLY_SHARE * model.opt.timestep)

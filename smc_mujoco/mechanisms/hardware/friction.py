@@ -113,10 +113,8 @@ class LuGre(Friction):
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         for joint in joints(spec):
-            friction = spec.add_actuator(
-                name=PASSIVE + joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
-            )
-            friction.set_to_dcmotor(
+            name, on_joint = PASSIVE + joint.name, mujoco.mjtTrn.mjTRN_JOINT
+            spec.add_actuator(name=name, target=joint.name, trntype=on_joint).set_to_dcmotor(
                 motorconst=(1e-9, 1e-9),  # a dcmotor needs a motor constant: too small to notice
                 resistance=1.0,
                 lugre=(self.stiffness, self.damping or 1.0, self.coulomb, self.static, self.stribeck),

@@ -33,11 +33,7 @@ class Part:
     """Base of all parts."""
 
     def check_numbers(self, *names: str, **bounds: Any) -> None:
-        """Replace fields by floats. None stays if it is the field's default.
-
-        Args:
-          bounds: those of `errors.number`; `high` is MAX_PARAMETER by default.
-        """
+        """Replace fields by floats within bounds of `errors.number`. None stays if it is the field's default."""
         limits: dict[str, Any] = {"high": MAX_PARAMETER} | bounds
         for name in names:
             value, optional = getattr(self, name), getattr(type(self), name, 0.0) is None
@@ -70,11 +66,7 @@ class Friction(Part):
     forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
 
     def scaled(self, factor: float) -> "Friction":
-        """Return this friction with a factor on its force.
-
-        Raises:
-          ScenarioError: its class does not name its `forces`.
-        """
+        """Return this friction with a factor on its force."""
         if not self.forces:
             raise ScenarioError(f"{type(self).__name__} cannot be scaled: name its fields that are forces in `forces`")
         values = {name: getattr(self, name) for name in self.forces}
@@ -86,15 +78,10 @@ class Friction(Part):
 
 
 class Nominal(NamedTuple):
-    """Force of an actuator as the law's model knows it: gain u - drag v.
+    """Force of an actuator as the law's model knows it: gain u - drag v."""
 
-    Attributes:
-      gain: force per unit of u.
-      drag: force per unit of the joint's velocity.
-    """
-
-    gain: float = 1.0
-    drag: float = 0.0
+    gain: float = 1.0  # force per unit of u
+    drag: float = 0.0  # force per unit of the joint's velocity
 
 
 @dataclasses.dataclass(frozen=True)

@@ -70,12 +70,9 @@ class Sliding(Friction):
     def value(v: float, motor: float, load: float, p: Any, /) -> tuple[float, float, float]:
         """Return F and the bounds low and high of the force at rest, N m (N).
 
-        Args:
-          v: speed of the joint, rad/s (m/s).
-          motor: force of its drive in the physics step before, N m (N).
-          load: sum of the other forces on it, N m (N): gravity, gyration, springs, the disturbances in a trace's d, and
-            the contacts and limits of the step before. It does not include the joint's damping.
-          p: the numbers of its channel, by name.
+        v is the speed of the joint, rad/s (m/s), motor the force of its drive in the physics step before, and load the
+        sum of the other forces on it, N m (N): gravity, gyration, springs, the disturbances in a trace's d, and the
+        contacts and limits of the step before, without the joint's damping. p has the numbers of its channel, by name.
         """
         raise NotImplementedError
 
@@ -90,21 +87,15 @@ class Sliding(Friction):
         for name in (*self.names, "stiffness"):
             value = getattr(self, name)
             if isinstance(value, tuple) and len(value) != plant.n:
-                raise ScenarioError(
-                    f"{type(self).__name__}'s {name} has {len(value)} values, {shown(value)}, and {plant.name} has "
-                    f"{plant.n} channels: give one number, or {plant.n}"
-                )
+                what, cure = f"{type(self).__name__}'s {name} is {shown(value)}", f"give one number, or {plant.n}"
+                raise ScenarioError(f"{what}, and {plant.name} has {plant.n} channels: {cure}")
 
     def parameters(self, i: int) -> tuple[float, ...]:
         """Return the numbers of channel i that `value` reads as p; NaN for None."""
         return tuple(math.nan if (x := _of(getattr(self, name), i)) is None else x for name in self.names)
 
     def bristle(self, i: int, inertia: float) -> tuple[float, float]:
-        """Return stiffness and critical damping of channel i when it sticks.
-
-        Args:
-          inertia: of the joint, kg m^2 (kg).
-        """
+        """Return stiffness and critical damping of channel i when it sticks, from its joint's inertia, kg m^2 (kg)."""
         if not inertia > 0.0:
             raise ScenarioError(f"the inertia of joint {i} is {inertia:g}, and friction needs one above 0: give others")
         stiffness = _of(self.stiffness, i)

@@ -354,7 +354,7 @@ def test_a_servo_needs_more_to_drive_a_load_than_it_loses_when_driven_back(model
         (lambda: smc.servo("mx64", "m7"), "unknown model of mx64 'm7': choose from m1, m2, m3, m4, m5, m6"),
         (
             lambda: smc.Scenario(plant="panda", law="none", friction=smc.Sigmoid([1.0, 2.0, 3.0], 5.0)),
-            "Sigmoid's p1 has 3 values, (1.0, 2.0, 3.0), and panda has 7 channels: give one number, or 7",
+            "Sigmoid's p1 is (1.0, 2.0, 3.0), and panda has 7 channels: give one number, or 7",
         ),
         (
             lambda: smc.Scenario(
