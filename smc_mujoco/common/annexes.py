@@ -8,15 +8,7 @@ ANNEXES = ("exchange", "evidence")
 
 
 def module(name: str, what: str) -> ModuleType:
-    """Return a module of the package.
-
-    Args:
-      name: dotted, such as "smc_mujoco.evidence.report".
-      what: what needs it; begins the sentence of an error.
-
-    Raises:
-      MissingPackageError: it belongs to an annex that is not installed.
-    """
+    """Return a module of the package."""
     annex = name.split(".")[1]
     if annex in ANNEXES and not installed(annex):
         from smc_mujoco.common.extras import MissingPackageError

@@ -12,15 +12,18 @@ If an entry is wrong, one sentence says why. It is an error if the entry was ask
 
 import dataclasses
 import functools
+import importlib
 import importlib.metadata
 import importlib.util
 import itertools
 import operator
+import pkgutil
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from importlib.machinery import ModuleSpec
 from importlib.metadata import EntryPoint
+from types import ModuleType
 from typing import Any, Generic, TypeVar, overload
 
 from smc_mujoco.common.errors import ScenarioError, shown, unknown, users_stacklevel, words
@@ -49,14 +52,10 @@ class PackageWarning(UserWarning):
 
 @dataclasses.dataclass(frozen=True)
 class Added(Generic[T_co]):
-    """An entry of another package, which is loaded at its first use.
-
-    Attributes:
-      make: returns the entry from its entry point, and may raise any exception.
-    """
+    """An entry of another package, which is loaded at its first use."""
 
     point: EntryPoint
-    make: Callable[[EntryPoint], T_co]
+    make: Callable[[EntryPoint], T_co]  # may raise any exception
 
     @property
     def package(self) -> str:
@@ -68,11 +67,7 @@ class Added(Generic[T_co]):
 
     @property
     def value(self) -> T_co:
-        """The entry.
-
-        Raises:
-          ScenarioError: it cannot be loaded, or is not what it should be.
-        """
+        """The entry."""
         entry = self._load() if _being_imported(self.point.module) else self._loaded
         if isinstance(entry, ScenarioError):
             raise ScenarioError(str(entry)) from entry.__cause__
@@ -106,15 +101,11 @@ class Catalogue(Mapping[str, T_co]):
     """Entries by name, in alphabetical order.
 
     `catalogue[name]` loads one entry. Iteration loads all, warns of those that cannot be loaded, and leaves them out.
-
-    Attributes:
-      own: the entries of the library, by name.
-      added: name -> the entries of that name of other packages.
     """
 
     def __init__(self, own: Mapping[str, T_co], added: Mapping[str, tuple[Added[T_co], ...]] | None = None):
         self.own = dict(own)
-        self.added = dict(added or {})
+        self.added = dict(added or {})  # entries of other packages
 
     def __getitem__(self, name: str) -> T_co:
         if name in self.own:
@@ -185,12 +176,7 @@ def added(group: str, make: Callable[[EntryPoint], T]) -> dict[str, tuple[Added[
 
 
 def imported(kind: type[T], fits: Callable[[T], bool]) -> Callable[[EntryPoint], T]:
-    """Return a function that imports the object that an entry point names, and checks its kind and its name.
-
-    Args:
-      kind: class of the object.
-      fits: what else must hold for it.
-    """
+    """Return a function that imports the object that an entry point names, and checks its kind and its name."""
 
     def make(point: EntryPoint) -> T:
         entry = point.load()
@@ -204,11 +190,7 @@ def imported(kind: type[T], fits: Callable[[T], bool]) -> Callable[[EntryPoint],
 
 
 def source(point: EntryPoint) -> ModuleSpec:
-    """Return the spec of the module that an entry point names. It imports only the packages around the module.
-
-    Raises:
-      ScenarioError: there is no such module, or the entry point names something in it.
-    """
+    """Return the spec of the module that an entry point names. It imports only the packages around the module."""
     if point.attr:
         raise ScenarioError(f"it is {point.attr!r} in a module: give {KINDS[point.group][1]}")
     if (spec := importlib.util.find_spec(point.module)) is None:
@@ -247,3 +229,33 @@ def _warn_of_unknown_groups() -> None:
         if group not in KINDS:
             package = point.dist.name if point.dist else point.value
             warn(f"package {package!r}: {unknown('group of entry points', group, KINDS)}")
+
+
+# finding entries
+
+
+def modules(package: str) -> Iterator[ModuleType]:
+    """Import and yield every module of a package."""
+    for info in pkgutil.iter_modules(importlib.import_module(package).__path__):
+        yield importlib.import_module(f"{package}.{info.name}")
+
+
+def discover(package: str, kind: type[T]) -> dict[str, T]:
+    """Return name -> object, of every object of a kind at the top level of a package's modules, sorted by name."""
+    values = [value for module in modules(package) for value in vars(module).values() if isinstance(value, kind)]
+    return {NAME(value): value for value in sorted(values, key=NAME)}
+
+
+def catalogue_of(
+    package: str, kind: type[T], group: str, fits: Callable[[T], bool] = lambda value: True
+) -> Catalogue[T]:
+    """Return the objects of a kind in a package's modules, and those of other packages in a group of entry points."""
+    return Catalogue(discover(package, kind), added(group, imported(kind, fits)))
+
+
+def subclasses(base: type[T]) -> list[type[T]]:
+    """Return every class derived from a base, users' too. A class comes before those derived from it."""
+    below = base.__subclasses__()
+    for kind in below:
+        below.extend(kind.__subclasses__())
+    return below

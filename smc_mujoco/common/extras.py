@@ -16,15 +16,7 @@ class MissingPackageError(ScenarioError, ImportError):
 
 @contextlib.contextmanager
 def extra(name: str, what: str) -> Iterator[None]:
-    """Say how to install an extra if an import in the with block fails.
-
-    Args:
-      name: the extra, such as "film".
-      what: what needs it; begins the sentence.
-
-    Raises:
-      MissingPackageError: an import in the block failed.
-    """
+    """Say how to install an extra if an import in the with block fails."""
     try:
         yield
     except (ImportError, AttributeError) as error:  # AttributeError: a package is too old for one that imports it
@@ -33,15 +25,7 @@ def extra(name: str, what: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def package(name: str, what: str) -> Iterator[None]:
-    """Say how to install a package that belongs to no extra if an import in the with block fails.
-
-    Args:
-      name: as pip knows it.
-      what: what needs it; begins the sentence.
-
-    Raises:
-      MissingPackageError: an import in the block failed.
-    """
+    """Say how to install a package that belongs to no extra if an import in the with block fails."""
     try:
         yield
     except ImportError as error:
@@ -49,13 +33,7 @@ def package(name: str, what: str) -> Iterator[None]:
 
 
 def missing(name: str, what: str, *packages: str) -> str | None:
-    """Return None if packages of an extra are installed, else a sentence that says which are not.
-
-    Args:
-      name: the extra, such as "film".
-      what: what needs it; begins the sentence.
-      packages: as they are imported.
-    """
+    """Return None if packages of an extra are installed, else a sentence that says which are not."""
     absent = [package for package in packages if importlib.util.find_spec(package) is None]
     return f"{what} needs {' and '.join(absent)}: {cure(name)}" if absent else None
 

@@ -23,11 +23,7 @@ NON_FINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}  # 
 
 
 def shipped(folder: str) -> Path:
-    """Return the folder models/ or scenes/, of a checkout or of an installed wheel.
-
-    Raises:
-      ScenarioError: there is no such folder.
-    """
+    """Return the folder models/ or scenes/, of a checkout or of an installed wheel."""
     here = Path(__file__).parents[1]
     for place in (here / folder, here.parent / folder):
         if place.is_dir():
@@ -89,11 +85,7 @@ def without_room(why: object) -> ScenarioError:
 
 @contextlib.contextmanager
 def no_room(*numbers: int) -> Iterator[None]:
-    """Turn an OSError in the block, which writes temporary files, into a ScenarioError.
-
-    Args:
-      numbers: the only errors, as in `errno`, that are turned. Default: all.
-    """
+    """Turn an OSError in the block, which writes temporary files, into a ScenarioError."""
     try:
         yield
     except OSError as error:
@@ -104,11 +96,7 @@ def no_room(*numbers: int) -> Iterator[None]:
 
 @contextlib.contextmanager
 def scratch() -> Iterator[Path]:
-    """Yield a temporary folder, which is removed after the block.
-
-    Raises:
-      ScenarioError: it cannot be made.
-    """
+    """Yield a temporary folder, which is removed after the block."""
     with no_room():
         folder = tempfile.TemporaryDirectory(prefix="smc_mujoco-", ignore_cleanup_errors=True)
     with folder as name:
@@ -117,17 +105,7 @@ def scratch() -> Iterator[Path]:
 
 @contextlib.contextmanager
 def reading(path: str | os.PathLike[str], kind: str, cure: str) -> Iterator[Path]:
-    """Turn an exception in the with block, which reads a file, into one sentence. Yield the path.
-
-    Args:
-      path: of a regular file. A pipe or a device is refused, because it may never end, and so is one that is too large,
-        or an archive that unpacks to too much.
-      kind: what the file should be, such as "trace".
-      cure: what to give instead.
-
-    Raises:
-      ScenarioError: there is no such file, it cannot be read, or the block raised something.
-    """
+    """Turn an exception in the with block, which reads a file, into one sentence. Yield the path."""
     if not isinstance(path, str | os.PathLike):
         raise ScenarioError(f"cannot read {shown(path)}: {cure}")
     try:
@@ -218,11 +196,7 @@ def from_json(text: str) -> Any:
 
 
 def write_json(path: Path, data: Any, indent: int | None = 1) -> Path:
-    """Write data as a JSON file, atomically.
-
-    Raises:
-      ScenarioError: the folder cannot be made or written.
-    """
+    """Write data as a JSON file, atomically."""
     text = to_json(data, indent)
     with replacing(path) as file:
         file.write_text(f"{text}\n", encoding="utf-8")
@@ -241,11 +215,7 @@ def _part(path: Path) -> Path:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary file beside `path`. It replaces `path` if the block succeeds, and is deleted otherwise.
-
-    Raises:
-      ScenarioError: the folder cannot be made or written.
-    """
+    """Yield a temporary file beside `path`. It replaces `path` if the block succeeds, and is deleted otherwise."""
     part = _part(path)
     with _writing(path):
         part.touch(exist_ok=False)

@@ -79,9 +79,6 @@ def of(thing: Any) -> str:
 
     The hash of a function or class of this package is computed once. That of another one is computed at every call,
     until `keep` keeps it.
-
-    Raises:
-      ScenarioError: it contains something that can be neither read nor pickled.
     """
     try:
         return _compiled_hashes[thing] if thing in _compiled_hashes else _cached(thing) if ours(thing) else now(thing)
@@ -207,14 +204,7 @@ def _overloads(function: FunctionType) -> list[Any]:
 
 
 def _reached(space: Mapping[str, Any], names: set[str], attributes: set[str], known: set[int]) -> list[Any]:
-    """Return the values of some names in a namespace, and of some attributes of the modules among those values.
-
-    Args:
-      space: the namespace.
-      names: in it. Those that it lacks are skipped.
-      attributes: names in the modules.
-      known: ids of modules that were read already; new ones are added.
-    """
+    """Return the values of some names in a namespace, and of some attributes of the modules among those values."""
     parts: list[Any] = []
     for name in sorted(names & space.keys()):
         value = space[name]

@@ -124,12 +124,7 @@ def missing() -> str | None:
 
 
 def probe(backend: str, code: str = PROBE) -> str | None:
-    """Return None if a new process can run some code with a backend, else the last line of its error.
-
-    Args:
-      backend: for MUJOCO_GL; "" to leave the variable as it is.
-      code: Python; by default it renders an empty model.
-    """
+    """Return None if a new process can run some code with a backend, else the last line of its error."""
     import subprocess
 
     environment = os.environ | ({"MUJOCO_GL": backend} if backend else {})
@@ -148,13 +143,6 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
 
     A mujoco.Renderer takes its context class from the module `gl_context`. The class is replaced there while the
     renderer is made, and put back.
-
-    Args:
-      model: the model that it renders.
-      height, width: size of the picture, px.
-
-    Raises:
-      ScenarioError: no backend renders here. Its message is the sentence of `missing`.
     """
     import mujoco
 

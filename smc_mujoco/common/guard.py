@@ -32,32 +32,15 @@ class Fault(Exception):
 
 
 class Failed(Exception):
-    """A trial that failed, in words.
-
-    Attributes:
-      stage: in which it failed.
-      fault: what is wrong; "" if the process died or was stopped.
-      code: the exit code of the process; None if it was stopped.
-    """
+    """A trial that failed, in words."""
 
     def __init__(self, stage: str, fault: str, code: int | None, timeout: float):
         super().__init__(fault or f"{stage} {_ended(code, timeout)}")
-        self.stage, self.fault, self.code = stage, fault, code
+        self.stage, self.fault, self.code = stage, fault, code  # code: None if the process was stopped
 
 
 def tried(module: str, order: Mapping[str, Any], timeout: float) -> Any:
-    """Call `attempt(order, say)` of a module in another process, and return its result.
-
-    Args:
-      module: its name. `say` in it reports a stage, and Fault in it what is wrong.
-      order: plain data, as is the result.
-      timeout: s.
-
-    Raises:
-      Failed: the process found a fault, crashed, or did not end.
-      ScenarioError: there is no room for its files.
-      OSError: this process may not start others.
-    """
+    """Call `attempt(order, say)` of a module in another process, and return its result."""
     from smc_mujoco.common import files, process
 
     with files.scratch() as folder:
@@ -91,14 +74,7 @@ def _ended(code: int | None, timeout: float) -> str:
 
 
 class Arithmetic:
-    """How this thread rounds, flushes and traps, which foreign code may change for all that computes after it.
-
-    Attributes:
-      numbers: what `computed` takes.
-      results: what it returned.
-      environment: as C's fegetenv stores it.
-      library: with C's fesetenv.
-    """
+    """How this thread rounds, flushes and traps, which foreign code may change for all that computes after it."""
 
     def __init__(self) -> None:
         self.numbers = (ctypes.c_double * 4)(3.0, 10.0, 2.0**-1022, 2.0**1000)
@@ -122,9 +98,6 @@ def computed(numbers: Any) -> tuple[float, ...]:
 
     The float64 nearest to 1/3 is below it, and that to 1/10 above. No result is subnormal itself, because a thread
     that reads subnormal numbers as 0 would take it for 0.
-
-    Args:
-      numbers: those of Arithmetic, in memory, so that no compiler computes with them beforehand.
     """
     three, ten, tiny, big = numbers[0], numbers[1], numbers[2], numbers[3]
     return 1.0 / three, 1.0 / ten, tiny / ten * big

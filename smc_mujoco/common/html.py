@@ -39,16 +39,7 @@ def table(
     numbers: range = range(0),
     max_rows: int = MAX_ROWS,
 ) -> Html:
-    """Return a table.
-
-    Args:
-      headings: one for each column; empty for a table without headings.
-      rows: a value for each column.
-      caption: above the table.
-      note: below it.
-      numbers: the columns that are aligned to the right.
-      max_rows: number of rows that are shown; a last line says how many are left out.
-    """
+    """Return a table."""
     width = len(headings or rows[0]) if headings or rows else 1
     sides = ["right" if i in numbers else "left" for i in range(width)]
     parts = [
@@ -83,14 +74,7 @@ def fields(values: Mapping[str, object], caption: object = "", note: object = ""
 
 
 def panel(t: np.ndarray, curves: Sequence[np.ndarray], heading: str, reference: np.ndarray | None = None) -> Html:
-    """Return a panel of curves over time as SVG, with its range at the axes.
-
-    Args:
-      t: times, (K,), s.
-      curves: (K,) each; values that are not finite are left out.
-      heading: the quantity with its unit.
-      reference: (K,), drawn dashed; None for none.
-    """
+    """Return a panel of curves over time as SVG, with its range at the axes."""
     drawn = [curve for curve in (*curves, *([] if reference is None else [reference])) if np.isfinite(curve).any()]
     if not drawn or len(t) < 2:
         return Html("")
@@ -139,13 +123,7 @@ def _lines(x: np.ndarray, y: np.ndarray, style: str) -> list[str]:
 
 
 def embedded(content: bytes, kind: str, width: float | None = None) -> Html:
-    """Return a picture or a film, kept in the page itself and no wider than the page.
-
-    Args:
-      content: the bytes of its file.
-      kind: its MIME type, such as "video/mp4".
-      width: px; None for the content's width.
-    """
+    """Return a picture or a film, kept in the page itself and no wider than the page."""
     source = f'src="data:{kind};base64,{base64.b64encode(content).decode()}" style="max-width:100%;height:auto"'
     source += "" if width is None else f' width="{width:.0f}"'
     if kind.startswith("video/"):

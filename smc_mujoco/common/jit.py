@@ -197,14 +197,7 @@ def loader(kind: type) -> Callable:
 
 
 def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = False) -> CFunc:
-    """Compile a C function with numba. Ctrl-C is delayed to the end, as numba may lose it.
-
-    Args:
-      signature: numba's types of the result and the arguments.
-      body: the function in Python.
-      cache: whether to load it from numba's cache on disk, and to write it there if the disk can be written. A body
-        whose closure holds other functions needs a name and a hash of all that it reaches.
-    """
+    """Compile a C function with numba. Ctrl-C is delayed to the end, as numba may lose it."""
     made = CFunc(body, normalize_signature(signature), {}, {"error_model": "numpy"})
     _compile(made, body, cache)
     return made
@@ -330,15 +323,10 @@ class Function:
 
 
 class AtAddress:
-    """Base of laws that are C functions, and already have the signature that the callback calls.
+    """Base of laws that are C functions, and already have the signature that the callback calls."""
 
-    Attributes:
-      address: of the function, valid as long as this object lives.
-      digest: a hash of its machine code.
-    """
-
-    address: int
-    digest: str
+    address: int  # of the function, valid as long as this object lives
+    digest: str  # a hash of its machine code
 
 
 class Uncompiled:

@@ -10,11 +10,7 @@ from smc_mujoco.common.errors import ScenarioError
 
 
 def path() -> Path:
-    """Return the path of the library's file.
-
-    Raises:
-      ScenarioError: it is not in the folder of the package mujoco.
-    """
+    """Return the path of the library's file."""
     folder = Path(mujoco.__file__).parent
     files = [path for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll") for path in folder.glob(pattern)]
     if not files:

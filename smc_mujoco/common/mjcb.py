@@ -73,9 +73,6 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
     A Python callback is removed meanwhile. The thread that installed it does not wait, so that a policy can make an
     environment during a run. Other threads wait until that run is over. No thread waits for native callbacks.
-
-    Raises:
-      ValueError: MuJoCo cannot compile it.
     """
     with _python_lock:
         if not any(map(_python, _callbacks().values())):

@@ -34,17 +34,7 @@ def _kill(process: subprocess.Popen[str]) -> None:
 def timed(
     command: Sequence[str], timeout: float, output: bool = True, cwd: str | os.PathLike[str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command, and stop it and every process that it started when its time is up.
-
-    Args:
-      timeout: s.
-      output: whether to keep what it prints. A user's code may print without end and fill the memory.
-      cwd: the folder that it runs in. Default: the present one.
-
-    Raises:
-      TimedOut: its time was up.
-      OSError: there is no such program.
-    """
+    """Run a command, and stop it and every process that it started when its time is up."""
     pipe = subprocess.PIPE if output else subprocess.DEVNULL
     with subprocess.Popen(
         command,

@@ -29,14 +29,7 @@ class Bar:
 
 @contextlib.contextmanager
 def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool = False) -> Iterator[Bar]:
-    """Show a bar while the block lasts. If stderr is no terminal, print a line each ten seconds instead.
-
-    Args:
-      what: the text beside it.
-      whole: the whole work; None if `reached` sets it.
-      shown: False for a Bar that shows nothing.
-      counted: whether to show "3/60" instead of a percentage.
-    """
+    """Show a bar while the block lasts. If stderr is no terminal, print a line each ten seconds instead."""
     if not shown:
         yield Bar()
         return
@@ -141,13 +134,7 @@ class NotebookBar(LogBar):
 
 
 def summed(report: Report, done: float, whole: float) -> Callable[[float], None]:
-    """Return a function that reports the work done so far, increased by a piece of work in each call.
-
-    Args:
-      report: called with the sum and with `whole`.
-      done: the work done before the first call.
-      whole: the whole work.
-    """
+    """Return a function that reports the work done so far, increased by a piece of work in each call."""
 
     def add(work: float) -> None:
         nonlocal done

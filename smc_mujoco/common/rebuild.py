@@ -23,13 +23,7 @@ class Names(NamedTuple):
 
 
 def rebuild(function: Any, finish: Callable[[Any], Any], copies: dict[Callable, Any] | None = None) -> Any:
-    """Return a copy of a function that calls copies of its compiled helpers.
-
-    Args:
-      function: plain Python or compiled.
-      finish: function, such as numba.njit, that is called with the plain Python of each copy; its result is used.
-      copies: function -> its copy, for copies that exist already. New ones are added.
-    """
+    """Return a copy of a function that calls copies of its compiled helpers."""
     return _rebuild(getattr(function, "py_func", function), finish, {} if copies is None else copies)
 
 

@@ -10,12 +10,7 @@ from smc_mujoco.common.files import reading
 
 
 def execute(path: Path) -> dict:
-    """Return what a user's script defines. It can import modules beside it.
-
-    Raises:
-      ScenarioError: the file is no Python, or the script raises a ScenarioError. The message says where.
-      Exception: any other one that the script raises, as it is.
-    """
+    """Return what a user's script defines. It can import modules beside it."""
     with reading(path, "Python file", "fix it") as file:
         compile(file.read_bytes(), str(path), "exec", dont_inherit=True)
     sys.path.insert(0, str(path.resolve().parent))

@@ -36,42 +36,25 @@ TEX |= {c: f"$_{i}$" for i, c in enumerate("₀₁₂₃₄₅₆₇₈₉")} | 
 
 
 class Cell(NamedTuple):
-    """A text with a smaller one below it, such as a median and its interval.
-
-    Attributes:
-      text: the first line.
-      below: further lines.
-      strong: whether it is marked: bold, and with a star where letters have no weight.
-      colour: of the text in a terminal, as rich names it; "" for the default.
-      alarm: a last line, such as how many runs failed.
-    """
+    """A text with a smaller one below it, such as a median and its interval."""
 
     text: str
-    below: str = ""
-    strong: bool = False
-    colour: str = ""
-    alarm: str = ""
+    below: str = ""  # further lines
+    strong: bool = False  # marked: bold, and with a star where letters have no weight
+    colour: str = ""  # in a terminal, as rich names it
+    alarm: str = ""  # a last line, such as how many runs failed
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Tabular:
-    """A table.
-
-    Attributes:
-      headings: one for each column.
-      rows: a text or a Cell for each column.
-      title: above the table.
-      notes: paragraphs below it.
-      left: number of columns of names, which are aligned to the left.
-      stacked: whether a terminal shows these in one column, below each other.
-    """
+    """A table."""
 
     headings: Sequence[str]
     rows: Sequence[Sequence[Cell | str]]
     title: str = ""
-    notes: Sequence[str] = ()
-    left: int = 1
-    stacked: bool = False
+    notes: Sequence[str] = ()  # paragraphs below the table
+    left: int = 1  # columns of names, which are aligned to the left
+    stacked: bool = False  # whether a terminal shows these in one column, below each other
 
     def __str__(self) -> str:
         return plain(self)

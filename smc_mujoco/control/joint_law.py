@@ -23,9 +23,8 @@ import numpy as np
 from numba import carray, njit
 from numba.extending import overload
 
-from smc_mujoco.common.catalogue import Catalogue
+from smc_mujoco.common.catalogue import Catalogue, catalogue_of
 from smc_mujoco.common.jit import call, floats, pointer, record_at
-from smc_mujoco.common.registry import catalogue_of
 from smc_mujoco.control.component import Template
 
 

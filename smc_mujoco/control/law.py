@@ -20,9 +20,8 @@ from typing import Any, NamedTuple, Unpack, overload
 
 from numba import njit
 
-from smc_mujoco.common.catalogue import Catalogue
+from smc_mujoco.common.catalogue import Catalogue, catalogue_of
 from smc_mujoco.common.errors import ScenarioError, find
-from smc_mujoco.common.registry import catalogue_of
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Component, Options, Template, decorated
 from smc_mujoco.mechanisms.named import as_plant

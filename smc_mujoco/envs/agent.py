@@ -35,9 +35,8 @@ def agent(
     """Return a law as an agent: a callable observation -> action, whose memory is cleared with each episode.
 
     Args:
-      law: a Law or the name of one.
+      law, model, surface, velocity: as in a Scenario.
       environment: from `suite.load`, or a single gymnasium environment, wrapped or not.
-      model, surface, velocity: as in a Scenario.
 
     Raises:
       ScenarioError: another environment, or values that a Scenario refuses. The agent raises it if its law fails.
@@ -55,16 +54,11 @@ def agent(
 
 
 class Agent:
-    """A law that acts in an environment.
-
-    Attributes:
-      episode: the environment's Episode, which counts the samples.
-      loop: the reference loop of the scenario with the law in it. Only its controller is used.
-      last_episode: number of the episode in which it acted last; 0 before its first action.
-    """
+    """A law that acts in an environment."""
 
     def __init__(self, episode: Episode, loop: reference.Loop):
-        self.episode, self.loop, self.last_episode = episode, loop, 0
+        self.episode, self.loop = episode, loop  # only the loop's controller is used
+        self.last_episode = 0  # number of the episode in which it acted last
 
     def __call__(self, observation: Any) -> np.ndarray:
         """Return the action for an observation: a TimeStep or mapping of dm_env, or an array of gymnasium."""

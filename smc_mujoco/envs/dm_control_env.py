@@ -20,7 +20,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.extras import MissingPackageError, cure, extra
 from smc_mujoco.envs.episode import Episode, Setting, bounded
 from smc_mujoco.envs.tasks import tasks
@@ -38,14 +38,9 @@ ENVIRONMENT_KWARGS = {"flat_observation": "flat_observation", "control_timestep"
 
 
 class PlantPhysics(Physics):
-    """dm_control's physics, without its exception for a plant that diverges.
+    """dm_control's physics, without its exception for a plant that diverges."""
 
-    Attributes:
-      step_counts: numbers of physics steps to take, from `Episode.apply_action`.
-      step_context: the context in which they are taken, from `Episode.with_friction`.
-    """
-
-    step_counts: Iterable[int] = ()
+    step_counts: Iterable[int] = ()  # from `Episode.apply_action`
     step_context: contextlib.AbstractContextManager[None] = contextlib.nullcontext()
 
     def step(self, nstep: int = 1) -> None:
@@ -165,16 +160,11 @@ def __getattr__(name: str) -> object:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-def _renamed(what: str, values: object, names: Mapping[str, str]) -> dict[str, Any]:
+def _renamed(what: str, values: Any, names: Mapping[str, str]) -> dict[str, Any]:
     """Return values with the names of dm_control's suite replaced by the names here."""
-    if values is None:
-        return {}
-    if not isinstance(values, Mapping):
+    if not isinstance(values, Mapping | None):
         raise ScenarioError(f"{what} is {shown(values)}: give a mapping of {', '.join(names)}")
-    for name in values:
-        if name not in names:
-            raise unknown(f"name in {what}", name, names)
-    return {names[name]: value for name, value in values.items()}
+    return {find(f"name in {what}", name, names): value for name, value in (values or {}).items()}
 
 
 def _physics(model: mujoco.MjModel) -> PlantPhysics:

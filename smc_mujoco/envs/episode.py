@@ -35,26 +35,7 @@ FIELDS = (  # of a Scenario, that an environment accepts
 
 
 class Setting:
-    """A plant with a task, compiled. Every environment has one.
-
-    Attributes:
-      task: the Task.
-      scenario: the run that equals an episode, with the law `none`.
-      model: its compiled model.
-      qpos, qvel: addresses of the n channels, (n,) each.
-      ctrl, shafts: addresses of the driven channels' actuators, and in qvel of what they drive.
-      rotors: channels with a separate rotor, and its addresses in qpos and qvel, (3, rotors).
-      initial_state: qpos (nq,) and qvel (nv,), into which x and v of an episode's start are written.
-      limits, scale: the largest commands, (driven,), and the actuators' inputs per unit of them.
-      selected: the channels that the task treats differently, (n,) of bool, see `Task.selected`.
-      rest_x: the plant's rest, from which positions count in errors, (n,).
-      rest_r: the same for the references: the rest of each channel that has one, then zeros, (3 m,).
-      low, high: bounds of the initial positions, (n,) each.
-      references: r, r' and r'' of m references at every sample, (K + 1, 3 m). There is one reference, or one for each
-        driven channel. A task without a reference has one row of zeros.
-      observation_size: number of values in an observation.
-      action_shape: (driven,).
-    """
+    """A plant with a task, compiled. Every environment has one."""
 
     def __init__(
         self,
@@ -63,49 +44,43 @@ class Setting:
         changes: Mapping[str, Any] | None = None,
         edit: Callable[[mujoco.MjSpec], None] = lambda spec: None,
     ):
-        """Compile a plant for a task.
+        """Compile a plant for one of its tasks. `changes`: Scenario field -> value, of FIELDS.
 
-        Args:
-          plant: a Plant or the name of one.
-          task: one of `tasks(plant)`.
-          changes: Scenario field -> value, of FIELDS, such as {"control_period": 0.01, "u_max": 3.0}.
-          edit: changes the mechanism before it is compiled; it must not change the motion.
-
-        Raises:
-          ScenarioError: an unknown plant, task or field, a task that is not for the plant, a value out of range.
+        `edit` changes the mechanism before it is compiled, and must not change the motion.
         """
         plant = as_plant(plant)
         self.task, known = find("task", task, TASKS), tasks(plant)
         if task not in known:
             raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(known)}")
         changes = _checked({} if changes is None else changes, task)
+        # the run that equals an episode
         self.scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes)).resolved
         if self.scenario.drive_step and self.scenario.drive_step.ripple:
             raise ScenarioError("environments have no DCMotor with a ripple: give ripple=0")
         if math.inf in self.scenario.limits:
             raise ScenarioError("u_max is inf: give a finite one, because actions are fractions of it")
         fixed = np.array(self.scenario.x0)
+        # bounds of the initial positions, (n,) each
         self.low, self.high = starts(self.task, plant) if changes.get("x0") is None else (fixed, fixed)
         self.model = _compiled(self.scenario, edit)
         table = channels(self.model)
-        self.qpos, self.qvel = table["qpos"], table["qvel"]
+        self.qpos, self.qvel = table["qpos"], table["qvel"]  # addresses of the channels, (n,) each
+        # addresses of the driven channels' actuators, and in qvel of what they drive, (driven,) each
         self.ctrl, self.shafts = (table[name][: plant.driven] for name in ("ctrl", "shaft"))
         self.rotors = _rotors(self.model)
-        self.initial_state = models.initial_state(self.model, self.scenario)
+        self.initial_state = models.initial_state(self.model, self.scenario)  # qpos (nq,) and qvel (nv,)
+        # the largest commands, (driven,), and the actuators' inputs per unit of them
         self.limits, self.scale = np.array(self.scenario.limits), math.prod(p.scale for p in self.scenario.actuator)
+        # the channels that the task treats differently, (n,) of bool, and from where positions count in errors, (n,)
         self.selected, self.rest_x = self.task.selected(plant), rest(plant)
         self.references = _references(self.scenario, self.scenario.samples + 1 if self.task.moving else 1)
         width = self.references.shape[1]
         self.observation_size, self.action_shape = 2 * plant.n + width * self.task.moving, (plant.driven,)
-        self.rest_r = np.zeros(width)
+        self.rest_r = np.zeros(width)  # from where the references count: the rest of each that has one, then zeros
         self.rest_r[: width // 3] = self.rest_x[: width // 3] if plant.rest else 0.0
 
     def command(self, action: Any, copies: tuple[int, ...] = ()) -> np.ndarray:
-        """Return the commands of an action, (*copies, driven): its saturated values times the limits.
-
-        Raises:
-          ScenarioError: an action of another shape, or not of finite numbers.
-        """
+        """Return the commands of an action, (*copies, driven): its saturated values times the limits."""
         shape = copies + self.action_shape
         try:
             a = np.asarray(action, float)
@@ -127,13 +102,9 @@ class Setting:
     def apply_command(
         self, ctrl: np.ndarray, command: np.ndarray, drive_states: np.ndarray, qvel: np.ndarray
     ) -> Iterator[int]:
-        """Write inputs into ctrl over a control period; yield after each for how many physics steps it lasts.
+        """Write inputs into ctrl (..., nu) over a control period; yield after each how many physics steps it lasts.
 
-        Args:
-          ctrl: of one simulation, (nu,), or of several, (..., nu).
-          command: the return value of `command`, (..., driven).
-          drive_states: both states of `DriveStep`, (2, ..., driven); updated in place.
-          qvel: velocities, (..., nv).
+        `command` is (..., driven); `drive_states`, (2, ..., driven), is updated in place; `qvel` is (..., nv).
         """
         effect, steps = self.scenario.drive_step, self.scenario.steps
         if effect is None:
@@ -151,14 +122,8 @@ class Setting:
         return None if self.scenario.formula_friction is None else FormulaFriction(self.scenario, self.model, count)
 
     def draw_start(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
-        """Return a start, x and v, (n,) each: drawn from a numpy generator, or set by the options x0 and v0.
-
-        Raises:
-          ScenarioError: another option, not n finite numbers, or an x0 outside a joint's range.
-        """
+        """Return a start, x and v, (n,) each: drawn from a numpy generator, or set by the options x0 and v0."""
         x, v = random.uniform(self.low, self.high), np.array(self.scenario.v0)
-        if not isinstance(options, Mapping | None):
-            raise ScenarioError(f"options is {shown(options)}: give a mapping, such as {{'x0': 1.0}}")
         for name, value in (options or {}).items():
             if name not in ("x0", "v0"):
                 raise unknown("option of an episode", name, ("x0", "v0"))
@@ -193,21 +158,12 @@ class Setting:
 
 
 class Episode:
-    """An episode of one simulation: the base of a gymnasium environment and of a task for dm_control.
-
-    Attributes:
-      setting: the plant with its task.
-      episodes: number of episodes that have begun.
-      sample: control samples since the episode began.
-      drive_states: both states of `DriveStep`, (2, driven).
-      friction: a friction by a formula, or None.
-      x, v: positions and velocities, (n,) each.
-      diverged: whether the plant has diverged, which ends the episode without a reward.
-    """
+    """An episode of one simulation: the base of a gymnasium environment and of a task for dm_control."""
 
     def __init__(self, setting: Setting):
-        self.setting, self.episodes, self.sample, self.diverged = setting, 0, 0, False
-        self.drive_states = np.zeros((2, *setting.action_shape))
+        self.setting, self.episodes, self.diverged = setting, 0, False
+        self.sample = 0  # control samples since the episode began
+        self.drive_states = np.zeros((2, *setting.action_shape))  # of `DriveStep`
         self.x = self.v = np.zeros(setting.scenario.plant.n)
         self.friction = setting.formula_friction()
 
@@ -236,11 +192,7 @@ class Episode:
         self.diverged = bool(self.setting.diverged(self.x, self.v)) or bool(self.friction and self.friction.failed[0])
 
     def reward_and_info(self) -> tuple[float, dict[str, Any]]:
-        """Return the reward of the state, in [0, 1], and the info of gymnasium.
-
-        The info has "time", s since the start, and "error", the e of the task in each channel, (n,). After a divergence
-        the error is NaN, and the reward is 0.
-        """
+        """Return the reward of the state, in [0, 1], and the info of gymnasium; 0 and NaN after a divergence."""
         time = self.sample * self.setting.scenario.control_period
         if self.diverged:
             return 0.0, {"time": time, "error": np.full(len(self.x), np.nan)}
@@ -265,7 +217,7 @@ def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:
 
 
 def _rotors(model: mujoco.MjModel) -> np.ndarray:
-    """Return `Setting.rotors`."""
+    """Return the channels with a separate rotor, and its addresses in qpos and qvel, (3, rotors)."""
     rotors = []
     for i, joint in enumerate(joint_ids(model)):
         rotor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(joint).name)
@@ -275,7 +227,7 @@ def _rotors(model: mujoco.MjModel) -> np.ndarray:
 
 
 def _references(scenario: Resolved, samples: int) -> np.ndarray:
-    """Return `Setting.references`, or raise ScenarioError."""
+    """Return r, r' and r'' at every sample, (K + 1, 3 m), of m references: one, or one for each driven channel."""
     if samples == 1:  # the task has none
         return np.zeros((1, 3))
     times = (np.arange(samples) * scenario.control_period).tolist()

@@ -17,14 +17,7 @@ from smc_mujoco.simulation.scenario import Resolved
 
 
 class FormulaFriction:
-    """The friction by a formula of `count` copies of a mechanism.
-
-    Args:
-      model: the compiled mechanism. It has callback.USERDATA numbers of userdata.
-
-    Raises:
-      ScenarioError: a function of the scenario does not compile.
-    """
+    """The friction by a formula of `count` copies of a mechanism."""
 
     def __init__(self, scenario: Resolved, model: mujoco.MjModel, count: int):
         prepared = prepare(scenario)

@@ -46,13 +46,9 @@ def observation_space(setting: Setting) -> spaces.Box:
 
 
 class TimeLimited:
-    """An environment that writes the length of its episodes to its spec, which `gymnasium.make` sets.
+    """An environment that writes the length of its episodes to its spec, which `gymnasium.make` sets."""
 
-    Attributes:
-      max_samples: control samples after which an episode is truncated.
-    """
-
-    max_samples: int
+    max_samples: int  # control samples after which an episode is truncated
     _spec: EnvSpec | None = None
 
     @property
@@ -69,12 +65,7 @@ class TimeLimited:
 
 
 class PlantEnv(TimeLimited, Episode, gymnasium.Env):  # pyright: ignore[reportIncompatibleVariableOverride]
-    """One plant with a task. It has the attributes of an Episode too.
-
-    Attributes:
-      data: the simulation's state.
-      max_samples: control samples after which an episode is truncated.
-    """
+    """One plant with a task. It has the attributes of an Episode too."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 1000}  # noqa: RUF012  # as gymnasium has it
 

@@ -54,13 +54,9 @@ class OffsetSine(Signal):
 
 
 class Task:
-    """The goal of an agent. This base class is `regulate`: bring every channel to 0.
+    """The goal of an agent. This base class is `regulate`: bring every channel to 0."""
 
-    Attributes:
-      moving: whether there is a moving reference, which is then part of the observation.
-    """
-
-    moving = False
+    moving = False  # whether there is a moving reference, which is then part of the observation
 
     def fits(self, plant: Plant) -> bool:
         """Return whether a plant has this task."""
@@ -80,12 +76,7 @@ class Task:
         return -reach, reach
 
     def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
-        """Return e and w for x and v, (..., n) each.
-
-        Args:
-          r: references r, r' and r'', (..., 3 m), m of each: one, or one for each driven channel; x and r count from
-            the plant's rest.
-        """
+        """Return e and w for x and v, (..., n) each; `r` has the references r, r' and r'', (..., 3 m), m of each."""
         return x, v
 
 

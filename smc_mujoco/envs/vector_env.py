@@ -3,8 +3,7 @@
     environments = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=1024)
 
 Copy i moves like the single environment with seed + i, to 1e-12. After the end of an episode a copy begins the next
-one as gymnasium's own vector environments do: in the next step, which ignores the action (AutoresetMode.NEXT_STEP, the
-default), in the same step, with its last observation in the info (SAME_STEP), or only by `reset` (DISABLED).
+one in the next step, which ignores the action, as gymnasium's own vector environments do (AutoresetMode.NEXT_STEP).
 """
 
 import math
@@ -36,17 +35,7 @@ SEEDS = 2**64
 
 
 class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVariableOverride]
-    """Copies of one plant with one task; they are not rendered.
-
-    Attributes:
-      setting: the plant with its task.
-      batch: the simulations.
-      drive_states: both states of `DriveStep`, (2, num_envs, driven).
-      friction: a friction by a formula, or None.
-      samples: control samples since the episode began, (num_envs,).
-      ended: the copies whose episode has ended, (num_envs,) of bool.
-      max_samples: control samples after which an episode is truncated.
-    """
+    """Copies of one plant with one task; they are not rendered."""
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012  # as gymnasium has it
 
@@ -57,7 +46,6 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         task: str = "regulate",
         changes: Mapping[str, Any] | None = None,
         threads: int | None = None,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         max_episode_steps: int | None = None,
         render_mode: None = None,
     ):
@@ -65,7 +53,6 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
 
         Args:
           threads: None for one per available core.
-          autoreset_mode: when a copy begins a new episode after the end of one.
           max_episode_steps: control samples after which an episode is truncated, if the duration is not shorter.
           render_mode: None, because copies are not rendered.
 
@@ -74,11 +61,6 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         """
         if render_mode is not None:
             raise ScenarioError(f"render_mode is {shown(render_mode)}: copies are not drawn, make a single environment")
-        try:
-            self.metadata = self.metadata | {"autoreset_mode": AutoresetMode(autoreset_mode)}
-        except ValueError:
-            modes = ", ".join(repr(mode.value) for mode in AutoresetMode)
-            raise ScenarioError(f"autoreset_mode is {shown(autoreset_mode)}: choose from {modes}") from None
         self.num_envs = whole("num_envs", num_envs, 1, MAX_COPIES)
         self.setting = Setting(plant, task, changes, edit=remove_scenery)
         disable_unused_constraints(self.setting.model)
@@ -93,25 +75,22 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         persistent = self.friction is not None  # it reads the forces of the previous step
         self.batch = Batch(self.setting.model, self.num_envs, workers, persistent=persistent)
         self.qpos, self.qvel, self.ctrl = (self.batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
-        self.drive_states = np.zeros((2, self.num_envs, *self.setting.action_shape))
+        self.drive_states = np.zeros((2, self.num_envs, *self.setting.action_shape))  # of `DriveStep`
         self.randoms: list[np.random.Generator] = []
+        # control samples since each episode began, and the copies whose episode has ended
         self.samples, self.ended = np.zeros(self.num_envs, int), np.zeros(self.num_envs, bool)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begin new episodes, from seed, seed + 1, ... or from a list of seeds. Options x0 and v0 hold for all copies.
-
-        The option reset_mask, (num_envs,) of bool, selects the copies; the others continue.
-        """
-        mask, options = self._mask(options)
+        """Begin new episodes, from seed, seed + 1, ... or a list of seeds. Options x0 and v0 hold for all copies."""
         generators = self.randoms or [None] * self.num_envs
         self.randoms = [
-            seeding.np_random(number)[0] if random is None or (new and number is not None) else random
-            for random, number, new in zip(generators, self._seeds(seed), mask, strict=True)
+            seeding.np_random(number)[0] if random is None or number is not None else random
+            for random, number in zip(generators, self._seeds(seed), strict=True)
         ]
-        self.begin(mask, options)
-        return self.observe(), self.infos(self.errors()[0], mask)
+        self.begin(np.ones(self.num_envs, bool), options)
+        return self.observe(), self.infos(self.errors()[0])
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Take one control period in every copy; copies at the end of an episode begin the next one.
@@ -121,10 +100,7 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         """
         if not self.randoms:
             raise ScenarioError("no episode has begun: call reset first")
-        restarts, mode = self.ended.copy(), self.metadata["autoreset_mode"]
-        if restarts.any() and mode is AutoresetMode.DISABLED:
-            copy = np.argmax(restarts)
-            raise ScenarioError(f"the episode of copy {copy} is over: reset it with the option reset_mask")
+        restarts = self.ended.copy()
         commands = self.setting.command(actions, (self.num_envs,))
         terminated = self.advance(np.flatnonzero(~restarts).astype(np.int32) if restarts.any() else None, commands)
         self.samples += 1
@@ -138,15 +114,8 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         with np.errstate(over="ignore", invalid="ignore"):
             rewards = np.where(terminated | restarts, 0.0, reward(e, w))
         e[terminated] = np.nan
-        observations, self.ended = self.observe(terminated), terminated | truncated
-        final, times = {}, self.times
-        if mode is AutoresetMode.SAME_STEP and self.ended.any():
-            for i in np.flatnonzero(self.ended):
-                info = {"time": times[i], "error": e[i]}
-                final = self._add_info(final, {"final_obs": observations[i].copy(), "final_info": info}, int(i))
-            self.begin(self.ended.copy())
-            observations, e = self.observe(), self.errors()[0]
-        return observations, rewards, terminated, truncated, self.infos(e) | final
+        self.ended = terminated | truncated
+        return self.observe(terminated), rewards, terminated, truncated, self.infos(e)
 
     def begin(self, mask: np.ndarray, options: Mapping[str, Any] | None = None) -> None:
         """Begin new episodes of the copies where `mask`, (num_envs,) of bool, is true."""
@@ -175,11 +144,7 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         return failed | self.friction.failed if self.friction else failed
 
     def observe(self, diverged: np.ndarray | None = None) -> np.ndarray:
-        """Return the observations of all copies, (num_envs, observation_size).
-
-        Args:
-          diverged: the copies that diverged, (num_envs,) of bool, if known.
-        """
+        """Return the observations of all copies, (num_envs, observation_size)."""
         x, v = self.state()
         if diverged is None:
             diverged = np.asarray(self.setting.diverged(x, v))
@@ -188,42 +153,19 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
             observations[diverged] = bounded(observations[diverged])
         return observations
 
-    @property
-    def times(self) -> np.ndarray:
-        """Time in each copy's episode, s, (num_envs,)."""
-        return self.samples * self.setting.scenario.control_period
-
     def errors(self) -> Pair:
         """Return the errors e and w of the task in all copies, (num_envs, n) each."""
         with np.errstate(over="ignore", invalid="ignore"):
             return self.setting.errors(*self.state(), self.samples)
 
-    def infos(self, e: np.ndarray, mask: np.ndarray | None = None) -> dict[str, Any]:
-        """Return the infos of `Episode.reward_and_info` for the copies in a mask, as gymnasium joins them.
-
-        Args:
-          e: errors of the task, (num_envs, n).
-          mask: (num_envs,) of bool; None for all copies.
-        """
-        known = np.ones(self.num_envs, bool) if mask is None else mask.copy()  # a user may change the mask later
-        times = np.where(known, self.times, 0.0)
-        return {"time": times, "_time": known, "error": np.where(known[:, None], e, 0.0), "_error": known.copy()}
+    def infos(self, e: np.ndarray) -> dict[str, Any]:
+        """Return the infos of `Episode.reward_and_info` as gymnasium joins them; e is (num_envs, n)."""
+        times, known = self.samples * self.setting.scenario.control_period, np.ones(self.num_envs, bool)
+        return {"time": times, "_time": known, "error": e, "_error": known.copy()}
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
         """Return positions and velocities of all copies, (num_envs, n) each."""
         return self.qpos[:, self.setting.qpos], self.qvel[:, self.setting.qvel]
-
-    def _mask(self, options: Mapping[str, Any] | None) -> tuple[np.ndarray, Mapping[str, Any] | None]:
-        """Return the copies to reset, (num_envs,) of bool, and the other options."""
-        if not isinstance(options, Mapping) or "reset_mask" not in options:
-            return np.ones(self.num_envs, bool), options
-        mask = options["reset_mask"]
-        if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != bool or not mask.any():
-            cure = f"give an array of {self.num_envs} bools, one of them True"
-            raise ScenarioError(f"reset_mask is {shown(mask)}: {cure}")
-        if not self.randoms:
-            raise ScenarioError("reset_mask needs episodes that have begun: call reset without it first")
-        return mask, {name: value for name, value in options.items() if name != "reset_mask"}
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
         """Return one seed for each copy."""

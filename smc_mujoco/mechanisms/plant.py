@@ -16,12 +16,11 @@ from typing import Any, NamedTuple, Protocol
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.catalogue import Catalogue
+from smc_mujoco.common.catalogue import Catalogue, catalogue_of
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, number, unknown, whole
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.common.registry import catalogue_of
 
 DIRECT_TEXT = "smc:direct"  # name of a text in models on whose joints, not bodies, disturbances act
 EFFORT = {"rad": "N m", "m": "N"}  # unit of a force, from that of x

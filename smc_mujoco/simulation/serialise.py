@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from typing import Any
 
+from smc_mujoco.common.catalogue import subclasses
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.fingerprint import arithmetic
-from smc_mujoco.common.registry import subclasses
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control import serialise as components
 from smc_mujoco.control.component import Component

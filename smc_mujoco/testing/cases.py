@@ -11,16 +11,7 @@ EXAMPLE = '@pytest.mark.smc(plants=["duffing"], conditions=["nominal", "noise"])
 
 
 def cases(given: Sequence[object], named: Mapping[str, object], arguments: Collection[str]) -> dict[str, list[str]]:
-    """Return the test's argument, "plant" or "condition" -> the names with which the test runs.
-
-    Args:
-      given, named: the marker's arguments by position and by name. Default: every plant of the study, and the condition
-        nominal.
-      arguments: names of the test's arguments.
-
-    Raises:
-      ScenarioError: an unknown plant or condition, or an argument that the test does not have.
-    """
+    """Return the test's argument, "plant" or "condition" -> the names with which the test runs."""
     if given:
         raise ScenarioError(f"marker smc is given {shown(given[0])}: name its arguments, as in {EXAMPLE}")
     for name in named:

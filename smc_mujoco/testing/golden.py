@@ -31,11 +31,7 @@ def golden_file(test: Path) -> Path:
 
 
 def record(file: Path, key: str, response: StepResponse, rel: float | None, tolerances: Mapping[str, float]) -> None:
-    """Write a response's metrics and their tolerances into the file, under `key`. Arguments are those of `compare`.
-
-    Raises:
-      ScenarioError: the run failed, a tolerance is not a number of at least 0, or the file cannot be written.
-    """
+    """Write a response's metrics and their tolerances into the file, under `key`. Arguments are those of `compare`."""
     _check(response, tolerances)
     names = tolerances if tolerances and rel is None else [name for name in response.values if response.applies(name)]
     entry = {}
@@ -53,20 +49,7 @@ def record(file: Path, key: str, response: StepResponse, rel: float | None, tole
 
 
 def compare(file: Path, key: str, response: StepResponse, rel: float | None, tolerances: Mapping[str, float]) -> None:
-    """Compare a response with the metrics recorded under `key`.
-
-    Args:
-      file: the golden file.
-      key: of the response in the file: the test's name, and a number if the test compares several.
-      response: what `step_response` returned.
-      rel: tolerance as a share of the recorded value; None for the tolerances in the file.
-      tolerances: metric -> tolerance in its unit. If rel is None, only these metrics are compared.
-
-    Raises:
-      AssertionError: nothing was recorded, or a metric is outside its tolerance; the message has a table of all
-        metrics.
-      ScenarioError: the file cannot be read, or a tolerance is not a number of at least 0.
-    """
+    """Compare a response with the metrics recorded under `key`."""
     __tracebackhide__ = True
     _check(response, tolerances)
     if response.failure is not None:
@@ -115,11 +98,7 @@ def _recorded(file: Path, key: str, name: str, known: Mapping[str, Any], what: s
 
 
 def read(file: Path) -> dict[str, dict[str, Any]]:
-    """Return the content of a golden file; {} if there is no file.
-
-    Raises:
-      ScenarioError: it is not a golden file.
-    """
+    """Return the content of a golden file; {} if there is no file."""
     try:
         stored = read_json(file)
         if isinstance(stored, dict) and all(isinstance(entry, dict) for entry in stored.values()):

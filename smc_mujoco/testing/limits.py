@@ -26,13 +26,6 @@ def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
     """Return the Limit of a value that may be up to `limit`, or in the range `limit` = (lowest, highest).
 
     A metric of a limit cycle is NaN in a run without one. `Metric.absent` is then compared with the limit.
-
-    Args:
-      metric: its name, or "GROUP METRIC".
-      value: of the metric, in `unit`.
-
-    Raises:
-      ScenarioError: the limit is neither a number nor a pair.
     """
     compared = CATALOGUE[metric.rpartition(" ")[2]].absent if math.isnan(value) else value
     if not isinstance(limit, tuple | list):
@@ -47,13 +40,7 @@ def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
 
 
 def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:
-    """Raise an AssertionError with a table of all limits if one is violated.
-
-    Args:
-      kind: heading of the limits in the table.
-      word: word between a value and the limit that it violates.
-      note: text in parentheses after the violations.
-    """
+    """Raise an AssertionError with a table of all limits if one is violated."""
     __tracebackhide__ = True
     if missed := [f"{metric} is {value}, {word} {limit}" for metric, value, limit, within in limits if not within]:
         rows = [(*line, "yes" if within else "NO") for *line, within in limits]

@@ -12,13 +12,7 @@ MAX_ID = 150  # characters of a test's id in a file's name: most file systems al
 
 
 def report_of(test: str, responses: Sequence[StepResponse], folder: Path, video: bool) -> str:
-    """Return tables of all responses, and the paths of the files that show them: a figure and a film for each plant.
-
-    Args:
-      test: node id of the test, from which the files' names are made.
-      folder: folder of the files; it is made if it does not exist.
-      video: whether to make films.
-    """
+    """Return tables of all responses, and the paths of the files that show them: a figure and a film for each plant."""
     from smc_mujoco.draw.figure import figure
     from smc_mujoco.draw.film.film import film
 

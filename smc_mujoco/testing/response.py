@@ -159,17 +159,7 @@ def respond(
     condition: str | Condition,
     fields: Mapping[str, object],
 ) -> StepResponse:
-    """Run a law from rest to a step of the reference at t = 0. Rest is at 0, or at `plant.rest` if the plant has it.
-
-    Args:
-      plant, law: as in a Scenario.
-      step: height of the step, rad or m.
-      condition: name of a condition, such as "noise", or your own, see `smc.condition`.
-      fields: Scenario field -> value, which replaces that of the condition; x0 may be among them.
-
-    Raises:
-      ScenarioError: an argument is unknown or out of range.
-    """
+    """Run a law from rest to a step of the reference at t = 0. Rest is at 0, or at `plant.rest` if the plant has it."""
     for name in fields:
         if name not in Scenario.fields():
             raise unknown("field of a Scenario", name, Scenario.fields())

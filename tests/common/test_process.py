@@ -8,9 +8,9 @@ import time
 
 import pytest
 
+from smc_mujoco.common.catalogue import discover, modules, subclasses
 from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.process import TimedOut, timed
-from smc_mujoco.common.registry import discover, modules, subclasses
 
 pytestmark = pytest.mark.quick
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.common.registry import subclasses
+from smc_mujoco.common.catalogue import subclasses
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.simulation import cfunctions, reference, serialise
 from smc_mujoco.simulation.channels import channels, lever

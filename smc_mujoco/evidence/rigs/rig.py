@@ -16,10 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.catalogue import Catalogue
+from smc_mujoco.common.catalogue import Catalogue, catalogue_of
 from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.common.frozen import frozen
-from smc_mujoco.common.registry import catalogue_of
 from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.rigs import inverse, records
 from smc_mujoco.evidence.rigs.records import Columns, Record
