@@ -109,7 +109,7 @@ def reading(path: str | os.PathLike[str], kind: str, cure: str) -> Iterator[Path
     if not isinstance(path, str | os.PathLike):
         raise ScenarioError(f"cannot read {shown(path)}: {cure}")
     try:
-        if (file := Path(path)).exists() and not file.is_file():
+        if (file := Path(path)).exists() and not file.is_file():  # a pipe or a device may never end
             raise ScenarioError("it is not a regular file")
         _bounded(file)
         yield file

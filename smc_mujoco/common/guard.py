@@ -40,7 +40,10 @@ class Failed(Exception):
 
 
 def tried(module: str, order: Mapping[str, Any], timeout: float) -> Any:
-    """Call `attempt(order, say)` of a module in another process, and return its result."""
+    """Call `attempt(order, say)` of a module in another process, and return its result, plain data as the order.
+
+    `say` reports a stage, and Fault in it what is wrong. The timeout is in s.
+    """
     from smc_mujoco.common import files, process
 
     with files.scratch() as folder:
@@ -99,7 +102,7 @@ def computed(numbers: Any) -> tuple[float, ...]:
     The float64 nearest to 1/3 is below it, and that to 1/10 above. No result is subnormal itself, because a thread
     that reads subnormal numbers as 0 would take it for 0.
     """
-    three, ten, tiny, big = numbers[0], numbers[1], numbers[2], numbers[3]
+    three, ten, tiny, big = numbers[0], numbers[1], numbers[2], numbers[3]  # from memory: no compiler knows them
     return 1.0 / three, 1.0 / ten, tiny / ten * big
 
 

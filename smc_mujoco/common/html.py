@@ -74,7 +74,7 @@ def fields(values: Mapping[str, object], caption: object = "", note: object = ""
 
 
 def panel(t: np.ndarray, curves: Sequence[np.ndarray], heading: str, reference: np.ndarray | None = None) -> Html:
-    """Return a panel of curves over time as SVG, with its range at the axes."""
+    """Return a panel of curves, (K,) each, over times t in s as SVG, with its range at the axes; a dashed reference."""
     drawn = [curve for curve in (*curves, *([] if reference is None else [reference])) if np.isfinite(curve).any()]
     if not drawn or len(t) < 2:
         return Html("")

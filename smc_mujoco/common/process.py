@@ -34,8 +34,8 @@ def _kill(process: subprocess.Popen[str]) -> None:
 def timed(
     command: Sequence[str], timeout: float, output: bool = True, cwd: str | os.PathLike[str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command, and stop it and every process that it started when its time is up."""
-    pipe = subprocess.PIPE if output else subprocess.DEVNULL
+    """Run a command, and stop it and every process that it started when its time, s, is up."""
+    pipe = subprocess.PIPE if output else subprocess.DEVNULL  # a user's code may print without end
     with subprocess.Popen(
         command,
         cwd=cwd,

@@ -6,8 +6,12 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
 from smc_mujoco.common.html import in_notebook
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 Report = Callable[[float, float], None]  # called with the work done and the whole work, which may be an estimate
 SPEED_WINDOW = 120.0  # s over which the terminal's bar averages its speed, for the time left: chosen
@@ -15,86 +19,36 @@ DRAWING_PERIOD, LINE_PERIOD = 0.2, 10.0  # s between two drawings of a notebook'
 
 
 class Bar:
-    """A progress bar that draws nothing. `bar` yields one that draws."""
+    """Work that is done, shown by `draw` at most once in a period (s), first after a delay (s)."""
 
-    def advance(self, work: float) -> None:
-        """Add work that is done."""
-
-    def reached(self, done: float, whole: float) -> None:
-        """Set the work done and the whole work, which may change from call to call."""
-
-    def says(self, text: str, work: float = 0.0) -> None:
-        """Change the text beside the bar, and add work that is done."""
-
-
-@contextlib.contextmanager
-def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool = False) -> Iterator[Bar]:
-    """Show a bar while the block lasts. If stderr is no terminal, print a line each ten seconds instead."""
-    if not shown:
-        yield Bar()
-        return
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TaskProgressColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    console = Console(stderr=True)
-    if in_notebook():
-        with contextlib.closing(NotebookBar(what, whole, counted)) as cell:
-            yield cell
-        return
-    if not console.is_terminal:
-        yield LogBar(what, whole, counted)
-        return
-    share = MofNCompleteColumn() if counted else TaskProgressColumn()
-    columns = TextColumn("{task.description}", markup=False), BarColumn(), share, TimeRemainingColumn()
-    with Progress(*columns, transient=True, console=console, speed_estimate_period=SPEED_WINDOW) as progress:
-        task, drawn = progress.add_task(what, total=whole), Bar()
-        drawn.advance = lambda work: progress.advance(task, work)
-        drawn.reached = lambda done, whole: progress.update(task, completed=done, total=whole)
-        drawn.says = lambda text, work=0.0: progress.update(task, description=text, advance=work)
-        yield drawn
-
-
-class LogBar(Bar):
-    """A bar as lines on stderr, the first after LINE_PERIOD."""
-
-    period = LINE_PERIOD
-
-    def __init__(self, what: str, whole: float | None, counted: bool):
-        self.what, self.whole, self.counted = what, whole, counted
+    def __init__(
+        self,
+        what: str = "",
+        whole: float | None = None,
+        counted: bool = False,
+        draw: "Callable[[Bar], None] | None" = None,
+        period: float = 0.0,
+        delay: float = 0.0,
+    ):
+        self.what, self.whole, self.counted, self.draw, self.period = what, whole, counted, draw, period
         self.done, self.start = 0.0, time.monotonic()
-        self.drawn = self.start
+        self.due = self.start + delay  # s, of the next drawing
 
     def advance(self, work: float) -> None:
         """Add work that is done."""
-        self.reached(self.done + work, self.whole or 0.0)
+        self.reached(self.done + work, self.whole)
 
-    def reached(self, done: float, whole: float) -> None:
-        """Set the work done and the whole."""
+    def reached(self, done: float, whole: float | None) -> None:
+        """Set the work done and the whole work, which may change from call to call."""
         self.done, self.whole = done, whole
-        self._draw()
+        if self.draw is not None and (now := time.monotonic()) >= self.due:
+            self.due = now + self.period
+            self.draw(self)
 
     def says(self, text: str, work: float = 0.0) -> None:
         """Change the text beside the bar, and add work that is done."""
         self.what = text
         self.advance(work)
-
-    def _draw(self) -> None:
-        """Show the bar as it is, unless it was shown less than a period ago."""
-        now = time.monotonic()
-        if now - self.drawn >= self.period:
-            self.drawn = now
-            self.show()
-
-    def show(self) -> None:
-        """Print a line."""
-        print(self, file=sys.stderr)
 
     @property
     def share(self) -> float:
@@ -109,28 +63,56 @@ class LogBar(Bar):
         return f"{self.what} {size}" + (f", {left:.0f} s left" if left < math.inf else "")
 
 
-class NotebookBar(LogBar):
-    """A bar in a notebook's cell, which vanishes in the end. It is HTML, because rich warns without ipywidgets."""
+@contextlib.contextmanager
+def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool = False) -> Iterator[Bar]:
+    """Show a bar while the block lasts. If stderr is no terminal, print a line each ten seconds instead.
 
-    period = DRAWING_PERIOD
+    `whole` is None if `reached` sets it; if `counted`, the bar has "3/60" instead of a percentage.
+    """
+    if not shown:
+        yield Bar()
+        return
+    from rich.console import Console
 
-    def __init__(self, what: str, whole: float | None, counted: bool):
-        from IPython.display import HTML, display
+    console = Console(stderr=True)
+    if in_notebook():
+        with _in_cell() as draw:
+            yield Bar(what, whole, counted, draw, DRAWING_PERIOD)
+    elif console.is_terminal:
+        with _on_terminal(what, whole, counted, console) as draw:
+            yield Bar(what, whole, counted, draw)
+    else:
+        yield Bar(what, whole, counted, lambda bar: print(bar, file=sys.stderr), LINE_PERIOD, LINE_PERIOD)
 
-        super().__init__(what, whole, counted)
-        self.drawn, self.html = -math.inf, HTML
-        self.cell = display(HTML(""), display_id=True)
 
-    def close(self) -> None:
-        """Take the bar away."""
-        if self.cell is not None:
-            self.cell.update(self.html(""))
+@contextlib.contextmanager
+def _in_cell() -> Iterator[Callable[[Bar], None]]:
+    """Yield what draws a bar in a notebook's cell, where it vanishes in the end; rich warns without ipywidgets."""
+    from IPython.display import HTML, display
 
-    def show(self) -> None:
-        """Draw the bar."""
-        if self.cell is not None:
-            value = f' value="{self.share:.3f}" max="1"' if self.whole else ""
-            self.cell.update(self.html(f"<progress{value}></progress> {html.escape(str(self))}"))
+    cell: Any = display(HTML(""), display_id=True)
+
+    def draw(bar: Bar) -> None:
+        value = f' value="{bar.share:.3f}" max="1"' if bar.whole else ""
+        cell.update(HTML(f"<progress{value}></progress> {html.escape(str(bar))}"))
+
+    try:
+        yield draw
+    finally:
+        cell.update(HTML(""))
+
+
+@contextlib.contextmanager
+def _on_terminal(what: str, whole: float | None, counted: bool, console: "Console") -> Iterator[Callable[[Bar], None]]:
+    """Yield what draws a bar with rich."""
+    from rich import progress
+
+    share = progress.MofNCompleteColumn() if counted else progress.TaskProgressColumn()
+    text = progress.TextColumn("{task.description}", markup=False)
+    columns = text, progress.BarColumn(), share, progress.TimeRemainingColumn()
+    with progress.Progress(*columns, transient=True, console=console, speed_estimate_period=SPEED_WINDOW) as drawn:
+        task = drawn.add_task(what, total=whole)
+        yield lambda bar: drawn.update(task, completed=bar.done, total=bar.whole, description=bar.what)
 
 
 def summed(report: Report, done: float, whole: float) -> Callable[[float], None]:

@@ -49,7 +49,10 @@ def record(file: Path, key: str, response: StepResponse, rel: float | None, tole
 
 
 def compare(file: Path, key: str, response: StepResponse, rel: float | None, tolerances: Mapping[str, float]) -> None:
-    """Compare a response with the metrics recorded under `key`."""
+    """Compare a response with the metrics recorded under `key`.
+
+    `rel` is a share of the recorded value; None: only `tolerances` in the metrics' units count, or those in the file.
+    """
     __tracebackhide__ = True
     _check(response, tolerances)
     if response.failure is not None:

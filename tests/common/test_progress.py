@@ -87,8 +87,9 @@ def test_a_terminal_s_bar_vanishes_and_takes_the_time_left_from_two_minutes(monk
         assert rich.call_args.kwargs == {"transient": True, "console": console, "speed_estimate_period": 120.0}
         assert console.stderr
     task = (shown := rich.return_value.__enter__.return_value).add_task.return_value
-    asked = call.add_task("runs", total=8.0), call.advance(task, 2.0), call.update(task, completed=3.0, total=9.0)
-    assert shown.mock_calls[-4:] == [*asked, call.update(task, description="more", advance=0.5)]
+    states = (2.0, 8.0, "runs"), (3.0, 9.0, "runs"), (3.5, 9.0, "more")
+    drawn = [call.update(task, completed=done, total=whole, description=what) for done, whole, what in states]
+    assert shown.mock_calls[-4:] == [call.add_task("runs", total=8.0), *drawn]
 
 
 def test_a_terminal_gets_no_html(capsys):
@@ -110,7 +111,7 @@ def test_a_log_gets_a_line_each_ten_seconds(monkeypatch, capsys):
 
 
 def test_the_count_of_a_study_is_that_of_its_bar(monkeypatch, capsys):
-    monkeypatch.setattr(progress.LogBar, "period", 0.0)
+    monkeypatch.setattr(progress, "LINE_PERIOD", 0.0)
     with progress.counter(8, 800, shown=True) as counts:
         counts.stepped(799)
         counts.stepped(1)
@@ -121,7 +122,7 @@ def test_the_count_of_a_study_is_that_of_its_bar(monkeypatch, capsys):
 def test_a_bar_says_its_share_its_count_and_the_time_left(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
-    shared, counted = progress.LogBar("runs", 8.0, False), progress.LogBar("claims", 8.0, True)
+    shared, counted = progress.Bar("runs", 8.0), progress.Bar("claims", 8.0, counted=True)
     assert [str(shared), str(counted)] == ["runs 0 %", "claims 0/8"]
     now[0] = 106.0
     for bar in (shared, counted):
@@ -130,7 +131,7 @@ def test_a_bar_says_its_share_its_count_and_the_time_left(monkeypatch):
     assert [str(shared), str(counted)] == ["more 38 %, 10 s left", "more 3/8, 10 s left"]
     shared.reached(9.0, 4.0)
     assert str(shared) == "more 100 %, 0 s left"
-    assert str(progress.LogBar("looking", None, False)) == "looking"
+    assert str(progress.Bar("looking")) == "looking"
 
 
 def test_a_count_is_of_whole_runs_and_of_runs_a_second(monkeypatch):
