@@ -116,9 +116,6 @@ class Component:
         """Return the same function and gains under another name, to compare two sets of gains of one law.
 
         Tables and figures show the name, and runs under different names are different runs.
-
-        Raises:
-          ScenarioError: not a name of 1 to 100 printable characters.
         """
         errors.name(f"name of the {self.kind}", name)
         template = self.template and dataclasses.replace(self.template, name=name, label="", short="", colour="")
@@ -140,11 +137,7 @@ class Component:
         return self.each or (self,)
 
     def of_channel(self, i: int) -> "Component":
-        """Return the component of channel i, with one number for each gain.
-
-        Raises:
-          ScenarioError: it is a law of many joints.
-        """
+        """Return the component of channel i, with one number for each gain."""
         if self.joint:
             raise ScenarioError(f"law {self.name!r} is of many joints: give a law of one channel")
         if self.uniform:

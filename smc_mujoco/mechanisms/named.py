@@ -25,15 +25,9 @@ def as_plant(value: object) -> Plant:
 
 
 def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
-    """Return a plant by its name, or from FILE.xml:joint,joint, an MJCF model with the joints to control.
+    """Return a plant by its name and parameters, or from FILE.xml:joint,joint in a folder and `plant_from`'s arguments.
 
-    Args:
-      text: a comma or a plus sign is between the joints: plants are separated by commas on the command line.
-      folder: of the model's file.
-      values: parameters of the plant; for a model, arguments of `plant_from`.
-
-    Raises:
-      ScenarioError: an unknown name, a model without joints, or one that cannot be a plant.
+    A comma or a plus sign is between the joints: plants are separated by commas on the command line.
     """
     if not (model := MODEL.fullmatch(text)):
         return plant(text, **values)

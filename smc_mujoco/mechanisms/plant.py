@@ -56,11 +56,11 @@ SEEN = np.dtype([(name, "i8") for name in ("i", "n", "x", "v", "u")])
 
 
 class Native(NamedTuple):
-    """A nominal model as a C function. `kept` holds the objects whose addresses are among its values."""
+    """A nominal model as a C function."""
 
     address: int
     values: tuple[float, ...]
-    kept: tuple
+    kept: tuple  # the objects whose addresses are among the values
 
 
 class Dynamics(NamedTuple):
@@ -212,12 +212,7 @@ class Plant:
         return self.build(self.n)
 
     def load(self, factors: Mapping[str, float] | None = None, nuserdata: int = 0) -> mujoco.MjModel:
-        """Compile the ideal plant.
-
-        Args:
-          factors: parameter name -> factor on its value (the true plant's mismatch).
-          nuserdata: length of mjData.userdata.
-        """
+        """Compile the ideal plant, with factors on its parameters by name, and mjData.userdata of length nuserdata."""
         model = compiled_for_runs(self.spec(), whole("nuserdata", nuserdata, 0, MAX_ITEMS))
         write(model, self.fields(model, self.values(factors or {})))
         mujoco.mj_setConst(model, mujoco.MjData(model))

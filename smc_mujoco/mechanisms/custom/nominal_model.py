@@ -23,6 +23,7 @@ Constraints are left out: contacts, limits, dry friction. A state that is not me
 in another kinematic tree, is taken to be the model's initial one.
 """
 
+import contextlib
 import ctypes
 import dataclasses
 import functools
@@ -73,13 +74,7 @@ class Places(NamedTuple):
     qpos: np.ndarray
     qvel: np.ndarray
     ctrl: np.ndarray
-
-    @property
-    def table(self) -> np.ndarray:
-        """The same as an array of channels, (n,) PLACE."""
-        made = np.full(len(self.qpos), -1, PLACE)
-        made["qpos"], made["qvel"], made["ctrl"][: len(self.ctrl)] = self
-        return made
+    table: np.ndarray  # the same as an array of channels, (n,) PLACE
 
 
 @dataclasses.dataclass(frozen=True)
@@ -96,15 +91,10 @@ class NominalModel:
         """Return f and g of channel i, given the last commands u, (n,), of the others; NaN without a nominal model."""
         if self.why_not:
             return np.nan, np.nan
-        model, places, data, _ = prepared(self, frozen(vars(p)))
-        with _lock:
-            data.qpos[:], data.qvel[:] = model.qpos0, 0.0
-            data.qpos[places.qpos], data.qvel[places.qvel] = x, v
-            data.ctrl[:] = 0.0
-            driven = len(places.ctrl)
+        with self._placed(x, p) as (model, places, data):
+            data.qvel[places.qvel], driven = v, len(places.ctrl)
             data.ctrl[places.ctrl] = 0.0 if u is None else np.asarray(u)[:driven]
             data.ctrl[places.ctrl[i % driven]] = 0.0
-            mujoco.mj_fwdPosition(model, data)
             mujoco.mj_fwdVelocity(model, data)
             mujoco.mj_fwdActuation(model, data)
             mujoco.mj_fwdAcceleration(model, data)
@@ -112,6 +102,16 @@ class NominalModel:
             unit[0, places.qvel[i % driven]] = 1.0
             mujoco.mj_solveM(model, data, moved, unit)
             return float(data.qacc_smooth[places.qvel[i]]), float(moved[0, places.qvel[i]])
+
+    @contextlib.contextmanager
+    def _placed(self, x: np.ndarray, p: Any) -> Iterator[tuple[mujoco.MjModel, Places, mujoco.MjData]]:
+        """Yield the model, its channels' indices and an mjData at rest at positions x, which no other thread has."""
+        model, places, data, _ = prepared(self, frozen(vars(p)))
+        with _lock:
+            data.qpos[:], data.qvel[:], data.ctrl[:] = model.qpos0, 0.0, 0.0
+            data.qpos[places.qpos] = x
+            mujoco.mj_fwdPosition(model, data)
+            yield model, places, data
 
     def native(self, parameters: Mapping[str, float]) -> Native:
         """Return the C function, and the addresses of one simulation's model, data and arrays."""
@@ -127,20 +127,14 @@ class NominalModel:
     def _borrow(self, parameters: Mapping[str, float]) -> "tuple[mujoco.MjModel, Places, BorrowedData]":
         """Return the model, its channels' indices, and an mjData for one simulation."""
         model, places, _, spare = prepared(self, frozen(parameters))
-        try:
-            data = spare.pop()  # used before, but a simulation writes every field before it reads it
-        except IndexError:
-            data = mujoco.MjData(model)
-        return model, places, BorrowedData(data, spare)
+        with contextlib.suppress(IndexError):  # used before, but a simulation writes every field before it reads it
+            return model, places, BorrowedData(spare.pop(), spare)
+        return model, places, BorrowedData(mujoco.MjData(model), spare)
 
     def dynamics(self, x: np.ndarray, v: np.ndarray, p: Any) -> Dynamics:
         """Return M, h and g of all channels, at their x and v, (n,) each."""
-        model, places, data, _ = prepared(self, frozen(vars(p)))
-        dense, forces = np.zeros((model.nv, model.nv)), {}
-        with _lock:
-            data.qpos[:], data.qvel[:], data.ctrl[:] = model.qpos0, 0.0, 0.0
-            data.qpos[places.qpos] = x
-            mujoco.mj_fwdPosition(model, data)
+        with self._placed(x, p) as (model, places, data):
+            dense, forces = np.zeros((model.nv, model.nv)), {}
             mujoco.mj_fullM(model, data, dense)
             for name, velocity in (("g", np.zeros(len(x))), ("h", v)):
                 data.qvel[places.qvel] = velocity
@@ -151,12 +145,8 @@ class NominalModel:
 
     def coriolis(self, x: np.ndarray, v: np.ndarray, w: np.ndarray, p: Any) -> np.ndarray:
         """Return C(x, v) w, (n,), with the C of Christoffel's symbols."""
-        model, places, data, _ = prepared(self, frozen(vars(p)))
         forces = np.zeros(len(x))
-        with _lock:
-            data.qpos[:], data.qvel[:] = model.qpos0, 0.0
-            data.qpos[places.qpos] = x
-            mujoco.mj_fwdPosition(model, data)
+        with self._placed(x, p) as (model, places, data):
             for sign in (1.0, -1.0):
                 data.qvel[places.qvel] = v + sign * w
                 mujoco.mj_fwdVelocity(model, data)
@@ -165,22 +155,13 @@ class NominalModel:
 
     def jacobian(self, x: np.ndarray, p: Any, tip: str) -> np.ndarray:
         """Return how the position of a site, the tip, depends on the channels, (3, n)."""
-        model, places, data, _ = prepared(self, frozen(vars(p)))
-        rows = np.zeros((3, model.nv))
-        with _lock:
-            data.qpos[:] = model.qpos0
-            data.qpos[places.qpos] = x
-            mujoco.mj_fwdPosition(model, data)
+        with self._placed(x, p) as (model, places, data):
+            rows = np.zeros((3, model.nv))
             mujoco.mj_jacSite(model, data, rows, None, model.site(tip).id)
         return rows[:, places.qvel]
 
     def native_dynamics(self, parameters: Mapping[str, float], tip: str, at_rest: bool = True) -> Native:
-        """Return the C function of `dynamics` for one simulation, whose values `coriolis` and `jacobian` use, too.
-
-        Args:
-          tip: the site of `jacobian`; "" for a plant without.
-          at_rest: whether to compute g; False: it is NaN.
-        """
+        """Return the C function of `dynamics` for one simulation; g is NaN unless at_rest. The tip is a site or ""."""
         model, places, borrowed = self._borrow(parameters)
         data = borrowed.data
         data.ctrl[:] = data.qfrc_actuator[:] = 0.0
@@ -220,8 +201,10 @@ def prepared(
     mujoco.mj_resetData(model, data)
     data.warning.number[:] = 1  # MuJoCo tells only the first; telling it inside a control callback would never end
     joints = joint_ids(model)
-    places = Places(model.jnt_qposadr[joints], model.jnt_dofadr[joints], model.actuator_ctrladr[drive_ids(model)])
-    return model, places, data, []
+    columns = model.jnt_qposadr[joints], model.jnt_dofadr[joints], model.actuator_ctrladr[drive_ids(model)]
+    table = np.full(len(joints), -1, PLACE)
+    table["qpos"], table["qvel"], table["ctrl"][: len(columns[2])] = columns
+    return model, Places(*columns, table), data, []
 
 
 @functools.cache
@@ -237,7 +220,7 @@ def unknown() -> Function:
 
 
 def _mujoco(name: str, more: int = 0) -> Callable:
-    """Return a function of MuJoCo's library, for numba. It takes model, data and as many more addresses.
+    """Return a function of MuJoCo's library of model, data and more addresses, for numba.
 
     Compiled code has its name, not its address, so that another process can load the code from the disk.
     """
@@ -253,10 +236,9 @@ def _on_disk(native: Callable) -> Function:
 
 def passive_alone(model: mujoco.MjModel) -> bool:
     """Return whether h is of inertia and passive forces alone: without tendons, and actuators that act at ctrl = 0."""
-    motors = np.all(model.actuator_dyntype == mujoco.mjtDyn.mjDYN_NONE.value) and np.all(
-        model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE.value
-    )
-    return bool(motors and not model.ntendon and not np.any(model.jnt_actgravcomp))
+    moving = model.actuator_dyntype != mujoco.mjtDyn.mjDYN_NONE.value
+    biased = model.actuator_biastype != mujoco.mjtBias.mjBIAS_NONE.value
+    return not (np.any(moving | biased) or model.ntendon or np.any(model.jnt_actgravcomp))
 
 
 @functools.cache
@@ -385,10 +367,7 @@ def native_jacobian() -> Function:
 
 @functools.cache
 def native() -> Function:
-    """Return the C function of the nominal model.
-
-    Its input is a record SEEN, its outputs are f and g of channel i.
-    """
+    """Return the C function of the nominal model. Its input is a record SEEN, its outputs are f and g of channel i."""
     positions, velocities = map(_mujoco, ("mj_fwdPosition", "mj_fwdVelocity"))
     actuation, accelerations, solve = map(_mujoco, ("mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM"), (0, 0, 3))
 

@@ -7,14 +7,10 @@ STEPS_PER_TURN = 12  # of the wire
 
 
 def draw(spec, name, start, end, *, radius, turns, wire, material):
-    """Add a coil spring to spec, as the skin `name`.
+    """Add a coil spring of whole turns to spec, as the skin `name`; radii of coil and wire in m.
 
-    Args:
-      start, end: (body, position of the body, position of the wire's end), metres in the world with every joint at 0. A
-        point at s in [0, 1] between them follows the bodies with weights 1 - s and s, so the coil stretches evenly.
-      radius, wire: radii of the coil and of its wire, m.
-      turns: whole turns of the coil.
-      material: name of its material.
+    start, end: (body, position of the body, position of the wire's end), metres in the world with every joint at 0. A
+    point at s in [0, 1] between them follows the bodies with weights 1 - s and s, so the coil stretches evenly.
     """
     first, last, axis, up = _line(start, end)
     s = np.linspace(0.0, 1.0, turns * STEPS_PER_TURN + 1)
@@ -27,11 +23,7 @@ def draw(spec, name, start, end, *, radius, turns, wire, material):
 
 
 def tube(spec, name, start, end, *, span, radius, material):
-    """Add a round tube to spec, as the skin `name`.
-
-    It covers the part `span`, (from, to) in [0, 1], of the line from start to end, and stretches with the line. The
-    other arguments are as in `draw`.
-    """
+    """Add a round tube to spec, on the part `span`, (from, to) in [0, 1], of the line from start to end; see `draw`."""
     first, last, axis, up = _line(start, end)
     s = np.array([span[0], span[0], span[1], span[1]])
     around = 2 * np.pi * np.arange(SIDES)[:, None] / SIDES

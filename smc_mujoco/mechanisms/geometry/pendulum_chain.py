@@ -87,17 +87,18 @@ def stand(spec, n):
         pos=(0.62 * distance, shown / 2 - 0.74 * distance, 0.62 + 0.26 * distance),
         xyaxes=(0.767, 0.642, 0.0, -0.167, 0.199, 0.966),
     )
-    rods = {"shaft": ((0.0, -PITCH, HEIGHT), (0.0, length + PITCH, HEIGHT), 0.008, "steel")}
+    bar(machine, "shaft", ((0.0, -PITCH, HEIGHT), (0.0, length + PITCH, HEIGHT)), 0.008, "steel")
     for end, y in (("front", -PITCH), ("back", length + PITCH)):
-        rods |= {
-            f"{end}_foot": ((0.0, y, 0.0), (0.0, y, 0.028), 0.15, "graphite"),
-            f"{end}_step": ((0.0, y, 0.028), (0.0, y, 0.040), 0.055, "steel"),
-            f"{end}_post": ((0.0, y, 0.028), (0.0, y, HEIGHT), 0.024, "graphite"),
-            f"{end}_bearing": ((0.0, y - 0.03, HEIGHT), (0.0, y + 0.03, HEIGHT), 0.042, "steel"),
-        }
-    for name, (bottom, top, radius, material) in rods.items():
-        bar(machine, name, (bottom, top), radius, material)
+        post(machine, end, 0.0, y, HEIGHT)
+        bar(machine, f"{end}_bearing", ((0.0, y - 0.03, HEIGHT), (0.0, y + 0.03, HEIGHT)), 0.042, "steel")
     return machine
+
+
+def post(machine, name, x, y, top):
+    """Add a post on a foot at (x, y), up to `top`, m."""
+    bar(machine, f"{name}_foot", ((x, y, 0.0), (x, y, 0.028)), 0.15, "graphite")
+    bar(machine, f"{name}_step", ((x, y, 0.028), (x, y, 0.040)), 0.055, "steel")
+    bar(machine, f"{name}_post", ((x, y, 0.028), (x, y, top)), 0.024, "graphite")
 
 
 def pivot(spec, i):
@@ -109,16 +110,8 @@ def draw_spring(spec, i, start, end, radius, turns):
     """Draw the spring between pendulums i and i + 1, from `start` to `end` in m, unless there are too many."""
     if len(spec.keys[0].qpos) > MAX_DRAWN:
         return
-    coil.draw(
-        spec,
-        f"spring{i}",
-        start=(f"p{i}/pendulum", pivot(spec, i), start),
-        end=(f"p{i + 1}/pendulum", pivot(spec, i + 1), end),
-        radius=radius,
-        turns=turns,
-        wire=0.0045,
-        material="brass",
-    )
+    near, far = (f"p{i}/pendulum", pivot(spec, i), start), (f"p{i + 1}/pendulum", pivot(spec, i + 1), end)
+    coil.draw(spec, f"spring{i}", near, far, radius=radius, turns=turns, wire=0.0045, material="brass")
 
 
 def fields(model, p):
@@ -209,10 +202,7 @@ def stand_row(spec, n, width):
         x = i * ROW_PITCH - width / 2
         bar(machine, f"axle{i}", ((x, -0.03, HEIGHT), (x, BEAM_Y[0], HEIGHT)), 0.010, "steel")
     for side, x in (("left", -end), ("right", end)):
-        y = sum(BEAM_Y) / 2
-        bar(machine, f"{side}_foot", ((x, y, 0), (x, y, 0.028)), 0.15, "graphite")
-        bar(machine, f"{side}_step", ((x, y, 0.028), (x, y, 0.040)), 0.055, "steel")
-        bar(machine, f"{side}_post", ((x, y, 0.028), (x, y, HEIGHT + 0.045)), 0.024, "graphite")
+        post(machine, side, x, sum(BEAM_Y) / 2, HEIGHT + 0.045)
     shown = min(width, 8 * ROW_PITCH)  # as the chain's camera, nine pendulums at most
     spec.stat.center, spec.stat.extent = (0.0, 0.0, HEIGHT), 1.6 + shown
     distance = 2.2 + 0.9 * shown

@@ -68,16 +68,8 @@ def add_springs(spec):
         spring = spec.add_tendon(name=f"{side}_spring", group=5, rgba=(0, 0, 0, 0))
         spring.wrap_site(f"{side}_anchor")
         spring.wrap_site("snap")
-        coil.draw(
-            spec,
-            f"{side}_coil",
-            start=("machine", (0, 0, 0), (0, y, SPRING_Z)),
-            end=("cart", body.pos, (0, 0, SPRING_Z)),
-            radius=0.04,
-            turns=24,
-            wire=0.008,
-            material="brass",
-        )
+        ends = ("machine", (0, 0, 0), (0, y, SPRING_Z)), ("cart", body.pos, (0, 0, SPRING_Z))
+        coil.draw(spec, f"{side}_coil", *ends, radius=0.04, turns=24, wire=0.008, material="brass")
 
 
 def spring_fields(model, p):

@@ -98,12 +98,9 @@ def fields(model, p):
 
 
 def blended(model, links, delta):
-    """Return masses, centres, frames and principal inertias of the links: (7,), (7, 3), (7, 4), (7, 3).
+    """Return masses, centres, frames and principal inertias of the links, (7,), (7, 3), (7, 4), (7, 3).
 
-    Args:
-      model: the compiled model, whose links have the first set.
-      links: ids of their bodies.
-      delta: share of the second set, in 0 .. 1.
+    The compiled model's links, bodies by index, have the first set. delta is the share of the second, in 0 .. 1.
     """
     if not 0.0 <= delta <= 1.0:
         raise ScenarioError(f"panda's delta is {delta:g}: give the share of the second set, 0 to 1")

@@ -31,16 +31,9 @@ def build(n):
 
 def draw_springs(spec, height, radius):
     for name, side in SPRINGS:
-        coil.draw(
-            spec,
-            name,
-            start=("machine", (0, 0, 0), (side * POST_END, 0, height)),
-            end=("cart", (0, 0, cart.RAIL_Z), (side * CART_END, 0, height)),
-            radius=radius,
-            turns=20,
-            wire=0.010,
-            material="brass",
-        )
+        start = "machine", (0, 0, 0), (side * POST_END, 0, height)
+        end = "cart", (0, 0, cart.RAIL_Z), (side * CART_END, 0, height)
+        coil.draw(spec, name, start, end, radius=radius, turns=20, wire=0.010, material="brass")
 
 
 def fields(model, p):
@@ -81,13 +74,8 @@ def add_springs(spec):
         spring.wrap_site(f"{name}_post")
         spring.wrap_site(f"{name}_cart")
     spec.site("far").pos, spec.site("near").pos = (0, ANCHOR_Y, DAMPER_Z), (0, 0, DAMPER_Z - cart.RAIL_Z)
-    motor = spec.add_actuator(
-        name="passive:active_damper",
-        target="slide",
-        trntype=mujoco.mjtTrn.mjTRN_JOINT,
-        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
-        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-    )
+    motor = spec.add_actuator(name="passive:active_damper", target="slide", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    motor.gaintype, motor.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
     motor.gainprm[0] = 0.0  # takes no command
     bar(body, "damper_post", ((0, 0, 0.13), (0, 0, DAMPER_Z - cart.RAIL_Z + 0.03)), 0.022, "steel")
     bar(machine, "damper_foot", ((0, ANCHOR_Y, 0), (0, ANCHOR_Y, 0.028)), 0.13, "graphite")
