@@ -115,15 +115,11 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
     Raises:
       ScenarioError: a law that does not compile, a channel that is not driven, or as Scenario.
     """
-    if isinstance(law, Scenario):
-        if fields:
-            raise ScenarioError(f"a Scenario and {', '.join(fields)}: give one of them")
-        scenario = law
-    elif "plant" not in fields:
+    if isinstance(law, Scenario) and fields:
+        raise ScenarioError(f"a Scenario and {', '.join(fields)}: give one of them")
+    if not isinstance(law, Scenario) and "plant" not in fields:
         raise ScenarioError("chattering lacks plant: give plant=...")
-    else:
-        scenario = Scenario(law=law, **fields)  # type: ignore[arg-type]
-    return predict(scenario, channel)
+    return predict(law if isinstance(law, Scenario) else Scenario(law=law, **fields), channel)  # type: ignore[arg-type]
 
 
 def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chattering:
@@ -192,15 +188,10 @@ def cycles(loop: Loop) -> tuple[list[Balance], list[Balance]]:
     balances: list[Balance] = []
     for cells in _starts(loop):
         one = next((balance for cell in cells if (balance := _balanced(loop, *cell))), None)
-        if one and all(_distance(one, other) > SAME_CYCLE_TOLERANCE for other in balances):
+        if one and all(np.abs(np.log(one) - np.log(other)).max() > SAME_CYCLE_TOLERANCE for other in balances):
             balances.append(one)
     stable = _stable(loop, balances) or _of_two_samples(loop)
     return stable, [one for one in balances if one not in stable]
-
-
-def _distance(one: Balance, other: Balance) -> float:
-    """Return the larger difference of the logs of amplitude and omega."""
-    return max(abs(math.log(a / b)) for a, b in zip(one, other, strict=True))
 
 
 def _starts(loop: Loop) -> Iterator[list[Cell]]:
@@ -231,8 +222,9 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
         cells = cells[_may_balance(at_corners(cells, side), side * step)]
         side //= 2
         cells = (cells[:, None] + side * CORNERS).reshape(-1, 2)
-    winding = np.zeros(CUTS * count)
-    winding[tuple(cells.T)] = _winding(at_corners(cells, 1))
+    winding, around = np.zeros(CUTS * count), at_corners(cells, 1) - 1.0
+    angles = np.angle(np.roll(around, -1, axis=1) * around.conj())
+    winding[tuple(cells.T)] = np.round(angles.sum(axis=1) / math.tau)  # -1, 0 or 1 times around 1
     neighbours, groups = label(winding, np.ones((3, 3)))  # type: ignore[misc]
     for group in range(1, groups + 1):
         cells = np.argwhere(neighbours == group)
@@ -255,12 +247,6 @@ def _may_balance(products: np.ndarray, sides: np.ndarray) -> np.ndarray:
     margins = CELL_MARGIN * np.maximum(np.ptp(phases, axis=1), max(sides[0], COARSE_NOISE))
     lowest, highest = phases.min(axis=1) - margins, phases.max(axis=1) + margins
     return near & (np.ceil(lowest / math.tau) * math.tau <= highest)
-
-
-def _winding(products: np.ndarray) -> np.ndarray:
-    """Return how often polygons wind around 1, (K,): -1, 0 or 1, of their corners (K, 4)."""
-    around = products - 1.0
-    return np.round(np.angle(np.roll(around, -1, axis=1) * around.conj()).sum(axis=1) / math.tau)
 
 
 def _balanced(loop: Loop, low: np.ndarray, high: np.ndarray) -> Balance | None:

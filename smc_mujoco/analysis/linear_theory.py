@@ -112,28 +112,6 @@ def smallest_lam(plant: Plant, k1: float) -> float:
     return max(0.0, -at.damping, stiff)
 
 
-def lam_range(plant: Plant, k1: float, control_period: float) -> tuple[float, float]:
-    """Return the range of lam in which the sampled loop without delay is stable; (inf, inf) if there is none.
-
-    u = -lam (k1, 1) z in `sampled_mode`. Jury's conditions, with t and d the trace and determinant of the closed loop's
-    E, are d > 0, t + d < 0 and 4 + 2 t + d > 0, all affine in lam.
-    """
-    k1, at = number("k1", k1, low=0.0), linear(plant)
-    low, high = 0.0, math.inf
-    for stiffness in at.modes:
-        e, gamma = sampled_mode(at, stiffness, control_period)
-        row = np.array([k1, 1.0])
-        t, d = np.array([np.trace(e), -row @ gamma]), np.array([np.linalg.det(e), -row @ _adjugate(e) @ gamma])
-        for a, b in (d, -t - d, np.array([4.0, 0.0]) + 2.0 * t + d):
-            if b > 0.0:
-                low = max(low, -a / b)
-            elif b < 0.0:
-                high = min(high, -a / b)
-            elif a <= 0.0:
-                return math.inf, math.inf
-    return (float(low), float(high)) if low < high else (math.inf, math.inf)
-
-
 def critical_delay(plant: Plant, lam: float, k1: float, control_period: float) -> float:
     """Return the input delay in s up to which (1) is stable: 0 if it is unstable without delay, inf if it never is.
 
@@ -145,15 +123,18 @@ def critical_delay(plant: Plant, lam: float, k1: float, control_period: float) -
     """
     lam, k1 = number("lam", lam, low=0.0), number("k1", k1, low=0.0)
     at, h = linear(plant), number("control_period", control_period, above=0.0)
-    low, high = lam_range(plant, k1, h)
-    return min(_crossing(at, stiffness, lam, k1, h) for stiffness in at.modes) if low < lam < high else 0.0
+    return min(_crossing(at, stiffness, lam, k1, h) for stiffness in at.modes) if lam else 0.0
 
 
 def _crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> float:
     """Return the delay at which a sampled mode first becomes unstable, s."""
     e, gamma = sampled_mode(at, stiffness, h)
     t, d, row = np.trace(e), np.linalg.det(e), lam * np.array([k1, 1.0])
-    n1, n0 = row @ gamma, -row @ _adjugate(e) @ gamma  # adj(w - E) = w - adj(E)
+    adjugate = np.array([[e[1, 1], -e[0, 1]], [-e[1, 0], e[0, 0]]])
+    n1, n0 = row @ gamma, -row @ adjugate @ gamma  # adj(w - E) = w - adj(E)
+    trace, determinant = t - n1, d + n0  # of the change of the loop without delay over a sample: Jury's conditions
+    if min(determinant, -trace - determinant, 4.0 + 2.0 * trace + determinant) <= 0.0:
+        return 0.0
     periods = [1.0] if n0 - 2.0 * n1 >= 4.0 + 2.0 * t + d else [math.inf]
     # |w^2 - t w + d|^2 = |n1 w + n0|^2 where |w|^2 = 2 y and w + conj(w) = -2 y
     equation = 4.0 * (1.0 + t + d), 2.0 * (t * t + t * d - 2.0 * d - n1 * n1 + n1 * n0), d * d - n0 * n0
@@ -163,10 +144,6 @@ def _crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> 
             turned = np.angle(-(n1 * w + n0) / (w * w - t * w + d)) % math.tau
             periods.append(turned / (2.0 * math.asin(math.sqrt(y / 2.0))))
     return float(h * min(periods))
-
-
-def _adjugate(m: np.ndarray) -> np.ndarray:
-    return np.array([[m[1, 1], -m[0, 1]], [-m[1, 0], m[0, 0]]])
 
 
 # at rest

@@ -11,7 +11,7 @@ import numpy as np
 
 from smc_mujoco.analysis.ranking import first_of_kind
 from smc_mujoco.analysis.relevant_difference import without_rounding
-from smc_mujoco.common.errors import ScenarioError, items_of, one_line, shown, unknown
+from smc_mujoco.common.errors import ScenarioError, items_of, one_line, unknown
 from smc_mujoco.common.text import counted
 from smc_mujoco.control.source import Source, restore
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
@@ -157,27 +157,11 @@ def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarr
         sets.append(known_gains.setdefault(json.dumps({name: of_law[name] for name in GAIN_ENTRIES}), len(known_gains)))
         conditions["plant"].get("mjcf", {}).pop("path", None)  # models are identified by their contents
         first_law, expected = first.setdefault(cell, (law, conditions))
-        if conditions != expected and (difference := _difference(expected, conditions)):
-            what, one, two = difference
-            differs = f"{what} is {shown(one)} under {first_law} and {shown(two)} under {law}"
+        if differing := [name for name in expected if expected[name] != conditions.get(name, expected[name])]:
+            what = f"{', '.join(differing)} of {first_law} and {law} differ"
             where = f"{cell[0]}, {cell[1]}, seed {cell[2]}"
-            raise ScenarioError(f"runs of {where} are not alike: {differs}: give runs that differ only in the law")
+            raise ScenarioError(f"runs of {where} are not alike: {what}: give runs that differ only in the law")
     return np.array(sets, np.int64)
-
-
-def _difference(one: Mapping[Any, Any], two: Mapping[Any, Any]) -> tuple[str, Any, Any] | None:
-    """Return the first entry in which two descriptions differ, with its values; None if common entries are equal."""
-    for name in (key for key in one if key in two):
-        a, b = one[name], two[name]
-        if isinstance(a, list) and isinstance(b, list) and a and isinstance(a[0], dict) and len(a) == len(b):
-            a, b = dict(enumerate(a)), dict(enumerate(b))
-        if not (isinstance(a, dict) and isinstance(b, dict)):
-            if a != b:
-                return str(name), a, b
-        elif difference := _difference(a, b):
-            inner = isinstance(name, int) or name == "values"  # these are not names that users know
-            return difference if inner else (f"{name}'s {difference[0]}", *difference[1:])
-    return None
 
 
 def _outcomes(table: Columns) -> np.ndarray:

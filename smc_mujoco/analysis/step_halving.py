@@ -34,11 +34,6 @@ class StepChange:
         """Whether the amplitude or the frequency changes by more than 10 %."""
         return max(self.amplitude, self.frequency) > TOLERANCE
 
-    @property
-    def mark(self) -> str:
-        """What stands behind the run's numbers of chattering in a table: "*" or nothing."""
-        return MARK if self.marked else ""
-
 
 def depends_on_step(scenario: Scenario) -> bool:
     """Return whether chattering may depend on the physics step: whether the integrator is not RK4."""

@@ -11,7 +11,7 @@ from rich import box
 from rich.table import Column, Table
 from rich.text import Text
 
-from smc_mujoco.analysis.step_halving import NOTE
+from smc_mujoco.analysis.step_halving import MARK, NOTE
 from smc_mujoco.common.text import number
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw import style
@@ -184,7 +184,7 @@ def _label(label: str, trace: Trace) -> Text:
 
 def trace_summary(trace: Trace, change: StepChange | None = None) -> list[Table]:
     """Return a table for each group of channels: every metric of one trace, with its unit and its meaning."""
-    mark = change.mark if change else ""
+    mark = MARK if change and change.marked else ""
     values, tables = metric_scores(trace), []
     for group, heading in headings(trace.scenario).items():
         value = Column("value", justify="right")
@@ -258,8 +258,8 @@ def chattering(
     table = titled(f"chattering of {plant.name}: predicted, and measured in runs", "law", *numbers)
     for scenario, cycle, (amplitude, frequency), change in zip(scenarios, cycles, measured, changes, strict=True):
         law = Text(scenario.law.name, style=style.law_colour(scenario.law.name))
-        sizes = number(cycle.amplitude), number(amplitude) + change.mark
-        rates = number(cycle.frequency), number(frequency) + change.mark
+        sizes = number(cycle.amplitude), number(amplitude) + MARK * change.marked
+        rates = number(cycle.frequency), number(frequency) + MARK * change.marked
         share = cycle.coupling if plant.driven > 1 else cycle.third_harmonic
         table.add_row(law, *sizes, *rates, _share(cycle.uncertainty), _share(share))
     if any(change.marked for change in changes):

@@ -339,7 +339,7 @@ def test_a_file_of_predictions_has_what_was_predicted_and_measured(tmp_path, sna
     changes = StepChange(0.02, 0.2), StepChange(0.0, math.inf)
     path = save([run, run], [sure, possible], [(0.4, 19.0), (math.nan, math.nan)], changes, tmp_path / "a.json")
     said = [json.dumps(one) for one in json.loads(path.read_text())]
-    assert [*said, bool(sure), bool(possible), *(one.mark for one in changes)] == snapshot
+    assert [*said, bool(sure), bool(possible), *(one.marked for one in changes)] == snapshot
 
 
 class Formula:

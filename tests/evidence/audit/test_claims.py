@@ -11,7 +11,7 @@ import typer
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.linear_theory import lam_range
+from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.audit import audit
 from smc_mujoco.evidence.audit import runs as claim_runs
@@ -387,8 +387,9 @@ def about(plants, **options):
 def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory():
     runs = about(("inverted_pendulum", "duffing"))
     for name, found in measured.smallest_stable(runs).items():
-        theory, _ = lam_range(find_plant(name), runs.law(name, OURS).gains["k1"], measured.LONG_PERIOD)
-        assert theory <= found <= 1.02 * theory, name
+        loop = runs.law(name, OURS).gains["k1"], measured.LONG_PERIOD
+        assert critical_delay(find_plant(name), found, *loop) > 0.0, name
+        assert critical_delay(find_plant(name), found / 1.02, *loop) == 0.0, name
 
 
 @pytest.mark.slow
