@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis import gains_for, relevant_difference, step_halving
+from smc_mujoco.analysis import gains_for, ranking, step_halving
 from smc_mujoco.analysis import region_of_attraction as region
 from smc_mujoco.analysis.tuning import objective, result, search, search_space
 from smc_mujoco.analysis.worst_case import search as attack
@@ -102,8 +102,8 @@ SAID = {
     scaling: [f"by more than a factor of {scaling.TREND:g} from each"],
     scaling.Scaling: [f"its {percent(scaling.CONFIDENCE)} interval"],
     scaling.Scaling.as_promised: [f"within {scaling.ORDER_BAND:g} of theory's"],
-    relevant_difference: [f"more than {percent(relevant_difference.RELEVANT)} of the larger value"],
-    relevant_difference.without_rounding: [f"0 below {short(relevant_difference.ROUNDING)}"],
+    ranking: [f"where {percent(ranking.RELEVANT)} of a value is less than what matters"],
+    ranking.without_rounding: [f"0 below {short(ranking.ROUNDING)}"],
     attack: [f"at most {attack.MAX_CORNERS}, each"],
     uncertainty.default_class: [
         f"up to a {part(uncertainty.DEFAULT_FORCE_SHARE)} of the force",

@@ -25,8 +25,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common.errors import number, whole
-
 LEVEL = 0.95  # of confidence, of every interval and verdict; chosen
 RESAMPLES = 1999  # chosen, so that one more is a multiple of 1000 and percentiles are whole numbers of resamples
 MIN_INTERVAL_SAMPLES = 6  # with fewer no interval of a median covers 95 %: it is their range
@@ -80,8 +78,6 @@ def share_interval(share: float, n: int) -> Interval:
     interval is as wide as that of n independent runs, however many runs a seed has and however alike they are. Its
     coverage is 95 % as a mean over all shares, and for some near 0 and 1 only 83 %, with 6 seeds as with 40.
     """
-    number("share", share, low=0.0, high=1.0)
-    whole("n", n, 1, 10**9)
     z = NormalDist().inv_cdf((1 + LEVEL) / 2)
     centre, half = share + z * z / (2 * n), z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
     low, high = ((centre + side * half) / (1 + z * z / n) for side in (-1, 1))

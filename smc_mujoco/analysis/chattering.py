@@ -1,9 +1,5 @@
 """Chattering, predicted before it is run: the limit cycle of a scenario by harmonic balance.
 
-    cycle = smc.chattering(scenario)
-    cycle = smc.chattering("super_twisting", plant="duffing", actuator=smc.Lag(0.01))
-    cycle.amplitude, cycle.frequency          # of s, in its unit, and Hz; NaN where no limit cycle is predicted
-
 A limit cycle e = a sin(omega t) solves N(a, omega) L(j omega) = 1. N is the first harmonic of what the law returns, and
 L the answer of the linearised mechanism (`harmonics`), without any integrator's error. Then the equation is solved
 again with the other harmonics of e, which follow from those of u. The solution is exact if the cycle is not locked to
@@ -124,7 +120,7 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
 
 def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chattering:
     """Return what `chattering` returns for a scenario; without the ranges of a predicted cycle it is faster."""
-    if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < scenario.plant.driven:
+    if channel not in range(scenario.plant.driven):
         raise ScenarioError(f"channel is {shown(channel)}: give 0 to {scenario.plant.driven - 1}")
     loop = Loop(scenario, channel)
     stable, unstable = cycles(loop)
@@ -158,9 +154,7 @@ def _threshold(loop: Loop, one: Balance, unstable: Sequence[Balance]) -> float:
 def switches(loop: Loop) -> bool:
     """Return whether a law switches: whether its gain grows without bound towards small amplitudes."""
     omega = 0.1 * math.pi / loop.scenario.control_period
-    small, smaller = (
-        abs(loop.gain(amplitude, omega, COARSE_SAMPLES)) for amplitude in (1e3 * MIN_AMPLITUDE, MIN_AMPLITUDE)
-    )
+    smaller, small = (abs(loop.gain(size * MIN_AMPLITUDE, omega, COARSE_SAMPLES)) for size in (1.0, 1e3))
     return smaller > MIN_GAIN_GROWTH * small
 
 
@@ -338,7 +332,6 @@ def _stable(loop: Loop, balances: Sequence[Balance]) -> list[Balance]:
 
 
 def _decays(loop: Loop, amplitude: float, omega: float) -> bool:
-    """Return whether an oscillation that is a little larger than the cycle decays."""
 
     def product(a: float, w: float) -> complex:
         return cmath.log(loop.gain(a, w) * loop.response(w) or SMALLEST)

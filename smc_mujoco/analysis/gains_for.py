@@ -1,8 +1,5 @@
 """Gains from a wanted amplitude: the largest gains whose chattering stays below it, at the upper end of its range.
 
-    design = smc.gains_for("super_twisting", "duffing", amplitude=1e-3, actuator=smc.Lag(0.01))
-    design.law, design.chattering.frequency, design.disturbance
-
 All gains of a law follow from two numbers, its size q and its speed w. For the same mass, positions become q times as
 large, times 1/w as large, and forces q w^2 times as large. A gain with the unit F^a X^b T^c is multiplied by
 
@@ -162,7 +159,6 @@ def _best_speed(
 
 
 def _scaled(law: Component, size: float, speed: float) -> Component:
-    """Return the law with its size and its speed multiplied. Gains that tuning does not search stay."""
     scales = {"F": size * speed**2, "X": size, "T": 1.0 / speed}
     gains = {name: gain * search_space.unit_size(law, name, scales) for name, gain in law.gains.items()}
     return dataclasses.replace(law, gains=gains)

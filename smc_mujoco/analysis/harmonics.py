@@ -1,10 +1,5 @@
 """Harmonic balance: what a compiled law returns for a sinusoidal error, and how the mechanism answers a sinusoidal u.
 
-    loop = Loop(scenario, channel=0)
-    loop.response(omega)                  # x of the channel per unit of u: complex, rad or m
-    wave = loop.wave(0.01, omega)         # what the law returns for e = 0.01 sin(omega t)
-    wave.gain                             # complex, unit of u per rad or m
-
 The response is that of MuJoCo's model, linearised about rest by finite differences, with drives, back-EMF, springs and
 joints without an actuator. The gain is that of the compiled law, with its estimator and its surface, at its control
 period, under an excitation: an error that oscillates for some periods. There is no approximation but that this error is
@@ -196,7 +191,6 @@ class Loop:
         return scale * min(*shifts, 0.0), scale * max(*shifts, 0.0)
 
     def _gain_of(self, first: complex, amplitude: float, omega: float) -> complex:
-        """Return the gain for a first harmonic of u."""
         two_samples = math.isclose(self.scenario.control_period * omega, math.pi, rel_tol=1e-9)
         images = 2.0 if two_samples else 1.0  # with two samples a period a wave and its image are the same
         return first / (1j * amplitude * images) * play(amplitude, self.gap)
@@ -419,7 +413,6 @@ def play(amplitude: float, gap: float) -> complex:
 
 
 def _play_at(c: float) -> complex:
-    """Return the describing function of play for the angle c at which the rotor hits the other flank."""
     impulse = 1.0 - math.cos(c)
     sine = 0.5 * (math.pi - c) + 0.25 * math.sin(2.0 * c) + impulse * math.sin(c)
     cosine = -0.5 * math.sin(c) ** 2 + impulse * math.cos(c)
@@ -427,7 +420,6 @@ def _play_at(c: float) -> complex:
 
 
 def _harmonic(values: np.ndarray, angles: np.ndarray) -> complex:
-    """Return the complex amplitude of sin(angle) in samples."""
     return _first(values, np.exp(-1j * angles))
 
 

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from smc_mujoco.analysis.ranking import first_of_kind
-from smc_mujoco.analysis.relevant_difference import without_rounding
+from smc_mujoco.analysis.ranking import first_of_kind, without_rounding
 from smc_mujoco.common.errors import ScenarioError, items_of, one_line, unknown
 from smc_mujoco.common.text import counted
 from smc_mujoco.control.source import Source, restore

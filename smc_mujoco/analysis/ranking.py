@@ -1,8 +1,7 @@
 """Comparison of laws on the runs that they share: which law is better in which block, and places over all blocks.
 
-Blocks are fixed, samples are as in `bootstrap`. inf is the worst value, equal to itself. For two laws, runs that are
-linked by a shared set of gains of either law are one sample, whose difference is the median of theirs. A run that
-repeats the results of both laws is not counted.
+Blocks and samples are as in `bootstrap`. For two laws, runs that are linked by a shared set of gains of either law are
+one sample, whose difference is the median of theirs. A run that repeats the results of both laws is not counted.
 
 The test. The difference of two laws in a sample is the logarithm of the ratio of their values. For shares, and where
 3 % of a value is less than what matters (see `paired_runs.floor`), it is the difference of the values. A law is better
@@ -28,9 +27,8 @@ boards. Both are corrected by S. Holm's method (Scandinavian Journal of Statisti
   another is at most 5 %, in addition to that of a wrong winner.
 
 A block without a test has one value of each law, which is no sample. There a law is better if its value is lower by
-more than the least relevant difference. The block belongs to neither family.
-
-A law with a run that failed, or has no value, wins nothing. In every order the laws with fewer such runs come first.
+more than the least relevant difference. The block belongs to neither family. A law with a run that failed, or has no
+value, wins nothing. In every order the laws with fewer such runs come first.
 
 A law is among the best if no other is better. One exception: where another law's median is relevantly lower, and two
 laws have too few samples for any verdict, the law is undecided, and not among the best.
@@ -46,10 +44,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from smc_mujoco.analysis.bootstrap import LEVEL, middle
-from smc_mujoco.analysis.relevant_difference import RELEVANT, ROUNDING, checked_share, least_difference
-from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.errors import number
 
 MAX_EXACT = 60  # samples; with more the normal approximation of the rank sum is used
+RELEVANT = 0.03  # default share of the larger value that is relevant; chosen
+ROUNDING = 1e-9  # in SI units: smaller differences are a tie, because they depend on how runs are integrated
 
 
 class Rank(NamedTuple):
@@ -209,7 +208,8 @@ def compare(
     seeds gave the same result, or had the same gains; default: all results differ, and all gains are the same. Limits
     are given where the blocks belong to a larger family.
     """
-    laws, cells = _cells(scores)
+    laws = tuple(sorted(scores))
+    cells = _stacked(scores, laws).astype(float)
     blocks, relevant = range(cells.shape[1]), checked_share(relevant)
     floors = np.broadcast_to(np.asarray(floors, float), len(blocks))
     untested = np.broadcast_to(np.asarray(untested, bool), len(blocks))
@@ -246,7 +246,6 @@ def compare(
 
 
 def _stacked(by_law: Mapping[str, ArrayLike], laws: Sequence[str]) -> np.ndarray:
-    """Return the numbers of all laws, (laws, blocks, seeds)."""
     return np.array([np.atleast_2d(by_law[law]) for law in laws])
 
 
@@ -264,26 +263,11 @@ def _differences(cells: np.ndarray, relative: np.ndarray, results: np.ndarray | 
     return differences
 
 
-def _cells(scores: Mapping[str, ArrayLike]) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return the laws by name and their scores, (laws, blocks, seeds). Raise ScenarioError if their cells differ."""
-    laws = tuple(sorted(scores))
-    each = [np.atleast_2d(np.asarray(scores[law], float)) for law in laws]
-    if not each or not each[0].size or len({one.shape for one in each}) > 1:
-        raise ScenarioError(f"scores of {shown(laws)} are not of the same cells: give each law (blocks, seeds)")
-    cells = np.stack(each)
-    missing = np.isnan(cells)
-    if (missing != missing[0]).any() or missing[0].all(axis=0).any() or missing[0].all(axis=1).any():
-        raise ScenarioError(f"scores of {shown(laws)} lack different cells, or a seed: give nan to all laws")
-    return laws, cells
-
-
 def _centres_of(cells: np.ndarray, shares: bool) -> np.ndarray:
-    """Return the medians, or means of shares, over the seeds, (laws, blocks)."""
     return np.nanmean(cells, axis=2) if shares else middle(cells)
 
 
 def _shifts(centres: np.ndarray, floors: np.ndarray, relative: np.ndarray, relevant: float, shares: bool) -> np.ndarray:
-    """Return the least relevant difference of every law from every rival, (blocks, laws, laws)."""
     if shares:
         return np.full(relative.shape, relevant)
     absolute = least_difference(centres.T[:, None, :], floors[:, None, None], relevant)
@@ -387,6 +371,36 @@ def ranked(centres: np.ndarray, floors: np.ndarray, lacking: ArrayLike = 0, rele
     behind = lacking[:, None] > lacking[None]
     behind |= (lacking[:, None] == lacking[None]) & (lowered[:, None] > centres[None])
     return (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
+
+
+# relevant differences
+
+
+def least_difference(value: ArrayLike, resolution: ArrayLike = 0.0, relevant: float = RELEVANT) -> np.ndarray:
+    """Return the least relevant difference between a value >= 0 and a smaller one.
+
+    It is the larger of a share of the value and the resolution, see `paired_runs.floor`. Any difference from inf is
+    relevant.
+    """
+    share = relevant * np.where(np.isinf(value), 0.0, np.abs(value))
+    return np.maximum(share, np.maximum(resolution, ROUNDING))
+
+
+def exceeds(a: ArrayLike, b: ArrayLike, resolution: ArrayLike = 0.0, relevant: float = RELEVANT) -> np.ndarray:
+    """Return whether a is larger than b by more than the least relevant difference; a, b >= 0."""
+    return np.asarray(a) - least_difference(a, resolution, relevant) > np.asarray(b)
+
+
+def checked_share(relevant: float) -> float:
+    """Return the share of a value that is relevant. Raise ScenarioError if it is out of range."""
+    return number("relevant", relevant, low=0.0, high=0.5)
+
+
+def without_rounding(values: np.ndarray) -> np.ndarray:
+    """Round values so that rounding errors vanish: 0 below 1e-9, else 20 binary digits."""
+    share, exponent = np.frexp(np.where(np.abs(values) < ROUNDING, 0.0, values))
+    with np.errstate(over="ignore"):
+        return np.ldexp(np.round(share * 2**20), exponent - 20)
 
 
 # the signed-rank test

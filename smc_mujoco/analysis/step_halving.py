@@ -59,7 +59,6 @@ def step_halving(traces: Sequence[Trace], channel: int | None = None, threads: i
 
 
 def _change(whole: float, half: float) -> float:
-    """Return the relative change from the whole to the half step."""
     if math.isnan(whole) or math.isnan(half):
         return 0.0 if math.isnan(whole) and math.isnan(half) else math.inf
     return abs(half / whole - 1.0)

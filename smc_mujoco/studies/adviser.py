@@ -39,8 +39,7 @@ import numpy as np
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.paired_runs import SETTLES, Scores
-from smc_mujoco.analysis.ranking import Comparison, Rank, compare, ranked, ranks
-from smc_mujoco.analysis.relevant_difference import RELEVANT, checked_share
+from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Rank, checked_share, compare, ranked, ranks
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, default_class
 from smc_mujoco.common.errors import ScenarioError, number, unknown, whole
 from smc_mujoco.control import gain_sets, source

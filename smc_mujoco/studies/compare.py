@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from smc_mujoco.analysis.paired_runs import SETTLES
-from smc_mujoco.analysis.relevant_difference import RELEVANT, checked_share
+from smc_mujoco.analysis.ranking import RELEVANT, checked_share
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown, whole
 from smc_mujoco.common.errors import number as checked

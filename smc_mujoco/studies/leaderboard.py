@@ -22,8 +22,7 @@ import numpy as np
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import Interval, median_of, share_interval
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns, Group, Scores
-from smc_mujoco.analysis.ranking import Comparison, Limits, compare, corrected_limits, linked, ranks
-from smc_mujoco.analysis.relevant_difference import RELEVANT
+from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Limits, compare, corrected_limits, linked, ranks
 from smc_mujoco.analysis.step_halving import depends_on_step
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.control.source import DEFAULT, Source

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from smc_mujoco.analysis.paired_runs import floor
-from smc_mujoco.analysis.relevant_difference import exceeds
+from smc_mujoco.analysis.ranking import exceeds
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.text import every, joined, number
 from smc_mujoco.metrics.catalogue import CATALOGUE, scores, settling_time

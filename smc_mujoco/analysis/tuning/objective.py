@@ -11,11 +11,8 @@ The conditions are those in which laws are ranked: nominal, noise, delay, a sine
 less and 30 % more mass. Their runs have seeds, noise and initial states (`initial_states`) that no grid uses, so no law
 is judged on runs that it was tuned on.
 
-With a bound on predicted chattering, gains beyond it cost as much as if all runs had failed, and more the further they
-are beyond it.
-
 A failed run has no ITAE. It costs FAILURE_COST (2 - t / duration), with t the time of the failure. This is more than
-any other run costs, and decreases with t.
+any other run costs, and decreases with t. With a bound on predicted chattering, gains beyond it cost more than that.
 """
 
 import dataclasses
@@ -61,8 +58,6 @@ class Objective:
         if not 0 < len(conditions) <= SEEDS_PER_TUNING:
             raise ScenarioError(f"conditions is {shown(self.conditions)}: give names, such as ('nominal', 'noise')")
         object.__setattr__(self, "conditions", tuple(map(find_condition, conditions)))
-        if not isinstance(self.starts, Starts):
-            raise ScenarioError(f"starts is {shown(self.starts)}: give smc.starts(...)")
         number("weight", self.weight, low=0.0)
         for name in ("duration", "control_period", "u_max", "chattering"):
             if getattr(self, name) is not None:

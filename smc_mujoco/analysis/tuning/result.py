@@ -208,7 +208,6 @@ def load(path: str | os.PathLike[str]) -> Tuned:
 
 
 def _short(value: float) -> float:
-    """Return a number with six digits."""
     return float(f"{value:.6g}")
 
 

@@ -151,7 +151,6 @@ def tune(
 
 
 def _result(ledger: "_Ledger", **fields: Any) -> Tuned:
-    """Return the result of a search whose evaluations are in the ledger, with its other fields."""
     best, case = min(ledger.evaluations, key=lambda e: e.objective), ledger.cases[0]
     return Tuned(
         law=_with_gains(case.law, ledger.names, best.gains),
@@ -168,7 +167,6 @@ def _result(ledger: "_Ledger", **fields: Any) -> Tuned:
 
 
 def _warn_of_result(tuned: Tuned, chatters: bool) -> None:
-    """Warn if a search ends with gains that are worse than the law's own, or chatter more than is wanted."""
     tried = f"tried for {tuned.law.name} on {tuned.plant.name}"
     if tuned.objective > tuned.before:
         values = f"an objective of {tuned.objective:.3g} s² instead of {tuned.before:.3g} s²"
@@ -193,7 +191,6 @@ def _warn(words: str) -> None:
 
 
 def _without_unit_warning(law: Component) -> str:
-    """Return the warning of a law with gains of unknown unit, which are searched about their defaults."""
     names = list(search_space.without_unit(law))
     have, whose = ("have", "their defaults") if len(names) > 1 else ("has", "its default")
     search = f"no unit, and so a search about {whose} in place of the rule of all laws"
@@ -214,7 +211,6 @@ class _Ledger:
     screened: int = 0
     evaluations: list[Evaluation] = dataclasses.field(default_factory=list)
     objectives: dict[tuple[float, ...], float] = dataclasses.field(default_factory=dict)
-    excesses: dict[tuple[float, ...], float] = dataclasses.field(default_factory=dict)
 
     @property
     def left(self) -> int:
@@ -250,18 +246,17 @@ class _Ledger:
         size = len(cases)
         laws = [_with_gains(cases[0].law, self.names, gains) for gains in candidates]
         traces = run([dataclasses.replace(case, law=law) for law in laws for case in cases], self.threads)
-        terms = [self.goal.terms(traces[i : i + size]) for i in range(0, len(traces), size)]
-        return [
-            Evaluation(gains, tracking + self.goal.weight * variation + self.excess(gains), tracking, variation)
-            for gains, (tracking, variation) in zip(candidates, terms, strict=True)
-        ]
+        made = []
+        for k, gains in enumerate(candidates):
+            tracking, variation = self.goal.terms(traces[k * size : (k + 1) * size])
+            cost = tracking + self.goal.weight * variation + self.excess(gains)
+            made.append(Evaluation(gains, cost, tracking, variation))
+        return made
 
     def excess(self, gains: tuple[float, ...]) -> float:
-        """Return what a candidate's predicted chattering costs, s^2. Each candidate is predicted once."""
-        if gains not in self.excesses:
-            law = _with_gains(self.cases[0].law, self.names, gains)
-            self.excesses[gains] = self.goal.excess(dataclasses.replace(self.cases[0], law=law))
-        return self.excesses[gains]
+        """Return what a candidate's predicted chattering costs, s^2."""
+        law = _with_gains(self.cases[0].law, self.names, gains)
+        return self.goal.excess(dataclasses.replace(self.cases[0], law=law))
 
 
 def _rounded(gain: float) -> float:
@@ -269,7 +264,6 @@ def _rounded(gain: float) -> float:
 
 
 def _under_euler(case: Scenario) -> Scenario:
-    """Return the case under Euler's method, if its own is RK4."""
     return dataclasses.replace(case, integrator="Euler") if case.resolved.integrator == "RK4" else case
 
 

@@ -20,9 +20,8 @@ decades about its default:
 
     @smc.law_function(gains={"lam": Gain(6.0, FORCE), "k1": Gain(2.5, RATE), "order": Gain(2.0, held=True)})
 
-With these units a law behaves the same in every system of units (tests/analysis/tuning/test_search_space.py). Some laws
-contain a number with a unit, such as the width 1 of tanh(s): their gains have the units that leave this number
-unchanged. A law without the model takes g as 1, so it treats forces and accelerations in the same way.
+Some laws contain a number with a unit, such as the width 1 of tanh(s): their gains have the units that leave this
+number unchanged. A law without the model takes g as 1, so it treats forces and accelerations in the same way.
 """
 
 import dataclasses

@@ -151,7 +151,6 @@ class Search:
             yield [Case(member, relay, worst.origin) for relay in relays]
 
     def _relayed(self, kind: str, sign: float = 1.0, **weights: float) -> Case:
-        """Return a member under a relay with these weights of what it sees."""
         relay = Relay(sign * self.members.within.disturbance, **weights, slope=self.members.slope)
         return Case(self.members.bare.named(kind), relay)
 
@@ -210,7 +209,6 @@ class Search:
             yield from self._evolution(rng)
 
     def _changes(self, rng: np.random.Generator) -> list[Case]:
-        """Return changes of the worst members, one for each origin."""
         best: dict[int, Tried] = {}
         for one in sorted(self.tried, key=lambda one: one.key, reverse=True):
             best.setdefault(one.origin, one)

@@ -156,7 +156,6 @@ def outside(scenario: Scenario, within: Uncertainty) -> str:
 
 
 def _range(name: str, value: object, lower_bound: float, strict: bool = False) -> Range:
-    """Return lowest and highest value, from a pair."""
     if not isinstance(value, tuple | list) or len(value) != 2:
         raise ScenarioError(f"Uncertainty's {name} is {shown(value)}: give the lowest and the highest, as (0.7, 1.3)")
     low, high = (number(f"Uncertainty's {name}", one, low=lower_bound) for one in value)
@@ -331,7 +330,6 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[SetConstant]
 
 
 def _of_range(bounds: Range, put: SetConstant) -> SetConstant:
-    """Return a function that sets the value at a share of a range."""
     low, high = bounds
     return lambda scenario, share: put(scenario, min(low + share * (high - low), high))
 
@@ -361,7 +359,6 @@ def _with_factor(scenario: Scenario, value: float, name: str) -> Scenario:
 
 
 def _with_start(scenario: Scenario, share: float, i: int) -> Scenario:
-    """Return the scenario with the start of one channel moved by a share of it."""
     x0 = list(scenario.resolved.x0)
     x0[i] *= 1.0 + share
     return dataclasses.replace(scenario, x0=x0)
@@ -375,7 +372,6 @@ def with_friction(scenario: Scenario, level: float) -> Scenario:
 
 
 def _dry(plant: Plant) -> list[str]:
-    """Return the parameters of the plant's own dry friction that are not 0."""
     return [name for name in plant.dry if plant.parameters[name]]
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from smc_mujoco.analysis.relevant_difference import RELEVANT
+from smc_mujoco.analysis.ranking import RELEVANT
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.errors import ScenarioError, printable

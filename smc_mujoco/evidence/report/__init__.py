@@ -46,7 +46,7 @@ def report(
         a further law that is unknown or has no tuned gains.
       MissingPackageError: jinja2 or plotly is not installed.
     """
-    from smc_mujoco.analysis.relevant_difference import checked_share
+    from smc_mujoco.analysis.ranking import checked_share
     from smc_mujoco.common import extras
     from smc_mujoco.common.errors import items_of, whole
     from smc_mujoco.common.files import replacing

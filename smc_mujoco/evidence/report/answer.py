@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.paired_runs import SETTLES
-from smc_mujoco.analysis.relevant_difference import ROUNDING
+from smc_mujoco.analysis.ranking import ROUNDING
 from smc_mujoco.common.text import every, joined
 from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
 from smc_mujoco.evidence.accuracy.scaling import ORDER_BAND

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from smc_mujoco.analysis.relevant_difference import RELEVANT
+from smc_mujoco.analysis.ranking import RELEVANT
 from smc_mujoco.common import progress
 from smc_mujoco.evidence.accuracy.accuracy import DEFAULT_SEEDS, PERIODS
 from smc_mujoco.evidence.papers.gaber import scenarios

@@ -13,8 +13,7 @@ import numpy as np
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.analysis.paired_runs import SETTLES
-from smc_mujoco.analysis.ranking import linked
-from smc_mujoco.analysis.relevant_difference import RELEVANT
+from smc_mujoco.analysis.ranking import RELEVANT, linked
 from smc_mujoco.evidence.report import words
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies.leaderboard import leaderboard

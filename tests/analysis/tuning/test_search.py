@@ -439,7 +439,6 @@ def test_a_bad_objective_is_refused(refused):
     for changed in (
         {"conditions": ("calm",)},
         {"conditions": 3},
-        {"starts": 1.0},
         {"conditions": ()},
         {"weight": -1.0},
     ):

@@ -14,7 +14,7 @@ import numpy as np
 
 from smc_mujoco.analysis import linear_theory
 from smc_mujoco.analysis.margins import DELAYS, TOLERATED_ERROR, Search, find_boundaries
-from smc_mujoco.analysis.relevant_difference import RELEVANT
+from smc_mujoco.analysis.ranking import RELEVANT
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.control.law import Measurement, catalogue, command, law_function, sliding
