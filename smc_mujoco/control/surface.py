@@ -38,11 +38,7 @@ def catalogue() -> Catalogue[Template]:
 
 
 def surface(name: str, **gains: float) -> Surface:
-    """Return the surface `name` with these gains.
-
-    Raises:
-      ScenarioError: an unknown surface or gain, or a gain out of range.
-    """
+    """Return the surface `name` with these gains. An unknown name or a gain out of range is a ScenarioError."""
     return find("surface", name, catalogue()).bind(gains, warn=True)
 
 

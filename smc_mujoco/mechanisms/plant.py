@@ -282,11 +282,7 @@ def catalogue() -> Catalogue[Plant]:
 
 
 def plant(name: str, **parameters: float) -> Plant:
-    """Return the plant `name`, with some of its parameters (or its size n) changed.
-
-    Raises:
-      ScenarioError: unknown name, or a parameter out of its range.
-    """
+    """Return the plant `name`, with some of its parameters (or its size n) changed, else a ScenarioError."""
     base = find("plant", name, catalogue())
     n = whole(f"n of {name}", parameters.pop("n", base.n), *base.sizes)
     values = dict(base.parameters)

@@ -52,11 +52,6 @@ class Channel:
     u_max: float | None = None
     reference: Any = None
 
-    @property
-    def mechanical(self) -> "Channel":
-        """The channel without what only scenarios read."""
-        return dataclasses.replace(self, **dict.fromkeys(SUGGESTED))
-
 
 Pairs = tuple[tuple[str, Channel], ...]  # each a joint and its Channel
 

@@ -5,7 +5,6 @@ process, with bounds on time and memory. That takes some hundredths of a second.
 """
 
 import dataclasses
-import functools
 import hashlib
 import os
 import re
@@ -53,7 +52,8 @@ class Source:
     @property
     def label(self) -> str:
         """The file's name; for a text, the name that the model gives itself, as a file's name."""
-        return Path(self.path).name if self.path else f"{_modelname(self.text)}.xml"
+        named = self.path or next((one.get("model") for one in _elements(self.text)[:1]), None) or "model"
+        return Path(self.path).name if self.path else f"{named}.xml"
 
     def read(self) -> mujoco.MjSpec:
         """Return the model as an editable MjSpec."""
@@ -263,13 +263,6 @@ def _elements(model: Path | str | bytes) -> list[ET.Element]:
 def _files(elements: Iterable[ET.Element]) -> list[str]:
     """Return the names of files in the attributes of elements."""
     return [value for element in elements for key, value in element.attrib.items() if key.startswith("file")]
-
-
-@functools.lru_cache(maxsize=32)
-def _modelname(text: str) -> str:
-    """Return the name that a model's text gives it, or "model"."""
-    root = next(iter(_elements(text)), None)
-    return (root is not None and root.get("model")) or "model"
 
 
 def check_model(label: str, model: mujoco.MjModel) -> None:

@@ -147,7 +147,7 @@ def _plant(source: Source, pairs: Pairs, name: str | None, keyframe: str | None,
     model, title = source.compiled(spec), spec.modelname
     mjcf.check_model(label, model)
     scenarios = own.suggested(pairs)
-    pairs = tuple((joint, channel.mechanical) for joint, channel in pairs)
+    pairs = tuple((joint, dataclasses.replace(channel, **dict.fromkeys(own.SUGGESTED))) for joint, channel in pairs)
     joints = own.joints_of(pairs)
     own.check(label, model, pairs)
     if keyframe is not None:

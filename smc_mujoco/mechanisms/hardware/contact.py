@@ -31,6 +31,8 @@ from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Field, Plant
 
+Pair = tuple[float, float]
+Ends = tuple[Sequence[float], Sequence[float]]  # of a bar
 HIT, RUB = "hit:", "rub:"
 DEPTH = 0.005  # m per m/s of a blow: chosen, so that 2 m/s goes 1 cm deep; e is met within 4 % at h = 0.25 ms
 # m per m/s: chosen, so that no rod of a falling chain passes through a bob. With h = 0.25 ms such a short blow meets e
@@ -159,14 +161,8 @@ def rub(spec: mujoco.MjSpec, geoms: tuple[str, str], friction: float) -> None:
     _pair(spec, RUB, geoms, SOLREF_RUB, SOFT_IMPEDANCE, friction)
 
 
-def _pair(
-    spec: mujoco.MjSpec,
-    sort: str,
-    geoms: tuple[str, str],
-    normal: tuple[float, float],
-    impedance: float,
-    friction: float,
-) -> None:
+def _pair(spec: mujoco.MjSpec, sort: str, geoms: tuple[str, str], normal: Pair, d: float, friction: float) -> None:
+    """Add a contact pair with the solref of its normal, its impedance d and its friction."""
     spec.option.disableflags &= ~mujoco.mjtDisableBit.mjDSBL_CONTACT.value
     if sort == RUB:
         spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPRATIO
@@ -178,7 +174,7 @@ def _pair(
         friction=(friction, friction, *TURNING_FRICTION),
         solref=normal,
         solreffriction=SOLREF_SLIDE,
-        solimp=(impedance, impedance, *REST_OF_SOLIMP),
+        solimp=(d, d, *REST_OF_SOLIMP),
     )
 
 
@@ -190,20 +186,11 @@ def solid(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[
 
 def box(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float], material: str) -> mujoco.MjsGeom:
     """Add a box between two corners, m in the body's frame."""
-    a, b = np.array(low, float), np.array(high, float)
-    return body.add_geom(
-        name=name, type=mujoco.mjtGeom.mjGEOM_BOX, pos=(a + b) / 2, size=(b - a) / 2, material=material
-    )
+    a, b, kind = np.array(low, float), np.array(high, float), mujoco.mjtGeom.mjGEOM_BOX
+    return body.add_geom(name=name, type=kind, pos=(a + b) / 2, size=(b - a) / 2, material=material)
 
 
-def bar(
-    body: mujoco.MjsBody,
-    name: str,
-    ends: tuple[Sequence[float], Sequence[float]],
-    radius: float,
-    material: str,
-    round_ends: bool = False,
-) -> mujoco.MjsGeom:
+def bar(body: mujoco.MjsBody, name: str, ends: Ends, radius: float, material: str, round_ends: bool = False) -> None:
     """Add a round bar between two points, m in the body's frame."""
     kind = mujoco.mjtGeom.mjGEOM_CAPSULE if round_ends else mujoco.mjtGeom.mjGEOM_CYLINDER
-    return body.add_geom(name=name, type=kind, fromto=(*ends[0], *ends[1]), size=(radius, 0, 0), material=material)
+    body.add_geom(name=name, type=kind, fromto=(*ends[0], *ends[1]), size=(radius, 0, 0), material=material)

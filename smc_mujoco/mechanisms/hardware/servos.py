@@ -99,16 +99,11 @@ def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
       name: "mx64" or "mx106", for Dynamixel MX-64 and MX-106.
       model: "m1" to "m6", see `ServoFriction`. Each was fitted on its own, with its own numbers of the motor.
       command: what u is, as in `DCMotor`: "torque" or "voltage".
-
-    Raises:
-      ScenarioError: an unknown servo, model or command.
     """
     models = find("servo", name, SERVOS)
     fitted = find(f"model of {name}", model, models)
-    k, resistance, armature = fitted["kt"], fitted["R"], fitted["armature"]
-    motor = DCMotor(
-        resistance, 0.0, k, gear=1.0, rotor_inertia=armature, voltage=VOLTAGE, current=math.inf, command=command
-    )
+    limits = {"voltage": VOLTAGE, "current": math.inf, "command": command}
+    motor = DCMotor(fitted["R"], 0.0, fitted["kt"], gear=1.0, rotor_inertia=fitted["armature"], **limits)
     numbers = {ours: fitted[theirs] for theirs, several in BAM_FIELDS.items() if theirs in fitted for ours in several}
     return Servo(motor, ServoFriction(**numbers))
 
