@@ -128,10 +128,7 @@ def headings(scenario: Scenario) -> dict[Group, str]:
 
 
 def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> list[Table]:
-    """Return a table for each metric that applies, with a line for each label and a column for each condition.
-
-    If there is only one condition, there is one table, with a column for each metric.
-    """
+    """Return a table for each metric that applies, or one table of them all if there is only one condition."""
     scenarios = (trace.scenario for runs in traces.values() for trace in runs.values())
     plants = dict.fromkeys((scenario.plant, scenario.efforts[0]) for scenario in scenarios)
     shown = {}

@@ -15,10 +15,7 @@ from smc_mujoco.common.scripts import users_traceback
 
 @contextlib.contextmanager
 def errors_as_sentences() -> Iterator[None]:
-    """Print one sentence instead of a traceback on an error that the user can correct, and on Ctrl-C, and exit.
-
-    An exception of the user's script ends with the script's part of the traceback, and exit code 1.
-    """
+    """Exit with a sentence on an error that the user can correct, and with their script's traceback on its own."""
     try:
         yield
     except ScenarioError as error:

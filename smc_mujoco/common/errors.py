@@ -111,10 +111,7 @@ def number(
     high: float = math.inf,
     infinite: bool = False,
 ) -> float:
-    """Return `value` as a float that is > `above`, >= `low` and <= `high`, or raise ScenarioError naming `what`.
-
-    NaN is refused, and so are infinities unless `infinite`.
-    """
+    """Return `value` as a float that is > `above`, >= `low` and <= `high`, finite unless `infinite`, and never NaN."""
     real = _real(value)
     if real is None:
         raise ScenarioError(f"{what} is {shown(value)}: give a number")
@@ -179,11 +176,7 @@ def name(what: str, value: object) -> str:
 
 
 def users_stacklevel() -> int:
-    """Return the stacklevel with which a warning points to the user's line.
-
-    The user's line is the nearest caller outside this package and outside `dataclasses`, whose `replace` makes
-    scenarios.
-    """
+    """Return the stacklevel of the nearest caller outside this package and `dataclasses`: that of the user's line."""
     frame, level = sys._getframe(1), 1
     inner = "smc_mujoco", "dataclasses"
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in inner:

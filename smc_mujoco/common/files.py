@@ -141,10 +141,7 @@ def _bounded(file: Path) -> None:
 
 
 def csv_rows(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
-    """Return the line number and the cells of each row of a CSV file that is not blank.
-
-    Where the first line has semicolons, they separate the cells, and a comma in a cell is a decimal point.
-    """
+    """Return line number and cells of each row of a CSV file; beside semicolons, a comma is a decimal point."""
     with reading(path, "CSV file", "give a CSV file, with commas or semicolons between cells") as file:
         with file.open(newline="", encoding="utf-8-sig") as text:
             semicolons = ";" in re.sub('"[^"]*"', "", text.readline())
@@ -159,10 +156,7 @@ def csv_rows(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
 
 
 def plain(data: Any) -> Any:
-    """Return the data with words in place of NaN and infinities, which JSON lacks.
-
-    A text that equals such a word gets the prefix ', which `from_json` removes.
-    """
+    """Return the data with words in place of NaN and infinities; a text that equals one gets the prefix '."""
     if isinstance(data, Mapping):
         return {name: plain(value) for name, value in data.items()}
     if isinstance(data, list | tuple):

@@ -59,10 +59,7 @@ def arithmetic() -> str:
 
 @functools.cache
 def package(*without: str) -> str:
-    """Return a hash of this package's code, models, gains and papers.
-
-    It leaves out PRESENTATION and the folders named in `without`.
-    """
+    """Return a hash of this package's code, models, gains and papers, but PRESENTATION and the folders `without`."""
     left_out = (*BESIDE_PACKAGE, *PRESENTATION, *without)
     files = {path.relative_to(PACKAGE): path for path in PACKAGE.rglob("*")}
     files = {name: path for name, path in files.items() if not any(map(name.is_relative_to, left_out))}
@@ -77,8 +74,7 @@ def package(*without: str) -> str:
 def of(thing: Any) -> str:
     """Return the hash of a function, a class with its methods, a callable object, or a tuple of these.
 
-    The hash of a function or class of this package is computed once. That of another one is computed at every call,
-    until `keep` keeps it.
+    That of this package's functions and classes is computed once, that of others at every call until `keep` keeps it.
     """
     try:
         return _compiled_hashes[thing] if thing in _compiled_hashes else _cached(thing) if ours(thing) else now(thing)
@@ -87,10 +83,7 @@ def of(thing: Any) -> str:
 
 
 def keep(thing: Any) -> None:
-    """Keep the present hash of a function or class that is compiled, because compiled code keeps its present globals.
-
-    Only the first call counts. A thing that cannot be hashed is ignored.
-    """
+    """Keep the first hash of a function or class that is compiled, because compiled code keeps its present globals."""
     with contextlib.suppress(ScenarioError):
         _compiled_hashes.setdefault(thing, of(thing))
 
@@ -131,10 +124,7 @@ class _CodePickler(pickle._Pickler):
     """Pickler that writes the contents of functions and classes, not their names. The result is never loaded."""
 
     def memoize(self, obj: Any) -> None:
-        """Note an object as written, so that it is written only once.
-
-        Constants are always written, because whether two equal constants are one object depends on the compiler.
-        """
+        """Note an object as written, but no constant: whether equal ones are one object depends on the compiler."""
         if not isinstance(obj, tuple | str | bytes | CodeType):
             super().memoize(obj)
 

@@ -75,8 +75,6 @@ def usable(backend: str) -> bool:
     """Return whether `import mujoco` works with this backend."""
     if backend not in LIBRARIES:
         return backend in OFF_VALUES + DISPLAY_VALUES
-    if os.environ.get("PYOPENGL_PLATFORM", "").lower() not in ("", backend):
-        return False
     return all(any(map(loads, group)) for group in LIBRARIES[backend])
 
 
@@ -101,18 +99,12 @@ def note() -> str | None:
 
 @functools.cache
 def missing() -> str | None:
-    """Return None if pictures can be rendered, else one sentence that says why not and what to do.
-
-    It renders an empty model in a child process, because a broken driver can end the process that it runs in.
-    """
+    """Return None if a child process can render, as a broken driver ends its process, else a sentence with the cure."""
     chosen = choice()
     if chosen.wish in OFF_VALUES:
         return f"no film: MUJOCO_GL={chosen.wish} turns rendering off: unset it"
     unusable = f" (and MUJOCO_GL={chosen.wish} cannot be used)" if note() else ""
     if chosen.backend in OFF_VALUES:
-        platform = os.environ.get("PYOPENGL_PLATFORM")
-        if platform:
-            return f"no film: PYOPENGL_PLATFORM={platform} rules out what is installed{unusable}: unset it"
         return f"no film: neither libEGL with libGL nor libOSMesa is here{unusable}: {CURE}"
     error = probe(chosen.backend)
     if error is None:
@@ -139,11 +131,7 @@ def probe(backend: str, code: str = PROBE) -> str | None:
 
 
 def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "mujoco.Renderer":
-    """Return a mujoco.Renderer with the backend of `choice`, even if MuJoCo took another one when it was imported.
-
-    A mujoco.Renderer takes its context class from the module `gl_context`. The class is replaced there while the
-    renderer is made, and put back.
-    """
+    """Return a mujoco.Renderer (px) with the backend of `choice`, even if MuJoCo took another one when imported."""
     import mujoco
 
     from smc_mujoco.common.errors import ScenarioError
@@ -154,7 +142,7 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
     if sys.platform != "linux":
         return mujoco.Renderer(model, height, width)
     backend = choice().backend
-    module = sys.modules[mujoco.Renderer.__module__].gl_context
+    module = sys.modules[mujoco.Renderer.__module__].gl_context  # from which a Renderer takes its context class
     with _LOCK:
         before = getattr(module, "GLContext", None)  # absent if MUJOCO_GL turned rendering off
         try:

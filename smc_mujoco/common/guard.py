@@ -99,8 +99,7 @@ class Arithmetic:
 def computed(numbers: Any) -> tuple[float, ...]:
     """Return results that differ between the directions of rounding, and where subnormal numbers are flushed to 0.
 
-    The float64 nearest to 1/3 is below it, and that to 1/10 above. No result is subnormal itself, because a thread
-    that reads subnormal numbers as 0 would take it for 0.
+    The float64 nearest to 1/3 is below it, and that to 1/10 above. No result is subnormal itself: it may be read as 0.
     """
     three, ten, tiny, big = numbers[0], numbers[1], numbers[2], numbers[3]  # from memory: no compiler knows them
     return 1.0 / three, 1.0 / ten, tiny / ten * big

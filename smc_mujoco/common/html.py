@@ -1,8 +1,4 @@
-"""Short tables, curves, pictures and films as HTML, which notebooks show.
-
-They set no colours: text and lines take the colour of the page, light or dark. All text is escaped,
-except `Html`.
-"""
+"""Short tables, curves, pictures and films as HTML for notebooks, in the colour of the page; all text is escaped."""
 
 import base64
 import html
@@ -107,10 +103,7 @@ def panel(t: np.ndarray, curves: Sequence[np.ndarray], heading: str, reference: 
 
 
 def _lines(x: np.ndarray, y: np.ndarray, style: str) -> list[str]:
-    """Return a curve as a polyline, or nothing if no value is finite.
-
-    A long curve is drawn through the lowest and the highest value of each of its PIECES.
-    """
+    """Return a curve as a polyline, through the lowest and highest value of each of PIECES; [] if none is finite."""
     known = np.isfinite(y)
     x, y = x[known], y[known]
     if len(x) > 2 * PIECES:

@@ -222,10 +222,7 @@ def _compile(made: Any, body: Callable, cache: bool | tuple[str, str], *types: A
 
 
 def _load_numba() -> None:
-    """Load numba's array functions without SciPy's linear algebra, which takes a tenth of a process's start.
-
-    Numba would import it only to see whether it is there, and imports it again where a function multiplies matrices.
-    """
+    """Load numba's array functions without SciPy's linear algebra, which takes a tenth of a process's start."""
     with global_compiler_lock:
         if "numba.np.arraymath" not in sys.modules:
             from numba.np import linalg
@@ -238,10 +235,7 @@ def _load_numba() -> None:
 
 
 class Cache(FunctionCache):
-    """Cache of a compiled function on disk. A damaged file counts as missing; a full disk is not an error.
-
-    Functions of one name have a file each, of which the last MAX_FILES_OF_A_NAME are kept.
-    """
+    """Cache of a compiled function on disk. A damaged file counts as missing; a full disk is not an error."""
 
     def __init__(self, body: Callable, name: str = "", content: str = ""):
         super().__init__(body)
@@ -284,10 +278,7 @@ def _complete(library: CPUCodeLibrary) -> bool:
 
 
 class Sealed(IndexDataCacheFile):
-    """Files of numba's cache, each sealed: it ends with a hash of its content and of the source that was compiled.
-
-    A file whose hash does not fit counts as missing: it is damaged, or belongs to another function of the same name.
-    """
+    """Files of numba's cache, sealed with a hash of content and source; one that does not fit counts as missing."""
 
     def _load_index(self) -> dict:
         return super()._load_index() if self._intact(self._index_path) else {}

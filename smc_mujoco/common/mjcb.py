@@ -42,10 +42,7 @@ if hasattr(os, "register_at_fork"):
 
 @contextlib.contextmanager
 def installed(control: Any) -> Iterator[None]:
-    """Install a control callback, or None, and `no_clock` during a with block, and remove all other callbacks.
-
-    Afterwards all are restored. Other threads wait, because their runs would continue without their laws.
-    """
+    """Install only a control callback, or None, and `no_clock` in a with block; other threads with callbacks wait."""
     with _lock:
         before = _callbacks()
         try:

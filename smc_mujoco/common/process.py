@@ -19,10 +19,7 @@ class TimedOut(Exception):
 
 
 def _kill(process: subprocess.Popen[str]) -> None:
-    """Kill a process and every process that it started.
-
-    On POSIX the process must have been started in a new session.
-    """
+    """Kill a process, on POSIX the first of its session, and every process that it started."""
     if hasattr(os, "killpg"):
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)

@@ -45,11 +45,7 @@ def _rebuild(function: Any, finish: Callable, copies: dict) -> Any:
 
 
 def _swapped(value: Any, names: Names, finish: Callable, copies: dict) -> Any:
-    """Return what replaces a value in a copy.
-
-    For a compiled function it is its copy; for a module, a copy of it with copies of the compiled functions among the
-    attributes in `names`; else the value itself.
-    """
+    """Return the copy of a compiled function, or of a module with such attributes among `names`; else the value."""
     if isinstance(value, Dispatcher):
         return _rebuild(value.py_func, finish, copies)
     if isinstance(value, ModuleType) and _holds(value, names.attributes):

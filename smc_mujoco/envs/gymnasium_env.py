@@ -76,11 +76,7 @@ class PlantEnv(TimeLimited, Episode, gymnasium.Env):  # pyright: ignore[reportIn
         changes: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
     ):
-        """Arguments are those of `episode.Setting`. The options of `reset` are x0 and v0.
-
-        Raises:
-          ScenarioError: what `episode.Setting` raises, or another render_mode.
-        """
+        """Make a plant with one of its tasks. `changes`: Scenario field -> value, of `episode.FIELDS`."""
         if render_mode not in (None, "rgb_array"):
             raise ScenarioError(f"render_mode is {shown(render_mode)}: give 'rgb_array' or None")
         Episode.__init__(self, Setting(plant, task, changes))
@@ -112,11 +108,7 @@ class PlantEnv(TimeLimited, Episode, gymnasium.Env):  # pyright: ignore[reportIn
         return observation, reward, self.diverged, self.sample >= self.max_samples, info
 
     def render(self) -> np.ndarray | None:
-        """Return a picture from the plant's camera, (height, width, 3), with render_mode "rgb_array", else None.
-
-        Raises:
-          ScenarioError: there is nothing to render with.
-        """
+        """Return a picture from the plant's camera, (height, width, 3), with render_mode "rgb_array", else None."""
         if self.render_mode is None:
             return None
         if self.renderer is None:

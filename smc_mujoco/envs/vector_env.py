@@ -93,11 +93,7 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         return self.observe(), self.infos(self.errors()[0])
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Take one control period in every copy; copies at the end of an episode begin the next one.
-
-        Returns:
-          Observations, rewards, terminated, truncated and infos, as in gymnasium.
-        """
+        """Take one control period in every copy; copies at the end of an episode begin the next one."""
         if not self.randoms:
             raise ScenarioError("no episode has begun: call reset first")
         restarts = self.ended.copy()

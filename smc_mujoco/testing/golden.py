@@ -5,12 +5,9 @@ unit of both. A test that names no tolerance uses those of the file.
 """
 
 import contextlib
-import hashlib
 import json
 import math
 import os
-import tempfile
-import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -119,9 +116,8 @@ def locked(folder: Path) -> Iterator[None]:
     """Lock a folder, so that only one worker of a parallel session at a time writes into it."""
     try:
         import fcntl
-    except ImportError:
-        with _locked_on_windows(folder):
-            yield
+    except ImportError:  # Windows locks no folder: record there without parallel workers
+        yield
         return
     handle = os.open(folder, os.O_RDONLY)
     try:
@@ -129,23 +125,3 @@ def locked(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)  # releases the lock
-
-
-@contextlib.contextmanager
-def _locked_on_windows(folder: Path) -> Iterator[None]:
-    """Lock the first byte of a temporary file named after the folder, because Windows locks no folders."""
-    import msvcrt  # pyright: ignore[reportMissingImports]
-
-    name = hashlib.sha256(str(folder.resolve()).encode()).hexdigest()[:16]
-    with (Path(tempfile.gettempdir()) / f"smc_mujoco-{name}.lock").open("a") as file:
-        while True:
-            try:
-                msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-                break
-            except OSError:  # another process has it
-                time.sleep(0.02)
-        try:
-            yield
-        finally:
-            file.seek(0)
-            msvcrt.locking(file.fileno(), msvcrt.LK_UNLCK, 1)

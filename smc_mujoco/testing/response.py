@@ -53,11 +53,7 @@ class StepResponse:
 
     @functools.cached_property
     def metrics(self) -> Mapping[str, float]:
-        """Every metric by name.
-
-        Raises:
-          ScenarioError: the run failed.
-        """
+        """Every metric by name. Raises ScenarioError if the run failed."""
         return score(self.trace)
 
     @functools.cached_property

@@ -314,7 +314,6 @@ def test_without_a_renderer_only_the_film_is_missing_and_one_line_says_the_cure(
     call, undrawn, scene, folder, monkeypatch
 ):
     monkeypatch.setattr(gl, "choice", lambda: gl.Choice(wish="", backend="disabled"))
-    monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
     gl.missing.cache_clear()
     code, out, err = call("run", scene, "--out", "out")
     gl.missing.cache_clear()

@@ -5,9 +5,7 @@ import builtins
 import os
 import subprocess
 import sys
-import threading
 import time
-import types
 from pathlib import Path
 
 import pytest
@@ -16,7 +14,6 @@ import smc_mujoco as smc
 from smc_mujoco.common import gl, guard, process
 from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.simulation import run
-from smc_mujoco.testing import golden
 
 PACKAGE = Path(smc.__file__).parent
 POSITION = {"read_text": 0, "write_text": 1}  # of the encoding among the arguments
@@ -72,36 +69,6 @@ def test_a_command_is_late_in_time_though_a_process_of_another_session_holds_its
     with pytest.raises(process.TimedOut):
         process.timed([sys.executable, "-c", leaves], 0.5)
     assert time.monotonic() - begun < 15.0
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="it is about systems with fcntl")
-def test_without_fcntl_one_at_a_time_is_in_a_locked_folder(tmp_path, monkeypatch):
-    import fcntl
-
-    def locking(handle: int, mode: int, count: int) -> None:
-        assert count == 1
-        fcntl.flock(handle, mode)  # which raises OSError where another has it
-
-    windows = types.SimpleNamespace(locking=locking, LK_NBLCK=fcntl.LOCK_EX | fcntl.LOCK_NB, LK_UNLCK=fcntl.LOCK_UN)
-    monkeypatch.setitem(sys.modules, "msvcrt", windows)
-    monkeypatch.setattr(golden.tempfile, "gettempdir", lambda: str(tmp_path))
-    without_module("fcntl", monkeypatch)
-    inside, most, free = [], [], threading.Event()
-
-    def enter(first: bool) -> None:
-        with golden.locked(tmp_path):
-            inside.append(1)
-            most.append(len(inside))
-            if first:
-                free.wait(0.3)
-            inside.pop()
-
-    workers = [threading.Thread(target=enter, args=(k == 0,)) for k in range(3)]
-    for worker in workers:
-        worker.start()
-    for worker in workers:
-        worker.join(10.0)
-    assert most == [1, 1, 1]
 
 
 @pytest.mark.parametrize("platform", ["darwin", "win32"])
