@@ -75,7 +75,6 @@ ELEMENTWISE = {getattr(np, name): name for name in NUMPY_NAMES} | {getattr(np, n
 ELEMENTWISE |= {np.abs: "fabs", abs: "fabs"}
 HELPER_NAMES = {np.minimum: "lesser", np.maximum: "greater", np.sign: "sign"}
 FILL_VALUES = {np.zeros: 0.0, np.empty: 0.0, np.ones: 1.0}
-ARRAY_MAKERS = {*FILL_VALUES, np.full, np.array, np.where}  # functions that return a new array
 SHARED_WORDS = "which shares its numbers with another name: write .copy() behind it"
 
 # Python's min, max, abs, % and indices of integers, and numpy's functions as numba compiles them, where NaN stays NaN:
@@ -240,27 +239,17 @@ class Program:
 class Function:
     """One function in C.
 
-    A component's own function writes its results to out[0] and out[1]. Another function returns a single result, or
-    writes several to pointers.
-
-    Args:
-      kinds: of its arguments.
-      constants: arguments replaced by literal numbers.
-      entry: whether it is the component's own function.
-
-    Attributes:
-      counters: variables of the present loops that are never negative.
-      frames: for each elementwise expression within another, the shapes of its operands and its calls.
-      before: lines that belong before the present one, such as loops that fill arrays.
-      temporaries: name -> kind of arrays for results within expressions.
-      fixed: whether nothing may move before the present line.
+    A component's own function, the `entry`, writes its results to out[0] and out[1]. Another function returns a single
+    result, or writes several to pointers. `constants`: arguments replaced by literal numbers.
     """
 
     def __init__(
         self, program: Program, function: Any, kinds: Sequence[str], constants: Mapping[str, float], entry: bool = False
     ):
-        self.program, self.constants, self.entry, self.counters = program, constants, entry, set[str]()
-        self.frames, self.fixed = list[tuple[list[str], list[Value]]](), False
+        self.program, self.constants, self.entry = program, constants, entry
+        self.counters = set[str]()  # variables of the present loops that are never negative
+        self.frames = list[tuple[list[str], list[Value]]]()  # shapes and calls of operands of nested expressions
+        self.fixed = False  # whether nothing may move before the present line
         written, self.tree = parsed(function)
         cells = zip(written.__code__.co_freevars, written.__closure__ or (), strict=True)
         self.globals = written.__globals__ | {name: cell.cell_contents for name, cell in cells} | dict(constants)
@@ -339,7 +328,9 @@ class Function:
     def block(self, body: Sequence[ast.stmt]) -> Iterator[str]:
         """Yield the lines of some statements, each after the lines that have moved before it."""
         if body is self.tree.body:
-            self.before, self.temporaries, self.counts = list[str](), dict[str, str](), itertools.count(1)
+            self.before = list[str]()  # lines before the present one, such as loops that fill arrays
+            self.temporaries = dict[str, str]()  # name -> kind of arrays for results within expressions
+            self.counts = itertools.count(1)
         for line in itertools.chain.from_iterable(map(self.statement, body)):
             before, self.before = self.before, []
             yield from before
@@ -923,9 +914,9 @@ class Function:
         if isinstance(node.func, ast.Attribute) and node.func.attr == "copy" and not node.args:
             return self.outside(self.value, node.func.value)._replace(pointer="")
         function = self.callee(node)
-        if function in ELEMENTWISE or function in HELPER_NAMES or function is np.where:
+        if function in ELEMENTWISE or function in HELPER_NAMES:
             return self.elementwise(lambda call: self.of_elements(function, call), node)
-        if function is len or function is np.full or function in FILL_VALUES:
+        if function is len or function in FILL_VALUES:
             method = self.sized
         elif function is np.array:
             method = self.listed
@@ -981,11 +972,6 @@ class Function:
         """Translate a function of numpy, by its elements."""
         values = [self.numeric(a) for a in node.args]
         kind = "single" if all(v.kind == "single" for v in values) else "real"
-        if function is np.where:
-            if len(values) != 3:
-                raise refuse(node, "where without two values")
-            test, yes, no = values
-            return Value(f"{test.within(SUM)} ? {yes.within(SUM)} : {no.within(SUM)}", wider(yes.kind, no.kind), LOOSE)
         if function in HELPER_NAMES:
             return Value(
                 f"{self.program.helper(HELPER_NAMES[function], kind)}({', '.join(v.text for v in values)})", kind
@@ -1018,14 +1004,11 @@ class Function:
 
     def sized(self, function: Any, node: ast.Call) -> Value:
         """Translate len, and arrays of one number."""
-        if len(node.args) != (2 if function is np.full else 1):
+        if len(node.args) != 1:
             raise refuse(node, "a call with another number of arguments")
         if function is len:
             return Value(self.dimensions(node)[0], "int")
         dimensions = "".join(f"[{n}]" for n in self.dimensions(node.args[0]))
-        if function is np.full:
-            value = self.numeric(node.args[1])
-            return value._replace(kind=value.kind + dimensions)
         return literal(FILL_VALUES[function], self.program.single, node)._replace(kind=f"real{dimensions}")
 
     def dimensions(self, node: ast.expr) -> list[str]:
@@ -1061,10 +1044,9 @@ class Function:
                 whole = [t for t in targets if isinstance(t, ast.Subscript) or isinstance(node, ast.AugAssign)]
                 changed |= {name for t in whole if shape(self.kinds.get(name := root(t), ""))}
         for target, value in pairs:
-            shares = self.shared(value)
-            if isinstance(target, ast.Name | ast.Tuple) and (
-                shares & changed or (shares and names_in([target]) & changed)
-            ):
+            names, shares = names_in([target]), self.shared(value)
+            whole = isinstance(target, ast.Name | ast.Tuple) and any(shape(self.kinds.get(name, "")) for name in names)
+            if whole and (shares & changed or (shares and names & changed)):
                 raise refuse(value, f"an array, {SHARED_WORDS},")
 
     def shared(self, node: ast.expr) -> set[str]:
@@ -1077,8 +1059,8 @@ class Function:
                 names = {ast.unparse(node)}
             case ast.IfExp():
                 parts = [node.body, node.orelse]
-            case ast.Call():
-                parts = [node.args[i] for i in shared_arguments(self.resolve(node.func))]
+            case ast.Call() if may_return_argument(self.resolve(node.func)):
+                parts = node.args
                 names = {a.id for a in parts if isinstance(a, ast.Name) and self.kinds.get(a.id) in ARGUMENTS}
         return names.union(*map(self.shared, parts))
 
@@ -1140,38 +1122,11 @@ def refuse(node: ast.AST | None, what: str) -> Untranslatable:
     )
 
 
-def shared_arguments(function: Any) -> set[int]:
-    """Return the places of the arguments that a function may return, in whole or in part."""
-    if not isinstance(getattr(function, "py_func", function), FunctionType) or function in ARRAY_MAKERS:
-        return set()
-    written, tree = parsed(function)
-    names = [a.arg for a in tree.args.args]
-    origins = {name: {i} for i, name in enumerate(names)}  # variable -> arguments of which it may be a part
-
-    def shared(value: ast.expr) -> set[int]:
-        parts = list[ast.expr]()
-        match value:
-            case ast.Name(id=name):
-                return origins.get(name, set())
-            case ast.Subscript() | ast.Attribute():
-                parts = [value.value]
-            case ast.IfExp():
-                parts = [value.body, value.orelse]
-            case ast.Tuple():
-                parts = value.elts
-            case ast.Call(func=ast.Name(id=name), args=arguments):
-                parts = [arguments[i] for i in shared_arguments(written.__globals__.get(name))]
-            case ast.Call(func=ast.Attribute(value=ast.Name(id=module), attr=name), args=arguments):
-                parts = [arguments[i] for i in shared_arguments(getattr(written.__globals__.get(module), name, None))]
-        return set().union(*map(shared, parts))
-
-    inside, before = list(ast.walk(tree)), {}
-    while before != origins:
-        before = dict(origins)
-        for node in inside:
-            if isinstance(node, ast.Assign):
-                origins |= {name: origins.get(name, set()) | shared(node.value) for name in assigned(node)}
-    return set().union(*(shared(n.value) for n in inside if isinstance(n, ast.Return) and n.value is not None))
+def may_return_argument(function: Any) -> bool:
+    """Return whether a function may return one of its arguments, or a part of it."""
+    written = getattr(function, "py_func", function)
+    fresh = getattr(written, "__module__", "") == joint_law.__name__ and function is not joint_law.torque
+    return isinstance(written, FunctionType) and not fresh
 
 
 def assigned(node: ast.AST) -> set[str]:

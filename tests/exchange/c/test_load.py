@@ -307,7 +307,10 @@ def test_what_cannot_be_loaded_is_one_sentence(file):
         (law("out[0] = other(y->e);"), "implicit declaration of function 'other'"),
         (MINE.replace("k1=2.5", "k1"), "my_law.c's smc_law_gains is 'lam=6,k1': give names and numbers"),
         (MINE.replace("k1=2.5", "k1=nan"), "smc_law_gains is 'lam=6,k1=nan': give names and numbers, each once"),
-        (MINE.replace("k1=2.5", "lam=2"), "my_law.c's smc_law_gains is 'lam=6,lam=2': give lam once"),
+        (
+            MINE.replace("k1=2.5", "lam=2"),
+            "my_law.c's smc_law_gains is 'lam=6,lam=2': give names and numbers, each once",
+        ),
         (MINE + "const int smc_law_degree = 5;", "degree is 5: give a whole number from 1 to 3"),
         (law("", "int smc_setup(void) { return 3; }"), "my_law.c: smc_setup returned 3"),
         (law("", "#include <stdlib.h>\nint smc_setup(void) { exit(7); }"), "ended the process with exit code 7"),
