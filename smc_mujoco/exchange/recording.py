@@ -30,11 +30,7 @@ GEOM = mujoco.mjtGeom
 
 
 def write(trace: Trace, file: Path) -> None:
-    """Write a trace to an .mcap file.
-
-    Raises:
-      MissingPackageError: the extra "mcap" is not installed.
-    """
+    """Write a trace to an .mcap file."""
     with extra("mcap", "Trace.export to .mcap"):
         from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
         from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
@@ -101,7 +97,7 @@ def posed(trace: Trace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def frames(model: mujoco.MjModel) -> list[str]:
-    """Return the name of each body's frame, (nbody,): its own, or its number; that of the first is "world"."""
+    """Return the name of each body's frame, (nbody,): its own, or its number."""
     return [model.body(i).name or f"body {i}" for i in range(model.nbody)]
 
 

@@ -80,12 +80,7 @@ def compiler() -> list[str]:
 
 
 def run_compiler(command: Sequence[str], timeout: float) -> subprocess.CompletedProcess[str]:
-    """Run the command of a compiler, for at most `timeout` seconds.
-
-    Raises:
-      ScenarioError: it cannot write its files.
-      TimedOut, OSError: as `process.timed`.
-    """
+    """Run the command of a compiler, for at most `timeout` seconds. Errors are those of `process.timed`."""
     done = timed(command, timeout)
     if done.returncode and (why := NO_ROOM_WORDS.search(done.stderr)):
         raise without_room(why[0])

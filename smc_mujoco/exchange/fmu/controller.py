@@ -102,10 +102,8 @@ class Controller:
 
     def code(self) -> dict[str, tuple[int, str]]:
         """Return kind -> number of memory slots, and C code, of each component."""
-        return {
-            kind: export.translated(part, joints=self.joints if kind == "law" else 0)
-            for kind, part in self.parts.items()
-        }
+        joints = {"law": self.joints}
+        return {kind: export.translated(part, joints=joints.get(kind, 0)) for kind, part in self.parts.items()}
 
 
 def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> list[Variable]:

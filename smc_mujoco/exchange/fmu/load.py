@@ -283,12 +283,10 @@ def _description(file: Path, digest: str) -> Any:
     if not any(binary.stem == about.coSimulation.modelIdentifier for binary in binaries.glob("*")):
         if binaries.exists():
             raise ScenarioError(f"{file.name} has no binary of its modelIdentifier in {binaries.name}: export it again")
-        machines = sorted(path.name for path in (folder / "binaries").glob("*"))
-        cure = (
-            "compile its sources with FMPy, fmpy compile" if (folder / "sources").is_dir() else "export it for this one"
-        )
+        machines = ", ".join(sorted(path.name for path in (folder / "binaries").glob("*"))) or "no machine"
         raise ScenarioError(
-            f"{file.name} has a binary for {', '.join(machines) or 'no machine'}, and this one is {here}: {cure}"
+            f"{file.name} has a binary for {machines}, and this one is {here}: export it for this one, or compile its "
+            "sources with FMPy, fmpy compile"
         )
     return about
 
@@ -308,16 +306,11 @@ def _meanings(
     taken = {*chosen.values(), *constants}
     inputs = {ours: theirs for ours, theirs in chosen.items() if ours in INPUT_FIELDS}
     inputs |= _by_name([n for n in ins if n not in taken], [n for n in INPUT_FIELDS if n not in chosen])
-    if joints := [n for n in ins if n.endswith("[2]") and n not in taken]:
-        raise ScenarioError(
-            f"{file} has inputs of many joints, such as {joints[0]!r}: give an FMU of one channel, or the law in C; "
-            f"if one channel does not need the input, hold it by constants={{{joints[0]!r}: 0.0}}"
-        )
     if strange := [n for n in ins if n not in {*inputs.values(), *constants}]:
         first = strange[0]
         meaning = f"say which it is, variables={{'x': {first!r}}} (--variables x={first}), or "
         raise ScenarioError(
-            f"{file} has inputs that mean nothing that a law measures, {', '.join(strange)}: "
+            f"{file} has inputs that mean nothing that a law measures, {', '.join(strange[:4])}: "
             f"{meaning * (known[first].type in REAL_TYPES)}hold each, constants={{{first!r}: 0.0}} "
             f"(--constants {first}=0)"
         )

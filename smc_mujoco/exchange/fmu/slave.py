@@ -13,6 +13,7 @@ CONVERTERS = dict.fromkeys(WHOLE_TYPES, round) | {"Boolean": bool}  # of numbers
 TRIAL_STEPS, TRIAL_PERIOD = 500, 1e-3  # of a trial: number of steps, and their length if the FMU names none, s; chosen
 MAX_POSITION = 3.0  # where the double integrator of a trial stops, because a law need not stabilise it; chosen
 MAX_COMMAND = 6.0  # bound on u in a trial; chosen
+CURE = "fix the FMU, or its inputs and parameters"
 
 
 class Group(NamedTuple):
@@ -102,11 +103,11 @@ class Slave:
             result = function(*arguments, **named)
         except Exception as error:
             why = self.said[-1] if self.said else f"{type(error).__name__}: {error}"
-            raise Fault(f"{what} fails ({' '.join(why.split())})") from error
+            raise Fault(f"{what} fails ({' '.join(why.split())}): {CURE}") from error
         finally:
             changed = self.arithmetic.changed()
         if changed:
-            raise Fault(f"{what} {ALTERS}")
+            raise Fault(f"{what} {ALTERS}: {CURE}")
         return result
 
     def _log(self, *words: Any) -> None:
@@ -117,13 +118,6 @@ class Slave:
 
 def attempt(order: Mapping[str, Any], say: Callable) -> None:
     """Run an FMU on a double integrator x'' = u. `order` is from `load`, and `say` reports a stage."""
-    try:
-        _run(order, say)
-    except Fault as fault:
-        raise Fault(f"{fault}: fix the FMU, or its inputs and parameters") from None
-
-
-def _run(order: Mapping[str, Any], say: Callable) -> None:
     say("instantiation")
     slave = Slave(order["folder"], list(order["inputs"].values()), order["outputs"], order["fixed"])
     length, x, v = order["step"] or TRIAL_PERIOD, 0.5, 0.0
@@ -134,7 +128,7 @@ def _run(order: Mapping[str, Any], say: Callable) -> None:
         seen |= {"a": -r, "g": 1.0, "gq": 1.0, "limit": MAX_COMMAND, "model": 1.0}
         outputs = slave.step([seen.get(name, 0.0) for name in order["inputs"]], k * length, length)
         if not all(map(math.isfinite, outputs)):
-            raise Fault(f"{order['outputs'][0]} is {outputs[0]:g} after {k + 1} steps")
+            raise Fault(f"{order['outputs'][0]} is {outputs[0]:g} after {k + 1} steps: {CURE}")
         v += length * min(max(outputs[0], -MAX_COMMAND), MAX_COMMAND)
         x += length * v
         if abs(x) > MAX_POSITION:

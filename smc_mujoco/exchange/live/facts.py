@@ -233,22 +233,15 @@ def _skins(plant: Plant) -> list[dict[str, Any]]:
         for column, bone in enumerate(bones):
             at = slice(model.skin_bonevertadr[bone], model.skin_bonevertadr[bone] + model.skin_bonevertnum[bone])
             weights[model.skin_bonevertid[at], column] = model.skin_bonevertweight[at]
-        skins.append(
-            {
-                "rgba": model.mat_rgba[model.skin_matid[i]].tolist(),
-                "vertices": model.skin_vert[first : first + count].round(5).ravel().tolist(),
-                "faces": model.skin_face[face : face + faces].ravel().tolist(),
-                "weights": weights.round(5).ravel().tolist(),
-                "bones": [
-                    {
-                        "body": model.body(int(model.skin_bonebodyid[bone])).name,
-                        "position": model.skin_bonebindpos[bone].tolist(),
-                        "quaternion": model.skin_bonebindquat[bone].tolist(),
-                    }
-                    for bone in bones
-                ],
-            }
-        )
+        names = [model.body(int(model.skin_bonebodyid[bone])).name for bone in bones]
+        poses = [(model.skin_bonebindpos[bone].tolist(), model.skin_bonebindquat[bone].tolist()) for bone in bones]
+        skins.append({
+            "rgba": model.mat_rgba[model.skin_matid[i]].tolist(),
+            "vertices": model.skin_vert[first : first + count].round(5).ravel().tolist(),
+            "faces": model.skin_face[face : face + faces].ravel().tolist(),
+            "weights": weights.round(5).ravel().tolist(),
+            "bones": [{"body": n, "position": p, "quaternion": q} for n, (p, q) in zip(names, poses, strict=True)],
+        })  # fmt: skip
     return skins
 
 

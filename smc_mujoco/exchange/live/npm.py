@@ -46,7 +46,15 @@ def fetched() -> Path:
     if target.is_dir():
         return target
     command = npm()
-    with _scratch(target.parent) as name:
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        folder = tempfile.TemporaryDirectory(dir=target.parent)
+    except OSError as error:
+        raise ScenarioError(
+            f"the live page's packages cannot be kept in {target.parent} ({error.strerror}): "
+            "set XDG_CACHE_HOME to a folder that you can write"
+        ) from error
+    with folder as name:
         scratch, made = Path(name), Path(name) / "vendor"
         for file in PACKAGE_FOLDER.iterdir():
             shutil.copy(file, scratch)
@@ -61,18 +69,6 @@ def fetched() -> Path:
             if not target.is_dir():
                 raise
     return target
-
-
-def _scratch(cache: Path) -> tempfile.TemporaryDirectory[str]:
-    """Return a new folder in the cache, which its context deletes."""
-    try:
-        cache.mkdir(parents=True, exist_ok=True)
-        return tempfile.TemporaryDirectory(dir=cache)
-    except OSError as error:
-        raise ScenarioError(
-            f"the live page's packages cannot be kept in {cache} ({error.strerror}): "
-            "set XDG_CACHE_HOME to a folder that you can write"
-        ) from error
 
 
 def npm() -> list[str]:

@@ -437,7 +437,10 @@ def test_what_cannot_be_an_fmu_is_one_sentence(tmp_path, monkeypatch):
         (lambda: smc.export_fmu("pid", u_max=-1.0), "u_max is -1"),
         (lambda: smc.export_fmu("pid", model="full"), "model is 'full': give 'none' or 'nominal'"),
         (lambda: smc.export_fmu("hierarchical", model="none"), "needs the nominal model"),
-        (lambda: smc.export_fmu("twisting", surface="linear"), "takes no surface such as 'linear'"),
+        (
+            lambda: smc.export_fmu("twisting", surface="linear"),
+            "surface 'linear' has relative degree 1, and law 'twisting' 2",
+        ),
         (lambda: smc.export_fmu(scenario("pid"), surface="linear"), "a scenario has its own surface"),
         (lambda: smc.export_fmu(smc.policy(lambda x: 0.0)), "cannot be written in C"),
     ):

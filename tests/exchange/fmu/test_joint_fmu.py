@@ -216,7 +216,7 @@ def test_what_cannot_be_an_fmu_is_one_sentence(call, said, tmp_path, monkeypatch
 
 
 def test_it_is_no_law_of_one_channel(made):
-    said = r"unit_vector\.fmu has inputs of many joints, such as 'x\[2\]': give an FMU of one channel, or the law in C"
+    said = r"unit_vector\.fmu has inputs that mean nothing that a law measures, x\[1\], x\[2\], x\[3\]"
     with pytest.raises(smc.ScenarioError, match=said) as error:
         smc.law_from_fmu(made["unit_vector"][0])
     assert "\n" not in str(error.value)
