@@ -1,32 +1,19 @@
 """An adviser: which law suits a plant, its conditions and the needs of a user, with which gains, and how sure that is.
 
-    advice = smc.which("duffing", ["noise", "coulomb"], needs=["fast", "calm"])
-    print(advice)                                  # a table, and "Use ... because ... Second choice ... How sure ..."
-    smc.Scenario(plant="duffing", law=advice.law)
-
 A need is a metric to compare (fast, accurate, calm ...) or a property that a law must have (continuous, two-gains ...).
 With "no-velocity", laws that read a velocity get one that is differentiated from the position.
 
-1. Every law that suits gets gains for the plant: those that come with the package, or by the same rule from `tune`,
-   with the same bound on u. Where laws have gains of the package, a search for others has the starts and the number of
-   evaluations of these. A law's own gains are one more set that is tried.
-2. Every law runs in each condition from the same seeds, which no search of gains has seen.
-3. They are compared by the rules of `ranking`. A block is a need in a condition, so every need weighs the same in every
-   condition, and the tests are corrected for all pairs of laws in all blocks.
-
-No law is left out after fewer runs: a few seeds would decide which law may be first.
-
-A law is not fit if, in some condition, it settles in less than half as many runs as the law that settles most often.
-Otherwise a law that does nothing would be the calmest. Laws that are not fit are not compared. A law is reliable if it
-settles in 90 % of the runs of every condition; otherwise the answer is that no law is. Laws with gains of the package
-run with all sets of these, a run with each in turn, so that the answer holds over the gains that a tuning may end with.
+Every law that suits gets gains by one rule, and runs in each condition from the same seeds. Laws are compared by the
+rules of `ranking`. A block is a need in a condition, so every need weighs the same in every condition. No law is left
+out after fewer runs: a few seeds would decide which law may be first. A law that settles in less than half as many runs
+of some condition as the law that settles most often is not fit, and not compared: else a law that does nothing would be
+the calmest. A law is reliable if it settles in 90 % of the runs of every condition.
 
 A law dominates another if it is better in some block and worse in none. Laws with fewer runs that fail come first, then
 laws by mean rank, but none before a law that dominates it. Laws that tie with the next law in this order stand by their
 overshoot, and then by their energy of u, less first. The first law is advised, unless all are level.
 
-"robust" is the one need that is not a metric of these runs. An adversary attacks each law, with the default budget of
-`worst_case` over all conditions. A law is better if its worst case is smaller by more than the least relevant
+For "robust" an adversary attacks each law. A law is better if its worst case is smaller by more than the least relevant
 difference. There is no test, because a worst case is no sample.
 """
 
@@ -38,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
-from smc_mujoco.analysis.paired_runs import SETTLES, Scores
+from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Rank, checked_share, compare, ranked, ranks
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, default_class
 from smc_mujoco.common.errors import ScenarioError, number, unknown, whole
@@ -50,9 +37,8 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
 from smc_mujoco.simulation.grid import case, check_moving, listed, listed_laws
 from smc_mujoco.simulation.initial_states import Starts
-from smc_mujoco.studies.advice import Advice
+from smc_mujoco.studies.advice import NEEDS, ROBUST, Advice, Choice, Need, Runs, ties
 from smc_mujoco.studies.fair_gains import Candidate, law_or_template
-from smc_mujoco.studies.needs import NEEDS, ROBUST, Choice, Need, Runs, ties
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.trial import Trial
@@ -67,15 +53,14 @@ MIN_SETTLED = 0.5  # of the largest share of runs that settle under a law; chose
 
 
 class Extent(NamedTuple):
-    """How much is run: s of a run, sets of gains that a tuning tries, and in how many parts a budget is shared."""
+    """How much is run."""
 
-    duration: float
-    budget: int
-    parts: int
+    duration: float  # s, of a run
+    budget: int  # sets of gains that a tuning tries
+    parts: int  # in how many parts the budget of an adversary is shared
 
 
-FULL = Extent(duration=5.0, budget=96, parts=1)
-QUICK = Extent(duration=3.0, budget=32, parts=3)
+FULL, QUICK = Extent(duration=5.0, budget=96, parts=1), Extent(duration=3.0, budget=32, parts=3)
 
 
 def which(
@@ -122,17 +107,17 @@ def which(
     tested = _conditions(conditions, machine, length, NO_VELOCITY in properties)
     trial = Trial([machine], tested, length, starts, Path(out), threads, progress)
     effort, wanted = _effort(trial), [name for name in properties if name != NO_VELOCITY]
-    candidates = _candidates(trial, wanted, laws, extent.budget)
+    candidates = _candidates(trial, _suited(machine, wanted, laws), extent.budget)
     table = trial.run({machine.name: [*candidates.values()]}, count, noise_key=noise_key)
     worst = _worst(trial, candidates, duration, within, extent.parts) if ROBUST in compared else {}
-    contest = _contest(table, worst, machine, compared, relevant)
+    comparison, choices = _contest(table, worst, candidates, machine, compared, relevant)
     return Advice(
         plant=machine,
         conditions=tuple(condition.name for condition in tested),
         needs=compared,
         wanted=tuple(PROPERTIES[name].words for name in wanted),
-        choices=_choices(contest, candidates),
-        comparison=contest.comparison,
+        choices=choices,
+        comparison=comparison,
         table=table,
         effort=effort,
         untuned=() if defaults else tuple(n for n, c in candidates.items() if c.law.source.kind == source.DEFAULT),
@@ -143,15 +128,10 @@ def which(
 
 
 def _needs(needs: str | Sequence[str], plant: Plant) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the needs that are metrics, and those that are properties.
-
-    Raises:
-      ScenarioError: an unknown need, or one that has no number on this plant.
-    """
+    """Return the needs that are metrics, and those that are properties."""
     if isinstance(needs, str):
         needs = [name.strip() for name in needs.split(",") if name.strip()]
-    none = isinstance(needs, list | tuple) and not needs
-    names = [] if none else list(dict.fromkeys(listed("needs", needs)))
+    names = list(dict.fromkeys(listed("needs", needs))) if needs else []
     for name in names:
         if name not in NEEDS and name not in PROPERTIES:
             raise unknown("need", name, [*NEEDS, *PROPERTIES])
@@ -191,11 +171,7 @@ def _effort(trial: Trial) -> str:
 
 
 def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> Sequence[Component | Template]:
-    """Return the laws to compare. Those without given gains are templates.
-
-    Raises:
-      ScenarioError: an unknown law, or none that has the properties.
-    """
+    """Return the laws to compare. Those without given gains are templates."""
     if laws is None:
         left_out = {"none", *gain_sets.ALIASES}  # aliases have the gains of laws that are there already
         chosen = [law for law in suitable(properties, plant=plant) if law.name not in left_out]
@@ -215,10 +191,9 @@ def _has(law: Component | Template, properties: Sequence[str]) -> bool:
     return template is None or all(PROPERTIES[name].holds(template) for name in properties)
 
 
-def _candidates(trial: Trial, properties: Sequence[str], laws: Any, budget: int) -> dict[str, Candidate]:
+def _candidates(trial: Trial, laws: Sequence[Component | Template], budget: int) -> dict[str, Candidate]:
     """Return name of the law -> the law with gains; raise ScenarioError if two laws have one name."""
-    (plant,) = trial.plants
-    (candidates,) = trial.gains({plant.name: _suited(plant, properties, laws)}, budget).values()
+    (candidates,) = trial.gains({trial.plants[0].name: laws}, budget).values()
     by_name = {candidate.law.name: candidate for candidate in candidates}
     if len(by_name) < len(candidates):
         raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")
@@ -231,11 +206,9 @@ def _candidates(trial: Trial, properties: Sequence[str], laws: Any, budget: int)
 def _worst(
     trial: Trial, candidates: Mapping[str, Candidate], duration: float | None, within: Uncertainty | None, parts: int
 ) -> dict[str, list[WorstCase]]:
-    """Return law -> its worst case in each condition, by default within the class of the first one.
+    """Return law -> its worst case in each condition; the default budget is divided by the conditions and by `parts`.
 
-    Args:
-      duration: of a run, s. Default: that of `worst_case`.
-      parts: the default budget of `worst_case` is divided by the conditions and by this.
+    All laws are attacked within one class, by default that of the first one.
     """
     (plant,), length = trial.plants, DURATION if duration is None else duration
     scenarios = {
@@ -251,34 +224,15 @@ def _worst(
     }
 
 
-class Contest(NamedTuple):
-    """Runs of laws and their comparison.
-
-    Attributes:
-      runs: what the needs are computed from.
-      scores: need -> the scores of all laws.
-      comparison: of the laws that are fit, or of all if none is.
-      order: all laws, best first. Those that are not fit come last, with NaN for a rank.
-      settled: share of runs that settle, (laws, conditions).
-      fit: names of the laws that are fit.
-    """
-
-    runs: Runs
-    scores: Mapping[str, Scores]
-    comparison: Comparison
-    order: list[Rank]
-    settled: np.ndarray
-    fit: set[str]
-
-
 def _contest(
-    table: Table, worst: Mapping[str, Sequence[WorstCase]], plant: Plant, needs: Sequence[str], relevant: float
-) -> Contest:
-    """Compare laws over all needs and conditions."""
+    table: Table, worst: Mapping[str, Sequence[WorstCase]], candidates: Mapping[str, Candidate], plant: Plant,
+    needs: Sequence[str], relevant: float,
+) -> tuple[Comparison, tuple[Choice, ...]]:  # fmt: skip
+    """Compare laws over all needs and conditions; those that are not fit come last, with NaN for a rank."""
     (group,) = paired_runs.groups(table, by=("plant",))
     runs = Runs(table, group, worst)
     rows = paired_runs.values(table, SETTLES)[group.rows]
-    settled = 1.0 - np.nanmean(np.where(group.rows >= 0, rows, np.nan), axis=2)
+    settled = 1.0 - np.nanmean(np.where(group.rows >= 0, rows, np.nan), axis=2)  # (laws, conditions)
     enough = np.all(settled >= MIN_SETTLED * settled.max(axis=0), axis=1)
     fit = {law for law, settles in zip(group.laws, enough.tolist(), strict=True) if settles}
     laws = [law for law in group.laws if law in fit] or group.laws
@@ -298,7 +252,20 @@ def _contest(
     )
     order = _order(comparison, _restraint(runs, ran, plant))
     order += [Rank(law, math.nan, math.nan, best=False) for law in group.laws if law not in laws]
-    return Contest(runs, scores, comparison, order, settled, fit)
+    shares = dict(zip(group.laws, settled, strict=True))
+    return comparison, tuple(
+        Choice(
+            law=candidates[rank.law].law,
+            remark=candidates[rank.law].remark,
+            rank=rank,
+            settles=float(shares[rank.law].mean()),
+            reliable=bool((shares[rank.law] >= RELIABLE).all()),
+            fit=rank.law in fit,
+            medians={need: NEEDS[need].median(its, rank.law) for need, its in scores.items()},
+            worst=tuple(worst.get(rank.law, ())),
+        )
+        for rank in order
+    )
 
 
 def _stacked(parts: Sequence[Mapping[str, np.ndarray]], laws: Sequence[str], fill: float = -1) -> dict[str, np.ndarray]:
@@ -338,21 +305,3 @@ def _order(comparison: Comparison, restraint: Mapping[str, tuple[float, ...]]) -
         ordered.append(min(tied, key=lambda rank: restraint[rank.law]))
         left.remove(ordered[-1])
     return ordered
-
-
-def _choices(contest: Contest, candidates: Mapping[str, Candidate]) -> tuple[Choice, ...]:
-    """Return the laws, best first."""
-    shares = dict(zip(contest.runs.group.laws, contest.settled, strict=True))
-    return tuple(
-        Choice(
-            law=candidates[rank.law].law,
-            remark=candidates[rank.law].remark,
-            rank=rank,
-            settles=float(shares[rank.law].mean()),
-            reliable=bool((shares[rank.law] >= RELIABLE).all()),
-            fit=rank.law in contest.fit,
-            medians={need: NEEDS[need].median(scores, rank.law) for need, scores in contest.scores.items()},
-            worst=tuple(contest.runs.worst.get(rank.law, ())),
-        )
-        for rank in contest.order
-    )

@@ -1,13 +1,10 @@
-"""A board: laws compared in one metric, its verdict in words, and boards as tables.
-
-A table has a line for each law and a column for each metric, with medians and their intervals.
-"""
+"""A board: laws compared in one metric, its verdict in words, and boards as tables, with medians and intervals."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
@@ -28,29 +25,19 @@ if TYPE_CHECKING:
 MAX_RATIO_OF_TIMES_LESS = 0.5  # a smaller ratio is "so many times less", a larger one so many percent; chosen
 MIN_RATIO_OF_TIMES_AS_MUCH = 10.0  # a larger ratio is "so many times as much", not so many percent; chosen
 MIN_DIFFERENCE = 1e-9  # smaller differences are not printed, see `number`
-MAX_NAMES = 4  # of plants or conditions in a verdict
-NO_BOARDS = Tabular(headings=["no boards: no metric applies"], rows=[])
+MAX_NAMES = 6  # in a sentence; chosen
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Entry:
-    """A law's line in a board.
-
-    Attributes:
-      law: its name.
-      interval: its median, or the share of its runs that settle, over its samples.
-      rank: its place.
-      failed: number of its runs that failed, or have no value, such as those that never settle.
-      runs: number of its runs, equal ones counted once.
-      sources: where its gains come from; none where the table does not say.
-    """
+    """A law's line in a board."""
 
     law: str
-    interval: Interval
+    interval: Interval  # of its median, or of the share of its runs that settle, over its samples
     rank: Rank
-    failed: int
-    runs: int
-    sources: tuple[Source, ...] = ()
+    failed: int  # number of its runs that failed, or have no value, such as those that never settle
+    runs: int  # number of its runs, equal ones counted once
+    sources: tuple[Source, ...] = ()  # of its gains; none where the table does not say
 
     @property
     def about_defaults(self) -> bool:
@@ -69,44 +56,26 @@ class Lead(NamedTuple):
     @property
     def words(self) -> str:
         """How the law compares with its rival, such as "12 % less than pid (8 to 16 %), ahead in 24 of 24 runs"."""
-        samples = "sets of gains" if self.effect.sets else "runs"
-        size = size_in_words(self.effect, self.unit, self.rival)
-        return f"{size}, ahead in {self.effect.ahead} of {self.effect.samples} {samples}"
+        return f"{size_in_words(self.effect, self.unit, self.rival)}, {ahead_in_words(self.effect)}"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Block:
-    """Laws compared on one plant in one condition.
-
-    Attributes:
-      plant, condition: their names.
-      medians: law -> median over the seeds; for "settles" the share of runs that do not settle.
-      lacking: law -> number of runs that failed or have no value.
-      best: the laws that no other law is better than, without such a run, and with enough samples to tell.
-      undecided: the laws that no other is better than, but only because there are too few samples, see `ranking`.
-      lead: how the law in front compares with its closest rival; None for one law, for "settles", or if it has runs
-        without a value.
-      seeds: number of seeds in which every law ran.
-      runs: number of distinct runs among these. In the others every law has the same result as in an earlier seed.
-      samples: largest number of samples of any two laws, see `ranking`; of one law that of its runs.
-      sets: smallest number of sets of gains of a law that has several; 1 if none has.
-      untuned: the laws with default gains, over which no other law is named the winner.
-      ahead: the law that is better than every other, laws with default gains included.
-    """
+    """Laws compared on one plant in one condition."""
 
     plant: str
     condition: str
-    medians: Mapping[str, float]
-    lacking: Mapping[str, int]
-    best: tuple[str, ...]
-    undecided: tuple[str, ...]
-    ahead: str | None
-    lead: Lead | None
-    seeds: int
-    runs: int
-    samples: int
-    sets: int
-    untuned: tuple[str, ...] = ()
+    medians: Mapping[str, float]  # law -> median over the seeds; for "settles" the share of runs that do not settle
+    lacking: Mapping[str, int]  # law -> number of runs that failed or have no value
+    best: tuple[str, ...]  # laws that no other is better than, without such a run, and with enough samples to tell
+    undecided: tuple[str, ...]  # laws that no other is better than, but only because there are too few samples
+    ahead: str | None  # the law that is better than every other, laws with default gains included
+    lead: Lead | None  # None for one law, for "settles", or if the law in front has runs without a value
+    seeds: int  # in which every law ran
+    runs: int  # distinct ones among these; in the others every law has the same result as in an earlier seed
+    samples: int  # largest number of samples of any two laws, see `ranking`; of one law that of its runs
+    sets: int  # smallest number of sets of gains of a law that has several; 1 if none has
+    untuned: tuple[str, ...] = ()  # the laws with default gains, over which no other law is named the winner
 
     @property
     def winner(self) -> str | None:
@@ -127,29 +96,17 @@ class Block:
 
 @dataclasses.dataclass(frozen=True, kw_only=True, repr=False)
 class Board(Tables):
-    """Laws compared in one metric within one group of runs.
+    """Laws compared in one metric within one group of runs."""
 
-    Attributes:
-      group: what the runs have in common, such as {"plant": "duffing"}.
-      metric: a metric's name, or "settles".
-      unit: of the medians, with {x} and {u} as in `conventions.Metric.unit`; "" for "settles", which is 0 to 1.
-      entries: lowest mean rank first. A median over several plants is NaN if its unit depends on the plant.
-      blocks: the same laws on each plant in each condition.
-      family: number of blocks of the table for which winners are corrected.
-      relevant: share of a value that is relevant.
-      resolution: the largest lower bound on the least relevant difference, in the unit of the board.
-      by_step: whether it is about chattering without RK4, which half the physics step may change.
-    """
-
-    group: Mapping[str, str]
-    metric: str
-    unit: str
-    entries: tuple[Entry, ...]
-    blocks: tuple[Block, ...]
-    family: int
-    relevant: float
-    resolution: float
-    by_step: bool
+    group: Mapping[str, str]  # what the runs have in common, such as {"plant": "duffing"}
+    metric: str  # its name, or "settles"
+    unit: str  # of the medians, with {x} and {u} as in `Metric.unit`; "" for "settles", which is 0 to 1
+    entries: tuple[Entry, ...]  # lowest mean rank first; no median over several plants where their units differ
+    blocks: tuple[Block, ...]  # the same laws on each plant in each condition
+    family: int  # number of blocks of the table for which winners are corrected
+    relevant: float  # share of a value that is relevant
+    resolution: float  # the largest lower bound on the least relevant difference, in the unit of the board
+    by_step: bool  # whether it is about chattering without RK4, which half the physics step may change
 
     @property
     def best(self) -> tuple[str, ...]:
@@ -164,8 +121,8 @@ class Board(Tables):
 
     @property
     def tables(self) -> list[Tabular]:
-        """The board as a table, see `Boards.tables`."""
-        return tables([self])
+        """The board as a table."""
+        return Boards([self]).tables
 
     @property
     def about(self) -> str:
@@ -199,7 +156,7 @@ class Board(Tables):
     def where(self) -> str:
         """The plants and conditions in words, such as " on duffing under noise"."""
         parts = {"on": [block.plant for block in self.blocks], "under": [block.condition for block in self.blocks]}
-        return "".join(f" {preposition} {_some_of(names)}" for preposition, names in parts.items())
+        return "".join(f" {preposition} {first_of(dict.fromkeys(names))}" for preposition, names in parts.items())
 
     @property
     def verdict(self) -> str:
@@ -209,34 +166,30 @@ class Board(Tables):
     @property
     def result(self) -> str:
         """The result in words: the winner, else where laws win and lose, why there is no winner, or the best laws."""
+        blocks = f"in {every(len(self.blocks))} {self.kind}"
+        these = ", for these gains" * all(block.sets == 1 for block in self.blocks)
         if self.winner:
             leads = [block.lead for block in self.blocks if block.lead]
             # ratios come before differences, and are ordered by the end of their interval
             closest = max(leads, key=lambda lead: lead.effect.high if lead.effect.relative else -math.inf, default=None)
-            several = f" in {every(len(self.blocks))} {self.kind}" * (len(self.blocks) > 1)
             how = f": {'at least ' * (len(leads) > 1)}{closest.words}" if closest else ""
-            return f"{self.winner} wins{several}{how}{self._gains([self.winner])}"
-        results = {}
-        for law in (entry.law for entry in self.entries):
-            if wins := self.wins(law):
-                losses = self.losses(law)
-                results[law] = f"{law} wins under {_listed(wins)}" + f", loses under {_listed(losses)}" * any(losses)
+            return f"{self.winner} wins{f' {blocks}' * (len(self.blocks) > 1)}{how}{self._search(self.winner)}{these}"
+        results = []
+        for law in (entry.law for entry in self.entries if self.wins(entry.law)):
+            losses = f", loses under {joined(self.losses(law))}" * bool(self.losses(law))
+            results.append(f"{law} wins under {joined(self.wins(law))}{losses}{self._search(law)}")
         if results:
-            words = "; ".join(results.values()) + self._gains(results)
-            return f"no winner in {every(len(self.blocks))} {self.kind}: {words}"
+            return f"no winner {blocks}: {'; '.join(results)}{these}"
         if self.why:
             return f"no winner: {self.why}"
         if len(self.best) == len(self.entries):
-            return "no winner: all laws are level" if len(self.best) > 2 else "no winner: both laws are level"
-        return f"no winner, undefeated: {_listed(self.best)}"
+            return f"no winner: {'all' if len(self.best) > 2 else 'both'} laws are level"
+        return f"no winner, undefeated: {joined(self.best)}"
 
-    def _gains(self, laws: Collection[str]) -> str:
-        """Return what limits the results of laws that win, after commas: their search, and "for these gains"."""
-        others = [entry.law for entry in self.entries if entry.law in laws and entry.about_defaults]
-        names, its = f"{joined(others)} " * (len(laws) > 1), "its" if len(others) == 1 else "their"
-        limits = [f"{names}with gains searched about {its} defaults and not by the rule"] * bool(others)
-        limits += ["for these gains"] * all(block.sets == 1 for block in self.blocks)
-        return "".join(f", {limit}" for limit in limits)
+    def _search(self, law: str) -> str:
+        """Return how the gains of a law that wins were searched, after a comma, if not by the rule."""
+        about = any(entry.about_defaults for entry in self.entries if entry.law == law)
+        return ", with gains searched about its defaults and not by the rule" * about
 
     @property
     def why(self) -> str:
@@ -259,23 +212,14 @@ class Board(Tables):
     def too_few(self) -> str:
         """The size of the sample in words, if no block has enough samples for a winner; else ""."""
         largest = max(self.blocks, key=lambda block: block.samples)
-        smallest_p, error = 2 * min_p(largest.samples), 1 - LEVEL
-        if smallest_p <= error / self.family:
+        if 2 * min_p(largest.samples) <= (1 - LEVEL) / self.family:
             return ""
-        compared = f", too few for {self.family} comparisons" if smallest_p <= error else ", too few"
-        if largest.samples < largest.sets or (largest.sets > 1 and largest.samples > largest.sets):
-            return f"{largest.samples} samples{compared}"
-        if largest.sets > 1:
-            return f"{largest.sets} sets of gains{compared}"
-        if largest.samples < largest.runs:
-            return f"{largest.sample}, of two laws {counted(largest.samples, 'distinct run')}"
-        return largest.sample + compared * (largest.runs == largest.seeds or smallest_p <= error)
+        known = largest.sets if largest.sets > 1 else largest.runs
+        samples = f": {counted(largest.samples, 'sample')}" * (largest.samples != known)
+        return f"{largest.sample}{samples}, too few" + f" for {self.family} comparisons" * (self.family > 1)
 
     def failures(self, entry: Entry) -> str:
-        """Return how many of a law's runs failed, such as "2 of 24 failed"; "" if none did.
-
-        In a metric that is a time, runs that never end are counted too: "2 of 24 never".
-        """
+        """Return how many of a law's runs failed, or never end in a time, such as "2 of 24 failed"; "" if none did."""
         return f"{entry.failed} of {entry.runs} {'never' if self.unit == 's' else 'failed'}" if entry.failed else ""
 
 
@@ -305,41 +249,43 @@ def size_in_words(effect: Effect, unit: str = "", rival: str = "") -> str:
     return f"{words}{named} ({'too few for an interval' if endless else span})"
 
 
+def ahead_in_words(effect: Effect) -> str:
+    """Return in how many samples a law is better, such as "ahead in 24 of 24 runs"."""
+    return f"ahead in {effect.ahead} of {effect.samples} {'sets of gains' if effect.sets else 'runs'}"
+
+
 def _percent(share: float) -> str:
     """Return a share in percent, with two digits where it is small."""
     return f"{share:g}" if math.isinf(share) else f"{100 * share:.2g}" if abs(share) < 0.0995 else f"{100 * share:.0f}"
 
 
-def _some_of(names: Sequence[str]) -> str:
-    """Return different names in words; if they are many, the first and the last."""
-    several = list(dict.fromkeys(names))
-    return joined(several) if len(several) <= MAX_NAMES else f"{several[0]} ... {several[-1]} ({len(several)})"
+def first_of(names: Iterable[str]) -> str:
+    """Return names in a row; if they are many, the first ones and how many more there are."""
+    several = list(names)
+    more = len(several) - MAX_NAMES
+    return joined([*several[:MAX_NAMES], f"{more} more"]) if more > 1 else joined(several)
 
 
 class Boards(Tables, list[Board]):
-    """Boards: a list that terminals, notebooks and `print` show as tables, with a verdict on each board.
+    """Boards: a list that terminals, notebooks and `print` show as tables, with a verdict on each board."""
 
-    Attributes:
-      worst: plant -> law -> its `worst_case`, for a column of the plant's tables; empty for none.
-      failures: a sentence for each law with failed runs, below the last table.
-    """
-
-    worst: Mapping[str, Mapping[str, WorstCase]] = frozen({})
-    failures: Sequence[str] = ()
+    worst: Mapping[str, Mapping[str, WorstCase]] = frozen({})  # plant -> law -> its worst case, for a last column
+    failures: Sequence[str] = ()  # a sentence for each law with failed runs, below the last table
 
     @property
     def tables(self) -> list[Tabular]:
-        """A table for each group of runs: a line for each law, a column for each metric.
+        """A table for each group of runs, with what each metric's board says below, and a key below the last.
 
-        A cell has a median with its interval. The median is marked if no law is better in any block, no run failed, and
-        there are enough runs for a winner.
+        It has a line for each law and a column for each metric. A cell has a median with its interval. The median is
+        marked if no law is better in any block, no run failed, and there are enough runs for a winner.
         """
-        return tables(self, self.worst, self.failures)
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Join names by commas, or by semicolons if a name has a comma in it."""
-    return ("; " if any("," in name for name in names) else ", ").join(names)
+        groups: dict[str, list[Board]] = {}
+        for board in self:
+            groups.setdefault(board.about, []).append(board)
+        if not groups:
+            return [Tabular(headings=["no boards: no metric applies"], rows=[])]
+        made = [_table(name, its, self.worst.get(its[0].group.get("plant", ""), {})) for name, its in groups.items()]
+        return [*made[:-1], dataclasses.replace(made[-1], notes=(*made[-1].notes, *self.failures, key(self)))]
 
 
 def size(value: float, metric: str) -> str:
@@ -350,10 +296,7 @@ def size(value: float, metric: str) -> str:
 
 
 def spread(interval: Interval, metric: str) -> str:
-    """Return the ends of an interval, rounded like its median, so that the printed median is within.
-
-    "" if they are not known, or both infinite.
-    """
+    """Return the ends of an interval, rounded like its median; "" if they are not known, or both infinite."""
     if math.isinf(interval.low):
         return ""
     ends = [size(value, metric) for value in (interval.low, interval.high)]
@@ -370,39 +313,20 @@ def heading(board: Board) -> str:
     return metric.label + (f" ({unit})" if unit not in ("", "1") else "")
 
 
-def tables(
-    boards: Iterable[Board], worst: Mapping[str, Mapping[str, WorstCase]] | None = None, failures: Sequence[str] = ()
-) -> list[Tabular]:
-    """Return a table for each group of runs, with what each metric's board says below, and a key below the last.
-
-    Args:
-      worst: plant -> law -> its worst case, for a last column.
-      failures: how laws failed, in sentences above the key.
-    """
-    groups: dict[str, list[Board]] = {}
-    for board in boards:
-        groups.setdefault(board.about, []).append(board)
-    made = [_table(name, its, (worst or {}).get(its[0].group.get("plant", ""), {})) for name, its in groups.items()]
-    if not made:
-        return [NO_BOARDS]
-    words = key([board for its in groups.values() for board in its])
-    return [*made[:-1], dataclasses.replace(made[-1], notes=(*made[-1].notes, *failures, words))]
-
-
 def _table(name: str, boards: Sequence[Board], worst: Mapping[str, WorstCase]) -> Tabular:
     """Return the table of one group of runs. Laws stand by place in the first metric, then in the next ones."""
     sources_of = sources(boards)
     known = ["gains"] * any(sources_of.values())
-    rows: dict[str, list[Cell | str]] = {}
+    cells = {(i, entry.law): _cell(board, entry) for i, board in enumerate(boards) for entry in board.entries}
     places: dict[str, list[float]] = {}
-    for i, board in enumerate(boards):
-        for entry in board.entries:
-            left = [Cell(entry.law, colour=style.law_colour(entry.law)), *([kinds(sources_of[entry.law])] * len(known))]
-            row = rows.setdefault(entry.law, [*left, *[""] * len(boards)])
-            row[len(left) + i] = _cell(board, entry)
-            places.setdefault(entry.law, []).append(entry.rank.place)
-    for law, case in worst.items():
-        rows[law].append(Cell(case.shown(case.value), f"median {case.shown(case.median)}"))
+    for entry in (entry for board in boards for entry in board.entries):
+        places.setdefault(entry.law, []).append(entry.rank.place)
+    rows: list[list[Cell | str]] = []
+    for law in sorted(places, key=lambda law: (places[law], law)):
+        left = [Cell(law, colour=style.law_colour(law)), *([kinds(sources_of[law])] * len(known))]
+        found = worst.get(law)
+        case = [Cell(found.shown(found.value), f"median {found.shown(found.median)}")] if found else []
+        rows.append([*left, *(cells.get((i, law), "") for i in range(len(boards))), *case])
     units = [f"worst found ({case.unit})" for case in worst.values()][:1]
     largest = max(boards, key=lambda board: len(board.blocks))
     name = ", ".join(filter(None, [name, largest.name(largest.blocks[0]) if len(largest.blocks) == 1 else ""]))
@@ -410,7 +334,7 @@ def _table(name: str, boards: Sequence[Board], worst: Mapping[str, WorstCase]) -
     several = "; ".join(f"{sample} ({block}{' ...' * (len(largest.blocks) > 2)})" for sample, block in samples.items())
     return Tabular(
         headings=["law", *known, *map(heading, boards), *units],
-        rows=[rows[law] for law in sorted(rows, key=lambda law: (places[law], law))],
+        rows=rows,
         title=f"{name}: {several if len(samples) > 1 else largest.blocks[0].sample}",
         notes=_verdicts(boards),
         left=1 + len(known),

@@ -2,14 +2,12 @@
 
     boards = leaderboard(table)                        # a Board for each plant and metric
     boards[0].winner                                   # a law's name, or None if no law is significantly better
-    print(boards[0].verdict)                           # the winner, and by how much it leads
     print(boards)                                      # tables, with all verdicts
 
-`analysis.ranking` defines samples, tests, winners and the correction, `analysis.bootstrap` the intervals of medians. A
-board is one metric in one group of runs. Laws are compared in each of its blocks, a plant in a condition. The tests are
-corrected for all blocks of the table in this metric, so the verdict on a block is the same on every board that has it.
-The winner of a board with several blocks wins in every one. The conclusions hold for the plants and conditions of the
-table, over initial states and noise, and over the gains with which the laws ran.
+A board is one metric in one group of runs. Laws are compared by the rules of `analysis.ranking` in each of its blocks,
+a plant in a condition. The tests are corrected for all blocks of the table in this metric, so the verdict on a block is
+the same on every board that has it. The winner of a board with several blocks wins in every one. The conclusions hold
+for the plants and conditions of the table, over initial states and noise, and over the gains with which the laws ran.
 """
 
 import dataclasses
@@ -33,6 +31,7 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation.scenario import Scenario
     from smc_mujoco.studies.worst_case import WorstCase
 
+UNITS = {SETTLES: ""} | {name: metric.unit for name, metric in CATALOGUE.items()}
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 
 
@@ -64,54 +63,34 @@ def leaderboard(
     """
     if isinstance(metrics, str) or not metrics:
         raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
-    known = {SETTLES: ""} | {name: metric.unit for name, metric in CATALOGUE.items()}
-    units = {name: find("metric", name, known) for name in metrics}
+    for name in metrics:
+        find("metric", name, UNITS)
     boards = Boards()
     boards.worst, boards.failures = worst or {}, paired_runs.failures(table)
-    by_row = {name: paired_runs.values(table, name) for name in units}
+    by_row = {name: paired_runs.values(table, name) for name in dict.fromkeys(metrics)}
     groups = list(paired_runs.groups(table, by))
     every = groups if set(by) == set(paired_runs.GROUPS) else list(paired_runs.groups(table, paired_runs.GROUPS))
-    families = {name: _family(table, every, by_row[name], name, units[name], relevant) for name in units}
+    families = {name: _family(table, every, values, name, relevant) for name, values in by_row.items()}
     for group in groups:
         ran = paired_runs.scenarios(table, group)
         sources = paired_runs.sources(table, group.rows[group.rows >= 0])
         at_default = (law for law, its in sources.items() if any(source.kind == DEFAULT for source in its))
         untuned = () if defaults else tuple(at_default)
-        for metric, unit in units.items():
+        for metric, values in by_row.items():
             limits, family = families[metric]
-            scores = group.scores(by_row[metric])
-            if not scores.blocks:
-                continue
-            comparison = _compared(scores, ran, metric, unit, relevant, limits)
-            boards.append(_board(group, scores, ran, metric, unit, comparison, untuned, sources, family))
+            scores = group.scores(values)
+            if scores.blocks:
+                comparison = _compared(scores, ran, metric, relevant, limits)
+                boards.append(_board(group, scores, ran, metric, comparison, untuned, sources, family))
     return boards
 
 
-def _compared(
-    scores: Scores,
-    ran: "Sequence[Scenario | None]",
-    metric: str,
-    unit: str,
-    relevant: float,
-    limits: Limits,
-) -> Comparison:
-    """Compare the scores of laws in a metric whose unit is `unit`; `ran` has a scenario of each block of the group."""
-    floors = [paired_runs.floor(ran[k], unit) for k in scores.blocks]
-    return compare(scores.values, floors, metric == SETTLES, scores.outcomes, scores.sets, relevant, limits)
-
-
 def _board(
-    group: Group,
-    scores: Scores,
-    ran: "Sequence[Scenario | None]",
-    metric: str,
-    unit: str,
-    comparison: Comparison,
-    untuned: tuple[str, ...],
-    sources: Mapping[str, tuple[Source, ...]],
-    family: int,
-) -> Board:
+    group: Group, scores: Scores, ran: "Sequence[Scenario | None]", metric: str, comparison: Comparison,
+    untuned: tuple[str, ...], sources: Mapping[str, tuple[Source, ...]], family: int,
+) -> Board:  # fmt: skip
     """Return the board of a comparison, whose limits are corrected for `family` comparisons."""
+    unit = UNITS[metric]
     if all((scenario := ran[k]) is not None and scenario.voltage_motor for k in scores.blocks):
         unit = unit.replace("({u})", "V").replace("{u}", "V")
     blocks = tuple(
@@ -131,8 +110,16 @@ def _board(
     )
 
 
+def _compared(
+    scores: Scores, ran: "Sequence[Scenario | None]", metric: str, relevant: float, limits: Limits
+) -> Comparison:
+    """Compare the scores of laws in a metric; `ran` has a scenario of each block of the group."""
+    floors = [paired_runs.floor(ran[k], UNITS[metric]) for k in scores.blocks]
+    return compare(scores.values, floors, metric == SETTLES, scores.outcomes, scores.sets, relevant, limits)
+
+
 def _family(
-    table: Columns, blocks: Sequence[Group], by_row: np.ndarray, metric: str, unit: str, relevant: float
+    table: Columns, blocks: Sequence[Group], by_row: np.ndarray, metric: str, relevant: float
 ) -> tuple[Limits, int]:
     """Return the limits of the p-values of a metric, corrected for all blocks of a table, and the number of these."""
     comparisons = []
@@ -143,7 +130,7 @@ def _family(
             continue
         if scores.values:
             ran = paired_runs.scenarios(table, group)
-            comparisons.append(_compared(scores, ran, metric, unit, relevant, Limits(0.0, 0.0)))
+            comparisons.append(_compared(scores, ran, metric, relevant, Limits(0.0, 0.0)))
     return corrected_limits(comparisons), sum(len(comparison.laws) > 1 for comparison in comparisons) or 1
 
 
@@ -191,10 +178,7 @@ def _lead(comparison: Comparison, at: int, unit: str) -> Lead | None:
 
 
 def _entries(
-    comparison: Comparison,
-    sets: Mapping[str, np.ndarray],
-    sources: Mapping[str, tuple[Source, ...]],
-    mixed: bool,
+    comparison: Comparison, sets: Mapping[str, np.ndarray], sources: Mapping[str, tuple[Source, ...]], mixed: bool
 ) -> tuple[Entry, ...]:
     """Return the entries of all laws. If `mixed`, values have several units, so there is no median."""
     entries = []

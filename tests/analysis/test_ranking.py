@@ -480,15 +480,15 @@ def test_over_several_conditions_only_what_holds_in_each_is_told():
     board = leaderboard(stand(scores), ["itae"])[0]
     assert (board.best, board.winner) == ((), None)
     assert board.result == (
-        "no winner in all 3 conditions: a wins under c0, loses under c1, c2; b wins under c2, loses under c0, c1; "
-        "c wins under c1, loses under c0, c2, for these gains"
+        "no winner in all 3 conditions: a wins under c0, loses under c1 and c2; b wins under c2, loses under c0 and "
+        "c1; c wins under c1, loses under c0 and c2, for these gains"
     )
     assert leaderboard(stand({"a": blocks(1, 2), "b": blocks(2, 4)}), ["itae"])[0].result == (
         "a wins in both conditions: at least 50 % less than b (50 to 50 %), ahead in 20 of 20 runs, for these gains"
     )
     text = " ".join(printed([board]).split())
     assert "too few" not in text
-    assert "b wins under c2, loses under c0, c1;" in text
+    assert "b wins under c2, loses under c0 and c1;" in text
     level = leaderboard(stand({"a": blocks(1, 2), "b": blocks(1.01, 4)}), ["itae"])[0]
     assert level.result == "no winner in both conditions: a wins under c1, for these gains"
     first = leaderboard(stand({"a": blocks(1, 2), "b": blocks(1.01, 4), "c": blocks(4, 2.01)}), ["itae"])[0]
@@ -546,7 +546,7 @@ def test_a_board_for_each_plant_and_metric_with_medians_shares_and_winners():
     assert itae.unit == "{x} s^2"
     settles = picked(boards, "settles", plant="duffing")
     assert [entry.interval.median for entry in settles.entries] == [1.0, 1.0, 0.0]
-    assert settles.result == "no winner, undefeated: a, b"
+    assert settles.result == "no winner, undefeated: a and b"
     assert by_law(picked(boards, "settling_time", plant="duffing").entries)["c"].interval[:3] == (INF, INF, INF)
     failing = by_law(picked(boards, "settles", plant="van_der_pol").entries)["c"]
     assert failing.interval.median == 39 / 40
@@ -751,7 +751,7 @@ def test_seeds_that_change_nothing_are_one_sample():
     same = stand({law: np.repeat(values, 20, axis=1) for law, values in once.items()})
     (board,) = leaderboard(same, ["itae"])
     assert board.winner is None
-    assert board.result == "no winner: 20 seeds, 1 distinct run"
+    assert board.result == "no winner: 20 seeds, 1 distinct run, too few"
     assert all(math.isnan(entry.interval.low) for entry in board.entries)
     assert "20 seeds, 1 distinct run" in " ".join(printed([board]).split())
 
@@ -796,7 +796,7 @@ def test_one_condition_without_randomness_is_one_sample_beside_others():
 def test_seeds_that_change_rounding_alone_are_one_sample():
     values = 1.0 + 1e-12 * np.arange(20.0)
     (board,) = leaderboard(stand({"a": values[None], "b": 2 * values[None]}), ["itae"])
-    assert board.result == "no winner: 20 seeds, 1 distinct run"
+    assert board.result == "no winner: 20 seeds, 1 distinct run, too few"
     assert len({*without_rounding(np.array([0.1, 0.1 + 1e-15, 0.1 - 1e-15]))}) == 1
     assert (
         without_rounding(np.array([INF, 0.0, 3.0, 1.7e308])) > without_rounding(np.array([1.0, -1e-3, 2.9999, 1.0]))
@@ -880,7 +880,7 @@ def test_a_real_scenario_without_randomness_is_one_run_from_any_seed(tmp_path):
         for seed in range(20)
     ]
     board = leaderboard(run_study(scenarios, tmp_path), ["itae"])[0]
-    assert board.result == "no winner: 20 seeds, 1 distinct run"
+    assert board.result == "no winner: 20 seeds, 1 distinct run, too few"
 
 
 def test_a_law_that_fails_more_often_does_not_tie():

@@ -27,7 +27,7 @@ from smc_mujoco.control.law import catalogue, law_function
 from smc_mujoco.control.properties import searched
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
 from smc_mujoco.studies import adviser, fair_gains
-from smc_mujoco.studies.needs import NEEDS, Runs
+from smc_mujoco.studies.advice import NEEDS, Runs
 
 FAST, SLOW = smc.law("observer_free", lam=6.0, k1=2.0), smc.law("observer_free", lam=6.0, k1=5.0).named("slow")
 COMMON = {"duration": 2.5, "seeds": 16, "conditions": ["nominal", "noise"]}
@@ -82,7 +82,6 @@ def test_wins_are_those_of_the_comparison(advice):
     assert medians[advice.law.name] < 0.97 * medians["slow"]
     assert ("fast", "noise") in advice.wins(advice.law.name, "slow")
     assert ("fast", "noise") not in advice.wins("slow", advice.law.name)
-    assert "noise" in advice.better("slow", "fast")[advice.law.name]
 
 
 def test_the_answer_says_what_why_and_how_sure(advice):
@@ -101,7 +100,7 @@ def test_the_answer_says_what_why_and_how_sure(advice):
     effect = comparison.effect(least, "observer_free", "slow", winner=False)
     where = f"fast under {advice.blocks[least][1]}, where it does worst, {100 * (1 - effect.value):.0f} % less"
     assert f"observer_free against slow: {where} (" in sure
-    assert f"ahead with {effect.ahead} of 16 runs" in sure
+    assert f"ahead in {effect.ahead} of 16 runs" in sure
 
 
 def test_robust_goes_by_the_worst_found_and_tells_the_median_too(folder, monkeypatch):
@@ -126,16 +125,12 @@ def test_robust_goes_by_the_worst_found_and_tells_the_median_too(folder, monkeyp
     said = text(made)
     assert f"Robust: worst found rms error {alone[first].words}; no law is better." in said
     assert "worst found in 18 runs of each law in each condition, half of them random, within |d| <= 2 N" in said
-    slow = alone["slow"]
-    assert slow.median < alone[first].median
-    median = f"would put slow first, with {number(slow.median)} m: its worst found is {slow.words}."
-    assert f"The median of the random runs {median}" in said
     assert made.tables[0].rows[0][3][:3] == (number(alone[first].value), f"median {number(alone[first].median)}", True)
     both = smc.which("duffing", needs="fast,robust", conditions="nominal", duration=2.5, seeds=6, **options)
     tested = ranking.compare({law: both.comparison.cells[i, :1] for i, law in enumerate(both.comparison.laws)})
     assert both.comparison.limits == tested.limits  # what has no test is in no family of tests
     assert text(made).endswith("There is no test, as the worst found is one value of a law and no sample.")
-    assert "Except for robust, these comparisons hold over sets of gains, but for these gains of" in text(both)
+    assert "Except for robust, these comparisons hold over sets of gains, for these gains of" in text(both)
     alike = options | {"starts": smc.starts(spread=0.0), "laws": [FAST, SLOW]}
     one = smc.which("duffing", needs="fast,robust", conditions="nominal", duration=2.5, seeds=6, **alike)
     assert one.comparison.cells.shape == (2, 2, 1)  # every seed is the same run
@@ -155,15 +150,14 @@ def with_cells(advice, restraint=None, **cells):
     return dataclasses.replace(advice, comparison=comparison, choices=tuple(choices))
 
 
-def test_where_another_law_is_better_the_answer_says_which_and_what_it_gives_and_costs(advice):
+def test_where_another_law_is_better_the_answer_says_which(advice):
     found = with_cells(advice, observer_free=[1, 1, 9.9, 9.9], slow=[2, 2, 3, 8], classical=[4, 4, 9, 9])
     first = text(found)
     assert found.law.name == "slow"
     assert "Calm: TV rate 5.50 N/s; no law is better." in first
     assert "Fast: settling time 2.00 s; better is observer_free." in first
-    assert f"If only fast counts: {FAST}, with settling time 1.00 s instead of 2.00 s; it costs TV rate 9.90" in first
     assert "a matter of what counts against observer_free, better here and worse there" in first
-    assert "with other starts and noise, or among other laws, a law that it does not dominate may be first." in first
+    assert "with other starts and noise, a law that it does not dominate may be first." in first
     assert "it dominates classical" in first
     once = np.where(np.arange(24) * [[1], [0], [1], [0]], math.nan, 1.0)  # one distinct run without noise
     few = with_cells(advice, observer_free=once * [[1], [1], [9.9], [9.9]], slow=once * [[2], [2], [3], [9.9]])
@@ -177,13 +171,6 @@ def test_a_need_in_one_condition_is_named_with_it(advice):
     assert f"Second choice: {SLOW} (gains: yours); better on calm under noise; worse on fast." in text(found)
 
 
-def test_a_law_that_is_better_in_one_condition_and_worse_over_all_is_not_named_for_a_need(advice):
-    found = with_cells(advice, observer_free=[1, 1, 9, 9], slow=[2, 2, 10, 8.5], classical=[3, 3, 11, 11])
-    assert found.law.name == "observer_free"
-    assert "better is slow under noise" in text(found)
-    assert "If only" not in text(found)
-
-
 def test_a_law_that_another_dominates_is_not_advised_for_its_mean_rank(advice):
     """Slow has the lower median in three blocks, but is ahead in half of the seeds only; in the fourth it is worse."""
     mixed, even = np.tile([0.5, 1.6], 12), np.ones(24)
@@ -193,11 +180,9 @@ def test_a_law_that_another_dominates_is_not_advised_for_its_mean_rank(advice):
     assert second.rank.mean < first.rank.mean
     assert (first.law.name, found.dominated("slow")) == ("observer_free", ["observer_free"])
     assert found.dominated("observer_free") == []
-    assert "stands behind those that dominate it" in found.key
     cells["slow"] = [0.4 * even, even, even, 9 * even]  # now it is better in one block
     traded = with_cells(advice, **cells)
     assert (traded.law.name, traded.dominated("slow")) == ("slow", [])
-    assert "dominate" not in traded.key
 
 
 def test_laws_that_tie_stand_in_the_order_of_overshoot_and_energy_and_the_answer_says_so(advice):
@@ -209,8 +194,9 @@ def test_laws_that_tie_stand_in_the_order_of_overshoot_and_energy_and_the_answer
         (other,) = {"slow", "observer_free"} - {first}
         assert [choice.law.name for choice in found.choices] == [first, other, "classical"]
         assert found.tied == found.level == [other]
-        assert f"it ties with {other}; laws that tie stand in the order of overshoot, then of energy of u" in text(
-            found
+        assert (
+            f"it ties with {other}; laws that tie stand in the order of overshoot, then of energy, less first"
+            in text(found)
         )
 
 
@@ -224,7 +210,7 @@ def test_a_law_that_ties_with_one_of_better_mean_rank_is_advised_for_the_rule(ad
     assert (first.law.name, second.law.name) == ("observer_free", "slow")
     assert second.rank.mean < first.rank.mean
     assert found.answer[1].startswith(
-        "Because it ties with slow, of better mean rank, and laws that tie stand in the ord"
+        "Because none dominates it, and it leads by mean rank; laws that tie stand in the "
     )
 
 
@@ -235,17 +221,13 @@ def test_where_all_laws_are_level_none_is_named(advice):
     assert answer.startswith("No law can be called the best: both laws are level in every comparison of 24 runs.")
     assert "Use observer_free" not in answer
     assert "Second choice" not in answer
-    assert found.code == ""
 
 
 def test_no_law_is_reliable_where_the_first_settles_in_a_quarter_of_its_runs(advice):
     choices = tuple(dataclasses.replace(choice, settles=0.25, reliable=False) for choice in advice.choices)
     answer = text(dataclasses.replace(advice, choices=choices))
-    assert answer.startswith(
-        "No law is reliable here: observer_free, the first of 3, settles in 25 % of its runs; give"
-    )
+    assert answer.startswith("No law is reliable here: observer_free settles in 25 % of its runs; give")
     assert "Use observer_free" not in answer
-    assert "In Python" not in str(dataclasses.replace(advice, choices=choices))
 
 
 def test_an_answer_over_sets_of_gains_counts_them(advice):
@@ -264,7 +246,7 @@ def test_an_answer_over_sets_of_gains_counts_them(advice):
     ]
     found = dataclasses.replace(advice, comparison=comparison, choices=tuple(choices))
     assert found.samples == "24 sets of gains"
-    assert "ahead with 9 of 24 sets of gains" in text(found)
+    assert "ahead in 9 of 24 sets of gains" in text(found)
     assert "These comparisons hold over sets of gains, over starts and noise." in text(found)
     assert "not tested" not in text(found)  # the first dominates all that there are
 
@@ -287,16 +269,7 @@ def test_the_reason_names_dominance_where_a_better_mean_rank_is_passed_over(advi
     worse = dataclasses.replace(found.choices[1], rank=found.choices[1].rank._replace(mean=0.5))
     assert "the best mean rank of 3 laws" in found.answer[1]
     passed = dataclasses.replace(found, choices=(found.choices[0], worse, *found.choices[2:]))
-    assert "the best mean rank of those that none dominates" in passed.answer[1]
-
-
-def test_the_reason_names_laws_with_the_same_mean_rank(advice):
-    first, *others = advice.choices
-    equal = [dataclasses.replace(choice, rank=choice.rank._replace(mean=first.rank.mean)) for choice in others]
-    names = [choice.law.name for choice in equal]
-    for same, ending in ((1, f", as has {names[0]}."), (2, f", as have {names[0]} and {names[1]}.")):
-        found = dataclasses.replace(advice, choices=(first, *equal[:same], *others[same:]))
-        assert f"the best mean rank of 3 laws{ending}" in found.answer[1]
+    assert "none dominates it, and it leads by mean rank; laws that tie stand" in passed.answer[1]
 
 
 def test_a_table_has_a_row_for_each_law_with_intervals(advice):
@@ -319,7 +292,7 @@ def test_equal_laws_are_level_and_no_law_is_called_the_best(folder):
     assert found.answer[0].startswith(
         "No law can be called the best: both laws are level in every comparison of 16 runs."
     )
-    assert "no difference, ahead with 0 of 16 runs" in text(found)
+    assert "no difference, ahead in 0 of 16 runs" in text(found)
 
 
 def test_few_seeds_tell_no_law_from_another(folder):
@@ -337,7 +310,6 @@ def test_if_nothing_settles_nothing_is_advised(folder):
         "No law can be advised, because none settles in any run: give longer runs than 0.1 s"
     )
     assert "observer_free" not in found.answer[0]  # no law is named
-    assert found.code == ""
     alone = smc.which("duffing", needs="calm", laws=[FAST], out=folder, duration=0.1, seeds=4)
     assert alone.answer[0].endswith("or easier conditions.")
 
@@ -350,8 +322,6 @@ def test_one_law_is_the_only_one(folder):
         "Because it is the only law here that suits. It settles in 100 % of its runs.",
         "Not sure: there was no second law.",
     ]
-    assert found.code == "smc.law('observer_free', lam=6, k1=2)"
-    assert dataclasses.replace(found, choices=(dataclasses.replace(found.choices[0], law=SLOW),)).code == ""
 
 
 # the runs

@@ -81,7 +81,7 @@ def test_robust_has_an_adversary_with_these_defaults(stopped, monkeypatch, snaps
         worst_case, "cached_worst_case", lambda *given, **options: stopped.append(told([*given, options]))
     )
 
-    def contest(table, worst, plant, needs, relevant):
+    def contest(table, worst, candidates, plant, needs, relevant):
         stopped.append(told(["contest", plant, sorted(worst), needs, relevant]))
         reached()
 
@@ -106,7 +106,7 @@ SCENES = [
     {"answers": ("itaee",)}, {"facts": {"a": 3}}, {"facts": ["a"]}, {"answer": "a"}, {"camera": (1.0,)},
 ]  # fmt: skip
 REFUSED = {
-    smc.leaderboard: [{"metrics": "itae"}, {"metrics": []}, {"metrics": ["itaee"]}, {"seed": -1}, {"seed": 2**53}],
+    smc.leaderboard: [{"metrics": "itae"}, {"metrics": []}, {"metrics": ["itaee"]}],
     smc.study: [
         {"out": 3}, {"scenarios": [3]}, {"scenarios": []}, {"scenarios": "duffing"}, {"traces": "best"},
         {"executor": "ray"}, {"executor": "dask://host"}, {"executor": "dask://:80"}, {"executor": "dask://host:65536"},

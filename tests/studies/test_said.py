@@ -35,7 +35,7 @@ from smc_mujoco.studies import (
     study_replays,
     worst_case,
 )
-from smc_mujoco.studies.needs import NEEDS, Choice, ties
+from smc_mujoco.studies.advice import NEEDS, Choice, ties
 from smc_mujoco.studies.scene import slug
 from smc_mujoco.studies.worst_case import WorstCase, WorstCases, default_budget
 
@@ -159,10 +159,8 @@ def test_needs_and_choices_say_as_recorded(snapshot):
         law=smc.law("classical"), remark="", rank=Rank("classical", 1.0, 1.0, True), settles=1.0, reliable=True,
         fit=True, worst=cases, medians={"fast": Interval(0.5, 0.4, 0.6, 8), "calm": Interval(1.0, 1.0, 1.0, 8)},
     )  # fmt: skip
-    other = dataclasses.replace(first, law=smc.law("pid"), remark="a remark", worst=(attacked("pid", 0.4, 0.01),))
-    unfit = dataclasses.replace(other, fit=False)
+    other = dataclasses.replace(first, law=smc.law("pid"), remark="a remark")
     said = [NEEDS[need].below(first) for need in ("fast", "calm", "robust")] + [first.gains, other.gains]
-    said += [NEEDS["robust"].remark(choices) for choices in ([first, other], [first, unfit], [first])]
     said += [
         str([metric.name for metric in ties(smc.plant(plant))]) for plant in ("duffing", "pendulum_network", "panda")
     ]
