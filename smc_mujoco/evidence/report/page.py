@@ -21,7 +21,7 @@ from smc_mujoco.control.law import laws
 from smc_mujoco.draw import style
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.evidence.report import answer, charts, maps, oscillation, rigs, words
+from smc_mujoco.evidence.report import answer, charts, oscillation, rigs, words
 from smc_mujoco.evidence.report.plan import GAINS
 from smc_mujoco.evidence.report.stages import Findings
 from smc_mujoco.mechanisms.plant import catalogue as plants
@@ -53,7 +53,7 @@ Cell = TypeVar("Cell")
 def environment() -> "Environment":
     """Return what renders the templates, with their filters and the functions that they share."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
-    from jinja2.utils import htmlsafe_json_dumps
+    from markupsafe import Markup
 
     made = Environment(
         loader=FileSystemLoader(TEMPLATES),
@@ -62,7 +62,11 @@ def environment() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters |= {"json": htmlsafe_json_dumps, "margin_kind": words.kind, "law_name": words.law}
+    made.filters |= {
+        "json": lambda figure: Markup(figure.to_json().replace("<", "\\u003c")),
+        "margin_kind": words.kind,
+        "law_name": words.law,
+    }
     made.globals |= {"words": words, "checks": checks, "white": style.WHITE_SHARE}
     return made
 
@@ -80,7 +84,6 @@ def page(findings: Findings) -> str:
         "infinity": math.inf,
         "answer": answer,
         "charts": charts,
-        "maps": maps,
         "rigs": rigs,
         "oscillation": oscillation,
         "link": link,

@@ -43,9 +43,9 @@ def report(
 
     Raises:
       ScenarioError: as `smc.audit`, or a folder that cannot be written.
-      MissingPackageError: jinja2 is not installed.
+      MissingPackageError: jinja2 or plotly is not installed.
     """
-    if why := extras.missing("report", "a report", "jinja2"):
+    if why := extras.missing("report", "a report", "jinja2", "plotly"):
         raise extras.MissingPackageError(why)
     folder = Path(out)
     with bar("claims", shown=progress, counted=True) as drawn:

@@ -105,3 +105,8 @@ def pretty(text: str) -> str:
 def escape(text: str) -> str:
     """Return text for a chart, where HTML tags would have an effect."""
     return html.escape(text, quote=False)
+
+
+def bold(text: str) -> str:
+    """Return text for a chart's heading, in bold."""
+    return f"<b>{escape(text)}</b>"

@@ -259,7 +259,7 @@ def test_a_page_of_thirteen_laws_has_a_line_for_each(findings):
     place = tuple(p._replace(law=law) for law in THIRTEEN for p in findings.places if p.law == "classical")
     shown = dataclasses.replace(findings, scores=many, places=place)
     forest, here = forest_of(shown), forest_of(findings)
-    per_law = (forest["layout"]["height"] - here["layout"]["height"]) / (13 - 3) / len(words.MAIN_METRICS)
+    per_law = (forest.layout.height - here.layout.height) / (13 - 3) / len(words.MAIN_METRICS)
     assert per_law >= 15  # px: a line of text
     text = page.page(shown)
     assert all(words.law(law) in text for law in THIRTEEN)

@@ -50,8 +50,8 @@ def test_records_find_the_twin_of_their_columns(shown):
 
 def test_a_chart_has_what_was_measured_beside_the_twin(shown):
     figure = charts.record(shown[0])
-    assert [trace["name"] for trace in figure["data"]] == ["measured", "twin"] * 2
-    measured = figure["data"][0]
+    assert [trace.name for trace in figure.data] == ["measured", "twin"] * 2
+    measured = figure.data[0]
     assert len(measured["x"]) == len(measured["y"]) <= rigs.MAX_CURVE_POINTS
     assert measured["x"][-1] == pytest.approx(0.4, abs=1e-3)
 
