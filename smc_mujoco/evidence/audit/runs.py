@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from smc_mujoco.studies.table import Table
 
 Scores = dict[str, float]
-Name = TypeVar("Name")
+Name, Value = TypeVar("Name"), TypeVar("Value")
 Substitute = Mapping[str, Callable[[Component], Component]]  # law's name -> what makes its mutant of it
 
 
@@ -158,6 +158,10 @@ class Runs:
         scenario = Scenario(**fields | changes)
         return scenario.named(condition if isinstance(condition, str) else condition.name)
 
+    def only(self, **changes: Any) -> Scenario:
+        """Return the scenario of the claim's first plant, law and condition, with some of its fields changed."""
+        return self.scenario(self.plants[0], self.laws[0], self.conditions[0], **changes)
+
     def grid(self, **changes: Any) -> dict[tuple[str, str, str], Scenario]:
         """Return (plant, law, condition) -> scenario for all that the claim names, with some fields changed."""
         cells = itertools.product(self.plants, self.laws, self.conditions)
@@ -198,6 +202,10 @@ class Runs:
     def traced(self, scenarios: Mapping[Name, Scenario]) -> dict[Name, Trace]:
         """Return name -> trace of named scenarios, such as those of `grid`."""
         return dict(zip(scenarios, self.traces(scenarios.values()), strict=True))
+
+    def measured(self, scenarios: Mapping[Name, Scenario], measure: Callable[[Trace], Value]) -> dict[Name, Value]:
+        """Return name -> what is measured on the trace of a named scenario."""
+        return {name: measure(trace) for name, trace in self.traced(scenarios).items()}
 
     def results(self) -> Iterator[Result]:
         """Yield every run of the audit whose scores were used, and every run of the table."""

@@ -120,9 +120,13 @@ def means(trace):
 
 def by_condition(runs, measure):
     """Return condition -> measure of its trace; with the law's name if there are several."""
-    traces = runs.traced(runs.grid())
-    names = {cell: cell[2] if len(runs.laws) == 1 else f"{cell[1]}, {cell[2]}" for cell in traces}
-    return {names[cell]: measure(trace) for cell, trace in traces.items()}
+    measured = runs.measured(runs.grid(), measure)
+    return {cell[2] if len(runs.laws) == 1 else f"{cell[1]}, {cell[2]}": value for cell, value in measured.items()}
+
+
+def amplitude(trace):
+    """Return the amplitude of the disturbance, N."""
+    return trace.scenario.disturbance[0].amplitude
 
 
 def inside(runs):
@@ -134,17 +138,13 @@ def inside(runs):
 
 def rejection(runs):
     """Largest |x| over what the disturbance adds to x in a control period."""
-    share = by_condition(
-        runs, lambda run: largest(run.v) / (run.scenario.control_period * run.scenario.disturbance[0].amplitude)
-    )
+    share = by_condition(runs, lambda run: largest(run.v) / (run.scenario.control_period * amplitude(run)))
     return {"largest |x| / (h largest |d|)": share}
 
 
 def multiplier(runs):
     """Largest |u + mean of d over the period before|, over the largest |d|."""
-    ratios = by_condition(
-        runs, lambda run: largest((run.u[1:] + means(run)[:-1])[:-1]) / run.scenario.disturbance[0].amplitude
-    )
+    ratios = by_condition(runs, lambda run: largest((run.u[1:] + means(run)[:-1])[:-1]) / amplitude(run))
     return {"largest |u + mean d of the period before| / largest |d|": ratios}
 
 
@@ -158,7 +158,7 @@ def reaching(runs):
     """Time from which |x| <= h rho, over the paper's bound h k0 = |x0| / (a - rho), rho the amplitude of d."""
 
     def share(trace):
-        rho = trace.scenario.disturbance[0].amplitude
+        rho = amplitude(trace)
         bound = abs(trace.scenario.resolved.v0[0]) / (trace.scenario.law.gains["k"] - rho)
         return settled(trace, trace.v[:-1], 1.01 * trace.scenario.control_period * rho) / bound
 
@@ -167,14 +167,15 @@ def reaching(runs):
 
 def explicit(runs):
     """Total variation of u, and the largest |x|, implicit over explicit."""
-    traces = runs.traced(runs.grid())
-    pairs = {condition: [traces[runs.plant, law, condition] for law in runs.laws] for condition in runs.conditions}
-    return {
-        "variation of u, implicit / explicit": {
-            k: variation_of(a.u) / variation_of(b.u) for k, (a, b) in pairs.items()
-        },
-        "largest |x|, implicit / explicit": {k: largest(a.v) / largest(b.v) for k, (a, b) in pairs.items()},
+    traces, ratios = runs.traced(runs.grid()), {}
+    measures = {
+        "variation of u, implicit / explicit": lambda trace: variation_of(trace.u),
+        "largest |x|, implicit / explicit": lambda trace: largest(trace.v),
     }
+    for name, of in measures.items():
+        pairs = {k: [of(traces[runs.plant, law, k]) for law in runs.laws] for k in runs.conditions}
+        ratios[name] = {condition: a / b for condition, (a, b) in pairs.items()}
+    return ratios
 
 
 def at_periods(runs, condition, count=None):
@@ -200,7 +201,7 @@ def twisting(runs):
     for condition in runs.conditions:
         for h, trace in at_periods(runs, condition).items():
             gap = trace.x[1:] - h**2 * trace.d[:-1]
-            errors[f"{condition}, {h:g} s"] = largest(gap) / (h**2 * trace.scenario.disturbance[0].amplitude)
+            errors[f"{condition}, {h:g} s"] = largest(gap) / (h**2 * amplitude(trace))
     return {"largest |x - h^2 d| / (h^2 largest |d|)": errors}
 
 
@@ -225,10 +226,13 @@ def observed(runs):
 
 def converges(runs):
     """Largest |x| of the last tenth of 120 s over h^2 times the largest |d|, from several starts at h = 0.1 s."""
+
+    def share(trace):
+        last = float(np.abs(trace.x[-len(trace.x) // 10 : -1]).max())
+        return last / (trace.scenario.control_period**2 * amplitude(trace))
+
     shares = {}
     for start, speed in runs.values["starts"][: 2 if runs.quick else None]:
-        for (_, _, condition), trace in runs.traced(runs.grid(x0=start, v0=speed, physics_step=0.1)).items():
-            h, amplitude = trace.scenario.control_period, trace.scenario.disturbance[0].amplitude
-            last = float(np.abs(trace.x[-len(trace.x) // 10 : -1]).max())
-            shares[f"{condition}, from {start:g} m at {speed:g} m/s"] = last / (h**2 * amplitude)
+        measured = runs.measured(runs.grid(x0=start, v0=speed, physics_step=0.1), share)
+        shares |= {f"{cell[2]}, from {start:g} m at {speed:g} m/s": value for cell, value in measured.items()}
     return {"largest |x| of the last tenth / (h^2 largest |d|)": shares}

@@ -63,7 +63,7 @@ def times(runs, cells, band=BAND):
         name: runs.scenario(plant, law.name, *runs.conditions, law=law, v0=v0, duration=RUN_BOUNDS * least_bound(law))
         for name, (plant, law, v0) in cells.items()
     }
-    return {name: settled(trace, trace.s, band) for name, trace in runs.traced(scenarios).items()}
+    return runs.measured(scenarios, lambda trace: settled(trace, trace.s, band))
 
 
 def from_far(runs):

@@ -425,9 +425,27 @@ def any_gain(runs):
 # the simulations: four laws side by side on single plants and on the network
 
 
-def pendulum_like_adaptive(runs):
-    """Claim 27: pendulum: like adaptive, minimal overshoot."""
-    return [alike(runs, runs.plant, OURS, ADAPTIVE), overshoots_little(runs, runs.plant, OURS)]
+def side_by_side(about, *checks):
+    """Return the function of a claim that consists of checks, each with its laws, on the claim's plant."""
+
+    def measure(runs):
+        return [check(runs, runs.plant, *laws) for check, *laws in checks]
+
+    measure.__doc__ = about
+    return measure
+
+
+pendulum_like_adaptive = side_by_side(
+    "Claim 27: pendulum: like adaptive, minimal overshoot.", (alike, OURS, ADAPTIVE), (overshoots_little, OURS)
+)
+larger_undershoot = side_by_side("Claim 29: pendulum: HOSMC fast, larger undershoot.", (overshoots_more, HOSMC))
+adaptive_overshoots = side_by_side("Claim 33: Van der Pol: adaptive overshoots more.", (overshoots_more, ADAPTIVE))
+classical_slower = side_by_side(
+    "Claim 34: Van der Pol: classical slower, no overshoot.", (slower, CLASSICAL), (overshoots_little, CLASSICAL)
+)
+classical_deviates = side_by_side(
+    "Claim 37: Duffing: classical slower, larger deviation.", (slower, CLASSICAL), (overshoots_more, CLASSICAL)
+)
 
 
 def classical_fluctuates(runs):
@@ -435,11 +453,6 @@ def classical_fluctuates(runs):
     ripple = runs.score(runs.plant, CLASSICAL)["ripple"] / scale(runs.scenario(runs.plant, CLASSICAL))
     checked = runs.check("ripple", f"{runs.plant}: ripple of classical over |x0|", ripple)
     return [slower(runs, runs.plant, CLASSICAL), checked]
-
-
-def larger_undershoot(runs):
-    """Claim 29: pendulum: HOSMC fast, larger undershoot."""
-    return [overshoots_more(runs, runs.plant, HOSMC)]
 
 
 def moderate_undershoot(runs):
@@ -459,16 +472,6 @@ def largest_oscillation(runs):
     return [*checks, Beside(names[UNCLAMPED], over[UNCLAMPED])]
 
 
-def adaptive_overshoots(runs):
-    """Claim 33: Van der Pol: adaptive overshoots more."""
-    return [overshoots_more(runs, runs.plant, ADAPTIVE)]
-
-
-def classical_slower(runs):
-    """Claim 34: Van der Pol: classical slower, no overshoot."""
-    return [slower(runs, runs.plant, CLASSICAL), overshoots_little(runs, runs.plant, CLASSICAL)]
-
-
 def fast_and_minimal(runs):
     """Claim 35: Duffing: fast, minimal overshoot."""
     ours, *others = times(runs, runs.plant, *LAWS)
@@ -486,17 +489,12 @@ def similar(runs):
     return [*(alike(runs, runs.plant, law, OURS) for law in (ADAPTIVE, HOSMC)), Beside(between.what, between.value)]
 
 
-def classical_deviates(runs):
-    """Claim 37: Duffing: classical slower, larger deviation."""
-    return [slower(runs, runs.plant, CLASSICAL), overshoots_more(runs, runs.plant, CLASSICAL)]
-
-
 def rapid(runs):
     """Claim 38: network: rapid synchronisation and damping."""
-    kinds = {of: f"settling time of the {of}, s" for of in ("mean", "spread")}
+    scores = {plant: runs.score(plant, OURS) for plant in runs.plants}
     return {
-        words: {plant: runs.score(plant, OURS)[f"{of}_settling_time"] for plant in runs.plants}
-        for of, words in kinds.items()
+        f"settling time of the {of}, s": {plant: one[f"{of}_settling_time"] for plant, one in scores.items()}
+        for of in ("mean", "spread")
     }
 
 

@@ -27,9 +27,7 @@ def quarter(signal):
 
 def rests(runs):
     """Largest |x| and |u| of the last quarter of 12 s at control periods of 5 to 100 ms, without a disturbance."""
-    periods = {f"{1e3 * h:g} ms": h for h in runs.values["periods"]}
-    grid = {name: runs.scenario(runs.plant, *runs.laws, control_period=h) for name, h in periods.items()}
-    traces = runs.traced(grid).items()
+    traces = runs.traced({f"{1e3 * h:g} ms": runs.only(control_period=h) for h in runs.values["periods"]}).items()
     return {
         "largest |x| of the last quarter, m": {name: np.abs(quarter(trace.x)).max() for name, trace in traces},
         "largest |u| of the last quarter, N": {name: np.abs(quarter(trace.u)).max() for name, trace in traces},
@@ -38,19 +36,17 @@ def rests(runs):
 
 def ratios(runs, scenarios, names):
     """Return measure -> {name: implicit over explicit} for pairs of scenarios."""
-    traces = runs.traces(scenarios)
     measures = {
         "largest |e|": lambda trace: np.abs(quarter(trace.x - trace.r)).max(),
         "variation of u": lambda trace: np.abs(np.diff(quarter(trace.u), axis=0)).sum(),
         "mean square of e": lambda trace: np.mean(quarter(trace.x - trace.r) ** 2),
     }
-    return {
-        f"{what} of the last quarter, implicit / explicit": {
-            name: float(of(implicit) / of(explicit))
-            for name, implicit, explicit in zip(names, traces[::2], traces[1::2], strict=True)
-        }
-        for what, of in measures.items()
-    }
+    traces, shares = runs.traces(scenarios), {}
+    for what, of in measures.items():
+        pairs = zip(map(of, traces[::2]), map(of, traces[1::2]), strict=True)
+        found = {name: float(implicit / explicit) for name, (implicit, explicit) in zip(names, pairs, strict=True)}
+        shares[f"{what} of the last quarter, implicit / explicit"] = found
+    return shares
 
 
 def compared(runs):
@@ -60,6 +56,6 @@ def compared(runs):
 
 def at_every_period(runs):
     """Error e and command u of the last quarter of 12 s at 1 to 50 ms, implicit over explicit."""
-    (plant,), (condition,), periods = runs.plants, runs.conditions, runs.values["periods"]
-    scenarios = [runs.scenario(plant, law, condition, control_period=h) for h in periods for law in runs.laws]
+    periods = runs.values["periods"]
+    scenarios = [scenario for h in periods for scenario in runs.grid(control_period=h).values()]
     return ratios(runs, scenarios, [f"{1e3 * h:g} ms" for h in periods])

@@ -26,33 +26,32 @@ def super_twisting_margins(gains):
 
 def sweep(runs):
     """Return plant -> traces, each start at each control period, in the order of the periods."""
-    (law,), (condition,), periods = runs.laws, runs.conditions, runs.values["periods"]
-    starts = runs.values.get("starts", [0.5])
+    starts, values = runs.values.get("starts", [0.5]), runs.values
     plants, starts = (runs.plants[:1], starts[:1]) if runs.quick else (runs.plants, starts)
     scenarios = [
-        runs.scenario(
-            plant, law, condition, x0=x0, control_period=period, duration=runs.values["settled"] + END_SAMPLES * period
-        )
+        runs.on(plant).only(x0=x0, control_period=h, duration=values["settled"] + END_SAMPLES * h)
         for plant in plants
-        for period in periods
+        for h in values["periods"]
         for x0 in starts
     ]
     traces = np.array(runs.traces(scenarios), dtype=object).reshape(len(plants), -1)
     return dict(zip(plants, traces, strict=True))
 
 
+def exponents(runs, measure):
+    """Return plant -> exponent of a measure as a function of the control period."""
+    periods = runs.values["periods"]
+    return {plant: exponent(periods, [measure(run) for run in traces]) for plant, traces in sweep(runs).items()}
+
+
 def accuracy_of_s(runs):
     """Exponent of the largest |s| of the last 3000 samples as a function of the control period, 0.5 to 4 ms."""
-    periods = runs.values["periods"]
-    exponents = {plant: exponent(periods, [late(run.s) for run in traces]) for plant, traces in sweep(runs).items()}
-    return {"exponent of the largest |s| in the period": exponents}
+    return {"exponent of the largest |s| in the period": exponents(runs, lambda run: late(run.s))}
 
 
 def continuity(runs):
     """Exponent of the largest step of u from sample to sample, of the last 3000, as a function of the period."""
-    periods = runs.values["periods"]
-    steps = {plant: exponent(periods, [late_step(run.u) for run in traces]) for plant, traces in sweep(runs).items()}
-    return {"exponent of the largest step of u in the period": steps}
+    return {"exponent of the largest step of u in the period": exponents(runs, lambda run: late_step(run.u))}
 
 
 def switching(runs):

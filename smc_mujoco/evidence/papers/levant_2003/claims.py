@@ -10,11 +10,9 @@ END_SHARE = 0.1  # share of a run that counts as its end
 
 def precision(runs):
     """Exponent of the largest |e| of the last 3000 samples as a function of the control period, 0.25 to 2 ms."""
-    (plant,), (law,), (condition,), values = runs.plants, runs.laws, runs.conditions, runs.values
+    values = runs.values
     traces = runs.traces(
-        runs.scenario(
-            plant, law, condition, x0=x0, control_period=h, physics_step=h, duration=values["settled"] + END_SAMPLES * h
-        )
+        runs.only(x0=x0, control_period=h, physics_step=h, duration=values["settled"] + END_SAMPLES * h)
         for h in values["periods"]
         for x0 in values["starts"][: 1 if runs.quick else None]
     )
@@ -27,23 +25,13 @@ def noise(runs):
     The control period is in proportion to eps^(1/3), eps = (period / 30 ms)^3, so that the noise is the same for every
     eps, relative to the speed of the loop. At one fixed period, white noise averages out where the loop is slow.
     """
-    (plant,), (law,), (condition,), values = runs.plants, runs.laws, runs.conditions, runs.values
+    values, scenarios = runs.values, []
     eps = [(h / values["pace"]) ** 3 for h in values["periods"]]
-    traces = runs.traces(
-        runs.scenario(
-            plant,
-            law,
-            condition,
-            x0=0.02,
-            control_period=h,
-            physics_step=h,
-            duration=values["settled"] + END_SAMPLES * h,
-            noise=smc.Noise(position=size),
-            seed=seed,
-        )
-        for h, size in zip(values["periods"], eps, strict=True)
-        for seed in values["seeds"][: 1 if runs.quick else None]
-    )
+    for h, size in zip(values["periods"], eps, strict=True):
+        sampled = {"control_period": h, "physics_step": h, "duration": values["settled"] + END_SAMPLES * h}
+        for seed in values["seeds"][: 1 if runs.quick else None]:
+            scenarios.append(runs.only(x0=0.02, noise=smc.Noise(position=size), seed=seed, **sampled))
+    traces = runs.traces(scenarios)
     return {
         "exponent of |e| in the noise": exponent(eps, [late(trace.x) for trace in traces]),
         "exponent of |e'| in the noise": exponent(eps, [late(trace.v) for trace in traces]),

@@ -24,6 +24,12 @@ def half(signal):
     return float(np.abs(signal[len(signal) // 2 : -1]).max())
 
 
+def by_condition(runs, measure):
+    """Return condition -> what is measured on its run."""
+    measured = runs.measured(runs.grid(**sampled(runs)), measure)
+    return {condition: value for (_, _, condition), value in measured.items()}
+
+
 def stays(runs):
     """Largest |s| of the last half of 8 s over eps, under d = D sin 2t with D = 0.5, 2 and 10 N."""
     shares = {
@@ -35,46 +41,37 @@ def stays(runs):
 
 def limit(runs):
     """Largest |s| of the last half over eps, under d = D sin 2t with D below and above 2 sqrt(eps/h) - 1."""
-    (plant,), (law,), periods = runs.plants, runs.laws, runs.values["periods"]
-    eps, sides = runs.law(plant, law).gains["eps"], dict(zip(("below", "above"), runs.values["shares"], strict=True))
-    measured = {}
-    for side, share in sides.items():
+    (plant,), (law,), measured = runs.plants, runs.laws, {}
+    eps = runs.law(plant, law).gains["eps"]
+    for side, share in zip(("below", "above"), runs.values["shares"], strict=True):
         grid = {}
-        for h in periods:
+        for h in runs.values["periods"]:
             size = share * (2.0 * (eps / h) ** 0.5 - 1.0)
             adapted, d = runs.law(plant, law, k_max=MAX_STEP_RATIO * eps / h - size), smc.Sine(size, 2.0)
             name = f"{1e3 * h:g} ms, D = {size:.3g} N"
             grid[name] = runs.scenario(plant, law, law=adapted, control_period=h, disturbance=d)
-        shares = {name: half(trace.s) / eps for name, trace in runs.traced(grid).items()}
-        measured[f"{side}: largest |s| of the last half / eps"] = shares
+        measured[f"{side}: largest |s| of the last half / eps"] = runs.measured(grid, lambda trace: half(trace.s) / eps)
     return measured
 
 
 def predefined(runs):
     """Largest |s| of the last half of 8 s over eps = 0.3, 0.1 and 0.03, under d = 2 sin 2t."""
-    (plant,), (law,), (condition,), widths = runs.plants, runs.laws, runs.conditions, runs.values["widths"]
-    grid = {
-        eps: runs.scenario(plant, law, condition, law=runs.law(plant, law, eps=eps), **sampled(runs)) for eps in widths
-    }
-    shares = {f"eps = {eps:g}": half(trace.s) / eps for eps, trace in runs.traced(grid).items()}
+    laws = {f"eps = {eps:g}": runs.law(runs.plant, *runs.laws, eps=eps) for eps in runs.values["widths"]}
+    grid = {name: runs.only(law=law, **sampled(runs)) for name, law in laws.items()}
+    shares = runs.measured(grid, lambda trace: half(trace.s) / trace.scenario.law.gains["eps"])
     return {"largest |s| of the last half / eps": shares}
 
 
 def converges(runs):
     """Time from which |s| < eps in 8 s, from s0 = 0.5, 5 and 50 m/s, under d = 2 sin 2t."""
-    (plant,), (law,), (condition,), starts = runs.plants, runs.laws, runs.conditions, runs.values["starts"]
-    grid = {start: runs.scenario(plant, law, condition, v0=start, **sampled(runs)) for start in starts}
-    times = {
-        f"from {start:g} m/s": settled(trace, trace.s, trace.scenario.law.gains["eps"])
-        for start, trace in runs.traced(grid).items()
-    }
+    grid = {f"from {start:g} m/s": runs.only(v0=start, **sampled(runs)) for start in runs.values["starts"]}
+    times = runs.measured(grid, lambda trace: settled(trace, trace.s, trace.scenario.law.gains["eps"]))
     return {"time from which |s| < eps, s": times}
 
 
 def not_overestimated(runs):
     """Largest |u|, which is the gain K as u = -K sgn s, of the last half of 8 s, over the largest |d|."""
-    traces = runs.traced(runs.grid(**sampled(runs)))
-    ratios = {condition: half(trace.u) / half(trace.d) for (_, _, condition), trace in traces.items()}
+    ratios = by_condition(runs, lambda trace: half(trace.u) / half(trace.d))
     return {"largest gain of the last half / largest |d|": ratios}
 
 
@@ -91,8 +88,9 @@ def falls(runs):
 
 def within(runs):
     """Largest |s| of the last half of 8 s over eps D / (1 + D), under d = D sin 2t with D = 0.5, 2 and 10 N."""
-    ratios = {}
-    for (_, _, condition), trace in runs.traced(runs.grid(**sampled(runs))).items():
+
+    def share(trace):
         bound = half(trace.d)
-        ratios[condition] = half(trace.s) / (trace.scenario.law.gains["eps"] * bound / (1.0 + bound))
-    return {"largest |s| of the last half / (eps D / (1 + D))": ratios}
+        return half(trace.s) / (trace.scenario.law.gains["eps"] * bound / (1.0 + bound))
+
+    return {"largest |s| of the last half / (eps D / (1 + D))": by_condition(runs, share)}

@@ -45,7 +45,7 @@ def predicted(k1, k2, lag):
 def compared(runs, law, expected):
     """Return measured amplitude and frequency over those expected of a lag, and the exponent of the amplitude."""
     lags = runs.values["lags"][QUICK_LAG if runs.quick else 0 :]
-    cycles = {lag: cycle(trace) for lag, trace in runs.traced({lag: behind(runs, law, lag) for lag in lags}).items()}
+    cycles = runs.measured({lag: behind(runs, law, lag) for lag in lags}, cycle)
     return {
         "amplitude / predicted": {f"{1e3 * lag:g} ms": a / expected(lag)[0] for lag, (a, _) in cycles.items()},
         "frequency / predicted": {f"{1e3 * lag:g} ms": f / expected(lag)[1] for lag, (_, f) in cycles.items()},
@@ -78,15 +78,12 @@ def some_disturbance(runs):
 
     STA has the gains for L = D omega, as its theory asks for; bounds D of 0.5 and 2, ATCs of 1 and 10 ms.
     """
-    cases = [
-        (bound, lag) for bound in runs.values["bounds"] for lag in runs.values["lags"][QUICK_LAG if runs.quick else 0 :]
-    ]
-    scenarios = []
+    lags, scenarios = runs.values["lags"][QUICK_LAG if runs.quick else 0 :], []
+    cases = [(bound, lag) for bound in runs.values["bounds"] for lag in lags]
     for bound, lag in cases:
         omega = runs.values["pace"] / lag
-        d = smc.Sine(bound, omega)
         for law in (relay(runs, bound), super_twisting(runs, bound * omega)):
-            scenarios.append(behind(runs, law, lag, disturbance=d))
+            scenarios.append(behind(runs, law, lag, disturbance=smc.Sine(bound, omega)))
     measured = [size_and_power(trace) for trace in runs.traces(scenarios)]
     names = [f"|d| <= {bound:g} N, {1e3 * lag:g} ms" for bound, lag in cases]
     ratios = np.divide(measured[::2], measured[1::2])

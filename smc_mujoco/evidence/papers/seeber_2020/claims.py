@@ -1,5 +1,6 @@
 """How the claims of Seeber & Reichhartinger 2020 are measured."""
 
+import itertools
 import math
 
 import numpy as np
@@ -21,27 +22,19 @@ def winds_up(runs):
     Without a disturbance. That bound holds where the integrator stays within -U .. U. Undefined where s does not reach
     0 at all.
     """
-    (plant,), (law,), starts = runs.plants, runs.laws, runs.values["starts"]
-    starts = starts[1:2] if runs.quick else starts
-    grid = {f"from {start:g} m/s": runs.scenario(plant, law, v0=start) for start in starts}
-    gains, bound = runs.law(plant, law).gains, runs.scenario(plant, law).u_max
+    starts = runs.values["starts"][1:2] if runs.quick else runs.values["starts"]
+    grid = {f"from {start:g} m/s": runs.only(v0=start) for start in starts}
+    gains, bound = runs.law(runs.plant, *runs.laws).gains, runs.only().u_max
     most = min(bound**2 / (2.0 * gains["k2"]), (bound / gains["k1"]) ** 2)
-    beyond = {
-        name: -float(trace.v.min()) / most if trace.v.min() <= 0.0 else math.nan
-        for name, trace in runs.traced(grid).items()
-    }
+    beyond = runs.measured(grid, lambda trace: -float(trace.v.min()) / most if trace.v.min() <= 0.0 else math.nan)
     return {"overshoot of s / bound of a law that does not wind up": beyond}
 
 
 def reaches(runs):
     """Largest |s| of the last quarter of 40 s under d = 1.5 sin 0.6 t, |u| <= 2 N, from three starts."""
-    (law,), (condition,), starts = runs.laws, runs.conditions, runs.values["starts"]
-    cells = [(plant, start) for plant in runs.plants for start in starts][: 1 if runs.quick else None]
-    grid = {cell: runs.scenario(cell[0], law, condition, v0=cell[1]) for cell in cells}
-    ends = {
-        f"{plant}, from {start:g} m/s": float(np.abs(trace.v[-(len(trace.t) // 4) :]).max())
-        for (plant, start), trace in runs.traced(grid).items()
-    }
+    cells = list(itertools.product(runs.plants, runs.values["starts"]))[: 1 if runs.quick else None]
+    grid = {f"{plant}, from {start:g} m/s": runs.on(plant).only(v0=start) for plant, start in cells}
+    ends = runs.measured(grid, lambda trace: float(np.abs(trace.v[-(len(trace.t) // 4) :]).max()))
     return {"largest |s| of the last quarter, m/s": ends}
 
 

@@ -39,31 +39,26 @@ def late(trace):
 
 
 def random_runs(runs, law):
-    """Return name -> trace under random slopes, for each period and seed."""
+    """Return name -> largest |x| under random slopes, for each period and seed."""
     seeds, periods = (runs.values[name][: 1 if runs.quick else None] for name in ("seeds", "periods"))
     grid, fields = {}, {"duration": 5.0, "v0": 0.1}
     for period, seed in itertools.product(periods, seeds):
         drawn = {"control_period": period, "disturbance": slopes(period, 5.0, seed)}
         name = f"{1e3 * period:g} ms, seed {seed}"
         grid[name] = runs.scenario(runs.plant, law, runs.conditions[0], **fields, **drawn)
-    return runs.traced(grid)
+    return runs.measured(grid, late)
 
 
 def bounded(runs):
     """Largest |x| of the last half of 5 s over L T^2, under slopes of L and -L drawn for each period."""
-    return {
-        "largest |x| of the last half / (L T^2)": {
-            name: late(trace) for name, trace in random_runs(runs, runs.laws[0]).items()
-        }
-    }
+    return {"largest |x| of the last half / (L T^2)": random_runs(runs, runs.laws[0])}
 
 
 def flipped(runs, law, condition, sign):
     """Return the scenario of a law under a triangle whose slope goes on, from rest."""
-    (period,) = {runs.scenario(runs.plant, law, condition).control_period}
-    return runs.scenario(
-        runs.plant, law, condition, duration=(TRIANGLE_PERIODS + 1) * period, v0=0.0, disturbance=flip(period, sign)
-    )
+    period = runs.scenario(runs.plant, law, condition).control_period
+    fields = {"duration": (TRIANGLE_PERIODS + 1) * period, "disturbance": flip(period, sign)}
+    return runs.scenario(runs.plant, law, condition, v0=0.0, **fields)
 
 
 def last(trace):
@@ -74,8 +69,8 @@ def last(trace):
 def attained(runs):
     """|x| over L T^2 a period after a triangle of mean 0 over every period goes on with its slope."""
     cells = itertools.product(runs.laws, runs.conditions)
-    traces = runs.traced({f"{law}, {condition}": flipped(runs, law, condition, 1.0) for law, condition in cells})
-    return {"largest |x| after the slope flips / (L T^2)": {name: last(trace) for name, trace in traces.items()}}
+    grid = {f"{law}, {condition}": flipped(runs, law, condition, 1.0) for law, condition in cells}
+    return {"largest |x| after the slope flips / (L T^2)": runs.measured(grid, last)}
 
 
 def best_possible(runs):
@@ -90,10 +85,9 @@ def best_possible(runs):
 def compared(runs):
     """Largest |x| of the last half of 5 s under random slopes, over that of the explicit and the older implicit law."""
     proper, *others = runs.laws
-    ours = {name: late(trace) for name, trace in random_runs(runs, proper).items()}
-    ratios = {
-        f"{law}, {name}": ours[name] / late(trace) for law in others for name, trace in random_runs(runs, law).items()
-    }
+    ours, ratios = random_runs(runs, proper), {}
+    for law in others:
+        ratios |= {f"{law}, {name}": ours[name] / theirs for name, theirs in random_runs(runs, law).items()}
     return {"proper / other, largest |x| of the last half": ratios}
 
 

@@ -30,28 +30,22 @@ def third(signal):
 
 def layer(runs):
     """Largest |s| of the last third of 30 s over mu, under d = D sin t with D = 0.5, 5 and 20 N."""
-    shares = {
-        condition: float(np.abs(third(trace.v)).max()) / trace.scenario.law.gains["mu"]
-        for (_, _, condition), trace in runs.traced(runs.grid()).items()
-    }
-    return {"largest |s| of the last third / mu": shares}
+    mu = runs.law(runs.plant, *runs.laws).gains["mu"]
+    shares = runs.measured(runs.grid(), lambda trace: float(np.abs(third(trace.v)).max()) / mu)
+    return {"largest |s| of the last third / mu": {cell[2]: share for cell, share in shares.items()}}
 
 
 def established(runs):
     """Time from which |s| stays within 5 mu in 30 s, from s0 = 0.1 to 100 m/s, under d = 5 sin t."""
-    (plant,), (law,), (condition,), starts = runs.plants, runs.laws, runs.conditions, runs.values["starts"]
-    grid = {f"from {start:g} m/s": runs.scenario(plant, law, condition, v0=start) for start in starts}
-    times = {
-        name: settled(trace, trace.v, BAND_IN_LAYERS * trace.scenario.law.gains["mu"])
-        for name, trace in runs.traced(grid).items()
-    }
-    return {"time from which |s| <= 5 mu, s": times}
+    grid = {f"from {start:g} m/s": runs.only(v0=start) for start in runs.values["starts"]}
+    band = BAND_IN_LAYERS * runs.law(runs.plant, *runs.laws).gains["mu"]
+    return {"time from which |s| <= 5 mu, s": runs.measured(grid, lambda trace: settled(trace, trace.v, band))}
 
 
 def narrower(runs):
     """Exponent of the largest |s| of the last third of 30 s as a function of mu, 1 to 4 cm/s, under d = 5 sin t."""
-    (plant,), (law,), (condition,), layers = runs.plants, runs.laws, runs.conditions, runs.values["layers"]
-    traces = runs.traces(runs.scenario(plant, law, condition, law=runs.law(plant, law, mu=mu)) for mu in layers)
+    layers = runs.values["layers"]
+    traces = runs.traces(runs.only(law=runs.law(runs.plant, *runs.laws, mu=mu)) for mu in layers)
     return {"exponent of the largest |s| in mu": exponent(layers, [np.abs(third(one.v)).max() for one in traces])}
 
 
