@@ -5,7 +5,7 @@ import inspect
 from collections.abc import Iterator
 
 MODULES = (
-    "audit.audit", "audit.badge", "audit.evidence", "audit.figure", "audit.mutants", "audit.paper", "audit.runs",
+    "audit.audit", "audit.evidence", "audit.figure", "audit.mutants", "audit.paper", "audit.runs",
     "audit.verdict", "boards.entries", "boards.published", "boards.scoring", "boards.simulator", "boards.standings",
     "papers.gaber.lyapunov", "papers.gaber.scenarios", "papers.gaber.timing", "papers.measures",
 )  # fmt: skip

@@ -57,9 +57,9 @@ class Audit:
 
     def badge(self, path: str | Path) -> Path:
         """Write a badge, an .svg file with the number of claims by verdict."""
-        from smc_mujoco.evidence.audit import badge
+        from smc_mujoco.evidence.audit.figure import save_badge
 
-        return badge.save(self.paper.name, self.claims, path)
+        return save_badge(self.paper.name, self.claims, path)
 
     def figure(self, path: str | Path | None = None, **options: Any) -> Figure | SubFigure:
         """Draw every check as a multiple of its threshold, a row for each claim; options as of `smc.figure`."""

@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from smc_mujoco.studies.table import Table
 
 Scores = dict[str, float]
-Name, Value = TypeVar("Name"), TypeVar("Value")
+Name = TypeVar("Name")
+Value = TypeVar("Value")
 Substitute = Mapping[str, Callable[[Component], Component]]  # law's name -> what makes its mutant of it
 
 

@@ -181,12 +181,7 @@ def first(findings: "Findings", metrics: Sequence[str]) -> str:
     return "No law is the best in every respect, nor in every condition: it depends on what is asked, and where."
 
 
-def rest(findings: "Findings", metrics: Sequence[str]) -> list[str]:
-    """Return the other sentences: how sure it is, and who settles."""
-    return list(filter(None, [_sure(findings, metrics), _settled(findings)]))
-
-
-def _sure(findings: "Findings", metrics: Sequence[str]) -> str:
+def sure(findings: "Findings", metrics: Sequence[str]) -> str:
     """Return how many comparisons have no winner, and what their samples are."""
     open, of = undecided(cells(findings.scores), metrics)
     compared = len({(s.plant, s.condition) for s in findings.scores})
@@ -198,19 +193,6 @@ def _sure(findings: "Findings", metrics: Sequence[str]) -> str:
         + f" In {repeated} of the cells seeds change nothing, or not each: equal runs count once."
         * bool(repeated)
     )
-
-
-def _settled(findings: "Findings") -> str:
-    """Return what share of runs settles, and how many failed; a run that does not settle may still be calm."""
-    share = {place.law: place.median for place in findings.places if place.metric == SETTLES and not place.plant}
-    if not share:
-        return ""
-    worst, best = min(share, key=share.__getitem__), max(share, key=share.__getitem__)
-    text = "Every run settles" if share[worst] == 1 else f"{100 * share[worst]:.0f}\u00a0% of every law’s runs settle"
-    if f"{share[worst]:.2f}" != f"{share[best]:.2f}":
-        text = f"{words.law(worst)} settles least often, in {100 * share[worst]:.0f} % of its runs; a run that does "
-        text += "not settle may still be calm"
-    return f"{text}. {findings.about.failed or 'None'} of {findings.about.runs} runs failed."
 
 
 def orders(table: AccuracyTable) -> Iterator[str]:

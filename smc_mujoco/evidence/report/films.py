@@ -4,14 +4,11 @@ Films are WebM, and small, as they are part of the page.
 """
 
 import dataclasses
-import io
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
-from smc_mujoco.common.files import replacing, scratch
+from smc_mujoco.common.files import scratch
 from smc_mujoco.draw import decimate
 from smc_mujoco.draw.film import film as video
 from smc_mujoco.draw.film import pace
@@ -21,7 +18,6 @@ from smc_mujoco.simulation.trace import Trace
 
 SIZE, FPS = (960, 540), 20  # px; 1/s
 BAND_WINDOWS = 250  # windows of a band across the run
-POSTER_TIME = 0.5  # s
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -48,7 +44,6 @@ class Scene:
     u_max: float
     curves: tuple[Curve, ...]
     film: bytes | None = None  # WebM
-    poster: bytes | None = None  # a picture of the film as JPEG
     seconds: float = 0.0  # duration of the film
 
 
@@ -65,29 +60,13 @@ def curve(trace: Trace) -> Curve:
     return Curve(law=trace.scenario.law.name, t=tx, x=x, tu=tu, u=line, tb=tb[: len(low)], low=low, high=high)
 
 
-def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whole: None) -> tuple[bytes, bytes]:
-    """Return a film of the traces as WebM, and a picture of it as JPEG."""
-    shown, poster = pace.clock(traces, FPS), io.BytesIO()
-    count = len(shown.times)
+def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whole: None) -> bytes:
+    """Return a film of the traces as WebM."""
+    shown = pace.clock(traces, FPS)
     with scratch() as folder:
         path = folder / "film.webm"
         with encoder(path, (SIZE[1], SIZE[0]), FPS) as write:
-            for k, picture in enumerate(video.frames(traces, shown, None, title, SIZE)):
-                if k == min(int(np.searchsorted(shown.times, POSTER_TIME)), count - 1):
-                    Image.fromarray(picture).save(poster, "JPEG", quality=80, optimize=True)
+            for k, picture in enumerate(video.frames(traces, shown, None, title, SIZE), 1):
                 write(picture)
-                report(k + 1, count)
-        return path.read_bytes(), poster.getvalue()
-
-
-def save(made: tuple[bytes, bytes], path: Path) -> None:
-    """Write the picture of a film, then the film beside it."""
-    film, poster = made
-    for data, file in ((poster, path.with_suffix(".jpg")), (film, path)):
-        with replacing(file) as part:
-            part.write_bytes(data)
-
-
-def load(path: Path) -> tuple[bytes, bytes]:
-    """Return the film and the picture that `save` wrote."""
-    return path.read_bytes(), path.with_suffix(".jpg").read_bytes()
+                report(k, len(shown.times))
+        return path.read_bytes()

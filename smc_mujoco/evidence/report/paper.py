@@ -11,8 +11,9 @@ from smc_mujoco.common.files import replacing, write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import number
 from smc_mujoco.common.version import __version__
-from smc_mujoco.evidence.audit import badge, evidence
+from smc_mujoco.evidence.audit import evidence
 from smc_mujoco.evidence.audit.audit import Audit, audit
+from smc_mujoco.evidence.audit.figure import badge
 from smc_mujoco.evidence.audit.verdict import ANSWERS, VERDICTS, summary
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.page import TEMPLATES, environment, uri
@@ -83,7 +84,7 @@ def page(done: Audit, seal: str, runs: int, figure: bytes) -> str:
             quick=done.quick,
             sections=SECTIONS,
             link=lambda what: "verdict",
-            badge=uri("image/svg+xml", badge.svg(done.paper.name, done.claims).encode()),
+            badge=uri("image/svg+xml", badge(done.paper.name, done.claims).encode()),
             figure=uri("image/svg+xml", figure),
             runs=runs,
             seal=seal,

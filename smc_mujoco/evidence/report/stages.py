@@ -264,14 +264,14 @@ def all_scenes(work: Work) -> tuple[films.Scene, ...]:
         plant, condition = scene
         runs = scenarios.comparison(plant, condition, plan.scene_laws, duration=plan.scene, gains=GAINS)
         traces = run(list(runs.values()), work.threads)
-        film = poster = None
+        film = None
         if scene in plan.scenes[: plan.filmed] and video.missing() is None:
-            film, poster = cached(
+            film = cached(
                 work.folder / f"film-{plant}-{condition}.webm",
                 [plan.scene_laws, plan.scene, GAINS, films.SIZE, films.FPS],
                 lambda: films.film(traces, f"{words.plant(plant)}, {words.condition(condition)}", report),
-                films.save,
-                films.load,
+                lambda data, path: path.write_bytes(data),
+                Path.read_bytes,
             )
         first = traces[0].scenario
         return films.Scene(
@@ -281,7 +281,6 @@ def all_scenes(work: Work) -> tuple[films.Scene, ...]:
             u_max=float(np.max(first.resolved.u_max)),
             curves=tuple(films.curve(trace) for trace in traces),
             film=film,
-            poster=poster,
             seconds=plan.scene,
         )
 

@@ -16,7 +16,7 @@ import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import from_json
 from smc_mujoco.draw import style
-from smc_mujoco.evidence.audit import badge, evidence
+from smc_mujoco.evidence.audit import evidence, figure
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import ANSWERS, REFUTED, VERDICTS
 from smc_mujoco.evidence.commands import papers, tables
@@ -196,16 +196,16 @@ def test_an_audit_draws_and_shows_its_claims(done, tmp_path):
     (head,) = done.figure(tmp_path / "checks.svg", size=(9.0, 6.0)).legends
     assert head.get_title().get_text() == "Claims of A. Nobody: Small"
     assert (tmp_path / "checks.svg").is_file()
-    assert done.badge(tmp_path / "badge.svg").read_text(encoding="utf-8") == badge.svg("small", done.claims)
+    assert done.badge(tmp_path / "badge.svg").read_text(encoding="utf-8") == figure.badge("small", done.claims)
     assert done._repr_html_() == done.claims._repr_html_()
 
 
 def test_verdicts_have_colours_of_their_own_from_green_to_red_and_answers_another():
-    for colours in (badge.COLOURS, tables.COLOURS):
+    for colours in (figure.COLOURS, tables.COLOURS):
         answers = {colours[answer] for answer in ANSWERS.values()}
         assert len(answers) == 1
         assert len({colours[verdict] for verdict in VERDICTS} | answers) == 5
-    refuted, partly, supported = (colorsys.rgb_to_hls(*style.rgb(badge.COLOURS[v]))[0] for v in VERDICTS[2::-1])
+    refuted, partly, supported = (colorsys.rgb_to_hls(*style.rgb(figure.COLOURS[v]))[0] for v in VERDICTS[2::-1])
     assert 0.0 < refuted < 0.05 < partly < 0.15 < supported < 0.4  # red, amber, green
 
 

@@ -7,8 +7,7 @@ import pytest
 from helpers.sketch import sketch
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.evidence.audit import badge
-from smc_mujoco.evidence.audit.figure import figure
+from smc_mujoco.evidence.audit.figure import badge, figure, save_badge
 from smc_mujoco.evidence.audit.verdict import (
     DERIVED,
     EXISTENTIAL,
@@ -72,9 +71,9 @@ def test_a_notebook_shows_claims_in_a_line_each_and_one_in_full(claims, snapshot
 
 
 def test_a_badge_has_a_field_for_each_verdict_of_the_paper_s_own_sentences(claims, snapshot):
-    assert badge.svg("a <b>", claims).replace("><", ">\n<") == snapshot
+    assert badge("a <b>", claims).replace("><", ">\n<") == snapshot
     with pytest.raises(ScenarioError, match=r"end the name in \.svg"):
-        badge.save("a", claims, "badge.png")
+        save_badge("a", claims, "badge.png")
 
 
 def drawn(page):
