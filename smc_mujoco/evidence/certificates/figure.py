@@ -23,7 +23,7 @@ LEVELS = 7  # lines between the inner and the outer level, or of V: chosen
 
 def draw(certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike[str] | None = None) -> Any:
     """Draw a certificate's state plane; see `Certificate.figure`."""
-    data = certificate.data
+    data, unit = certificate.data, certificate.data["unit"]
     if data["plant"]["n"] > 1:
         raise ScenarioError(f"the states of {data['plant']['n']} pendulums do not fit into a plane: draw a single one")
     part = next((one for one in data["parts"] if one["theorem"] == "level sets"), None)
@@ -36,9 +36,14 @@ def draw(certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike
         axes = page.subplots(1, 2 if bounded else 1, squeeze=False).ravel()
         x, v = _plane(certificate, part, traces)
         for ax, zoom in zip(axes, (1.0, ZOOM_BOUNDS * (part["bound"] if part else 0.0) / x[-1]), strict=False):
-            _panel(ax, certificate, part, x * zoom, v * zoom ** (0.5 if zoom < 1.0 else 1.0), traces)
-        unit, d0 = data["unit"], data["disturbance"]
-        under = f"|d| ≤ {d0:g} {EFFORT[unit]}" if d0 else "no disturbance"
+            plane = np.meshgrid(x * zoom, v * zoom ** (0.5 if zoom < 1.0 else 1.0))
+            (_region if part else _energy)(ax, certificate, part, *plane)
+            for trace in traces:
+                ax.plot(trace.x[:, 0], trace.v[:, 0], color=style.REACTION, linewidth=style.points(1.2))
+                ax.plot(trace.x[0, 0], trace.v[0, 0], "o", color=style.INK, markersize=style.points(5))
+            ends = [(float(at.min()), float(at.max())) for at in plane]
+            ax.set(xlim=ends[0], ylim=ends[1], xlabel=f"position ({unit})", ylabel=f"velocity ({unit}/s)")
+        under = f"|d| ≤ {data['disturbance']:g} {EFFORT[unit]}" if data["disturbance"] else "no disturbance"
         plant = style.plant_name(as_plant(certificate.plant))
         axes[0].set_title(f"{style.law_name(certificate.law)} on {plant}, {under}")
         if bounded:
@@ -46,23 +51,6 @@ def draw(certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike
         _legend(page, certificate, part, bool(traces))
         pages.write(page, paths)
     return page
-
-
-def _panel(ax: Any, certificate: Any, part: Any, x: np.ndarray, v: np.ndarray, traces: Sequence[Trace]) -> None:
-    """Draw the region or V, and the runs, in a part of the plane."""
-    X, V = np.meshgrid(x, v)
-    if part is not None:
-        _region(ax, certificate, part, X, V)
-    else:
-        _energy(ax, certificate, X, V)
-    for trace in traces:
-        ax.plot(trace.x[:, 0], trace.v[:, 0], color=style.REACTION, linewidth=style.points(1.2))
-        ax.plot(trace.x[0, 0], trace.v[0, 0], "o", color=style.INK, markersize=style.points(5))
-    unit = certificate.data["unit"]
-    ax.set_xlim(x[0], x[-1])
-    ax.set_ylim(v[0], v[-1])
-    ax.set_xlabel(f"position ({unit})")
-    ax.set_ylabel(f"velocity ({unit}/s)")
 
 
 def _plane(certificate: Any, part: Any, traces: Sequence[Trace]) -> tuple[np.ndarray, np.ndarray]:
@@ -91,7 +79,7 @@ def _region(ax: Any, certificate: Any, part: Any, X: np.ndarray, V: np.ndarray) 
         ax.axvline(side * part["bound"], color=style.INK, linewidth=style.points(0.8), linestyle=(0, (4, 3)))
 
 
-def _energy(ax: Any, certificate: Any, X: np.ndarray, V: np.ndarray) -> None:
+def _energy(ax: Any, certificate: Any, part: None, X: np.ndarray, V: np.ndarray) -> None:
     """Draw level sets of V."""
     value = loops.energy(certificate.data, X, V)
     top = float(loops.energy(certificate.data, X[:1, -1:], 0.0 * X[:1, -1:])[0, 0])  # the energy at rest at the edge
