@@ -15,7 +15,7 @@ import smc_mujoco as smc
 from smc_mujoco.common import extras
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
-from smc_mujoco.evidence.report import about, films, oscillation, paper, rigs, scores, stages, words
+from smc_mujoco.evidence.report import about, films, oscillation, paper, plan, rigs, scores, stages, words
 from smc_mujoco.evidence.report import report as make
 from smc_mujoco.evidence.report.plan import FULL, QUICK, Bars, Plan, Work
 from smc_mujoco.evidence.report.scores import Place
@@ -38,7 +38,7 @@ def test_a_stage_shows_its_share_of_items_and_its_time(tmp_path, monkeypatch, ca
     monkeypatch.setattr(
         "smc_mujoco.common.progress.Bar.reached", lambda self, done, whole: reached.append((done, whole))
     )
-    monkeypatch.setattr("time.monotonic", iter([10.0, 13.4]).__next__)
+    monkeypatch.setattr(plan, "time", SimpleNamespace(monotonic=iter([10.0, 13.4]).__next__))
     bars = Bars(False)
     its = dataclasses.replace(work(tmp_path), bars=bars)
 
@@ -51,7 +51,7 @@ def test_a_stage_shows_its_share_of_items_and_its_time(tmp_path, monkeypatch, ca
     assert reached == [(0.25, 2), (0.0, 2), (1, 2), (1.25, 2), (1.0, 2), (2, 2)]
     assert bars.spent == {"maps": pytest.approx(3.4)}
     assert capsys.readouterr().out == ""
-    monkeypatch.setattr("time.monotonic", iter([10.0, 13.4]).__next__)
+    monkeypatch.setattr(plan, "time", SimpleNamespace(monotonic=iter([10.0, 13.4]).__next__))
     shown = Bars(True)
     with shown.stage("maps", "2 plants", bar=False):
         pass
