@@ -88,9 +88,8 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
     if amplitude is None and frequency is None:
         raise ScenarioError("gains_for needs a wanted amplitude, a frequency or both: give amplitude=1e-3")
     if not base.law.uniform:
-        raise ScenarioError(
-            f"gains_for needs gains that all channels share, not {base.law}: give one number for each gain"
-        )
+        cure = "give one number for each gain"
+        raise ScenarioError(f"gains_for needs gains that all channels share, not {base.law}: {cure}")
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if value is not None:
             number(name, value, above=0.0)
@@ -136,19 +135,15 @@ def _best_speed(
     """
     speeds = [speed for speed in SPEEDS if speed**2 <= headroom * (1.0 + SIZE_TOLERANCE)]
     if not speeds:
-        raise ScenarioError(
-            f"forces among the gains are {1.0 / headroom:.3g} times what u_max allows, and the search makes them "
-            f"at most {SPEEDS[0] ** -2:g} times smaller: give smaller gains, or a larger u_max"
-        )
+        found = f"{1.0 / headroom:.3g} times what u_max allows, and the search makes them at most {SPEEDS[0] ** -2:g}"
+        raise ScenarioError(f"forces among the gains are {found} times smaller: give smaller gains, or a larger u_max")
     cycles = {speed: cycle(speed) for speed in speeds}
     first = min((speed for speed, one in cycles.items() if one), default=math.inf)
     slow = {speed: one for speed, one in cycles.items() if one.frequency <= frequency or (not one and speed < first)}
     if not slow:
         lowest = min(one.frequency for one in cycles.values() if one)
-        raise ScenarioError(
-            f"frequency is {frequency:g}, and the law oscillates at {lowest:.3g} Hz at least, at whatever speed: "
-            "give a larger one"
-        )
+        found = f"the law oscillates at {lowest:.3g} Hz at least, at whatever speed"
+        raise ScenarioError(f"frequency is {frequency:g}, and {found}: give a larger one")
 
     def force(speed: float) -> float:
         allowed = math.inf if amplitude is None or not slow[speed] else amplitude / slow[speed].amplitude_range[1]
@@ -203,10 +198,8 @@ def _largest_size(predicted: Callable[[float], float], wanted: float, limit: flo
             amplitude_at(min(scale, limit))
     while not low:
         if high < 1.0 / MAX_SIZE_RATIO:
-            raise ScenarioError(
-                f"amplitude is {wanted:g}, and that of gains {MAX_SIZE_RATIO:g} times smaller is {amplitude:.3g}: "
-                "give a larger amplitude"
-            )
+            found = f"that of gains {MAX_SIZE_RATIO:g} times smaller is {amplitude:.3g}"
+            raise ScenarioError(f"amplitude is {wanted:g}, and {found}: give a larger amplitude")
         amplitude = amplitude_at(high / SIZE_STEP)
     while low < limit and high == math.inf:
         amplitude_at(min(low * SIZE_STEP, limit))

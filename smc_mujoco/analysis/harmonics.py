@@ -70,14 +70,14 @@ class Loop:
         self.scenario, self.channel, self.delay, s = scenario, channel, 0.0, scenario.resolved
         plant = s.plant
         if not s.clock.regular:
-            cure = "leave the clock out, or measure it in a run"
-            raise ScenarioError(f"chattering is predicted for samples that are on time: {cure}")
+            raise ScenarioError(
+                "chattering is predicted for samples on time: leave the clock out, or measure it in a run"
+            )
         for joint, low, high in plant.ranges:
             if not low <= 0.0 <= high:
-                raise ScenarioError(
-                    f"chattering is predicted about x = 0, and joint {joint!r} of {plant.name} moves from {low:g} to "
-                    f"{high:g}: measure it in a run, with smc.score, or choose another plant"
-                )
+                moves = f"joint {joint!r} of {plant.name} moves from {low:g} to {high:g}"
+                cure = "measure it in a run, with smc.score, or choose another plant"
+                raise ScenarioError(f"chattering is predicted about x = 0, and {moves}: {cure}")
         free = channel + plant.driven  # the joint without an actuator that the channel moves, if there is one
         self.joints = [channel, free] if free < plant.n else [channel]
         self.controller = Controller(s.velocity, s.surface, s.law.of_channel(channel))

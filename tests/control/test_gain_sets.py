@@ -47,7 +47,7 @@ def test_every_search_is_of_the_one_rule_and_tells_whether_its_starts_agree(gain
         assert known.rule == search.RULE, name
         assert known.converged is search.converged(known.ends), name
         assert known.objective <= min(known.ends), name
-        ended = known.converged and len(known.sets) == search.MAX_SETS
+        ended = known.converged and len(known.sets) == result.MAX_SETS
         assert ended or known.evaluations > budget - search.SPARE_EVALUATIONS - start, name  # no start is left
         assert known.evaluations <= budget, name
         assert len(known.sets) in result.SET_COUNTS, name

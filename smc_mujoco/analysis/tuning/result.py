@@ -10,15 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective, restore
-from smc_mujoco.analysis.tuning.search_space import (
-    ROUNDING_TOLERANCE,
-    Box,
-    actuator_limits,
-    at_bound,
-    box,
-    without_unit,
-)
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.tabular import Tables, Tabular
@@ -72,8 +65,8 @@ class Tuned(Tables):
     budget: int  # largest number of sets of gains that could be evaluated
     seed: int  # of search and noise
     scales: dict[str, float]  # the plant's X, F, M and T, SI units
-    bounds: Box  # gain -> lowest, highest, by the rule; starts are drawn from this box
-    searched: Box  # the wider bounds of the search, up to a decade beyond the box
+    bounds: search_space.Box  # gain -> lowest, highest, by the rule; starts are drawn from this box
+    searched: search_space.Box  # the wider bounds of the search, up to a decade beyond the box
     versions: dict[str, str]  # of the packages that the numbers depend on
 
     def __repr__(self) -> str:
@@ -96,7 +89,7 @@ class Tuned(Tables):
 
     def sourced(self) -> "Tuned":
         """Return the tuning with a law that names this search as the source of its gains."""
-        about_defaults = bool(without_unit(self.law))
+        about_defaults = bool(search_space.without_unit(self.law))
         search = source.Search(
             rule=self.rule, evaluations=self.evaluations, converged=self.converged, about_defaults=about_defaults
         )
@@ -111,10 +104,10 @@ class Tuned(Tables):
     def at_bound(self) -> dict[str, str]:
         """Gain -> "lower" or "upper", if it is within 2 % of a bound of the search, or at the actuator's limit."""
         u_max = math.inf if self.definition.u_max is None else self.definition.u_max
-        limits = actuator_limits(self.law, self.law.gains, u_max)
-        tight = 1.0 - ROUNDING_TOLERANCE
+        limits = search_space.actuator_limits(self.law, self.law.gains, u_max)
+        tight = 1.0 - search_space.ROUNDING_TOLERANCE
         full = {name: "upper" for name, gain in self.gains.items() if gain >= limits.get(name, math.inf) * tight}
-        return at_bound(self.gains, self.searched) | full
+        return search_space.at_bound(self.gains, self.searched) | full
 
     @property
     def evaluations(self) -> int:
@@ -240,7 +233,9 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
         if one.evaluations > one.budget:
             words = f"more than their budget {cannot}, {law} evaluated {one.evaluations} of {one.budget}"
             raise ScenarioError(f"laws tuned with {words}: tune them in the same way")
-        for gain, ends in box(one.law, one.scales).items() if one.law.template else ():  # of a law that is known here
+        for gain, ends in (
+            search_space.box(one.law, one.scales).items() if one.law.template else ()
+        ):  # of a law that is known here
             if not np.allclose(one.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
                 words = f"{cannot}, {law}'s {gain} was searched in {one.bounds.get(gain)}, not in {ends}"
                 raise ScenarioError(f"laws tuned within unequal bounds {words}: tune them in the same way")

@@ -31,21 +31,9 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.analysis.tuning import search_space
+from smc_mujoco.analysis.tuning import result, search_space
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, OBJECTIVES, Objective
-from smc_mujoco.analysis.tuning.result import (
-    AGREEING_STARTS,
-    AGREEMENT_TOLERANCE,
-    MAX_SETS,
-    NEAR_OPTIMAL_TOLERANCE,
-    Evaluation,
-    Tuned,
-    compare,
-    converged,
-    load,
-    near_optimal,
-    versions,
-)
+from smc_mujoco.analysis.tuning.result import Evaluation, Tuned, converged, near_optimal, versions
 from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, users_stacklevel, whole
 from smc_mujoco.common.progress import bar
@@ -59,8 +47,6 @@ from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario, default_u_max
 from smc_mujoco.simulation.trace import Trace
-
-__all__ = ["Tuned", "compare", "load", "tune"]
 
 EVALUATIONS_PER_GAIN = 64  # of a start
 SCREENED_SHARE, EVOLVED_SHARE = 1 / 8, 1 / 2  # of the evaluations; the rest descend
@@ -79,8 +65,9 @@ RULE = (
     " gains' scale by dimension, forces up to u_max, and a half evolves from the best of them by CMA-ES, both under"
     " Euler's method at 1 ms. The rest descends from the best of these by COBYQA under RK4. Both may leave the box by"
     " a decade. Starts end when"
-    f" {AGREEING_STARTS} starts end within {100 * AGREEMENT_TOLERANCE:g} % of the best and {MAX_SETS} sets of gains"
-    f" within {100 * NEAR_OPTIMAL_TOLERANCE:g} % of it are known, or when {SPARE_EVALUATIONS} evaluations are left."
+    f" {result.AGREEING_STARTS} starts end within {100 * result.AGREEMENT_TOLERANCE:g} % of the best and"
+    f" {result.MAX_SETS} sets of gains within {100 * result.NEAR_OPTIMAL_TOLERANCE:g} % of it are known, or when"
+    f" {SPARE_EVALUATIONS} evaluations are left."
     " These are random steps from the sets that are known, until they are as many"
 )
 Report = Callable[[int], None]
@@ -288,7 +275,7 @@ def _search(ledger: _Ledger, box: Box, searched: Box, seed: int, failure: str) -
         ends.append(_descend(ledger, searched, logs, size - (ledger.screened - screened)))
         if failure and size == whole_start and ends[0] >= FAILURE_COST * len(ledger.cases):
             raise _broken(ledger.cases[0].law, failure)
-        if converged(ends) and len(near_optimal(ledger.evaluations)) >= MAX_SETS:
+        if converged(ends) and len(near_optimal(ledger.evaluations)) >= result.MAX_SETS:
             break
     _spread(ledger, searched, np.random.default_rng([seed, len(ends)]))
     return tuple(ends)
@@ -300,11 +287,11 @@ def _spread(ledger: _Ledger, box: Box, random: np.random.Generator) -> None:
     step = FIRST_RADII[-1]  # decades, standard deviation
     for _ in range(ledger.left):
         near = near_optimal(ledger.evaluations)
-        if len(near) >= MAX_SETS or near[0].failed:
+        if len(near) >= result.MAX_SETS or near[0].failed:
             return
         logs = np.log10(near[random.integers(len(near))].gains) + step * random.standard_normal(len(low))
         cost = ledger.cost(np.clip(logs, low, high))
-        is_near = cost <= near[0].objective * (1.0 + NEAR_OPTIMAL_TOLERANCE)
+        is_near = cost <= near[0].objective * (1.0 + result.NEAR_OPTIMAL_TOLERANCE)
         step = max(step * (STEP_GROWTH if is_near else STEP_SHRINKAGE), LAST_RADIUS)
 
 

@@ -16,8 +16,8 @@ import smc_mujoco as smc
 from smc_mujoco.analysis import ranking
 from smc_mujoco.analysis.tuning import search, search_space
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
-from smc_mujoco.analysis.tuning.result import MAX_SETS, Evaluation
-from smc_mujoco.analysis.tuning.search import EVALUATIONS_PER_GAIN, SPARE_EVALUATIONS, compare, load, tune
+from smc_mujoco.analysis.tuning.result import MAX_SETS, Evaluation, compare, load
+from smc_mujoco.analysis.tuning.search import EVALUATIONS_PER_GAIN, SPARE_EVALUATIONS, tune
 from smc_mujoco.cli import main
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.units import Gain, Unit
