@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from rich import box
 from rich.table import Column, Table
 from rich.text import Text
@@ -53,7 +52,6 @@ SCORE_COLUMNS = {
 FAILED = Text("failed", style="red")
 MAX_PRINTED_OVERSHOOT = 1000  # %, the largest that is printed as a number; chosen
 MAX_NAMED_JOINTS = 4  # in the heading of a group
-SPARKS, SPARK_WIDTH = "▁▂▃▄▅▆▇█", 60  # block characters, and how many a curve has
 
 
 def titled(title: str, *columns: Column | str, **options: Any) -> Table:
@@ -196,16 +194,6 @@ def trace_summary(trace: Trace, change: StepChange | None = None) -> list[Table]
                 )
         tables.append(table)
     return tables
-
-
-def spark(values: Sequence[float] | np.ndarray) -> str:
-    """Return a line of block characters that rise and fall with the values."""
-    y = np.asarray(values, float)
-    y = y[np.linspace(0, len(y) - 1, min(SPARK_WIDTH, len(y))).astype(int)]
-    finite = y[np.isfinite(y)]
-    low, high = (finite.min(), finite.max()) if len(finite) else (0.0, 0.0)
-    level = (y - low) / ((high - low) or 1.0) * (len(SPARKS) - 1)
-    return "".join(SPARKS[round(v)] if np.isfinite(v) else " " for v in level)
 
 
 def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Table:

@@ -126,29 +126,18 @@ def summed(report: Report, done: float, whole: float) -> Callable[[float], None]
     return add
 
 
-class Counter:
-    """Count of a study's simulated steps. Its text, shown beside a bar, has the runs done and the runs a second."""
-
-    def __init__(self, runs: int, steps: int, bar: Bar):
-        self.total, self.all_steps, self.bar = runs, steps, bar
-        self.steps = 0
-        self.start = time.monotonic()
-
-    def stepped(self, steps: int) -> None:
-        """Add simulated steps."""
-        self.steps += steps
-        self.bar.says(str(self), steps)
-
-    def __str__(self) -> str:
-        spent = time.monotonic() - self.start
-        runs = self.total * self.steps / self.all_steps if self.all_steps else 0.0
-        return f"{math.floor(runs + 1e-9)} of {self.total} runs, {runs / spent if spent else 0.0:.3g} a second"
-
-
 @contextlib.contextmanager
-def counter(runs: int, steps: int, shown: bool) -> Iterator[Counter]:
-    """Yield a Counter, with a bar on the terminal if `shown` and if there is something to do."""
+def counter(runs: int, steps: int, shown: bool) -> Iterator[Callable[[int], None]]:
+    """Yield a function that adds simulated steps; a bar has the runs done and the runs a second, if there are any."""
+    start, done = time.monotonic(), 0
+
+    def stepped(count: int) -> None:
+        nonlocal done
+        done += count
+        spent, complete = time.monotonic() - start, runs * done / steps if steps else 0.0
+        rate = complete / spent if spent else 0.0
+        drawn.says(f"{math.floor(complete + 1e-9)} of {runs} runs, {rate:.3g} a second", count)
+
     with bar("", steps, shown=shown and runs > 0) as drawn:
-        counts = Counter(runs, steps, drawn)
-        drawn.says(str(counts))
-        yield counts
+        stepped(0)
+        yield stepped

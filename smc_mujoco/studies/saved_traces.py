@@ -50,7 +50,7 @@ def save(table: Table, choice: str, folder: Path, threads: int, progress: bool) 
         (row,) = table.data.slice(i, 1).to_pylist()
         if not (file := path(folder, row)).exists():
             files[table.scenario(i)] = file
-    with counter(len(files), sum(s.work for s in files), progress) as counts:
+    with counter(len(files), sum(s.work for s in files), progress) as stepped:
         for batch in batches(files, threads):
-            for i, trace in stream(batch, threads, counts.stepped):
+            for i, trace in stream(batch, threads, stepped):
                 trace.save(files[batch[i].scenario])

@@ -141,12 +141,12 @@ def _compute(
                 trace.save(saved_traces.path(traces, run_key.row(trace.scenario, plants)))
         finish(batch, [executors.result_columns(trace) for trace in finished])
 
-    with counter(len(missing), sum(s.work for s in missing.values()), progress) as counts:
+    with counter(len(missing), sum(s.work for s in missing.values()), progress) as stepped:
         if where == "local":
-            executors.compute_here(executors.batches(missing.values(), threads), threads, finish_here, counts.stepped)
+            executors.compute_here(executors.batches(missing.values(), threads), threads, finish_here, stepped)
         else:
             with executors.opened(where) as pool:
-                executors.compute_elsewhere(executors.batches(missing.values(), 1), pool, finish, counts.stepped)
+                executors.compute_elsewhere(executors.batches(missing.values(), 1), pool, finish, stepped)
 
 
 def _checked(scenarios: Any) -> Iterator[Scenario]:

@@ -60,13 +60,6 @@ def test_a_table_of_tips_has_the_worst_joint_only_if_there_is_room(monkeypatch):
     assert asked == ["work"]
 
 
-def test_a_line_of_blocks_has_one_for_each_value_up_to_its_width():
-    assert [len(tables.spark(range(count))) for count in (1, 5, 60, 1000)] == [1, 5, 60, 60]
-    low, middle, absent, high = tables.spark([-1.0, 1.0, math.inf, 3.0])
-    assert (low, absent, high) == (tables.SPARKS[0], " ", tables.SPARKS[-1])
-    assert low < middle < high
-
-
 def test_margins_and_cycles_are_told_with_their_limits(snapshot):
     """Of margins that are open, of cycles that are uncertain, and of runs that depend on the step."""
     rows = [

@@ -112,9 +112,9 @@ def test_a_log_gets_a_line_each_ten_seconds(monkeypatch, capsys):
 
 def test_the_count_of_a_study_is_that_of_its_bar(monkeypatch, capsys):
     monkeypatch.setattr(progress, "LINE_PERIOD", 0.0)
-    with progress.counter(8, 800, shown=True) as counts:
-        counts.stepped(799)
-        counts.stepped(1)
+    with progress.counter(8, 800, shown=True) as stepped:
+        stepped(799)
+        stepped(1)
     last = [re.sub(", .* second", "", line) for line in capsys.readouterr().err.splitlines()[-2:]]
     assert last == ["7 of 8 runs 100 %, 0 s left", "8 of 8 runs 100 %, 0 s left"]
 
@@ -137,12 +137,14 @@ def test_a_bar_says_its_share_its_count_and_the_time_left(monkeypatch):
 def test_a_count_is_of_whole_runs_and_of_runs_a_second(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
-    counts = progress.Counter(8, 800, progress.Bar())
-    assert str(counts) == "0 of 8 runs, 0 a second"
-    now[0] = 104.0
-    counts.stepped(250)
-    assert str(counts) == "2 of 8 runs, 0.625 a second"
-    assert str(progress.Counter(0, 0, progress.Bar())) == "0 of 0 runs, 0 a second"
+    said: list[str] = []
+    monkeypatch.setattr(progress.Bar, "says", lambda bar, text, work=0.0: said.append(text))
+    with progress.counter(8, 800, shown=True) as stepped:
+        now[0] = 104.0
+        stepped(250)
+    with progress.counter(0, 0, shown=True):
+        pass
+    assert said == ["0 of 8 runs, 0 a second", "2 of 8 runs, 0.625 a second", "0 of 0 runs, 0 a second"]
 
 
 def test_pieces_of_work_are_reported_as_their_sum():
@@ -156,6 +158,6 @@ def test_pieces_of_work_are_reported_as_their_sum():
 def test_what_is_not_shown_draws_nothing(cell, capsys):
     with progress.bar("runs", 2.0, shown=False) as bar:
         bar.says("more", 1.0)
-    with progress.counter(0, 0, shown=True) as counts:
-        counts.stepped(1)
+    with progress.counter(0, 0, shown=True) as stepped:
+        stepped(1)
     assert (cell, capsys.readouterr()) == ([], ("", ""))

@@ -1,7 +1,6 @@
 """smc-mujoco run, show, view: the runs of a scene, a saved trace, and a run in a window."""
 
 import dataclasses
-import itertools
 import os
 import sys
 from pathlib import Path
@@ -94,7 +93,6 @@ def show(
     s = loaded.scenario
     plant, law, times = (s.plant.name, "bold"), (str(s.law), "bold"), f", {s.duration:g} s at {s.control_period:g} s"
     terminal.print(Text.assemble(plant, " under ", law, times, f", gains: {s.law.source}"))
-    _print_curves(loaded, terminal)
     if loaded.failure:
         terminal.note(f"failed: {loaded.failure}", "red", wrap=True)
     else:
@@ -117,22 +115,6 @@ def _step_change(trace: "Trace") -> "StepChange | None":
     except ScenarioError:  # such as a law whose code is not here
         return None
     return change
-
-
-def _print_curves(trace: "Trace", terminal: Terminal) -> None:
-    """Print the columns of a trace as curves of block characters. A large group shows only its first channel."""
-    from smc_mujoco.cli import tables
-    from smc_mujoco.mechanisms.hardware.part import column_ends
-
-    ends = column_ends(trace.scenario.plant)
-    for group, heading in tables.headings(trace.scenario).items():
-        if heading:
-            terminal.note(f"{heading}:")
-        channels = list(group.channels if len(group.channels) <= tables.MAX_NAMED_JOINTS else group.channels[:1])
-        names = ["x", "v", *("u", "s") * group.driven, *["reaction"] * bool(trace.reaction[:, channels].any())]
-        for name, i in itertools.product(names, channels):
-            column = getattr(trace, name)[:, i]
-            terminal.note(f"{name}{ends[i]} {tables.spark(column)} {column[0]:.3g} to {column[-1]:.3g}")
 
 
 @errors_as_sentences()
