@@ -19,21 +19,13 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Group:
-    """Channels of one kind and one unit.
+    """Channels of one kind and one unit."""
 
-    Attributes:
-      name: "driven" or "free"; "driven rad" if several groups are driven.
-      unit: of their x, "rad" or "m".
-      effort: unit of their u: "N m", "N" or "V".
-      driven: whether they have actuators.
-      channels: their indices, ascending.
-    """
-
-    name: str
-    unit: str
-    effort: str
-    driven: bool
-    channels: tuple[int, ...]
+    name: str  # "driven" or "free"; "driven rad" if several groups are driven
+    unit: str  # of their x, "rad" or "m"
+    effort: str  # unit of their u: "N m", "N" or "V"
+    driven: bool  # whether they have actuators
+    channels: tuple[int, ...]  # their indices, ascending
 
 
 def groups(machine: Plant | Scenario) -> tuple[Group, ...]:

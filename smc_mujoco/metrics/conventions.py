@@ -56,30 +56,19 @@ CATALOGUE: dict[str, Metric] = {}  # filled by @metric, in order of definition
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Metric:
-    """A metric's entry in the catalogue.
+    """A metric's entry in the catalogue."""
 
-    Attributes:
-      name: the function's name.
-      unit: "s", "%", ...; {x} stands for the unit of x, {u} for that of u, {force} for that of a force, see `unit_for`.
-      summary: first line of the docstring.
-      formula: Trace of one group's channels -> float, without the checks.
-      label: its name in tables and figures.
-      need: the word of somebody who wants this number small, such as "fast"; "" if there is none.
-      network: whether it compares channels, and so needs several of a kind.
-      realistic: whether it is meaningful only for mechanisms with friction, contacts or other parts.
-      command: whether it is computed from u or s, which free joints do not have.
-      absent: value with which laws are compared where the metric is NaN; NaN for a metric that is never NaN.
-    """
-
-    name: str
+    name: str  # the function's name
+    # "s", "%", ...; {x} stands for the unit of x, {u} for that of u, {force} for that of a force, see `unit_for`
     unit: str
-    summary: str
-    formula: Callable[[Trace], float]
-    label: str
-    need: str = ""
-    network: bool = False
-    realistic: bool = False
-    command: bool = False
+    summary: str  # first line of the docstring
+    formula: Callable[[Trace], float]  # Trace of one group's channels -> float, without the checks
+    label: str  # its name in tables and figures
+    need: str = ""  # the word of somebody who wants this number small, such as "fast"; "" if there is none
+    network: bool = False  # whether it compares channels, and so needs several of a kind
+    realistic: bool = False  # whether it is meaningful only for mechanisms with friction, contacts or other parts
+    command: bool = False  # whether it is computed from u or s, which free joints do not have
+    # Value with which laws are compared where the metric is NaN; NaN for a metric that is never NaN
     absent: float = math.nan
 
     def refusal(self, plant: Plant) -> str:

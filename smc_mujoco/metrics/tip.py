@@ -38,17 +38,11 @@ FORCE_START = 0.2  # share of a run after which forces are scored; chosen, so th
 
 
 class Contacts(NamedTuple):
-    """Contacts of a run at its samples. All values are NaN after a failure.
+    """Contacts of a run at its samples. All values are NaN after a failure."""
 
-    Attributes:
-      force: sum of the normal forces, N, (K + 1,); 0 without contact.
-      depth: penetration of the deepest contact, m, (K + 1,); 0 without contact.
-      push: sum of the normal forces on the arm, as a vector in space, N, (K + 1, 3).
-    """
-
-    force: np.ndarray
-    depth: np.ndarray
-    push: np.ndarray
+    force: np.ndarray  # sum of the normal forces, N, (K + 1,); 0 without contact
+    depth: np.ndarray  # penetration of the deepest contact, m, (K + 1,); 0 without contact
+    push: np.ndarray  # sum of the normal forces on the arm, as a vector in space, N, (K + 1, 3)
 
 
 def tip_path(plant: Plant, x: np.ndarray, factors: Mapping[str, float] | None = None) -> np.ndarray:
@@ -106,11 +100,7 @@ def _with_hidden_state(scenario: Scenario) -> list:
 
 @once_per_trace
 def contacts(trace: Trace) -> Contacts:
-    """Return the normal forces and the penetrations of a run's contacts, read-only.
-
-    Raises:
-      ScenarioError: the scenario has no contact, or an actuator with a state that a trace lacks.
-    """
+    """Return the normal forces and the penetrations of a run's contacts, read-only."""
     scenario = trace.scenario.resolved
     if scenario.contact.kind == "none":
         raise ScenarioError(f"the scenario of {scenario.plant.name} has no contact: give contact=")

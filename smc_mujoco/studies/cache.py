@@ -23,10 +23,6 @@ def cached(
     The file's name ends in two hashes. The first is of all that the result depends on: `depends`, the package's code,
     models and gains, and the versions of other packages. The second is of its content, so that a changed file is not
     read. When a file is written, files with other hashes are removed.
-
-    Args:
-      path: of the file, without the hash.
-      depends: what the result depends on besides the code, as JSON data.
     """
     text = json.dumps([depends, fingerprint.package(), result.versions()], sort_keys=True, default=str)
     stem = f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"

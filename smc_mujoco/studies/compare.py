@@ -60,25 +60,16 @@ MAX_BLOCKS = 12  # plants times conditions with a table each; beyond, each plant
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Compared(Tables):
-    """Laws compared on plants in conditions. `print` and notebooks show its tables and verdicts.
+    """Laws compared on plants in conditions. `print` and notebooks show its tables and verdicts."""
 
-    Attributes:
-      table: a row for each run, with all its scores, as `smc.study` returns it.
-      candidates: plant -> the laws with all sets of gains that their runs used, and remarks on them.
-      metrics: names of the metrics that are compared.
-      defaults: whether a winner may be named over laws with default gains.
-      relevant: the least relevant difference, as a share of the larger value.
-      out: the folder with the gains and the runs.
-      worst: plant -> law -> its `worst_case`; empty if it was not searched.
-    """
-
-    table: Table
+    table: Table  # a row for each run, with all its scores, as `smc.study` returns it
+    # Plant -> the laws with all sets of gains that their runs used, and remarks on them
     candidates: Mapping[str, Sequence[Candidate]]
-    metrics: tuple[str, ...]
-    defaults: bool
-    relevant: float
-    out: Path
-    worst: "Mapping[str, Mapping[str, WorstCase]]"
+    metrics: tuple[str, ...]  # names of the metrics that are compared
+    defaults: bool  # whether a winner may be named over laws with default gains
+    relevant: float  # the least relevant difference, as a share of the larger value
+    out: Path  # the folder with the gains and the runs
+    worst: "Mapping[str, Mapping[str, WorstCase]]"  # plant -> law -> its `worst_case`; empty if it was not searched
 
     @property
     def gains(self) -> dict[str, dict[str, Law]]:
@@ -203,32 +194,18 @@ def compare(
     laws: str | Law | Template | Sequence[str | Law | Template] | None = None,
     plants: str | Plant | Sequence[str | Plant] | None = None,
     conditions: str | Condition | Sequence[str | Condition] | None = None,
-    seeds: int = 16,
-    tune: bool = True,
-    worst: "bool | Uncertainty" = False,
-    executor: "executors.Workers | None" = None,
-    *,
-    out: str | os.PathLike[str] = "compared",
-    metrics: Sequence[str] = METRICS,
-    duration: float | None = None,
-    starts: Starts | None = None,
-    gains: str = "tuned",
-    budget: int | None = None,
-    quick: bool = False,
-    defaults: bool = False,
-    relevant: float = RELEVANT,
-    traces: str = "none",
-    fresh: bool = False,
-    noise_key: int | str = DRAWN,
-    threads: int | None = None,
-    progress: bool = True,
-) -> Compared:
+    seeds: int = 16, tune: bool = True, worst: "bool | Uncertainty" = False,
+    executor: "executors.Workers | None" = None, *,
+    out: str | os.PathLike[str] = "compared", metrics: Sequence[str] = METRICS,
+    duration: float | None = None, starts: Starts | None = None, gains: str = "tuned", budget: int | None = None,
+    quick: bool = False, defaults: bool = False, relevant: float = RELEVANT, traces: str = "none",
+    fresh: bool = False, noise_key: int | str = DRAWN, threads: int | None = None, progress: bool = True,
+) -> Compared:  # fmt: skip
     """Compare laws on plants in conditions, with gains by one rule for all, and say which is better and how sure it is.
 
     A law whose gains you gave keeps them. Any other law, yours too, has those that come with the package for the plant,
-    or is tuned by the same rule, which takes some seconds for each law on each plant. Gains and runs are kept in the
-    folder: after a kill, the same call goes on from there. A winner is not named over laws with default gains. One run
-    of each of your laws on each plant in each condition is replayed, see `replay`.
+    or is tuned by the same rule. Gains and runs are kept in the folder: after a kill, the same call goes on from there.
+    One run of each of your laws on each plant in each condition is replayed, see `replay`.
 
     Args:
       laws: names, or your own laws. Default: those of the report's first page that are for the plant, or else all that

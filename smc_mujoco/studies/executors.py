@@ -90,12 +90,7 @@ def compute_here(
     finish: Callable[[Batch, Sequence[Trace]], None],
     report: Report = lambda steps: None,
 ) -> None:
-    """Run batches one after the other; a thread scores and writes each while the next one runs.
-
-    Args:
-      finish: called with each batch and its traces, one batch at a time.
-      report: called with the number of steps just simulated.
-    """
+    """Run batches one after the other; a thread scores and writes each while the next one runs."""
     with futures.ThreadPoolExecutor(1) as pool:
         last: Future[None] | None = None
         for batch in batches:
@@ -113,16 +108,7 @@ def compute_elsewhere(
     finish: Callable[[Batch, Sequence[ResultColumns]], None],
     report: Report = lambda steps: None,
 ) -> None:
-    """Have the workers of an Executor run batches. They send back result columns, not traces.
-
-    Args:
-      pool: any concurrent.futures.Executor. It stays open.
-      finish: called with each batch and its result columns, as they come.
-      report: called with the number of steps of each batch.
-
-    Raises:
-      ScenarioError: the workers died, cannot load the scenarios, or have other code than this process.
-    """
+    """Have the workers of an Executor run batches. They send back result columns, not traces."""
     sent: dict[Future[list[ResultColumns]], Batch] = {}
     plants: run_key.Hashes = {}
 
@@ -157,15 +143,7 @@ def compute_elsewhere(
 
 
 def run_on_worker(packed: bytes, keys: Sequence[str]) -> list[ResultColumns]:
-    """Run and score scenarios, on a worker.
-
-    Args:
-      packed: the scenarios, pickled.
-      keys: their keys in the process that sent them, see `run_key.key`.
-
-    Raises:
-      ScenarioError: the worker cannot load the scenarios, or other code or versions give them other keys here.
-    """
+    """Run and score scenarios, on a worker."""
     try:
         scenarios: list[Scenario] = pickle.loads(packed)
     except (ImportError, AttributeError) as error:
@@ -210,14 +188,7 @@ def as_executor(executor: object) -> str | Executor:
 
 @contextlib.contextmanager
 def opened(executor: str | Executor) -> Iterator[Executor]:
-    """Yield the Executor, or one with the workers of a dask scheduler.
-
-    Args:
-      executor: an Executor, which stays open, or dask://HOST:PORT.
-
-    Raises:
-      ScenarioError: dask is not installed, there is no scheduler or worker, or the workers crash.
-    """
+    """Yield the Executor, or one with the workers of a dask scheduler."""
     if isinstance(executor, Executor):
         yield executor
         return

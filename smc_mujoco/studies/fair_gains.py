@@ -34,17 +34,11 @@ from smc_mujoco.studies.cache import cached
 
 
 class Candidate(NamedTuple):
-    """A law with its gains for a plant.
+    """A law with its gains for a plant."""
 
-    Attributes:
-      law: with the best gains.
-      sets: the law with each of the sets of gains that runs have in turn.
-      remark: what there is to say of the gains besides their source.
-    """
-
-    law: Component
-    sets: tuple[Component, ...]
-    remark: str = ""
+    law: Component  # with the best gains
+    sets: tuple[Component, ...]  # the law with each of the sets of gains that runs have in turn
+    remark: str = ""  # what there is to say of the gains besides their source
 
     def __call__(self, seed: int) -> Component:
         """Return the law with the gains of the run with this seed."""
@@ -65,16 +59,8 @@ def fair_gains(
 ) -> list[Candidate]:
     """Return laws with gains for a plant: given, shipped, tuned or default ones, in this order of preference.
 
-    If some laws have shipped gains, the others are tuned like these, from the same starts.
-
-    Args:
-      laws: those without given gains as templates.
-      folder: for the results of searches, which another call reads.
-      budget, starts: of searches, see `smc.tune`.
-      threads, progress: as in `smc.run`.
-      tune: whether to search gains; otherwise laws without shipped ones keep their defaults.
-      gains: the set of shipped gains.
-      shipped_budget: whether, if some laws have shipped gains, the others are tuned with the budget of these.
+    If some laws have shipped gains, the others are tuned like these, from the same starts, and if `shipped_budget` with
+    the same budget. Laws without given gains come as templates. The folder keeps the results of searches.
     """
     candidates = [_known(plant, law, gains) for law in laws]
     if any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in candidates):

@@ -34,16 +34,7 @@ def draw_key() -> int:
 
 
 def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume: bool = True) -> Iterator[Scenario]:
-    """Yield the scenarios with the noise key of a study.
-
-    Args:
-      wanted: a key; 0 for the noise of the seeds alone; DRAWN for that of the folder, or a new one.
-      folder: of the study.
-      resume: whether the folder's key may be used.
-
-    Raises:
-      ScenarioError: `wanted` is none of these.
-    """
+    """Yield the scenarios with the key `wanted`: a number, 0 for the seeds alone, DRAWN for the folder's or a new one."""
     if wanted == DRAWN:
         scenarios = list(scenarios)
         if not resume:
@@ -60,11 +51,7 @@ def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume
 
 
 def _of_folder(file: Path, laws: dict[str, dict[str, Any]]) -> int:
-    """Return the key in a file if it was drawn for all these laws, else a new one, which is written there.
-
-    Args:
-      laws: `law_hash` -> `_description`, of each of the user's laws.
-    """
+    """Return the key in a file if it was drawn for all these laws, else a new one, which is written there."""
     try:
         stored = json.loads(file.read_text(encoding="utf-8"))
         key, before = whole("noise_key", stored["key"], 1, MAX_SEED), dict(stored["laws"])

@@ -16,11 +16,7 @@ SCRIPTS = ("__main__", "__mp_main__")  # modules that differ from process to pro
 
 
 def packed(thing: Any) -> bytes:
-    """Return a thing as bytes for `pickle.loads` in any process that has this package, and cloudpickle if needed.
-
-    Raises:
-      ScenarioError: it cannot be sent, or needs cloudpickle, which is not installed.
-    """
+    """Return a thing as bytes for `pickle.loads` in any process that has this package, and cloudpickle if needed."""
     try:
         data = pickle.dumps(thing)
     except (pickle.PicklingError, AttributeError, TypeError) as error:

@@ -43,26 +43,17 @@ KNOWN_FIELDS = ("plant", "law", "model", "surface", "control_period", "u_max", "
 
 
 class Replay(NamedTuple):
-    """The result for a trace.
+    """The result for a trace."""
 
-    Attributes:
-      same: whether the commands were computed again; None if the trace cannot be replayed.
-      why: what differs and when, or why it cannot be replayed; "" if it is the same.
-    """
-
-    same: bool | None
-    why: str = ""
+    same: bool | None  # whether the commands were computed again; None if the trace cannot be replayed
+    why: str = ""  # what differs and when, or why it cannot be replayed; "" if it is the same
 
 
 class Recording(NamedTuple):
-    """The input of the process without the law: the run without its law, and the recorded signals.
-
-    Attributes:
-      exact: whether a replay computes u and s to the last bit.
-    """
+    """The input of the process without the law: the run without its law, and the recorded signals."""
 
     scenario: Scenario
-    exact: bool
+    exact: bool  # whether a replay computes u and s to the last bit
     x: np.ndarray
     v: np.ndarray
     u: np.ndarray
@@ -135,11 +126,7 @@ def _known(scenario: Scenario) -> Scenario:
 
 
 def _in_fresh_process(task: str, arguments: object) -> Any:
-    """Return the result of a function of this file, computed in a fresh process.
-
-    Raises:
-      ScenarioError: the process failed.
-    """
+    """Return the result of a function of this file, computed in a fresh process."""
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
     code = "from smc_mujoco.studies.replay import serve; serve()"
     try:

@@ -18,7 +18,8 @@ from smc_mujoco.simulation.scenario import U_MAX, Scenario
 PACKAGE = "smc_mujoco."
 # Fields of a description that belong to the plant, the law or the run, and not to the condition.
 NOT_OF_CONDITION = ("plant", "law", "model", "surface", "seed", "noise_key", "x0", "duration", "versions", "condition")
-Hashes = dict[Plant, list[str]]  # plant -> hashes of its code and files, for a call with many runs
+# Plant -> hashes of its code and files, for a call with many runs. A new dict for each study: a file may change.
+Hashes = dict[Plant, list[str]]
 UNRELATED_FOLDERS = (  # of this package, which do not affect runs
     "evidence/audit", "evidence/boards", "evidence/papers", "exchange/live", "draw", "testing", "control/tuned_gains",
 )  # fmt: skip
@@ -33,13 +34,7 @@ def description(scenario: Scenario) -> dict[str, Any]:
 
 
 def key(scenario: Scenario, data: dict[str, Any] | None = None, plants: Hashes | None = None) -> str:
-    """Return a hash, 32 hex digits, of all that determines a run: scenario, code of its parts and package, versions.
-
-    Args:
-      data: the result of `description`, if the caller has it.
-      plants: a dict in which callers with many runs keep the hashes of plants. It is empty at first, and new for each
-        study, because a file that a plant reads may change.
-    """
+    """Return a hash, 32 hex digits, of all that determines a run: scenario, code of its parts and package, versions."""
     data = data or description(scenario)
     if scenario.condition in NAMED:  # the name adds nothing to the fields
         data = data | {"condition": None}

@@ -39,11 +39,7 @@ def worst(table: Table) -> list[int]:
 
 
 def save(table: Table, choice: str, folder: Path, threads: int, progress: bool) -> None:
-    """Repeat the chosen runs that have no file yet, and save their traces.
-
-    Raises:
-      ScenarioError: the folder cannot be written.
-    """
+    """Repeat the chosen runs that have no file yet, and save their traces."""
     chosen = {"none": [], "worst": worst(table), "all": range(len(table))}[choice]
     files = {}
     for i in chosen:

@@ -147,11 +147,7 @@ def find(name: str) -> Path:
 
 
 def read(path: Path) -> Scene:
-    """Return the scene that a file declares.
-
-    Raises:
-      ScenarioError: the file fails, or declares none.
-    """
+    """Return the scene that a file declares."""
     main = sys.modules["__main__"]
     if getattr(main, "__file__", None) and Path(str(main.__file__)).resolve() == path.resolve():
         scene = vars(main).get("scene")  # it is running already, as a script

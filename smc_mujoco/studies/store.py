@@ -44,11 +44,7 @@ class Store:
         self.where: dict[str, tuple[Path, int]] = {}  # hash of a finished run -> its part, and its row in it
 
     def open(self, resume: bool) -> None:
-        """Make the folder and list the runs in it. Without `resume`, remove them and the table.
-
-        Raises:
-          ScenarioError: the folder cannot be made.
-        """
+        """Make the folder and list the runs in it. Without `resume`, remove them and the table."""
         try:
             self.parts.mkdir(parents=True, exist_ok=True)
             self._tidy()
@@ -72,11 +68,7 @@ class Store:
                     path.unlink()
 
     def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Write finished runs as a part.
-
-        Raises:
-          ScenarioError: the folder cannot be written.
-        """
+        """Write finished runs as a part."""
         import pyarrow as pa
 
         hashes = [row["hash"] for row in rows]
@@ -93,12 +85,8 @@ class Store:
     def collect(self, hashes: Sequence[str], changes: Mapping[str, Mapping[str, Any]]) -> None:
         """Write the table of these finished runs, in this order.
 
-        Args:
-          changes: hash -> columns that replace those of the part. These are the columns of `run_key.source`, because
-            an earlier study with other sources may have written the part, and those of replays.
-
-        Raises:
-          ScenarioError: the folder cannot be written, or a part has been removed.
+        `changes` are columns that replace those of the part, by hash: the source of the gains, because an earlier study
+        with other sources may have written the part, and the results of replays.
         """
         import pyarrow as pa
 

@@ -77,9 +77,6 @@ def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None
     """Write a parquet file with a row group for each table, and a digest of all rows in its metadata.
 
     The digest is needed because parquet's checksums cover neither the headers of pages nor the footer.
-
-    Raises:
-      ScenarioError: the folder cannot be written.
     """
     import pyarrow.parquet as pq
 
@@ -96,14 +93,7 @@ def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None
 
 
 def read(path: Path, sealed: bool = False) -> "pa.Table":
-    """Return the rows that `write` wrote.
-
-    Args:
-      sealed: whether to refuse a file without a digest, such as a copy that another program wrote.
-
-    Raises:
-      ScenarioError: the file has changed since it was written. Other errors: it is not a parquet file.
-    """
+    """Return the rows that `write` wrote; if `sealed`, refuse a file without a digest, such as another program's."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -48,37 +48,21 @@ FIRST_MEMBERS = 2  # the worst random members, from which the search begins
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class WorstCase(Tables):
-    """The worst run of a scenario that was found within a class.
+    """The worst run of a scenario that was found within a class."""
 
-    Attributes:
-      value: the metric of the worst run; inf if it failed.
-      median: the metric's median over as many random members as the search had runs.
-      unit: of both.
-      scenario: the worst run, an ordinary scenario that gives this value to the last bit.
-      found_by: the strategy that made the member, or the one from which it was changed.
-      tried: number of runs, half of them of random members.
-      strategies: strategy -> largest value among its members, changed ones included.
-      nominal: the scenario that was given.
-      within: the class.
-      metric: its name.
-      outside: why the theorem of the law does not cover the class; "" if nothing is known against it.
-      seed: of the search.
-      sets: number of sets of the machine's parameters that the adversary chose from.
-    """
-
-    value: float
-    median: float
-    unit: str
-    scenario: Scenario
-    found_by: str
-    tried: int
-    strategies: Mapping[str, float]
-    nominal: Scenario
-    within: Uncertainty
-    metric: str
-    outside: str
-    seed: int
-    sets: int = 1
+    value: float  # the metric of the worst run; inf if it failed
+    median: float  # the metric's median over as many random members as the search had runs
+    unit: str  # of both
+    scenario: Scenario  # the worst run, an ordinary scenario that gives this value to the last bit
+    found_by: str  # the strategy that made the member, or the one from which it was changed
+    tried: int  # number of runs, half of them of random members
+    strategies: Mapping[str, float]  # strategy -> largest value among its members, changed ones included
+    nominal: Scenario  # the scenario that was given
+    within: Uncertainty  # the class
+    metric: str  # its name
+    outside: str  # why the theorem of the law does not cover the class; "" if nothing is known against it
+    seed: int  # of the search
+    sets: int = 1  # number of sets of the machine's parameters that the adversary chose from
 
     def __repr__(self) -> str:
         return f"WorstCase({self})"
@@ -290,11 +274,7 @@ def cached_worst_case(
 
 
 def _listed(given: object) -> list[Scenario]:
-    """Return the scenario, or the scenarios, to attack.
-
-    Raises:
-      ScenarioError: none, or several that differ in more than parameters.
-    """
+    """Return the scenario, or the scenarios, to attack."""
     scenarios: Any = list(given) if isinstance(given, list | tuple) else [given]
     if not scenarios or not all(isinstance(attacked, Scenario) for attacked in scenarios):
         raise ScenarioError(f"worst_case attacks a Scenario, not {shown(given)}: give smc.Scenario(...)")
