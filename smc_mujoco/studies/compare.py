@@ -208,11 +208,9 @@ def compare(
     One run of each of your laws on each plant in each condition is replayed, see `replay`.
 
     Args:
-      laws: names, or your own laws. Default: those of the report's first page that are for the plant, or else all that
-        suit it.
+      laws: names, or your own laws. Default: those of the report's first page, or else all that suit the plant.
       plants: names, or Plants, such as one from your own MJCF. Default: the paper's five.
-      conditions: names, such as "friction" or "noise + coulomb", texts, or your own, see `condition`. Default: one of
-        each kind that suits the plants.
+      conditions: names, such as "noise + coulomb", texts, or your own, see `condition`. Default: one of each kind.
       seeds: runs of a law on each plant in each condition; each has another start and other noise, the same for every
         law, and the next of the law's sets of gains.
       tune: whether to tune laws without gains for a plant; otherwise they run with their defaults.
@@ -223,8 +221,7 @@ def compare(
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
-      budget: largest number of sets of gains that a tuning tries. Default: that of `tune`, or a third of it if quick
-        and no law has gains of the package.
+      budget: largest number of sets of gains that a tuning tries. Default: that of `tune`, if quick a third of it.
       quick: shorter runs and searches; by default three plants and three conditions.
       fresh: whether to remove the runs that are in the folder first.
       threads, progress: as in `run`.

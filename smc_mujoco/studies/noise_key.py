@@ -34,7 +34,7 @@ def draw_key() -> int:
 
 
 def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume: bool = True) -> Iterator[Scenario]:
-    """Yield the scenarios with the key `wanted`: a number, 0 for the seeds alone, DRAWN for the folder's or a new one."""
+    """Yield the scenarios with a key: a number, 0 for the seeds alone, or DRAWN for that of the folder or a new one."""
     if wanted == DRAWN:
         scenarios = list(scenarios)
         if not resume:
