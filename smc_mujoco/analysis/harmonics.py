@@ -70,9 +70,8 @@ class Loop:
         self.scenario, self.channel, self.delay, s = scenario, channel, 0.0, scenario.resolved
         plant = s.plant
         if not s.clock.regular:
-            raise ScenarioError(
-                "chattering is predicted for samples on time: leave the clock out, or measure it in a run"
-            )
+            cure = "leave the clock out, or measure it in a run"
+            raise ScenarioError(f"chattering is predicted for samples that are on time: {cure}")
         for joint, low, high in plant.ranges:
             if not low <= 0.0 <= high:
                 moves = f"joint {joint!r} of {plant.name} moves from {low:g} to {high:g}"

@@ -233,9 +233,8 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
         if one.evaluations > one.budget:
             words = f"more than their budget {cannot}, {law} evaluated {one.evaluations} of {one.budget}"
             raise ScenarioError(f"laws tuned with {words}: tune them in the same way")
-        for gain, ends in (
-            search_space.box(one.law, one.scales).items() if one.law.template else ()
-        ):  # of a law that is known here
+        known = search_space.box(one.law, one.scales) if one.law.template else {}  # of a law that can be loaded here
+        for gain, ends in known.items():
             if not np.allclose(one.bounds.get(gain, math.nan), ends, rtol=1e-9, atol=0.0):
                 words = f"{cannot}, {law}'s {gain} was searched in {one.bounds.get(gain)}, not in {ends}"
                 raise ScenarioError(f"laws tuned within unequal bounds {words}: tune them in the same way")
