@@ -153,11 +153,9 @@ class Replays:
         """Return the rig at a point."""
         return self.twin.with_values(self.values(point))
 
-    def _part(self, k: int) -> Part:
+    def _part(self, k: int) -> Any:
         """Return what the replay of piece k takes from its record."""
-        part = self.pieces[k].part
-        assert part is not None
-        return part
+        return self.pieces[k].part
 
     def state(self, point: Point, k: int) -> np.ndarray | None:
         """Return positions and velocities at the start of piece k, (2n,); None if they are not free."""
@@ -176,10 +174,7 @@ class Replays:
 
     def residuals(self, points: Sequence[Point]) -> list[list[np.ndarray]]:
         """Return the residuals of each piece, (N,), at each point. All replays are one batch."""
-        return [
-            [self.relative(piece, columns) for piece, columns in zip(self.pieces, by_piece, strict=True)]
-            for by_piece in self.predicted(points)
-        ]
+        return [list(map(self.relative, self.pieces, by_piece)) for by_piece in self.predicted(points)]
 
     def predicted(self, points: Sequence[Point]) -> list[list[Record]]:
         """Return the predicted columns of each piece at each point."""

@@ -45,7 +45,7 @@ class CLaw(AtAddress):
     Two laws are equal if their machine code is. It follows from file, headers, flags and compiler.
     """
 
-    def __init__(self, path: Path, symbol: str, file: Path, doc: str | None):
+    def __init__(self, path: Path, symbol: str, file: Path):
         self.path, self.symbol = path, symbol
         self.code = file.read_bytes()
         self.digest = hashlib.sha256(symbol.encode() + b"\0" + self.code).hexdigest()
@@ -59,7 +59,7 @@ class CLaw(AtAddress):
             self.address = self._trampoline.address
         self.sizes = 0, 1  # number of gains, and of memory slots
         self.__name__ = re.sub(r"\W", "_", path.stem)
-        self.__module__, self.__doc__ = path.name, doc
+        self.__module__, self.__doc__ = path.name, None
 
     def __call__(self, y: Any, gains: Sequence[Any], memory: np.ndarray) -> tuple[Any, Any]:
         """Return u and s, two vectors of a law of many joints. `y`: a Measurement, or a JointMeasurement."""
@@ -107,16 +107,16 @@ class CLaw(AtAddress):
 
     def __reduce__(self):
         """Pickle the machine code: another process runs this law even if its file has changed."""
-        return _unpickled, (self.path.name, self.symbol, self.code, self.sizes, self.__name__, self.__doc__)
+        return _unpickled, (self.path.name, self.symbol, self.code, self.sizes, self.__name__)
 
 
 @functools.cache
-def _unpickled(file: str, symbol: str, code: bytes, sizes: tuple[int, int], name: str, doc: str | None) -> CLaw:
+def _unpickled(file: str, symbol: str, code: bytes, sizes: tuple[int, int], name: str) -> CLaw:
     """Return a law from another process, loaded once in this one."""
     copy = build.fresh(".so")
     copy.write_bytes(code)
     try:
-        law = CLaw(Path(file), symbol, copy, doc)
+        law = CLaw(Path(file), symbol, copy)
     except OSError as error:
         why = str(error).replace(str(copy), file)
         raise ScenarioError(
@@ -195,7 +195,7 @@ def law_from_c(
     about = _about(library, gains, memory)
     if isolate:
         _try(library, about)
-    law = CLaw(library.path, symbol, library.file, _first_comment(library.path))
+    law = CLaw(library.path, symbol, library.file)
     law.set_up(len(about.gains), about.memory, name)
     words = {"requires_model": about.modelled, "joint": bool(about.joints)}
     return template_decorator("law", about.gains, about.memory, (), (), about.degree, None, plants, **words)(law)
@@ -287,10 +287,3 @@ def _about(library: sandbox.Library, gains: Mapping[str, float | Gain] | None, m
         bool(facts.get("smc_law_modelled")),
         joints,
     )
-
-
-def _first_comment(path: Path) -> str | None:
-    """Return the comment at the top of a C file."""
-    text = path.read_text(encoding="utf-8", errors="replace") if path.suffix == ".c" else ""
-    comment = re.match(r"\s*/\*+(.*?)\*/", text, re.DOTALL)
-    return re.sub(r"^ ?\* ?", "", comment[1], flags=re.MULTILINE).strip() if comment else None
