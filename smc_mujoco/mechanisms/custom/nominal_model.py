@@ -246,8 +246,7 @@ def _stages() -> tuple[Callable, Callable]:
     """Return compiled functions of what MuJoCo computes from positions, and from velocities.
 
     Both take model, data, the address of qfrc_bias, and whether h is of passive forces alone. They then leave out what
-    M and h do not need, which is half of the time: the factors of M, collisions, lights, transmissions, actuators. The
-    numbers are the same.
+    M and h do not need, half of the time: factors of M, collisions, lights, transmissions, actuators.
     """
     position, velocity, actuation = map(_mujoco, ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation"))
     kinematics, centres, inertia = map(_mujoco, ("mj_kinematics", "mj_comPos", "mj_makeM"))
@@ -277,10 +276,7 @@ def _stages() -> tuple[Callable, Callable]:
 
 @functools.cache
 def native_dynamics() -> Function:
-    """Return the C function of M, h and g.
-
-    Its input is a record SEEN, its outputs are M (n, n), h and g, (n,) each. Without `at_rest` g is NaN.
-    """
+    """Return the C function of M (n, n), h and g, (n,) each, from a record SEEN. Without `at_rest` g is NaN."""
     positions, velocities = _stages()
     full = _mujoco("mj_fullM", 1)
 
