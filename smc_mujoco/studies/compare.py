@@ -1,12 +1,4 @@
-"""Comparison of laws on plants in conditions, in one call: gains, runs, tables, verdicts, figures.
-
-    compared = smc.compare([my_law, "classical"], ["duffing", "inverted_pendulum"], ["friction", "encoder"])
-    print(compared)                                # tables of at most 80 columns, and a verdict on every metric
-    compared.plot("compared.pdf")
-    compared.to_latex("compared.tex")
-
-Its parts can be used alone: `fair_gains`, `smc.grid`, `smc.study` and `smc.leaderboard`.
-"""
+"""Comparison of laws on plants in conditions, in one call: gains, runs, tables, verdicts, figures."""
 
 import dataclasses
 import functools

@@ -1,19 +1,8 @@
 """Computation of a study's runs: in batches, on threads of this process or by the workers of an Executor.
 
-    compute_here(batches(scenarios, threads), threads, finish)
-    compute_elsewhere(batches(scenarios, 1), ProcessPoolExecutor(8), finish)
-
 A batch is a list of prepared scenarios of one layout. It is run, scored and stored as a whole, so a killed study loses
-at most one. The result columns of a table's row follow from the run: its scores, or how it failed. They depend neither
-on the batch nor on the machine that computed it.
-
-A cluster takes `pip install 'smc-mujoco[cluster]'` on every machine, with the same versions, and
-
-    dask scheduler                                         # prints its address
-    dask worker tcp://HOST:PORT                            # on every machine
-    smc-mujoco compare --executor dask://HOST:PORT
-
-If a worker dies, another one runs its batch. If four die with the same batch, the study ends, and can be started again.
+at most one. The results depend neither on the batch nor on the machine. If a worker dies, another one runs its batch.
+If four die with the same batch, the study ends, and can be started again.
 """
 
 import contextlib

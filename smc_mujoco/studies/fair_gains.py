@@ -1,13 +1,9 @@
 """Gains for laws that are compared on a plant, all by one rule.
 
-    for candidate in fair_gains(plant("duffing"), [law_or_template("classical"), my_law], Path("folder")):
-        print(candidate.law.name, candidate.law.source, candidate.remark)
-
-A law has the gains that the user gave it. Otherwise it has those that come with the package for the plant. Otherwise a
-search by the same rule finds them: with the same bound on u, the same starts and as many evaluations as those of the
-package. A law that cannot be tuned keeps its defaults, and its remark says why. A search ends with several sets of
-near-optimal gains. The run of seed s has set s modulo their number, so that a comparison holds over the gains with
-which a tuning may end.
+A law has the gains that the user gave it, else those that come with the package for the plant, else those that a search
+by the same rule finds: with the same bound on u, the same starts and as many evaluations. A law that cannot be tuned
+keeps its defaults, and its remark says why. A search ends with several sets of near-optimal gains. The run of seed s
+has set s modulo their number, so that a comparison holds over the gains with which a tuning may end.
 """
 
 import dataclasses

@@ -1,9 +1,5 @@
 """Leaderboards: comparison of a study's laws on equal runs, with the uncertainty of every number.
 
-    boards = leaderboard(table)                        # a Board for each plant and metric
-    boards[0].winner                                   # a law's name, or None if no law is significantly better
-    print(boards)                                      # tables, with all verdicts
-
 A board is one metric in one group of runs. Laws are compared by the rules of `analysis.ranking` in each of its blocks,
 a plant in a condition. The tests are corrected for all blocks of the table in this metric, so the verdict on a block is
 the same on every board that has it. The winner of a board with several blocks wins in every one. The conclusions hold

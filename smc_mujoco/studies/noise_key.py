@@ -14,7 +14,6 @@ import secrets
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
 
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError, shown, whole
@@ -25,7 +24,6 @@ from smc_mujoco.simulation.scenario import MAX_SEED, Scenario
 
 DRAWN = "drawn"
 FILE = "noise_key.json"
-CODE = "its code"  # name of a function's code among the names of the variables that it reads
 
 
 def draw_key() -> int:
@@ -39,8 +37,7 @@ def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume
         scenarios = list(scenarios)
         if not resume:
             (folder / FILE).unlink(missing_ok=True)
-        laws = {law_hash(scenario): scenario for scenario in filter(has_user_code, scenarios)}
-        key = _of_folder(folder / FILE, {name: _description(scenario) for name, scenario in laws.items()})
+        key = _of_folder(folder / FILE, {law_hash(one): one.law.name for one in scenarios if has_user_code(one)})
     elif isinstance(wanted, str):
         raise ScenarioError(f"noise_key is {shown(wanted)}: give a whole number, or {DRAWN!r}")
     else:
@@ -50,8 +47,8 @@ def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume
         yield scenario if same else dataclasses.replace(scenario, noise_key=key).named(scenario.condition)
 
 
-def _of_folder(file: Path, laws: dict[str, dict[str, Any]]) -> int:
-    """Return the key in a file if it was drawn for all these laws, else a new one, which is written there."""
+def _of_folder(file: Path, laws: dict[str, str]) -> int:
+    """Return the key in a file if it was drawn for all these laws, else a new one. `laws` is `law_hash` -> name."""
     try:
         stored = json.loads(file.read_text(encoding="utf-8"))
         key, before = whole("noise_key", stored["key"], 1, MAX_SEED), dict(stored["laws"])
@@ -61,31 +58,11 @@ def _of_folder(file: Path, laws: dict[str, dict[str, Any]]) -> int:
     if key and not new:
         return key
     if key:
-        changes = joined(dict.fromkeys(_change_in_words(law, list(before.values())) for law in new))
+        changes = f"law {joined(dict.fromkeys(new))} is new or has changed"
         print(f"{changes}: a new noise key is drawn, and all runs are done again", file=sys.stderr)
     key = draw_key()
     write_json(file, {"key": key, "laws": laws})
     return key
-
-
-def _description(scenario: Scenario) -> dict[str, Any]:
-    """Return the name of a scenario's law, and hashes of what its law, surface and estimator read, by name."""
-    functions = tuple(part.function for part in _parts(scenario))
-    reads = {CODE: fingerprint.of(functions)}
-    for function in functions:
-        reads |= fingerprint.variables(function)
-    return {"name": scenario.law.name, "reads": reads}
-
-
-def _change_in_words(law: dict[str, Any], before: list[dict[str, Any]]) -> str:
-    """Return what has changed of a law since the laws `before`, or that no law of its name was among them."""
-    name = law["name"]
-    same_name = [other["reads"] for other in before if other["name"] == name]
-    if not same_name:
-        return f"law {name} is new"
-    names = [read for read, value in law["reads"].items() if value != same_name[-1].get(read)]
-    variables = [read for read in names if read != CODE]
-    return f"law {name} has changed ({joined(variables or names or ['its gains'])})"
 
 
 def _parts(scenario: Scenario) -> list[Component]:

@@ -1,11 +1,7 @@
 """The outcome of a scene's runs in words: the parts of the sentence that answers the scene's question.
 
-    def answer(runs):
-        return f"{runs.who('settles', 'settle')}; first: {runs.least('settling_time')}"
-
-gives "all 4 settle; first: adaptive and super_twisting tied (0.840 to 0.853 s)". Values that differ by less than the
-least relevant difference are tied, as on leaderboards. These are single runs: a study says whether another start or
-noise would change the order.
+Values that differ by less than the least relevant difference are tied, as on leaderboards. These are single runs: a
+study says whether another start or noise would change the order.
 """
 
 import dataclasses

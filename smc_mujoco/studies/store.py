@@ -1,10 +1,5 @@
 """A study's folder: part files of finished runs, and the table made from them.
 
-    store = Store(Path("study"))
-    store.open(resume=True)
-    store.add(rows)                        # a part, written whole or not at all
-    store.collect(["5f0c...", ...], {})    # results.parquet, in this order, from the parts
-
 A part is a parquet file, named by a hash of the runs in it. A file that is damaged, has other columns, or has scores by
 other code is ignored, and its runs count as not done. The bytes of results.parquet depend only on its rows.
 """

@@ -1,9 +1,5 @@
 """A study: many runs, stored as they finish, and a table of their scores.
 
-    scenarios = smc.grid(["duffing"], ["observer_free", "classical"], ["noise", "coulomb"], seeds=20)
-    table = smc.study(scenarios, "study")          # study/results.parquet; killed, it continues where it was
-    print(table.select(law="classical").column("ultimate_bound"))
-
 A run is identified by everything that determines its result: the scenario, the code of its law, of its signals and of
 your other parts, and the versions of the packages. A run with a result in the folder is repeated only if this code has
 changed.

@@ -1,11 +1,4 @@
-"""A trial: plants, conditions and starts on which laws are compared, and the folder of its results.
-
-    trial = Trial([plant], [noise], duration=5.0, starts=None, folder=Path("which"), threads=None, progress=True)
-    candidates = trial.gains({plant.name: laws}, budget=96)
-    table = trial.run(candidates, seeds=24)
-
-`compare` and `adviser` take these steps.
-"""
+"""A trial: what `compare` and `adviser` compare laws on, and the folder of its results."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,9 +1,5 @@
 """The worst that an adversary finds for a law within a class of uncertainty, beside the median of random members.
 
-    worst = smc.worst_case(scenario, within=smc.Uncertainty(disturbance=2.0))
-    worst.value, worst.median                # rms errors, in the unit of x
-    smc.run(worst.scenario)                  # the worst run, to the last bit
-
 Sliding mode promises that the error stays small whatever a disturbance does within its bound. A median over random
 seeds does not test this. The user gives the class. The search has no parameters, so that no law gets a milder adversary
 than another. `analysis.worst_case` describes both. The worst run that is found is a lower bound of the worst case.
