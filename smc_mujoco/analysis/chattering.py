@@ -229,10 +229,7 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
 
 
 def _may_balance(products: np.ndarray, sides: np.ndarray) -> np.ndarray:
-    """Return whether N L, given at the corners of cells (K, 4), may be 1 in each cell, (K,).
-
-    Size and phase may be outside those of the corners by a share of their range, of the cell's sides, or of the noise.
-    """
+    """Return whether N L may be 1 in cells (K,), given at their corners (K, 4), within its range and a share more."""
     sizes = np.log(np.maximum(np.abs(products), SMALLEST))
     margins = CELL_MARGIN * np.maximum(np.ptp(sizes, axis=1), max(sides[1], COARSE_NOISE))
     near = (sizes.min(axis=1) <= margins) & (sizes.max(axis=1) >= -margins)
@@ -287,10 +284,7 @@ def _bisected(excess: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high:
 
 
 def _nearest_cycle(loop: Loop, wave: Wave, shift: float) -> Wave | None:
-    """Return the cycle nearest to `wave` of a law that acts `shift` rad earlier, or later if negative, or None.
-
-    A later law is not faster, an earlier one not slower.
-    """
+    """Return the cycle nearest to `wave` of a law that acts `shift` rad earlier, or later if negative, or None."""
     later = loop.later(-shift / wave.omega)
     stable, _ = cycles(later)
     sign = math.copysign(1.0, shift)

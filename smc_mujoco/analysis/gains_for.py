@@ -38,15 +38,11 @@ SPEEDS = tuple(10.0 ** (0.1 * k) for k in range(-10, 11))
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Design:
-    """Gains that were chosen by predicted chattering.
-
-    `disturbance` is the largest constant force that the law tolerates in both directions, see `smc.margins`. A force
-    that changes may be worse: see `smc.worst_case`.
-    """
+    """Gains that were chosen by predicted chattering."""
 
     law: Component
     chattering: Chattering
-    disturbance: float  # N m or N, in runs of 10 s; NaN if the law does not hold the plant even without one
+    disturbance: float  # largest constant one in runs of 10 s, see `smc.margins`; NaN if not even 0 is tolerated
     size: float  # q, over the gains that were given
     speed: float  # w, over the gains that were given
 
@@ -174,11 +170,7 @@ def _force_headroom(base: Scenario) -> float:
 
 
 def _largest_size(predicted: Callable[[float], float], wanted: float, limit: float) -> float:
-    """Return the largest scale up to `limit` whose predicted amplitude, NaN for no cycle, is at most the wanted one.
-
-    If a limit cycle is lost on the way up, the law has become too large for the actuator, and that counts as too large
-    an amplitude. That is in proportion to the scale for most laws, so that the first guess is often right.
-    """
+    """Return the largest scale up to `limit` with at most the wanted amplitude; a lost cycle counts as too large."""
     limit = min(limit, MAX_SIZE_RATIO)
     low, high, oscillates = 0.0, math.inf, False
 

@@ -137,10 +137,7 @@ class Loop:
         return float(np.delete(answer, self.channel).max(initial=0.0) / answer[self.channel])
 
     def _solve(self, omega: complex) -> np.ndarray:
-        """Return the amplitudes of MuJoCo's state at control samples, positions before velocities, per unit of u.
-
-        A sine that is sampled and held has images at omega + 2 pi m / control_period, which are summed.
-        """
+        """Return MuJoCo's state at samples per unit of held u; its images at omega + 2 pi m / control_period count."""
         s = self.scenario.resolved
         count = round(s.control_period / self.step)
         z = np.exp(1j * (omega * self.step + math.tau * np.arange(count) / count))
@@ -305,11 +302,10 @@ class Controller:
         models: Sequence[tuple[float, ...]],
         memories: list[np.ndarray],
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return u and s, each (K,), for samples of a motion, of which `first` is the first, counted from time 0.
+        """Return u and s, each (K,), for samples of a motion, of which `first` is the first; the memories change.
 
-        `fixed` has fields of a measurement with their values in all samples; `motion` has x and v of the channel, each
-        (K,), then those of the joint that it moves, if any; `models` is as `Loop._nominal_model` returns it for these.
-        The memories of estimator, surface and law change.
+        `fixed` has fields of a measurement with their values in all samples; `motion` has x and v of the channel, then
+        those of the joint that it moves, if any; `models` is as `Loop._nominal_model` returns it for these.
         """
         x, v, q, dq = motion if len(motion) == 4 else (*motion, np.empty(0), np.empty(0))
         start, of_joint = np.zeros(len(FIELDS)), models[1] if len(motion) == 4 else (0.0,) * 4
@@ -329,10 +325,7 @@ class Controller:
 def transition(
     model: mujoco.MjModel, data: mujoco.MjData, actuator: Sequence[Actuator] = ()
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return A (n, n) and B (n, nu) of a physics step without any integrator's error, linearised at `data`.
-
-    The state is positions, velocities and activations, then what the drives of an `actuator` give, see `_behind`.
-    """
+    """Return A (n, n) and B (n, nu) of a physics step at `data`, without any integrator's error."""
     from scipy.linalg import expm
 
     block = rates(model, data)

@@ -157,10 +157,7 @@ def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
 
 
 def restoring_force(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.ndarray], np.ndarray] | None:
-    """Return the force of law and plant that pulls every channel back from the same x > 0, as a function of x, (k,).
-
-    It is in N or N m; None for a law without linear part.
-    """
+    """Return the force, N or N m, that pulls all channels back from the same x > 0, (k,); None for none at rest."""
     rest, gains = law.template and law.template.rest, SimpleNamespace(**law.gains)
     if not rest:
         return None
@@ -180,8 +177,7 @@ def restoring_force(plant: Plant, law: Law, u_max: float = math.inf) -> Callable
 def tolerated_force(plant: Plant, law: Law, max_error: float, u_max: float = math.inf) -> float | None:
     """Return the largest constant d, or dry friction, with which the plant comes to rest within |x| <= max_error.
 
-    It is in N or N m, max_error in rad or m; None for a law without linear part. Dry friction up to this level cannot
-    hold the plant further out, but it may stop it closer to 0.
+    It is None for a law without linear part. Dry friction up to this level may also stop the plant closer to 0.
     """
     from scipy.optimize import minimize_scalar
 

@@ -138,10 +138,7 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
 
 
 def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return a number for each row, the same for runs with the same gains: 0 if there is no column "scenario".
-
-    Raise ScenarioError if runs of one plant, condition and seed differ in more than the law.
-    """
+    """Return a number for each row, the same for the same gains; refuse runs of a cell that differ in more."""
     try:
         texts = table.column("scenario")
     except ScenarioError:

@@ -350,10 +350,7 @@ def _holm(p: np.ndarray, error: float) -> float:
 
 
 def ranks(comparison: Comparison) -> list[Rank]:
-    """Return the laws' ranks: those with the fewest runs without a value first, then by mean rank.
-
-    In a block, medians that differ by less than the least relevant difference are tied.
-    """
+    """Return the laws' ranks: fewest runs without a value first, then by mean rank; irrelevant differences are ties."""
     by_block = ranked(comparison.centres, comparison.floors, comparison.without_value, comparison.relevant)
     mean = by_block.mean(axis=1)
     lacking = comparison.without_value.sum(axis=1)

@@ -72,10 +72,7 @@ def unit_size(law: Component, name: str, scales: Mapping[str, float]) -> float:
 
 
 def scales(plant: Plant, u_max: float, with_model: bool, reach: float | None = None) -> dict[str, float]:
-    """Return the plant's X, F, M and T in SI units, for a law with or without the nominal model.
-
-    `reach` is X, rad or m. Default: max |x0| of the plant.
-    """
+    """Return the plant's X, F, M and T in SI units; `reach` is X, rad or m, by default max |x0| of the plant."""
     if plant.unscaled:
         raise ScenarioError(f"cannot tune on {plant.name}: {plant.unscaled}")
     zeros = np.zeros(plant.n)

@@ -250,10 +250,7 @@ def relay_signals(trace: Trace) -> dict[str, np.ndarray]:
 
 
 def recorded_force(trace: Trace, relay: Relay, before: np.ndarray) -> np.ndarray:
-    """Return the force of a relay over its bound during a run, (samples + 1,). After a failure it keeps its value.
-
-    `before` is the force until the relay starts, (samples + 1,); (0,) for a relay that starts at 0.
-    """
+    """Return the force of a relay over its bound, (samples + 1,), and `before` until the relay starts."""
     parts = relay_signals(trace)
     aim = relay.s * parts["s"] + relay.rate * parts["rate"] + relay.error * parts["error"]
     goals = np.where(np.nan_to_num(aim) > 0.0, relay.amplitude, -relay.amplitude)

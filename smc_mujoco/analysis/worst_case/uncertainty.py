@@ -183,10 +183,8 @@ class Member:
 class Members:
     """The members of a class around one scenario, or around the same scenario on several parameter sets.
 
-    `constants` are functions of a scenario and a share in [0, 1] that return the scenario with one of its constants.
-    The first chooses another scenario, where there are several. `ends` are the shares that a corner of the class may
-    have, for each constant. `bare` is the member without force or noise, with the first set, and its other constants
-    in the middle.
+    `constants` set a scenario's constants to a share in [0, 1] of their ranges, the first one the parameter set where
+    there are several; `ends` are those of corners. `bare` has no force and no noise, and constants in the middle.
     """
 
     def __init__(self, scenarios: Sequence[Scenario], within: Uncertainty):
