@@ -167,12 +167,7 @@ class Rig:
     def scenario(self, law: Law | str | None = None, **fields: Any) -> Scenario:
         """Return a Scenario of the machine under a law, by default the rig's own controller.
 
-        Args:
-          law: the law.
-          fields: fields of a Scenario that replace the rig's.
-
-        Raises:
-          ScenarioError: no law, where the rig's own controller is not known.
+        `fields`: fields of a Scenario that replace the rig's.
         """
         if law is None and self.controller is None:
             raise ScenarioError(f"the controller of {self.name} is not known: give a law")
@@ -304,10 +299,7 @@ class Rig:
         return self.period or records.step_of(data[self.columns.time])
 
     def reading(self, many: Sequence[Source]) -> tuple["Rig", list[Mapping[str, Any]]]:
-        """Return the rig that repeats some records, and the records as columns.
-
-        For traces, that rig has their law and starts at their start.
-        """
+        """Return the rig that repeats some records, of traces from their start under their law, and them as columns."""
         traces = [record for record in many if isinstance(record, Trace)]
         if not traces:
             return self, [record for record in many if not isinstance(record, Trace)]

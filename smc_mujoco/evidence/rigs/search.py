@@ -140,10 +140,7 @@ def refine(replays: Replays, point: Point, most: int) -> Slopes:
 
 
 def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
-    """Return the best point of several damped steps, and its cost. Each piece moves its own states as far as it gains.
-
-    All steps are simulated in one batch.
-    """
+    """Return the best of several damped steps, and its cost. Each piece moves its own states as far as it gains."""
     groups = [_variants(replays, slopes, _moved(replays, slopes, damping)) for damping in DAMPINGS]
     trials, size = [point for group in groups for point in group], len(groups[0])
     costs = np.array([[cost([rows]) for rows in pieces] for pieces in replays.residuals(trials)])

@@ -70,10 +70,7 @@ def live(
 
 
 def _library(chosen: Sequence[Plant]) -> list[Component]:
-    """Return the library's laws that suit one of the plants, its surfaces and its velocity estimators.
-
-    Surfaces that read an acceleration are left out, because they are for actuators with a lag.
-    """
+    """Return the library's laws that suit a plant, surfaces, but those for actuators with a lag, and estimators."""
     laws = [find_law(name) for name in dict.fromkeys(name for plant in chosen for name in laws_for(plant))]
     surfaces = [template() for template in surface.catalogue().values() if "a" not in reads(template)]
     return [*laws, *surfaces, *(template() for template in estimator.catalogue().values())]

@@ -220,10 +220,7 @@ def _fields(model: mujoco.MjModel, plant: Plant) -> dict[str, list[list[float]]]
 
 
 def _skins(plant: Plant) -> list[dict[str, Any]]:
-    """Return the skins that the plant's build adds to its MJCF, such as springs; lengths in m.
-
-    A vertex follows the bodies of the skin's bones, each with a weight.
-    """
+    """Return the skins, such as springs, that the plant's build adds to its MJCF. Bones move vertices by weights."""
     model, skins = compiled(plant.spec()), []
     for i in range(model.nskin):
         first, count = model.skin_vertadr[i], model.skin_vertnum[i]

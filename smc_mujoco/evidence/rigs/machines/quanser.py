@@ -18,10 +18,7 @@ SRV02 = "Quanser, SRV02 rotary servo and pendulum, user manuals (no licence stat
 
 
 def motor(q):
-    """Return the motor and gearbox of a rig.
-
-    The efficiency of the gearbox divides resistance and inductance, which reduces the torque per volt as losses do.
-    """
+    """Return motor and gearbox, whose efficiency divides resistance and inductance: less torque per volt."""
     return DCMotor(
         resistance=q.resistance / q.efficiency, inductance=q.inductance / q.efficiency,
         torque_constant=q.torque_constant, gear=q.gear, rotor_inertia=q.rotor_inertia, voltage=q.voltage,
