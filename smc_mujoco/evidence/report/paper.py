@@ -33,19 +33,7 @@ def report(
     threads: int | None = None,
     progress: bool = False,
 ) -> Path:
-    """Audit a paper and write its report, out/report.html, with evidence.json, badge.svg and checks.svg beside it.
-
-    Args:
-      paper: the name of one that ships, or a folder.
-      out: the folder.
-      quick: less, as each claim says.
-      threads: simulations at once; None for one per available core.
-      progress: whether to show a bar.
-
-    Raises:
-      ScenarioError: as `smc.audit`, or a folder that cannot be written.
-      MissingPackageError: jinja2 or plotly is not installed.
-    """
+    """Audit a paper and write its report, out/report.html, with evidence.json, badge.svg and checks.svg beside it."""
     if why := extras.missing("report", "a report", "jinja2", "plotly"):
         raise extras.MissingPackageError(why)
     folder = Path(out)
@@ -68,29 +56,26 @@ def page(done: Audit, seal: str, runs: int, figure: bytes) -> str:
     counts = Counter(claim.verdict for claim in done.claims)
     kinds = (*VERDICTS, *ANSWERS.values())
     sets = list(done.claims[0].verdicts)
-    return (
-        environment()
-        .get_template("paper.jinja")
-        .render(
-            css=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
-            js=Markup((TEMPLATES / "page.js").read_text(encoding="utf-8")),
-            paper=done.paper,
-            claims=done.claims,
-            counts={verdict: counts[verdict] for verdict in kinds if counts[verdict]},
-            summary=summary(done.claims),
-            sets=sets,
-            gains_set=sets[-1],
-            gains={name: gains(done, name) for name in sets},
-            quick=done.quick,
-            sections=SECTIONS,
-            link=lambda what: "verdict",
-            badge=uri("image/svg+xml", badge(done.paper.name, done.claims).encode()),
-            figure=uri("image/svg+xml", figure),
-            runs=runs,
-            seal=seal,
-            varying=[id for id, entry in done.paper.claims.items() if entry.varies and id in done.used],
-            version=__version__,
-        )
+    template = environment().get_template("paper.jinja")
+    return template.render(
+        css=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
+        js=Markup((TEMPLATES / "page.js").read_text(encoding="utf-8")),
+        paper=done.paper,
+        claims=done.claims,
+        counts={verdict: counts[verdict] for verdict in kinds if counts[verdict]},
+        summary=summary(done.claims),
+        sets=sets,
+        gains_set=sets[-1],
+        gains={name: gains(done, name) for name in sets},
+        quick=done.quick,
+        sections=SECTIONS,
+        link=lambda what: "verdict",
+        badge=uri("image/svg+xml", badge(done.paper.name, done.claims).encode()),
+        figure=uri("image/svg+xml", figure),
+        runs=runs,
+        seal=seal,
+        varying=[id for id, entry in done.paper.claims.items() if entry.varies and id in done.used],
+        version=__version__,
     )
 
 

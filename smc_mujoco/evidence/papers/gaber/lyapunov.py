@@ -40,13 +40,7 @@ def value(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> 
 
 
 def vdot(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return V' by (2) in the states (x, v), in the unit of s, squared, per s.
-
-    Args:
-      plant: with its nominal f and g; a network is synchronised.
-      lam, k1: gains of the paper's law, not saturated.
-      x, v: positions and velocities, arrays of one shape, SI units.
-    """
+    """Return V' by (2) in the states (x, v), in the unit of s, squared, per s; gains lam, k1 are not saturated."""
     x, v = np.asarray(x, float), np.asarray(v, float)
     f, g = _model(plant, x, v)
     alpha = v + k1 * x
