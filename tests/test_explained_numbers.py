@@ -18,7 +18,7 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.envs import tasks
 from smc_mujoco.evidence.accuracy import scaling
 from smc_mujoco.metrics import catalogue, conventions, limit_cycle, tip
-from smc_mujoco.simulation import conditions, controller, perturbations, scenario, signals, time_series
+from smc_mujoco.simulation import conditions, controller, scenario, signals, time_series
 from smc_mujoco.testing import golden, plugin
 
 pytestmark = pytest.mark.quick
@@ -123,7 +123,7 @@ SAID = {
         f"late by up to {part(under('jitter')['clock'].jitter / conditions.CONTROL_PERIOD)} of the",
         f"one sample in {round(1 / under('missed')['clock'].missed)} does".replace("10", "ten"),
     ],
-    smc.Clock: [f"0 .. {perturbations.MAX_MISSED:g}"],
+    smc.Clock: [f"0 .. {signals.MAX_MISSED:g}"],
     smc.TimeSeries.from_csv: [f"longer than {time_series.MAX_GAP_STEPS:g} median steps"],
     smc.BandLimited: [f"N = {signals.SINUSOIDS}, phi_i uniform"],
     smc.OrnsteinUhlenbeck: [f"`dt` defaults to {1e3 * smc.OrnsteinUhlenbeck(1.0, 1.0).dt:g} ms"],

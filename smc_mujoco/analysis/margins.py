@@ -34,12 +34,10 @@ from smc_mujoco.metrics import catalogue
 from smc_mujoco.metrics.conventions import by_group, refuse, scale
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import DURATION, Condition
-from smc_mujoco.simulation.grid import case, listed, listed_laws
-from smc_mujoco.simulation.initial_states import START_CURE, Starts
-from smc_mujoco.simulation.perturbations import Noise
+from smc_mujoco.simulation.grid import START_CURE, Starts, case, listed, listed_laws
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Constant
+from smc_mujoco.simulation.signals import Constant, Noise
 from smc_mujoco.simulation.trace import Trace
 
 TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound

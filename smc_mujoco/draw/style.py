@@ -28,8 +28,7 @@ from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
 from smc_mujoco.metrics.channel_groups import Group, group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation.conditions import CONDITION_FIELDS
-from smc_mujoco.simulation.perturbations import Jump
-from smc_mujoco.simulation.signals import Push
+from smc_mujoco.simulation.signals import Jump, Push
 from smc_mujoco.simulation.trace import Trace
 
 INK, MUTED, GRID, PAPER, FAILED = "#1F2429", "#646C75", "#E3E6E9", "#FFFFFF", "#A9AFB6"

@@ -22,8 +22,8 @@ from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, compiled_for_runs
 from smc_mujoco.simulation import callback, coerce
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation.channels import channels
 from smc_mujoco.simulation.controller import MAX_STATE
+from smc_mujoco.simulation.model import channels
 from smc_mujoco.simulation.reference import Failure, evaluate
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel

@@ -10,8 +10,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.simulation import callback, state
-from smc_mujoco.simulation.channels import channels
-from smc_mujoco.simulation.model import Mechanism
+from smc_mujoco.simulation.model import Mechanism, channels
 from smc_mujoco.simulation.prepare import pack, prepare
 from smc_mujoco.simulation.scenario import Resolved
 

@@ -155,8 +155,7 @@ class ScenarioBatch:
 def law_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
     """Call the law that failed again, in Python, and return its exception, or its u and s in the record, in words.
 
-    Compiled functions have no text of an exception. The inputs are those in the record, so the text depends only on the
-    run. Return None if the law does not raise again, because it had already changed its memory.
+    Compiled functions have no text of an exception. Return None for a law that had already changed its memory.
     """
     n, i, width = s.plant.n, int(record["seen"]["i"]), int(record["width"])
     function = reference.PythonComponent(s.law, n)

@@ -123,20 +123,14 @@ def callback():
             return
         address = int(userdata[1])
         arrays = Arrays(
-            pointer(integers(data + at.qpos)[0]),
-            pointer(integers(data + at.qvel)[0]),
-            pointer(integers(data + at.ctrl)[0]),
-            pointer(integers(data + at.xfrc_applied)[0]),
-            pointer(integers(data + at.qfrc_applied)[0]),
-            pointer(integers(data + at.sensordata)[0]),
-            pointer(integers(data + at.xipos)[0]),
-            pointer(integers(data + at.xanchor)[0]),
-            pointer(integers(data + at.xaxis)[0]),
-            pointer(integers(data + at.actuator_force)[0]),
-            pointer(integers(data + at.qfrc_constraint)[0]),
-            pointer(integers(data + at.qfrc_bias)[0]),
+            pointer(integers(data + at.qpos)[0]), pointer(integers(data + at.qvel)[0]),
+            pointer(integers(data + at.ctrl)[0]), pointer(integers(data + at.xfrc_applied)[0]),
+            pointer(integers(data + at.qfrc_applied)[0]), pointer(integers(data + at.sensordata)[0]),
+            pointer(integers(data + at.xipos)[0]), pointer(integers(data + at.xanchor)[0]),
+            pointer(integers(data + at.xaxis)[0]), pointer(integers(data + at.actuator_force)[0]),
+            pointer(integers(data + at.qfrc_constraint)[0]), pointer(integers(data + at.qfrc_bias)[0]),
             pointer(integers(data + at.qfrc_spring)[0]),
-        )
+        )  # fmt: skip
         run_simulation(address, simulation_at(address, 0), arrays)
 
     return compiled(types.void(types.intp, types.intp), control, cache=True)

@@ -214,10 +214,9 @@ def cached(function: Callable) -> Callable:
 
 
 def _disk_key(function: Callable, *arguments: object) -> tuple[str, str] | bool:
-    """Return the name and the hash under which a compiled function is kept on disk.
+    """Return the name and the hash of a compiled function on disk.
 
-    Return False, for none, if the function has no hash, or if one of its globals has changed since it was compiled
-    first, as for other gains: the code has the present value.
+    Return False, for none, if there is no hash, or if a global has changed since the first compilation.
     """
     function_name = getattr(function, "__qualname__", function.__name__)
     name = re.sub(r"\W+", "-", f"{function.__module__}.{function_name}")
@@ -229,11 +228,7 @@ def _disk_key(function: Callable, *arguments: object) -> tuple[str, str] | bool:
 
 
 def compile_component(c: Component) -> Function | AtAddress:
-    """Return a law, a surface or an estimator as a C function.
-
-    Raises:
-      NotCompilable: with its name and the compiler's reason.
-    """
+    """Return a law, a surface or an estimator as a C function; NotCompilable has its name and the reason."""
     if isinstance(c.function, AtAddress):
         return c.function
     name = f"{c.kind} {c.name!r}"

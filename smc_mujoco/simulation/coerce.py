@@ -22,8 +22,7 @@ from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part, joint_
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_STATE
-from smc_mujoco.simulation.perturbations import parameter_factors
-from smc_mujoco.simulation.signals import Constant, PerChannel, Signal
+from smc_mujoco.simulation.signals import Constant, PerChannel, Signal, parameter_factors
 
 T = TypeVar("T")
 

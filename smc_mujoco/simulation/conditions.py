@@ -44,9 +44,8 @@ from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation import coerce
-from smc_mujoco.simulation.perturbations import Clock, Jump, Noise
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Constant, OrnsteinUhlenbeck, Pulse, Signal, Sine, Step
+from smc_mujoco.simulation.signals import Clock, Constant, Jump, Noise, OrnsteinUhlenbeck, Pulse, Signal, Sine, Step
 
 Fields = Mapping[str, Any]
 Recipe = Fields | Callable[[Plant, float], Fields]  # fields, or a function of plant and duration that returns them
@@ -75,12 +74,7 @@ JUMP_MILD, JUMP_HARD = (
 
 @dataclasses.dataclass(frozen=True)
 class Condition:
-    """A named condition; see `condition`.
-
-    Attributes:
-      name: its name in tables and figures.
-      fields: Scenario field -> value, or a function of the plant and the duration, s, that returns such a mapping.
-    """
+    """A named condition; see `condition`."""
 
     name: str
     fields: Recipe
@@ -90,11 +84,7 @@ class Condition:
             object.__setattr__(self, "fields", frozen({name: _frozen(value) for name, value in self.fields.items()}))
 
     def on(self, plant: Plant, duration: float) -> dict[str, Any]:
-        """Return the Scenario fields on a plant, in runs of this duration, s. Single events happen at half time.
-
-        Raises:
-          ScenarioError: the condition has no numbers for the plant.
-        """
+        """Return the Scenario fields on a plant, in runs of this duration, s. Single events happen at half time."""
         length = number("duration", duration, above=0.0)
         return dict(self.fields(plant, length) if callable(self.fields) else self.fields)
 
@@ -171,11 +161,7 @@ def applicable(names: Iterable[str], plants: Sequence[Plant], duration: float) -
 
 
 def parse(text: str) -> Condition:
-    """Return the condition that a text describes, such as "worn gear: friction=Coulomb(0.05)".
-
-    Values are numbers, texts, lists, dicts, and calls of parts, signals and estimators. These may be the suite's or
-    imported ones of the user. Nothing is evaluated.
-    """
+    """Return the condition that a text describes, such as "worn gear: friction=Coulomb(0.05)"; evaluate nothing."""
     name, _, fields = text.partition(":")
     try:
         values = read_fields(fields)

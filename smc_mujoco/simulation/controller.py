@@ -31,8 +31,7 @@ from smc_mujoco.mechanisms.hardware.drives import rippled
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
-from smc_mujoco.simulation.channels import channel_at, lever
-from smc_mujoco.simulation.state import disturbance_at, function_at, log_at, state_at
+from smc_mujoco.simulation.state import channel_at, disturbance_at, function_at, log_at, state_at
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo itself gives up at 1e10
 LAST_STAGE = 1.0 - 1e-8  # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
@@ -480,6 +479,15 @@ def _apply_disturbances(address, sim, data, t, k):
         if channel.qfrc >= 0 and not math.isfinite(data.qfrc_applied[channel.qfrc]):
             return record.DISTURBANCE_NOT_FINITE
     return record.FINE
+
+
+@njit(error_model="numpy", inline="always")
+def lever(channel, xipos, xanchor, xaxis):
+    """Return the torque of a horizontal force of 1 N about a hinge, m: axis . (arm x force). All are flat arrays."""
+    j, k = channel.axis + 1, (channel.axis + 2) % 3
+    arm_j = xipos[channel.hinge_body + j] - xanchor[channel.anchor + j]
+    arm_k = xipos[channel.hinge_body + k] - xanchor[channel.anchor + k]
+    return xaxis[channel.anchor + j] * arm_k - xaxis[channel.anchor + k] * arm_j
 
 
 @njit(error_model="numpy", inline="always")

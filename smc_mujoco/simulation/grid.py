@@ -2,9 +2,16 @@
 
     scenarios = smc.grid(["duffing", arm], ["classical", my_law], ["noise", worn_gear], seeds=16)
 
-Plants, laws and conditions are names in the suite, or the user's objects.
+Plants, laws and conditions are names in the suite, or the user's objects. A seed gives all laws and conditions the same
+start. Seed 0 is x0 itself. Seed s starts channel i from
+
+    x_i = x0_i (1 + spread z_i) + by z_i,    z_i uniform in [-1, 1], drawn from (s, i)
+
+A run with contacts must start clear of its obstacles. There -|z_i| replaces z_i, which moves the start inwards, and
+pendulums that may touch each other ("bobs") start in order from left to right.
 """
 
+import dataclasses
 import itertools
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -18,6 +25,7 @@ from smc_mujoco.common.errors import (
     ScenarioError,
     ScenarioWarning,
     items_of,
+    number,
     one_line,
     shown,
     users_stacklevel,
@@ -33,13 +41,75 @@ from smc_mujoco.mechanisms.plant import Plant, catalogue
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, DURATION, Condition, find_condition
-from smc_mujoco.simulation.initial_states import GRID_SEEDS, Starts
 from smc_mujoco.simulation.model import compile_model, initial_state, with_values
-from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.scenario import U_MAX, Scenario
+from smc_mujoco.simulation.signals import Noise
 
 LawOfSeed = Callable[[int], Law]  # seed -> the law of that run
 MAX_REST_ACCELERATION = 1e-9  # rad/s^2 or m/s^2; chosen: rounding stays below
+SPREAD = 0.2  # of x0, to either side; chosen
+GRID_SEEDS = 2**52  # number of a grid's seeds; tuning takes larger ones
+START_CURE = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"  # where a plant starts at 0
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Starts:
+    """Where runs begin, by seed. The fields are the arguments of `starts`."""
+
+    x0: tuple[float, ...] | None = None
+    spread: float = SPREAD
+    by: float = 0.0
+
+    def largest(self, scenario: Scenario) -> float:
+        """Return the largest |x| of any channel at the middle of the starts, or `by` if all are 0, rad or m."""
+        middle = scenario.resolved.x0 if self.x0 is None else self.x0
+        return max(abs(x) for x in middle) or self.by
+
+    def check_condition(self, name: str, fields: Mapping[str, Any]) -> None:
+        """Raise ScenarioError if both the starts and the fields of a condition set x0."""
+        if self.x0 is not None and "x0" in fields:
+            raise ScenarioError(f"condition {name!r} and the starts, or --x0, both set x0: give one of them")
+
+    def place(self, scenario: Scenario, seed: int) -> Scenario:
+        """Return a scenario with a seed, from the start that belongs to the seed."""
+        if self.x0 is not None:
+            scenario = dataclasses.replace(scenario, x0=self.x0)
+        if seed == 0:
+            return dataclasses.replace(scenario, seed=0)
+        kind = scenario.contact.kind
+        z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(scenario.plant.n)]
+        z = z if kind == "none" else [-abs(factor) for factor in z]
+        x0 = [
+            x * (1.0 + self.spread * factor) + (self.by if x >= 0.0 else -self.by) * factor
+            for x, factor in zip(scenario.resolved.x0, z, strict=True)
+        ]
+        return dataclasses.replace(scenario, seed=seed, x0=sorted(x0) if kind == "bobs" else x0)
+
+
+def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by: float = 0.0) -> Starts:
+    """Return where the runs of a grid begin, by seed.
+
+    Args:
+      x0: the middle of all starts, rad or m: one number for all channels, or one for each. Default: the plant's x0.
+      spread: how far starts lie to either side of the middle, as a fraction of it, 0 or more.
+      by: how much farther they lie, rad or m, 0 or more; for a plant that rests at 0.
+
+    Raises:
+      ScenarioError: a number out of its range.
+
+    Warns:
+      ScenarioWarning: a spread of more than 1, which may be percent.
+    """
+    if number("spread", spread, low=0.0) > 1.0:
+        warnings.warn(
+            f"spread is {spread:g}, which moves starts by {spread:g} times x0: if it is {spread:g} %, give "
+            f"{spread / 100:g}",
+            ScenarioWarning,
+            users_stacklevel(),
+        )
+    items = items_of("x0", x0) if isinstance(x0, Sequence) and not isinstance(x0, str) else [x0]
+    middle = None if x0 is None else tuple(number("x0", item) for item in items)
+    return Starts(x0=middle, spread=spread, by=number("by", by, low=0.0))
 
 
 def grid(
@@ -92,11 +162,7 @@ def all_combinations(
     duration: float,
     starts: Starts | None = None,
 ) -> list[Scenario]:
-    """Return scenarios of every plant, condition, law and seed, as `grid`.
-
-    Args:
-      laws: plant -> for each law, a function of the seed that returns the law of that run.
-    """
+    """Return scenarios as `grid`; `laws` returns, for a plant, a function of the seed for each law."""
     scenarios = []
     for plant in plants:
         for condition in conditions:
@@ -119,11 +185,7 @@ def case(
     starts: Starts | None = None,
     changes: Mapping[str, Any] = frozen({}),
 ) -> Scenario:
-    """Return one run of a grid, with arguments as in `grid`.
-
-    Args:
-      changes: Scenario field -> value, in place of what the condition sets.
-    """
+    """Return one run of a grid, with `changes` of the fields that its condition sets."""
     plant, condition, seed = as_plant(plant), find_condition(condition), whole("seed", seed, 0, GRID_SEEDS - 1)
     fields: dict[str, Any] = {"plant": plant, "law": _law(plant, law, gains, seed), "duration": duration}
     if plant.name in sets.STUDY:

@@ -16,13 +16,14 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.mechanisms.hardware import encoder
-from smc_mujoco.mechanisms.hardware.part import ROTOR, Part, initial_pose, joint_ids
-from smc_mujoco.mechanisms.plant import compiled_for_runs, field_array
-from smc_mujoco.simulation.channels import channels
+from smc_mujoco.mechanisms.hardware.part import PASSIVE, ROTOR, Part, drive_ids, initial_pose, joint_ids
+from smc_mujoco.mechanisms.plant import DIRECT_TEXT, compiled_for_runs, field_array
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.state import CHANNEL
 
 USERDATA = 2  # numbers in mjData.userdata: callback.magic() and the address of the simulation's record
 PATH_POINTS = 400  # points that are checked on the path to a start: 1 cm apart on the longest rail
+SENSORS = {"x_sensor": mujoco.mjtSensor.mjSENS_JOINTPOS, "v_sensor": mujoco.mjtSensor.mjSENS_JOINTVEL}
 MAX_RECENT = 16  # mechanisms that are kept for later runs, as those of a search for gains; chosen
 MAX_OVERLAP = 1e-3  # m, at a start; chosen: bodies in contact overlap by less, so a deeper start begins with a blow
 
@@ -65,6 +66,59 @@ def mechanism(scenario: Scenario) -> Mechanism:
         if not scenario.plant.own:  # a user's file is read again, because it may have changed
             _recent.append(shared)
     return shared
+
+
+def channels(model: mujoco.MjModel) -> np.ndarray:
+    """Return the channels, (n,) CHANNEL: one for each actuator that takes commands, then one for each other joint.
+
+    A disturbance d acts on the body of the joint, as a force along the axis of a slide or a torque about the axis of a
+    hinge, so that its generalised force is d. A horizontal force acts on the body's centre of mass.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    for i in drive_ids(model):
+        if model.actuator_trntype[i] != mujoco.mjtTrn.mjTRN_JOINT or model.actuator_gear[i, 0] != 1.0:
+            raise ScenarioError(f"actuator {model.actuator(i).name!r} does not drive a joint with gear 1: give it one")
+    joints, drives = joint_ids(model).tolist(), drive_ids(model).tolist()
+    drives += [-1] * (len(joints) - len(drives))
+    rows = [_channel(model, data, drive, joint) for drive, joint in zip(drives, joints, strict=True)]
+    return np.array([tuple(one[name] for name in CHANNEL.names or ()) for one in rows], CHANNEL)
+
+
+def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int) -> dict[str, int]:
+    """Return the fields of a CHANNEL; `drive` is -1 for a joint without an actuator."""
+    body = int(model.jnt_bodyid[joint])
+    name = f"actuator {model.actuator(drive).name!r}" if drive >= 0 else f"sensor of joint {model.joint(joint).name!r}"
+    hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
+    if not hinge and model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_SLIDE:
+        raise ScenarioError(f"{name} is not on a hinge or slide joint: give it one")
+    direct = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, DIRECT_TEXT) >= 0
+    axis = np.array([0.0, 0.0, 1.0]) if direct else data.xaxis[joint].round(12)  # a direct channel may have any axis
+    if np.count_nonzero(axis) != 1:
+        raise ScenarioError(f"the joint of {name} has axis {axis}: align it with a world axis")
+    component = int(np.argmax(np.abs(axis)))
+    friction = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, PASSIVE + model.joint(joint).name)
+    computed = friction >= 0 and model.actuator_ctrlnum[friction] > 0  # a friction by a formula
+    xfrc, sign = 6 * body + component + 3 * hinge, int(np.sign(axis[component]))
+    indices = {
+        "qpos": model.jnt_qposadr[joint], "qvel": model.jnt_dofadr[joint], "xfrc": xfrc, "sign": sign,
+        "ctrl": model.actuator_ctrladr[drive] if drive >= 0 else -1,
+        "force": model.actuator_outadr[drive] if drive >= 0 else -1,
+        "shaft": model.jnt_dofadr[model.actuator_trnid[drive, 0]] if drive >= 0 else -1,
+        "horizontal": xfrc, "axis": 0, "hinge_body": -1, "anchor": -1,
+        "friction_force": -1 if friction < 0 else model.actuator_outadr[friction],
+        "friction_ctrl": model.actuator_ctrladr[friction] if computed else -1,
+        "qfrc": model.jnt_dofadr[joint] if direct else -1,
+    }  # fmt: skip
+    if hinge:
+        across = int(component == 0)  # a horizontal axis across that of the hinge
+        indices |= {"horizontal": 6 * body + across, "axis": across, "hinge_body": 3 * body, "anchor": 3 * joint}
+    for field, kind in SENSORS.items():
+        sensors = np.flatnonzero((model.sensor_type == kind) & (model.sensor_objid == joint))
+        if not len(sensors):
+            raise ScenarioError(f"the joint of {name} has no {kind.name[7:].lower()} sensor: add one")
+        indices[field] = model.sensor_adr[sensors[0]]
+    return indices
 
 
 def spec(scenario: Scenario) -> mujoco.MjSpec:

@@ -8,7 +8,7 @@ import numpy as np
 from smc_mujoco.common.errors import shown
 from smc_mujoco.common.html import Html, fields, panel
 from smc_mujoco.mechanisms.hardware.contact import Contact
-from smc_mujoco.simulation.perturbations import Clock, Noise
+from smc_mujoco.simulation.signals import Clock, Noise
 
 ABSENT = None, (), {}, Noise(), Clock(), Contact("none")  # values of fields that were left out
 MAX_CHANNELS = 8  # of one unit in a panel

@@ -41,12 +41,7 @@ def block(seed, channel, stream, k):
     c0, c1, c2, c3 = np.uint64(k), np.uint64(stream), np.uint64(0), np.uint64(0)
     key0, key1 = np.uint64(seed), np.uint64(channel)
     for _ in range(10):
-        c0, c1, c2, c3 = (
-            _mulhi(_M1, c2) ^ c1 ^ key0,
-            _M1 * c2,
-            _mulhi(_M0, c0) ^ c3 ^ key1,
-            _M0 * c0,
-        )
+        c0, c1, c2, c3 = (_mulhi(_M1, c2) ^ c1 ^ key0, _M1 * c2, _mulhi(_M0, c0) ^ c3 ^ key1, _M0 * c0)
         key0, key1 = key0 + _W0, key1 + _W1
     return c0, c1, c2, c3
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.jit import AtAddress, Function, NotCompilable
+from smc_mujoco.common.jit import NotCompilable
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import gain_at
 from smc_mujoco.control.properties import read_by
@@ -32,26 +32,11 @@ READING_BYTES = 67  # of a delayed sensor's history, per channel and reading, in
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
-class Functions:
-    """The compiled functions of a scenario. `nominal` is None for a model that MuJoCo itself computes."""
-
-    laws: tuple[Function | AtAddress, ...]  # one for all channels, or one for each driven channel
-    surface: Function | AtAddress | None
-    estimator: Function | AtAddress
-    nominal: Function | None
-    references: tuple[Function, ...]  # one for all channels, or one for each driven channel
-    feedforward: Function | None
-    disturbances: tuple[Function, ...]
-    friction: Function | None  # by a formula
-    errors: tuple[Function | None, Function | None]  # of measurement: of position and velocity
-
-
-@dataclasses.dataclass(frozen=True, slots=True)
 class Prepared:
     """A scenario that is ready to run."""
 
     scenario: Scenario  # not resolved
-    functions: Functions | None  # None if one of them does not compile
+    functions: dict[str, Any] | None  # what -> compiled; None if one of them does not compile
     why_not: str  # what does not compile, in one sentence
     mechanism: Mechanism
     key: Hashable  # equal for scenarios that can share a Batch
@@ -86,25 +71,23 @@ def prepare(scenario: object) -> Prepared:
         return Prepared(scenario, None, str(error), shared, key)
 
 
-def _compile(s: Resolved) -> Functions:
+def _compile(s: Resolved) -> dict[str, Any]:
     """Compile every function of a scenario; NotCompilable names the first that numba refuses."""
-    plant = s.plant
+    plant, by_mujoco = s.plant, isinstance(s.plant.nominal, NominalModel)
     optional = [signal for signal in (s.feedforward, *s.noise.errors) if signal]
     for signal in (*dict.fromkeys(s.references), *s.disturbance, *optional):
         cfunctions.signal_values(signal)  # refuses data that compiled code would misread
-    return Functions(
-        laws=tuple(cfunctions.compile_component(law) for law in s.law.of_channels(plant.driven)),
-        surface=s.surface and cfunctions.compile_component(s.surface),
-        estimator=cfunctions.compile_component(s.velocity),
-        nominal=None
-        if isinstance(plant.nominal, NominalModel)
-        else cfunctions.compile_nominal(plant.nominal, tuple(plant.parameters)),
-        references=tuple(cfunctions.compile_signal(signal) for signal in references(s)),
-        feedforward=s.feedforward and cfunctions.compile_signal(s.feedforward),
-        disturbances=tuple(map(cfunctions.compile_signal, s.disturbance)),
-        friction=s.formula_friction and cfunctions.compile_friction(s.formula_friction),
-        errors=tuple(error and cfunctions.compile_signal(error) for error in s.noise.errors),  # pyright: ignore[reportArgumentType]
-    )
+    return {
+        "laws": [cfunctions.compile_component(law) for law in s.law.of_channels(plant.driven)],  # one for all, or each
+        "surface": s.surface and cfunctions.compile_component(s.surface),
+        "estimator": cfunctions.compile_component(s.velocity),
+        "nominal": None if by_mujoco else cfunctions.compile_nominal(plant.nominal, tuple(plant.parameters)),
+        "references": [cfunctions.compile_signal(signal) for signal in references(s)],
+        "feedforward": s.feedforward and cfunctions.compile_signal(s.feedforward),
+        "disturbances": [cfunctions.compile_signal(signal) for signal in s.disturbance],
+        "friction": s.formula_friction and cfunctions.compile_friction(s.formula_friction),  # by a formula
+        "errors": [error and cfunctions.compile_signal(error) for error in s.noise.errors],  # of position and velocity
+    }
 
 
 def references(s: Resolved) -> tuple[Signal, ...]:
@@ -162,9 +145,9 @@ def _tables(prepared: Prepared, buffer: state.Buffer) -> dict[str, list[dict[str
     assert functions is not None
     n, memory = s.plant.n, {"memory": buffer.reserve(s.law.memory * s.plant.n), "stride": 8 * s.law.memory}
     each = range(n if s.law.joint else 1)  # numbers of a gain
-    laws = zip(functions.laws, s.law.of_channels(s.plant.driven), strict=True)
-    signals = zip(functions.references, references(s), strict=True)
-    disturbances = enumerate(zip(functions.disturbances, s.disturbance, strict=True))
+    laws = zip(functions["laws"], s.law.of_channels(s.plant.driven), strict=True)
+    signals = zip(functions["references"], references(s), strict=True)
+    disturbances = enumerate(zip(functions["disturbances"], s.disturbance, strict=True))
     return {
         "laws": [
             _function(compiled, [gain_at(value, i) for value in law.gains.values() for i in each], buffer) | memory
@@ -186,15 +169,15 @@ def _shared_functions(prepared: Prepared, nominal: Native | None, buffer: state.
     s, functions = prepared.scenario.resolved, prepared.functions
     assert functions is not None
     fields, n = {}, s.plant.n
-    fields["estimator"] = _function(functions.estimator, s.velocity.gains.values(), buffer, s.velocity.memory, n)
+    fields["estimator"] = _function(functions["estimator"], s.velocity.gains.values(), buffer, s.velocity.memory, n)
     if s.surface is not None:
-        fields["surface"] = _function(functions.surface, s.surface.gains.values(), buffer, s.surface.memory, n)
+        fields["surface"] = _function(functions["surface"], s.surface.gains.values(), buffer, s.surface.memory, n)
     if nominal is not None:
         fields["dynamics" if s.law.joint else "nominal"] = _function(nominal, nominal.values, buffer)
-    elif functions.nominal is not None:
-        fields["nominal"] = _function(functions.nominal, s.plant.parameters.values(), buffer)
+    elif functions["nominal"] is not None:
+        fields["nominal"] = _function(functions["nominal"], s.plant.parameters.values(), buffer)
     names = "feedforward", "position_error", "velocity_error"
-    signals, compiled = (s.feedforward, *s.noise.errors), (functions.feedforward, *functions.errors)
+    signals, compiled = (s.feedforward, *s.noise.errors), (functions["feedforward"], *functions["errors"])
     return fields | {
         name: _signal(function, signal, buffer)
         for name, function, signal in zip(names, compiled, signals, strict=True)
@@ -211,28 +194,15 @@ def _settings(s: Resolved) -> dict[str, Any]:
     """Return the numbers of a record that set clock, sensor and drives."""
     sensor, drives = s.sensor or IDEAL_SENSOR, s.drive_step
     return {
-        "steps": s.steps,
-        "stages": s.stages,
-        "step": s.physics_step,
-        "period": s.control_period,
-        "jitter": s.clock.jitter_steps(s.physics_step),
-        "missed": s.clock.missed,
-        "delay": s.delay_steps,
+        "steps": s.steps, "stages": s.stages, "step": s.physics_step, "period": s.control_period,
+        "jitter": s.clock.jitter_steps(s.physics_step), "missed": s.clock.missed, "delay": s.delay_steps,
         "scale": math.prod(part.scale for part in s.actuator),
-        "has_drives": drives is not None,
-        "drive_step": drives._asdict() if drives else {},
-        "seed": s.noise_seed,
-        "sigma_x": s.noise.position,
-        "sigma_v": s.noise.velocity,
-        "bias": sensor.bias,
-        "counts": 0.0 if sensor.counts == math.inf else sensor.counts,
-        "dropout": sensor.dropout,
-        "read_period": sensor.period or 0.0,
-        "read_delay": sensor.delay,
-        "uses_model": s.model == "nominal",
-        "drive_gain": s.nominal_drive.gain,
-        "drive_drag": s.nominal_drive.drag,
-    }
+        "has_drives": drives is not None, "drive_step": drives._asdict() if drives else {},
+        "seed": s.noise_seed, "sigma_x": s.noise.position, "sigma_v": s.noise.velocity, "bias": sensor.bias,
+        "counts": 0.0 if sensor.counts == math.inf else sensor.counts, "dropout": sensor.dropout,
+        "read_period": sensor.period or 0.0, "read_delay": sensor.delay,
+        "uses_model": s.model == "nominal", "drive_gain": s.nominal_drive.gain, "drive_drag": s.nominal_drive.drag,
+    }  # fmt: skip
 
 
 def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
@@ -244,15 +214,10 @@ def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
     if s.drive_step is not None:
         states["first"], states["second"] = s.drive_step.start(np.array(s.v0))
     return {
-        "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")},
-        "a": buffer.reserve(n),
-        "width": width,
-        "commands": buffer.reserve(2 * width),
-        "states": buffer.put(states.view(float).tolist()),
-        "limits": buffer.put(s.limits),
-        "delay_slots": slots,
-        "delay_buffer": buffer.reserve(slots * n),
-    }
+        "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")}, "a": buffer.reserve(n),
+        "width": width, "commands": buffer.reserve(2 * width), "states": buffer.put(states.view(float).tolist()),
+        "limits": buffer.put(s.limits), "delay_slots": slots, "delay_buffer": buffer.reserve(slots * n),
+    }  # fmt: skip
 
 
 def _joint_measurement(
@@ -264,12 +229,8 @@ def _joint_measurement(
     arrays = {name: state.Index(head + offset // 8) for name, (_, offset, *_) in (stored.fields or {}).items()}
     fields: dict[str, Any] = {"joint": arrays | {"head": head}}
     if nominal is not None:
-        fields["handle"] = {
-            "coriolis": native_coriolis().address,
-            "jacobian": native_jacobian().address,
-            "parameters": functions["dynamics"]["parameters"],
-            "unit": s.nominal_drive.gain,
-        }
+        shared = {"parameters": functions["dynamics"]["parameters"], "unit": s.nominal_drive.gain}
+        fields["handle"] = {"coriolis": native_coriolis().address, "jacobian": native_jacobian().address} | shared
     return fields
 
 
@@ -287,7 +248,7 @@ def _native_nominal(s: Resolved) -> Native | None:
 
 def _frictions(prepared: Prepared, buffer: state.Buffer) -> list[dict[str, int]]:
     """Return the FUNCTIONs of a friction by a formula, one for each joint. Their numbers go into the buffer."""
-    compiled, friction = prepared.functions and prepared.functions.friction, prepared.scenario.formula_friction
+    compiled, friction = prepared.functions and prepared.functions["friction"], prepared.scenario.formula_friction
     if compiled is None or friction is None:
         return []
     shared = prepared.mechanism

@@ -108,7 +108,8 @@ class Loop:
     def step(self, step: int) -> None:
         """Do physics step 0, 1, ..., with `control` installed. The step after the last one only completes the log."""
         if step == self.scenario.jump_step:
-            self.set_parameters(step)
+            models.put_values(self.model, self.base, self.scenario, step)
+            mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
         if step < self.total:
             mujoco.mj_step(self.model, self.data)
         else:
@@ -116,11 +117,6 @@ class Loop:
         expected_calls = min(step + 1, self.total) * self.scenario.stages + (step == self.total)
         if self.calls != expected_calls and self.failure is None:
             self.failure, self.failed_step = INTERRUPTED, step
-
-    def set_parameters(self, step: int) -> None:
-        """Give the mechanism the true parameters that hold from a step on."""
-        models.put_values(self.model, self.base, self.scenario, step)
-        mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
 
     def control(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Control callback: run the law at the first stage of a sample, and the disturbance at every stage."""
@@ -361,41 +357,21 @@ def gains_of(c: Component, n: int = 1) -> tuple:
 
 
 class PythonComponent:
-    """A law, surface or estimator as the Python function that its author wrote.
-
-    Attributes:
-      name: its kind and name, for messages.
-      functions: the function of each channel, and all that it calls, not compiled.
-      gains: the record that each reads.
-      memory: one row for each channel, (n, c.memory).
-    """
+    """A law, surface or estimator as the Python function that its author wrote, with a memory, (n, c.memory)."""
 
     def __init__(self, c: Component, n: int):
         self.name, self.returns = f"{c.kind} {c.name!r}", RETURN_VALUES[c.kind]
         self.memory = np.zeros((n, c.memory))
-        parts = self._parts(c)
+        parts = c.of_channels(n)  # one for each channel, or one for all
+        parts = parts * n if len(parts) == 1 else parts
         functions = {id(part.function): part.function for part in parts}  # a callable object may have no hash
         uncompiled = {key: rebuild(function, lambda inner: inner) for key, function in functions.items()}
         self.functions, self.sizes = [uncompiled[id(part.function)] for part in parts], [part.memory for part in parts]
-        self.bind(c)
-
-    def _parts(self, c: Component) -> list[Component]:
-        """Return the component of each channel; of a law of many joints itself."""
-        parts = c.of_channels(n := len(self.memory))
-        return parts * n if len(parts) == 1 else parts
-
-    def bind(self, c: Component) -> None:
-        """Take the gains of a component with the same functions."""
-        parts = self._parts(c)
-        gains = {id(part): gains_of(part, len(parts)) for part in {id(part): part for part in parts}.values()}
-        self.gains = [gains[id(part)] for part in parts]
+        gains = {id(part): gains_of(part, n) for part in {id(part): part for part in parts}.values()}
+        self.gains = [gains[id(part)] for part in parts]  # the record that each reads
 
     def __call__(self, i: int, y: tuple) -> list[float]:
-        """Return its two numbers for channel i; NaN for an acceleration that is not estimated.
-
-        Args:
-          y: a Reading for an estimator, else a Measurement.
-        """
+        """Return its two numbers for channel i, of a Reading or a Measurement; NaN for a missing acceleration."""
         try:
             out = self.functions[i](y, self.gains[i], self.memory[i, : self.sizes[i]])
         except USER_EXCEPTIONS as error:
@@ -486,9 +462,7 @@ def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
 def evaluate(signal: Signal, t: float, *state: Any) -> list[float]:
     """Return a signal and its two derivatives at time t, s.
 
-    Args:
-      state: memory, seed, channel and stream, for process noise; or memory, e, e' and s, for a disturbance that sees
-        the loop. Other signals do not read it.
+    The state is memory, seed, channel and stream for process noise, and memory, e, e' and s for one that sees the loop.
     """
     name = type(signal).__name__
     try:

@@ -16,7 +16,7 @@ from typing import overload
 
 import mujoco
 
-from smc_mujoco.common.errors import ScenarioError, shown, users_stacklevel, whole
+from smc_mujoco.common.errors import ScenarioError, users_stacklevel, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.simulation import callback, reference
 from smc_mujoco.simulation.batch import Report, ScenarioBatch
@@ -58,7 +58,7 @@ def run(
     MuJoCo's callbacks are global to the process. During a run no other callback is called, and a run fails if somebody
     sets the control callback meanwhile.
     """
-    prepared = list(_prepared([scenarios] if isinstance(scenarios, Scenario) else scenarios))
+    prepared = list(map(prepare, [scenarios] if isinstance(scenarios, Scenario) else scenarios))
     work, count = sum(item.scenario.work for item in prepared), len(prepared)
     with bar(f"{count} run{'s' * (count != 1)}", work, shown=progress) as progress_bar:
         traces = dict(stream(prepared, threads, progress_bar.advance))
@@ -66,15 +66,13 @@ def run(
 
 
 def stream(
-    scenarios: Iterable[Scenario | Prepared],
-    threads: int | None = None,
-    report: Report = lambda steps: None,
+    scenarios: Iterable[Scenario | Prepared], threads: int | None = None, report: Report = lambda steps: None
 ) -> Iterator[tuple[int, Trace]]:
     """Yield pairs (index, Trace) as soon as their batch is done. At most one batch is in memory."""
     threads = cores(threads)
     groups: dict[Hashable, list[tuple[int, Prepared]]] = {}
     uncompiled: list[tuple[int, Prepared]] = []
-    for index, prepared in enumerate(_prepared(scenarios)):
+    for index, prepared in enumerate(map(prepare, scenarios)):
         if prepared.why_not:
             warnings.warn(f"{prepared.why_not}; the run takes the reference loop", PlainLoopWarning, users_stacklevel())
             uncompiled.append((index, prepared))
@@ -129,13 +127,6 @@ def _batches(group: Sequence[tuple[int, Prepared]], threads: int) -> Iterator[li
         size += needed
     if batch:
         yield batch
-
-
-def _prepared(scenarios: object) -> Iterator[Prepared]:
-    """Yield scenarios, prepared one by one."""
-    if isinstance(scenarios, str) or not isinstance(scenarios, Iterable):
-        raise ScenarioError(f"cannot run {shown(scenarios)}: give a smc.Scenario or several")
-    yield from map(prepare, scenarios)
 
 
 def cores(threads: int | None = None) -> int:

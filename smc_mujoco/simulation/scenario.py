@@ -34,9 +34,8 @@ from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import MAX_SEED, MIN_TIME
-from smc_mujoco.simulation.perturbations import Clock, Jump, Noise
 from smc_mujoco.simulation.philox import PROCESS
-from smc_mujoco.simulation.signals import Impulse, OrnsteinUhlenbeck, PerChannel, Push, Signal
+from smc_mujoco.simulation.signals import Clock, Impulse, Jump, Noise, OrnsteinUhlenbeck, PerChannel, Push, Signal
 
 MAX_TIME = 1e9  # s, of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
@@ -108,11 +107,9 @@ class Scenario:
       sensor: an Encoder, or None: position and velocity as they are, with `noise`.
       condition: name of the run's condition in a grid, set by `named`; dataclasses.replace drops it.
 
-    Defaults that depend on other fields are None until they are resolved: model, physics_step, u_max, x0, v0,
-    reference, velocity and integrator. `resolved` is the same scenario with these defaults. dataclasses.replace keeps
-    None, so that a default follows the fields that it depends on. The law is never None: the default, that of the
-    plant's channels, is taken at once. Scenarios whose resolved fields are equal are equal, and give the same trace to
-    the last bit.
+    Fields that are left out stay None, also under dataclasses.replace, so that a default follows the fields on which it
+    depends. `resolved` is the same scenario with its defaults. Scenarios whose resolved fields are equal are equal, and
+    give the same trace to the last bit.
 
     Raises:
       ScenarioError: a value out of its range, or values that do not fit together, in one sentence.
@@ -157,36 +154,18 @@ class Scenario:
     if TYPE_CHECKING:  # what the converters take, which a type checker cannot see
 
         def __init__(
-            self,
-            *,
-            plant: Plant | str,
-            law: coerce.Laws | None = None,
-            model: str | None = None,
-            surface: Surface | Template | str | None = None,
-            duration: float = 10.0,
-            control_period: float = 1e-3,
-            physics_step: float | None = None,
-            u_max: float | coerce.ByChannel[float] | None = None,
-            x0: float | Sequence[float] | None = None,
-            v0: float | Sequence[float] | None = None,
-            reference: Signal | coerce.ByChannel[Signal] | None = None,
-            feedforward: Signal | None = None,
-            disturbance: Signal | Sequence[Signal] | None = None,
-            noise: Noise | None = None,
-            input_delay: float = 0.0,
-            clock: Clock | None = None,
-            velocity: Estimator | Template | str | None = None,
-            mismatch: Mapping[str, float] | None = None,
-            jump: Jump | None = None,
-            seed: int = 0,
-            noise_key: int = 0,
-            integrator: str | None = None,
-            friction: Friction | Sequence[Friction] | None = None,
-            contact: Contact | str | None = None,
-            mechanism: str = "equation",
-            actuator: Actuator | Sequence[Actuator] | None = None,
-            sensor: Encoder | None = None,
-        ) -> None: ...
+            self, *, plant: Plant | str, law: coerce.Laws | None = None, model: str | None = None,
+            surface: Surface | Template | str | None = None, duration: float = 10.0, control_period: float = 1e-3,
+            physics_step: float | None = None, u_max: float | coerce.ByChannel[float] | None = None,
+            x0: float | Sequence[float] | None = None, v0: float | Sequence[float] | None = None,
+            reference: Signal | coerce.ByChannel[Signal] | None = None, feedforward: Signal | None = None,
+            disturbance: Signal | Sequence[Signal] | None = None, noise: Noise | None = None, input_delay: float = 0.0,
+            clock: Clock | None = None, velocity: Estimator | Template | str | None = None,
+            mismatch: Mapping[str, float] | None = None, jump: Jump | None = None, seed: int = 0, noise_key: int = 0,
+            integrator: str | None = None, friction: Friction | Sequence[Friction] | None = None,
+            contact: Contact | str | None = None, mechanism: str = "equation",
+            actuator: Actuator | Sequence[Actuator] | None = None, sensor: Encoder | None = None,
+        ) -> None: ...  # fmt: skip
 
     def __post_init__(self) -> None:
         self._convert()
@@ -347,10 +326,7 @@ class Scenario:
         return Nominal() if self.voltage_motor is None else self.voltage_motor.nominal
 
     def factors(self, step: int) -> dict[str, float]:
-        """Return the true plant's parameter factors at a physics step: the mismatch, times the jump from its time on.
-
-        For the parameters in `plant.added` they are terms, which are added.
-        """
+        """Return the plant's parameter factors, or terms for those of `plant.added`, at a physics step."""
         factors = dict(self.mismatch)
         if self.jump is not None and step >= self.jump_step:
             for name, factor in self.jump.factors.items():
@@ -427,9 +403,7 @@ def _default_steps(s: Scenario) -> int:
 def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
     """Return the bounds that the plant's channels suggest, and the default bound for those that suggest none."""
     default = default_u_max(plant)
-    if "u_max" not in plant.suggested:
-        return default
-    bounds = tuple(default if bound is None else bound for bound in plant.suggested["u_max"])
+    bounds = tuple(default if bound is None else bound for bound in plant.suggested.get("u_max", (None,)))
     return bounds if len(set(bounds)) > 1 else bounds[0]
 
 
@@ -479,11 +453,8 @@ def check_signals(s: Resolved) -> None:
             )
         if isinstance(d, Impulse) and d.width < s.physics_step:
             raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
-    for name, signal in [*(("disturbance", d) for d in s.disturbance), ("feedforward", s.feedforward)]:
-        if isinstance(signal, PerChannel):
-            raise ScenarioError(
-                f"{name} has a signal for each channel, which only a reference may have: give one signal for all"
-            )
+    if any(isinstance(signal, PerChannel) for signal in (*s.disturbance, s.feedforward)):
+        raise ScenarioError("only a reference may have a signal for each channel: give one signal for all")
     for push in [d for d in s.disturbance if isinstance(d, Push)]:
         find(f"body of {s.plant.name} in a Push", push.body, dict.fromkeys(bodies(s.plant)))
     if s.plant.direct and (forces := [d for d in s.disturbance if d.cartesian and not isinstance(d, Push)]):
@@ -547,24 +518,16 @@ def check_channels(s: Resolved) -> None:
             )
     if not s.law.joint:
         return
-    if s.plant.n == 1:
-        raise ScenarioError(
-            f"law {s.law.name!r} is of many joints, and {s.plant.name} has one: give a law of one channel, such as "
-            "'computed_torque'"
-        )
-    joints = getattr(s.law.function, "joints", s.plant.n)  # of C code
-    if joints != s.plant.n:
-        raise ScenarioError(
-            f"law {s.law.name!r} is C code for {joints} joints, and {s.plant.name} has {s.plant.n}: write it for "
-            f"{s.plant.n}, with SMC_JOINTS, or --joints of export-c"
-        )
-    if s.plant.free:
-        raise ScenarioError(
-            f"law {s.law.name!r} is of many joints and commands them all, and {s.plant.name} has {s.plant.free} "
-            "without an actuator: give a law of one channel"
-        )
-    if s.surface is not None:
-        raise ScenarioError(f"law {s.law.name!r} is of many joints and has its own surface: leave the surface out")
+    plant, joints = s.plant, getattr(s.law.function, "joints", s.plant.n)
+    sized = f"write it for {plant.n}, with SMC_JOINTS, or --joints of export-c"
+    for refused, why in (
+        (plant.n == 1, f"{plant.name} has one: give a law of one channel, such as 'computed_torque'"),
+        (joints != plant.n, f"as C code of {joints}, where {plant.name} has {plant.n}: {sized}"),
+        (plant.free, f"{plant.name} has {plant.free} without an actuator: give a law of one channel"),
+        (s.surface is not None, "has its own surface: leave the surface out"),
+    ):
+        if refused:
+            raise ScenarioError(f"law {s.law.name!r} is of many joints, and {why}")
 
 
 def check_inertia(s: Resolved) -> None:

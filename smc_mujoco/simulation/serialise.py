@@ -20,9 +20,8 @@ from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation import time_series  # noqa: F401  # whose signals a file may name
-from smc_mujoco.simulation.perturbations import Clock, Jump, Noise
 from smc_mujoco.simulation.scenario import Resolved, Scenario
-from smc_mujoco.simulation.signals import PerChannel, Signal
+from smc_mujoco.simulation.signals import Clock, Jump, Noise, PerChannel, Signal
 
 RESOLVED = tuple(Resolved.__annotations__)  # fields that are None if left out, with a default that `resolved` has
 

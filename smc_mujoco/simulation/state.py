@@ -29,6 +29,24 @@ SLIDING, ESTIMATE = floats(("s", "v_eq")), floats(("v", "a"))
 MOTION, MODEL = floats(("value", "rate", "acceleration")), floats(("f", "g"))
 FRICTION_INPUT, FRICTION_OUTPUT = floats(("v", "motor", "load")), floats(("f", "low", "high"))  # see `Sliding.value`
 
+# Indices of a channel in arrays of mjData, -1 if there is none:
+#   qpos, qvel, ctrl: in the arrays of these names; x_sensor and v_sensor: in sensordata; force: in actuator_force
+#   shaft: in qvel, of what the actuator drives: the joint, or its rotor
+#   xfrc: of the body's force along the joint, in xfrc_applied; `sign` is 1 or -1, the sign with which d enters there
+#   horizontal: of the body's horizontal force, in xfrc_applied; for a hinge along the axis `axis` of the world, 0 or 1
+#   hinge_body: of the body of a hinge, in xipos; anchor: of a hinge, in xanchor and xaxis
+#   friction_force: of a friction's actuator, in actuator_force; friction_ctrl: in ctrl, if the callback computes it
+#   qfrc: in qfrc_applied, of users' models, whose disturbances act on joints
+CHANNEL = np.dtype(
+    [
+        (name, "i8")
+        for name in (
+            "qpos", "qvel", "x_sensor", "v_sensor", "ctrl", "force", "shaft", "xfrc", "sign", "horizontal", "axis",
+            "hinge_body", "anchor", "friction_force", "friction_ctrl", "qfrc",
+        )
+    ]
+)  # fmt: skip
+
 # The state of a channel between calls:
 #   last_x, last_v: the last reading that was not lost; delayed: the command after its delay
 #   first, second: the states of the drives, see `DriveStep`
@@ -106,8 +124,8 @@ SIMULATION = np.dtype(
 )  # fmt: skip
 
 # How compiled code reads record i of an array at an address.
-simulation_at, state_at, log_at, disturbance_at, function_at = map(
-    record_at, (SIMULATION, CHANNEL_STATE, LOG, DISTURBANCE, FUNCTION)
+simulation_at, channel_at, state_at, log_at, disturbance_at, function_at = map(
+    record_at, (SIMULATION, CHANNEL, CHANNEL_STATE, LOG, DISTURBANCE, FUNCTION)
 )
 
 # Bytes from the start of a simulation's record to the inputs and outputs of functions.
@@ -131,13 +149,7 @@ class Index(int):
 
 
 class Buffer:
-    """Numbers that become one float64 array. They have indices at once, and addresses when the array is made.
-
-    buffer = Buffer()
-    gains = buffer.put([6.0, 3.0])                          # an Index
-    array = buffer.array()
-    buffer.as_tuple(FUNCTION, {"parameters": gains, ...})   # with the address, valid as long as `array` lives
-    """
+    """Numbers that become one float64 array. They have indices at once, and addresses when the array is made."""
 
     def __init__(self) -> None:
         self.values: list[float] = []

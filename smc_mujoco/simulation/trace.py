@@ -12,7 +12,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from smc_mujoco.common import annexes
-from smc_mujoco.common.errors import ScenarioError, find, one_line
+from smc_mujoco.common.errors import ScenarioError, find, one_line, words
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import from_json, reading, replacing, to_json
 from smc_mujoco.mechanisms.hardware.part import column_ends, joint_names
@@ -127,11 +127,14 @@ class Trace:
 
     def _units(self, name: str) -> list[str]:
         """Return the unit of an array for each channel, (n,)."""
-        units = []
-        for x, u in zip(self.scenario.plant.units, self.scenario.efforts, strict=True):
-            special = {"x": x, "r": x, "v": f"{x}/s", "u": u, "applied": u, "s": ""}
-            units.append(special.get(name, EFFORT[x]))
-        return units
+        pairs = zip(self.scenario.plant.units, self.scenario.efforts, strict=True)
+        of_channels = [{"x": x, "r": x, "v": f"{x}/s", "u": u, "applied": u, "s": ""} for x, u in pairs]
+        return [units.get(name, EFFORT[units["x"]]) for units in of_channels]
+
+    def _unit(self, name: str) -> str:
+        """Return the unit of an array, or those of its channels where they differ: "m, rad"."""
+        units = ["s"] if name == "t" else self._units(name)
+        return units[0] if len(set(units)) == 1 else ", ".join(units)
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         """Return the `columns` as a stream of Arrow's C interface: what polars.from_dataframe and duckdb take."""
@@ -157,10 +160,8 @@ class Trace:
     def to_xarray(self) -> "xarray.Dataset":
         """Return the arrays as an xarray Dataset: a variable for each, with dimensions t and channel.
 
-        Each variable has its unit in `attrs["units"]`. Where channels have different units, the coordinate "unit" has
-        that of x for each channel, and x, v, u, ... have "by channel". The coordinate "channel" counts from 0, and
-        "joint" has the names of the joints. The Dataset's `attrs` have the "scenario", and of a run that failed the
-        "failure".
+        Each variable has its unit in `attrs["units"]`, or those of its channels, "m, rad". The coordinate "joint" has
+        the names of the joints. The Dataset's `attrs` have the "scenario", and of a run that failed the "failure".
 
         Raises:
           MissingPackageError: xarray is not installed.
@@ -168,22 +169,11 @@ class Trace:
         with package("xarray", "Trace.to_xarray"):
             import xarray  # pyright: ignore[reportMissingImports]
 
-        units = {"t": ["s"]} | {name: self._units(name) for name in ARRAYS[1:]}
-        attrs = {
-            name: {"units": by_channel[0] if len(set(by_channel)) == 1 else "by channel"}
-            for name, by_channel in units.items()
-        }
         about = {"scenario": to_json(serialise.describe(self.scenario))}
-        return xarray.Dataset(
-            {name: (("t", "channel"), getattr(self, name), attrs[name]) for name in ARRAYS[1:]},
-            coords={
-                "t": ("t", self.t, attrs["t"]),
-                "channel": np.arange(self.x.shape[1]),
-                "joint": ("channel", list(joint_names(self.scenario.plant))),
-                "unit": ("channel", list(self.scenario.plant.units)),
-            },
-            attrs=about | ({"failure": self.failure} if self.failure else {}),
-        )
+        variables = {n: (("t", "channel"), getattr(self, n), {"units": self._unit(n)}) for n in ARRAYS[1:]}
+        joints = "channel", list(joint_names(self.scenario.plant))
+        coords = {"t": ("t", self.t, {"units": "s"}), "channel": np.arange(self.x.shape[1]), "joint": joints}
+        return xarray.Dataset(variables, coords, about | ({"failure": self.failure} if self.failure else {}))
 
     def export(self, path: str | os.PathLike[str]) -> Path:
         """Write the trace to a .csv, .parquet, .mat (MATLAB 5) or .mcap file, without losing a bit of any number.
@@ -191,8 +181,8 @@ class Trace:
         CSV: a header line with units, "t [s]", "x [rad]", ..., then a line per sample, with the fewest digits that
         identify each number (0.1, not 0.10000000000000001), and nan after a failure. Parquet: the `columns`; the
         metadata of each column has its "unit", and that of the schema the "scenario", as JSON. MAT: the arrays by name,
-        (K + 1, n), a struct `units` with the unit of each (a cell array if channels differ), and `scenario`. MCAP:
-        the moving machine and the arrays, for Foxglove and Rerun (`pip install 'smc-mujoco[mcap]'`).
+        (K + 1, n), a struct `units` with the unit of each ("m, rad" if channels differ), and `scenario`. MCAP: the
+        moving machine and the arrays, for Foxglove and Rerun (`pip install 'smc-mujoco[mcap]'`).
 
         Raises:
           ScenarioError: the name has another ending.
@@ -217,10 +207,8 @@ def _write_mat(trace: Trace, file: Path) -> None:
     from scipy.io import savemat
 
     about = to_json(serialise.describe(trace.scenario))
-    by_channel = {"t": ["s"]} | {name: trace._units(name) for name in ARRAYS[1:]}
-    units = {name: us[0] if len(set(us)) == 1 else np.array(us, object) for name, us in by_channel.items()}
     arrays = {name: getattr(trace, name) for name in ARRAYS}
-    savemat(file, arrays | {"units": units, "scenario": about}, oned_as="column")
+    savemat(file, arrays | {"units": {n: trace._unit(n) for n in ARRAYS}, "scenario": about}, oned_as="column")
 
 
 def _write_parquet(trace: Trace, file: Path) -> None:
@@ -250,12 +238,9 @@ def formats(text: str) -> tuple[str, ...]:
 
 
 def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str | None) -> Trace:
-    """Return the Trace of a log. A number that is not finite counts as a failure, and the trace is NaN from there on.
+    """Return the Trace of a log, (K + 1, n) LOG, of a run that failed at a physics step, or that did not fail.
 
-    Args:
-      log: (K + 1, n) LOG.
-      failed_step: physics step of the failure.
-      failure: what happened then, or None.
+    A number that is not finite counts as a failure, and the trace is NaN from there on.
     """
     t = np.arange(scenario.samples + 1) * scenario.control_period
     diverged_at = None
@@ -291,11 +276,8 @@ def load(path: str | os.PathLike[str]) -> Trace:
         scenario = serialise.restore(about)
     except ScenarioError as error:  # with its cure
         raise ScenarioError(f"the scenario of {path} cannot be restored, {error}") from None
-    except Exception as error:  # JSON that is not a scenario
-        why = f"{type(error).__name__}, {error}"
-        raise ScenarioError(
-            f"{path} holds no scenario that can be read ({why}): give a file that a run wrote"
-        ) from None
+    except Exception as error:
+        raise ScenarioError(f"{path} holds no scenario ({words(error)}): give a file that a run wrote") from None
     with reading(path, *FILE) as file, zipfile.ZipFile(file) as archive:
         arrays = {name: _checked_array(archive, name, scenario) for name in ARRAYS}
     return Trace(**arrays, scenario=scenario, **end)

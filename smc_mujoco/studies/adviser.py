@@ -35,8 +35,7 @@ from smc_mujoco.control.properties import PROPERTIES, suitable
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
-from smc_mujoco.simulation.grid import case, check_moving, listed, listed_laws
-from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.grid import Starts, case, check_moving, listed, listed_laws
 from smc_mujoco.studies.advice import NEEDS, ROBUST, Advice, Choice, Need, Runs, ties
 from smc_mujoco.studies.fair_gains import Candidate, law_or_template
 from smc_mujoco.studies.noise_key import DRAWN

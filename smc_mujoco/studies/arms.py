@@ -19,10 +19,9 @@ from smc_mujoco.mechanisms.plant import Plant, Values, plant
 from smc_mujoco.metrics.catalogue import tv_rate
 from smc_mujoco.metrics.conventions import last_exit
 from smc_mujoco.metrics.tip import tip_error, tip_scores
-from smc_mujoco.simulation.perturbations import Jump, Noise
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Push
+from smc_mujoco.simulation.signals import Jump, Noise, Push
 from smc_mujoco.simulation.time_series import Waypoints, cartesian_path
 from smc_mujoco.simulation.trace import Trace
 

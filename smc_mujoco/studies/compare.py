@@ -27,8 +27,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition, applicable, find_condition
-from smc_mujoco.simulation.grid import case, check_moving, check_names, listed, listed_laws
-from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.grid import Starts, case, check_moving, check_names, listed, listed_laws
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import executors

@@ -24,7 +24,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import applicable
-from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.grid import Starts
 from smc_mujoco.studies import run_key
 from smc_mujoco.studies.cache import cached
 

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import Condition
-from smc_mujoco.simulation.grid import all_combinations
-from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.grid import Starts, all_combinations
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.fair_gains import Candidate, fair_gains
 from smc_mujoco.studies.study import study

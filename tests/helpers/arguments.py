@@ -10,7 +10,7 @@ from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import Condition
-from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.grid import Starts
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.scene import Scene
 

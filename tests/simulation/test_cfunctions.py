@@ -253,14 +253,14 @@ def test_code_that_holds_an_address_or_a_number_of_this_process_is_not_kept(cach
 def test_own_functions_divide_as_numpy_does_and_those_of_laws_as_python_does():
     """An exception cannot leave the callback, so a division by zero gives inf there. In a law it ends the run."""
     from smc_mujoco.control import law
-    from smc_mujoco.simulation import channels, controller, philox, signals, time_series
+    from smc_mujoco.simulation import controller, philox, signals, time_series
 
     def models(*modules):
         found = [(module, one) for module in modules for one in vars(module).values() if hasattr(one, "targetoptions")]
         own = [one for module, one in found if one.py_func.__module__ == module.__name__]
         return [one.targetoptions.get("error_model", "python") for one in own]
 
-    callbacks = models(channels, controller, philox, signals, time_series)
+    callbacks = models(controller, philox, signals, time_series)
     assert len(callbacks) > 20
     assert set(callbacks) == {"numpy"}
     assert set(models(law)) == {"python"}

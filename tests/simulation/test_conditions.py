@@ -18,7 +18,7 @@ from smc_mujoco.analysis.tuning.result import load
 from smc_mujoco.cli.main import app
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation.conditions import NAMED, applicable, find_condition, from_file, parse
-from smc_mujoco.simulation.initial_states import GRID_SEEDS
+from smc_mujoco.simulation.grid import GRID_SEEDS
 from smc_mujoco.studies.run_key import condition as told
 from smc_mujoco.studies.run_key import key
 

@@ -38,7 +38,8 @@ from smc_mujoco.common import jit as compiled_module
 from smc_mujoco.common.jit import compiled
 from smc_mujoco.control.law import Measurement, catalogue
 from smc_mujoco.simulation import callback, controller, reference, state
-from smc_mujoco.simulation.channels import channels, lever
+from smc_mujoco.simulation.controller import lever
+from smc_mujoco.simulation.model import channels
 from smc_mujoco.simulation.prepare import pack, prepare
 from smc_mujoco.studies import run_key
 

@@ -16,7 +16,8 @@ import smc_mujoco as smc
 from smc_mujoco.common.catalogue import subclasses
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.simulation import cfunctions, reference, serialise
-from smc_mujoco.simulation.channels import channels, lever
+from smc_mujoco.simulation.controller import lever
+from smc_mujoco.simulation.model import channels
 from smc_mujoco.simulation.signals import (
     SINUSOIDS,
     BandLimited,
@@ -377,7 +378,6 @@ def test_numbers_that_are_no_time_series_are_refused(refused):
         (5.0, [1.0, 2.0], ("times", "5.0")),
         ([0.0, 1.0], "12", ("values", "'12'")),
         (np.eye(2), [1.0, 2.0], ("times[0]", "[1.0, 0.0]")),
-        ([0.0, 1e-300], [0.0, 1e300], ("item 1", "too steep")),
     ):
         refused(lambda times=times, values=values: TimeSeries(times, values), "TimeSeries", *parts)
 
@@ -471,7 +471,6 @@ def test_a_csv_file_that_is_not_sound_is_refused_with_its_line(file, refused):
         (b"\x89PNG\r\n\x1a\n\0\0", {}, ("not text", "commas")),
         (b"t,d\n0,1\0\n", {}, ("CSV", "commas")),
         ('t,d\n0,"1\n', {}, ("CSV", "commas")),
-        ("t,d\n0,0\n1e-300,1e300\n", {}, ("line 3", "too steep")),
     ):
         refused(lambda content=content, asked=asked: TimeSeries.from_csv(file(content), **asked), "wind.csv", *parts)
 

@@ -26,7 +26,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics import catalogue as metrics
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, Condition, find_condition
-from smc_mujoco.simulation.initial_states import GRID_SEEDS, START_CURE, Starts
+from smc_mujoco.simulation.grid import GRID_SEEDS, START_CURE, Starts
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 

@@ -42,7 +42,7 @@ from smc_mujoco.control.component import Component, Template, unit_cure
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
-from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.grid import Starts
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario, default_u_max

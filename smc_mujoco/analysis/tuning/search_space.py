@@ -34,7 +34,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.component import Component, unit_cure
 from smc_mujoco.control.units import FORCE, Gain, Unit
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.initial_states import START_CURE
+from smc_mujoco.simulation.grid import START_CURE
 
 HALF_WIDTH = 1.5  # decades on either side of a scale: chosen, a factor of 1000 in all
 BOUND_MARGIN = 0.02  # of the range in log space: a gain so close to a bound counts as at the bound

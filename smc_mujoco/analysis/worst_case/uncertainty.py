@@ -22,9 +22,8 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
-from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Relay, Signal
+from smc_mujoco.simulation.signals import Noise, Relay, Signal
 from smc_mujoco.simulation.time_series import Held, TimeSeries
 
 KNOT_SPACING = 0.5  # s between the knots of a random disturbance, straight lines in between; chosen

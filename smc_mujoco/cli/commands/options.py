@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from smc_mujoco.mechanisms.hardware.part import Actuator
     from smc_mujoco.mechanisms.plant import Plant
     from smc_mujoco.simulation import conditions as named
-    from smc_mujoco.simulation.initial_states import Starts
+    from smc_mujoco.simulation.grid import Starts
 
 COMMA = re.compile(r",(?![^(]*\))")  # a comma outside brackets
 FIELD_START = re.compile(r"\w+\s*=")  # of a scenario, in a condition
@@ -268,9 +268,9 @@ def compared_laws(
 
 def starts(x0: float | None) -> "Starts | None":
     """Return the initial states of the option --x0; None for each plant's own."""
-    from smc_mujoco.simulation import initial_states
+    from smc_mujoco.simulation import grid
 
-    return None if x0 is None else initial_states.starts(x0)
+    return None if x0 is None else grid.starts(x0)
 
 
 def actuator(text: str) -> "tuple[Actuator, ...]":

@@ -13,7 +13,7 @@ from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
-    from smc_mujoco.simulation.initial_states import Starts
+    from smc_mujoco.simulation.grid import Starts
     from smc_mujoco.studies.compare import Compared
     from smc_mujoco.studies.table import Table
 

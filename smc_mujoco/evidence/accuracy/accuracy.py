@@ -53,11 +53,10 @@ from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import last_part
 from smc_mujoco.simulation.conditions import Condition, find_condition
-from smc_mujoco.simulation.grid import DURATION, case, listed, listed_laws
-from smc_mujoco.simulation.initial_states import Starts
-from smc_mujoco.simulation.perturbations import Noise
+from smc_mujoco.simulation.grid import DURATION, Starts, case, listed, listed_laws
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import MIN_TIME, Scenario
+from smc_mujoco.simulation.signals import Noise
 from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:

@@ -13,8 +13,7 @@ from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.rigs.rig import Rig, Values
-from smc_mujoco.simulation.grid import grid
-from smc_mujoco.simulation.initial_states import Starts
+from smc_mujoco.simulation.grid import Starts, grid
 from smc_mujoco.simulation.scenario import Scenario
 
 BY_STARTS = ("x0", "v0")  # fields of a rig's machine that the starts of the grid replace

@@ -18,8 +18,8 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.rigs import records
 from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes
-from smc_mujoco.simulation.perturbations import Noise
 from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.signals import Noise
 
 MAX_CORRELATION = 0.98  # beyond this correlation records cannot tell two quantities apart; chosen
 REPEATS = 24  # simulated repetitions of the records of a closed loop, for standard errors; chosen

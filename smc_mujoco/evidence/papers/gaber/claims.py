@@ -28,7 +28,7 @@ from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import HIGH_FREQUENCY, settling_time
-from smc_mujoco.simulation.perturbations import Noise
+from smc_mujoco.simulation.signals import Noise
 
 OURS, CLASSICAL, ADAPTIVE, HOSMC = LAWS  # the paper's law, and those that it compares
 RIVALS = LAWS[1:]
