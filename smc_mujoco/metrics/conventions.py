@@ -119,10 +119,7 @@ class Metric:
 def metric(
     unit: str, *, label: str = "", need: str = "", **flags: Any
 ) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
-    """Return a decorator that enters a function Trace -> float in the catalogue and makes it refuse broken traces.
-
-    Arguments are fields of `Metric`; the label is by default the function's name with spaces.
-    """
+    """Return a decorator that enters a function Trace -> float in the catalogue and makes it refuse broken traces."""
 
     def enter(formula: Callable[[Trace], float]) -> Callable[[Trace], float]:
         name, summary = formula.__name__, (inspect.getdoc(formula) or "").partition("\n")[0]

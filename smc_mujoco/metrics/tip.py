@@ -69,10 +69,7 @@ def tip_path(plant: Plant, x: np.ndarray, factors: Mapping[str, float] | None = 
 
 @once_per_trace
 def tip_paths(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
-    """Return the actual and the wanted path of the tip, m, (K + 1, 3) each, read-only. Raises like `tip_path`.
-
-    The actual path is that of the true plant, the wanted path that of the nominal plant.
-    """
+    """Return the actual path of the tip (true plant) and the wanted one (nominal plant), m, (K + 1, 3), read-only."""
     scenario, jump = trace.scenario, _jump_sample(trace)
     parts = (trace.x[:jump], 0), (trace.x[jump:], scenario.jump_step)
     actual = np.concatenate([tip_path(scenario.plant, x, scenario.factors(step)) for x, step in parts if len(x)])

@@ -90,11 +90,7 @@ def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
 
 
 def hybrid(friction: bool = False) -> Law:
-    """Return the law that presses on the wall, with the gains of computed_torque_sliding.
-
-    Args:
-      friction: whether it knows the joints' friction.
-    """
+    """Return the law that presses on the wall, gained as computed_torque_sliding; `friction`: whether it knows it."""
     gains: dict[str, object] = {"force": PRESS, **GAINS["computed_torque_sliding"]}
     if friction:
         known = arm().friction
@@ -119,11 +115,7 @@ def pick_and_place() -> tuple[Waypoints, ...]:
 
 @functools.cache
 def wall_path(behind: float = -PATH_BEFORE) -> tuple[Waypoints, ...]:
-    """Return references on which the tip rests until 0.4 s, and then slides along the wall, across and up.
-
-    Args:
-      behind: how far the path is behind the wall's face, m; below 0: before it.
-    """
+    """Return references on which the tip rests until 0.4 s, and then slides along the wall, `behind` its face, m."""
     from smc_mujoco.mechanisms.plants.panda import WALL_DISTANCE
 
     x = WALL_DISTANCE - PROBE + behind
@@ -181,19 +173,13 @@ def off_path(trace: Trace, after: float = 0.0) -> np.ndarray:
 
 
 def back_within(trace: Trace, distance: float, after: float) -> float:
-    """Return how long after the time `after`, s, the tip stays within `distance`, m, of its path; inf if never.
-
-    A run that fails does not stay there.
-    """
+    """Return how long after `after`, s, the tip stays within `distance`, m, of its path; inf if never or failed."""
     distances = np.nan_to_num(off_path(trace, after), nan=math.inf)  # NaN after a failure
     return last_exit(trace.t[trace.t >= after], distances, distance)
 
 
 def unstable(scenarios: Sequence[Scenario], traces: Sequence[Trace]) -> bool:
-    """Return whether half the physics step changes the tip's rms error by over MAX_STEP_CHANGE, in the median run.
-
-    The numbers of such runs depend on their step, and say nothing of the arm.
-    """
+    """Return whether half the physics step changes the tip's rms error by over MAX_STEP_CHANGE, in the median run."""
     halves = [dataclasses.replace(s, physics_step=s.resolved.physics_step / 2.0) for s in scenarios]
     errors, finer = (
         np.array([tip_scores(trace)["rms_error"] if trace.failure is None else math.inf for trace in runs])
@@ -211,12 +197,7 @@ def cost(trace: Trace) -> float:
 
 
 def search(name: str, draws: int = DRAWS) -> tuple[dict[str, float], float]:
-    """Return the best of random gains of a law, rounded to two digits, and their cost.
-
-    Args:
-      name: of a law in RANGES.
-      draws: number of random draws, uniform in the logarithm of each gain.
-    """
+    """Return the best of random gains of a law, uniform in their logarithms, of two digits, and their cost."""
     rng, ranges = np.random.default_rng(SEARCH_SEED), RANGES[name]
     tried = [
         {gain: float(f"{math.exp(rng.uniform(*np.log(bounds))):.2g}") for gain, bounds in ranges.items()}

@@ -39,11 +39,6 @@ class Entry:
     runs: int  # number of its runs, equal ones counted once
     sources: tuple[Source, ...] = ()  # of its gains; none where the table does not say
 
-    @property
-    def about_defaults(self) -> bool:
-        """Whether some of its gains were searched about their defaults, because one has no unit."""
-        return any(source.search and source.search.about_defaults for source in self.sources)
-
 
 class Lead(NamedTuple):
     """The law in front in a block, its closest rival (with the largest p-value), and how they compare, in a unit."""
@@ -188,7 +183,8 @@ class Board(Tables):
 
     def _search(self, law: str) -> str:
         """Return how the gains of a law that wins were searched, after a comma, if not by the rule."""
-        about = any(entry.about_defaults for entry in self.entries if entry.law == law)
+        its = (source for entry in self.entries if entry.law == law for source in entry.sources)
+        about = any(source.search and source.search.about_defaults for source in its)
         return ", with gains searched about its defaults and not by the rule" * about
 
     @property
@@ -224,10 +220,7 @@ class Board(Tables):
 
 
 def size_in_words(effect: Effect, unit: str = "", rival: str = "") -> str:
-    """Return how much less or more a law has than a rival, with the interval, such as "12 % less (8 to 16 %)".
-
-    A difference that is no ratio has the unit. The rival's name, if given, stands before the interval.
-    """
+    """Return how much less or more a law has than a rival, with the interval, such as "12 % less (8 to 16 %)"."""
     if effect.low == effect.high == float(effect.relative):
         return "no difference"
     if not effect.relative and max(map(abs, effect[:3])) < MIN_DIFFERENCE:

@@ -176,10 +176,7 @@ class Outcome:
         return lambda run: math.nan if run.failure is not None else float(value(run))
 
     def _level(self, condition: str, measure: Measure, group: str, smallest: bool) -> dict[str, float]:
-        """Return label -> value of the runs with the smallest or largest value in a condition, or level with it.
-
-        There are none if all fail, or if the smallest value is "never".
-        """
+        """Return label -> value of the runs with the smallest or largest value, or level with it; none if "never"."""
         values = self[condition].values(measure, group)[condition]
         known = {label: value for label, value in values.items() if not math.isnan(value)}
         if not known or (smallest and min(known.values()) == math.inf):

@@ -172,21 +172,14 @@ def _computed(laws: list[tuple[bytes, list[Readings]]]) -> list[np.ndarray | str
 
 
 class Playback(reference.Loop):
-    """A run with recorded commands, without a law.
-
-    Attributes:
-      recorded: the run.
-      readings: of every call of the law.
-      mismatch_time: the first time, s, at which the state is not the recorded one; None if it always is.
-      end: number of recorded samples without NaN.
-    """
+    """A run with recorded commands, without a law."""
 
     def __init__(self, recorded: Recording):
         with installed():
             super().__init__(recorded.scenario, mechanism(recorded.scenario))
         self.recorded = recorded
-        self.readings: list[Readings] = []
-        self.mismatch_time: float | None = None
+        self.readings: list[Readings] = []  # of every call of the law
+        self.mismatch_time: float | None = None  # s, first time at which the state is not the recorded one
         missing = np.flatnonzero(np.isnan(recorded.x).any(axis=1) | np.isnan(recorded.u).any(axis=1))
         self.end = int(missing[0]) if len(missing) else len(recorded.x)
 
@@ -219,10 +212,7 @@ class Playback(reference.Loop):
         return self.recorded.u[k], self.recorded.s[k]
 
     def verdict(self, computed: np.ndarray | str | None) -> tuple[bool | None, str]:
-        """Return whether these u and s, (calls, 2, n), are the recorded ones, and what differs first.
-
-        A text says why the law cannot be replayed; None is a law that ends its process.
-        """
+        """Return whether u and s, (calls, 2, n), are the recorded ones, and what differs; None: the law ended."""
         if self.mismatch_time is not None:
             return False, f"the plant does not move as recorded under these commands, at t = {self.mismatch_time:g} s"
         if computed is None:

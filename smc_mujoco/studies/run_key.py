@@ -44,10 +44,7 @@ def key(scenario: Scenario, data: dict[str, Any] | None = None, plants: Hashes |
 
 
 def portable_key(scenario: Scenario) -> str:
-    """Return a hash, 16 hex digits, of the scenario and of the code of its parts: the same on every machine.
-
-    It does not depend on the versions of packages or on the rest of this package's code, though the run does.
-    """
+    """Return a hash, 16 hex digits, of the scenario and of the code of its parts alone: the same on every machine."""
     data = description(scenario) | {"versions": None, "condition": None}  # the condition's name adds nothing
     return hashlib.sha256(to_json([data, _codes(scenario, {})], sort_keys=True).encode()).hexdigest()[:16]
 
@@ -77,10 +74,7 @@ def source(scenario: Scenario) -> dict[str, str | None]:
 
 
 def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
-    """Return the name of the run's condition: the given name, or the differences from the nominal condition.
-
-    Plant, law, initial state, seed and duration do not belong to it. `data` is the `description`, if the caller has it.
-    """
+    """Return the name of the run's condition: the given name, or the differences from the nominal condition."""
     if scenario.condition:
         return scenario.condition
     text, nominal = _condition_text(data or description(scenario)), _nominal(scenario.plant, scenario.duration)
@@ -105,10 +99,7 @@ def _codes(s: Scenario, plants: Hashes) -> list[str]:
 
 
 def _plant_codes(plant: Plant) -> list[str]:
-    """Return hashes of a user's plant: of its functions, and of the model, which its build may read from a file.
-
-    For a plant of this package, return only hashes of the functions that a user replaced.
-    """
+    """Return hashes of what is a user's in a plant: functions, and the model, which its build may read from a file."""
     builds = *plant.contacts.items(), *plant.mechanisms.items()
     if plant.build.__module__.startswith(PACKAGE):
         return [fingerprint.of(thing) for thing in (plant.fields, plant.nominal, *builds) if _of_a_user(thing)]

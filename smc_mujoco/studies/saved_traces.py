@@ -22,11 +22,7 @@ def path(folder: Path, row: Mapping[str, Any]) -> Path:
 
 
 def worst(table: Table) -> list[int]:
-    """Return the row of the worst run of every plant and condition.
-
-    Failed runs are the worst, then those that never settle. Among these the ultimate bound decides, or the overshoot
-    where channels have different units, and so no ultimate bound.
-    """
+    """Return the row of the worst run of every plant and condition: failed, unsettled, then by bound or overshoot."""
     failed, bounds = table.column("failure") != np.array(None), table.column("ultimate_bound")
     ends = np.where(np.isnan(bounds), table.column("overshoot"), bounds)
     unsettled = table.column("settling_time") == np.inf

@@ -93,11 +93,7 @@ class Scene:
             raise ScenarioError(f"scene {self.title!r} has answer {shown(self.answer)}: give a function of its runs")
 
     def sentence(self, traces: Mapping[str, Mapping[str, Trace]]) -> str:
-        """Return the sentence that answers the question of the scene, from condition -> label -> Trace.
-
-        Raises:
-          ScenarioError: the scene's function returns no text. What the function itself raises is not caught.
-        """
+        """Return the sentence that answers the question of the scene, from condition -> label -> Trace."""
         text = self.answer(Outcome(traces=traces))
         if not isinstance(text, str) or not text.strip():
             raise ScenarioError(

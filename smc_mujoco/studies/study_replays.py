@@ -27,11 +27,7 @@ OTHER_SCORES = "run again, it has other scores: the law keeps a state of its own
 def replayed(
     runs: Mapping[str, Scenario], store: Store, folder: Path, threads: int | None, progress: bool
 ) -> dict[str, dict[str, Any]]:
-    """Replay chosen runs. Return hash -> the columns of the table that their replays change.
-
-    Results are written into the folder, so that a study that goes on replays nothing twice. A law that cannot be sent
-    to another process is not replayed, and a line on standard error says so.
-    """
+    """Replay chosen runs, those with no result in the folder. Return hash -> the columns that their replays change."""
     chosen, known = _chosen(runs), _known(folder / FILE)
     if missing := [name for name in chosen if name not in known]:
         if progress:
