@@ -157,7 +157,7 @@ def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
 
 
 def restoring_force(plant: Plant, law: Law, u_max: float = math.inf) -> Callable[[np.ndarray], np.ndarray] | None:
-    """Return the force, N or N m, that pulls all channels back from the same x > 0, (k,); None for none at rest."""
+    """Return the force, N or N m, that pulls all channels back from the same x > 0, (k,), or None without theory."""
     rest, gains = law.template and law.template.rest, SimpleNamespace(**law.gains)
     if not rest:
         return None
