@@ -29,7 +29,6 @@ def answer(runs):
 scene = smc.Scene(
     title="A blow on the forearm",
     conditions={"blow": {name: smc.arms.scenario("blow", smc.arms.gained(name)) for name in LAWS}},
-    figure="joints",
     answer=answer,
 )
 

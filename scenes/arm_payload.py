@@ -30,7 +30,6 @@ def answer(runs):
 scene = smc.Scene(
     title="A payload of 2 kg is picked up",
     conditions={"pick and place": {name: smc.arms.scenario("payload", smc.arms.gained(name)) for name in LAWS}},
-    figure="joints",
     answer=answer,
 )
 

@@ -23,7 +23,6 @@ def answer(runs):
 scene = smc.Scene(
     title="A seven-joint arm with 2 kg unknown to the laws",
     conditions={"sway": {name: smc.arms.scenario("sway", smc.arms.gained(name), payload=2.0) for name in LAWS}},
-    figure="joints",
     answer=answer,
 )
 

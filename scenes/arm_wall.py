@@ -41,7 +41,6 @@ scene = smc.Scene(
             "path behind the wall": smc.arms.scenario("behind", smc.arms.gained("computed_torque_sliding")),
         }
     },
-    figure="joints",
     camera=(60.0, -18.0),  # from the side: the tip is in sight between arm and wall
     answer=answer,
 )

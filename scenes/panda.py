@@ -40,7 +40,7 @@ CASES = {"no friction": {}, "friction": {"friction": PANDA.friction}}
 CASES["friction, 2 kg"] = CASES["friction"] | {"payload": 2.0}
 conditions = {name: {label: run(law, **case) for label, law in LAWS.items()} for name, case in CASES.items()}
 title = "An arm with friction and payload"
-scene = smc.Scene(title=title, conditions=conditions, film="friction, 2 kg", figure="joints", answer=answer)
+scene = smc.Scene(title=title, conditions=conditions, film="friction, 2 kg", answer=answer)
 
 if __name__ == "__main__":
     smc.play(__file__)

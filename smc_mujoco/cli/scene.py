@@ -100,22 +100,18 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
     from smc_mujoco.draw.page import files
 
     if scene.figure == "signals":
-        named = [(condition, trace) for condition, runs in traces.items() for trace in runs.values()]
-        labels = [condition for condition, _ in named]
-        signals([trace for _, trace in named], out / "signals", labels=labels, title=scene.title)
+        named = {condition: {style.label(label): t for label, t in runs.items()} for condition, runs in traces.items()}
+        signals(named, out / "signals", scene.title)
         return files(out / "signals")
     if scene.figure == "chattering":
         from smc_mujoco.draw.amplitudes import amplitudes
 
         amplitudes(traces, out / "chattering", title=scene.title)
         return files(out / "chattering")
-    from smc_mujoco.draw.joints import joints
-
     written: list[Path] = []
-    draw = joints if scene.figure == "joints" else figure
     for condition, runs in traces.items():
         path = out / f"{slug(condition)}.svg"
-        draw(list(runs.values()), path, labels=[*map(style.label, runs)], title=_title(scene, condition))
+        figure(list(runs.values()), path, labels=[*map(style.label, runs)], title=_title(scene, condition))
         written += files(path)
     return written
 

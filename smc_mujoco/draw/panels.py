@@ -7,25 +7,21 @@ the range of u, s or a force within a column of pixels.
 
 import dataclasses
 import itertools
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
-from matplotlib.ticker import NullFormatter, ScalarFormatter
+from matplotlib.ticker import NullFormatter
 
 from smc_mujoco.control.law import Law
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import columns, end, line, smooth, window
-from smc_mujoco.draw.states import MIN_STATE_TIME, at_rest, backlash_gap, has_dry_friction
 from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.metrics import tip
 from smc_mujoco.metrics.channel_groups import Group, group_trace
 from smc_mujoco.metrics.conventions import SETTLING_BAND, scale
-from smc_mujoco.simulation.signals import PerChannel
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 
 COLUMNS = 360  # of pixels of a panel: traces of more samples are drawn as means and ranges
@@ -33,47 +29,39 @@ LAST_SAMPLES = 60  # control samples in the close-up of u
 MIN_CLOSE_UP = 0.02  # least height of the close-up, of the largest |u|, so that it hides round-off; chosen
 MAX_DRAWN_CHANNELS = 9  # channels of a network that are drawn one by one
 LASTING_QUANTILE = 0.98  # quantile of |reaction|, or of what an arrow shows: larger values are short peaks; chosen
-MAX_RESTS = 12  # marked in a phase portrait
 POINT_SPACING = 1 / 200  # of points in a phase portrait, as a share of its diagonal
 MAX_SMALL = 12  # channels that each have small panels
 CROWDED_STRIP = 3  # groups of channels: a film of so many or more has no panel of the error
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
-LEAVING_LINE = 0.6  # points, width of a curve that leaves its panel
 COINCIDENT_DISTANCE = 0.02  # of a panel's height, about the width of a line: curves no farther apart are dashed in turn
 COINCIDENT_SHARE = 0.99  # of the samples of coinciding curves, so that controls that switch a sample apart do; chosen
 DASH_LENGTH = 5.0  # widths of a line
 MIN_WIDE_BAND, MAX_BANDS = 0.2, 1  # mean height of a wide band, of a panel's; more of them need a row each; chosen
 VISIBLE_CHATTERING = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
-MAX_SMALL_AXIS = 0.03  # of a unit: axes with smaller values show thousandths, such as mm; chosen
 REST_BAND = 0.02  # of a panel's height: an x that stays within it rests; chosen
 ZOOM, MAX_ZOOMED = 1.3, 0.5  # of the time until all rest, which panels show if it is less than that part of the run
-MIN_ERROR, MIN_RATIO = 1e-9, 20.0  # rad or m: smaller errors are drawn at it; least ratio of a logarithmic axis, chosen
+MIN_ERROR, MIN_RATIO = 1e-9, 20.0  # smaller errors are drawn at it; least ratio of a logarithmic axis, chosen
 JUMP_RATIO = 2.0  # a reference jumps where its rate is more than this many times the 99 % quantile; chosen
 QUANTITY_OF_UNIT = {  # quantity -> another one of the same unit
-    **dict.fromkeys(("spread", "e", "worst", "joint", "settling"), "x"),
+    **dict.fromkeys(("spread", "e", "settling"), "x"),
     **dict.fromkeys(("largest", "applied"), "u"),
     **dict.fromkeys(("reaction", "d"), "force"),
 }
 WORDS = {"force": "delivered", "reaction": "reaction", "spread": "max − min x"}  # quantity -> its words, no letter
 KINDS = {"v": "velocity", "u": "control", "s": "sliding variable", "e": "error", "d": "disturbance"}
 KINDS["applied"] = "control"
-LABELS_OF_ARMS = {  # quantities of several joints, one number a sample -> what an axis says
+WHOLE_LABELS = {  # quantity, one number a sample -> what an axis says
     "tip": "tip off its path (mm)",
     "contact": "force of contact (N)",
-    "worst": "largest error of a joint",
-    "joint": "error",
     "settling": "|x − r|",
     "largest": "largest |u| of a joint",
 }
-IN_THOUSANDTHS = ("worst", "joint")  # of arms, in thousandths of the group's unit
-SINGLE = ("spread", *LABELS_OF_ARMS)  # one number a sample, whatever the number of channels
+PEAKS = ("settling", "tip")  # drawn as `peaks`, on a logarithmic axis
+SINGLE = ("spread", *WHOLE_LABELS)  # one number a sample, whatever the number of channels
 UNBANDED = ("x", "e", *SINGLE)  # drawn sample by sample, without a mean over time
-FAR_OFF_RATIO = 8.0  # times the values of every other run: such a run leaves the panel, not to flatten them; chosen
 UNDIVERGED_SHARE = 0.8  # of a run whose plant diverged: its first part sets a panel's range if no run lasts; chosen
 MARGIN = 0.08  # of a panel's height, above and below its curves
-
-REFERENCE, BACKLASH = "reference", "backlash"  # ids of a reference's lines, and of a gear's play
-PLAY = 0.16  # opacity of a gear's play around the reference
+REFERENCE = "reference"  # id of a reference's lines
 
 QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
     "x": lambda trace: trace.x,
@@ -86,11 +74,9 @@ QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
     "force": lambda trace: trace.force,
     "reaction": lambda trace: trace.reaction,
     "spread": lambda trace: np.ptp(trace.x, axis=1, keepdims=True),
-    "tip": lambda trace: 1e3 * tip.tip_error(trace)[:, None],
+    "tip": lambda trace: peaks(1e3 * tip.tip_error(trace), trace),
     "contact": lambda trace: tip.contacts(trace).force[:, None],
-    "worst": lambda trace: 1e3 * np.abs(trace.x - trace.r).max(axis=1, keepdims=True),
-    "joint": lambda trace: 1e3 * (trace.x - trace.r),
-    "settling": lambda trace: peaks(np.abs(trace.x - trace.r).max(axis=1), window(trace))[:, None],
+    "settling": lambda trace: peaks(np.abs(trace.x - trace.r).max(axis=1), trace),
     "largest": lambda trace: np.abs(trace.u).max(axis=1, keepdims=True),
 }
 
@@ -104,36 +90,26 @@ class Panel(NamedTuple):
     channel: int | None = None  # of a small panel
 
     @property
-    def thousandths(self) -> bool:
-        """Whether its axis shows thousandths of the unit, as all its values are small."""
-        largest = max(map(abs, span(self.traces, self.quantity)))
-        return 0.0 < largest < MAX_SMALL_AXIS and not self.unitless and self.quantity not in LABELS_OF_ARMS
-
-    @property
-    def unitless(self) -> bool:
-        """Whether the unit depends on the law: that of s. The s of twisting is e, and that of PID is a force."""
-        plant, laws = self.traces[0].scenario.plant, [trace.scenario.law for trace in self.traces]
-        rates = all(law.relative_degree == 1 and not _is_baseline(law) for law in laws)
-        return self.quantity == "s" and (plant.free > 0 or not rates)
-
-    @property
     def unit(self) -> str:
-        """The unit of the vertical axis in brackets; "" where the words have it, or where it depends on the law."""
-        if self.quantity in ("tip", "contact") or self.unitless:
+        """The unit of the vertical axis in brackets; "" where the words have it, or where it depends on the law.
+
+        That of s does: the s of twisting is e, and that of PID is a force.
+        """
+        plant, laws = self.traces[0].scenario.plant, [trace.scenario.law for trace in self.traces]
+        rates = plant.free == 0 and all(law.relative_degree == 1 and not _is_baseline(law) for law in laws)
+        if self.quantity in ("tip", "contact") or (self.quantity == "s" and not rates):
             return ""
-        small = self.thousandths or self.quantity in IN_THOUSANDTHS
-        return f" ({'m' * small}{style.units(self.group)[QUANTITY_OF_UNIT.get(self.quantity, self.quantity)]})"
+        return f" ({style.units(self.group)[QUANTITY_OF_UNIT.get(self.quantity, self.quantity)]})"
 
     @property
     def label(self) -> str:
         """The label of the vertical axis, with its unit. A joint of a robot has its name in it."""
         name, group, plant = self.quantity, self.group, self.traces[0].scenario.plant
-        joint = joint_names(plant)[group.channels[0]]
-        if name in LABELS_OF_ARMS:
-            return f"{joint}, " * (self.channel is not None) + LABELS_OF_ARMS[name] + self.unit
+        if name in WHOLE_LABELS:
+            return WHOLE_LABELS[name] + self.unit
         letter = WORDS.get(name, name) if group.driven else {"x": "q", "v": "q′"}.get(name, WORDS.get(name, name))
         if len(group.channels) == 1 and (plant.direct or self.channel is not None):
-            return f"{joint} {letter}{self.unit}"
+            return f"{joint_names(plant)[group.channels[0]]} {letter}{self.unit}"
         if name in WORDS or (name == "s" and plant.mixed):  # short: mixed plants have many panels, and low ones
             return f"{letter}{' on q' * (not group.driven)}{self.unit}"
         kind = {"rad": "angle", "m": "position"}[group.unit]
@@ -148,7 +124,7 @@ def _is_baseline(law: Law) -> bool:
 def overview(traces: Sequence[Trace]) -> list[Panel]:
     """Return the default panels of a figure, from top to bottom.
 
-    Realistic mechanisms have forces on their joints; s is left out if no law is a sliding mode.
+    Realistic mechanisms have forces on their joints, arms their tip; s is left out if no law is a sliding mode.
     """
     groups = style.split(traces)
     driven = {group: parts for group, parts in groups.items() if group.driven}
@@ -161,9 +137,17 @@ def overview(traces: Sequence[Trace]) -> list[Panel]:
         panels += [Panel(name, group, parts) for name in ("u", *force)]
     for group, parts in groups.items():
         panels += [Panel("reaction", group, parts)] * any(np.nan_to_num(part.reaction).any() for part in parts)
+    panels += _of_tip(traces)
     if all(_is_baseline(trace.scenario.law) for trace in traces):
         return panels
     return panels + [Panel("s", group, parts) for group, parts in driven.items()]
+
+
+def _of_tip(traces: Sequence[Trace]) -> list[Panel]:
+    """Return the panels of an arm's tip: how far it is off its path, and the force of its contact."""
+    names = ["tip"] * all(bool(trace.scenario.plant.tip) for trace in traces)
+    names += ["contact"] * all(tip.knows_contacts(trace.scenario) for trace in traces)
+    return [Panel(name, next(iter(style.split(traces))), traces) for name in names]
 
 
 def small(traces: Sequence[Trace], group: Group) -> list[tuple[Panel, ...]]:
@@ -192,44 +176,37 @@ def by_channel(panel: Panel) -> list[Panel]:
 def strip(traces: Sequence[Trace]) -> list[Panel]:
     """Return the panels below a film, from left to right: x of each group of channels, the error, u of driven ones.
 
-    Of arms: how far the tip is off its path, and the force of its contact, or else the largest error of a joint. Of a
-    network: how far its channels are apart, and the largest error. Of two joints of your own model: x and u of each; of
-    more: the largest error and the largest u of a joint.
+    Of arms: how far the tip is off its path, and the force of its contact, or else the error. Of a network: how far its
+    channels are apart, and the error. Of two joints of your own model: x and u of each; of more: the error and the
+    largest u of a joint.
     """
     groups, plant = list(style.split(traces).items()), traces[0].scenario.plant
     driven = [each for each in groups if each[0].driven]
-    if all(trace.scenario.plant.tip for trace in traces):
-        first = groups[0][0]
-        if all(tip.knows_contacts(trace.scenario) for trace in traces):
-            return [Panel("tip", first, traces), Panel("contact", first, traces)]
-        return [Panel("tip", first, traces), *(Panel("worst", *each) for each in driven)]
+    errors = [Panel("settling", *each) for each in driven]
+    if of_tip := _of_tip(traces):
+        return of_tip if len(of_tip) > 1 else [*of_tip, *errors]
     if all(len(group.channels) == 1 for group, _ in groups):
-        settling = [Panel("settling", *driven[0])] * (len(groups) < CROWDED_STRIP)
-        return [*(Panel("x", *each) for each in groups), *settling, *(Panel("u", *each) for each in driven)]
-    if not plant.direct:
-        return [Panel(name, *each) for each in driven for name in ("spread", "settling")]
-    if plant.n == plant.driven == 2:
+        errors = errors[: len(groups) < CROWDED_STRIP]
+        return [*(Panel("x", *each) for each in groups), *errors, *(Panel("u", *each) for each in driven)]
+    if plant.direct and plant.n == plant.driven == 2:
         return [panel for group, _ in groups for row in small(traces, group) for panel in (row[0], row[-1])]
-    return [Panel(name, *each) for each in driven for name in ("settling", "largest")]
+    names = ("settling", "largest") if plant.direct else ("spread", "settling")
+    return [Panel(name, *each) for each in driven for name in names]
 
 
 def meaning(panels: Sequence[Panel]) -> dict[str, str]:
-    """Return the meaning of bands and lines that need an explanation: "play", "band", "line", ... -> words."""
+    """Return the meaning of bands and lines that need an explanation: "band", "line", ... -> words."""
     n = max((len(panel.group.channels) for panel in panels if panel.quantity not in SINGLE), default=1)
     banded = dict.fromkeys(panel.quantity for panel in panels if panel.quantity not in UNBANDED)
     windows = [mean_window(panel.traces) for panel in panels if panel.quantity == "u"]
     over, single, words = max(filter(None, windows), default=None), len(drawn_channels(n)), {}
-    for panel in panels:
-        gap = max(backlash_gap(trace.scenario) for trace in panel.traces)
-        if gap and panel.quantity in ("x", "e"):
-            words["play"] = f"the gear leaves ± {style.short(gap / 2)} {style.units(panel.group)['x']} free"
     if banded and (over or n > 1):
         words["band"] = f"range of {', '.join(banded).replace('force', 'delivered')}"
     if over:
         words["line"] = f"mean over {1e3 * over:.3g} ms where it chatters"
     if n > 1:
         words["thin lines"] = f"the {n} channels" if single == n else f"{single} of {n} channels"
-    if any(panel.quantity == "settling" for panel in panels):
+    if any(panel.quantity in PEAKS for panel in panels):
         words["peaks"] = f"largest in {1e3 * peak_window(panels[0].traces):.3g} ms"
     return words
 
@@ -263,11 +240,11 @@ def mean_window(traces: Sequence[Trace]) -> float | None:
     return max(times, default=None)
 
 
-def peaks(y: np.ndarray, width: int) -> np.ndarray:
-    """Return the largest of y (K+1,) within `width` samples around each, or MIN_ERROR if that is more."""
+def peaks(y: np.ndarray, trace: Trace) -> np.ndarray:
+    """Return the largest of y (K+1,) within a window around each sample, (K+1, 1), or MIN_ERROR if that is more."""
     from scipy.ndimage import maximum_filter1d
 
-    return np.maximum(maximum_filter1d(y, width, mode="nearest"), MIN_ERROR)
+    return np.maximum(maximum_filter1d(y, window(trace), mode="nearest"), MIN_ERROR)[:, None]
 
 
 def peak_window(traces: Sequence[Trace]) -> float:
@@ -298,32 +275,30 @@ def until(trace: Trace, time: float) -> Trace:
 
 
 def over_time(
-    ax: Axes, panel: Panel, colours: Sequence[str], label: bool = True, among: Sequence[Trace] = (), bands: bool = True
+    ax: Axes, panel: Panel, colours: Sequence[str], among: Sequence[Trace] = (), bands: bool = True
 ) -> list[Artist]:
     """Draw the panel with the first trace on top, set its vertical range, and return the artists of the traces.
 
-    The reference of x is drawn in front, its settling band behind.
-
-    Args:
-      label: whether to print the size of impacts outside the range.
-      among: traces that set the range; default: the panel's own.
-      bands: whether to draw ranges behind the lines.
+    The reference of x is drawn in front, its settling band behind. The traces `among` set the range, by default the
+    panel's own; `bands`: whether to draw ranges behind the lines.
     """
     artists: list[Artist] = []
     name, means = panel.quantity, [QUANTITIES[panel.quantity](trace).mean(axis=1) for trace in panel.traces]
-    if name == "settling":
+    if name in PEAKS:
         ax.set_yscale("log")
         ax.yaxis.set_minor_formatter(NullFormatter())
     ax.set_ylim(limits(among or panel.traces, name))
     if name == "reaction":
-        clip_impacts(ax, panel, colours, label)
+        clip_impacts(ax, panel, colours)
     if name in ("x", "e"):
         target(ax, panel)
     lines = [curve(trace, mean, name) for trace, mean in zip(panel.traces, means, strict=True)]
-    far = far_off(panel.traces, name)
-    widths = [style.points(LEAVING_LINE if k == far else LINE) for k in range(len(lines))]
-    drawn = list(zip(panel.traces, colours, means, lines, panel_dashes(panel, lines), widths, strict=True))
-    for trace, colour, mean, path, dash, width in reversed(drawn):
+    places = [(t, np.log10(y)) for t, y in lines] if name in PEAKS else lines
+    heights = limits(panel.traces, name)
+    styles = dashes(places, np.ptp(np.log10(heights) if name in PEAKS else heights))
+    for trace, colour, mean, path, dash in reversed(
+        list(zip(panel.traces, colours, means, lines, styles, strict=True))
+    ):
         y, steps = QUANTITIES[name](trace), "default" if smoothed(trace) or name != "u" else "steps-post"
         if bands and name not in UNBANDED:
             e = columns(trace.t, y, COLUMNS)
@@ -333,16 +308,12 @@ def over_time(
             for i in drawn_channels(y.shape[1]):
                 artists += ax.plot(*curve(trace, y[:, i], name), alpha=0.8, lw=style.points(LIGHT_LINE), **look)
         else:
-            artists += ax.plot(*path, lw=width, ls=dash, **look)
-        if ends_in_failure(trace):
+            artists += ax.plot(*path, lw=style.points(LINE), ls=dash, **look)
+        # a trace that is cut to a close-up may end before its run failed
+        if trace.diverged_at is not None and trace.t[-1] + trace.scenario.control_period > trace.diverged_at - 1e-9:
             last = np.clip(mean[-1], *ax.get_ylim())
             artists += ax.plot(trace.t[-1], last, "X", color=colour, clip_on=False, zorder=5, **cross())
     return artists
-
-
-def ends_in_failure(trace: Trace) -> bool:
-    """Return whether a trace ends where its run failed. A trace that is cut to a close-up may end before."""
-    return trace.diverged_at is not None and trace.t[-1] + trace.scenario.control_period > trace.diverged_at - 1e-9
 
 
 def cross() -> dict[str, Any]:
@@ -350,29 +321,15 @@ def cross() -> dict[str, Any]:
     return {"ms": style.points(9), "mec": "white", "mew": style.points(1)}
 
 
-def dotted() -> dict[str, Any]:
-    """Return the look of the line that marks when a plant changes or an arm is hit."""
-    return {"color": style.INK, "lw": style.points(0.9), "ls": (0, (2, 2))}
-
-
-def panel_dashes(panel: Panel, lines: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[Any]:
-    """Return a style for each line of a panel, see `dashes`."""
-    low, high = limits(panel.traces, panel.quantity)
-    if panel.quantity == "settling":
-        return dashes([(t, np.log10(y)) for t, y in lines], (math.log10(low), math.log10(high)))
-    return dashes(lines, (low, high))
-
-
-def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], limits: tuple[float, float]) -> list[Any]:
-    """Return a style for each line: solid, or dashed in turn for lines that coincide, so that all are visible."""
-    near = COINCIDENT_DISTANCE * (limits[1] - limits[0])
+def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], height: float) -> list[Any]:
+    """Return a style for each line in a panel of this height: solid, or dashed in turn for lines that coincide."""
     groups: list[list[int]] = []
     for i, (t, y) in enumerate(lines):
         for group in groups:
             at, first = lines[group[0]]
             if min(len(t), len(at)) > 1 and t[-1] == at[-1]:
                 apart = np.abs(np.interp(at, t, y) - first)
-                if np.quantile(apart, COINCIDENT_SHARE) <= near:
+                if np.quantile(apart, COINCIDENT_SHARE) <= COINCIDENT_DISTANCE * height:
                     group.append(i)
                     break
         else:
@@ -384,8 +341,8 @@ def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], limits: tuple[float, 
     return styles
 
 
-def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str], label: bool) -> None:
-    """Fit the vertical range to lasting reactions. Mark short impacts outside it and, if `label`, print their size."""
+def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
+    """Fit the vertical range to lasting reactions. Mark short impacts outside it and print their size."""
     sizes = [np.abs(trace.reaction[np.isfinite(trace.reaction)]) for trace in panel.traces]
     peak = max(size.max(initial=0.0) for size in sizes)
     levels = [float(np.quantile(size, LASTING_QUANTILE)) for size in sizes if size.size]
@@ -400,8 +357,7 @@ def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str], label: bool) ->
             starts = trace.t[np.flatnonzero(np.diff(beyond, prepend=0) > 0)]
             look = {"marker": mark, "ls": "", "color": colour, "ms": style.points(5), "mew": style.points(1.2)}
             ax.plot(starts, np.full(len(starts), side * top), clip_on=False, in_layout=False, **look)
-    if label:
-        note(ax, f"|reaction| up to {style.short(peak, 3)} {style.units(panel.group)['force']}")
+    note(ax, f"|reaction| up to {style.short(peak, 3)} {style.units(panel.group)['force']}")
 
 
 def note(ax: Axes, words: str) -> None:
@@ -409,49 +365,24 @@ def note(ax: Axes, words: str) -> None:
     ax.set_title(words, loc="right", fontweight="normal", fontsize=style.points(9.5), color=style.MUTED)
 
 
-def rests(trace: Trace) -> list[int]:
-    """Return the last samples of the latest times when dry friction holds all channels for MIN_STATE_TIME or longer."""
-    if not trace.scenario.realistic or not has_dry_friction(trace.scenario):
-        return []
-    still = at_rest(trace).all(axis=1)
-    edges = np.flatnonzero(np.diff(still.astype(int), prepend=0, append=0)).reshape(-1, 2)
-    long = [int(last) for first, last in edges - (0, 1) if trace.t[last] - trace.t[first] >= MIN_STATE_TIME]
-    return long[-MAX_RESTS:]
+def references(traces: Sequence[Trace]) -> list[tuple[Trace, np.ndarray, np.ndarray]]:
+    """Return the longest trace of each reference, with its times (K+1,) and values (K+1,), the mean of its channels."""
+    longest = sorted(traces, key=lambda trace: len(trace.t))
+    found = []
+    for trace in {trace.scenario.resolved.reference: trace for trace in longest}.values():
+        r = trace.r.mean(axis=1)
+        found.append((trace, trace.t[np.isfinite(r)], r[np.isfinite(r)]))
+    return [each for each in found if len(each[1])]
 
 
 def target(ax: Axes, panel: Panel) -> None:
-    """Draw each reference (zero for an error) as long as a run has it, its settling band, and the play of a gear."""
-    several, (bottom, top) = sorted(panel.traces, key=lambda trace: len(trace.t)), ax.get_ylim()
-    for trace in {trace.scenario.resolved.reference: trace for trace in several}.values():
-        r = reference(trace)
-        known = np.isfinite(r)
-        r = r[known] if panel.quantity == "x" else np.zeros(known.sum())
-        if known.any():
-            (t, r), half = line(trace.t[known], r, 2), SETTLING_BAND * scale(trace)
-            play = backlash_gap(trace.scenario) / 2
-            if not (r - half < bottom).all() or not (r + half > top).all():  # else it is the background
-                ax.fill_between(t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
-            if play:
-                ax.fill_between(t, r - play, r + play, color=style.REACTION, alpha=PLAY, lw=0, zorder=1.1, gid=BACKLASH)
-            ax.plot(t, r, color=style.INK, lw=style.points(0.8), ls=(0, (4, 4)), zorder=3, gid=REFERENCE)
-
-
-class Thousandths(ScalarFormatter):
-    """Labels of ticks in thousandths of the axis's unit."""
-
-    def set_locs(self, locs: Any) -> None:
-        """Choose the digits for ticks at these places."""
-        super().set_locs([1e3 * place for place in locs])
-
-    def __call__(self, x: float, pos: int | None = None) -> str:
-        """Return the label of a tick."""
-        return super().__call__(1e3 * x, pos)
-
-
-def scale_ticks(axis: Axis, panel: Panel) -> None:
-    """Label the ticks of an axis in the unit of a panel's label."""
-    if panel.thousandths:
-        axis.set_major_formatter(Thousandths())
+    """Draw each reference (zero for an error) as long as a run has it, and its settling band."""
+    bottom, top = ax.get_ylim()
+    for trace, times, values in references(panel.traces):
+        (t, r), half = line(times, values if panel.quantity == "x" else 0.0 * values, 2), SETTLING_BAND * scale(trace)
+        if not (r - half < bottom).all() or not (r + half > top).all():  # else it is the background
+            ax.fill_between(t, r - half, r + half, color=style.BAND, lw=0, zorder=1)
+        ax.plot(t, r, color=style.INK, lw=style.points(0.8), ls=(0, (4, 4)), zorder=3, gid=REFERENCE)
 
 
 def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
@@ -460,7 +391,7 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
     room = ax.get_window_extent().width * 72 / ax.figure.dpi  # points
     ends: list[float] = []  # of the words in each row above the axes, in points
     for time, change in sorted(changes.items()):
-        ax.axvline(time, **dotted(), zorder=1.5)
+        ax.axvline(time, color=style.INK, lw=style.points(0.9), ls=(0, (2, 2)), zorder=1.5)
         if not named:
             continue
         words = style.cropped(change, room, size)
@@ -473,68 +404,37 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
         ax.annotate(words, (time, 1.0), place, ("data", "axes fraction"), "offset points", **look)
 
 
-def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], rests: Sequence[Sequence[int]]) -> None:
-    """Draw v over x of traces, and of a reference that moves.
-
-    A ring marks the start of a trace, a diamond a sample in `rests`, at which friction holds it.
-    """
-    drawn = list(zip(traces, colours, rests, phase_dashes(traces), strict=True))
-    for trace, colour, samples, dash in reversed(drawn):
-        shown, width = drawn_channels(trace.x.shape[1]), style.points(LINE if trace.x.shape[1] == 1 else LIGHT_LINE)
-        for x, v in zip(trace.x.T[shown], trace.v.T[shown], strict=True):
-            ax.plot(*thinned(x, v), color=colour, lw=width, ls=dash)
-            ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
-        x, v = trace.x[:, 0], trace.v[:, 0]
-        for sample in samples:
-            ax.plot(x[sample], 0.0, "D", color=colour, ms=style.points(5.5), mec=style.PAPER, zorder=4)
-        if trace.diverged_at is not None:
-            ax.plot(x[-1], v[-1], "X", color=colour, zorder=5, **cross())
-    ax.axhline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
-    ax.axvline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
-    low, high = limits(traces, "v")
-    longest = sorted(traces, key=lambda trace: len(trace.t))
-    for trace in {trace.scenario.resolved.reference: trace for trace in longest}.values():
-        r, dr = orbit(trace)
-        if dr.any():
-            ax.plot(r, dr, color=style.INK, lw=style.points(0.8), ls=(0, (4, 4)), zorder=3, gid=REFERENCE)
-            low, high = min(low, 1.05 * dr.min()), max(high, 1.05 * dr.max())
-    ax.set_xlim(limits(traces, "x"))
-    ax.set_ylim(low, high)
-
-
-def phase_dashes(traces: Sequence[Trace]) -> list[Any]:
-    """Return a style for the curve of each trace in a phase portrait, see `dashes`."""
+def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
+    """Draw v over x of traces, and of a reference that moves. A ring marks the start of a trace."""
     (left, right), (low, high) = limits(traces, "x"), limits(traces, "v")
+    ax.set_xlim(left, right)
     lines = []  # x, then v, as one curve: traces coincide if both do
     for trace in traces:
         x, v = trace.x.mean(axis=1) / (right - left), trace.v.mean(axis=1) / (high - low)
         lines.append((np.concatenate([trace.t, trace.t + trace.t[-1]]), np.concatenate([x, v])))
-    return dashes(lines, (0.0, 1.0))
+    for trace, colour, dash in reversed(list(zip(traces, colours, dashes(lines, 1.0), strict=True))):
+        shown, width = drawn_channels(trace.x.shape[1]), style.points(LINE if trace.x.shape[1] == 1 else LIGHT_LINE)
+        for x, v in zip(trace.x.T[shown], trace.v.T[shown], strict=True):
+            ax.plot(*thinned(x, v), color=colour, lw=width, ls=dash)
+            ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
+        if trace.diverged_at is not None:
+            ax.plot(trace.x[-1, 0], trace.v[-1, 0], "X", color=colour, zorder=5, **cross())
+    ax.axhline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
+    ax.axvline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
+    for trace, _, r in references(traces):
+        dr = np.gradient(r, trace.scenario.control_period) if len(r) > 1 else 0.0 * r
+        steady = np.abs(dr) <= JUMP_RATIO * np.quantile(np.abs(dr), 0.99)  # where the reference does not jump
+        dr = dr[steady]
+        if dr.any():
+            ax.plot(r[steady], dr, color=style.INK, lw=style.points(0.8), ls=(0, (4, 4)), zorder=3, gid=REFERENCE)
+            low, high = min(low, 1.05 * dr.min()), max(high, 1.05 * dr.max())
+    ax.set_ylim(low, high)
 
 
-def reference(trace: Trace) -> np.ndarray:
-    """Return the reference of a trace's channels, (K + 1,), or the mean of their references if these differ."""
-    return trace.r.mean(axis=1) if isinstance(trace.scenario.resolved.reference, PerChannel) else trace.r[:, 0]
-
-
-def orbit(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
-    """Return the reference r and its rate r' by differences, where it does not jump."""
-    r = reference(trace)
-    r = r[np.isfinite(r)]
-    dr = np.gradient(r, trace.scenario.control_period) if len(r) > 1 else np.zeros(len(r))
-    smooth = np.abs(dr) <= JUMP_RATIO * np.quantile(np.abs(dr), 0.99) if len(r) else []
-    return r[smooth], dr[smooth]
-
-
-def last_period(traces: Sequence[Trace]) -> tuple[float, float]:
-    """Return the times between which a close-up shows the last samples of u, s."""
-    stop = end(traces)
-    return max(0.0, stop - LAST_SAMPLES * max(trace.scenario.control_period for trace in traces)), stop
-
-
-def last_samples(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], period: tuple[float, float]) -> None:
-    """Draw the last samples of u of the first channel, each held until the next, in a period of time in s."""
-    begin, stop = period
+def last_samples(ax: Axes, panel: Panel, colours: Sequence[str], among: Sequence[Trace]) -> None:
+    """Draw the last samples of u of the first channel, each held until the next, of the longest run of `among`."""
+    traces, stop = panel.traces, end(among)
+    begin = max(0.0, stop - LAST_SAMPLES * max(trace.scenario.control_period for trace in among))
     lines = []
     for trace in traces:
         part = slice(int(np.searchsorted(trace.t, begin - 1e-9)), None)
@@ -544,7 +444,7 @@ def last_samples(ax: Axes, traces: Sequence[Trace], colours: Sequence[str], peri
         low, high = shown.min(), shown.max()
         half = max(0.62 * (high - low), MIN_CLOSE_UP / 2 * max(map(abs, span(traces, "u")))) or 1.0
         ax.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
-    for (t, u), colour, dash in reversed(list(zip(lines, colours, dashes(lines, ax.get_ylim()), strict=True))):
+    for (t, u), colour, dash in reversed(list(zip(lines, colours, dashes(lines, np.ptp(ax.get_ylim())), strict=True))):
         ax.step(t, u, where="post", color=colour, lw=style.points(LINE), ls=dash)
     if all(trace.diverged_at is not None for trace in traces):
         words = "the run failed" if len(traces) == 1 else "all runs failed"
@@ -581,39 +481,19 @@ def thinned(x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return x[keep], v[keep]
 
 
-def lasting(traces: Sequence[Trace], name: str) -> dict[int, np.ndarray]:
-    """Return the values of successful runs by their index; if there are none, of failed ones without their ends."""
-    values = {k: QUANTITIES[name](trace) for k, trace in enumerate(traces)}
-    shares = {k: UNDIVERGED_SHARE if traces[k].plant_diverged else 1.0 for k in values}
-    lasted = {k: y for k, y in values.items() if traces[k].diverged_at is None}
-    lasted = lasted or {k: y[: max(1, int(shares[k] * len(y)))] for k, y in values.items()}
-    return {k: y for k, y in lasted.items() if np.isfinite(y).all()}
-
-
-def far_off(traces: Sequence[Trace], name: str) -> int | None:
-    """Return the index of the run that would flatten all others in a panel of an arm, or None."""
-    if name not in LABELS_OF_ARMS or name == "settling":
-        return None
-    sizes = {k: float(np.abs(y).max()) for k, y in lasting(traces, name).items()}
-    if len(sizes) < 2:
-        return None
-    *_, second, largest = sorted(sizes, key=lambda k: sizes[k])
-    return largest if sizes[largest] > FAR_OFF_RATIO * sizes[second] > 0.0 else None
-
-
-def outside(panel: Panel, names: Sequence[str]) -> tuple[str, str]:
-    """Return the name of the run that leaves a panel, and how far: "Time-delay sliding", ": up to 310"; else "", ""."""
-    away = far_off(panel.traces, panel.quantity)
-    if away is None:
-        return "", ""
-    largest = float(np.abs(QUANTITIES[panel.quantity](panel.traces[away])).max())
-    return names[away], f": up to {style.short(largest)}"
+def lasting(traces: Sequence[Trace], name: str) -> list[np.ndarray]:
+    """Return the values of successful runs; if there are none, of failed ones without their ends."""
+    values = [QUANTITIES[name](trace) for trace in traces if trace.diverged_at is None]
+    if not values:
+        shares = [UNDIVERGED_SHARE if trace.plant_diverged else 1.0 for trace in traces]
+        whole = [QUANTITIES[name](trace) for trace in traces]
+        values = [y[: max(1, int(share * len(y)))] for y, share in zip(whole, shares, strict=True)]
+    return [y for y in values if np.isfinite(y).all()]
 
 
 def span(traces: Sequence[Trace], name: str) -> tuple[float, float]:
-    """Return the least and largest value of the runs that last, without one that is far off."""
-    seen, away = lasting(traces, name), far_off(traces, name)
-    values = [y for k, y in seen.items() if k != away] or [np.zeros(1)]
+    """Return the least and largest value of the runs that last."""
+    values = lasting(traces, name) or [np.zeros(1)]
     return float(min(y.min() for y in values)), float(max(y.max() for y in values))
 
 
@@ -625,7 +505,7 @@ def limits(traces: Sequence[Trace], name: str) -> tuple[float, float]:
         low, high = min(low, r.min(initial=low)), max(high, r.max(initial=high))
     if name == "e":
         low, high = min(low, 0.0), max(high, 0.0)
-    if name == "settling":
+    if name in PEAKS:
         high = max(high, MIN_RATIO * MIN_ERROR)
         return min(max(low, MIN_ERROR), high / MIN_RATIO) / 1.5, high * 1.5
     air = MARGIN * (high - low) or 1.0

@@ -38,9 +38,8 @@ class Scene:
       title: shown on figures and films.
       conditions: condition -> label -> Scenario. Each condition gets a figure, which compares its labelled runs.
       film: the condition that is filmed; by default the first.
-      figure: "overview" (x, u, s and phase portrait, a figure for each condition), "signals" (u of all conditions in
-        one), "chattering" (amplitude over the actuator's lag, predicted and run, all conditions in one) or "joints" (a
-        small panel for each joint of an arm, a figure for each condition).
+      figure: "overview" (as `smc.figure`, a figure for each condition), "signals" (u of all conditions in one) or
+        "chattering" (amplitude over the actuator's lag, predicted and run, all conditions in one).
       answers: metrics of the driven channels that answer the scene's question, printed after the scores.
       facts: label -> sentence on another measurement, printed under the answers.
       answer: function of the `Outcome` of all runs that returns the sentence which answers the scene's question. The
@@ -81,7 +80,7 @@ class Scene:
                 raise ScenarioError(f"scene {self.title!r} has names that make the same file name: {', '.join(same)}")
         object.__setattr__(self, "film", self.film or next(iter(self.conditions)))
         lookup(f"condition to film in scene {self.title!r}", self.film, self.conditions)
-        lookup("kind of figure", self.figure, dict.fromkeys(("overview", "signals", "chattering", "joints")))
+        lookup("kind of figure", self.figure, dict.fromkeys(("overview", "signals", "chattering")))
         object.__setattr__(self, "camera", checked(self.camera))
         answers = (self.answers,) if isinstance(self.answers, str) else tuple(self.answers)
         object.__setattr__(self, "answers", answers)

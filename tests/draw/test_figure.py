@@ -30,11 +30,6 @@ def figure(traces, path, format="svg", **options) -> list:
     return files(path, format)
 
 
-def signals(traces, path, labels) -> list:
-    draw_figure.signals(traces, path, labels, format="svg")
-    return files(path, "svg")
-
-
 def runs(plant: str = "duffing", condition: str = "nominal", duration: float = 1.0) -> list[smc.Trace]:
     return smc.run(list(smc.paper.comparison(plant, condition, LAWS, duration=duration).values()))
 
@@ -123,7 +118,7 @@ def test_a_run_that_fails_at_once_is_an_x_where_it_started(tmp_path):
     gone = broken(bad, 0, "law 'classical' raised ValueError (no)")
     assert "Classical (failed at 0 s)" in words(draw_figure.figure([gone]))
     draw_figure.figure([good, gone])
-    signals([good, gone], tmp_path / "c", ["all", "all"])
+    draw_figure.figure([good, gone], panels=["u"])
     cut = decimate.finite(gone)
     assert cut.x.tolist() == [list(gone.scenario.resolved.x0)]
     assert np.isnan(cut.u).all()
@@ -139,14 +134,6 @@ def test_a_jump_is_marked_with_what_has_changed(tmp_path):
     assert style.jumps([jumping, still], ["A", "B"]) == {0.5: "A: mass × 25.9, delta × 2"}
 
 
-def test_signals_has_a_column_for_each_condition(pair, tmp_path):
-    noisy = runs(condition="noise")
-    text = words(draw_figure.signals([*pair, *noisy], None, ["nominal", "nominal", "noise", "noise"]))
-    assert all(word in text for word in ("nominal", "noise", "Observer-free", "Classical", "u (N)"))
-    with pytest.raises(smc.ScenarioError, match="one law under one condition"):
-        signals([pair[0], pair[0]], tmp_path / "a", ["nominal", "nominal"])
-
-
 def cart_and_pole(**fields) -> smc.Trace:
     return smc.run(smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", duration=1.0, **fields))
 
@@ -158,8 +145,8 @@ def test_a_pole_has_panels_of_its_own_in_its_own_unit(tmp_path):
     assert "reaction" not in text
     assert "sliding variable s (" not in text  # of the cart and the pole: its unit is the law's
     rubbed = words(draw_figure.figure([cart_and_pole(friction=Coulomb(0.01))]))
-    assert "reaction (mN)" in rubbed
-    assert "reaction on q (mN·m)" in rubbed
+    assert "reaction (N)" in rubbed
+    assert "reaction on q (N·m)" in rubbed
 
 
 def test_the_band_around_each_joint_is_that_of_its_own_scale():
@@ -198,8 +185,6 @@ def test_a_slide_and_a_hinge_that_are_driven_share_no_panel(tmp_path):
     for name in ("lift x (m)", "turn x (rad)", "lift u (N)", "turn u (N·m)"):
         assert name in text
     assert "mean" not in text.replace("line: mean over", "")
-    with pytest.raises(smc.ScenarioError, match="u of arm has several units: draw it with"):
-        signals([trace], tmp_path / "b", ["all"])
 
 
 def test_refuses_what_shares_no_axes(pair, tmp_path):
@@ -225,20 +210,12 @@ def test_a_voltage_is_drawn_in_volts_beside_forces_in_newton_metres(tmp_path):
     torque = dataclasses.replace(volts, actuator=motor)
     one, other = smc.run([volts, torque])
     text = words(draw_figure.figure([one]))
-    assert all(label in text for label in ("u (V)", "reaction (mN·m)"))
+    assert all(label in text for label in ("u (V)", "reaction (N·m)"))
     assert "u (N·m)" not in text
     assert "sliding variable" not in text  # the law has none
     assert "u (N·m)" in words(draw_figure.figure([other]))
     with pytest.raises(smc.ScenarioError, match="traces of furuta have u in N m and V: draw those of one unit"):
         figure([one, other], tmp_path / "c")
-
-
-def test_small_values_are_drawn_in_thousandths_of_their_unit(tmp_path):
-    small = smc.run(smc.Scenario(plant="duffing", law="lqr", x0=0.02, duration=0.3))
-    text = words(figure([small], tmp_path / "a")[0])
-    assert "position x (mm)" in text
-    assert "control u (N)" in text
-    assert " 15 20 position x (mm)" in text.replace("  ", " ")
 
 
 def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told(pair):
@@ -251,7 +228,7 @@ def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told
             Figure().add_subplot(),
             types.SimpleNamespace(traces=[first, calm[1]], group=groups(first.scenario.plant)[0]),
         )
-        panels.clip_impacts(ax, shown, ["r", "b"], label=True)  # pyright: ignore[reportArgumentType]
+        panels.clip_impacts(ax, shown, ["r", "b"])  # pyright: ignore[reportArgumentType]
         marks = [(line.get_color(), line.get_marker(), *line.get_xydata().tolist()) for line in ax.lines]  # pyright: ignore
         sides = [("r", 2, [first.t[100], 5.8]), ("r", 3, [first.t[200], -5.8]), ("b", 2), ("b", 3)]
         assert (ax.get_title(loc="right"), marks) == (title, sides if title else [])
@@ -300,7 +277,7 @@ def test_another_ending_is_refused(pair, tmp_path):
     with pytest.raises(smc.ScenarioError, match="end the name in"):
         figure(pair, tmp_path / "a.gif")
     with pytest.raises(smc.ScenarioError, match="end the name in"):
-        signals(pair, tmp_path / "a.gif", ["all", "all"])
+        figure(pair, tmp_path / "a.gif")
     assert not list(tmp_path.iterdir())
     assert figure(pair, tmp_path / "lam_0.5")[0].name == "lam_0.5.svg"
 
@@ -433,7 +410,7 @@ def test_the_line_of_a_late_and_noisy_control_stays_within_its_means():
 def test_the_legend_says_what_line_and_band_are(pair, tmp_path):
     chattering = runs(duration=1.5)
     text = words(draw_figure.figure(chattering))
-    alone = words(draw_figure.signals(chattering, None, ["c", "c"]))
+    alone = words(draw_figure.figure(chattering, panels=["u"]))
     assert "band: range of u, s" in text
     assert "band: range of u" in alone
     assert "band: range of u, s" not in alone
@@ -454,7 +431,6 @@ def test_an_overview_of_friction_has_a_panel_of_the_reaction_and_marks_where_it_
     rubbed = realistic(friction=Coulomb(0.5))
     text = words(draw_figure.figure([pair[0], rubbed]))
     assert "reaction (N)" in text
-    assert "held by friction for 0.15 s or longer" in text
     assert "range of u, reaction, s" in text or "band" not in text
     ideal = words(draw_figure.figure(pair))
     assert "reaction" not in ideal
@@ -466,16 +442,6 @@ def test_an_overview_with_an_actuator_has_a_panel_of_what_it_delivers(tmp_path):
     text = words(draw_figure.figure([late]))
     assert "delivered (N)" in text
     assert "reaction" not in text  # nothing rubs or touches
-
-
-def test_a_rest_is_marked_where_the_joint_stands_and_only_where_dry_friction_can_hold_it():
-    rubbed = realistic(friction=Coulomb(0.5))
-    (sample,) = panels.rests(rubbed)
-    place = rubbed.x[sample, 0]
-    assert place == pytest.approx(rubbed.x[-1, 0], abs=1e-9)
-    assert abs(place) > 1e-3  # friction stopped it before the goal
-    assert panels.rests(realistic(friction=smc.Viscous(5.0))) == []
-    assert panels.rests(realistic(friction=Coulomb(0.0))) == []
 
 
 @pytest.mark.slow
@@ -504,23 +470,23 @@ def test_a_realistic_run_that_fails_at_once_is_drawn():
 def test_one_trace_is_drawn_like_a_list_of_one_and_the_same_traces_give_the_same_files(pair, tmp_path):
     alone, listed = figure(pair[0], tmp_path / "a", None), figure(pair[:1], tmp_path / "b", None)
     assert [path.read_bytes() for path in alone] == [path.read_bytes() for path in listed]
-    assert signals(pair[0], tmp_path / "c", ["all"])[0].stat().st_size
 
 
 @pytest.mark.parametrize("level", [-0.596, 0.0])
 def test_the_close_up_shows_no_round_off(pair, level):
     """Of a run that ends in 1 part of 1e9 around a level; or that never leaves it."""
     held = level + 1e-9 * np.random.default_rng(0).normal(size=pair[0].u.shape)
-    period = panels.last_period(pair[:1])
+    (shown, *_) = panels.overview(pair[:1])
     ends = np.where(pair[0].t[:, None] < 0.5, pair[0].u, held)
     for u in (ends, held, np.full_like(held, level)):
         ax = Figure().subplots()
-        panels.last_samples(ax, [dataclasses.replace(pair[0], u=u)], ["#000000"], period)
+        panels.last_samples(ax, shown._replace(traces=[dataclasses.replace(pair[0], u=u)]), ["#000000"], pair[:1])
         low, high = ax.get_ylim()
         assert high - low >= 0.0199 * np.abs(u).max()
         assert (low + high) / 2 == pytest.approx(level, abs=1e-6)
     full = Figure().subplots()
-    panels.last_samples(full, [dataclasses.replace(pair[0], u=np.sign(held - level))], ["#000000"], period)
+    switching = dataclasses.replace(pair[0], u=np.sign(held - level))
+    panels.last_samples(full, shown._replace(traces=[switching]), ["#000000"], pair[:1])
     assert full.get_ylim() == pytest.approx((-1.24, 1.24))  # what is large fills it
 
 
@@ -545,16 +511,6 @@ def test_where_a_joint_is_is_drawn_as_it_is(pair):
         _, y = panels.curve(pair[0], x, name)
         assert (y[0], y.max(), y.min()) == (x[0], x.max(), x.min())
     assert panels.curve(pair[0], ripple, "u")[1].max() < 1e-9
-
-
-def test_small_commands_have_ticks_in_the_unit_of_their_label():
-    trace = smc.run(smc.Scenario(plant="duffing", law="observer_free", x0=(0.5,), duration=0.2, u_max=0.01))
-    page = draw_figure.signals([trace], None, None)
-    ax = page.axes[0]
-    page.canvas.draw()
-    assert ax.get_ylabel() == "u (mN)"
-    place, text = next((p, t.get_text()) for p, t in zip(ax.get_yticks(), ax.get_yticklabels(), strict=True) if p > 0)
-    assert float(text) == pytest.approx(1e3 * place)
 
 
 def test_small_panels_show_the_error_only_where_a_reference_moves():

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 import smc_mujoco as smc
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels, style
-from smc_mujoco.draw.figure import figure, signals
+from smc_mujoco.draw.figure import figure
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.trace import ARRAYS
 
@@ -109,11 +109,6 @@ def test_words_are_apart_and_on_the_page(kind, size, one, arm):
     check(page)
 
 
-def test_words_of_signals_are_apart(one):
-    several = ten(one)[:2]
-    check(signals([*several, *several], None, ["calm", "calm", "noisy", "noisy"], size=PAGE))
-
-
 def curves(ax) -> list:
     """The lines of traces, without those of single channels of several."""
     return [line for line in ax.lines if len(line.get_xdata()) > 20 and line.get_gid() is None and not line.get_alpha()]
@@ -160,18 +155,6 @@ def test_a_run_that_fails_does_not_set_the_range_of_the_rows_of_others(one):
     assert cross.get_ydata()[0] in panels.limits(three, "u")  # at the edge of the range: it lies far outside
     assert max(row.get_ylim()[1] for row in rows(end)) < 0.0
     assert [text.get_text() for row in rows(end) for text in row.texts] == ["the run failed"]
-
-
-def test_the_play_of_a_gear_is_a_band_around_the_reference_with_its_size_in_the_legend(one):
-    loose = dataclasses.replace(one, scenario=dataclasses.replace(one.scenario, actuator=smc.Backlash(0.05)))
-    page = figure([loose], panels=["x", "u", "error"])
-    bands = [[a for a in ax.collections if a.get_gid() == panels.BACKLASH] for ax in page.axes]
-    assert [len(found) for found in bands] == [1, 0, 1]
-    edges = np.asarray(bands[2][0].get_paths()[0].vertices)[:, 1]
-    assert (edges.min(), edges.max()) == pytest.approx((-0.025, 0.025))
-    words = [text.get_text() for text in page.legends[0].get_texts()]
-    assert "play: the gear leaves ± 0.025 m free" in words
-    assert not any("play" in text.get_text() for text in figure([one], panels=["x"]).legends[0].get_texts())
 
 
 def test_the_legend_of_ten_laws_and_the_title_take_less_than_a_quarter_of_a_column(one):
@@ -253,7 +236,7 @@ def test_curves_that_coincide_are_all_seen(one):
         assert [line.get_linestyle() for line in (pid, classical)] == ["--", "--"]
         assert pid._unscaled_dash_pattern[0] != classical._unscaled_dash_pattern[0]
     zero = 0.0 * one.t
-    assert panels.dashes([(one.t, zero), (one.t, np.where(one.t < 0.1 * one.t[-1], 1.0, 0.0))], (0.0, 1.0)) == ["-"] * 2
+    assert panels.dashes([(one.t, zero), (one.t, np.where(one.t < 0.1 * one.t[-1], 1.0, 0.0))], 1.0) == ["-"] * 2
 
 
 @pytest.mark.slow

@@ -15,7 +15,6 @@ from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECI
 from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.draw import amplitudes, region
 from smc_mujoco.draw.figure import figure, signals
-from smc_mujoco.draw.joints import joints
 from smc_mujoco.draw.nyquist import nyquist
 from smc_mujoco.draw.pareto import pareto
 from smc_mujoco.evidence.accuracy.orders import orders
@@ -60,25 +59,26 @@ def test_a_column_of_every_panel_of_a_cart_with_a_pole(snapshot):
 
 
 @pytest.mark.parametrize("size", [None, (4.0, 7.0)])
-def test_joints_of_an_arm_of_which_one_run_is_far_off_and_one_is_hit(size, snapshot):
+def test_an_arm_of_which_one_run_is_far_off_and_one_is_hit(size, snapshot):
     hit = made(smc.Scenario(plant=arms.arm(), law=smc.law("none"), reference=SINE, duration=0.3))
     push = smc.Push("hand", y=30.0, z=40.0, time=0.1, width=0.02)
     hit = dataclasses.replace(hit, scenario=dataclasses.replace(hit.scenario, disturbance=push))
     far = dataclasses.replace(hit, x=hit.r + 50.0 * (hit.x - hit.r))
     same = dataclasses.replace(hit, x=hit.x + 1e-4)
-    assert sketch(joints([hit, far, same], labels=["near", "far", "same"], size=size)) == snapshot
+    assert sketch(figure([hit, far, same], labels=["near", "far", "same"], size=size)) == snapshot
 
 
-@pytest.mark.parametrize("size", [None, "ieee-page"])
-def test_signals_of_two_laws_under_two_conditions(size, snapshot):
+def test_signals_of_two_laws_under_two_conditions(snapshot):
     calm = [duffing("classical"), switching(duffing("super_twisting"), 0.7)]
     jump = [
         dataclasses.replace(one, scenario=dataclasses.replace(one.scenario, jump=smc.Jump(0.4, {"mass": 2.0})))
         for one in calm
     ]
     jump[1] = failed(jump[1], 300, "the law raised ValueError: no")
-    page = signals([*calm, *jump], None, ["calm", "calm", "heavier", "heavier"], size=size)
-    assert sketch(page) == snapshot
+    page = signals(
+        {"calm": dict(zip("ab", calm, strict=True)), "heavier": dict(zip("ab", jump, strict=True))}, None, "Duffing"
+    )
+    assert "\n".join(map(sketch, page.subfigs)) == snapshot
 
 
 def test_amplitudes_of_two_laws_that_are_equal_at_one_lag(monkeypatch, snapshot):
@@ -144,8 +144,6 @@ REFUSED = {  # call -> arguments, and what replaces them
         {"panels": ["y"]}, {"panels": []}, {"size": (5.0,)}, {"size": (5.0, 4.0), "fig": Figure()},
         {"format": 10**5000},
     ]),
-    signals: ({"traces": [ONE, ONE], "path": None}, [{"labels": ["a", "a"]}, {"labels": []}]),
-    joints: ({"traces": []}, [{}]),
     amplitudes.amplitudes: ({"traces": {}}, [{}]),
     nyquist: ({"scenarios": []}, [{}]),
     orders: ({"rows": []}, [{}]),

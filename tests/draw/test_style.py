@@ -97,10 +97,10 @@ def test_laws_that_would_share_a_colour_differ_in_signals_and_fronts_too(monkeyp
     monkeypatch.setattr(style, "law_colour", lambda law: "#0072B2")
     laws = ("observer_free", "classical")
     runs = smc.run([smc.Scenario(plant="duffing", law=law, duration=0.05) for law in laws])
-    rows = figure.signals(runs, None, ["b", "b"])
+    rows = figure.figure(runs, None, ["b", "b"], panels=["u"])
     brief = Objective(conditions=("nominal",), duration=0.1)
     fronts = pareto([tune("duffing", law, budget=4, objective=brief) for law in laws])
-    assert len({to_hex(ax.lines[0].get_color()) for ax in rows.axes}) == 2
+    assert len({to_hex(line.get_color()) for ax in rows.axes for line in ax.lines}) == 2
     (ax,) = fronts.axes
     assert len({to_hex(line.get_color()) for line in ax.lines if str(line.get_marker()) in MARKS}) == 2
 

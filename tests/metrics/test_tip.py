@@ -8,7 +8,6 @@ import pytest
 from helpers import arms
 
 import smc_mujoco as smc
-from smc_mujoco.draw.joints import mark_losses
 from smc_mujoco.mechanisms.plant import Field
 from smc_mujoco.metrics import tip
 from smc_mujoco.studies import arms as tasks
@@ -182,19 +181,6 @@ def test_rubbing_on_the_wall_does_not_change_the_force():
     rough = smc.Scenario(plant="panda", law=law, reference=path, x0=start, contact="wall", duration=1.4)
     late = tip.contacts(smc.run(rough)).force[-400:]
     assert late.mean() == pytest.approx(20.0, rel=0.02)
-
-
-def test_a_lost_contact_is_marked():
-    class Axes:
-        def fill_between(self, t, low, high, where, **_):
-            self.marked = where
-
-        def get_xaxis_transform(self):
-            return None
-
-    axes = Axes()
-    mark_losses(axes, np.arange(6.0), np.array([0.0, 3.0, 0.0, 0.0, 2.0, 0.0]), "k", 0)  # pyright: ignore
-    assert axes.marked == [False, False, True, True, False, True]
 
 
 def test_bad_input_is_one_sentence(trace, pressed, refused):

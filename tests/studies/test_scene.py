@@ -113,7 +113,7 @@ def test_a_scene_of_each_kind_of_figure_is_drawn(name, tmp_path, monkeypatch):
     with contextlib.redirect_stdout(io.StringIO()):
         traces = show.simulate(scene, threads=None)
     drawn = show.figures(scene, traces, tmp_path)
-    assert len(drawn) == 2 * (len(traces) if scene.figure in ("overview", "joints") else 1)
+    assert len(drawn) == 2 * (len(traces) if scene.figure == "overview" else 1)
     assert drawn == [path for paths in pages for path in paths]
     assert drawn[0].stat().st_size > 1000
     assert list(tmp_path.iterdir()) == [drawn[0]]

@@ -154,7 +154,7 @@ def _sizes(traces: Sequence[Trace], name: str) -> Sizes:
     A brief value takes at most 1 - LASTING_QUANTILE of the time.
     """
     peak = max(map(abs, panels.span(traces, name)))
-    runs = panels.lasting(traces, name).values()
+    runs = panels.lasting(traces, name)
     usual = max((float(np.quantile(np.abs(y), panels.LASTING_QUANTILE, axis=0).max()) for y in runs), default=0.0)
     return Sizes(peak, usual if peak > 2.0 * usual > 0.0 else peak)
 

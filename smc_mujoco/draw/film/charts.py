@@ -45,13 +45,12 @@ class Charts:
             figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=0.2, top=0.855, wspace=CHART_GAP / wide)
             artists = []
             for ax, panel in zip(axes, strip, strict=True):
-                set_titles(ax, panel, names, DPI * scale / 72)
+                set_titles(ax, panel, DPI * scale / 72)
                 ax.set_xlim(0.0, self.end)
                 ax.set_xlabel("time (s)", labelpad=2)
                 ax.tick_params(length=0)
                 panels.mark(ax, style.marks(traces, names), named=False)
-                artists += panels.over_time(ax, panel, colours, label=False, bands=not panels.crowded(panel))
-                panels.scale_ticks(ax.yaxis, panel)
+                artists += panels.over_time(ax, panel, colours, bands=not panels.crowded(panel))
             self.full = picture(canvas)
             for artist in artists:
                 artist.set_alpha(FUTURE_OPACITY * (artist.get_alpha() or 1.0))
@@ -88,15 +87,13 @@ class Charts:
             image[rows, cols] = (image[rows, cols] * (1 - cover) + ink * cover).astype(np.uint8)
 
 
-def set_titles(ax: Axes, panel: Panel, names: Sequence[str], point: float) -> None:
+def set_titles(ax: Axes, panel: Panel, point: float) -> None:
     """Set the panel's label at the left and, at the right, as much of what its lines mean as fits; `point` in px."""
     words = [
         f"{name}: {text}"
         for name, text in panels.meaning([panel]).items()
         if not (name == "band" and panels.crowded(panel))
     ]
-    if away := "".join(panels.outside(panel, names)):
-        words.insert(0, away)
     room = ax.get_window_extent().width - style.width(panel.label, 11 * point, bold=True) - 15 * point
     while words and style.width(", ".join(words), 9.5 * point) > room:
         words.pop()
