@@ -1,4 +1,4 @@
-"""The report's answer in sentences: which law leads where, where no winner is known, how the paper's law does.
+"""The report's answer in sentences: which law leads where, where no winner is known, where the paper's law loses.
 
 Everything here is counted from `Findings.scores`.
 """
@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.analysis.ranking import ROUNDING
 from smc_mujoco.common.text import every, joined
 from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
 from smc_mujoco.evidence.accuracy.scaling import ORDER_BAND
@@ -45,6 +46,22 @@ class Pick(NamedTuple):
         return f"{unbeaten}, wins in {self.wins}" if self.wins else unbeaten
 
 
+class Loss(NamedTuple):
+    """A cell in which another law is better than the paper's."""
+
+    metric: str
+    plant: str
+    condition: str
+    median: float  # of the paper's law
+    rival: float  # median of the best law
+    law: str  # the best one
+    times: (
+        float  # ratio of the medians; where the rival's is below the least difference that counts, to that difference
+    )
+    rounded: bool  # whether it is, so that the ratio is a lower bound
+    settles: bool  # whether the best law settles there: a law that hardly acts may be calm, and never arrive
+
+
 def cells(scores: Sequence[Score]) -> Cells:
     """Return the scores of each comparison."""
     by_cell: Cells = {}
@@ -64,10 +81,31 @@ def winner(by_cell: Cells, plant: str, condition: str, metric: str) -> str | Non
     return next((score.law for score in by_cell.get((plant, condition, metric), ()) if score.wins), None)
 
 
+def settles(by_cell: Cells, plant: str, condition: str, law: str) -> bool:
+    """Return whether a law settles in the median of a cell; True where that was not measured."""
+    return all(s.median < math.inf for s in by_cell.get((plant, condition, "settling_time"), ()) if s.law == law)
+
+
 def undecided(by_cell: Cells, metrics: Sequence[str]) -> tuple[int, int]:
     """Return how many comparisons have no winner, and how many comparisons there are."""
     winners = [winner(by_cell, *key) for key in by_cell if key[2] in metrics]
     return winners.count(None), len(winners)
+
+
+def losses(by_cell: Cells, metrics: Sequence[str]) -> list[Loss]:
+    """Return the cells in which another law is better than the paper's, worst first."""
+    lost: list[Loss] = []
+    for (plant, condition, metric), scores in by_cell.items():
+        score = next((s for s in scores if s.law == words.PAPER_LAW), None)
+        if metric not in metrics or score is None or not score.beaten:
+            continue
+        best = min((s for s in scores if s.best), key=lambda s: s.median, default=None)
+        if best is not None and math.isfinite(best.median):
+            resolution = max(best.floor, ROUNDING)
+            times, rounded = score.median / max(best.median, resolution), best.median < resolution
+            arrives = settles(by_cell, plant, condition, best.law)
+            lost.append(Loss(metric, plant, condition, score.median, best.median, best.law, times, rounded, arrives))
+    return sorted(lost, key=lambda loss: -loss.times)
 
 
 def pick(findings: "Findings", metric: str, plant: str = "") -> Pick | None:

@@ -341,6 +341,24 @@ def test_places_over_all_plants_count_the_cells_that_a_law_wins(made, folder):
     assert {p.of for p in overall} == {2}
 
 
+def test_where_the_papers_law_loses_is_listed_worst_first():
+    lost = answer.losses(answer.cells(scores(observer_free=3.0, classical=1.0, adaptive=2.0)), ["settling_time"])
+    assert [(loss.law, loss.times) for loss in lost] == [("classical", 3.0)]
+    assert answer.losses(answer.cells(scores(observer_free=1.0, classical=3.0)), ["settling_time"]) == []
+    calm = scores(observer_free=1.0, classical=math.inf)
+    calm += [s._replace(metric="tv_rate") for s in scores(observer_free=2.0, classical=1.0)]
+    (one,) = answer.losses(answer.cells(calm), ["tv_rate"])
+    assert (one.law, one.settles) == ("classical", False)
+    exact = answer.losses(answer.cells(scores(observer_free=3.0, classical=1e-20)), ["settling_time"])
+    assert exact[0].times == pytest.approx(3e9)  # over what rounding leaves of zero, not over 1e-20
+    assert exact[0].rounded
+    small = [s._replace(floor=0.5) for s in scores(observer_free=3.0, classical=0.1)]
+    (one,) = answer.losses(answer.cells(small), ["settling_time"])
+    assert (one.times, one.rounded) == (6.0, True)  # over the least difference that counts
+    never = answer.losses(answer.cells(scores(observer_free=math.inf, classical=1.0)), ["settling_time"])
+    assert never[0].times == math.inf
+
+
 def place(law, losses=0, wins=0, mean=1.0, metric="itae", median=1.0, plant="duffing"):
     return Place(plant, metric, law, mean, 0, not losses, median, wins, losses, 4)
 
