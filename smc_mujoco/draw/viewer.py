@@ -21,7 +21,7 @@ from smc_mujoco.mechanisms.hardware.part import driven
 from smc_mujoco.mechanisms.plant import compiled_for_runs, field_array
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.callback import installed
-from smc_mujoco.simulation.reference import Loop
+from smc_mujoco.simulation.reference import Loop, PythonComponent
 from smc_mujoco.simulation.scenario import Scenario
 
 GAIN = "gain:"  # prefix of the sliders' names
@@ -134,7 +134,7 @@ class Live:
         if gains != dict(self.law.gains):
             law = dataclasses.replace(self.law, gains=gains)
             self.loop.scenario, self.unchanged = dataclasses.replace(self.loop.scenario, law=law), 0
-            self.loop.law.bind(law)
+            self.loop.law.gains = PythonComponent(law, len(self.loop.law.memory)).gains  # the memory stays
         elif self.unchanged >= SETTLED_FRAMES and self.printed != self.law:
             self.printed = self.law
             self.say(as_code(self.law))
