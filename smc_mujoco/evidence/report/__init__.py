@@ -46,15 +46,16 @@ def report(
         a further law that is unknown or has no tuned gains.
       MissingPackageError: jinja2 or plotly is not installed.
     """
-    from smc_mujoco.analysis.ranking import checked_share
     from smc_mujoco.common import extras
+
+    if why := extras.missing("report", "a report", "jinja2", "plotly"):
+        raise extras.MissingPackageError(why)
+    from smc_mujoco.analysis.ranking import checked_share
     from smc_mujoco.common.errors import items_of, whole
     from smc_mujoco.common.files import replacing
     from smc_mujoco.evidence.report import page, stages
     from smc_mujoco.evidence.report.plan import FULL, QUICK, Bars
 
-    if why := extras.missing("report", "a report", "jinja2", "plotly"):
-        raise extras.MissingPackageError(why)
     plan = plan or (QUICK if quick else FULL)
     if seeds is not None:
         plan = dataclasses.replace(plan, seeds=whole("seeds", seeds, 1, 10_000))

@@ -297,14 +297,13 @@ def test_theory_of_delays_knows_no_drive():
     [
         (
             (smc.Lag(0.1), smc.Lag(0.2), smc.Lag(0.3)),
-            "actuator has 3 drives, (Lag(tau=0.1), Lag(tau=0.2), Lag(tau=0.3)): give one, or two in series",
+            "actuator has the drives [Lag(tau=0.1), Lag(tau=0.2), Lag(tau=0.3)]: give one drive, or (smc.Lag(0.01), ",
         ),
         (
             (smc.RateLimit(2.0), smc.Lag(0.2)),
-            "actuator has RateLimit(rate=2.0) before Lag(tau=0.2), but the first of two drives in series must be "
-            "a Lag: give one drive, or (smc.Lag(0.01), another)",
+            "actuator has the drives [RateLimit(rate=2.0), Lag(tau=0.2)]: give one drive, or (smc.Lag(0.01), another)",
         ),
-        ((smc.Backlash(0.1), smc.Lag(0.2), smc.Backlash(0.1)), "actuator has a Backlash twice, "),
+        ((smc.Backlash(0.1), smc.Lag(0.2), smc.Backlash(0.1)), "actuator has a Backlash twice: give one"),
     ],
 )
 def test_parts_that_cannot_be_in_series_are_one_sentence(actuator, says):
