@@ -17,6 +17,7 @@ from smc_mujoco.evidence.rigs.uncertainty import BLOCKS, MAX_CORRELATION
 POOR_FIT = 80.0  # percent: a fit below this may mean that the search ended in the wrong place; chosen
 PERFECT_FIT = 99.99  # percent: residuals beyond it are the simulation's; chosen
 UNIT_FACTOR = 5.0  # factor between a quantity before and after, beyond which a column may be in another unit; chosen
+FACTOR_TOLERANCE = 0.1  # relative difference up to which such factors count as the same; chosen
 MAX_FIT_LOSS = 0.1  # percent, by which the fit of a whole record may fall without a note; chosen
 
 
@@ -59,9 +60,15 @@ class Identified:
         positive = {name: q.value for name, q in before.items() if q.least >= 0.0 and q.value > 0.0}
         factors = {name: self.values[name] / value for name, value in positive.items()}
         far = {name: factor for name, factor in factors.items() if not 1.0 / UNIT_FACTOR < factor < UNIT_FACTOR}
+        if not far:
+            return []
+        middle = float(np.median(list(far.values())))
+        if len(far) > 1 and all(abs(factor / middle - 1.0) < FACTOR_TOLERANCE for factor in far.values()):
+            return [
+                f"{joined(list(far))} are {middle:.3g} times what they were before: look at the unit of the command"
+            ]
         changes = [f"{name} is {factor:.3g} times its value before" for name, factor in far.items()]
-        cure = "look at the units of the columns, unless the values before were only a guess"
-        return [f"{joined(changes)}: {cure}"] if far else []
+        return [f"{joined(changes)}: look at the units of the columns, unless the values before were only a guess"]
 
     def _doubts(self) -> list[str]:
         """Sentences on residuals that the standard errors do not allow for, and on a poor fit."""

@@ -17,10 +17,10 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.evidence.rigs import search
-from smc_mujoco.evidence.rigs.identified import Identified
+from smc_mujoco.evidence.rigs.identified import POOR_FIT, Identified
 from smc_mujoco.evidence.rigs.records import Columns
 from smc_mujoco.evidence.rigs.replays import Point, Replays, Slopes, cost
-from smc_mujoco.evidence.rigs.rig import Quantity, Rig, Source
+from smc_mujoco.evidence.rigs.rig import RADIANS_GAIN, Quantity, Rig, Source
 from smc_mujoco.evidence.rigs.rig import rig as find_rig
 from smc_mujoco.evidence.rigs.uncertainty import statistics
 from smc_mujoco.mechanisms.hardware.part import column_ends
@@ -59,8 +59,8 @@ def identify(
       progress: whether to show a progress bar.
 
     Raises:
-      ScenarioError: an unknown quantity, not a record, columns in another unit, or records that cannot tell the
-        quantities apart.
+      ScenarioError: an unknown quantity, not a record, columns in another unit or in the wrong order, or records that
+        cannot tell the quantities apart.
     """
     many: list[Any] = list(records) if isinstance(records, (list, tuple)) else [records]
     if not many:
@@ -107,6 +107,7 @@ def _solved(
     pieces = Replays(twin, names, data, False, report)
     reached = search.search(pieces, starts, seed, most)
     if twin.controller is None:
+        _refuse_swapped(twin, names, data, reached)
         slopes, moved = search.accurate(pieces, reached)
         return pieces, search.not_worse(pieces, slopes), moved
     closed = Replays(twin, names, data, True, report)
@@ -116,6 +117,20 @@ def _solved(
     slopes = search.refine(closed, search.better(closed, *points), most)
     closed.evaluations += pieces.evaluations
     return closed, slopes, np.zeros(len(names))
+
+
+def _refuse_swapped(twin: Rig, names: list[str], data: Sequence[Mapping[str, Any]], reached: Slopes) -> None:
+    """Raise ScenarioError if records of one joint fit badly as they are, and well with position and command swapped."""
+    (x, *others), u = twin.columns.x, twin.columns.u
+    if others or twin.columns.state or twin.dynamics is not None or reached.fit >= POOR_FIT:
+        return
+    swapped = Replays(twin, names, [dict(record) | {x: record[u], u: record[x]} for record in data], False)
+    fit = search.search(swapped, 4, 0, search.ROUGH_STEPS).fit
+    if fit > max(RADIANS_GAIN, reached.fit + RADIANS_GAIN):
+        raise ScenarioError(
+            f"the columns {x} and {u} of the record of {twin.name} look swapped, as its pieces fit by {fit:.0f} % with "
+            f"them exchanged and by {reached.fit:.0f} % as they are: name the position {x} and the command {u}"
+        )
 
 
 def _starting_states(

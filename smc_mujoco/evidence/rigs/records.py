@@ -6,7 +6,7 @@ A record is a mapping from names of columns to arrays, with one value for each c
 import dataclasses
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -236,11 +236,10 @@ def rate(values: np.ndarray, period: float, order: int = 1) -> np.ndarray:
     return np.asarray(savgol_filter(values, 2 * STATE_SAMPLES + 1, 3, deriv=order, delta=period))
 
 
-def in_radians(record: Mapping[str, Any], columns: Columns) -> Record:
-    """Return the record with its angles converted from degrees to radians."""
-    angles = (*columns.x, *columns.references)
-    known = {name: np.asarray(record[name]) for name in columns.known if name in record}
-    return {name: np.deg2rad(values) if name in angles else values for name, values in known.items()}
+def in_radians(record: Mapping[str, Any], columns: Columns, names: Sequence[str]) -> Record:
+    """Return the record with some columns converted from degrees to radians."""
+    angles = {name: np.deg2rad(np.asarray(record[name], float)) for name in names if name in record}
+    return {name: np.asarray(record[name]) for name in columns.known if name in record} | angles
 
 
 def percent(fit: Mapping[str, float]) -> str:

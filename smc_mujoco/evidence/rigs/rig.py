@@ -341,14 +341,26 @@ class Rig:
         return fit
 
     def refuse_degrees(self, record: Mapping[str, Any], fit: Mapping[str, float]) -> None:
-        """Raise ScenarioError if a record, with this fit, fits far better after its angles are converted to radians."""
+        """Raise ScenarioError if a record has degrees in place of radians.
+
+        It has if it fits far better after all its angles, those of a joint, or the references are converted to radians.
+        A record that fits well as it is, by `fit`, is not simulated again.
+        """
         if min(fit.values()) >= 100.0 - RADIANS_GAIN or "rad" not in self.scenario("none").plant.units:
             return
-        other = self.fits([records.in_radians(record, self.columns)])[0]
-        if min(other.values()) > max(RADIANS_GAIN, min(fit.values()) + RADIANS_GAIN):
+        joints, references = self.columns.x, self.columns.references
+        pairs = [(x, *references[i : i + 1]) for i, x in enumerate(joints)]
+        sets = ((*joints, *references), *((name,) for name in (*joints, *references)), *pairs, references)
+        there = [tuple(name for name in names if name in record) for names in sets]
+        suspects = [names for names in dict.fromkeys(there) if names]
+        others = self.fits([records.in_radians(record, self.columns, names) for names in suspects])
+        best = max(range(len(suspects)), key=lambda i: min(others[i].values()))
+        if min(others[best].values()) > max(RADIANS_GAIN, min(fit.values()) + RADIANS_GAIN):
+            which = "angles" if best == 0 else f"values of {' and '.join(suspects[best])}"
             raise ScenarioError(
-                f"the angles of the record of {self.name} look like degrees, as it fits by {records.percent(other)} "
-                f"with them in radians and by {records.percent(fit)} as they are: give radians"
+                f"the {which} of the record of {self.name} look like degrees, as it fits by "
+                f"{records.percent(others[best])} with them in radians and by {records.percent(fit)} as they are: "
+                "give radians"
             )
 
     def fits(

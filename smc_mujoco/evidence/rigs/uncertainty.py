@@ -12,6 +12,7 @@ error is at least the deviation that these cause.
 """
 
 import dataclasses
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -43,11 +44,7 @@ def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[
             raise ScenarioError(f"nothing in the records depends on {name}: leave it out, or give other records")
     _, singular, rows = np.linalg.svd(J / sizes, full_matrices=False)
     if singular[-1] < SINGULAR_RATIO * singular[0]:
-        alike = " and ".join(names[i] for i in np.argsort(-np.abs(rows[-1]))[:2])
-        raise ScenarioError(
-            f"the records of {replays.twin.name} cannot tell {alike} apart: leave one out, or give a longer record or "
-            "one of a richer motion, or look at its units and columns"
-        )
+        raise _alike(replays.twin.name, (names[i] for i in np.argsort(-np.abs(rows[-1]))[:2]))
     covariance = jackknife(slopes)
     deviation, count = np.sqrt(np.diag(covariance)), independent(slopes)
     with np.errstate(all="ignore"):
@@ -57,7 +54,27 @@ def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[
         deviation = np.maximum(deviation, _fed_back(replays, slopes.point, J))
     deviation = np.hypot(deviation, by_steps)
     errors = dict(zip(names, (deviation * replays.scales).tolist(), strict=True))
+    _refuse_alike(replays.twin.name, replays.values(slopes.point), errors, correlations)
     return errors, correlations, count
+
+
+def _refuse_alike(rig: str, values: dict[str, float], errors: dict[str, float], correlations: np.ndarray) -> None:
+    """Raise ScenarioError for two quantities of which only a sum is known: neither is above its standard error."""
+    names = list(values)
+    unknown = np.array([errors[name] > abs(value) for name, value in values.items()])
+    pairs = np.triu(np.abs(correlations), 1) * np.outer(unknown, unknown)
+    i, j = np.unravel_index(int(pairs.argmax()), pairs.shape)
+    if pairs[i, j] > MAX_CORRELATION:
+        two = names[i], names[j]
+        raise _alike(rig, (f"{name} ({values[name]:.3g} ± {errors[name]:.2g})" for name in two))
+
+
+def _alike(rig: str, quantities: Iterable[str]) -> ScenarioError:
+    """Return the error that the records of a rig cannot tell some quantities apart."""
+    return ScenarioError(
+        f"the records of {rig} cannot tell {' and '.join(quantities)} apart: leave one out, or give a longer record or "
+        "one of a richer motion, or look at its units and columns"
+    )
 
 
 def jackknife(slopes: Slopes) -> np.ndarray:

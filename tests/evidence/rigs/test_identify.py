@@ -149,6 +149,9 @@ def test_parameters_that_cannot_be_told_apart_are_named(swung):
     with pytest.raises(smc.ScenarioError) as error:
         smc.identify(AXIS, smc.run(AXIS.scenario(duration=0.06, x0=0.0)), starts=1)
     assert "cannot tell" in str(error.value) or "nothing in the records depends on" in str(error.value)
+    known, errors = {"coulomb": 1.0, "offset": -1.0}, {"coulomb": 2.0, "offset": 3.0}
+    with pytest.raises(smc.ScenarioError, match=r"tell coulomb \(1 ± 2\) and offset \(-1 ± 3\) apart: leave"):
+        uncertainty._refuse_alike("emps", known, errors, np.array([[1.0, -0.99], [-0.99, 1.0]]))
 
 
 @pytest.mark.slow
@@ -258,6 +261,15 @@ def test_shorter_steps_change_what_a_record_with_stops_says():
         residuals.append(np.concatenate(replays.residuals([at])[0]) * np.linalg.norm(record["x"] - record["x"].mean()))
     assert np.std(residuals[0]) > 1.3 * np.std(residuals[1])
     assert np.std(residuals[1]) == pytest.approx(NOISE, rel=0.1)
+
+
+def test_swapped_columns_are_told():
+    record = pushed(1, 0.75)
+    exchanged = record | {"x": record["u"], "u": record["x"]}
+    with pytest.raises(
+        smc.ScenarioError, match=r"columns x and u of the record of servo_axis look swapped, as its pie"
+    ):
+        smc.identify(smc.plant("servo_axis", **CARRIAGE), exchanged, ["M"], starts=1, most=1)
 
 
 def test_masses_and_frictions_stay_physical():

@@ -197,6 +197,9 @@ def changed(record, name, at, value):
         (lambda r: {k: v[:800] for k, v in r.items()}, "lasts 1.6 s, too short to repeat it: give at least 2.1"),
         (lambda r: {k: v[:1500] for k, v in r.items()}, "lasts 3 s, too short to score it: give at least 4.1 s"),
         (lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "alpha", "target_theta")}, "look like degrees"),
+        (lambda r: r | {"alpha": np.rad2deg(r["alpha"])}, "the values of alpha of the record of qube_servo look like"),
+        (lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "target_theta")}, "values of theta and target_theta of"),
+        (lambda r: r | {"target_theta": np.rad2deg(r["target_theta"])}, "the values of target_theta of the record of"),
         (lambda r: "record.csv", "record is 'record.csv': give a mapping of columns"),
     ],
 )  # fmt: skip
