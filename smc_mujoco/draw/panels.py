@@ -303,7 +303,7 @@ def over_time(
         if bands and name not in UNBANDED:
             e = columns(trace.t, y, COLUMNS)
             artists.append(ax.fill_between(e.t, e.low.min(axis=1), e.high.max(axis=1), color=colour, alpha=0.22, lw=0))
-        look = {"color": colour, "drawstyle": steps}
+        look: dict[str, Any] = {"color": colour, "drawstyle": steps}
         if y.shape[1] > 1:
             for i in drawn_channels(y.shape[1]):
                 artists += ax.plot(*curve(trace, y[:, i], name), alpha=0.8, lw=style.points(LIGHT_LINE), **look)

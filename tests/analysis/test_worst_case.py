@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 import re
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -203,7 +204,8 @@ def test_a_weighted_sum_sees_two_signals_as_equally_large(monkeypatch):
         seen = signals | ({still: 0.0 * t} if still else {})
         monkeypatch.setattr(attack, "relay_signals", lambda trace, seen=seen: seen)
         searcher = Search(Members([scenario(duration=0.1)], CLASSES["slope"]), CATALOGUE["rms_error"], 9, 1, print)
-        *pairs, last = searcher._weighted_sums(None)
+        cases: list[Any] = [*searcher._weighted_sums(None)]
+        *pairs, last = cases
         size = {name: signal.std() for name, signal in signals.items()}
         assert last.member.kind == "sign of e' and s"
         assert (last.relay.rate * size["rate"], last.relay.s) == pytest.approx(

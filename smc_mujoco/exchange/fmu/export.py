@@ -123,20 +123,20 @@ def _controller(
     joints: int | None,
 ) -> Controller:
     """Return the controller, checked. Arguments and errors as in `export_fmu`."""
-    surface, estimator = coerce.surface("surface", surface, None), coerce.velocity("velocity", velocity, None)
+    sliding, estimator = coerce.surface("surface", surface, None), coerce.velocity("velocity", velocity, None)
     chosen = writable(law)
     count = number_of_joints(chosen, joints)
-    if surface is not None and count:
+    if sliding is not None and count:
         raise ScenarioError(f"law {chosen.name!r} is of many joints and has its own surface: leave the surface out")
-    if surface is not None:
-        check_surface(surface, chosen)
+    if sliding is not None:
+        check_surface(sliding, chosen)
     if model not in (None, *coerce.MODELS):
         raise ScenarioError(f"model is {shown(model)}: give 'none' or 'nominal'")
     if chosen.requires_model and model == "none":
         raise ScenarioError(f"law {chosen.name!r} needs the nominal model: leave model out, or give 'nominal'")
     return Controller(
         law=chosen,
-        surface=surface,
+        surface=sliding,
         estimator=None if estimator is None or estimator.name == "measured" else estimator,
         period=1e-3 if control_period is None else number("control_period", control_period, above=0.0),
         u_max=_bounds(math.inf if u_max is None else u_max, count),
