@@ -17,7 +17,7 @@ OTHERWISE = {  # flag -> the classes that lack it; for "slots", those that have 
     "frozen": {"margins.Search", "_Ledger", "Frames", "BorrowedData", "Tip"},
     "eq": {
         *("Linear", "Comparison", "Basin", "Member", "Network", "Frames", "Certificate", "Levels", "BorrowedData"),
-        *("Scenario", "Trace", "Advice", "Compared", "Outcome", "Table", "WorstCase", "StepResponse"),
+        *("Scenario", "Trace", "Advice", "Compared", "Outcome", "Table", "WorstCase", "StepResponse", "Mechanism"),
     },
     "repr": {
         *("Tuned", "Frames", "Held", "TimeSeries", "Waypoints"),
@@ -29,7 +29,7 @@ POSITIONAL = {  # made by position, as signals and parts of machines are
     *("Clock", "Wave", "StepChange", "_Ledger", "Member", "Added", "LinearLaw", "File", "Network", "Policy", "Gain"),
     *("Frames", "Audit", "Robustness", "Identified", "Columns", "Piece", "Point", "Slopes", "rig.Part", "Quantity"),
     *("Reached", "FmuLaw", "Source", "BorrowedData", "NominalModel", "UserFields", "UserModel", "Tip", "Condition"),
-    *("Jump", "Noise", "Functions", "Packed", "Prepared", "Need"),
+    *("Jump", "Noise", "Functions", "Packed", "Prepared", "Need", "Mechanism"),
 }
 
 

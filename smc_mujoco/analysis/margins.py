@@ -98,7 +98,7 @@ def find_boundaries(
 # the kinds of margins
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Kind:
     """A kind of margin: something that a law tolerates up to some level."""
 
@@ -184,16 +184,29 @@ def _with_missed(base: Scenario, level: float) -> Scenario:
 
 MARGIN_KINDS: dict[str, Kind] = {
     "delay": Kind(
-        "input delay", "s", DELAYS, _with_delay, quantum=lambda base: base.control_period, theory=_critical_delay
+        label="input delay",
+        unit="s",
+        levels=DELAYS,
+        put=_with_delay,
+        quantum=lambda base: base.control_period,
+        theory=_critical_delay,
     ),
-    "disturbance": Kind("constant disturbance", "{u}", FORCES, _with_force, signed=True, theory=_tolerated_force),
-    "friction": Kind("dry friction", "{u}", FORCES, with_friction, theory=_tolerated_force),
-    "mass": Kind("mass", "1", MASS_RATIOS, _with_mass, none=1.0),
-    "noise": Kind("position noise", "{x}", NOISES, _with_noise),
+    "disturbance": Kind(
+        label="constant disturbance", unit="{u}", levels=FORCES, put=_with_force, signed=True, theory=_tolerated_force
+    ),
+    "friction": Kind(label="dry friction", unit="{u}", levels=FORCES, put=with_friction, theory=_tolerated_force),
+    "mass": Kind(label="mass", unit="1", levels=MASS_RATIOS, put=_with_mass, none=1.0),
+    "noise": Kind(label="position noise", unit="{x}", levels=NOISES, put=_with_noise),
     "jitter": Kind(
-        "largest delay of a sample, of the control period", "1", JITTERS, with_jitter, quantum=lambda base: JITTERS[0]
+        label="largest delay of a sample, of the control period",
+        unit="1",
+        levels=JITTERS,
+        put=with_jitter,
+        quantum=lambda base: JITTERS[0],
     ),
-    "missed": Kind("share of missed samples", "1", tuple(i / 10 for i in range(1, 10)), _with_missed),
+    "missed": Kind(
+        label="share of missed samples", unit="1", levels=tuple(i / 10 for i in range(1, 10)), put=_with_missed
+    ),
 }
 KINDS = ("delay", "disturbance", "friction", "mass", "noise")  # those of the report, and the default
 
