@@ -219,10 +219,15 @@ class Advice(Tables):
     def key(self) -> str:
         """The meaning of the table's signs."""
         shown, more = self.choices[:MAX_ROWS], [choice.law.name for choice in self.choices[MAX_ROWS:]]
-        medians = f" Medians over the conditions, with 95 % intervals over {self.samples}." * (not self._untested)
+        over = f" over {len(self.conditions)} conditions" * (len(self.conditions) > 1)
+        medians = f" Medians{over}, with {100 * LEVEL:g} % intervals over {self.samples}." * (not self._untested)
         text = "place by failed runs, then by mean rank, behind laws that dominate: better somewhere, worse nowhere."
         text += medians + f" {counted(len(more), 'more law')}: {first_of(more)}." * bool(more)
         text += " *: no law is better in any condition, every run has a value, and samples are enough to tell."
+        bare = any(not NEEDS[need].below(choice) for choice in shown for need in self.needs)
+        text += " No interval: its ends are equal, or one is a run without a value." * bare
+        if self._shared and len(self._shared) < len(self.comparison.laws):
+            text += f" Sets of gains, which are the sample of a law that has several: {first_of(self._shared)}."
         if sources := in_words({choice.law.name: [choice.law.source] for choice in shown}):
             text += f" {capital(sources)}."
         text += " –: settles too seldom to be advised." * any(not choice.fit for choice in shown)
@@ -238,6 +243,13 @@ class Advice(Tables):
         block, a, b = np.unravel_index(int(samples.argmax()), samples.shape)
         count = int(samples[block, a, b]) if len(sets) > 1 else int(self.comparison.seeds.max())
         return f"{counted(count, 'set')} of gains" if max(sets[a], sets[b]) > 1 else counted(count, "run")
+
+    @property
+    def _shared(self) -> list[str]:
+        """The laws whose runs share several sets of gains, with their number, such as "classical 3"."""
+        seeds, counts = self.comparison.seeds.max(), self.comparison.sets.max(axis=1).tolist()
+        named = zip(self.comparison.laws, counts, strict=True)
+        return [f"{law} {count}" for law, count in named if 1 < count < seeds]
 
     @property
     def _untested(self) -> bool:
@@ -283,11 +295,22 @@ class Advice(Tables):
 
     def _because(self) -> str:
         first, count = self.choices[0], len(self.compared)
-        if not first.reliable or not first.fit or self.all_level:
+        if not first.reliable or not first.fit:
             return ""
+        if self.all_level:
+            share = min(choice.settles for choice in self.choices if choice.fit)
+            return f"Each settles in {'at least ' * (share < 1)}{100 * share:.0f} % of its runs."
+        rivals = [choice for choice in self.choices[1:] if choice.fit]
+        equals = [choice.law.name for choice in rivals if choice.rank.mean == first.rank.mean]
+        ahead = [choice.law.name for choice in rivals if choice.rank.mean < first.rank.mean]
+        tied = [name for name in ahead if name in self.tied]
         why = f"it has the best mean rank of {count} laws"
-        if first.rank.mean > min(choice.rank.mean for choice in self.choices if choice.fit):
-            why = f"none dominates it, and it leads by mean rank; {self._rule}"
+        if equals:
+            why += f", as {'has' if len(equals) == 1 else 'have'} {first_of(equals)}"
+        if ahead:
+            why = "it has the best mean rank of those that none dominates, being better somewhere and worse nowhere"
+        if tied:
+            why = f"it ties with {first_of(tied)}, of better mean rank, and {self._rule}"
         if count == 1:
             why = "it is the only law here that suits" if len(self.choices) == 1 else "it alone settles often enough"
         parts = [f"Because {why}. It settles in {100 * first.settles:.0f} % of its runs."]
@@ -310,12 +333,19 @@ class Advice(Tables):
         return f"{capital(need)}: {value}; {said}."
 
     def _robust(self) -> str:
-        """Return what the adversary did."""
+        """Return what the adversary did, and which law the median of its random runs puts first, if another."""
         worst = self.choices[0].worst_found
-        return (
+        fit = [choice for choice in self.choices if choice.fit] or self.choices
+        lowest = min(fit, key=lambda choice: choice.worst_found.median)
+        text = (
             f"Robust is by the worst found in {worst.tried} runs of each law in each condition, half of them random, "
             f"within {worst.class_words}, with its best set of gains from the first start; there may be worse."
         )
+        if lowest is self.choices[0]:
+            return text
+        other = lowest.worst_found
+        first = f"The median of the random runs would put {lowest.law.name} first, with {other.with_unit(other.median)}"
+        return f"{text} {first}: its worst found is {other.words}."
 
     def _second(self) -> str:
         if len(self.choices) < 2 or self.all_level or not self.choices[0].reliable:
@@ -337,16 +367,19 @@ class Advice(Tables):
         beaten = [name for name in others if first in self.dominated(name)]
         mixed = [name for name in others if self.wins(name, first)]
         unsure = [name for name in self.level if name not in self.tied]
+        it = first if self.all_level else "it"  # no law is advised where all are level
         parts = [
             f"it dominates {first_of(beaten)}: better somewhere, worse nowhere" if beaten else "",
-            f"it ties with {first_of(self.tied)}; {self._rule}" if self.tied else "",
-            f"not to be told from {first_of(unsure)}" if unsure else "",
+            f"{it} ties with {first_of(self.tied)}; {self._rule}" if self.tied else "",
+            f"{it} is not to be told from {first_of(unsure)}" if unsure else "",
             f"a matter of what counts against {first_of(mixed)}, better here and worse there" if mixed else "",
             self._against(others[0]),
         ]
-        chance = " The order is not tested: with other starts and noise, a law that it does not dominate may be first."
-        luck = "" if self._untested or self.all_level or len(beaten) == len(others) else chance
-        return f"How sure: {'; '.join(filter(None, parts))}. {self._holds}{luck}"
+        sure = f"How sure: {'; '.join(filter(None, parts))}. {self._holds}"
+        if self._untested or self.all_level or len(beaten) == len(others):
+            return sure
+        chance = "with other starts and noise, or among other laws, a law that it does not dominate may be first"
+        return f"{sure} The order is not tested: {chance}."
 
     def _against(self, rival: str) -> str:
         """Return how the first law compares with a rival on each need, in the condition that is worst for the first."""

@@ -171,8 +171,8 @@ class Board(Tables):
             return f"{self.winner} wins{f' {blocks}' * (len(self.blocks) > 1)}{how}{self._search(self.winner)}{these}"
         results = []
         for law in (entry.law for entry in self.entries if self.wins(entry.law)):
-            losses = f", loses under {joined(self.losses(law))}" * bool(self.losses(law))
-            results.append(f"{law} wins under {joined(self.wins(law))}{losses}{self._search(law)}")
+            losses = f", loses under {_listed(self.losses(law))}" * bool(self.losses(law))
+            results.append(f"{law} wins under {_listed(self.wins(law))}{losses}{self._search(law)}")
         if results:
             return f"no winner {blocks}: {'; '.join(results)}{these}"
         if self.why:
@@ -252,6 +252,11 @@ def _percent(share: float) -> str:
     return f"{share:g}" if math.isinf(share) else f"{100 * share:.2g}" if abs(share) < 0.0995 else f"{100 * share:.0f}"
 
 
+def _listed(names: Sequence[str]) -> str:
+    """Return names in a row, between semicolons if a name has a comma in it, as that of a plant with a condition."""
+    return "; ".join(names) if any("," in name for name in names) else joined(names)
+
+
 def first_of(names: Iterable[str]) -> str:
     """Return names in a row; if they are many, the first ones and how many more there are."""
     several = list(names)
@@ -318,7 +323,7 @@ def _table(name: str, boards: Sequence[Board], worst: Mapping[str, WorstCase]) -
     for law in sorted(places, key=lambda law: (places[law], law)):
         left = [Cell(law, colour=style.law_colour(law)), *([kinds(sources_of[law])] * len(known))]
         found = worst.get(law)
-        case = [Cell(found.shown(found.value), f"median {found.shown(found.median)}")] if found else []
+        case = [Cell(found.shown(found.value), f"median {found.shown(found.median)}") if found else ""] * bool(worst)
         rows.append([*left, *(cells.get((i, law), "") for i in range(len(boards))), *case])
     units = [f"worst found ({case.unit})" for case in worst.values()][:1]
     largest = max(boards, key=lambda board: len(board.blocks))

@@ -52,15 +52,17 @@ def leaderboard(
       by: what the runs of a group have in common, of "plant" and "condition"; () for one group of all runs.
       defaults: whether a winner may be named over laws whose gains are their defaults.
       relevant: the least relevant difference, as a share of the larger value. `paired_runs.floor` is its lower bound.
-      worst: plant -> law -> its `worst_case`, for a column of the tables.
+      worst: plant -> law -> its `worst_case`, for a column of the tables of a plant.
 
     Raises:
-      ScenarioError: no runs, an unknown metric or group, two runs in a cell, or laws without a common cell.
+      ScenarioError: no runs, an unknown metric or group, two runs in a cell, laws without a common cell, or a worst
+        case of a plant or law that has no run.
     """
     if isinstance(metrics, str) or not metrics:
         raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
     for name in metrics:
         find("metric", name, UNITS)
+    _check_worst(table, worst or {})
     boards = Boards()
     boards.worst, boards.failures = worst or {}, paired_runs.failures(table)
     by_row = {name: paired_runs.values(table, name) for name in dict.fromkeys(metrics)}
@@ -79,6 +81,15 @@ def leaderboard(
                 comparison = _compared(scores, ran, metric, relevant, limits)
                 boards.append(_board(group, scores, ran, metric, comparison, untuned, sources, family))
     return boards
+
+
+def _check_worst(table: Columns, worst: "Mapping[str, Mapping[str, WorstCase]]") -> None:
+    """Raise ScenarioError for the worst case of a law that has no run on the plant."""
+    ran = set(zip(table.column("plant").tolist(), table.column("law").tolist(), strict=True)) if worst else set()
+    for plant, cases in worst.items():
+        for law in cases:
+            if (plant, law) not in ran:
+                raise ScenarioError(f"worst has {law} on {plant}, which has no run in the table: leave it out")
 
 
 def _board(

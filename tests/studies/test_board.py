@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import re
+import types
 from xml.etree import ElementTree
 
 import numpy as np
@@ -133,6 +134,30 @@ def test_only_what_no_law_beats_is_bold(boards):
     assert "*" not in repr(few)
     assert bold(few._repr_html_())[1:] == []
     assert "too few" in few._repr_html_()
+
+
+def test_a_worst_case_stands_beside_its_law_and_one_without_runs_is_refused():
+    found = types.SimpleNamespace(value=2.0, median=1.0, unit="rad", shown=str)
+    (table,) = leaderboard(Stand(), METRICS, worst={"duffing": {"second": found}}).tables
+    assert table.headings[-1] == "worst found (rad)"
+    assert {len(row) for row in table.rows} == {len(table.headings)}
+    assert {getattr(row[0], "text", row[0]): getattr(row[-1], "text", row[-1]) for row in table.rows} == {
+        EVIL: "",
+        "second": "2.0",
+        "third": "",
+    }
+    for worst in ({"duffing": {"fourth": found}}, {"pendulum": {"second": found}}):
+        with pytest.raises(ScenarioError, match="has no run in the table: leave it out"):
+            leaderboard(Stand(), METRICS, worst=worst)
+
+
+def test_names_with_commas_stand_between_semicolons():
+    two = Stand(conditions=("nominal", "noise"))
+    (made,) = leaderboard(two, ["itae"], by=())
+    assert made.result.startswith("third wins in both cells")
+    blocks = [dataclasses.replace(made.blocks[0], condition=name) for name in ("nominal", "noise", "sine")]
+    blocks[2] = dataclasses.replace(blocks[2], ahead=None, lead=None)
+    assert "third wins under duffing, nominal; duffing, noise" in dataclasses.replace(made, blocks=tuple(blocks)).result
 
 
 def test_verdicts_are_said_once_with_their_metrics(boards):
