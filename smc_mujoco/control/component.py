@@ -61,6 +61,15 @@ class Options(TypedDict, total=False):
     joint: bool
 
 
+OF_SURFACE = ("gains", "memory", "positive", "nonnegative", "relative_degree", "conditions", "label")
+OPTIONS = {  # kind of a component -> options of its decorator
+    "law": tuple(Options.__optional_keys__),
+    "surface": OF_SURFACE,
+    "estimator": tuple(name for name in OF_SURFACE if name != "relative_degree"),
+}
+OPTION_KEYS = {"accuracy": ("s", "e"), "admits": ("d", "d'")}  # option that is a mapping -> its possible keys
+
+
 class GainWarning(UserWarning):
     """Gains violate a condition of the law's theorem."""
 
@@ -336,8 +345,8 @@ def as_gains(gains: object, known: Mapping[str, GainValue] = frozen({})) -> dict
 
 def decorated(kind: str, function: Callable | None, options: Mapping) -> "Callable[[Callable], Template] | Template":
     """Return the Template of a function, or its decorator if the function is None."""
-    if foreign := options.keys() - Options.__optional_keys__:
-        raise unknown(f"option of {kind}_function", min(foreign), Options.__optional_keys__)
+    if foreign := options.keys() - OPTIONS[kind]:
+        raise unknown(f"option of {kind}_function", min(foreign), OPTIONS[kind])
     decorate = template_decorator(kind, **options)
     return decorate if function is None else decorate(function)
 
@@ -358,6 +367,10 @@ def template_decorator(
     memory, relative_degree = whole("memory", memory, 1, 10_000), whole("relative_degree", relative_degree, 1, 10)
     if isinstance(plants, str):
         raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")
+    for option, keys in OPTION_KEYS.items():
+        if not isinstance(value := options.get(option, {}), Mapping) or not value.keys() <= {*keys}:
+            names = " and ".join(map(repr, keys))
+            raise ScenarioError(f"{option} is {shown(value)}: give numbers, or functions of the gains, for {names}")
     if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(options.get("colour", ""))):
         raise ScenarioError(f"colour is {shown(options['colour'])}: give one like '#0072B2'")
     if options.get("finite_time", "") not in FINITE_TIME:

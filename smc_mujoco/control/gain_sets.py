@@ -86,7 +86,11 @@ def general() -> tuple[str, ...]:
 def general_laws(plants: Sequence[str | Plant], gains: str) -> list[str]:
     """List the general laws that have gains in a set on each of these plants, those of LAWS first."""
     find("set of gains", gains, KNOWN_SETS)
-    return [name for name in general() if all(in_set(as_plant(plant), name, gains) for plant in plants)]
+    named = [as_plant(plant) for plant in plants]
+    if names := [name for name in general() if all(in_set(plant, name, gains) for plant in named)]:
+        return names
+    together = ", ".join(plant.name for plant in named)
+    raise ScenarioError(f"gains is {gains!r}, and no general law has such gains on {together}: give 'default'")
 
 
 def in_set(plant: Plant, name: str, gains: str) -> bool:

@@ -63,7 +63,7 @@ def prepare(scenario: object) -> Prepared:
         if part is not None and part.function is None:
             raise ScenarioError(f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}")
     shared = mechanism(scenario)
-    check_start(shared.model, scenario)
+    check_start(shared, scenario)
     key = shared, scenario.control_period, scenario.samples
     try:
         return Prepared(scenario, _compile(scenario.resolved), "", shared, key)

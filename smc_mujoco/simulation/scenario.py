@@ -172,6 +172,7 @@ class Scenario:
         check(self.resolved)
         check_ranges(self.plant.name, self.plant.ranges, self.resolved.x0)
         check_inertia(self.resolved)
+        check_names(self.resolved)
         for doubt in itertools.islice(_doubts(self.resolved), 1):
             warnings.warn(doubt, ScenarioWarning, users_stacklevel())
 
@@ -539,6 +540,14 @@ def check_inertia(s: Resolved) -> None:
                 f"the mass matrix of {s.plant.name} is singular at x0 {shown(s.x0)}, as where two joints move the same "
                 "bodies in the same way: drive one of them, or give another x0"
             )
+
+
+def check_names(s: Resolved) -> None:
+    """Check that no parameter is named twice, once by its own name and once as the mass."""
+    for name, factors in (("mismatch", s.mismatch), ("Jump", s.jump.factors if s.jump else {})):
+        if s.plant.mass != "mass" and {"mass", s.plant.mass} <= factors.keys():
+            both = f"{s.plant.mass} {factors[s.plant.mass]:g} and mass {factors['mass']:g}"
+            raise ScenarioError(f"{name} has {both}, which are the same parameter of {s.plant.name}: give one of them")
 
 
 def check_mechanism(s: Resolved) -> None:

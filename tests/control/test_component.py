@@ -33,14 +33,17 @@ def test_gain_keeps_its_unit_and_the_decorators_sign():
 
 @pytest.mark.parametrize("decorator", [smc.surface_function, smc.estimator_function, smc.law_function])
 def test_option_of_no_such_component_is_one_sentence(decorator):
-    with pytest.raises(smc.ScenarioError, match=r"unknown option of .*colours"):
-        decorator(colours=())
+    option = "colours" if decorator is smc.law_function else "plants"
+    with pytest.raises(smc.ScenarioError, match=f"unknown option of .*{option}"):
+        decorator(**{option: ()})
 
 
-@pytest.mark.parametrize("value", ["red", 3])
-def test_colour_that_cannot_be_drawn_is_refused(value):
-    with pytest.raises(smc.ScenarioError, match=r"^colour is .*: give "):
-        smc.law_function(colour=value)
+@pytest.mark.parametrize(
+    ("option", "value"), [("colour", "red"), ("colour", 3), ("accuracy", 3), ("admits", {"x": 1.0})]
+)
+def test_colour_that_cannot_be_drawn_and_bound_of_nothing_are_refused(option, value):
+    with pytest.raises(smc.ScenarioError, match=f"^{option} is .*: give "):
+        smc.law_function(**{option: value})
 
 
 @pytest.mark.parametrize("value", [{"shoulder": 1.0}, {1.0, 2.0}])

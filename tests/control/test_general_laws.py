@@ -22,3 +22,8 @@ def test_a_law_without_gains_in_the_set_on_one_of_the_plants_is_left_out():
     assert set(general_laws(["duffing"], "study")) <= set(smc.paper.GAINS["duffing"]) | {"conditioned_super_twisting"}
     with pytest.raises(ScenarioError, match="set of gains"):
         general_laws(["duffing"], "best")
+
+
+def test_a_set_without_gains_for_any_law_on_the_plants_is_refused():
+    with pytest.raises(ScenarioError, match=r"'tracking', and no general law has such gains on pendubot: give"):
+        general_laws(["pendubot"], "tracking")

@@ -132,9 +132,13 @@ def test_a_physics_step_that_does_not_divide_the_period_is_refused(refused):
         refused(lambda step=step: scenario(physics_step=step), "physics_step", f"{step:g}", "0.001")
 
 
-def test_factors_of_one_parameter_under_two_names_multiply():
+def test_one_parameter_under_two_names_is_refused(refused):
     for name in ["duffing", "pendulum_network"]:
         plant = smc.plant(name)
+        both = {"mass": 1.2, plant.mass: 1.5}
+        words = f"{plant.mass} 1.5 and mass 1.2, which are the same parameter of {name}: give one of them"
+        for fields, said in (({"mismatch": both}, "mismatch has"), ({"jump": smc.Jump(0.5, both)}, "Jump has")):
+            refused(lambda fields=fields, plant=plant: scenario(plant=plant, **fields), said, words)
         apart = scenario(plant=name, mismatch={"mass": 1.2}, jump=smc.Jump(0.5, {plant.mass: 1.5}))  # in turn
         mass = getattr(plant.values(apart.factors(10**6)), plant.mass)
         assert mass == pytest.approx(1.8 * plant.parameters[plant.mass])
