@@ -310,15 +310,24 @@ def linked(*sets: np.ndarray) -> tuple[int, ...] | None:
     Each of `sets` has the number of the set of each run, -1 where there is no run. One that has a single set links
     nothing. None if no two runs are linked.
     """
+    from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    links = np.eye(sets[0].size, dtype=bool)
+    count = nodes = sets[0].size  # a node for each run, then one for each set of gains; no matrix of all pairs of runs
+    runs, their_sets = [], []
     for numbers in sets:
-        if np.unique(numbers[numbers >= 0]).size > 1:
-            links |= (numbers[:, None] == numbers) & (numbers >= 0)
-    if links.sum() == len(links):
+        there = np.flatnonzero(numbers >= 0)
+        distinct, which = np.unique(numbers[there], return_inverse=True)
+        if distinct.size > 1:
+            runs.append(there)
+            their_sets.append(nodes + which.ravel())
+            nodes += distinct.size
+    if not runs:
         return None
-    return tuple(connected_components(links, directed=False)[1].tolist())
+    edges = np.concatenate(runs), np.concatenate(their_sets)
+    graph = coo_array((np.ones(edges[0].size), edges), shape=(nodes, nodes))
+    samples, labels = connected_components(graph, directed=False)
+    return None if samples == count else tuple(labels[:count].tolist())
 
 
 def first_of_kind(outcomes: np.ndarray, exists: np.ndarray) -> np.ndarray:

@@ -86,7 +86,7 @@ class Search:
             self.run([Case(self.members.random(rng)) for _ in range(min(left, BATCH_MEMBERS))])
 
     def search(self, rng: np.random.Generator, known: Sequence[Tried]) -> None:
-        """Try the strategies of the module, beginning with members that were run before."""
+        """Try the strategies, beginning with members that were run before."""
         self.tried += [one._replace(origin=-1 - i) for i, one in enumerate(known)]
         batches = self._simple(), self._corners(), self._at_loop_frequency(), self._driven(), self._changed(rng)
         for batch in itertools.chain(*batches):
