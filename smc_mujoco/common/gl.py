@@ -75,6 +75,8 @@ def usable(backend: str) -> bool:
     """Return whether `import mujoco` works with this backend."""
     if backend not in LIBRARIES:
         return backend in OFF_VALUES + DISPLAY_VALUES
+    if os.environ.get("PYOPENGL_PLATFORM", "").lower() not in ("", backend):
+        return False
     return all(any(map(loads, group)) for group in LIBRARIES[backend])
 
 
@@ -105,6 +107,8 @@ def missing() -> str | None:
         return f"no film: MUJOCO_GL={chosen.wish} turns rendering off: unset it"
     unusable = f" (and MUJOCO_GL={chosen.wish} cannot be used)" if note() else ""
     if chosen.backend in OFF_VALUES:
+        if platform := os.environ.get("PYOPENGL_PLATFORM"):
+            return f"no film: PYOPENGL_PLATFORM={platform} rules out what is installed{unusable}: unset it"
         return f"no film: neither libEGL with libGL nor libOSMesa is here{unusable}: {CURE}"
     error = probe(chosen.backend)
     if error is None:

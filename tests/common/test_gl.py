@@ -88,23 +88,28 @@ def test_choose_gl_sets_nothing_once_mujoco_is_imported():
 EGL, MESA = {"libEGL.so.1", "libGL.so.1"}, {"libOSMesa.so.6"}
 HERE = "install a renderer (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri)"
 NEITHER = "no film: neither libEGL with libGL nor libOSMesa is here"
-BACKENDS = {  # MUJOCO_GL, libraries, error of a trial -> backend, note, why pictures are missing
-    "all there": ("", EGL | MESA, None, "egl", None, None),
-    "only OSMesa": ("", MESA, None, "osmesa", None, None),
-    "OSMesa wanted": (" OSMesa ", EGL | MESA, None, "osmesa", None, None),
-    "no GL beside EGL": ("", {"libEGL.so.1"}, None, "disabled", None, f"{NEITHER}: {HERE}"),
+BACKENDS = {  # MUJOCO_GL, libraries, PYOPENGL_PLATFORM, error of a trial -> backend, note, why pictures are missing
+    "all there": ("", EGL | MESA, "", None, "egl", None, None),
+    "only OSMesa": ("", MESA, "", None, "osmesa", None, None),
+    "OSMesa wanted": (" OSMesa ", EGL | MESA, "", None, "osmesa", None, None),
+    "no GL beside EGL": ("", {"libEGL.so.1"}, "", None, "disabled", None, f"{NEITHER}: {HERE}"),
     "nothing there": (
-        "egl", set(), None, "disabled", "MUJOCO_GL=egl does not load here: films are off",
+        "egl", set(), "", None, "disabled", "MUJOCO_GL=egl does not load here: films are off",
         f"{NEITHER} (and MUJOCO_GL=egl cannot be used): {HERE}",
     ),
     "OSMesa wanted, not there": (
-        "osmesa", EGL, None, "egl", "MUJOCO_GL=osmesa does not load here: egl is used instead", None,
+        "osmesa", EGL, "", None, "egl", "MUJOCO_GL=osmesa does not load here: egl is used instead", None,
     ),
-    "another word": ("x", EGL, None, "egl", "MUJOCO_GL=x is not a backend of MuJoCo: egl is used instead", None),
-    "turned off": ("0", EGL, None, "0", None, "no film: MUJOCO_GL=0 turns rendering off: unset it"),
-    "a broken driver": ("", EGL, "lost", "egl", None, f"no film: egl does not render (lost): {HERE}"),
+    "another word": ("x", EGL, "", None, "egl", "MUJOCO_GL=x is not a backend of MuJoCo: egl is used instead", None),
+    "turned off": ("0", EGL, "", None, "0", None, "no film: MUJOCO_GL=0 turns rendering off: unset it"),
+    "a platform for OSMesa": ("", EGL | MESA, "OSMesa", None, "osmesa", None, None),
+    "a platform for neither": (
+        "egl", EGL | MESA, "glx", None, "disabled", "MUJOCO_GL=egl does not load here: films are off",
+        "no film: PYOPENGL_PLATFORM=glx rules out what is installed (and MUJOCO_GL=egl cannot be used): unset it",
+    ),
+    "a broken driver": ("", EGL, "", "lost", "egl", None, f"no film: egl does not render (lost): {HERE}"),
     "no window": (
-        "glx", EGL, "no display", "glx", None,
+        "glx", EGL, "", "no display", "glx", None,
         "no film: MuJoCo cannot open a window to render in (no display): set MUJOCO_GL=egl",
     ),
 }  # fmt: skip
@@ -112,8 +117,9 @@ BACKENDS = {  # MUJOCO_GL, libraries, error of a trial -> backend, note, why pic
 
 @pytest.mark.parametrize("case", BACKENDS)
 def test_the_backend_is_the_wish_or_the_first_that_loads_and_the_rest_is_said(case, monkeypatch):
-    wish, libraries, error, *expected = BACKENDS[case]
+    wish, libraries, platform, error, *expected = BACKENDS[case]
     monkeypatch.setenv("MUJOCO_GL", wish)
+    monkeypatch.setenv("PYOPENGL_PLATFORM", platform)
     monkeypatch.setattr(gl, "loads", libraries.__contains__)
     monkeypatch.setattr(gl, "probe", lambda backend: error)
     chosen = gl.choice.__wrapped__()

@@ -132,8 +132,9 @@ def worst(
         str | None,
         typer.Option(
             metavar="NAME=BOUND,...",
-            help="Other bounds of `smc.Uncertainty`, as delay=0:0.01 (s), mass=0.7:1.3 (a factor) or "
-            "position_noise=0.01, and the ranges of other parameters of the plant, as payload=0:2.",
+            help="Other bounds of `smc.Uncertainty`. Ranges: delay=0:0.01 (s), mass=0.7:1.3 and friction_scale=0.5:2 "
+            "(factors), friction=0:0.1 (N or N m), parameters of the plant, as payload=0:2. Numbers: slope (of d, per "
+            "s), position_noise, velocity_noise, hold (of an error, s), jitter (s), x0 (a share of it).",
         ),
     ] = None,
     metric: Annotated[str, typer.Option(help="The metric to make large, any of `smc.score`.")] = "rms_error",
@@ -150,9 +151,10 @@ def worst(
 ) -> None:
     """Find the worst that can happen to laws within bounds that you give: an adversary instead of random seeds.
 
-    You say only what is uncertain. By default, it is what the plant declares, such as an arm's payload, or else a
-    disturbance up to a sixth of what the weakest drive gives. Of a rig, such as qube_servo, the adversary also chooses
-    one of its parameter sets. The search is the same for every law, and there may be worse than what it finds.
+    You say only what is uncertain; all else is as in the condition. Without bounds, it is what the plant declares, such
+    as an arm's payload, or else a disturbance up to a sixth of what the weakest drive gives. Of a rig, such as
+    qube_servo, the adversary also chooses one of its parameter sets. The search is the same for every law, and there
+    may be worse than what it finds.
 
     The column "worst found" has the error of the worst run, the column "median" that of as many random runs within the
     bounds. Laws are ordered by the worst. A line below the table says where the bounds go beyond the theorem of a law.
@@ -181,7 +183,7 @@ def worst(
 
 
 def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | None":
-    """Return the class of the options --disturbance and --bound; None if neither is given."""
+    """Return the class of the options --disturbance and --bound: numbers and ranges; None if neither is given."""
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 
     known = [field.name for field in dataclasses.fields(Uncertainty)]
@@ -190,8 +192,11 @@ def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | Non
         try:
             low, *high = map(float, text.split(":"))
         except ValueError:
-            raise ScenarioError(f"--bound {name}={text} cannot be read: write it as mass=0.7:1.3") from None
+            cure = "write a range as mass=0.7:1.3, a number as x0=0.2"
+            raise ScenarioError(f"--bound {name}={text} cannot be read: {cure}") from None
         value = (low, *high) if high else low
+        if name in fields:
+            raise ScenarioError(f"--bound {name}={text} bounds what --disturbance does: leave out one of them")
         if name in known:
             fields[name] = value
         else:

@@ -99,7 +99,7 @@ Laws = Annotated[
     ),
 ]
 NoiseKey = Annotated[
-    int | None, typer.Option(min=0, help="Key of the noise, to repeat a table; default: a number drawn now.")
+    int | None, typer.Option(min=0, help="Key of the noise, to repeat a table; 0: public seeds; default: drawn now.")
 ]
 Plants = Annotated[
     list[str] | None,

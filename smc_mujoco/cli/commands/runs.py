@@ -27,7 +27,10 @@ def run(
     film: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
     camera: Annotated[
         str | None,
-        typer.Option(metavar="NAME|AZIMUTH,ELEVATION[,DISTANCE]", help="The film's: of the model, or degrees and m."),
+        typer.Option(
+            metavar="NAME|AZIMUTH,ELEVATION[,DISTANCE]",
+            help="Camera of the film: one of the model, or a direction in degrees and a distance in m.",
+        ),
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers; default the scene's.")] = None,
     threads: options.Threads = None,

@@ -89,8 +89,12 @@ def compare(
     figure: Annotated[Path | None, options.picture("the medians")] = None,
     latex: Annotated[Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")] = None,
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
-    traces: Annotated[str, typer.Option(help="Traces to save: none, all, or worst (of each condition).")] = "none",
-    rig: Annotated[str | None, typer.Option(help="A machine, whose parameter sets replace plants, conditions.")] = None,
+    traces: Annotated[
+        str, typer.Option(help="Traces to save: none, all, or the worst per plant and condition.")
+    ] = "none",
+    rig: Annotated[
+        str | None, typer.Option(help="A real machine: its parameter sets replace plants and conditions.")
+    ] = None,
     noise_key: options.NoiseKey = None,
     threads: options.Threads = None,
 ) -> None:
