@@ -55,9 +55,8 @@ class Loss(NamedTuple):
     median: float  # of the paper's law
     rival: float  # median of the best law
     law: str  # the best one
-    times: (
-        float  # ratio of the medians; where the rival's is below the least difference that counts, to that difference
-    )
+    # Ratio of the medians; where the rival's is below the least difference that counts, the ratio to that difference.
+    times: float
     rounded: bool  # whether it is, so that the ratio is a lower bound
     settles: bool  # whether the best law settles there: a law that hardly acts may be calm, and never arrive
 

@@ -209,9 +209,13 @@ def _try(library: sandbox.Library, about: "About") -> list[str]:
 
 
 def check(
-    source: Path, gains: Mapping[str, float] | None, memory: int | None, symbol: str, flags: Sequence[str],
+    source: Path,
+    gains: Mapping[str, float] | None,
+    memory: int | None,
+    symbol: str,
+    flags: Sequence[str],
     timeout: float,
-) -> Iterator[str]:  # fmt: skip
+) -> Iterator[str]:
     """Try a law without loading it, and yield lines: warnings, limits of the trial, gains and memory."""
     library = _library(source, symbol, (*build.WARNING_FLAGS, *flags) if source.suffix == ".c" else flags, timeout)
     about = _about(library, gains, memory)
