@@ -194,15 +194,28 @@ def _settings(s: Resolved) -> dict[str, Any]:
     """Return the numbers of a record that set clock, sensor and drives."""
     sensor, drives = s.sensor or IDEAL_SENSOR, s.drive_step
     return {
-        "steps": s.steps, "stages": s.stages, "step": s.physics_step, "period": s.control_period,
-        "jitter": s.clock.jitter_steps(s.physics_step), "missed": s.clock.missed, "delay": s.delay_steps,
+        "steps": s.steps,
+        "stages": s.stages,
+        "step": s.physics_step,
+        "period": s.control_period,
+        "jitter": s.clock.jitter_steps(s.physics_step),
+        "missed": s.clock.missed,
+        "delay": s.delay_steps,
         "scale": math.prod(part.scale for part in s.actuator),
-        "has_drives": drives is not None, "drive_step": drives._asdict() if drives else {},
-        "seed": s.noise_seed, "sigma_x": s.noise.position, "sigma_v": s.noise.velocity, "bias": sensor.bias,
-        "counts": 0.0 if sensor.counts == math.inf else sensor.counts, "dropout": sensor.dropout,
-        "read_period": sensor.period or 0.0, "read_delay": sensor.delay,
-        "uses_model": s.model == "nominal", "drive_gain": s.nominal_drive.gain, "drive_drag": s.nominal_drive.drag,
-    }  # fmt: skip
+        "has_drives": drives is not None,
+        "drive_step": drives._asdict() if drives else {},
+        "seed": s.noise_seed,
+        "sigma_x": s.noise.position,
+        "sigma_v": s.noise.velocity,
+        "bias": sensor.bias,
+        "counts": 0.0 if sensor.counts == math.inf else sensor.counts,
+        "dropout": sensor.dropout,
+        "read_period": sensor.period or 0.0,
+        "read_delay": sensor.delay,
+        "uses_model": s.model == "nominal",
+        "drive_gain": s.nominal_drive.gain,
+        "drive_drag": s.nominal_drive.drag,
+    }
 
 
 def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
@@ -214,10 +227,15 @@ def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
     if s.drive_step is not None:
         states["first"], states["second"] = s.drive_step.start(np.array(s.v0))
     return {
-        "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")}, "a": buffer.reserve(n),
-        "width": width, "commands": buffer.reserve(2 * width), "states": buffer.put(states.view(float).tolist()),
-        "limits": buffer.put(s.limits), "delay_slots": slots, "delay_buffer": buffer.reserve(slots * n),
-    }  # fmt: skip
+        "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")},
+        "a": buffer.reserve(n),
+        "width": width,
+        "commands": buffer.reserve(2 * width),
+        "states": buffer.put(states.view(float).tolist()),
+        "limits": buffer.put(s.limits),
+        "delay_slots": slots,
+        "delay_buffer": buffer.reserve(slots * n),
+    }
 
 
 def _joint_measurement(

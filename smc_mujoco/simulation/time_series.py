@@ -100,7 +100,7 @@ class TimeSeries(Signal):
         if not rows or len(rows[0][1]) < 2:
             raise ScenarioError(f"{path} has no two columns: give time and value, with commas between")
         names = rows[0][1]
-        if all(math.isnan(_number(name)) for name in names):
+        if all(_number(name) is None for name in names):
             rows = rows[1:]
         else:
             names = [f"column {i + 1}" for i in range(len(names))]
@@ -109,7 +109,7 @@ class TimeSeries(Signal):
             if len(row) != len(names):
                 raise ScenarioError(f"{path}, line {line}: {len(row)} cells for {len(names)} columns: give as many")
             for i in places:
-                if not math.isfinite(_number(row[i])):
+                if (value := _number(row[i])) is None or not math.isfinite(value):
                     cure = "give a finite number, or cut the file there"
                     raise ScenarioError(f"{path}, line {line}: {names[i]} is {shown(row[i])}: {cure}")
         times, values = ([float(row[i]) for _, row in rows] for i in places)
@@ -234,12 +234,12 @@ def _columns(path: str | os.PathLike[str], names: list[str], column: str | None)
     return at, (names if column in names else plain).index(column)
 
 
-def _number(cell: str) -> float:
-    """Return the number in a cell, NaN for any other text."""
+def _number(cell: str) -> float | None:
+    """Return the number in a cell, which may be NaN; None for any other text."""
     try:
         return float(cell)
     except ValueError:
-        return math.nan
+        return None
 
 
 def cartesian_path(
