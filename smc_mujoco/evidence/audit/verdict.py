@@ -29,7 +29,7 @@ VERDICTS = (SUPPORTED, PARTLY, REFUTED, NOT_SHOWN, NOT_TESTABLE)
 ANSWERS: dict[str, str] = dict(zip(VERDICTS, ("yes", "in part", "no", "no example", "no answer"), strict=True))
 MARKS = dict(zip((*VERDICTS, *ANSWERS.values()), "●◐○◌–■◧□◇–", strict=True))
 
-PAPER, DERIVED, OURS = WHOSE = ("paper", "derived", "ours")  # whose a claim is
+PAPER, DERIVED, OURS = "paper", "derived", "ours"  # whose a claim is
 WHOSE_WORDS = {PAPER: "the paper's", DERIVED: "derived", OURS: "a question"}
 
 DISTANCE_WORDS = ", distance from "  # in a range check's name, between number and range
