@@ -154,18 +154,36 @@ class Scenario:
     if TYPE_CHECKING:  # what the converters take, which a type checker cannot see
 
         def __init__(
-            self, *, plant: Plant | str, law: coerce.Laws | None = None, model: str | None = None,
-            surface: Surface | Template | str | None = None, duration: float = 10.0, control_period: float = 1e-3,
-            physics_step: float | None = None, u_max: float | coerce.ByChannel[float] | None = None,
-            x0: float | Sequence[float] | None = None, v0: float | Sequence[float] | None = None,
-            reference: Signal | coerce.ByChannel[Signal] | None = None, feedforward: Signal | None = None,
-            disturbance: Signal | Sequence[Signal] | None = None, noise: Noise | None = None, input_delay: float = 0.0,
-            clock: Clock | None = None, velocity: Estimator | Template | str | None = None,
-            mismatch: Mapping[str, float] | None = None, jump: Jump | None = None, seed: int = 0, noise_key: int = 0,
-            integrator: str | None = None, friction: Friction | Sequence[Friction] | None = None,
-            contact: Contact | str | None = None, mechanism: str = "equation",
-            actuator: Actuator | Sequence[Actuator] | None = None, sensor: Encoder | None = None,
-        ) -> None: ...  # fmt: skip
+            self,
+            *,
+            plant: Plant | str,
+            law: coerce.Laws | None = None,
+            model: str | None = None,
+            surface: Surface | Template | str | None = None,
+            duration: float = 10.0,
+            control_period: float = 1e-3,
+            physics_step: float | None = None,
+            u_max: float | coerce.ByChannel[float] | None = None,
+            x0: float | Sequence[float] | None = None,
+            v0: float | Sequence[float] | None = None,
+            reference: Signal | coerce.ByChannel[Signal] | None = None,
+            feedforward: Signal | None = None,
+            disturbance: Signal | Sequence[Signal] | None = None,
+            noise: Noise | None = None,
+            input_delay: float = 0.0,
+            clock: Clock | None = None,
+            velocity: Estimator | Template | str | None = None,
+            mismatch: Mapping[str, float] | None = None,
+            jump: Jump | None = None,
+            seed: int = 0,
+            noise_key: int = 0,
+            integrator: str | None = None,
+            friction: Friction | Sequence[Friction] | None = None,
+            contact: Contact | str | None = None,
+            mechanism: str = "equation",
+            actuator: Actuator | Sequence[Actuator] | None = None,
+            sensor: Encoder | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         self._convert()
