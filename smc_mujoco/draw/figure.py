@@ -31,6 +31,7 @@ SIDE_PANELS = {"phase": 1.5, "settling": 1.0, "end": 1.0}  # panel -> its relati
 PANEL_NAMES = {name: name for name in (*TIME_PANELS, "channels", *SIDE_PANELS)}  # of panels
 COLUMN_WIDTHS = (2.6, 1.7, 1.0)  # relative: of small panels, of those over time, and of those beside
 ROW_HEIGHT = 1.5  # inches on a full page, height of a panel over time
+LABEL_SIZE = 10.5  # points on a full page, of a small panel's label that has room
 SMALL_ROW = 0.62  # relative height of a row of small panels
 LINE_ROW, LINES_ROW = 0.32, 0.45  # relative height of a row with one line, and with several
 ROW_FILLED = 0.6  # part of a row below its name
@@ -277,7 +278,8 @@ def _draw_small(page, cells: Sequence[SubplotSpec], small: Sequence[Sequence[Pan
     rows = [cell.subgridspec(len(small), max(map(len, small))) for cell in cells]
     for i, row in enumerate(small):
         for k, panel in enumerate(row):
-            ax = page.add_subplot(rows[0][i, k], ylabel=panel.label)
+            ax = page.add_subplot(rows[0][i, k])
+            ax.set_ylabel(panel.label, fontsize=_fitting(panel.label, cells[0], len(small), page))
             ax.set_xlim(0.0, runs.span[0])
             ax.locator_params(axis="y", nbins=3)
             drawing.over_time(ax, panel, runs.colours)
@@ -285,6 +287,12 @@ def _draw_small(page, cells: Sequence[SubplotSpec], small: Sequence[Sequence[Pan
             ax.tick_params(labelbottom=i == len(small) - 1)
             if i == len(small) - 1:
                 ax.set_xlabel(runs.time)
+
+
+def _fitting(label: str, cell: SubplotSpec, rows: int, page: Figure | SubFigure) -> float:
+    """Return the size, points, at which a label is no longer than one of the equal rows of a cell is high."""
+    high = 72 * cell.get_position(page).height * page.bbox.height / page.dpi / rows
+    return min(style.points(LABEL_SIZE), high / style.width(label, 1.0))
 
 
 def _draw_beside(
