@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number, shown, unknown, whole
+from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown, whole
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -126,7 +126,7 @@ def state(name: str, value: float | Sequence[float] | None, s: Any) -> tuple[flo
     value = value.tolist() if isinstance(value, np.ndarray) else value
     if value is None:
         return None
-    values = list(value) if isinstance(value, Sequence) and not isinstance(value, str | bytes) else [value]
+    values = items_of(name, value) if isinstance(value, Sequence) and not isinstance(value, str | bytes) else [value]
     n = s.plant.n
     if len(values) not in (1, n):
         raise ScenarioError(f"{name} has {len(values)} values for {n} channels: give one number or {n}")

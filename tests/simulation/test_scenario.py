@@ -181,6 +181,7 @@ def test_a_state_of_the_wrong_length_is_refused(refused):
         for value in ([], [1.0, 2.0], np.zeros(4), np.zeros((10, 10))):
             words = f"{len(value)} values", "3 channels"
             refused(lambda value=value, field=field: scenario(plant=plant, **{field: value}), field, *words)
+        refused(lambda field=field: scenario(**{field: range(10**9)}), field, "more than")  # is not made a list
 
 
 def test_a_state_is_one_number_or_one_a_channel():
