@@ -289,7 +289,7 @@ def _draw_small(page, cells: Sequence[SubplotSpec], small: Sequence[Sequence[Pan
                 ax.set_xlabel(runs.time)
 
 
-def _fitting(label: str, cell: SubplotSpec, rows: int, page: Figure | SubFigure) -> float:
+def _fitting(label: str, cell: SubplotSpec, rows: int, page) -> float:
     """Return the size, points, at which a label is no longer than one of the equal rows of a cell is high."""
     high = 72 * cell.get_position(page).height * page.bbox.height / page.dpi / rows
     return min(style.points(LABEL_SIZE), high / style.width(label, 1.0))
