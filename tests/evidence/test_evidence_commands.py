@@ -1,6 +1,7 @@
 """What the annex's commands print, write and hand on, with the work itself replaced by typed results."""
 
 import contextlib
+import io
 import json
 import re
 from pathlib import Path
@@ -10,12 +11,14 @@ import numpy as np
 import pytest
 from helpers.arguments import told
 from helpers.certificates import certificate
+from rich.console import Console
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
 from smc_mujoco.common.progress import Bar
 from smc_mujoco.evidence import boards
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
+from smc_mujoco.evidence.commands import tables
 from smc_mujoco.evidence.rigs.identified import Identified
 from smc_mujoco.evidence.rigs.rig import Fall
 
@@ -208,3 +211,12 @@ def test_a_command_prints_and_hands_on_what_is_recorded(line, snapshot, tmp_path
     text = "\n".join([*notes, out, said.err, f"{files}exit code {ended.value.code or 0}"])
     text = re.sub(r"(?<![.\d])\d+ s\b", "# s", text.replace(str(tmp_path), ".").replace(smc.__version__, "VERSION"))
     assert re.sub(" *\n( *\n)*", "\n", text).strip() == snapshot
+
+
+@pytest.mark.parametrize(("full", "id", "verdict"), [(True, "1;36m3", "1;31m"), (False, "36m 3", "31m")])
+def test_a_terminal_shows_a_claim_s_id_in_cyan_and_a_refuted_one_in_red(full, id, verdict):
+    console = Console(record=True, width=80, file=io.StringIO(), force_terminal=True, color_system="standard")
+    tables.print_claims(CLAIMS[:1], console, full)
+    text = console.export_text(styles=True)
+    assert f"\x1b[{id}\x1b[0m" in text
+    assert f"\x1b[{verdict}refuted, flips" in text

@@ -140,10 +140,8 @@ class Paper:
 
     def plant(self, plant: str) -> Plant:
         """Return a plant by the paper's name or the suite's."""
-        if plant in self.plants:
-            return self.plants[plant]
         find("plant", plant, plants_known() | self.plants)
-        return find_plant(plant)
+        return self.plants[plant] if plant in self.plants else find_plant(plant)
 
     def condition(self, text: str | Condition) -> Condition:
         """Return a condition by the paper's name, the suite's, or from its text."""
@@ -208,13 +206,13 @@ def paper(which: str | Path) -> Paper:
     """Return a paper by its name in `smc-mujoco papers`, or from its folder."""
     known = catalogue()
     if isinstance(which, str) and which in known:
-        return _read(*known[which])
+        return _read_once(*known[which])
     folder = Path(which)
     if not os.path.isdir(folder):
         if isinstance(which, str) and not set("/\\.") & set(which):
             raise unknown("paper", which, known)
         raise ScenarioError(f"no folder {str(which)!r} with a {PAPER_FILE}: give one, or a name of {', '.join(known)}")
-    return _read.__wrapped__(folder, _package(folder))  # not kept, as a folder may change
+    return _read(folder, _package(folder))
 
 
 def papers() -> dict[str, Paper]:
@@ -222,7 +220,7 @@ def papers() -> dict[str, Paper]:
     known: dict[str, Paper] = {}
     for key, home in catalogue().items():
         try:
-            known[key] = _read(*home)
+            known[key] = _read_once(*home)
         except ScenarioError as error:
             if not (package := catalogue().package(key)):
                 raise
@@ -261,7 +259,6 @@ def _about(what: object) -> Iterator[None]:
         raise ScenarioError(f"{what}: {error}") from None
 
 
-@functools.cache
 def _read(folder: Path, package: str) -> Paper:
     """Return the paper in a folder, whose code is imported under a package's name."""
     with reading(folder / PAPER_FILE, "paper", "make one with `smc-mujoco papers --new FOLDER`") as file:
@@ -273,6 +270,9 @@ def _read(folder: Path, package: str) -> Paper:
     code = _module(folder, package)
     with _about(folder / PAPER_FILE):
         return _checked(folder, data, code)
+
+
+_read_once = functools.cache(_read)  # of what is installed: a user's folder may change
 
 
 def _module(folder: Path, package: str) -> ModuleType:

@@ -392,6 +392,16 @@ def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory():
         assert critical_delay(find_plant(name), found / 1.02, *loop) == 0.0, name
 
 
+def test_the_smallest_lambda_is_of_starts_near_rest_without_velocity(monkeypatch):
+    runs, tried = about(("inverted_pendulum_network",)), []
+    trace = SimpleNamespace(t=np.arange(10.0), x=np.zeros((10, 5)))
+    monkeypatch.setattr(runs, "traces", lambda grid: tried.extend(grid) or [trace])
+    measured.dying(runs, {"inverted_pendulum_network": [2.0]})
+    (scenario,) = tried
+    assert scenario.x0 == pytest.approx([1e-3 * x for x in scenario.plant.x0])
+    assert scenario.resolved.v0 == (0.0,) * scenario.plant.n
+
+
 @pytest.mark.slow
 def test_a_law_without_effect_stabilises_what_hangs_alone():
     runs = about(("duffing", "pendulum_network"), quick=True, substitute=substituted("zero"))

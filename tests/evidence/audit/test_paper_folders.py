@@ -180,7 +180,7 @@ ADDED = [  # to the minimal paper.toml
     'conditions = ["farr"]\n[conditions]\nfar = "x0=2.0"',
     'conditions = ["friction=Coulom(1)+"]',
     'plants = "duffing"',
-    "plants = [3]",
+    'plants = [["duffing"]]',
     'quantifier = "every"',
     'runs = "durations=1"',
     'runs = "duration 1"',

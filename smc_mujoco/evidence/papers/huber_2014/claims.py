@@ -44,8 +44,8 @@ def ratios(runs, scenarios, names):
     traces, shares = runs.traces(scenarios), {}
     for what, of in measures.items():
         pairs = zip(map(of, traces[::2]), map(of, traces[1::2]), strict=True)
-        found = {name: float(implicit / explicit) for name, (implicit, explicit) in zip(names, pairs, strict=True)}
-        shares[f"{what} of the last quarter, implicit / explicit"] = found
+        by_name = {name: float(implicit / explicit) for name, (implicit, explicit) in zip(names, pairs, strict=True)}
+        shares[f"{what} of the last quarter, implicit / explicit"] = by_name
     return shares
 
 
