@@ -100,6 +100,17 @@ def now(thing: Any) -> str:
     return hashlib.sha256(buffer.getvalue()).hexdigest()
 
 
+def variables(function: Any) -> dict[str, str]:
+    """Return name -> hash of each variable that a function reads from outside itself; {} for machine code."""
+    function = _as_written(function)
+    if not isinstance(function, FunctionType):
+        return {}
+    names = names_in(function.__code__)
+    reached = _reached(function.__globals__, names.variables, names.attributes, set())
+    cells = zip(function.__code__.co_freevars, map(_cell_contents, function.__closure__ or ()), strict=True)
+    return {name: now(value) for name, value in (*zip(reached[::2], reached[1::2], strict=True), *cells)}
+
+
 _compiled_hashes: dict[Any, str] = {}  # function or class -> its hash when it was compiled
 _cached = functools.cache(now)
 

@@ -37,7 +37,8 @@ def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume
         scenarios = list(scenarios)
         if not resume:
             (folder / FILE).unlink(missing_ok=True)
-        key = _of_folder(folder / FILE, {law_hash(one): one.law.name for one in scenarios if has_user_code(one)})
+        laws = {law_hash(scenario): scenario for scenario in filter(has_user_code, scenarios)}
+        key = _of_folder(folder / FILE, {name: _description(scenario) for name, scenario in laws.items()})
     elif isinstance(wanted, str):
         raise ScenarioError(f"noise_key is {shown(wanted)}: give a whole number, or {DRAWN!r}")
     else:
@@ -47,8 +48,8 @@ def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume
         yield scenario if same else dataclasses.replace(scenario, noise_key=key).named(scenario.condition)
 
 
-def _of_folder(file: Path, laws: dict[str, str]) -> int:
-    """Return the key in a file if it was drawn for all these laws, else a new one. `laws` is `law_hash` -> name."""
+def _of_folder(file: Path, laws: dict[str, dict[str, str]]) -> int:
+    """Return the key in a file if it was drawn for all these laws, else a new one, which is written there."""
     try:
         stored = json.loads(file.read_text(encoding="utf-8"))
         key, before = whole("noise_key", stored["key"], 1, MAX_SEED), dict(stored["laws"])
@@ -58,11 +59,33 @@ def _of_folder(file: Path, laws: dict[str, str]) -> int:
     if key and not new:
         return key
     if key:
-        changes = f"law {joined(dict.fromkeys(new))} is new or has changed"
+        changes = joined(dict.fromkeys(_change_in_words(law, list(before.values())) for law in new))
         print(f"{changes}: a new noise key is drawn, and all runs are done again", file=sys.stderr)
     key = draw_key()
     write_json(file, {"key": key, "laws": laws})
     return key
+
+
+def _description(scenario: Scenario) -> dict[str, str]:
+    """Return the name of a scenario's law, its gains, and hashes of its code and of each variable that it reads."""
+    parts, variables = _parts(scenario), {}
+    for part in parts:
+        variables |= fingerprint.variables(part.function)
+    code = fingerprint.now(tuple(getattr(part.function, "__code__", part.function) for part in parts))
+    return variables | {"name": scenario.law.name, "its gains": _gains(parts), "its code": code}
+
+
+def _change_in_words(law: dict[str, str], before: list[dict[str, str]]) -> str:
+    """Return what has changed of a law since the laws `before`, or that no law of its name was among them."""
+    same_name = [other for other in before if other["name"] == law["name"]]
+    if not same_name:
+        return f"law {law['name']} is new"
+    changed = [name for name, value in law.items() if value != same_name[-1].get(name)]
+    return f"law {law['name']} has changed ({joined(changed or ['its code'])})"
+
+
+def _gains(parts: Iterable[Component]) -> str:
+    return repr([dict(part.gains) for part in parts])
 
 
 def _parts(scenario: Scenario) -> list[Component]:
@@ -78,4 +101,4 @@ def has_user_code(scenario: Scenario) -> bool:
 def law_hash(scenario: Scenario) -> str:
     """Return a hash of the code and the gains of a scenario's law, surface and estimator."""
     parts = _parts(scenario)
-    return fingerprint.of(tuple(part.function for part in parts))[:16] + repr([dict(part.gains) for part in parts])
+    return fingerprint.of(tuple(part.function for part in parts))[:16] + _gains(parts)

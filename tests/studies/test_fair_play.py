@@ -173,12 +173,12 @@ def test_a_key_that_an_author_may_have_read_is_not_used_for_another_law(tmp_path
     gains = smc.grid("duffing", [honest(k=float(key % 1000))], "noise", seeds=1, duration=0.05)
     assert smc.study(gains, tmp_path, noise_key="drawn").column("noise_key").tolist() != [key]
     assert (
-        "law honest is new or has changed: a new noise key is drawn, and all runs are done again"
+        "law honest has changed (its gains): a new noise key is drawn, and all runs are done again"
         in capsys.readouterr().err
     )
 
 
-def test_a_study_that_begins_again_says_which_law_has_changed(tmp_path, capsys):
+def test_a_study_that_begins_again_says_which_law_has_changed_and_which_of_its_variables(tmp_path, capsys):
     script = """
 import smc_mujoco as smc
 WIDTH = {width}
@@ -197,9 +197,9 @@ def mine(y, gains, memory):
         return capsys.readouterr().err.strip().partition(":")[0]
 
     assert [ran(0.2), ran(0.2)] == ["", ""]
-    assert ran(0.3) == "law mine is new or has changed"
-    assert ran(0.3, k=3.0) == "law mine is new or has changed"
-    assert ran(0.3, "(2.0 * WIDTH)", k=3.0) == "law mine is new or has changed"
+    assert ran(0.3) == "law mine has changed (WIDTH)"
+    assert ran(0.3, k=3.0) == "law mine has changed (its gains)"
+    assert ran(0.3, "(2.0 * WIDTH)", k=3.0) == "law mine has changed (its code)"
 
 
 @pytest.mark.parametrize("key", ["often", -1, 2**53, 1.5])
