@@ -24,7 +24,11 @@ app = typer.Typer(
 )
 GROUPS = {  # heading in the help -> name -> command; the annexes add theirs
     "Run and look": {
-        "list": catalogue.list_, "laws": catalogue.laws, "run": runs.run, "show": runs.show, "view": runs.view,
+        "list": catalogue.list_,
+        "laws": catalogue.laws,
+        "run": runs.run,
+        "show": runs.show,
+        "view": runs.view,
     },
     "Compare": {"compare": studies.compare, "which": studies.which},
     "Tune and analyse": {
@@ -34,7 +38,7 @@ GROUPS = {  # heading in the help -> name -> command; the annexes add theirs
         "basin": analysis.basin,
         "chatter": analysis.chatter,
     },
-}  # fmt: skip
+}
 for annex in sorted(filter(annexes.installed, annexes.ANNEXES)):
     for group, commands in annexes.module(f"smc_mujoco.{annex}.commands", "the command line").GROUPS.items():
         GROUPS[group] = GROUPS.get(group, {}) | commands

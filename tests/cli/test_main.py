@@ -915,3 +915,21 @@ def test_chatter_prints_predictions_and_measurements_and_writes_files(call, fold
 @pytest.mark.usefixtures("coarse_grid")
 def test_chatter_refuses_in_one_sentence(words, said, call):
     refused(call("chatter", "duffing", *words), said)
+
+
+# worst
+
+
+@pytest.mark.parametrize(
+    ("bound", "said"),
+    [
+        ("mass=", "'mass=' cannot be read: write it as mass=0.7:1.3"),
+        ("mass=heavy", "mass=heavy cannot be read: write a range as mass=0.7:1.3, a number as x0=0.2"),
+        ("mass=0.7", "mass is 0.7: give the lowest and the highest"),
+        ("mass=0.7:1.3,mass=0.5:2", "--bound has mass twice"),
+        ("disturbance=1", "disturbance=1 bounds what --disturbance does"),
+        ("weight=0:1", "unknown parameter of duffing 'weight'"),
+    ],
+)
+def test_worst_refuses_in_one_sentence(bound, said, call):
+    refused(call("worst", "duffing", "--law", "pid", "--disturbance", "2", "--bound", bound), said)

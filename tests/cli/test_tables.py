@@ -11,7 +11,9 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.cli import tables
+from smc_mujoco.common.text import number
 from smc_mujoco.draw.film import arrows, caption
+from smc_mujoco.metrics.tip import tip_scores
 
 VOLTS = smc.run(
     smc.Scenario(
@@ -56,8 +58,14 @@ def test_a_table_of_tips_has_the_worst_joint_only_if_there_is_room(monkeypatch):
     )
     assert "12.5 (joint4)" in printed(tables.tips("runs", {"free": free}))
     assert asked == ["work"]
-    assert "joint4" not in printed(tables.tips("runs", {"pressing": pressing}))
+    (table,) = tables.tips("runs", {"pressing": pressing})
+    assert "joint4" not in printed([table])
     assert asked == ["work"]
+    cells = {str(column.header): next(iter(column.cells)) for column in table.columns}
+    values = tip_scores(pressing)
+    assert cells["touching\n%"] == number(values["touching"])
+    assert cells["deepest\nmm"] == number(1e3 * values["depth"])
+    assert cells["mean\nforce\nN"] == number(values["mean_force"])
 
 
 def test_margins_and_cycles_are_told_with_their_limits(snapshot):

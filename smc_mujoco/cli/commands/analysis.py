@@ -151,10 +151,9 @@ def worst(
 ) -> None:
     """Find the worst that can happen to laws within bounds that you give: an adversary instead of random seeds.
 
-    You say only what is uncertain; all else is as in the condition. Without bounds, it is what the plant declares, such
-    as an arm's payload, or else a disturbance up to a sixth of what the weakest drive gives. Of a rig, such as
-    qube_servo, the adversary also chooses one of its parameter sets. The search is the same for every law, and there
-    may be worse than what it finds.
+    Only what you bound is uncertain; all else is as in the condition. Without bounds, the plant's own count, such as an
+    arm's payload, or else a disturbance up to a sixth of what the weakest drive gives. Of a rig, such as qube_servo,
+    the adversary also chooses a parameter set. The search is the same for all laws; there may be worse than it finds.
 
     The column "worst found" has the error of the worst run, the column "median" that of as many random runs within the
     bounds. Laws are ordered by the worst. A line below the table says where the bounds go beyond the theorem of a law.

@@ -165,12 +165,14 @@ def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
         name, _, value = (part.strip() for part in pair.partition("="))
         if not (name and value):
             raise ScenarioError(f"{option} {pair!r} cannot be read: write it as {example}")
+        if name in values:
+            raise ScenarioError(f"{option} has {name} twice: leave out one of them")
         values[name] = value
     return values
 
 
 def numbers(text: str | None, option: str, example: str) -> dict[str, float]:
-    """Return name -> number from the text of an option, as `pairs`."""
+    """Return name -> number from the text of an option such as "M=5,b=8"; {} for None."""
     values = {}
     for name, value in pairs(text, option, example).items():
         try:
