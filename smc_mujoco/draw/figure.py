@@ -1,6 +1,5 @@
 """Figures: x, u and s of several runs over time with their phase portrait; only u under several conditions."""
 
-import itertools
 import os
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -29,7 +28,7 @@ TIME_PANELS = {  # panel -> quantity
 }  # fmt: skip
 SIDE_PANELS = {"phase": 1.5, "settling": 1.0, "end": 1.0}  # panel -> its relative height
 PANEL_NAMES = {name: name for name in (*TIME_PANELS, "channels", *SIDE_PANELS)}  # of panels
-COLUMN_WIDTHS = (2.6, 1.7, 1.0)  # relative: of small panels, of those over time, and of those beside
+BLOCK_WIDTHS = (2.6, 1.7, 1.0)  # relative: of small panels, of those over time, and of those beside
 ROW_HEIGHT = 1.5  # inches on a full page, height of a panel over time
 LABEL_SIZE = 10.5  # points on a full page, of a small panel's label that has room
 SMALL_ROW = 0.62  # relative height of a row of small panels
@@ -111,9 +110,11 @@ def signals(
 ) -> Figure | SubFigure:
     """Draw only u, a column for each condition: condition -> label -> Trace."""
     page = pages.blank(style.FULL_WIDTH, SIGNALS_HEIGHT)
+    with style.page():
+        page.suptitle(title, x=0.01, ha="left", size=pages.TITLE_SIZE, weight="bold", parse_math=False)
     columns = page.subfigures(1, len(conditions), squeeze=False)[0]
     for column, (condition, runs) in zip(columns, conditions.items(), strict=True):
-        figure([*runs.values()], labels=[*runs], title=f"{title}, {condition}", panels=["u"], fig=column)
+        figure([*runs.values()], labels=[*runs], title=condition, panels=["u"], fig=column)
     pages.write(page, pages.files(path))
     return page
 
@@ -142,38 +143,42 @@ def _composed_page(
         [*map(_height, overview)],
         [last if n == "end" else SIDE_PANELS[n] for n in beside],
     )
-    parts, narrow = [*map(sum, blocks)], width < pages.NARROW
-    if not any(parts):
+    narrow = width < pages.NARROW
+    columns = [(0, 1, 2)] if narrow else [(0,), (1, 2)] if small else [(1,), (2,)]  # of blocks
+    parts = {column: sum(sum(blocks[k]) for k in column) for column in columns}
+    if not any(parts.values()):
         raise ScenarioError(f"panels is {list(chosen)}: give a panel that the plant has, or leave panels out")
-    rows = sum(parts) if narrow else max(parts[0], parts[1], 4.0 if beside else 1.0)
+    rows = max(*parts.values(), 0.0 if narrow else 4.0 if beside else 1.0)
     space = pages.head_height(width, key)
     tall = height or max(0.5625 * width * (not narrow), space + style.points(ROW_HEIGHT) * rows + 0.5)
     page = pages.blank(width, tall, fig)
-    pitch = 72 * (page.bbox.height / page.dpi - space - 0.4) / (rows if narrow else max(parts[1], 1))
-    cells = _cells(page, narrow, blocks)
-    _draw_small(page, cells[0], small, runs)
+    over_time = next(part for column, part in parts.items() if 1 in column)
+    pitch = 72 * (page.bbox.height / page.dpi - space - 0.4) / max(over_time, 1.0)
+    cells = _cells(page, [column for column in columns if parts[column]], blocks)
+    if small:
+        _draw_small(page, cells[0][0], small, runs, named=not overview)
     words = drawing.titles(overview, [pitch * part for part in blocks[1]])
-    _draw_over_time(page, cells[1], list(zip(overview, words, strict=True)), runs, named=not small)
+    _draw_over_time(page, cells[1], list(zip(overview, words, strict=True)), runs)
     _draw_beside(page, cells[2], beside, (groups[0], *places), runs)
     pages.set_head(page, width, title or style.plant_name(traces[0].scenario.plant), key, gains)
     pages.space_ticks(page)
     return page
 
 
-def _cells(page: Figure | SubFigure, narrow: bool, blocks: Sequence[Sequence[float]]) -> list[list[SubplotSpec]]:
-    """Return the cells of each block of panels, of these relative heights: side by side, or one below the other."""
-    there = [k for k, heights in enumerate(blocks) if heights]
-    if narrow:
-        cells = iter(_column(page.add_gridspec(1, 1)[0], [*itertools.chain(*blocks)]))
-        return [[*itertools.islice(cells, len(heights))] for heights in blocks]
-    grid = page.add_gridspec(1, len(there), width_ratios=[COLUMN_WIDTHS[k] for k in there])
-    return [_column(grid[there.index(k)], heights) if heights else [] for k, heights in enumerate(blocks)]
-
-
-def _column(cell: SubplotSpec, heights: Sequence[float]) -> list[SubplotSpec]:
-    """Return cells one below the other, with these relative heights."""
-    grid = cell.subgridspec(len(heights), 1, height_ratios=heights)
-    return [grid[i] for i in range(len(heights))]
+def _cells(
+    page: Figure | SubFigure, columns: Sequence[Sequence[int]], blocks: Sequence[Sequence[float]]
+) -> list[list[SubplotSpec]]:
+    """Return the cells of each block of panels, of these relative heights, in columns that have one block or more."""
+    widths = [max(BLOCK_WIDTHS[k] for k in column if blocks[k]) for column in columns]
+    grid = page.add_gridspec(1, len(columns), width_ratios=widths)
+    cells: list[list[SubplotSpec]] = [[] for _ in blocks]
+    for i, column in enumerate(columns):
+        heights = [height for k in column for height in blocks[k]]
+        rows = grid[i].subgridspec(len(heights), 1, height_ratios=heights)
+        owners = [k for k in column for _ in blocks[k]]
+        for row, k in enumerate(owners):
+            cells[k].append(rows[row])
+    return cells
 
 
 def _height(panel: Panel) -> float:
@@ -214,10 +219,8 @@ def _by_joint(panels: Sequence[Panel]) -> list[Panel]:
     return [part for panel in panels for part in (drawing.by_channel(panel) if direct else [panel])]
 
 
-def _draw_over_time(
-    page, cells: Sequence[SubplotSpec], overview: Sequence[tuple[Panel, str]], runs: Runs, named: bool
-) -> None:
-    """Draw panels over time with their labels in the cells of a column; `named`: whether changes are told above it."""
+def _draw_over_time(page, cells: Sequence[SubplotSpec], overview: Sequence[tuple[Panel, str]], runs: Runs) -> None:
+    """Draw panels over time with their labels in the cells of a column. Changes are told above the first."""
     frames: list[Axes] = []
     axes: list[Axes] = []
     for cell, (panel, words) in zip(cells, overview, strict=True):
@@ -228,12 +231,12 @@ def _draw_over_time(
             axes.append(ax)
             ax.set_xlim(0.0, runs.span[0])
             drawing.over_time(ax, part, colours, among=panel.traces)
-            drawing.mark(ax, runs.changes, named=named and ax is axes[0])
+            drawing.mark(ax, runs.changes, named=ax is axes[0])
             ax.tick_params(labelbottom=False)
         _equal_ranges(frame, rows)
-    for ax in axes[-1:]:
-        ax.tick_params(labelbottom=True)
-        ax.set_xlabel(runs.time)
+    if axes:
+        axes[-1].tick_params(labelbottom=True)
+        axes[-1].set_xlabel(runs.time)
     page.align_ylabels(frames)
 
 
@@ -273,17 +276,17 @@ def _equal_ranges(frame: Axes, rows: Sequence[tuple[Axes, Panel, Sequence[str]]]
     frame.tick_params(labelcolor="none", length=0)  # invisible numbers, which keep its label beside those of the rows
 
 
-def _draw_small(page, cells: Sequence[SubplotSpec], small: Sequence[Sequence[Panel]], runs: Runs) -> None:
-    """Draw a row of small panels for each channel, all in one cell."""
-    rows = [cell.subgridspec(len(small), max(map(len, small))) for cell in cells]
+def _draw_small(page, cell: SubplotSpec, small: Sequence[Sequence[Panel]], runs: Runs, named: bool) -> None:
+    """Draw a row of small panels for each channel; `named`: whether changes are told above the first."""
+    rows = cell.subgridspec(len(small), max(map(len, small)))
     for i, row in enumerate(small):
         for k, panel in enumerate(row):
-            ax = page.add_subplot(rows[0][i, k])
-            ax.set_ylabel(panel.label, fontsize=_fitting(panel.label, cells[0], len(small), page))
+            ax = page.add_subplot(rows[i, k])
+            ax.set_ylabel(panel.label, fontsize=_fitting(panel.label, cell, len(small), page))
             ax.set_xlim(0.0, runs.span[0])
             ax.locator_params(axis="y", nbins=3)
             drawing.over_time(ax, panel, runs.colours)
-            drawing.mark(ax, runs.changes, named=i == k == 0)
+            drawing.mark(ax, runs.changes, named=named and i == k == 0)
             ax.tick_params(labelbottom=i == len(small) - 1)
             if i == len(small) - 1:
                 ax.set_xlabel(runs.time)
@@ -339,7 +342,7 @@ def _key(runs: Runs, shown: Sequence[Panel]) -> tuple[list[Handle], str]:
         "line": Line2D([], [], color=style.MUTED, lw=style.points(drawing.LINE)),
         "thin lines": Line2D([], [], color=style.MUTED, lw=style.points(drawing.LIGHT_LINE)),
     }
-    words = drawing.meaning(shown) if shown else {}
+    words = drawing.meaning(shown)
     for name, look in looks.items():
         look.set_label(f"{name}: {words.get(name)}")
     return [*handles, *(look for name, look in looks.items() if name in words)], gains

@@ -277,7 +277,7 @@ def test_another_ending_is_refused(pair, tmp_path):
     with pytest.raises(smc.ScenarioError, match="end the name in"):
         figure(pair, tmp_path / "a.gif")
     with pytest.raises(smc.ScenarioError, match="end the name in"):
-        figure(pair, tmp_path / "a.gif")
+        draw_figure.signals({"all": {"Classical": pair[0]}}, tmp_path / "a.gif", "Signals")
     assert not list(tmp_path.iterdir())
     assert figure(pair, tmp_path / "lam_0.5")[0].name == "lam_0.5.svg"
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 import smc_mujoco as smc
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels, style
-from smc_mujoco.draw.figure import figure
+from smc_mujoco.draw.figure import figure, signals
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.trace import ARRAYS
 
@@ -91,7 +91,7 @@ def check(page) -> None:
     ("kind", "size"),
     [
         ("one", None), ("ten", COLUMN), ("failed", COLUMN), ("jump", COLUMN), ("short", COLUMN),
-        ("arm", PAGE),
+        ("arm", PAGE), ("arm", COLUMN),
     ],
 )  # fmt: skip
 def test_words_are_apart_and_on_the_page(kind, size, one, arm):
@@ -107,6 +107,14 @@ def test_words_are_apart_and_on_the_page(kind, size, one, arm):
     page = figure(traces, size=size)
     assert page.get_figwidth() == (12.8 if size is None else pages.NAMED_WIDTHS[size])
     check(page)
+
+
+def test_words_of_signals_are_apart_and_each_condition_is_told(one):
+    laws = {"Observer-free": ten(one)[0], "Classical": one}
+    page = signals({"calm": laws, "noisy": laws, "late": laws}, None, "Control signals, Duffing oscillator")
+    check(page)
+    titles = [column.legends[0].get_title().get_text() for column in page.subfigs]
+    assert [page.get_suptitle(), *titles] == ["Control signals, Duffing oscillator", "calm", "noisy", "late"]
 
 
 def curves(ax) -> list:
@@ -260,10 +268,11 @@ def test_each_joint_of_an_arm_has_its_reference_and_its_error_if_that_moves(arm)
 
 def test_blows_and_jumps_do_not_cover_curves(one):
     jump = dataclasses.replace(one, scenario=dataclasses.replace(one.scenario, jump=smc.Jump(0.5, {"mass": 2.0})))
-    page = figure([jump])
-    page.draw_without_rendering()
-    (words,) = [text for ax in page.axes for text in ax.texts if "mass" in text.get_text()]
-    assert words.get_window_extent().y0 >= page.axes[0].get_window_extent().y1 - 1
+    for shown in (None, ["channels"]):
+        page = figure([jump], panels=shown)
+        page.draw_without_rendering()
+        (words,) = [text for ax in page.axes for text in ax.texts if "mass" in text.get_text()]
+        assert words.get_window_extent().y0 >= page.axes[0].get_window_extent().y1 - 1
     hit = dataclasses.replace(one, reaction=np.where(np.arange(len(one.t)) == 700, 500.0, 0.0)[:, None])
     (ax,) = figure([hit], panels=["reaction"]).axes
     assert ax.get_title(loc="right") == "|reaction| up to 500 N"
