@@ -178,7 +178,7 @@ def unit_cure(name: str, default: GainValue) -> str:
 
 def _checked_gain(name: str, value: object, **limits: Any) -> GainValue:
     """Return a gain, one number or a tuple of one for each channel, checked as `number` checks it."""
-    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
+    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1):
         if not (listed := items_of(name, value)):
             raise ScenarioError(f"{name} is {shown(value)}: give a number, or one for each driven channel")
         return tuple(number(f"{name}[{i}]", one, **limits) for i, one in enumerate(listed))

@@ -162,8 +162,8 @@ def checked_name(law: Law) -> Law:
     if known is None or law.function is None:
         return law
     # module and name stay the same when the module is loaded again
-    mine, theirs = ((f.__module__, getattr(f, "__qualname__", f)) for f in (law.function, known.function))
-    if mine == theirs:
+    names = {(getattr(f, "__module__", ""), getattr(f, "__qualname__", f)) for f in (law.function, known.function)}
+    if len(names) == 1:
         return law
     package = known_laws().package(law.name)
     raise ScenarioError(

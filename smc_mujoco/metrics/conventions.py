@@ -119,7 +119,10 @@ class Metric:
 def metric(
     unit: str, *, label: str = "", need: str = "", **flags: Any
 ) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
-    """Return a decorator that enters a function Trace -> float in the catalogue and makes it refuse broken traces."""
+    """Return a decorator that enters a function Trace -> float in the catalogue and makes it refuse broken traces.
+
+    Flags are fields of `Metric`; the label is by default the function's name with spaces.
+    """
 
     def enter(formula: Callable[[Trace], float]) -> Callable[[Trace], float]:
         name, summary = formula.__name__, (inspect.getdoc(formula) or "").partition("\n")[0]

@@ -134,11 +134,18 @@ def test_laws_are_chosen_by_all_that_is_asked():
     assert names() == smc.laws()
     assert {"continuous_twisting"} == {"continuous_twisting", "twisting", "lqr"} & {*names("finite-time", "continuous")}
     assert set(names("two-gains")) < set(smc.laws())
-    assert "pid" not in names("two-gains")
-    assert {"none", "classical"}.isdisjoint(names("one-gain"))
     assert "lqr" in names("two-gains")  # its weight r and its plant are held
     assert {"none"} == {"none", "pid", "classical"} & {*names("no-velocity")}
     assert {"none"} == {"none", "hierarchical"} & {*names("no-model", plant="cart_pole")}
+
+
+@pytest.mark.parametrize(("need", "counts"), [("one-gain", [1]), ("two-gains", [1, 2])])
+def test_a_law_with_few_gains_to_choose_has_at_least_one(need, counts):
+    def law(y, gains, memory):
+        return 0.0, 0.0
+
+    made = [smc.law_function(gains=dict.fromkeys("abcd"[:n], 1.0))(law) for n in range(5)]
+    assert [n for n in range(5) if PROPERTIES[need].holds(made[n])] == counts
 
 
 def test_every_law_is_in_one_family():

@@ -123,7 +123,10 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
 def starts(
     model: mujoco.MjModel, joints: list[str], channels: Pairs, keyframe: str | None
 ) -> tuple[dict[str, float], list[Range]]:
-    """Return joint -> x0, rad or m, of the channels, the keyframe or the model, and ranges of those the user chose."""
+    """Return joint -> x0, rad or m, and the ranges in which positions that the user chose must be.
+
+    x0 is that of the channel, else of the keyframe, else of the model. The model's own x0 may be outside its range.
+    """
     qpos = model.qpos0 if keyframe is None else model.key_qpos[model.key(keyframe).id]
     chosen = {joint: channel.x0 for joint, channel in channels if channel.x0 is not None}
     chosen |= {c.partner: c.partner_x0 for _, c in channels if c.partner is not None and c.partner_x0 is not None}
@@ -225,7 +228,10 @@ def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
 
 
 def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[float, float]:
-    """Return the forces that the forceranges of a joint's actuators allow together; no bound if not both ways."""
+    """Return the least and the largest force that the forceranges of a joint's actuators allow together, N m or N.
+
+    There is no bound if one has no forcerange, and if they push only one way: the ideal motor pushes both ways.
+    """
     if not actuators or not all(model.actuator_forcelimited[i] for i in actuators):
         return -math.inf, math.inf
     ends = [sorted(float(model.actuator_gear[i, 0] * end) for end in model.actuator_forcerange[i]) for i in actuators]

@@ -52,8 +52,10 @@ class Source:
     @property
     def label(self) -> str:
         """The file's name; for a text, the name that the model gives itself, as a file's name."""
-        named = self.path or next((one.get("model") for one in _elements(self.text)[:1]), None) or "model"
-        return Path(self.path).name if self.path else f"{named}.xml"
+        if self.path:
+            return Path(self.path).name
+        roots = _elements(self.text)[:1]
+        return f"{(roots and roots[0].get('model')) or 'model'}.xml"
 
     def read(self) -> mujoco.MjSpec:
         """Return the model as an editable MjSpec."""
@@ -232,7 +234,10 @@ def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
 
 
 def digest(path: Path) -> str:
-    """Hash a file and all that it names (includes, attached models, meshes, textures) in any folder: SHA-256, hex."""
+    """Hash the file and every file that it names (includes, attached models, meshes, textures): SHA-256, 64 hex digits.
+
+    If a name fits files in several folders, all of them are hashed.
+    """
     texts, files = [path], {path.resolve(): None}
     names, folders, inner = [], {}, {"": None}
     for text in texts:  # grows as files name further files
@@ -266,13 +271,14 @@ def _files(elements: Iterable[ET.Element]) -> list[str]:
 
 
 def check_model(label: str, model: mujoco.MjModel) -> None:
-    """Raise ScenarioError for wild numbers, ranges may be infinite, and for names that this package uses itself."""
+    """Raise ScenarioError for NaN, for numbers beyond MAX_PARAMETER, and for names that this package uses itself."""
     arrays = [(name, getattr(model, name)) for name in fields(model)]
     arrays += [(f"opt.{name}", np.atleast_1d(getattr(model.opt, name))) for name in ("gravity", "wind", "density")]
     for field, values in arrays:
         if values.dtype.kind != "f" or any(part in field for part in UNUSED):
             continue
-        wrong = np.isnan(values) if field.endswith("range") else ~(np.abs(values) <= MAX_PARAMETER)
+        endless = field.endswith("range")  # ranges may be infinite
+        wrong = np.isnan(values) if endless else ~(np.abs(values) <= MAX_PARAMETER)
         if wrong.any():
             cure = f"give finite numbers of at most {MAX_PARAMETER:g} in its MJCF"
             raise ScenarioError(f"{field}[{np.argwhere(wrong)[0][0]}] of {label} is {values[wrong][0]:g}: {cure}")

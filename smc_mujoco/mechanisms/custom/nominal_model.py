@@ -127,9 +127,11 @@ class NominalModel:
     def _borrow(self, parameters: Mapping[str, float]) -> "tuple[mujoco.MjModel, Places, BorrowedData]":
         """Return the model, its channels' indices, and an mjData for one simulation."""
         model, places, _, spare = prepared(self, frozen(parameters))
-        with contextlib.suppress(IndexError):  # used before, but a simulation writes every field before it reads it
-            return model, places, BorrowedData(spare.pop(), spare)
-        return model, places, BorrowedData(mujoco.MjData(model), spare)
+        try:
+            data = spare.pop()  # used before, but a simulation writes every field before it reads it
+        except IndexError:
+            data = mujoco.MjData(model)
+        return model, places, BorrowedData(data, spare)
 
     def dynamics(self, x: np.ndarray, v: np.ndarray, p: Any) -> Dynamics:
         """Return M, h and g of all channels, at their x and v, (n,) each."""

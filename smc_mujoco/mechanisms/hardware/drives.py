@@ -218,7 +218,7 @@ class DriveStep(NamedTuple):
 
     `first` is the output of the first lag. `second` is that of the second lag, or the force behind a RateLimit, or the
     torque of a winding's current, plus `drag` times the speed. All are in the unit of u, in which a winding's torque is
-    that of a rotor at rest. All factors without a unit are shares of a state's distance from u. v: the speed at the
+    that of a rotor at rest. All factors without a unit are shares of a state's distance from u. v is the speed at the
     start of the step.
     """
 
