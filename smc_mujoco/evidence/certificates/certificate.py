@@ -127,11 +127,11 @@ class Certificate:
     def conditions(self) -> tuple[Condition, ...]:
         """All conditions of the theorems."""
         x, made = self.data["unit"], []
-        for theorem, row in ((part["theorem"], row) for part in self.data["parts"] for row in part["conditions"]):
-            unit, asks, fails = CONDITIONS[row["name"]]
-            unit, there = unit.replace("x", x).replace("F", EFFORT[x]), holds(row["name"], row["margin"])
-            words = asks if there else fails
-            made.append(Condition(theorem, row["name"], row["margin"], unit, words, there))
+        for part in self.data["parts"]:
+            for name, margin in ((row["name"], row["margin"]) for row in part["conditions"]):
+                unit, asks, fails = CONDITIONS[name]
+                unit, held = unit.replace("x", x).replace("F", EFFORT[x]), holds(name, margin)
+                made.append(Condition(part["theorem"], name, margin, unit, asks if held else fails, held))
         return tuple(made)
 
     @property

@@ -36,13 +36,15 @@ def draw(certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike
         axes = page.subplots(1, 2 if bounded else 1, squeeze=False).ravel()
         x, v = _plane(certificate, part, traces)
         for ax, zoom in zip(axes, (1.0, ZOOM_BOUNDS * (part["bound"] if part else 0.0) / x[-1]), strict=False):
-            plane = np.meshgrid(x * zoom, v * zoom ** (0.5 if zoom < 1.0 else 1.0))
-            (_region if part else _energy)(ax, certificate, part, *plane)
+            X, V = np.meshgrid(x * zoom, v * zoom ** (0.5 if zoom < 1.0 else 1.0))
+            if part is None:
+                _energy(ax, certificate, X, V)
+            else:
+                _region(ax, certificate, part, X, V)
             for trace in traces:
                 ax.plot(trace.x[:, 0], trace.v[:, 0], color=style.REACTION, linewidth=style.points(1.2))
                 ax.plot(trace.x[0, 0], trace.v[0, 0], "o", color=style.INK, markersize=style.points(5))
-            ends = [(float(at.min()), float(at.max())) for at in plane]
-            ax.set(xlim=ends[0], ylim=ends[1], xlabel=f"position ({unit})", ylabel=f"velocity ({unit}/s)")
+            ax.set(xlim=X[0, [0, -1]], ylim=V[[0, -1], 0], xlabel=f"position ({unit})", ylabel=f"velocity ({unit}/s)")
         under = f"|d| ≤ {data['disturbance']:g} {EFFORT[unit]}" if data["disturbance"] else "no disturbance"
         plant = style.plant_name(as_plant(certificate.plant))
         axes[0].set_title(f"{style.law_name(certificate.law)} on {plant}, {under}")
@@ -79,7 +81,7 @@ def _region(ax: Any, certificate: Any, part: Any, X: np.ndarray, V: np.ndarray) 
         ax.axvline(side * part["bound"], color=style.INK, linewidth=style.points(0.8), linestyle=(0, (4, 3)))
 
 
-def _energy(ax: Any, certificate: Any, part: None, X: np.ndarray, V: np.ndarray) -> None:
+def _energy(ax: Any, certificate: Any, X: np.ndarray, V: np.ndarray) -> None:
     """Draw level sets of V."""
     value = loops.energy(certificate.data, X, V)
     top = float(loops.energy(certificate.data, X[:1, -1:], 0.0 * X[:1, -1:])[0, 0])  # the energy at rest at the edge

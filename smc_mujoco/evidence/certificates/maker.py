@@ -194,12 +194,13 @@ def _part(theorem: str, conditions: list[dict], **data: Any) -> dict:
 
 
 def _told(margins: dict[str, Any]) -> list[dict]:
+    """Return conditions as data, from their names and margins."""
     return [{"name": name, "margin": float(margin)} for name, margin in margins.items()]
 
 
 def _judged(theorem: str, data: dict, judge: Judge) -> dict:
     """Return a theorem with the margins that the checker derives from its data."""
-    return _part(theorem, _told(judge(theorem, data) or {}), **data)  # what is refused here is so as a whole in the end
+    return _part(theorem, _told(judge(theorem, data) or {}), **data)  # if it is refused, so is the whole in the end
 
 
 def _saturated(document: dict, loop: Loop, terms: list[float], judge: Judge) -> dict:

@@ -120,11 +120,16 @@ class Identified:
 
     def save(self, path: str | Path) -> Path:
         """Write values, errors, correlations and fits to a JSON file. Return its path."""
-        known = self.rig.quantities
-        quantities = {n: {"value": v, "error": self.errors[n], "unit": known[n].unit} for n, v in self.values.items()}
+        quantities = {
+            name: {"value": value, "error": self.errors[name], "unit": self.rig.quantities[name].unit}
+            for name, value in self.values.items()
+        }
         about = {"rig": self.rig.name, "quantities": quantities, "correlations": self.correlations.tolist()}
-        for name, fits in (("fits", self.fits), ("fits_before", self.fits_before)):
-            about[name] = [{k: str(v) if isinstance(v, Fall) else v for k, v in fit.items()} for fit in fits]
+        for key, fits in (("fits", self.fits), ("fits_before", self.fits_before)):
+            about[key] = [
+                {column: str(value) if isinstance(value, Fall) else value for column, value in fit.items()}
+                for fit in fits
+            ]
         return write_json(Path(path), about)
 
     def figure(self, path: str | Path, record: int = 0) -> list[Path]:

@@ -201,8 +201,8 @@ def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
     try:
         array = np.asarray(values, float)
     except (TypeError, ValueError, OverflowError):
-        array = np.empty((0, 0))
-    if array.ndim != 1:
+        array = None
+    if array is None or array.ndim != 1:
         raise ScenarioError(f"column {name} of {rig} is {shown(values)}: give one number a sample")
     wrong = np.flatnonzero(~np.isfinite(array))
     if len(wrong):

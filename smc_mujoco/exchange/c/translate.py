@@ -719,11 +719,7 @@ class Function:
 
     def resolve(self, node: ast.expr) -> Any:
         """Return the value of a global name, dotted or not; None for a variable."""
-        if isinstance(node, ast.Name):
-            return None if node.id in self.names else self.globals.get(node.id, getattr(builtins, node.id, None))
-        if isinstance(node, ast.Attribute) and isinstance(module := self.resolve(node.value), ModuleType):
-            return getattr(module, node.attr, None)
-        return None
+        return None if names_in([node]) & self.names.keys() else resolved(node, self.globals)
 
     def callee(self, node: ast.Call) -> Any:
         """Return the function that is called."""
@@ -905,8 +901,11 @@ class Function:
 
     def _ifexp(self, node: ast.IfExp) -> Value:
         yes, no, test = self.numeric(node.body), self.numeric(node.orelse), self.truth(node.test)
-        test = f"({test})" if " " in test else test
-        return Value(f"{test} ? {yes.within(SUM)} : {no.within(SUM)}", wider(yes.kind, no.kind), LOOSE)
+        return self.chosen(Value(test, "bool", LOOSE if " " in test else ATOM), yes, no)
+
+    def chosen(self, test: Value, yes: Value, no: Value) -> Value:
+        """Return one of two values, by a condition."""
+        return Value(f"{test.within(SUM)} ? {yes.within(SUM)} : {no.within(SUM)}", wider(yes.kind, no.kind), LOOSE)
 
     def _call(self, node: ast.Call) -> Value:
         if node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
@@ -914,7 +913,7 @@ class Function:
         if isinstance(node.func, ast.Attribute) and node.func.attr == "copy" and not node.args:
             return self.outside(self.value, node.func.value)._replace(pointer="")
         function = self.callee(node)
-        if function in ELEMENTWISE or function in HELPER_NAMES:
+        if function in ELEMENTWISE or function in HELPER_NAMES or function is np.where:
             return self.elementwise(lambda call: self.of_elements(function, call), node)
         if function is len or function in FILL_VALUES:
             method = self.sized
@@ -972,6 +971,10 @@ class Function:
         """Translate a function of numpy, by its elements."""
         values = [self.numeric(a) for a in node.args]
         kind = "single" if all(v.kind == "single" for v in values) else "real"
+        if function is np.where:
+            if len(values) != 3:
+                raise refuse(node, "where without two values")
+            return self.chosen(*values)
         if function in HELPER_NAMES:
             return Value(
                 f"{self.program.helper(HELPER_NAMES[function], kind)}({', '.join(v.text for v in values)})", kind
@@ -1077,6 +1080,8 @@ def syntax(text: str, mode: Literal["exec", "eval"] = "exec") -> Any:
 def parsed(function: Any) -> tuple[FunctionType, ast.FunctionDef]:
     """Return a Python function, compiled or not, and its syntax tree."""
     written = getattr(function, "py_func", function)
+    if of_numpy(written):
+        raise refuse(None, f"numpy's {function.__name__}")
     if not isinstance(written, FunctionType):
         raise refuse(None, f"{getattr(function, '__name__', function)}, which is not a Python function,")
     try:
@@ -1086,6 +1091,11 @@ def parsed(function: Any) -> tuple[FunctionType, ast.FunctionDef]:
     if not isinstance(tree, ast.FunctionDef):
         raise refuse(tree, "a function without def")
     return written, tree
+
+
+def of_numpy(function: Any) -> bool:
+    """Return whether a function is one of numpy's own."""
+    return str(getattr(function, "__module__", "")).partition(".")[0] == "numpy"
 
 
 def names_in(nodes: Iterable[ast.AST]) -> set[str]:
@@ -1122,11 +1132,32 @@ def refuse(node: ast.AST | None, what: str) -> Untranslatable:
     )
 
 
+def resolved(node: ast.expr, known: Mapping[str, Any]) -> Any:
+    """Return the value of a name, dotted or not, among known names and Python's own; None for another expression."""
+    if isinstance(node, ast.Name):
+        return known.get(node.id, getattr(builtins, node.id, None))
+    if isinstance(node, ast.Attribute) and isinstance(module := resolved(node.value, known), ModuleType):
+        return getattr(module, node.attr, None)
+    return None
+
+
 def may_return_argument(function: Any) -> bool:
-    """Return whether a function may return one of its arguments, or a part of it."""
+    """Return whether a function may return one of its arguments, or a part of it, and not only what it computes."""
     written = getattr(function, "py_func", function)
-    fresh = getattr(written, "__module__", "") == joint_law.__name__ and function is not joint_law.torque
-    return isinstance(written, FunctionType) and not fresh
+    if not isinstance(written, FunctionType) or of_numpy(written):
+        return False
+    if written.__module__ == joint_law.__name__:
+        return function is joint_law.torque
+
+    def may_share(value: Any) -> bool:
+        match value:
+            case ast.Tuple():
+                return any(map(may_share, value.elts))
+            case ast.Call():
+                return may_return_argument(resolved(value.func, written.__globals__))
+        return not isinstance(value, ast.BinOp | ast.UnaryOp | ast.Compare | ast.Constant)
+
+    return any(may_share(node.value) for node in ast.walk(parsed(function)[1]) if isinstance(node, ast.Return))
 
 
 def assigned(node: ast.AST) -> set[str]:

@@ -70,8 +70,9 @@ def live(
 
 
 def _library(chosen: Sequence[Plant]) -> list[Component]:
-    """Return the library's laws that suit a plant, surfaces, but those for actuators with a lag, and estimators."""
+    """Return the library's laws that suit one of the plants, its surfaces and its velocity estimators."""
     laws = [find_law(name) for name in dict.fromkeys(name for plant in chosen for name in laws_for(plant))]
+    # surfaces that read an acceleration are for actuators with a lag, which the page does not have
     surfaces = [template() for template in surface.catalogue().values() if "a" not in reads(template)]
     return [*laws, *surfaces, *(template() for template in estimator.catalogue().values())]
 

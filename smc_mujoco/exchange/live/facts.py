@@ -230,16 +230,25 @@ def _skins(plant: Plant) -> list[dict[str, Any]]:
         for column, bone in enumerate(bones):
             at = slice(model.skin_bonevertadr[bone], model.skin_bonevertadr[bone] + model.skin_bonevertnum[bone])
             weights[model.skin_bonevertid[at], column] = model.skin_bonevertweight[at]
-        names = [model.body(int(model.skin_bonebodyid[bone])).name for bone in bones]
-        poses = [(model.skin_bonebindpos[bone].tolist(), model.skin_bonebindquat[bone].tolist()) for bone in bones]
-        skins.append({
-            "rgba": model.mat_rgba[model.skin_matid[i]].tolist(),
-            "vertices": model.skin_vert[first : first + count].round(5).ravel().tolist(),
-            "faces": model.skin_face[face : face + faces].ravel().tolist(),
-            "weights": weights.round(5).ravel().tolist(),
-            "bones": [{"body": n, "position": p, "quaternion": q} for n, (p, q) in zip(names, poses, strict=True)],
-        })  # fmt: skip
+        skins.append(
+            {
+                "rgba": model.mat_rgba[model.skin_matid[i]].tolist(),
+                "vertices": model.skin_vert[first : first + count].round(5).ravel().tolist(),
+                "faces": model.skin_face[face : face + faces].ravel().tolist(),
+                "weights": weights.round(5).ravel().tolist(),
+                "bones": [_bone(model, bone) for bone in bones],
+            }
+        )
     return skins
+
+
+def _bone(model: mujoco.MjModel, bone: int) -> dict[str, Any]:
+    """Return the body that a bone of a skin follows, and its pose when the skin is at rest."""
+    return {
+        "body": model.body(int(model.skin_bonebodyid[bone])).name,
+        "position": model.skin_bonebindpos[bone].tolist(),
+        "quaternion": model.skin_bonebindquat[bone].tolist(),
+    }
 
 
 def _part(model: mujoco.MjModel, field: Field) -> dict[str, Any]:

@@ -277,6 +277,26 @@ def test_masses_and_frictions_stay_physical():
     assert {name: each.least for name, each in ranges.items()} == {"M": 1e-6, "b": 0.0, "cf": 0.0, "offset": -math.inf}
 
 
+def test_the_twin_of_a_run_has_the_whole_machine_of_the_run():
+    machine = {
+        "control_period": 2e-3,
+        "friction": smc.Coulomb(0.1),
+        "contact": smc.Contact("floor"),
+        "actuator": smc.Lag(0.02),
+        "sensor": smc.Encoder(counts=512),
+        "u_max": 7.0,
+        "input_delay": 4e-3,
+        "velocity": "levant",
+        "model": "nominal",
+    }
+    plain = smc.Scenario(plant="inverted_pendulum", law="classical", duration=0.1)
+    run = smc.run(dataclasses.replace(plain, **machine))
+    twin, _ = identification._twin(plain.plant, [run])
+    for name in machine:
+        assert getattr(twin.scenario("classical"), name) == getattr(run.scenario, name), name
+        assert getattr(run.scenario, name) != getattr(plain, name), name
+
+
 def test_columns_of_a_plant_s_record_are_those_of_its_channels():
     columns = identification._of_plant(smc.plant("pendulum_network"), None).columns
     assert (columns.x, columns.u, columns.reference) == (("x0", "x1", "x2", "x3", "x4"), "u0", "r0")
