@@ -41,18 +41,15 @@ class PlantPhysics(Physics):
     """dm_control's physics, without its exception for a plant that diverges."""
 
     step_counts: Iterable[int] = ()  # from `Episode.apply_action`
-    step_context: contextlib.AbstractContextManager[None] = contextlib.nullcontext()
 
     def step(self, nstep: int = 1) -> None:
         """Take physics steps. Those of an action are taken one by one if `DriveStep` simulates a drive."""
         step_counts, self.step_counts = self.step_counts, ()
-        context, self.step_context = self.step_context, contextlib.nullcontext()
-        with context:
-            for steps in step_counts:
-                super().step(steps)
-                nstep -= steps
-            if nstep > 0:  # a user may step without a command
-                super().step(nstep)
+        for steps in step_counts:
+            super().step(steps)
+            nstep -= steps
+        if nstep > 0:  # a user may step without a command
+            super().step(nstep)
 
     @contextlib.contextmanager
     def check_invalid_state(self) -> Iterator[None]:
@@ -74,7 +71,6 @@ class PlantTask(Episode, control.Task):
     def before_step(self, action: Any, physics: PlantPhysics) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Apply the action."""
         physics.step_counts = self.apply_action(physics.data.ptr, action)
-        physics.step_context = self.with_friction(physics.data.ptr)
 
     def after_step(self, physics: Physics) -> None:
         """Count the sample and read the state."""

@@ -5,7 +5,6 @@ and held for one control period; it saturates outside [-1, 1]. The limit is u_ma
 An environment has no law, no noise, delay or encoder, and no disturbances, contacts or jumps.
 """
 
-import contextlib
 import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -14,13 +13,12 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
-from smc_mujoco.envs.formula_friction import FormulaFriction
 from smc_mujoco.envs.tasks import TASKS, Pair, rest, reward, starts, tasks
 from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, compiled_for_runs
-from smc_mujoco.simulation import callback, coerce
+from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.model import channels
@@ -57,6 +55,9 @@ class Setting:
         self.scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes)).resolved
         if self.scenario.drive_step and self.scenario.drive_step.ripple:
             raise ScenarioError("environments have no DCMotor with a ripple: give ripple=0")
+        if self.scenario.formula_friction is not None:
+            name = type(self.scenario.formula_friction).__name__
+            raise ScenarioError(f"friction {name} is a formula, which environments lack: give Coulomb, Viscous or LuGre")
         if math.inf in self.scenario.limits:
             raise ScenarioError("u_max is inf: give a finite one, because actions are fractions of it")
         fixed = np.array(self.scenario.x0)
@@ -117,10 +118,6 @@ class Setting:
             ctrl[..., self.ctrl] = self.scale * force
             yield 1
 
-    def formula_friction(self, count: int = 1) -> FormulaFriction | None:
-        """Return the friction by a formula of `count` simulations; None without one."""
-        return None if self.scenario.formula_friction is None else FormulaFriction(self.scenario, self.model, count)
-
     def draw_start(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
         """Return a start, x and v, (n,) each: drawn from a numpy generator, or set by the options x0 and v0."""
         x, v = random.uniform(self.low, self.high), np.array(self.scenario.v0)
@@ -165,7 +162,6 @@ class Episode:
         self.sample = 0  # control samples since the episode began
         self.drive_states = np.zeros((2, *setting.action_shape))  # of `DriveStep`
         self.x = self.v = np.zeros(setting.scenario.plant.n)
-        self.friction = setting.formula_friction()
 
     def begin(self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None) -> None:
         """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
@@ -174,13 +170,7 @@ class Episode:
         self.setting.write_start(data.qpos, data.qvel, x, v)
         self.episodes, self.sample = self.episodes + 1, 0
         self.drive_states[:] = self.setting.drive_start(data.qvel)
-        if self.friction:
-            self.friction.begin([0])
         self.read_state(data)
-
-    def with_friction(self, data: mujoco.MjData) -> contextlib.AbstractContextManager[None]:
-        """Return the context of physics steps, in which a friction by a formula acts, if there is one."""
-        return self.friction.with_friction(data) if self.friction else contextlib.nullcontext()
 
     def apply_action(self, data: mujoco.MjData, action: Any) -> Iterator[int]:
         """Apply an action over a control period, see `Setting.apply_command`."""
@@ -189,7 +179,7 @@ class Episode:
     def read_state(self, data: mujoco.MjData) -> None:
         """Read the state."""
         self.x, self.v = data.qpos[self.setting.qpos], data.qvel[self.setting.qvel]
-        self.diverged = bool(self.setting.diverged(self.x, self.v)) or bool(self.friction and self.friction.failed[0])
+        self.diverged = bool(self.setting.diverged(self.x, self.v))
 
     def reward_and_info(self) -> tuple[float, dict[str, Any]]:
         """Return the reward of the state, in [0, 1], and the info of gymnasium; 0 and NaN after a divergence."""
@@ -249,7 +239,7 @@ def _compiled(scenario: Resolved, edit: Callable[[mujoco.MjSpec], None]) -> mujo
     """Return the model of a scenario. `edit` changes its mechanism before."""
     spec = models.spec(scenario)
     edit(spec)
-    model = compiled_for_runs(spec, 0 if scenario.formula_friction is None else callback.USERDATA)
+    model = compiled_for_runs(spec, 0)
     model.opt.timestep = scenario.physics_step
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenario.integrator.upper()}")
     return models.with_values(model, scenario)

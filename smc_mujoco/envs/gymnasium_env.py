@@ -96,9 +96,8 @@ class PlantEnv(TimeLimited, Episode, gymnasium.Env):  # pyright: ignore[reportIn
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Take one control period. Return observation, reward, terminated, truncated and the info."""
-        with self.with_friction(self.data):
-            for steps in self.apply_action(self.data, action):
-                mujoco.mj_step(self.setting.model, self.data, steps)
+        for steps in self.apply_action(self.data, action):
+            mujoco.mj_step(self.setting.model, self.data, steps)
         self.sample += 1
         self.read_state(self.data)
         observation = self.setting.observe(self.x, self.v, self.sample)

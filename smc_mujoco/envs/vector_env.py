@@ -20,15 +20,14 @@ from smc_mujoco.envs.gymnasium_env import TimeLimited, action_space, observation
 from smc_mujoco.envs.tasks import Pair, reward
 from smc_mujoco.mechanisms.custom.plant_from import smooth
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Plant
-from smc_mujoco.simulation import callback  # also imports mujoco.batch without a callback
 from smc_mujoco.simulation.model import without_scenery
-from smc_mujoco.simulation.run import cores
+from smc_mujoco.simulation.run import cores  # also imports mujoco.batch without a callback
 
 # isort: split
 from gymnasium.utils import seeding  # already imported by gymnasium_env
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
-from mujoco.batch import Batch, SimulationError  # already imported by callback
+from mujoco.batch import Batch, SimulationError  # already imported with simulation.run
 
 MAX_COPIES = 1_000_000  # a larger number is a mistake
 SEEDS = 2**64
@@ -70,10 +69,7 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         self.single_observation_space = observation_space(self.setting)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.friction = self.setting.formula_friction(self.num_envs)
-        workers = min(cores(threads), self.num_envs)
-        persistent = self.friction is not None  # it reads the forces of the previous step
-        self.batch = Batch(self.setting.model, self.num_envs, workers, persistent=persistent)
+        self.batch = Batch(self.setting.model, self.num_envs, min(cores(threads), self.num_envs))
         self.qpos, self.qvel, self.ctrl = (self.batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
         self.drive_states = np.zeros((2, self.num_envs, *self.setting.action_shape))  # of `DriveStep`
         self.randoms: list[np.random.Generator] = []
@@ -122,22 +118,18 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
             self.setting.write_start(self.qpos[i], self.qvel[i], *self.setting.draw_start(self.randoms[i], options))
         self.samples[mask], self.ended[mask] = 0, False
         self.drive_states[:, mask] = self.setting.drive_start(self.qvel[mask])
-        if self.friction:
-            self.friction.begin(ids)
-            self.batch.bind("userdata")[ids] = self.friction.userdata[ids]
 
     def advance(self, ids: np.ndarray | None, commands: np.ndarray) -> np.ndarray:
         """Take one control period in the copies `ids`, None for all. Return those that failed, (num_envs,) of bool."""
         failed = np.zeros(self.num_envs, bool)
         for steps in self.setting.apply_command(self.ctrl, commands, self.drive_states, self.qvel):
             try:
-                # a Batch refuses Python callbacks, which runs of other threads may have set
-                with callback.installed() if self.friction else mjcb.installed(None):
+                with mjcb.installed(None):  # a Batch refuses Python callbacks, which runs of other threads may have set
                     self.batch.step(ids, nstep=steps)
             except SimulationError as error:
                 failed[list(error.ids)] = True
                 ids = np.setdiff1d(np.arange(self.num_envs) if ids is None else ids, error.ids).astype(np.int32)
-        return failed | self.friction.failed if self.friction else failed
+        return failed
 
     def observe(self, diverged: np.ndarray | None = None) -> np.ndarray:
         """Return the observations of all copies, (num_envs, observation_size)."""

@@ -53,9 +53,6 @@ def control(address, sim, data):
     sim.calls = calls + 1
     if sim.failure != record.FINE:
         return
-    if sim.agent != 0:
-        sim.failure = _apply_friction(address, sim, data)
-        return
     stages, steps = sim.stages, sim.steps
     step, stage = calls // stages, calls % stages
     k, within = step // steps, step % steps

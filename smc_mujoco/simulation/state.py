@@ -103,8 +103,6 @@ SIMULATION = np.dtype(
         ("laws", "i8"), ("references", "i8"),
         # address of the FUNCTIONs (n,) of a friction by a formula, whose memory is stiffness and damping; 0: none
         ("frictions", "i8"),
-        # whether an agent acts in an environment: then the callback computes a friction by a formula, and nothing else
-        ("agent", "i8"),
         # the drive as the nominal model knows it: force = gain u - drag v
         ("drive_gain", "f8"), ("drive_drag", "f8"),
         # what has been measured, and the address of estimated accelerations, (n,)

@@ -158,15 +158,6 @@ def test_the_reward_is_one_at_the_goal_and_small_far_from_it(plant, task, goal, 
     )
 
 
-def test_an_arm_with_its_friction_moves_as_in_its_run():
-    arm = smc.plant("panda")
-    environment = suite.load("panda", changes={"friction": arm.friction, "duration": 0.2, "x0": arm.x0})
-    law = smc.law("computed_torque_sliding", k=50.0, c=10.0, width=0.4)
-    trace = smc.run(run_of(environment.task.setting, law))  # pyright: ignore[reportAttributeAccessIssue]
-    assert np.abs(trace.reaction).max() > 0.2
-    assert np.abs(driven_by_dm(environment, smc.agent(law, environment)) - columns(trace)).max() < 1e-12
-
-
 def test_tracking_is_rewarded_where_the_plant_follows():
     found = Setting("cart_pole", "track", {"reference": smc.Sine(0.5, 2.0)})
     r, dr, _ = found.reference(300)

@@ -1,7 +1,6 @@
 """gymnasium environments, single and in batches: the physics of smc.run, its own checkers pass, ids are found."""
 
 import copy
-import dataclasses
 import os
 import pickle
 import subprocess
@@ -14,7 +13,6 @@ from helpers.episodes import LAW, SHORT, columns, driven_by_gym, one_of_each, ru
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.envs import registration, tasks
-from smc_mujoco.mechanisms.hardware.sliding import Sliding
 
 gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
 
@@ -61,87 +59,6 @@ def test_friction_and_drives_hold_in_a_batch_too(drives):
         for _ in range(100):
             o, *_ = many.step([[1.0], [0.0]])
             assert np.abs(o[0] - single.step([1.0])[0]).max() < 1e-12
-
-
-ARM = {"friction": smc.plant("panda").friction, "duration": 0.06}
-
-
-def test_an_arm_with_its_friction_moves_as_in_its_run():
-    """Joints turn back and stick on the way."""
-    single = PlantEnv("panda", "track", ARM | {"duration": 0.3, "x0": smc.plant("panda").rest})
-    law = smc.law("computed_torque_sliding", k=50.0, c=10.0, width=0.4)
-    trace = smc.run(run_of(single.setting, law))
-    assert np.abs(trace.reaction).max() > 0.2
-    assert np.abs(driven_by_gym(single, smc.agent(law, single)) - columns(trace)).max() < 1e-12
-
-
-SERVO = smc.servo("mx106", "m6")  # its friction reads the motor's torque of the step before
-
-
-@pytest.mark.parametrize(
-    ("plant", "changes"),
-    [("panda", ARM), ("inverted_pendulum", ARM | {"friction": SERVO.friction, "actuator": SERVO.motor})],
-)
-def test_a_batch_has_the_friction_of_single_environments_in_every_episode(plant, changes):
-    many, random = BatchEnv(plant, 2, changes=changes), np.random.default_rng(0)
-    singles = [PlantEnv(plant, changes=changes) for _ in range(2)]
-    many.reset(seed=5)
-    for i, one in enumerate(singles):
-        one.reset(seed=5 + i)
-    for k in range(150):
-        u = 0.05 * random.uniform(-1.0, 1.0, many.action_space.shape)
-        o, _, _, truncated, _ = many.step(u)
-        over = k % 61 == 60  # the batch begins its next episodes in the step after the last one
-        expected = [one.reset()[0] if over else one.step(each)[0] for one, each in zip(singles, u, strict=True)]
-        assert np.abs(o - expected).max() < 1e-12
-        assert truncated.all() == (k % 61 == 59)
-
-
-def test_an_arm_with_friction_is_copied_and_sent_away_while_its_joints_stick():
-    one = PlantEnv("panda", changes=ARM | {"x0": smc.plant("panda").rest})
-    one.reset(seed=0)
-    for _ in range(3):
-        one.step(np.zeros(7))
-    assert np.any(one.friction.states(0))  # pyright: ignore[reportOptionalMemberAccess]
-    others = [copy.deepcopy(one), pickle.loads(pickle.dumps(one))]
-    expected = [one.step(np.full(7, 0.02))[0] for _ in range(20)]
-    for other in others:
-        assert np.array_equal([other.step(np.full(7, 0.02))[0] for _ in range(20)], expected)
-
-
-@dataclasses.dataclass(frozen=True)
-class Slippery(Sliding):
-    """A friction that raises above 0.1 rad/s."""
-
-    @staticmethod
-    def value(v, motor, load, p):
-        if abs(v) > 0.1:
-            raise ValueError("too fast")
-        return 0.0, -1e-3, 1e-3
-
-
-@dataclasses.dataclass(frozen=True)
-class Untyped(Sliding):
-    """A friction that numba refuses."""
-
-    @staticmethod
-    def value(v, motor, load, p):
-        return float(str(v)), 0.0, 0.0
-
-
-def test_a_friction_that_raises_ends_its_episode_and_the_next_one_begins(refused):
-    changes = {"friction": Slippery(), "duration": 1.0, "x0": 0.0}
-    one, many = PlantEnv("duffing", changes=changes), BatchEnv("duffing", 2, changes=changes)
-    many.reset(seed=0)
-    for _ in range(2):
-        one.reset(seed=0)
-        ends = [one.step([1.0])[1:3] for _ in range(40)]
-        assert (0.0, True) in ends
-        assert ends[0][1] is False
-    found = [many.step([[1.0], [0.0]])[2].tolist() for _ in range(40)]
-    assert found[0] == [False, False]
-    assert found[found.index([True, False]) + 1] == [False, False]  # the first copy begins a new episode
-    refused(lambda: PlantEnv("duffing", changes={"friction": Untyped()}))
 
 
 class Giving(Batch):
@@ -503,6 +420,7 @@ except ValueError as error:
 def test_bad_input_is_one_sentence(refused):
     for make in (
         lambda: PlantEnv("duffing", render_mode="human"),
+        lambda: PlantEnv("panda", changes={"friction": smc.plant("panda").friction}),
         lambda: PlantEnv("duffing").reset(options={"x1": 0.0}),
         lambda: PlantEnv("duffing").reset(options={"x0": [0.0, 1.0]}),
         lambda: PlantEnv("duffing").step([0.0, 0.0]),
