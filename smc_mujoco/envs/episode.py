@@ -57,7 +57,7 @@ class Setting:
             raise ScenarioError("environments have no DCMotor with a ripple: give ripple=0")
         if self.scenario.formula_friction is not None:
             name = type(self.scenario.formula_friction).__name__
-            raise ScenarioError(f"friction {name} is a formula, which environments lack: give Coulomb, Viscous or LuGre")
+            raise ScenarioError(f"friction {name} is a formula, which environments lack: give Coulomb or LuGre")
         if math.inf in self.scenario.limits:
             raise ScenarioError("u_max is inf: give a finite one, because actions are fractions of it")
         fixed = np.array(self.scenario.x0)
