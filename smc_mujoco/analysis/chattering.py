@@ -326,7 +326,6 @@ def _stable(loop: Loop, balances: Sequence[Balance]) -> list[Balance]:
 
 
 def _decays(loop: Loop, amplitude: float, omega: float) -> bool:
-
     def product(a: float, w: float) -> complex:
         return cmath.log(loop.gain(a, w) * loop.response(w) or SMALLEST)
 

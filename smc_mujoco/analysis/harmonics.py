@@ -100,8 +100,13 @@ class Loop:
         ideal = dataclasses.replace(
             self.scenario,
             actuator=None if motor is None else dataclasses.replace(motor, inductance=0.0),
-            contact="none", x0=None, v0=None, jump=None, integrator=s.integrator, physics_step=s.physics_step,
-        )  # fmt: skip
+            contact="none",
+            x0=None,
+            v0=None,
+            jump=None,
+            integrator=s.integrator,
+            physics_step=s.physics_step,
+        )
         with installed(None):
             model = models.with_values(models.compile_model(ideal), ideal)
             model.opt.disableflags |= NONLINEAR_FLAGS

@@ -224,9 +224,13 @@ def _worst(
 
 
 def _contest(
-    table: Table, worst: Mapping[str, Sequence[WorstCase]], candidates: Mapping[str, Candidate], plant: Plant,
-    needs: Sequence[str], relevant: float,
-) -> tuple[Comparison, tuple[Choice, ...]]:  # fmt: skip
+    table: Table,
+    worst: Mapping[str, Sequence[WorstCase]],
+    candidates: Mapping[str, Candidate],
+    plant: Plant,
+    needs: Sequence[str],
+    relevant: float,
+) -> tuple[Comparison, tuple[Choice, ...]]:
     """Compare laws over all needs and conditions; those that are not fit come last, with NaN for a rank."""
     (group,) = paired_runs.groups(table, by=("plant",))
     runs = Runs(table, group, worst)

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from smc_mujoco.analysis.paired_runs import SETTLES
+from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.ranking import RELEVANT, checked_share
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown, whole
@@ -35,7 +35,7 @@ from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.fair_gains import Candidate, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard
 from smc_mujoco.studies.noise_key import DRAWN
-from smc_mujoco.studies.study import FULL, QUICK
+from smc_mujoco.studies.study import FULL, QUICK, Extent
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.trial import Trial
 
@@ -56,24 +56,14 @@ class Compared(Tables):
     table: Table  # a row for each run, with all its scores, as `smc.study` returns it
     # Plant -> the laws with all sets of gains that their runs used, and remarks on them
     candidates: Mapping[str, Sequence[Candidate]]
-    metrics: tuple[str, ...]  # names of the metrics that are compared
-    defaults: bool  # whether a winner may be named over laws with default gains
-    relevant: float  # the least relevant difference, as a share of the larger value
-    out: Path  # the folder with the gains and the runs
+    # A board for each metric on each plant in each condition, or on each plant if these are more than 12
+    leaderboard: Boards
     worst: "Mapping[str, Mapping[str, WorstCase]]"  # plant -> law -> its `worst_case`; empty if it was not searched
 
     @property
     def gains(self) -> dict[str, dict[str, Law]]:
         """Plant -> law -> the law with its best gains; `gains["duffing"]["classical"].source` says their source."""
         return {plant: {c.law.name: c.law for c in laws} for plant, laws in self.candidates.items()}
-
-    @functools.cached_property
-    def leaderboard(self) -> Boards:
-        """A board for each metric on each plant in each condition, or on each plant if these are more than 12."""
-        blocks = set(zip(self.table.column("plant").tolist(), self.table.column("condition").tolist(), strict=True))
-        by = ("plant", "condition") if len(blocks) <= MAX_BLOCKS else ("plant",)
-        options: dict[str, Any] = {"defaults": self.defaults, "relevant": self.relevant, "worst": self.worst}
-        return leaderboard(self.table, self.metrics, by, **options)
 
     @functools.cached_property
     def traces(self) -> list[Trace]:
@@ -185,13 +175,25 @@ def compare(
     laws: str | Law | Template | Sequence[str | Law | Template] | None = None,
     plants: str | Plant | Sequence[str | Plant] | None = None,
     conditions: str | Condition | Sequence[str | Condition] | None = None,
-    seeds: int = 16, tune: bool = True, worst: "bool | Uncertainty" = False,
-    executor: "executors.Workers | None" = None, *,
-    out: str | os.PathLike[str] = "compared", metrics: Sequence[str] = METRICS,
-    duration: float | None = None, starts: Starts | None = None, gains: str = "tuned", budget: int | None = None,
-    quick: bool = False, defaults: bool = False, relevant: float = RELEVANT, traces: str = "none",
-    fresh: bool = False, noise_key: int | str = DRAWN, threads: int | None = None, progress: bool = True,
-) -> Compared:  # fmt: skip
+    seeds: int = 16,
+    tune: bool = True,
+    worst: "bool | Uncertainty" = False,
+    executor: "executors.Workers | None" = None,
+    *,
+    out: str | os.PathLike[str] = "compared",
+    metrics: Sequence[str] = METRICS,
+    duration: float | None = None,
+    starts: Starts | None = None,
+    gains: str = "tuned",
+    budget: int | None = None,
+    quick: bool = False,
+    defaults: bool = False,
+    relevant: float = RELEVANT,
+    traces: str = "none",
+    noise_key: int | str = DRAWN,
+    threads: int | None = None,
+    progress: bool = True,
+) -> Compared:
     """Compare laws on plants in conditions, with gains by one rule for all, and say which is better and how sure it is.
 
     A law whose gains you gave keeps them. Any other law, yours too, has those that come with the package for the plant,
@@ -214,42 +216,56 @@ def compare(
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
       budget: largest number of sets of gains that a tuning tries. Default: that of `tune`, if quick a third of it.
       quick: shorter runs and searches; by default three plants and three conditions.
-      fresh: whether to remove the runs that are in the folder first.
       threads, progress: as in `run`.
 
     Raises:
       ScenarioError: an unknown name, or arguments that `grid`, `study` or `leaderboard` refuse.
     """
-    extent = QUICK if quick else FULL
     count, relevant = whole("seeds", seeds, 1, MAX_ITEMS), checked_share(relevant)
-    length = extent.duration if duration is None else checked("duration", duration, above=0.0)
-    tries = search.BUDGET // (3 if quick else 1) if budget is None else whole("budget", budget, 1, MAX_ITEMS)
     workers = executors.as_executor("local" if executor is None else executor)
     _check_names(metrics, gains, out)
-    machines = [as_plant(plant) for plant in (extent.plants if plants is None else listed("plants", plants))]
-    given = applicable(extent.conditions, machines, length) if conditions is None else listed("conditions", conditions)
-    trial = Trial(machines, [find_condition(name) for name in given], length, starts, Path(out), threads, progress)
-    candidates = trial.gains(
-        _checked(trial, laws), tries, tune=tune and gains == "tuned", gains=gains, shipped_budget=budget is None
-    )
-    return Compared(
-        table=trial.run(candidates, count, executor=workers, resume=not fresh, traces=traces, noise_key=noise_key),
-        candidates=candidates,
-        metrics=tuple(metrics),
-        defaults=defaults,
-        relevant=relevant,
-        out=trial.folder,
-        worst=_worst_cases(trial, candidates, None if worst is True else worst, duration) if worst else {},
-    )
+    trial = _trial(QUICK if quick else FULL, plants, conditions, duration, starts, Path(out), threads, progress)
+    candidates = _candidates(trial, laws, tune, gains, budget, search.BUDGET // (3 if quick else 1))
+    table = trial.run(candidates, count, executor=workers, traces=traces, noise_key=noise_key)
+    found = _worst_cases(trial, candidates, None if worst is True else worst, duration) if worst else {}
+    by = paired_runs.GROUPS if len(trial.plants) * len(trial.conditions) <= MAX_BLOCKS else ("plant",)
+    boards = leaderboard(table, metrics, by, defaults, relevant, found)
+    return Compared(table=table, candidates=candidates, leaderboard=boards, worst=found)
 
 
 def _check_names(metrics: Sequence[str], gains: str, out: object) -> None:
     """Raise ScenarioError for an unknown metric or set of gains, or for what is no path of a folder."""
     for name in items_of("metrics", metrics):
-        find("metric", name, dict.fromkeys((SETTLES, *CATALOGUE)))
+        find("metric", name, dict.fromkeys((paired_runs.SETTLES, *CATALOGUE)))
     find("set of gains", gains, gain_sets.KNOWN_SETS)
     if not isinstance(out, str | os.PathLike):
         raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
+
+
+def _trial(
+    extent: Extent,
+    plants: str | Plant | Sequence[str | Plant] | None,
+    conditions: str | Condition | Sequence[str | Condition] | None,
+    duration: float | None,
+    starts: Starts | None,
+    out: Path,
+    threads: int | None,
+    progress: bool,
+) -> Trial:
+    """Return what laws are compared on; what is not given is that of an extent."""
+    length = extent.duration if duration is None else checked("duration", duration, above=0.0)
+    machines = [as_plant(plant) for plant in (extent.plants if plants is None else listed("plants", plants))]
+    given = applicable(extent.conditions, machines, length) if conditions is None else listed("conditions", conditions)
+    return Trial(machines, [find_condition(name) for name in given], length, starts, out, threads, progress)
+
+
+def _candidates(
+    trial: Trial, laws: Any, tune: bool, gains: str, budget: int | None, default_budget: int
+) -> dict[str, list[Candidate]]:
+    """Return plant -> its laws with gains."""
+    tries = default_budget if budget is None else whole("budget", budget, 1, MAX_ITEMS)
+    options: dict[str, Any] = {"tune": tune and gains == "tuned", "gains": gains, "shipped_budget": budget is None}
+    return trial.gains(_checked(trial, laws), tries, **options)
 
 
 def _worst_cases(

@@ -86,13 +86,8 @@ def _known(plant: Plant, law: Component | Template, gains: str) -> Candidate | N
     if not law.gains or gains == "default":
         return _default(law)
     library = plants_known().get(plant.name)
-    same_plant = library is not None and library.parameters == plant.parameters
-    if (
-        same_plant
-        and catalogue().get(law.name) is law
-        and not plant.unscaled
-        and gain_sets.in_set(plant, law.name, gains)
-    ):
+    ours = catalogue().get(law.name) is law and library is not None and library.parameters == plant.parameters
+    if ours and not plant.unscaled and gain_sets.in_set(plant, law.name, gains):
         count = 1 if gains == "study" else len(gain_sets.tuned(plant, law.name, gains).sets)
         sets = tuple(gain_sets.law(plant, law.name, gains, seed) for seed in range(count))
         return Candidate(sets[0], sets)

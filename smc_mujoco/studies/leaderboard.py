@@ -93,9 +93,15 @@ def _check_worst(table: Columns, worst: "Mapping[str, Mapping[str, WorstCase]]")
 
 
 def _board(
-    group: Group, scores: Scores, ran: "Sequence[Scenario | None]", metric: str, comparison: Comparison,
-    untuned: tuple[str, ...], sources: Mapping[str, tuple[Source, ...]], family: int,
-) -> Board:  # fmt: skip
+    group: Group,
+    scores: Scores,
+    ran: "Sequence[Scenario | None]",
+    metric: str,
+    comparison: Comparison,
+    untuned: tuple[str, ...],
+    sources: Mapping[str, tuple[Source, ...]],
+    family: int,
+) -> Board:
     """Return the board of a comparison, whose limits are corrected for `family` comparisons."""
     unit = UNITS[metric]
     if all((scenario := ran[k]) is not None and scenario.voltage_motor for k in scores.blocks):

@@ -107,9 +107,15 @@ def _recording(trace: Trace) -> Recording:
     """Return a trace without the code of law, surface and estimator. A law of the same kind, at rest, stands for it."""
     s = trace.scenario
     placeholder = Component(
-        kind="law", name="recorded", gains={}, memory=1, function=_at_rest, joint=s.law.joint,
-        requires_model=s.law.requires_model, relative_degree=s.law.relative_degree,
-    )  # fmt: skip
+        kind="law",
+        name="recorded",
+        gains={},
+        memory=1,
+        function=_at_rest,
+        joint=s.law.joint,
+        requires_model=s.law.requires_model,
+        relative_degree=s.law.relative_degree,
+    )
     bare = dataclasses.replace(s, law=placeholder, surface=None, velocity=estimator("measured"))
     exact = s.resolved.model == "none" or bool(prepare(s).why_not)
     return Recording(bare, exact, trace.x, trace.v, trace.u, trace.s)
@@ -131,9 +137,13 @@ def _in_fresh_process(task: str, arguments: object) -> Any:
     code = "from smc_mujoco.studies.replay import serve; serve()"
     try:
         done = subprocess.run(
-            [sys.executable, "-c", code, task], input=pickle.dumps(arguments), capture_output=True,
-            timeout=TIMEOUTS[task], env=environment, check=False,
-        )  # fmt: skip
+            [sys.executable, "-c", code, task],
+            input=pickle.dumps(arguments),
+            capture_output=True,
+            timeout=TIMEOUTS[task],
+            env=environment,
+            check=False,
+        )
     except subprocess.TimeoutExpired:
         raise ScenarioError(f"a replay took more than {TIMEOUTS[task]:g} s: replay fewer traces at a time") from None
     if done.returncode:

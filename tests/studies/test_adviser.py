@@ -125,6 +125,10 @@ def test_robust_goes_by_the_worst_found_and_tells_the_median_too(folder, monkeyp
     said = text(made)
     assert f"Robust: worst found rms error {alone[first].words}; no law is better." in said
     assert "worst found in 18 runs of each law in each condition, half of them random, within |d| <= 2 N" in said
+    slow = alone["slow"]
+    assert slow.median < alone[first].median
+    median = f"would put slow first, with {number(slow.median)} m: its worst found is {slow.words}."
+    assert f"The median of the random runs {median}" in said
     assert made.tables[0].rows[0][3][:3] == (number(alone[first].value), f"median {number(alone[first].median)}", True)
     both = smc.which("duffing", needs="fast,robust", conditions="nominal", duration=2.5, seeds=6, **options)
     tested = ranking.compare({law: both.comparison.cells[i, :1] for i, law in enumerate(both.comparison.laws)})
@@ -268,6 +272,15 @@ def test_the_reason_names_dominance_where_a_better_mean_rank_is_passed_over(advi
     assert "the best mean rank of 3 laws" in found.answer[1]
     passed = dataclasses.replace(found, choices=(found.choices[0], worse, *found.choices[2:]))
     assert "the best mean rank of those that none dominates, being better somewhere" in passed.answer[1]
+
+
+def test_the_reason_names_laws_with_the_same_mean_rank(advice):
+    first, *others = advice.choices
+    equal = [dataclasses.replace(choice, rank=choice.rank._replace(mean=first.rank.mean)) for choice in others]
+    names = [choice.law.name for choice in equal]
+    for same, ending in ((1, f", as has {names[0]}."), (2, f", as have {names[0]} and {names[1]}.")):
+        found = dataclasses.replace(advice, choices=(first, *equal[:same], *others[same:]))
+        assert f"the best mean rank of 3 laws{ending}" in found.answer[1]
 
 
 def test_a_table_has_a_row_for_each_law_with_intervals(advice):

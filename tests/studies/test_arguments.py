@@ -59,7 +59,7 @@ ASKED = [
     lambda: smc.compare(LAWS, quick=True, seeds=2, progress=False),
     lambda: smc.compare(
         ["classical", smc.law("pid", kp=20.0)], "cart_pole", "noise", 3, tune=False, gains="study", budget=30,
-        out="mine", traces="all", fresh=True, noise_key=5, threads=2, duration=2.0, executor="dask://host:1",
+        out="mine", traces="all", noise_key=5, threads=2, duration=2.0, executor="dask://host:1",
     ),
     lambda: smc.compare(["classical"], "duffing", "noise", 3, gains="tracking", quick=True, budget=12),
 ]  # fmt: skip

@@ -17,6 +17,7 @@ from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.units import FORCE, RATE, Gain
 from smc_mujoco.studies import executors, fair_gains, worst_case
+from smc_mujoco.studies.leaderboard import METRICS
 
 pytestmark = pytest.mark.usefixtures("replayed_here")
 SHORT = {"duration": 0.5, "budget": 48, "progress": False}
@@ -44,10 +45,14 @@ def searched_shortly():
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory):
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("compared")
+
+
+@pytest.fixture(scope="module")
+def found(folder):
     laws = [my_law, "classical", smc.law("pid", kp=20.0)]
-    out = tmp_path_factory.mktemp("compared")
-    return smc.compare(laws, PLANTS, ["friction", "encoder"], 8, out=out, **SHORT)
+    return smc.compare(laws, PLANTS, ["friction", "encoder"], 8, out=folder, **SHORT)
 
 
 def kinds(found, plant="duffing"):
@@ -84,7 +89,7 @@ def test_runs_use_every_set_of_gains_in_turn(found):
 
 @pytest.mark.slow
 def test_a_verdict_names_its_metric_plant_and_condition(found):
-    assert len(found.verdicts) == len(found.metrics) * 4
+    assert len(found.verdicts) == len(METRICS) * 4
     for board, verdict in zip(found.leaderboard, found.verdicts, strict=True):
         assert verdict.startswith(f"{board.label} on {board.group['plant']} under {board.group['condition']}: ")
         assert board.result in " ".join(repr(found).split())
@@ -114,12 +119,12 @@ def test_traces_are_those_of_the_first_seed(found):
     assert smc.score(found.traces[0])["itae"] == found.table.column("itae")[0]
 
 
-def test_the_same_call_goes_on_from_its_folder(found, monkeypatch):
+def test_the_same_call_goes_on_from_its_folder(found, folder, monkeypatch):
     monkeypatch.setattr(search, "tune", None)  # would raise
     monkeypatch.setattr(executors, "compute_here", lambda batches, *rest: [*batches].index(0))
     laws = [my_law, "classical", smc.law("pid", kp=20.0)]
     with pytest.raises(ValueError, match="0 is not in list"):  # no run is missing, so no batch
-        smc.compare(laws, PLANTS, ["friction", "encoder"], 8, out=found.out, **SHORT)
+        smc.compare(laws, PLANTS, ["friction", "encoder"], 8, out=folder, **SHORT)
 
 
 @pytest.mark.slow

@@ -8,8 +8,8 @@ is w = h times 1 s^2 = 1e-3 s^3, chosen so that such chattering costs 2 s^2, as 
 first 2 s. Without it ("tracking", w = 0), chattering costs nothing.
 
 The conditions are those in which laws are ranked: nominal, noise, delay, a sine and a constant disturbance, and 30 %
-less and 30 % more mass. Their runs have seeds, noise and initial states that no grid uses, so no law
-is judged on runs that it was tuned on.
+less and 30 % more mass. Their runs have seeds, noise and initial states that no grid uses, so no law is judged on runs
+that it was tuned on.
 
 A failed run has no ITAE. It costs FAILURE_COST (2 - t / duration), with t the time of the failure. This is more than
 any other run costs, and decreases with t. With a bound on predicted chattering, gains beyond it cost more than that.
