@@ -141,7 +141,7 @@ def _bounded(file: Path) -> None:
 
 
 def csv_rows(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
-    """Return line number and cells of each row of a CSV file; beside semicolons, a comma is a decimal point."""
+    """Return line number and cells of each row. If semicolons separate the cells, a comma is a decimal point."""
     with reading(path, "CSV file", "give a CSV file, with commas or semicolons between cells") as file:
         with file.open(newline="", encoding="utf-8-sig") as text:
             semicolons = ";" in re.sub('"[^"]*"', "", text.readline())
@@ -156,7 +156,7 @@ def csv_rows(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
 
 
 def plain(data: Any) -> Any:
-    """Return the data with words in place of NaN and infinities; a text that equals one gets the prefix '."""
+    """Return the data with words for NaN and infinities. A text that is such a word gets a ', until `from_json`."""
     if isinstance(data, Mapping):
         return {name: plain(value) for name, value in data.items()}
     if isinstance(data, list | tuple):

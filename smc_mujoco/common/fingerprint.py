@@ -59,7 +59,7 @@ def arithmetic() -> str:
 
 @functools.cache
 def package(*without: str) -> str:
-    """Return a hash of this package's code, models, gains and papers, but PRESENTATION and the folders `without`."""
+    """Return a hash of this package's code, models, gains and papers, without PRESENTATION and some folders."""
     left_out = (*BESIDE_PACKAGE, *PRESENTATION, *without)
     files = {path.relative_to(PACKAGE): path for path in PACKAGE.rglob("*")}
     files = {name: path for name, path in files.items() if not any(map(name.is_relative_to, left_out))}

@@ -101,7 +101,7 @@ def note() -> str | None:
 
 @functools.cache
 def missing() -> str | None:
-    """Return None if a child process can render, as a broken driver ends its process, else a sentence with the cure."""
+    """Return None if pictures can be rendered, as a child process tries, else a sentence with the cure."""
     chosen = choice()
     if chosen.wish in OFF_VALUES:
         return f"no film: MUJOCO_GL={chosen.wish} turns rendering off: unset it"
@@ -135,7 +135,7 @@ def probe(backend: str, code: str = PROBE) -> str | None:
 
 
 def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "mujoco.Renderer":
-    """Return a mujoco.Renderer (px) with the backend of `choice`, even if MuJoCo took another one when imported."""
+    """Return a renderer of pictures of this size, px, with the backend of `choice`, even if MuJoCo took another one."""
     import mujoco
 
     from smc_mujoco.common.errors import ScenarioError

@@ -35,7 +35,7 @@ def table(
     numbers: range = range(0),
     max_rows: int = MAX_ROWS,
 ) -> Html:
-    """Return a table."""
+    """Return a table: caption above, note below, the columns `numbers` aligned to the right."""
     width = len(headings or rows[0]) if headings or rows else 1
     sides = ["right" if i in numbers else "left" for i in range(width)]
     parts = [
@@ -70,7 +70,7 @@ def fields(values: Mapping[str, object], caption: object = "", note: object = ""
 
 
 def panel(t: np.ndarray, curves: Sequence[np.ndarray], heading: str, reference: np.ndarray | None = None) -> Html:
-    """Return a panel of curves, (K,) each, over times t in s as SVG, with its range at the axes; a dashed reference."""
+    """Return curves and a dashed reference, (K,) each, over times t, s, as SVG, with their range at the axes."""
     drawn = [curve for curve in (*curves, *([] if reference is None else [reference])) if np.isfinite(curve).any()]
     if not drawn or len(t) < 2:
         return Html("")

@@ -199,7 +199,7 @@ def loader(kind: type) -> Callable:
 def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = False) -> CFunc:
     """Compile a C function with numba. Ctrl-C is delayed to the end, as numba may lose it.
 
-    `cache`: whether to use numba's cache on disk; for a body whose closure holds functions, a name and a hash of all.
+    `cache`: whether to use numba's cache on disk; for a body whose closure holds functions, its name and a hash of all.
     """
     made = CFunc(body, normalize_signature(signature), {}, {"error_model": "numpy"})
     _compile(made, body, cache)

@@ -42,7 +42,7 @@ if hasattr(os, "register_at_fork"):
 
 @contextlib.contextmanager
 def installed(control: Any) -> Iterator[None]:
-    """Install only a control callback, or None, and `no_clock` in a with block; other threads with callbacks wait."""
+    """Install a control callback, or None, and `no_clock`, and no others, in a with block. Other threads wait."""
     with _lock:
         before = _callbacks()
         try:

@@ -87,7 +87,7 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
 
 @contextlib.contextmanager
 def _in_cell() -> Iterator[Callable[[Bar], None]]:
-    """Yield what draws a bar in a notebook's cell, where it vanishes in the end; rich warns without ipywidgets."""
+    """Yield what draws a bar in a notebook's cell, where it vanishes in the end. Rich would need ipywidgets."""
     from IPython.display import HTML, display
 
     cell: Any = display(HTML(""), display_id=True)

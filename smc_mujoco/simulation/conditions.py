@@ -161,7 +161,7 @@ def applicable(names: Iterable[str], plants: Sequence[Plant], duration: float) -
 
 
 def parse(text: str) -> Condition:
-    """Return the condition that a text describes, such as "worn gear: friction=Coulomb(0.05)"; evaluate nothing."""
+    """Return the condition that a text describes, such as "worn gear: friction=Coulomb(0.05)". It is not run."""
     name, _, fields = text.partition(":")
     try:
         values = read_fields(fields)

@@ -198,7 +198,7 @@ def _evaluate_model(address, sim, i):
 
 @njit(error_model="numpy")
 def update_law(address, sim, k, t):
-    """Run the law at sample k, at time t, s: once for each driven channel, or once for all.
+    """Run the law at sample k, at time t, s: once for each driven channel, or once for all. Return a failure code.
 
     A channel's nominal model may depend on the new commands of the channels before it.
     """
@@ -246,7 +246,7 @@ def _evaluate_reference(address, sim, k, i):
 
 @njit(error_model="numpy", inline="always")
 def _measure_channel(address, sim, k, t, i):
-    """Write what the law of channel i reads into the record; the nominal model has the drive's gain u - drag v as u."""
+    """Write what the law of channel i reads. The force in its nominal model is that of the drive, gain u - drag v."""
     if _evaluate_reference(address, sim, k, i) != 0:
         return record.RAISED
     y, x, v, a, motion, model = sim.y, pointer(sim.seen.x), pointer(sim.seen.v), pointer(sim.a), sim.motion, sim.model
@@ -433,7 +433,7 @@ def _add_force(data, channel, force, cartesian):
 
 @njit(error_model="numpy")
 def _evaluate_feedback(address, sim, data, signal, i, k):
-    """Write the force of a disturbance that sees the loop into the record: a new one at sample k, the last if k < 0."""
+    """Write the force of a disturbance that sees the loop, the last one if k < 0. Return 1 if it raised, or 0."""
     if i > 0 or k < 0:
         sim.motion.value = pointer(signal.function.memory)[0]
         return 0
@@ -446,7 +446,7 @@ def _evaluate_feedback(address, sim, data, signal, i, k):
 
 @njit(error_model="numpy")
 def _apply_disturbances(address, sim, data, t, k):
-    """Apply the sum of the disturbances at time t, s; `k` is -1 but at the first stage of control sample k."""
+    """Apply the sum of the disturbances at time t, s; k is the sample at its first stage, and -1 at all others."""
     instant, motion = sim.instant, sim.motion
     instant.t, instant.seed = t, sim.seed
     if _apply_pushes(address, sim, data) != record.FINE:

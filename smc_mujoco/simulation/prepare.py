@@ -102,7 +102,7 @@ class Packed:
     numbers: np.ndarray  # gains, memories and all else that is float64
     disturbances: np.ndarray  # (m,) DISTURBANCE
     laws: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
-    references: np.ndarray  # likewise
+    references: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
     frictions: np.ndarray  # by a formula, (n,) FUNCTION, or (0,)
     nominal: Any  # the data of a nominal model that MuJoCo computes, or None
 

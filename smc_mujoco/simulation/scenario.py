@@ -541,7 +541,7 @@ def check_channels(s: Resolved) -> None:
     sized = f"write it for {plant.n}, with SMC_JOINTS, or --joints of export-c"
     for refused, why in (
         (plant.n == 1, f"{plant.name} has one: give a law of one channel, such as 'computed_torque'"),
-        (joints != plant.n, f"as C code of {joints}, where {plant.name} has {plant.n}: {sized}"),
+        (joints != plant.n, f"its C code is for {joints}, where {plant.name} has {plant.n}: {sized}"),
         (plant.free, f"{plant.name} has {plant.free} without an actuator: give a law of one channel"),
         (s.surface is not None, "has its own surface: leave the surface out"),
     ):

@@ -472,7 +472,8 @@ class Clock:
 
     def check(self, control_period: float, physics_step: float) -> None:
         """Raise ScenarioError for a jitter that reaches the next sample, or is shorter than a physics step."""
-        if self.jitter and not 1 <= self.jitter_steps(physics_step) < round(control_period / physics_step):
+        late = self.jitter >= control_period
+        if late or (self.jitter and not 1 <= self.jitter_steps(physics_step) < round(control_period / physics_step)):
             raise ScenarioError(
                 f"Clock's jitter is {self.jitter:g} s: give at least a physics step, {physics_step:g} s, and less than "
                 f"the control period, {control_period:g} s, and missed=... for samples that do not run"

@@ -64,6 +64,10 @@ class TimeSeries(Signal):
                 f"{kind} has {len(self.times)} times and {len(self.values)} values: give as many of each"
             )
         _check(kind, self.times, "item {}".format)
+        with np.errstate(all="ignore"):
+            curvature = np.diff(self.values) / np.diff(self.times) ** 2
+        if not np.isfinite(curvature).all():
+            raise ScenarioError(f"{kind} is too steep for a float: give longer steps of time or smaller ones of value")
         object.__setattr__(self, "data", self._data())
         self.data.flags.writeable = False
 

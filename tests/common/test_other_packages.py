@@ -402,7 +402,7 @@ def test_a_paper_with_something_wrong_is_left_out_of_the_list(install, tmp_path)
     assert "no_folder.py is no folder: give a package with paper.toml and claims.py" in first[0]
     assert paper.papers()["their_paper"].name == "their_paper"
     assert paper.catalogue().package("their_paper") == "papers"
-    paper._read.cache_clear()
+    paper._read_once.cache_clear()
     (home / "paper.toml").write_text("title = 3")
     (sentence,) = said(paper.papers)
     assert sentence.startswith("package 'papers': its paper 'their_paper': ")

@@ -118,6 +118,7 @@ def test_a_law_that_raises_late_ends_the_run_with_its_own_reason():
 def test_a_clock_that_cannot_run_is_refused(refused):
     for fields in [
         {"clock": smc.Clock(jitter=1e-3)},
+        {"clock": smc.Clock(jitter=1e308)},
         {"clock": smc.Clock(jitter=1e-4), "physics_step": 5e-4},
         {"clock": 0.5},
     ]:

@@ -378,6 +378,7 @@ def test_numbers_that_are_no_time_series_are_refused(refused):
         (5.0, [1.0, 2.0], ("times", "5.0")),
         ([0.0, 1.0], "12", ("values", "'12'")),
         (np.eye(2), [1.0, 2.0], ("times[0]", "[1.0, 0.0]")),
+        ([0.0, 1e-300], [0.0, 1e300], ("too steep",)),
     ):
         refused(lambda times=times, values=values: TimeSeries(times, values), "TimeSeries", *parts)
 
