@@ -95,18 +95,6 @@ def alike(runs, plant, law, other):
     return runs.check("settling time, apart", what, abs(ratio(*times(runs, plant, law, other)) - 1.0))
 
 
-def overshoots_little(runs, plant, law):
-    """Check the overshoot of a law, %, which must settle."""
-    return runs.check("overshoot, %", f"{plant}: overshoot of {law}, %", overshoot(runs, plant, law))
-
-
-def overshoots_more(runs, plant, law):
-    """Check that a law's overshoot is larger than that of the paper's law, which must settle."""
-    limit = larger_than(overshoot(runs, plant, OURS), of=100.0)
-    what = f"{plant}: overshoot of {law} against {OURS}'s, %"
-    return runs.check("overshoot", what, runs.score(plant, law)["overshoot"], limit)
-
-
 def deviation(trace, other):
     """Return the largest |x - x'| of two traces over all channels, as a share of |x0|; inf if one failed."""
     apart = float(np.abs(trace.x - other.x).max())
@@ -418,41 +406,37 @@ def converging(runs, lams, starts):
 
 def any_gain(runs):
     """Claim 21: g smooth and non-zero suffices."""
-    laws = {name: variant(runs.law(name, OURS), "reversed") for name in runs.plants}
-    return comes_to_rest(runs, {name: runs.scenario(name, OURS, law=law) for name, law in laws.items()})
+    law_on = {plant: variant(runs.law(plant, OURS), "reversed") for plant in runs.plants}
+    return comes_to_rest(runs, {plant: runs.scenario(plant, OURS, law=law) for plant, law in law_on.items()})
 
 
 # the simulations: four laws side by side on single plants and on the network
 
 
-def side_by_side(about, *checks):
-    """Return the function of a claim that consists of checks, each with its laws, on the claim's plant."""
+def side_by_side(runs):
+    """Claims 27 to 29, 33, 34 and 37: what the thresholds name, of the claim's first law or of the paper's rival."""
+    (law, other), plant = runs.laws, runs.plant
+    rival = law if other == OURS else other
 
-    def measure(runs):
-        return [check(runs, runs.plant, *laws) for check, *laws in checks]
+    def overshoots_more():
+        limit = larger_than(overshoot(runs, plant, OURS), of=100.0)
+        what = f"{plant}: overshoot of {rival} against {OURS}'s, %"
+        return runs.check("overshoot", what, runs.score(plant, rival)["overshoot"], limit)
 
-    measure.__doc__ = about
-    return measure
+    def fluctuates():
+        ripple = runs.score(plant, rival)["ripple"] / scale(runs.scenario(plant, rival))
+        return runs.check("ripple", f"{plant}: ripple of {rival} over |x0|", ripple)
 
-
-pendulum_like_adaptive = side_by_side(
-    "Claim 27: pendulum: like adaptive, minimal overshoot.", (alike, OURS, ADAPTIVE), (overshoots_little, OURS)
-)
-larger_undershoot = side_by_side("Claim 29: pendulum: HOSMC fast, larger undershoot.", (overshoots_more, HOSMC))
-adaptive_overshoots = side_by_side("Claim 33: Van der Pol: adaptive overshoots more.", (overshoots_more, ADAPTIVE))
-classical_slower = side_by_side(
-    "Claim 34: Van der Pol: classical slower, no overshoot.", (slower, CLASSICAL), (overshoots_little, CLASSICAL)
-)
-classical_deviates = side_by_side(
-    "Claim 37: Duffing: classical slower, larger deviation.", (slower, CLASSICAL), (overshoots_more, CLASSICAL)
-)
-
-
-def classical_fluctuates(runs):
-    """Claim 28: pendulum: classical slower, fluctuates."""
-    ripple = runs.score(runs.plant, CLASSICAL)["ripple"] / scale(runs.scenario(runs.plant, CLASSICAL))
-    checked = runs.check("ripple", f"{runs.plant}: ripple of classical over |x0|", ripple)
-    return [slower(runs, runs.plant, CLASSICAL), checked]
+    measures = {
+        "settling time": lambda: slower(runs, plant, rival),
+        "settling time, apart": lambda: alike(runs, plant, law, other),
+        "overshoot, %": lambda: runs.check(
+            "overshoot, %", f"{plant}: overshoot of {law}, %", overshoot(runs, plant, law)
+        ),
+        "overshoot": overshoots_more,
+        "ripple": fluctuates,
+    }
+    return [measures[measure]() for measure in runs.thresholds]
 
 
 def moderate_undershoot(runs):
@@ -741,34 +725,27 @@ PROBE_SAMPLES = 50  # chosen
 def table_one(runs):
     """Claim T: table I: no chattering, observer-free, bounded input, delay-tolerant, smoothness."""
     steps = {law: worst_ratio(runs, law, "max_step", law, "max_u") for law in LAWS}
-    properties = {
-        "no chattering": (
-            "TV rate over classical's",
-            lambda law: worst_ratio(runs, law, "tv_rate", CLASSICAL, "tv_rate"),
-        ),
-        "observer-free": ("estimated signals", lambda law: estimated(runs, law)),
-        "bounded input": ("growth of max |u|", lambda law: growth(runs, law)),
-        "delay-tolerant": ("delay less classical's, s", tolerance(runs).get),
-        "smoothness": ("largest step over max |u|", steps.get),
+    rates = {law: worst_ratio(runs, law, "tv_rate", CLASSICAL, "tv_rate") for law in LAWS}
+    properties = {  # property -> its unit, and its number for each law
+        "no chattering": ("TV rate over classical's", rates),
+        "observer-free": ("estimated signals", {law: estimated(runs, law) for law in LAWS}),
+        "bounded input": ("growth of max |u|", {law: growth(runs, law) for law in LAWS}),
+        "delay-tolerant": ("delay less classical's, s", tolerance(runs)),
+        "smoothness": ("largest step over max |u|", steps),
     }
     evidence = []
-    for name, (unit, value) in properties.items():
+    for name, (unit, numbers) in properties.items():
         for (column, law), mark in zip(TABLE_COLUMNS.items(), TABLE_MARKS[name], strict=True):
-            certain = ", cannot fail" if (name, column) in CERTAIN_CELLS else ""
-            cell = f"{name}: {column}"
+            certain, cell = ", cannot fail" * ((name, column) in CERTAIN_CELLS), f"{name}: {column}"
             what = f"{cell} (paper: {'+' if mark == '+' else '--'}), {unit}{certain}"
-            plus = runs.check(name, what, value(law), sentence=cell)
-            evidence.append(plus if mark == "+" else opposite(plus))
+            plus = runs.check(name, what, numbers[law], sentence=cell)
+            minus = check(what, plus.value, OPPOSITE_RELATIONS[plus.relation], plus.limit, cell)
+            evidence.append(plus if mark == "+" else minus)
     for column, law in TABLE_COLUMNS.items():
         if runs.values["strict"] <= steps[law] < runs.thresholds["smoothness"].limit:
             what = f"smoothness: {column}, at a limit of {runs.values['strict']:g} the mark would be --"
             evidence.append(Beside(what, steps[law]))
     return [*evidence, Beside(f"bounded input: {UNCLAMPED}, growth of max |u|", growth(runs, UNCLAMPED))]
-
-
-def opposite(plus):
-    """Return the check of a cell in which the paper has a minus."""
-    return check(plus.what, plus.value, OPPOSITE_RELATIONS[plus.relation], plus.limit, plus.sentence)
 
 
 def worst_ratio(runs, law, metric, other, reference):

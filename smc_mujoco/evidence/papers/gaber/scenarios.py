@@ -9,14 +9,14 @@ in `simulation.conditions`. The plants' parameters are in their files.
     comparison("duffing", "noise")                         # the four laws: name -> Scenario
 """
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.common.errors import unknown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import gain_sets as sets
-from smc_mujoco.mechanisms.named import as_plant
-from smc_mujoco.simulation.conditions import (  # noqa: F401  # smc.paper has the paper's own numbers, too
+from smc_mujoco.simulation.conditions import (  # noqa: F401  # smc.paper has the numbers of the study, too
     CONTROL_PERIOD,
     DIFFERENCED,
     DURATION,
@@ -28,9 +28,9 @@ from smc_mujoco.simulation.conditions import (  # noqa: F401  # smc.paper has th
     SENSOR_NOISE,
     SINE,
     Condition,
-    find_condition,
 )
-from smc_mujoco.simulation.scenario import U_MAX, Scenario
+from smc_mujoco.simulation.grid import case
+from smc_mujoco.simulation.scenario import U_MAX, Scenario  # noqa: F401
 
 # The four laws that the paper compares; its higher-order one is the last.
 LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
@@ -58,17 +58,11 @@ def scenario(
     Raises:
       ScenarioError: a name that the study does not have, or that is no field of a Scenario.
     """
-    if not isinstance(changes, Mapping):
-        raise ScenarioError(f"changes is {shown(changes)}: give Scenario fields with their values")
     for name in changes:
         if name not in Scenario.fields():
             raise unknown("field of a Scenario", name, Scenario.fields())
-    sets.paper_plant(plant)
-    law = sets.law(plant, law_name, "default" if law_name == "none" else gains)
-    common = {"duration": duration, "control_period": CONTROL_PERIOD, "u_max": U_MAX, "seed": seed}
-    conditioned = find_condition(condition).on(as_plant(plant), duration)
-    made = Scenario(**({"plant": plant, "law": law} | common | conditioned | dict(changes)))
-    return made if changes else made.named(find_condition(condition).name)
+    made = case(sets.paper_plant(plant), law_name, condition, duration, gains, changes=changes)
+    return dataclasses.replace(made, seed=seed).named(None if changes else made.condition)
 
 
 def comparison(
