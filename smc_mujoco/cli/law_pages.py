@@ -4,15 +4,14 @@ Everything comes from the templates and their docstrings, see `smc_mujoco.contro
 """
 
 import itertools
-import re
 from collections.abc import Iterable, Sequence
 
 from rich.console import Console
 from rich.padding import Padding
-from rich.table import Column
+from rich.table import Column, Table
 from rich.text import Text
 
-from smc_mujoco.cli.tables import plain, titled, with_package
+from smc_mujoco.cli.tables import plain, titled
 from smc_mujoco.common.errors import unknown
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Template
@@ -21,32 +20,19 @@ from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.joint_law import catalogue as joint_laws
 from smc_mujoco.control.law import Law, Measurement
 from smc_mujoco.control.law import catalogue as laws
-from smc_mujoco.control.properties import PROPERTIES, reads, searched, suitable
+from smc_mujoco.control.properties import PROPERTIES, reads, suitable
 from smc_mujoco.control.surface import catalogue as surfaces
 from smc_mujoco.mechanisms.plant import Plant
 
-INITIALS = re.compile(r"\b[A-Z]\.(?:[- ]?[A-Z]\.)*\s*")  # of authors
 CATALOGUES = {"Laws": laws, "Laws of many joints": joint_laws, "Surfaces": surfaces, "Velocity estimators": estimators}
 # Relative degree -> what a law acts on.
 DEGREES = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}
-ARRIVAL_CELLS = {"s": "s", "e": "e", "": "–"}  # what is 0 after a finite time -> cell of a table
+ARRIVALS = {"s": "s = 0 after a finite time", "e": "e = 0 after a finite time"}  # of `Template.finite_time`
 CALL_TEMPLATES = {  # kind of component -> how a user makes one
     "law": "smc.law({})",
     "surface": "smc.Scenario(surface=smc.surface({}), ...)",
     "estimator": "smc.Scenario(velocity=smc.estimator({}), ...)",
 }
-
-
-def short_source(source: str) -> str:
-    """Return a source in short: its one or two authors, or the first "et al.", and its year."""
-    first = INITIALS.sub("", source).partition(";")[0]
-    authors, *others = re.split(r", | \(", first.partition('"')[0])
-    if authors.startswith("the law of "):  # what follows is by others
-        return authors.removeprefix("the law of ")
-    if "&" not in authors and any("&" in other for other in others[:4]):
-        authors += " et al."
-    years = re.findall(r"(?<![:\d-])(?:19|20)\d\d\b", re.split(r",? following ", first)[0])
-    return " ".join([authors.removeprefix("after ").strip(), *years[-1:]])
 
 
 def print_pages(name: str, console: Console) -> None:
@@ -64,26 +50,14 @@ def print_pages(name: str, console: Console) -> None:
 def print_lists(console: Console) -> None:
     """Print a line about each law, surface and estimator."""
     for heading, templates in CATALOGUES.items():
-        known, degree = templates(), [Column("deg", justify="right", style="dim")] * (heading == "Laws")
-        columns = (
-            Column("name", no_wrap=True, style="cyan"),
-            *degree,
-            "formula",
-            Column("source", style="dim", max_width=17),
-        )
-        table = titled(f"{heading} ({len(known)})", *columns, show_edge=False, padding=(0, 2, 0, 0), pad_edge=False)
-        for _, template in sorted(known.items()):
-            parts = entry(template)
-            degrees = [str(template.relative_degree)] * len(degree)
-            formula = with_package(parts.formula, known.package(template.name))
-            table.add_row(template.name, *degrees, Text(formula), Text(short_source(parts.source)))
-        console.print(table, "")
+        known = [template for _, template in sorted(templates().items())]
+        console.print(_table(f"{heading} ({len(known)})", known, heading == "Laws"), "")
     page, some = ("smc-mujoco laws NAME", "cyan"), ("smc-mujoco laws --needs continuous,two-gains", "cyan")
     console.print(Text.assemble("One law in full: ", page, ". Only some laws: ", some))
 
 
 def print_suitable(needs: Sequence[str], plant: Plant | str | None, console: Console) -> None:
-    """Print a table of the laws that have all these PROPERTIES and suit a plant, with what distinguishes them."""
+    """Print a line about each law that has all these PROPERTIES and suits a plant."""
     suitable_laws = suitable(needs, plant)
     filters = " and ".join(PROPERTIES[need].words for need in needs)
     machine = plant if plant is None or isinstance(plant, str) else plant.name
@@ -92,17 +66,20 @@ def print_suitable(needs: Sequence[str], plant: Plant | str | None, console: Con
     if "no-velocity" in needs:
         text = 'Every law runs without a velocity sensor if the scenario estimates the velocity: velocity="levant".'
         console.print(text, highlight=False)
-    if not suitable_laws:
+    if suitable_laws:
+        console.print(_table(title, suitable_laws, True))
+    else:
         console.print(f"{title}: leave out a need, or --plant", highlight=False)
-        return
-    columns = Column("name", no_wrap=True, style="cyan"), "family", "u", "arrives", "gains to choose"
+
+
+def _table(title: str, templates: Iterable[Template], of_laws: bool) -> Table:
+    """Return a table of names and formulas, of laws with their relative degree."""
+    degree = [Column("deg", justify="right", style="dim")] * of_laws
+    columns = Column("name", no_wrap=True, style="cyan"), *degree, "formula"
     table = titled(title, *columns, show_edge=False, padding=(0, 2, 0, 0), pad_edge=False)
-    for law in suitable_laws:
-        u = "continuous" * law.continuous
-        table.add_row(law.name, law.family, u, ARRIVAL_CELLS[law.finite_time], ", ".join(searched(law)) or "none")
-    console.print(table, "")
-    key = "u: continuous, where the law says so. arrives: what theory says is 0 after a finite time, s or the error e."
-    console.print(key, style="dim", highlight=False)
+    for template in templates:
+        table.add_row(template.name, *[str(template.relative_degree)] * of_laws, Text(entry(template).formula))
+    return table
 
 
 def print_page(template: Template, console: Console, package: str, text: str) -> None:
@@ -147,10 +124,9 @@ def _promises(template: Template) -> str:
     if template.kind != "law":
         return ""
     u = "a continuous u" * template.continuous
-    arrival = {"s": "s = 0 after a finite time", "e": "e = 0 after a finite time", "": ""}[template.finite_time]
     orders = [f"|{name}| of order {template.order(name, template.defaults):.3g}" for name in template.accuracy]
     accuracy = f"{' and '.join(orders)} in the control period" if orders else ""
-    return ", ".join(filter(None, [u, arrival, accuracy]))
+    return ", ".join(filter(None, [u, ARRIVALS.get(template.finite_time), accuracy]))
 
 
 def _degree(template: Template) -> str:

@@ -19,7 +19,7 @@ from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.catalogue import scores as metric_scores
 from smc_mujoco.metrics.channel_groups import Group, groups
 from smc_mujoco.metrics.conventions import CATALOGUE, Metric
-from smc_mujoco.metrics.tip import tip_scores, worst_joint
+from smc_mujoco.metrics.tip import tip_scores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.margins import Margin
     from smc_mujoco.analysis.step_halving import StepChange
 
-MAX_TIP_COLUMNS = 5  # with more, the name of the joint that does most work does not fit into 80 characters
 TIP_COLUMNS = {  # of a table of an arm's tip: heading -> score, unit, factor on its SI value
     "largest\nerror": ("max_error", "mm", 1e3),
     "error at\nthe end": ("last_error", "mm", 1e3),
@@ -90,23 +89,17 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
 
 
 def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:
-    """Return a table of the tips of arms, with the joint that does most work; [] for other plants."""
+    """Return a table of the tips of arms; [] for other plants."""
     if not next(iter(traces.values())).scenario.plant.tip:
         return []
     values = {label: tip_scores(trace) for label, trace in traces.items() if trace.diverged_at is None}
     known = {name for its in values.values() for name in its}
     shown = {head: column for head, column in TIP_COLUMNS.items() if column[0] in known}
     heads = [Text(f"{head}\n").append(unit, "dim") for head, (_, unit, _) in shown.items()]
-    room = len(shown) < MAX_TIP_COLUMNS
-    table = _by_label(f"{title}, tip", [*heads, *([Text("most work\n").append("J", "dim")] * room)], traces.values())
+    table = _by_label(f"{title}, tip", heads, traces.values())
     for label, trace in traces.items():
-        if label not in values:
-            table.add_row(_label(label, trace), FAILED)
-            continue
-        cells = [number(factor * values[label].get(name, math.nan)) for name, _, factor in shown.values()]
-        if room:
-            joint, work = worst_joint(trace, "work")
-            cells.append(f"{number(work)} ({joint})")
+        its = values.get(label)
+        cells = [number(factor * its.get(name, math.nan)) for name, _, factor in shown.values()] if its else [FAILED]
         table.add_row(_label(label, trace), *cells)
     return [table]
 

@@ -194,8 +194,3 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
             values[names[i]] = {m.name: float(m.formula(part)) for m in metrics() if m.fits(joint)}
             values[names[i]] |= {"peak_power": float(power.max()), "work": float(np.trapezoid(power, trace.t))}
     return {name: values[name] for name in names}
-
-
-def worst_joint(trace: Trace, metric: str) -> tuple[str, float]:
-    """Return the joint with the largest value of a metric of `joint_scores`, and this value."""
-    return max(((name, scores[metric]) for name, scores in joint_scores(trace).items()), key=lambda pair: pair[1])

@@ -56,12 +56,11 @@ def test_the_table_has_every_law_surface_and_estimator_and_fits(call):
     assert "smc-mujoco laws NAME" in out
 
 
-def test_the_table_has_formula_degree_and_source(call):
+def test_the_table_has_formula_and_degree(call):
     out = call("laws")[1]
     (line,) = (line for line in out.splitlines() if line.startswith("super_twisting "))
     assert line.split()[1] == "1"
-    assert "Levant 1993" in line
-    assert "u = -k1 [s]^(1/2) + w, w' = -k2 sgn(s)" in flat(re.sub(r"Levant 1993|\s+", " ", out[out.index(line) :]))
+    assert "u = -k1 [s]^(1/2) + w, w' = -k2 sgn(s)" in flat(out[out.index(line) :])
 
 
 def test_there_are_at_least_thirty_laws():
@@ -77,7 +76,7 @@ def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
     assert max(map(len, out.splitlines())) <= 80
     rows = filter(None, map(str.split, out.splitlines()))
     lines = {name: rest for name, *rest in rows if name in laws()}
-    assert lines["continuous_twisting"] == ["higher-order", "continuous", "e", "L,", "k1,", "k2"]
+    assert lines["continuous_twisting"][0] == "2"
     assert not {"twisting", "lqr"} & {*lines}
     words = "laws that have a continuous u and bring the error to 0 in finite time"
     assert f"{len(lines)} of {len(laws())} {words}" in flat(out)
@@ -178,26 +177,6 @@ def test_an_unknown_name_is_one_sentence_with_the_nearest(typed, meant, call):
     assert err == f"smc-mujoco: unknown law, surface or velocity estimator {typed!r}: did you mean {meant!r}?\n"
 
 
-# sources in short
-
-
-@pytest.mark.parametrize(
-    ("source", "short"),
-    [
-        ("V. Utkin, Sliding Modes, Springer 1992, chapter 1.", "Utkin 1992"),
-        ("J.-J. Slotine & W. Li, Applied Control, Prentice Hall 1991.", "Slotine & Li 1991"),
-        ('A. Levant, "Quasi", TAC 50(11):1812, 2005; B. More, 2010.', "Levant 2005"),
-        ('W. Gao, Y. Wang & A. Homaifa, "Discrete", TIE 42(2):117, 1995.', "Gao et al. 1995"),
-        ('L. Yang & J. Yang, "Fast", IJRNC 21(16):1865, 2011.', "Yang & Yang 2011"),
-        ('J. Gaber, "Observer-Free Control", eq. 4.', "Gaber"),
-        ("the law of J. Gaber, with the leak of P. Ioannou & P. Kokotovic, 1984.", "Gaber"),
-        ("", ""),
-    ],
-)
-def test_a_source_in_short_is_its_first_authors_and_their_year(source, short):
-    assert law_pages.short_source(source) == short
-
-
 def test_a_law_of_one_s_own_is_read_as_the_library_s_are():
     @law_function(gains={"k": 2.0}, conditions={"k > 1": lambda g: g.k > 1})
     def own(y, gains, memory):
@@ -283,7 +262,6 @@ for words in (["list"], ["laws"], ["laws", "brand_new"]):
 """
     out = python(added, "-c", code)
     assert out.count("brand_new") >= 3
-    assert out.count("Body 2001") == 1
     for words in ("k > c", "J. Nothing 1(1):1, 2001", "c = 2.5"):
         assert words in flat(out)
 

@@ -74,9 +74,6 @@ def test_joint_scores_are_each_joints_own(trace):
         assert scores["ultimate_bound"] <= smc.scores(trace)["driven m" if i == 0 else "driven rad"]["ultimate_bound"]
         assert scores["peak_power"] == power.max()
         assert scores["work"] == pytest.approx(np.sum((power[1:] + power[:-1]) / 2 * np.diff(trace.t)))
-    assert tip.worst_joint(trace, "max_u") == max(
-        ((name, scores["max_u"]) for name, scores in found.items()), key=lambda pair: pair[1]
-    )
 
 
 def test_contact_forces_are_those_that_the_joints_feel(pressed):

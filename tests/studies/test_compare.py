@@ -220,6 +220,7 @@ def test_shells_complete_the_last_name():
     assert "furuta" in options.SCENES("fur")
 
 
-def test_conditions_are_taken_apart_at_commas_between_them():
-    texts = ["noise,worn: friction=Coulomb(0.05), x0=0.3,sine", "encoder"]
-    assert [one.name for one in options.conditions(texts)] == ["noise", "worn", "sine", "encoder"]
+def test_conditions_are_names_with_commas_or_one_text(refused):
+    texts = ["noise,sine", "worn: friction=Coulomb(0.05), x0=0.3", "encoder"]
+    assert [one.name for one in options.conditions(texts)] == ["noise", "sine", "worn", "encoder"]
+    refused(lambda: options.conditions(["noise,worn: friction=Coulomb(0.05)"]))

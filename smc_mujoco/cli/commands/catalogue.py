@@ -67,13 +67,12 @@ def laws(
         str | None, typer.Option(metavar="PLANT", autocompletion=options.PLANTS, help="Only laws that suit a plant.")
     ] = None,
 ) -> None:
-    """Show all laws, surfaces and velocity estimators, or one in full: formula, gains, conditions, source.
+    """Show all laws, surfaces and velocity estimators, those laws that suit, or one in full with gains and source.
 
     The column deg is the relative degree of the variable that a law drives to zero: 1 for a sliding variable s, of any
     surface of degree 1; 2 for the error e and its rate; 3 for e and two rates.
 
-    With --needs or --plant the table has the laws that suit, and what distinguishes them. The command "smc-mujoco
-    which" compares such laws on a plant, and advises one.
+    The command "smc-mujoco which" compares laws that suit a plant, and advises one.
 
     Example: smc-mujoco laws super_twisting
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import importlib
+import itertools
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation.grid import Starts
 
 COMMA = re.compile(r",(?![^(]*\))")  # a comma outside brackets
-FIELD_START = re.compile(r"\w+\s*=")  # of a scenario, in a condition
 GAINS_HELP = "With your own gains: pid(kp=50, ki=1). Of a file: my_law.py, or gains.json of `smc-mujoco tune --out`."
 
 
@@ -230,27 +230,14 @@ def plant(text: str) -> "str | Plant":
 
 
 def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
-    """Return the conditions of the option --condition: names, as a,b, texts and files."""
+    """Return the conditions of the option --condition: names and files, as a,b, or a text with a colon."""
     from smc_mujoco.simulation.conditions import find_condition, from_file
 
-    chosen = []
-    for text in _conditions_apart(texts or ()):
+    chosen, parts = [], [[text] if ":" in text else names(text) for text in texts or ()]
+    for text in itertools.chain(*parts):
         if ":" not in text and (Path(text).name != text or Path(text).suffix) and not os.path.exists(text):
             raise ScenarioError(f"no file {text!r}: give a file of conditions, or one as worn: friction=Coulomb(0.05)")
         chosen += from_file(Path(text)) if os.path.exists(text) else [find_condition(text)]
-    return chosen
-
-
-def _conditions_apart(texts: Sequence[str]) -> list[str]:
-    """Return the conditions in texts such as "noise,worn: friction=Coulomb(0.05), x0=0.3", each by itself."""
-    chosen: list[str] = []
-    for text in texts:
-        first = len(chosen)
-        for part in names(text):
-            if len(chosen) > first and ":" in chosen[-1] and ":" not in part and FIELD_START.match(part):
-                chosen[-1] += f", {part}"
-            else:
-                chosen.append(part)
     return chosen
 
 
