@@ -19,32 +19,19 @@ import dataclasses
 import itertools
 import math
 import os
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common.errors import (
-    ScenarioError,
-    ScenarioWarning,
-    find,
-    items_of,
-    number,
-    one_line,
-    shown,
-    users_stacklevel,
-    whole,
-)
-from smc_mujoco.common.extras import package
+from smc_mujoco.common.errors import ScenarioError, find, items_of, number, one_line, shown, whole
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets as sets
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.gain_sets import in_set
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.source import by_words, kinds, untuned_laws
 from smc_mujoco.draw.style import law_colour
@@ -60,7 +47,6 @@ from smc_mujoco.simulation.signals import Noise
 from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
-    import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure, SubFigure
 
 PERIODS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)  # s
@@ -98,17 +84,6 @@ class AccuracyTable(Tables, list[Accuracy]):
         tables = [_table(f"{title}: |e| in {rows[0].unit}", rows) for title, rows in self.groups.items()]
         return [*tables[:-1], *(dataclasses.replace(last, notes=[*last.notes, KEY]) for last in tables[-1:])]
 
-    def to_pandas(self) -> "pandas.DataFrame":
-        """Return a pandas DataFrame with a row for each law on each plant in each condition.
-
-        Raises:
-          MissingPackageError: pandas is not installed.
-        """
-        with package("pandas", "AccuracyTable.to_pandas"):
-            import pandas  # pyright: ignore[reportMissingImports]
-
-        return pandas.DataFrame([row.row() for row in self])
-
     def plot(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
         """Draw error over control period, both logarithmic; title, size, format and fig are as in `smc.figure`."""
         from smc_mujoco.evidence.accuracy.orders import orders
@@ -121,11 +96,7 @@ class AccuracyTable(Tables, list[Accuracy]):
 
 
 def load(path: str | os.PathLike) -> AccuracyTable:
-    """Read the table that `AccuracyTable.save` wrote.
-
-    Raises:
-      ScenarioError: no such file, or not a file of accuracies.
-    """
+    """Read the table that `AccuracyTable.save` wrote."""
     with reading(path, "file of accuracies", "give a .json file that AccuracyTable.save wrote") as file:
         rows = [_with_tuples(entry) for entry in read_json(file)]
         return AccuracyTable(Accuracy(**row | {name: Scaling(**row[name]) for name in QUANTITIES}) for row in rows)
@@ -178,7 +149,7 @@ def accuracy(
         a disturbance. The default, "constant", is a constant force of 0.2 N or N m.
       seeds: a number of seeds, or the seeds: initial states, and gains where a law was tuned several times.
       gains: set of gains for laws given by name, see `gain_sets`. A law without gains in the set for a plant gets its
-        defaults, with a warning.
+        defaults, as the table's title says.
       duration: of each run, s.
       starts: initial states, see `smc.starts`. Default: within 20 % of the plant's own x0.
       threads: as in `run`.
@@ -191,9 +162,6 @@ def accuracy(
     Raises:
       ScenarioError: fewer than two periods, a condition that sets the period, a plant whose driven channels have
         different units, or as `grid`.
-
-    Warns:
-      ScenarioWarning: laws that have no gains in the set.
     """
     descending = _longest_first(periods)
     numbers = listed("seeds", seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_SEEDS)))
@@ -203,7 +171,6 @@ def accuracy(
         for condition in listed("conditions", conditions)
         for law in listed_laws(laws)
     ]
-    _warn_of_defaults(setups, gains)
     scenarios = [scenario for setup in setups for scenario in setup.scenarios]
     counted = summed(report, 0.0, sum(scenario.work for scenario in scenarios))
     runs = {k: _measured(trace) for k, trace in stream(scenarios, threads, counted)}
@@ -213,11 +180,7 @@ def accuracy(
 
 
 def _longest_first(periods: Sequence[float]) -> tuple[float, ...]:
-    """Return the control periods in descending order.
-
-    Raises:
-      ScenarioError: fewer than two, two that are equal, or one that is no period.
-    """
+    """Return the control periods in descending order; refuse fewer than two, equal ones, and what is no period."""
     numbers = [number("a period", h, above=0.0, low=MIN_TIME) for h in items_of("periods", periods)]
     if len(numbers) < 2 or len(set(numbers)) < len(numbers):
         raise ScenarioError(f"periods is {shown(periods)}: give two or more different ones in s, such as {PERIODS}")
@@ -225,17 +188,11 @@ def _longest_first(periods: Sequence[float]) -> tuple[float, ...]:
 
 
 class Run(NamedTuple):
-    """The numbers of a run that its row needs.
+    """The numbers of a run that its row needs."""
 
-    Attributes:
-      parts: "e" and "s" -> largest magnitude in each of the last three parts of the run; inf if it failed.
-      saturated: share of the samples of the last part at which u is at its bound.
-      failure: how the run failed; None if it did not.
-    """
-
-    parts: Mapping[str, Sequence[float]]
-    saturated: float = 0.0
-    failure: str | None = None
+    parts: Mapping[str, Sequence[float]]  # "e" and "s" -> largest magnitude in each of its last parts; inf if it failed
+    saturated: float = 0.0  # share of the samples of the last part at which u is at its bound
+    failure: str | None = None  # how it failed
 
 
 def _measured(trace: Trace) -> Run:
@@ -254,20 +211,12 @@ def _measured(trace: Trace) -> Run:
 
 
 class Setup(NamedTuple):
-    """A law on a plant in a condition.
+    """A law on a plant in a condition."""
 
-    Attributes:
-      scenarios: for each start one for each period. The last one is that of the first start at the shortest period,
-        with half the physics step.
-      periods: s, longest first.
-      starts: number of starts.
-      untuned: whether the law has its default gains, because the set of gains has none for it.
-    """
-
+    # For each start one for each period; then the first start at the shortest period, with half the physics step.
     scenarios: list[Scenario]
-    periods: tuple[float, ...]
-    starts: int
-    untuned: bool
+    periods: tuple[float, ...]  # s, longest first
+    starts: int  # their number
 
 
 def _setup(
@@ -280,48 +229,23 @@ def _setup(
     duration: float,
     starts: Starts | None,
 ) -> Setup:
-    """Return the runs of a law on a plant in a condition. Raises like `accuracy`."""
+    """Return the runs of a law on a plant in a condition; of a law of no gains in the set with its defaults."""
     fields = condition.on(plant, duration)
     if "control_period" in fields:
         raise ScenarioError(f"condition {condition.name!r} sets control_period, which accuracy varies: leave it out")
     if len(units := set(plant.units[: plant.driven])) > 1:
         raise ScenarioError(f"{plant.name} has driven channels in {joined(sorted(units))}: give a plant with one unit")
-    untuned = isinstance(law, str) and not _has_gains(plant, law, gains)
+    find("set of gains", gains, sets.KNOWN_SETS)
+    gain_set = gains if not isinstance(law, str) or sets.in_set(plant, law, gains) else "default"
 
     def scenario(seed: int, h: float, divisor: int = 1) -> Scenario:
-        gain_set = "default" if untuned else gains
         made = case(plant, law, condition, duration, gain_set, seed, starts, {"control_period": h})
         steps = made.steps if made.resolved.integrator == "RK4" else max(made.steps, MIN_STEPS)
         step = fields["physics_step"] / divisor if "physics_step" in fields else h / (steps * divisor)
         return dataclasses.replace(made, physics_step=step).named(made.condition)
 
     runs = [scenario(seed, h) for seed in seeds for h in periods]
-    return Setup([*runs, scenario(seeds[0], periods[-1], divisor=2)], periods, len(seeds), untuned)
-
-
-def _has_gains(plant: Plant, law: str, gains: str) -> bool:
-    """Return whether a set has gains for a law on a plant, or the law needs none.
-
-    Raises:
-      ScenarioError: an unknown law or set.
-    """
-    if not sets.law(plant, law, "default").gains:
-        return True
-    find("set of gains", gains, dict.fromkeys((*sets.SETS, "default")))
-    return in_set(plant, law, gains)
-
-
-def _warn_of_defaults(setups: Sequence[Setup], gains: str) -> None:
-    """Warn of laws that have no gains in the set."""
-    untuned = [setup.scenarios[0] for setup in setups if setup.untuned]
-    pairs = dict.fromkeys(f"{scenario.law.name} on {scenario.plant.name}" for scenario in untuned)
-    if pairs:
-        warnings.warn(
-            f"no gains in set {gains!r} for {', '.join(pairs)}: these have their default gains; tune them, or give "
-            "laws with gains",
-            ScenarioWarning,
-            users_stacklevel(),
-        )
+    return Setup([*runs, scenario(seeds[0], periods[-1], divisor=2)], periods, len(seeds))
 
 
 def _row(setup: Setup, runs: Sequence[Run]) -> Accuracy:

@@ -32,16 +32,7 @@ def orders(
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
 ) -> Figure | SubFigure:
-    """Draw how the errors of laws fall with the control period.
-
-    Args:
-      rows: of `smc.accuracy`. Each plant and condition has its own panels.
-      path, size, format, fig: as in `figure`.
-      title: default: "Accuracy", with the plant and the condition if there is one of each.
-
-    Raises:
-      ScenarioError: no rows, or as `figure`.
-    """
+    """Draw how the errors of laws fall with the control period, panels for each plant and condition, as `figure`."""
     groups: dict[str, list[Accuracy]] = {}
     for row in rows:
         plant = style.plant_name(row.plant, short=True)
@@ -67,10 +58,8 @@ def orders(
             ax.minorticks_off()
             ax.xaxis.set_major_formatter("{x:g}")
             ax.set_title(name if len(groups) > 1 else "")
-        handles = [
-            Line2D([], [], color=colour, marker=mark, lw=style.points(2.0), label=_label(law, rows))
-            for law, (colour, mark) in looks.items()
-        ]
+        common = {"xdata": [], "ydata": [], "lw": style.points(2.0)}
+        handles = [Line2D(**common, color=c, marker=mark, label=_label(law, rows)) for law, (c, mark) in looks.items()]
         handles.append(Line2D([], [], color=style.MUTED, ls="--", label="theory's slope"))
         whole = "Accuracy" if len(groups) > 1 else f"Accuracy: {next(iter(groups))}"
         pages.set_head(page, width, title or whole, handles)

@@ -10,7 +10,6 @@ and no run's error still falls or grows: by more than a factor of 1.5 from each 
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -24,24 +23,15 @@ UNTOLD = "the order cannot be told"
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Scaling:
-    """How the error of one quantity depends on the control period.
+    """The order with which the error of one quantity falls with the control period, and its 95 % interval."""
 
-    Attributes:
-      errors: the error of each run: a tuple for each start, with a number for each period; inf for a failed run.
-      used: the periods in the fit, s.
-      order: exponent of the period; NaN with fewer than two periods.
-      low, high: its 95 % interval; NaN with fewer than three periods.
-      theory: the order that the law's theorem promises, at least; None if it promises none here.
-      why: why periods were left out, and why the order is not theory's where the runs show a reason; "" for neither.
-    """
-
-    errors: tuple[tuple[float, ...], ...]
-    used: tuple[float, ...]
-    order: float
-    low: float
+    errors: tuple[tuple[float, ...], ...]  # of each run: for each start, for each period; inf if it failed
+    used: tuple[float, ...]  # the periods in the fit, s
+    order: float  # exponent of the period; NaN with fewer than two periods
+    low: float  # with `high` its interval; NaN with fewer than three periods
     high: float
-    theory: float | None
-    why: str
+    theory: float | None  # the order that the law's theorem promises, at least; None if it promises none here
+    why: str  # why periods were left out, and why the order is not theory's where the runs show a reason
 
     @property
     def largest(self) -> tuple[float, ...]:
@@ -61,29 +51,19 @@ class Scaling:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Accuracy:
-    """The accuracy of one law on one plant in one condition.
-
-    Attributes:
-      plant, condition, law: their names.
-      gains: the kinds of sources of the law's gains, see `control.source`, such as "shipped".
-      unit: of e. That of s depends on the law; for s = de + c e it is this unit per second.
-      periods: control periods, s, longest first.
-      e, s: how the tracking error and the law's sliding variable depend on the period.
-      runs, failed: the number of runs, and of those that failed.
-      floor: errors up to this size are rounding.
-    """
+    """The accuracy of one law on one plant in one condition."""
 
     plant: str
     condition: str
     law: str
-    gains: str
-    unit: str
-    periods: tuple[float, ...]
-    e: Scaling
-    s: Scaling
+    gains: str  # the kinds of sources of the law's gains, see `control.source`, such as "shipped"
+    unit: str  # of e; that of s depends on the law, for s = de + c e it is this unit per second
+    periods: tuple[float, ...]  # control periods, s, longest first
+    e: Scaling  # of the tracking error
+    s: Scaling  # of the law's sliding variable
     runs: int
-    failed: int
-    floor: float
+    failed: int  # runs
+    floor: float  # errors up to this size are rounding
 
     @property
     def place(self) -> tuple[float, ...]:
@@ -110,30 +90,15 @@ class Accuracy:
             return "failed"
         return f"<{self.floor:.0e}" if value <= self.floor else f"{value:.1e}"
 
-    def row(self) -> dict[str, Any]:
-        """Return its numbers by name: the columns of `AccuracyTable.to_pandas`."""
-        found: dict[str, Any] = {
-            name: getattr(self, name) for name in ("plant", "condition", "law", "gains", "runs", "failed", "unit")
-        }
-        for name in QUANTITIES:
-            its: Scaling = getattr(self, name)
-            found |= {f"{name}_order": its.order, f"{name}_low": its.low, f"{name}_high": its.high}
-            found |= {f"{name}_theory": math.nan if its.theory is None else its.theory, f"{name}_why": its.why}
-            found |= {f"{name}_at_{h:g}": error for h, error in zip(self.periods, its.largest, strict=True)}
-        return found
-
 
 def scaling(
     parts: np.ndarray, periods: Sequence[float], theory: float | None, floor: float, reasons: Mapping[str, str]
 ) -> Scaling:
-    """Return how errors depend on the control period.
+    """Return how errors depend on the control period; periods (s, longest first), theory and floor as of the classes.
 
     Args:
       parts: largest magnitudes in the last three parts of each run, (starts, periods, 3), in order of time; inf for a
         failed run. The last one is the error.
-      periods: s, longest first.
-      theory: the order that theory promises, or None.
-      floor: errors up to this size are rounding.
       reasons: what may keep the order from theory's, known without the errors: "always" is said in any case, all others
         only where the order is lower than promised, or there is none.
     """
@@ -156,24 +121,12 @@ def scaling(
         if mask.any():
             said.append(f"{_periods(periods, mask)} {words}")
     said += _difference(errors[:, used], h, order, (low, high), theory, reasons)
-    return Scaling(
-        errors=tuple(map(tuple, errors.tolist())),
-        used=tuple(h.tolist()),
-        order=order,
-        low=low,
-        high=high,
-        theory=theory,
-        why="; ".join(said),
-    )
+    every, counted = tuple(map(tuple, errors.tolist())), tuple(h.tolist())
+    return Scaling(errors=every, used=counted, order=order, low=low, high=high, theory=theory, why="; ".join(said))
 
 
 def fit(periods: np.ndarray, errors: np.ndarray) -> tuple[float, float, float]:
-    """Return the exponent of the period with its interval; NaN where there are too few periods.
-
-    Args:
-      periods: (P,), s.
-      errors: (starts, P), all positive.
-    """
+    """Return the exponent of periods (P,), s, in positive errors (starts, P), and its interval; NaN for too few."""
     if len(periods) < 2:
         return math.nan, math.nan, math.nan
     x, y = np.log(periods), np.log(errors)
