@@ -37,10 +37,9 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
 from smc_mujoco.simulation.grid import Starts, case, check_moving, listed, listed_laws
 from smc_mujoco.studies.advice import NEEDS, ROBUST, Advice, Choice, Need, Runs, ties
-from smc_mujoco.studies.fair_gains import Candidate, law_or_template
+from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.table import Table
-from smc_mujoco.studies.trial import Trial
 from smc_mujoco.studies.worst_case import DURATION, WorstCase, default_budget
 
 DEFAULT_NEEDS = ("fast", "accurate", "calm")

@@ -32,12 +32,11 @@ from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import executors
 from smc_mujoco.studies.board import Boards
-from smc_mujoco.studies.fair_gains import Candidate, law_or_template
+from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, Extent
 from smc_mujoco.studies.table import Table
-from smc_mujoco.studies.trial import Trial
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]

@@ -1,4 +1,4 @@
-"""Gains for laws that are compared on a plant, all by one rule.
+"""Trials of laws on plants: their gains, all by one rule, their runs and their worst cases.
 
 A law has the gains that the user gave it, else those that come with the package for the plant, else those that a search
 by the same rule finds: with the same bound on u, the same starts and as many evaluations. A law that cannot be tuned
@@ -8,9 +8,9 @@ has set s modulo their number, so that a comparison holds over the gains with wh
 
 import dataclasses
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from smc_mujoco.analysis.tuning import result, search, search_space
 from smc_mujoco.analysis.tuning.objective import Objective
@@ -23,10 +23,17 @@ from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
 from smc_mujoco.simulation import coerce
-from smc_mujoco.simulation.conditions import applicable
-from smc_mujoco.simulation.grid import Starts
+from smc_mujoco.simulation.conditions import Condition, applicable
+from smc_mujoco.simulation.grid import Starts, all_combinations
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies import run_key
 from smc_mujoco.studies.cache import cached
+from smc_mujoco.studies.study import study
+from smc_mujoco.studies.table import Table
+
+if TYPE_CHECKING:
+    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+    from smc_mujoco.studies.worst_case import WorstCase
 
 
 class Candidate(NamedTuple):
@@ -147,3 +154,37 @@ def _candidate(default: Component, tuned: result.Tuned) -> Candidate:
     have = "have no unit, so their" if len(without_unit) > 1 else "has no unit, so its"
     words = f"{joined(without_unit)} {have} search is about the defaults and not by the rule"
     return Candidate(sets[0], sets, words * bool(without_unit))
+
+
+class Trial(NamedTuple):
+    """What laws are compared on, and the folder of the results; `threads` and `progress` are as in `run`."""
+
+    plants: Sequence[Plant]
+    conditions: Sequence[Condition]
+    duration: float  # of a run, s
+    starts: Starts | None
+    folder: Path
+    threads: int | None
+    progress: bool
+
+    def gains(
+        self, laws: Mapping[str, Sequence[Component | Template]], budget: int, **options: Any
+    ) -> dict[str, list[Candidate]]:
+        """Return plant -> its laws with gains by one rule, see `fair_gains` for the options."""
+        given = self.folder / "gains", budget, self.starts, self.threads, self.progress
+        return {plant.name: fair_gains(plant, laws[plant.name], *given, **options) for plant in self.plants}
+
+    def run(self, candidates: Mapping[str, Sequence[Candidate]], seeds: int, **options: Any) -> Table:
+        """Run the laws of each plant in each condition from the seeds 0, 1, ..., with the options of `study`."""
+        grid = self.plants, lambda plant: candidates[plant.name], self.conditions, range(seeds)
+        runs = all_combinations(*grid, self.duration, self.starts)
+        return study(runs, self.folder, replay=True, threads=self.threads, progress=self.progress, **options)
+
+    def attack(
+        self, name: str, scenario: Scenario, within: "Uncertainty | None", budget: int | None = None
+    ) -> "WorstCase":
+        """Return the worst case of a scenario, which the folder keeps under a name."""
+        from smc_mujoco.studies.worst_case import cached_worst_case
+
+        file = self.folder / "worst" / f"{name}.json"
+        return cached_worst_case(file, scenario, within, budget, self.threads, self.progress)

@@ -6,30 +6,42 @@ changed.
 """
 
 import dataclasses
+import hashlib
+import json
 import os
 import sys
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from smc_mujoco.common.errors import ScenarioError, find, printable, shown
+from smc_mujoco.common.files import slug, write_json
 from smc_mujoco.common.progress import counter
+from smc_mujoco.common.text import counted
 from smc_mujoco.control.gain_sets import LAWS
 from smc_mujoco.control.law import checked_name
+from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.conditions import DURATION, PLANTS
-from smc_mujoco.simulation.run import cores
+from smc_mujoco.simulation.run import PlainLoopWarning, cores, run, stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
-from smc_mujoco.studies import executors, run_key, saved_traces, study_replays
+from smc_mujoco.studies import executors, run_key
 from smc_mujoco.studies import noise_key as noise
 from smc_mujoco.studies.executors import Batch, ResultColumns
+from smc_mujoco.studies.replay import replays
 from smc_mujoco.studies.store import Store
 from smc_mujoco.studies.table import Table
 
 # One condition of each kind: of the paper's, and one each for friction, drive, gear, sensor and obstacles.
 IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
 REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
+TRACES = ("none", "worst", "all")  # choices of traces to save
+REPLAYS = "replays.json"  # file in a study's folder
+OTHER_SCORES = "run again, it has other scores: the law keeps a state of its own, or reads a clock"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -92,7 +104,7 @@ def study(
     if not isinstance(out, str | os.PathLike):
         raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
     where = executors.as_executor(executor)
-    find("choice of traces", traces, dict.fromkeys(saved_traces.CHOICES))
+    find("choice of traces", traces, dict.fromkeys(TRACES))
     threads = cores(threads)
     store, folder = Store(Path(out)), Path(out) / "traces"
     plants: run_key.Hashes = {}
@@ -106,11 +118,11 @@ def study(
     _compute(missing, store, plants, where, threads, progress, folder if traces == "all" else None)
     changes = {name: run_key.source(scenario) for name, scenario in by_key.items()}
     if replay:
-        for name, columns in study_replays.replayed(by_key, store, Path(out), threads, progress).items():
+        for name, columns in _replayed(by_key, store, Path(out), threads, progress).items():
             changes[name] = changes[name] | columns
     store.collect(list(by_key), changes)
     table = dataclasses.replace(Table.read(store.results), known=by_key)
-    saved_traces.save(table, traces, folder, threads, progress)
+    _save_traces(table, traces, folder, threads, progress)
     return table
 
 
@@ -134,7 +146,7 @@ def _compute(
     def finish_here(batch: Batch, finished: Sequence[Trace]) -> None:
         if traces:
             for trace in finished:
-                trace.save(saved_traces.path(traces, run_key.row(trace.scenario, plants)))
+                trace.save(trace_file(traces, run_key.row(trace.scenario, plants)))
         finish(batch, [executors.result_columns(trace) for trace in finished])
 
     with counter(len(missing), sum(s.work for s in missing.values()), progress) as stepped:
@@ -156,3 +168,102 @@ def _checked(scenarios: Any) -> Iterator[Scenario]:
         empty = False
     if empty:
         raise ScenarioError(f"scenarios is {shown(scenarios)}: give several, such as a list")
+
+
+# replays: one run of each of the user's laws on each plant in each condition, which no law can foresee
+
+
+def _replayed(
+    runs: Mapping[str, Scenario], store: Store, folder: Path, threads: int | None, progress: bool
+) -> dict[str, dict[str, Any]]:
+    """Replay chosen runs, those with no result in the folder. Return hash -> the columns that their replays change."""
+    chosen, known = _to_replay(runs), _known(folder / REPLAYS)
+    if missing := [name for name in chosen if name not in known]:
+        if progress:
+            print(f"replaying {counted(len(missing), 'run')} of your laws", file=sys.stderr)
+        try:
+            known |= _replay_results({name: runs[name] for name in missing}, store, threads)
+            write_json(folder / REPLAYS, known)
+        except ScenarioError as error:
+            print(f"not replayed: {error}", file=sys.stderr)
+    nothing = dict.fromkeys((*(metric.name for metric in metrics()), "diverged_at"))
+    return {
+        name: {"replayed": True} if known[name] == "" else {**nothing, "replayed": False, "failure": known[name]}
+        for name in chosen
+        if known.get(name) is not None
+    }
+
+
+def _to_replay(runs: Mapping[str, Scenario]) -> list[str]:
+    """Return the hash of one run for each of the user's laws, on each plant in each condition.
+
+    The choice is by a hash of these hashes. They depend on the noise key, so it cannot be foreseen.
+    """
+    groups: dict[tuple, list[str]] = {}
+    for name, scenario in runs.items():
+        if noise.has_user_code(scenario):
+            group = scenario.law.name, scenario.plant.name, run_key.condition(scenario)
+            groups.setdefault(group, []).append(name)
+    return [min(names, key=lambda name: hashlib.sha256(name.encode()).digest()) for names in groups.values()]
+
+
+def _known(file: Path) -> dict[str, str | None]:
+    """Return the results in a file: hash -> what differs, "" for nothing, None for a run that cannot be replayed."""
+    try:
+        known = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return known if isinstance(known, dict) else {}
+
+
+def _replay_results(runs: Mapping[str, Scenario], store: Store, threads: int | None) -> dict[str, str | None]:
+    """Run and replay runs. Return hash -> what differs, as in `_known`."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PlainLoopWarning)  # the study itself has warned
+        traces = run(list(runs.values()), threads=threads)
+    results: dict[str, str | None] = {}
+    for name, trace, replay in zip(runs, traces, replays(traces), strict=True):
+        row = store.row(name)
+        if replay.same is None and trace.failure is None:
+            print(f"not replayed: {trace.scenario.law.name}, {replay.why}", file=sys.stderr)
+        if any(row.get(column) != value for column, value in executors.result_columns(trace).items()):
+            results[name] = OTHER_SCORES
+        else:
+            results[name] = None if replay.same is None else replay.why
+    return results
+
+
+# saved traces
+
+
+def trace_file(folder: Path, row: Mapping[str, Any]) -> Path:
+    """Return the file of a row's trace."""
+    names = "-".join(slug(row[column]) for column in ("plant", "condition", "law"))
+    return folder / f"{names}-{row['seed']}-{row['hash'][:8]}.npz"
+
+
+def worst_rows(table: Table) -> list[int]:
+    """Return the row of the worst run of every plant and condition: failed, unsettled, then by bound or overshoot."""
+    failed, bounds = table.column("failure") != np.array(None), table.column("ultimate_bound")
+    ends = np.where(np.isnan(bounds), table.column("overshoot"), bounds)
+    unsettled = table.column("settling_time") == np.inf
+    badness = list(zip(failed, unsettled & ~failed, np.where(failed, 0.0, ends), strict=True))
+    rows: dict[tuple, int] = {}
+    for i, cell in enumerate(zip(table.column("plant"), table.column("condition"), strict=True)):
+        if badness[i] > badness[rows.setdefault(cell, i)]:
+            rows[cell] = i
+    return list(rows.values())
+
+
+def _save_traces(table: Table, choice: str, folder: Path, threads: int, progress: bool) -> None:
+    """Repeat the chosen runs that have no file yet, and save their traces."""
+    chosen = {"none": [], "worst": worst_rows(table), "all": range(len(table))}[choice]
+    files = {}
+    for i in chosen:
+        (row,) = table.data.slice(i, 1).to_pylist()
+        if not (file := trace_file(folder, row)).exists():
+            files[table.scenario(i)] = file
+    with counter(len(files), sum(s.work for s in files), progress) as stepped:
+        for batch in executors.batches(files, threads):
+            for i, trace in stream(batch, threads, stepped):
+                trace.save(files[batch[i].scenario])

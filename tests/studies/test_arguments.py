@@ -6,7 +6,7 @@ from helpers.arguments import told
 import smc_mujoco as smc
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
-from smc_mujoco.studies import adviser, scene, trial, worst_case
+from smc_mujoco.studies import adviser, fair_gains, scene, worst_case
 from smc_mujoco.studies.fair_gains import Candidate
 
 pytestmark = pytest.mark.quick
@@ -41,9 +41,9 @@ def stopped(monkeypatch):
         raise Reached
 
     calls: list[str] = []
-    monkeypatch.setattr(trial, "fair_gains", gains)
-    monkeypatch.setattr(trial, "all_combinations", combinations)
-    monkeypatch.setattr(trial, "study", runs)
+    monkeypatch.setattr(fair_gains, "fair_gains", gains)
+    monkeypatch.setattr(fair_gains, "all_combinations", combinations)
+    monkeypatch.setattr(fair_gains, "study", runs)
     return calls
 
 
@@ -75,7 +75,7 @@ def test_what_is_asked_reaches_gains_and_runs_with_these_defaults(stopped, snaps
 
 def test_robust_has_an_adversary_with_these_defaults(stopped, monkeypatch, snapshot):
     """The contest is given; what is asked of it is told."""
-    monkeypatch.setattr(trial, "study", lambda runs, folder, **options: stopped.append(f"study {folder}"))
+    monkeypatch.setattr(fair_gains, "study", lambda runs, folder, **options: stopped.append(f"study {folder}"))
     monkeypatch.setattr(adviser, "default_budget", lambda scenario, within: 1000)
     monkeypatch.setattr(
         worst_case, "cached_worst_case", lambda *given, **options: stopped.append(told([*given, options]))

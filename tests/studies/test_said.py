@@ -30,9 +30,8 @@ from smc_mujoco.studies import (
     pickling,
     replay,
     run_key,
-    saved_traces,
     store,
-    study_replays,
+    study,
     worst_case,
 )
 from smc_mujoco.studies.advice import NEEDS, Choice, ties
@@ -169,7 +168,7 @@ def test_needs_and_choices_say_as_recorded(snapshot):
 
 def test_names_of_files(tmp_path):
     row = {"plant": "my plant", "condition": "delay = 0.01, c", "law": "λ/..", "seed": 3, "hash": "0123456789abcdef"}
-    assert saved_traces.path(tmp_path, row).name == "my_plant-delay-0.01_c-λ_..-3-01234567.npz"
+    assert study.trace_file(tmp_path, row).name == "my_plant-delay-0.01_c-λ_..-3-01234567.npz"
     names = ["", "...", "A  =  B", "x" * 60, "x" * 61, "é" * 31, "a/b\\c", "_a_", "k=-1.5+2"]
     made = [slug(name) for name in names]
     assert made[:3] == ["run", "run", "a-b"]
@@ -265,14 +264,14 @@ def test_what_cannot_be_sent_or_replayed_is_said_as_recorded(monkeypatch, capsys
     told(replay._in_fresh_process, "verify", [])
     monkeypatch.setattr(replay.subprocess, "run", mock.Mock(side_effect=subprocess.TimeoutExpired("x", 600.0)))
     told(replay._in_fresh_process, "verify", [])
-    monkeypatch.setattr(study_replays, "has_user_code", lambda scenario: True)
-    monkeypatch.setattr(study_replays.run_key, "condition", lambda scenario: "nominal")
-    monkeypatch.setattr(study_replays, "_results", mock.Mock(side_effect=smc.ScenarioError("it cannot be sent")))
+    monkeypatch.setattr(study.noise, "has_user_code", lambda scenario: True)
+    monkeypatch.setattr(study.run_key, "condition", lambda scenario: "nominal")
+    monkeypatch.setattr(study, "_replay_results", mock.Mock(side_effect=smc.ScenarioError("it cannot be sent")))
     runs = {"a": RUN, "b": dataclasses.replace(RUN, law=smc.law("pid"))}
-    said.append(str(study_replays.replayed(runs, None, tmp_path, None, True)))
-    monkeypatch.setattr(study_replays, "_results", lambda runs, *_: dict.fromkeys(runs, "it differs") | {"b": ""})
+    said.append(str(study._replayed(runs, None, tmp_path, None, True)))
+    monkeypatch.setattr(study, "_replay_results", lambda runs, *_: dict.fromkeys(runs, "it differs") | {"b": ""})
     for progress in (True, False):
-        found = study_replays.replayed(runs, None, tmp_path, None, progress)
+        found = study._replayed(runs, None, tmp_path, None, progress)
     said += [str({name: {k: v for k, v in row.items() if v is not None} for name, row in found.items()})]
     said += [str({name: len(row) > 2 for name, row in found.items()}), (tmp_path / "replays.json").read_text()]
     assert "\n".join([*said, capsys.readouterr().err]) == snapshot

@@ -16,9 +16,9 @@ from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.prepare import prepare
-from smc_mujoco.studies import executors, run_key, saved_traces, store
+from smc_mujoco.studies import executors, run_key, store
 from smc_mujoco.studies.run_key import condition
-from smc_mujoco.studies.study import study
+from smc_mujoco.studies.study import study, trace_file, worst_rows
 from smc_mujoco.studies.table import Table
 
 scenario = functools.partial(runs.scenario, duration=0.05)
@@ -304,7 +304,7 @@ def test_the_worst_run_failed_or_never_settled_or_has_the_largest_bound():
         "ultimate_bound": np.array([0.0045, 0.0007, 0.1, *[np.nan] * 3, 9.0, np.nan]),
         "overshoot": np.array([1.0, 1.0, 1.0, 5.0, 20.0, 90.0, 1.0, np.nan]),
     }
-    assert saved_traces.worst(SimpleNamespace(column=columns.get)) == [1, 4, 7]
+    assert worst_rows(SimpleNamespace(column=columns.get)) == [1, 4, 7]
 
 
 def test_all_traces_are_saved_and_none_twice(tmp_path, none_runs):
@@ -315,6 +315,6 @@ def test_all_traces_are_saved_and_none_twice(tmp_path, none_runs):
     study(small(), tmp_path / "a", traces="all")
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "a" / "traces").iterdir()} == before
     row = run_key.row(small()[0])
-    file = saved_traces.path(tmp_path / "a" / "traces", row)
+    file = trace_file(tmp_path / "a" / "traces", row)
     assert file.name == f"duffing-nominal-observer_free-0-{row['hash'][:8]}.npz"
     assert dataclasses.replace(smc.load(file).scenario) == small()[0]
