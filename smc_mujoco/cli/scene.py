@@ -48,10 +48,6 @@ def perform(
         terminal.print()
     for table in tables.answers(scene.answers, traces) if scene.answers else ():
         terminal.print(table, "")
-    for label, sentence in scene.facts.items():
-        terminal.note(f"{label}: {sentence}", wrap=True)
-    if scene.facts:
-        terminal.print()
     with clock("traces"):  # first, so that runs are kept if the scene's own answer fails
         written = save(traces, out, export)
     terminal.note(f"{scene.sentence(traces)}\n", "bold", wrap=True)

@@ -5,7 +5,6 @@ study says whether another start or noise would change the order.
 """
 
 import dataclasses
-import functools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -13,7 +12,7 @@ from smc_mujoco.analysis.paired_runs import floor
 from smc_mujoco.analysis.ranking import exceeds
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.text import every, joined, number
-from smc_mujoco.metrics.catalogue import CATALOGUE, scores, settling_time
+from smc_mujoco.metrics.catalogue import CATALOGUE, settling_time
 from smc_mujoco.simulation.trace import Trace
 
 Measure = str | Callable[[Trace], float]
@@ -65,40 +64,36 @@ class Outcome:
     def __iter__(self) -> Iterator[tuple[str, Mapping[str, Trace]]]:
         return iter(self.traces.items())
 
-    def values(self, measure: Measure, group: str = "") -> dict[str, dict[str, float]]:
-        """Return condition -> label -> value: NaN for a run that failed, inf for "never".
-
-        Args:
-          group: of channels, as in `smc.scores`, such as "free"; by default the one value of `smc.score`.
-        """
-        value = self._function(measure, group)
+    def values(self, measure: Measure) -> dict[str, dict[str, float]]:
+        """Return condition -> label -> value: NaN for a run that failed, inf for "never"."""
+        value = _function(measure)
         return {name: {label: value(run) for label, run in runs.items()} for name, runs in self}
 
-    def size(self, measure: Measure, group: str = "", unit: str = "") -> str:
+    def size(self, measure: Measure, unit: str = "") -> str:
         """Return the value of the run, or the range of all: "0.323 s", "1.12 to 1.13 s, 1 failed", "never".
 
         Args:
           unit: of a measure that is a function.
         """
-        values = [value for by_label in self.values(measure, group).values() for value in by_label.values()]
-        units = {unit or _unit(measure, run, group) for _, runs in self for run in runs.values()}
+        values = [value for by_label in self.values(measure).values() for value in by_label.values()]
+        units = {unit or _unit(measure, run) for _, runs in self for run in runs.values()}
         return _range(values, units.pop() if len(units) == 1 else "") if values else "none"
 
     def leaders(self, *measures: Measure) -> list[str]:
         """Return the labels whose value is smallest, or level with it, in every measure and condition."""
-        winners = [self._level(name, measure, "", smallest=True) for name in self.traces for measure in measures]
+        winners = [self._level(name, measure, smallest=True) for name in self.traces for measure in measures]
         return [label for label in self.labels if all(label in level for level in winners)]
 
-    def least(self, measure: Measure, group: str = "", unit: str = "") -> str:
+    def least(self, measure: Measure, unit: str = "") -> str:
         """Return whose value is smallest, with the value: "classical (1.12 s)", "a and b tied (1.12 to 1.13 s)".
 
         Several conditions have a winner each: "classical (10 ms, 20 ms), adaptive (50 ms)". "none" where all fail.
         """
-        return self._first(measure, group, unit, smallest=True)
+        return self._first(measure, unit, smallest=True)
 
-    def most(self, measure: Measure, group: str = "", unit: str = "") -> str:
+    def most(self, measure: Measure, unit: str = "") -> str:
         """Return whose value is largest, as `least` does."""
-        return self._first(measure, group, unit, smallest=False)
+        return self._first(measure, unit, smallest=False)
 
     def who(self, singular: str, plural: str, holds: Callable[[Trace], bool] = settles) -> str:
         """Return for which runs something holds: "all 4 settle", "a and b settle, c does not".
@@ -140,18 +135,18 @@ class Outcome:
             words.setdefault((-good, text), []).append(label)
         return ", ".join(f"{_all(words[key], self.labels)} {key[1]}" for key in sorted(words))
 
-    def changes(self, measure: Measure, one: str, other: str, group: str = "", unit: str = "") -> str:
+    def changes(self, measure: Measure, one: str, other: str, unit: str = "") -> str:
         """Return each label's value in one condition and in another: "a 1.20 to 1.43 s".
 
         A change below the least relevant difference is called that: "b no relevant change (0.535 s)".
         """
-        value, parts = self._function(measure, group), []
+        value, parts = _function(measure), []
         before, after = (find("condition of the scene", name, self.traces) for name in (one, other))
         for label in (label for label in before if label in after):
             run = before[label]
             pair = [value(run), value(after[label])]
-            size = _from_to(pair, unit or _unit(measure, run, group))
-            level = not any(map(math.isnan, pair)) and not _exceeds(max(pair), min(pair), _floor(measure, run, group))
+            size = _from_to(pair, unit or _unit(measure, run))
+            level = not any(map(math.isnan, pair)) and not _exceeds(max(pair), min(pair), _floor(measure, run))
             parts.append(f"{label} no relevant change ({size})" if level else f"{label} {size}")
         return ", ".join(parts) or "none"
 
@@ -164,33 +159,22 @@ class Outcome:
                     where[label].append(name)
         return where
 
-    def _function(self, measure: Measure, group: str) -> Callable[[Trace], float]:
-        """Return the function of a measure; its value is NaN for a run that failed."""
-        if isinstance(measure, str):
-            metric = find("metric", measure, CATALOGUE)
-            value = functools.partial(_of_group, name=measure, group=group) if group else metric.of
-        elif callable(measure):
-            value = measure
-        else:
-            raise ScenarioError(f"a measure is {shown(measure)}: give the name of a metric, or a function of a trace")
-        return lambda run: math.nan if run.failure is not None else float(value(run))
-
-    def _level(self, condition: str, measure: Measure, group: str, smallest: bool) -> dict[str, float]:
+    def _level(self, condition: str, measure: Measure, smallest: bool) -> dict[str, float]:
         """Return label -> value of the runs with the smallest or largest value, or level with it; none if "never"."""
-        values = self[condition].values(measure, group)[condition]
+        values = self[condition].values(measure)[condition]
         known = {label: value for label, value in values.items() if not math.isnan(value)}
         if not known or (smallest and min(known.values()) == math.inf):
             return {}
-        resolution = _floor(measure, self.traces[condition][next(iter(known))], group)
+        resolution = _floor(measure, self.traces[condition][next(iter(known))])
         best = (min if smallest else max)(known.values())
         ends = {label: (value, best) if smallest else (best, value) for label, value in known.items()}
         return {label: known[label] for label, (a, b) in ends.items() if not _exceeds(a, b, resolution)}
 
-    def _first(self, measure: Measure, group: str, unit: str, smallest: bool) -> str:
+    def _first(self, measure: Measure, unit: str, smallest: bool) -> str:
         """Return in words the runs with the smallest or largest value of each condition."""
         winners: dict[tuple[str, ...], dict[str, list[float]]] = {}
         for name in self.traces:
-            level = self._level(name, measure, group, smallest)
+            level = self._level(name, measure, smallest)
             winners.setdefault(tuple(level), {})[name] = list(level.values())
         parts = []
         for labels, where in winners.items():
@@ -198,7 +182,7 @@ class Outcome:
             if 1 < len(labels) == len(self.labels):
                 several = f"{_all(labels, self.labels)} tied"
             values = [value for of_condition in where.values() for value in of_condition]
-            units = {unit or _unit(measure, self.traces[name][labels[0]], group) for name in where if labels}
+            units = {unit or _unit(measure, self.traces[name][labels[0]]) for name in where if labels}
             size = _range(values, units.pop()) if len(units) == 1 else ""
             sized = f" ({size})" if size else ""
             if len(self.traces) == 1:
@@ -208,6 +192,14 @@ class Outcome:
             else:
                 parts.append(f"{several} ({', '.join(where)})")
         return ", ".join(parts)
+
+
+def _function(measure: Measure) -> Callable[[Trace], float]:
+    """Return the function of a measure; its value is NaN for a run that failed."""
+    if not isinstance(measure, str) and not callable(measure):
+        raise ScenarioError(f"a measure is {shown(measure)}: give the name of a metric, or a function of a trace")
+    value = find("metric", measure, CATALOGUE).of if isinstance(measure, str) else measure
+    return lambda run: math.nan if run.failure is not None else float(value(run))
 
 
 def _true(holds: Callable[[Trace], bool], run: Trace) -> bool:
@@ -247,19 +239,14 @@ def _exceeds(a: float, b: float, resolution: float) -> bool:
     return a != b and bool(exceeds(a, b, resolution=resolution))
 
 
-def _of_group(trace: Trace, name: str, group: str) -> float:
-    """Return a metric of one group of channels."""
-    return find(f"metric of group {group!r}", name, find("group of channels", group, scores(trace)))
-
-
-def _floor(measure: Measure, run: Trace, group: str) -> float:
+def _floor(measure: Measure, run: Trace) -> float:
     """Return the difference of a metric that matters on no machine, as on leaderboards; 0 for a function."""
-    return floor(run.scenario, CATALOGUE[measure].unit) if isinstance(measure, str) and not group else 0.0
+    return floor(run.scenario, CATALOGUE[measure].unit) if isinstance(measure, str) else 0.0
 
 
-def _unit(measure: Measure, run: Trace, group: str) -> str:
+def _unit(measure: Measure, run: Trace) -> str:
     """Return the unit of a metric in a run; "" for a function."""
-    unit = CATALOGUE[measure].unit_in(run.scenario, group) if isinstance(measure, str) else ""
+    unit = CATALOGUE[measure].unit_in(run.scenario) if isinstance(measure, str) else ""
     return "" if unit == "1" else unit
 
 

@@ -41,7 +41,6 @@ class Scene:
       figure: "overview" (as `smc.figure`, a figure for each condition), "signals" (u of all conditions in one) or
         "chattering" (amplitude over the actuator's lag, predicted and run, all conditions in one).
       answers: metrics of the driven channels that answer the scene's question, printed after the scores.
-      facts: label -> sentence on another measurement, printed under the answers.
       answer: function of the `Outcome` of all runs that returns the sentence which answers the scene's question. The
         default says who settles, and who is first.
       camera: of the film, as `smc.film` takes it; default: the plant's own.
@@ -52,7 +51,6 @@ class Scene:
     film: str = ""
     figure: str = "overview"
     answers: tuple[str, ...] = ()
-    facts: Mapping[str, str] = dataclasses.field(default_factory=dict)
     answer: Callable[[Outcome], str] = dataclasses.field(default_factory=lambda: summary)
     camera: Camera | None = None
 
@@ -86,8 +84,6 @@ class Scene:
         object.__setattr__(self, "answers", answers)
         for name in answers:
             lookup(f"metric that answers scene {self.title!r}", name, CATALOGUE)
-        if not isinstance(self.facts, Mapping) or not all(isinstance(text, str) for text in self.facts.values()):
-            raise ScenarioError(f"scene {self.title!r} has facts {shown(self.facts)}: give labels with sentences")
         if not callable(self.answer):
             raise ScenarioError(f"scene {self.title!r} has answer {shown(self.answer)}: give a function of its runs")
 

@@ -420,7 +420,6 @@ scene = smc.Scene(
     title="Blocks",
     conditions={"dry": {"light": block(0.05), "heavy": block(5.0)}, "wet": {"light": block(0.0)}},
     answers=("stick_time", "peak_reaction"),
-    facts={"springs": "they deviate by 3 % [at most]."},
 )
 """
 
@@ -437,7 +436,6 @@ def test_answers_have_a_table_per_metric_with_labels_by_conditions(call, undrawn
     assert stick[1][1] == "0.300"
     assert reaction[0][1].split() == ["0.0500", "0"]
     assert len(reaction[1][1].split()) == 1  # no heavy one in the wet
-    assert "springs: they deviate by 3 % [at most]." in after
     assert max(map(len, after.partition("wrote")[0].splitlines())) <= 80
 
 
@@ -538,7 +536,6 @@ SCENES = {
     "conditions alike": ("smc.Scene(title='T', conditions={'A': {'b': ok()}, 'a': {'b': ok()}})", "A, a"),
     "no such film": ("smc.Scene(title='T', film='c', conditions={'a': {'b': ok()}})", "'c'"),
     "no such metric": ("smc.Scene(title='T', answers=('ripples',), conditions={'a': {'b': ok()}})", "'ripple'"),
-    "facts without labels": ("smc.Scene(title='T', facts=['so'], conditions={'a': {'b': ok()}})", "facts"),
     "no such figure": ("smc.Scene(title='T', figure='pie', conditions={'a': {'b': ok()}})", "'pie'"),
 }
 

@@ -103,7 +103,7 @@ SCENES = [
     {"conditions": {"nominal": {"a": 3}}}, {"conditions": {"": {"a": RUN}}}, {"conditions": {"nominal": {"": RUN}}},
     {"conditions": {"nominal": {"a": RUN, "b": OTHER}}}, {"conditions": {"nominal": {"a": RUN, "A": RUN}}},
     {"conditions": {"x": {"a": RUN}, "X": {"a": RUN}}}, {"film": "noise"}, {"figure": "figures"},
-    {"answers": ("itaee",)}, {"facts": {"a": 3}}, {"facts": ["a"]}, {"answer": "a"}, {"camera": (1.0,)},
+    {"answers": ("itaee",)}, {"answer": "a"}, {"camera": (1.0,)},
 ]  # fmt: skip
 REFUSED = {
     smc.leaderboard: [{"metrics": "itae"}, {"metrics": []}, {"metrics": ["itaee"]}],

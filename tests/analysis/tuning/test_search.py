@@ -334,8 +334,6 @@ def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, rival, refus
         "objective": dataclasses.replace(rival, definition=Objective(duration=0.5, u_max=12.0)),
         "seed": dataclasses.replace(rival, seed=4),
         "plant": dataclasses.replace(rival, plant=smc.plant("duffing", M=2.0)),
-        "bounds": dataclasses.replace(rival, bounds=dict(rival.bounds) | {"k": (1e-3, 1e3)}),
-        "budget ": dataclasses.replace(rival, history=rival.history * 2),
     }
     away = dataclasses.replace(rival, law=dataclasses.replace(rival.law, function=None))
     assert len(compare([away, found])) == 2
