@@ -8,6 +8,7 @@ import hashlib
 import importlib
 import io
 import itertools
+import math
 import os
 import re
 import secrets
@@ -155,23 +156,40 @@ call = _calling(64)  # (address, inputs, parameters, memory, outputs) -> status
 call_int = _calling(32)  # the same for a C function that returns an int: the register's upper half is undefined
 
 
-@intrinsic
-def attempt(typingctx, body, arguments):
-    """Return whether body(*arguments) returned without an exception, and its result. No exception reaches Python."""
-    resolved = body.get_call_type(typingctx, tuple(arguments), {})
-    returned = resolved.return_type
-    for item in returned.types if isinstance(returned, types.BaseTuple) else (returned,):
-        if not isinstance(item, types.Integer | types.Float | types.Boolean):
+@functools.cache
+def attempting(count: int, estimates: bool = False) -> Callable:
+    """Return a compiled function that stores `count` numbers, body(*arguments), at an address: 1 if it raised, else 0.
+
+    No exception reaches Python. An estimator may return one number, its velocity: its acceleration is then NaN.
+    """
+
+    @intrinsic
+    def attempt(typingctx, body, arguments, outputs):
+        resolved = body.get_call_type(typingctx, tuple(arguments), {})
+        returned = resolved.return_type
+        items = list(returned.types if isinstance(returned, types.BaseTuple) else [returned])
+        if not all(isinstance(item, types.Integer | types.Float | types.Boolean) for item in items):
             raise TypingError(f"it returns {returned} instead of numbers")
+        if len(items) != count and not (estimates and len(items) == 1):
+            raise TypingError(f"it returns {len(items)} numbers instead of {count}")
 
-    def codegen(context, builder, signature, args):
-        compiled = body.dispatcher.overloads[resolved.args]
-        context.active_code_library.add_linking_library(compiled.library)
-        values = [builder.extract_value(args[1], i) for i in range(len(resolved.args))]
-        status, result = context.call_internal_no_propagate(builder, compiled.fndesc, resolved, values)
-        return context.make_tuple(builder, signature.return_type, [status.is_ok, result])
+        def codegen(context, builder, signature, args):
+            compiled = body.dispatcher.overloads[resolved.args]
+            context.active_code_library.add_linking_library(compiled.library)
+            values = [builder.extract_value(args[1], i) for i in range(len(resolved.args))]
+            status, result = context.call_internal_no_propagate(builder, compiled.fndesc, resolved, values)
+            with builder.if_then(status.is_ok):
+                single = not isinstance(returned, types.BaseTuple)
+                numbers = [result] if single else [builder.extract_value(result, i) for i in range(count)]
+                stored = [context.cast(builder, x, item, types.float64) for x, item in zip(numbers, items, strict=True)]
+                place = builder.inttoptr(args[2], ir.DoubleType().as_pointer())
+                for i, x in enumerate([*stored, ir.Constant(ir.DoubleType(), math.nan)][:count]):
+                    builder.store(x, builder.gep(place, [ir.Constant(ir.IntType(64), i)]))
+            return builder.zext(builder.not_(status.is_ok), ir.IntType(64))
 
-    return types.Tuple([types.boolean, returned])(body, arguments), codegen
+        return types.int64(body, arguments, types.intp), codegen
+
+    return attempt
 
 
 @functools.cache

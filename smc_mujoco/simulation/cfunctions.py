@@ -13,13 +13,11 @@ that reaches u or s, the run ends.
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
 import functools
-import math
 import re
 from collections.abc import Callable
 from typing import Any
 
-from numba import carray, njit, types
-from numba.extending import intrinsic
+from numba import carray, njit
 
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
@@ -28,7 +26,7 @@ from smc_mujoco.common.jit import (
     Function,
     NotCompilable,
     Uncompiled,
-    attempt,
+    attempting,
     checked,
     compile_for,
     floats,
@@ -56,18 +54,10 @@ instant_at, friction_input_at, seen_at, series_at = map(record_at, (INSTANT, FRI
 def _compile_pair(function: Callable, kind: str, gains: tuple[str, ...], memory: int) -> Function:
     """Compile (y, gains, memory) -> two numbers; an estimator may return only the velocity."""
     body, inputs, values = jit(function), loader(Reading if kind == "estimator" else Measurement), loader(named(gains))
-    estimates = kind == "estimator"
+    attempt = attempting(2, kind == "estimator")
 
     def native(y, g, m, out):
-        ok, result = attempt(body, (inputs(y), values(g), carray(pointer(m), (memory,))))
-        if ok:
-            if estimates:
-                first, second = with_acceleration(result)
-            else:
-                first, second = result
-            output = carray(pointer(out), (2,))
-            output[0], output[1] = first, second
-        return not ok
+        return attempt(body, (inputs(y), values(g), carray(pointer(m), (memory,))), out)
 
     return _stored(native, function, kind, gains, memory)
 
@@ -78,7 +68,7 @@ def _compile_joint_law(function: Callable, gains: tuple[str, ...], shared: tuple
 
     Its inputs are the numbers of a JointMeasurement, its parameters n numbers a gain, its outputs u and s, (n,) each.
     """
-    body, values = jit(function), _joint_gains(gains, shared)
+    body, values, attempt = jit(function), _joint_gains(gains, shared), attempting(0)
 
     @checked
     def law(y, g, m, out):
@@ -87,14 +77,13 @@ def _compile_joint_law(function: Callable, gains: tuple[str, ...], shared: tuple
             raise ValueError
         for i in range(len(u)):
             out[i], out[len(u) + i] = u[i], s[i]
-        return 0
+        return ()
 
     def native(y, g, m, out):
         seen = measurement_at(y)
         n = len(seen.x)
         memories, output = carray(pointer(m), (n, memory)), carray(pointer(out), (2 * n,))
-        ok, _ = attempt(law, (seen, values(g, n), memories, output))
-        return not ok
+        return attempt(law, (seen, values(g, n), memories, output), out)
 
     return _stored(native, function, gains, shared, memory)
 
@@ -109,27 +98,13 @@ def _joint_gains(names: tuple[str, ...], shared: tuple[str, ...]) -> Callable:
     return checked(space["gains_at"])
 
 
-@intrinsic
-def with_acceleration(typingctx, result):
-    """Return (v, NaN) for a number v, which is a velocity without acceleration; anything else as it is."""
-    if not isinstance(result, types.Float | types.Integer | types.Boolean):
-        return result(result), lambda context, builder, signature, args: args[0]
-    numbers = types.UniTuple(types.float64, 2)
-
-    def codegen(context, builder, signature, args):
-        v = context.cast(builder, args[0], result, types.float64)
-        return context.make_tuple(builder, numbers, [v, context.get_constant(types.float64, math.nan)])
-
-    return numbers(result), codegen
-
-
 @functools.cache
 def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
     """Compile a record INSTANT -> value, first and second derivative.
 
     The parameters of a series are followed by the address and the number of its data.
     """
-    body, values = jit(kind.value), loader(named(names))
+    body, values, attempt = jit(kind.value), loader(named(names)), attempting(3)
     random, series, memory, parameter_bytes = kind.random, kind.series, max(kind.memory, 1), 8 * len(names)
     rows, sees = kind.rows, kind.sees
 
@@ -137,21 +112,15 @@ def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
         now = instant_at(y, 0)
         if random:
             state = carray(pointer(m), (memory,))
-            ok, result = attempt(body, (now.t, values(p), state, now.seed, now.channel, now.stream))
-        elif sees:
+            return attempt(body, (now.t, values(p), state, now.seed, now.channel, now.stream), out)
+        if sees:
             state = carray(pointer(m), (memory,))
-            ok, result = attempt(body, (now.t, values(p), state, now.e, now.de, now.s))
-        elif series:
+            return attempt(body, (now.t, values(p), state, now.e, now.de, now.s), out)
+        if series:
             data = series_at(p + parameter_bytes, 0)
             table = carray(pointer(int(data.address)), (rows, int(data.count)))
-            ok, result = attempt(body, (now.t, values(p), table))
-        else:
-            ok, result = attempt(body, (now.t, values(p)))
-        if ok:
-            r, dr, ddr = result
-            output = carray(pointer(out), (3,))
-            output[0], output[1], output[2] = r, dr, ddr
-        return not ok
+            return attempt(body, (now.t, values(p), table), out)
+        return attempt(body, (now.t, values(p)), out)
 
     compiled = _stored(native, kind.value, names, random, series, memory, rows, sees)
     fingerprint.keep(kind)
@@ -161,17 +130,12 @@ def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
 @functools.cache
 def compile_nominal(function: Callable, names: tuple[str, ...]) -> Function:
     """Compile a record SEEN -> f and g of channel i."""
-    body, values = jit(function), loader(named(names))
+    body, values, attempt = jit(function), loader(named(names)), attempting(2)
 
     def native(y, p, m, out):
         seen = seen_at(y, 0)
         x, v = carray(pointer(seen.x), (seen.n,)), carray(pointer(seen.v), (seen.n,))
-        ok, result = attempt(body, (x, v, seen.i, values(p)))
-        if ok:
-            f, g = result
-            output = carray(pointer(out), (2,))
-            output[0], output[1] = f, g
-        return not ok
+        return attempt(body, (x, v, seen.i, values(p)), out)
 
     return _stored(native, function, names)
 
@@ -179,16 +143,11 @@ def compile_nominal(function: Callable, names: tuple[str, ...]) -> Function:
 @functools.cache
 def _compile_friction(function: Callable, names: tuple[str, ...]) -> Function:
     """Compile a friction by a formula: v, motor, load -> sliding friction, and both bounds of the static friction."""
-    body, values = jit(function), loader(named(names))
+    body, values, attempt = jit(function), loader(named(names)), attempting(3)
 
     def native(y, p, m, out):
         friction = friction_input_at(y, 0)
-        ok, result = attempt(body, (friction.v, friction.motor, friction.load, values(p)))
-        if ok:
-            f, low, high = result
-            output = carray(pointer(out), (3,))
-            output[0], output[1], output[2] = f, low, high
-        return not ok
+        return attempt(body, (friction.v, friction.motor, friction.load, values(p)), out)
 
     return _stored(native, function, names)
 
