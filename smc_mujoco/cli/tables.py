@@ -170,21 +170,15 @@ def _label(label: str, trace: Trace) -> Text:
     return Text(label, style=style.law_colour(trace.scenario.law.name))
 
 
-def trace_summary(trace: Trace, change: StepChange | None = None) -> list[Table]:
+def trace_summary(trace: Trace) -> list[Table]:
     """Return a table for each group of channels: every metric of one trace, with its unit and its meaning."""
-    mark = MARK if change and change.marked else ""
     values, tables = metric_scores(trace), []
     for group, heading in headings(trace.scenario).items():
-        value = Column("value", justify="right")
-        table = titled(heading, "metric", value, "unit", "", box=None, padding=(0, 2, 0, 0))
+        table = titled(heading, "metric", Column("value", justify="right"), "unit", "", box=None, padding=(0, 2, 0, 0))
         for m in metrics():
             if m.name in values[group.name] and (trace.scenario.realistic or not m.realistic):
-                table.add_row(
-                    m.name,
-                    number(values[group.name][m.name]) + mark * m.name.startswith("chattering"),
-                    m.unit_for(group.unit, group.effort),
-                    Text(m.summary),
-                )
+                value, unit = number(values[group.name][m.name]), m.unit_for(group.unit, group.effort)
+                table.add_row(m.name, value, unit, Text(m.summary))
         tables.append(table)
     return tables
 

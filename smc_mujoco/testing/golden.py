@@ -27,15 +27,13 @@ def golden_file(test: Path) -> Path:
     return test.with_suffix(".golden.json")
 
 
-def record(file: Path, key: str, response: StepResponse, rel: float | None, tolerances: Mapping[str, float]) -> None:
+def record(file: Path, key: str, response: StepResponse, tolerances: Mapping[str, float]) -> None:
     """Write a response's metrics and their tolerances into the file, under `key`. Arguments are those of `compare`."""
-    _check(response, tolerances)
-    names = tolerances if tolerances and rel is None else [name for name in response.values if response.applies(name)]
+    tolerances = _checked(response, tolerances)
     entry = {}
-    for name in names:
+    for name in tolerances or [name for name in response.values if response.applies(name)]:
         value, unit = response.value(name)
-        tolerance = _tolerance(name, value, tolerances, RELATIVE if rel is None else rel)
-        entry[name] = {"value": value, "tolerance": tolerance, "unit": unit}
+        entry[name] = {"value": value, "tolerance": tolerances.get(name, _tolerance(value)), "unit": unit}
     try:
         with locked(file.parent):
             text = json.dumps(plain(dict(sorted((read(file) | {key: entry}).items()))), indent=2, ensure_ascii=False)
@@ -45,19 +43,19 @@ def record(file: Path, key: str, response: StepResponse, rel: float | None, tole
         raise ScenarioError(f"{file} cannot be written ({error.strerror}): record it in a writable folder") from None
 
 
-def compare(file: Path, key: str, response: StepResponse, rel: float | None, tolerances: Mapping[str, float]) -> None:
+def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[str, float]) -> None:
     """Compare a response with the metrics recorded under `key`.
 
-    `rel` is a share of the recorded value; None: only `tolerances` in the metrics' units count, or those in the file.
+    With `tolerances`, in the metrics' units, only these metrics count; without, all with the tolerances in the file.
     """
     __tracebackhide__ = True
-    _check(response, tolerances)
+    tolerances = _checked(response, tolerances)
     if response.failure is not None:
         raise AssertionError(f"{response}: {response.failure}")
     known = read(file).get(key, {})
     if missing := [name for name in tolerances if name not in known] or ([] if known else ["metrics"]):
         raise AssertionError(f"{file.name} has no golden {', '.join(missing)} of {key}: {UPDATE}")
-    names = tolerances if tolerances and rel is None else known
+    names = tolerances or known
     try:
         response.check_names(names)
     except ScenarioError as error:  # recorded by another version, or of another plant
@@ -65,28 +63,23 @@ def compare(file: Path, key: str, response: StepResponse, rel: float | None, tol
     limits = []
     for name in names:
         (value, unit), golden = response.value(name), _recorded(file, key, name, known, "value")
-        if rel is None and name not in tolerances:
-            tolerance = _recorded(file, key, name, known, "tolerance")
-        else:
-            tolerance = _tolerance(name, golden, tolerances, rel or 0.0)
+        tolerance = tolerances[name] if tolerances else _recorded(file, key, name, known, "tolerance")
         within = value == golden or abs(value - golden) <= tolerance or (math.isnan(value) and math.isnan(golden))
         limits.append(Limit(name, quantity(value, unit), f"{quantity(golden)} ± {quantity(tolerance)}", within))
     judge(limits, "golden", "golden", f"{response}; if it is meant, {UPDATE}")
 
 
-def _check(response: object, tolerances: Mapping[str, float]) -> None:
-    """Raise ScenarioError for anything but a response, and for tolerances of metrics that it does not have."""
+def _checked(response: object, tolerances: Mapping[str, float]) -> dict[str, float]:
+    """Return tolerances as numbers; raise ScenarioError for others, and for anything but a response that has them."""
     if not isinstance(response, StepResponse):
         raise ScenarioError(f"golden is given {shown(response)}: give what step_response returned")
     response.check_names(tolerances)
+    return {name: number(f"tolerance of {name}", value, low=0.0) for name, value in tolerances.items()}
 
 
-def _tolerance(name: str, value: float, tolerances: Mapping[str, float], rel: float) -> float:
-    """Return a metric's tolerance in its unit: that in `tolerances`, else the share `rel` of its value; 0 for inf."""
-    if name in tolerances:
-        return number(f"tolerance of {name}", tolerances[name], low=0.0)
-    share = max(number("rel", rel, low=0.0) * abs(value), MIN_TOLERANCE)
-    return float(f"{share:.2g}") if math.isfinite(value) else 0.0
+def _tolerance(value: float) -> float:
+    """Return the default tolerance of a metric in its unit: a share of its value; 0 for inf."""
+    return float(f"{max(RELATIVE * abs(value), MIN_TOLERANCE):.2g}") if math.isfinite(value) else 0.0
 
 
 def _recorded(file: Path, key: str, name: str, known: Mapping[str, Any], what: str) -> float:

@@ -95,7 +95,7 @@ def smc_golden(request: pytest.FixtureRequest) -> Callable[..., None]:
     """Compare a response with the metrics that `pytest --smc-update` recorded: smc_golden(r, settling_time=0.01).
 
     Named metrics are compared within a tolerance in their unit. If none is named, all metrics are compared, within 1 %
-    of their recorded value by default. With rel=0.05 the metrics that are not named are compared too, within 5 %.
+    of their recorded value.
     """
     from smc_mujoco.testing import golden as files
     from smc_mujoco.testing.limits import without_frames
@@ -104,14 +104,14 @@ def smc_golden(request: pytest.FixtureRequest) -> Callable[..., None]:
     test, number = request.node.nodeid.partition("::")[2], itertools.count(1)
 
     @without_frames
-    def compare(response: StepResponse, rel: float | None = None, **tolerances: float) -> None:
+    def compare(response: StepResponse, **tolerances: float) -> None:
         __tracebackhide__ = True
         key = test if (n := next(number)) == 1 else f"{test} {n}"
         if update:
-            files.record(file, key, response, rel, tolerances)
+            files.record(file, key, response, tolerances)
             request.node.user_properties.append((GOLDEN, str(file)))
         else:
-            files.compare(file, key, response, rel, tolerances)
+            files.compare(file, key, response, tolerances)
 
     return compare
 
@@ -131,7 +131,7 @@ def pytest_runtest_makereport(
     report = yield
     ledger = item.config.stash.get(LEDGER, None)
     if ledger and report.failed and call.when != "teardown" and (responses := _used(item, ledger)):
-        from smc_mujoco.testing.report import report_of
+        from smc_mujoco.testing.response import report_of
 
         config, out = item.config, item.config.getoption("smc_out")
         folder = config.invocation_params.dir / out if out else ledger.temporary / "smc_mujoco"

@@ -4,7 +4,7 @@ import dataclasses
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.text import Text
@@ -12,10 +12,6 @@ from rich.text import Text
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Clock, Terminal, errors_as_sentences
 from smc_mujoco.common.interrupts import delay_ctrl_c
-
-if TYPE_CHECKING:
-    from smc_mujoco.analysis.step_halving import StepChange
-    from smc_mujoco.simulation.trace import Trace
 
 
 @errors_as_sentences()
@@ -80,8 +76,9 @@ def show(
     Example: smc-mujoco show videos/duffing/nominal-classical.npz --figure classical
     """
     with delay_ctrl_c():
-        from smc_mujoco.analysis.step_halving import NOTE
+        from smc_mujoco.analysis.step_halving import UNTRIED, depends_on_step
         from smc_mujoco.cli import tables
+        from smc_mujoco.common.text import capital
         from smc_mujoco.simulation.trace import formats, load
 
     endings = () if export is None else formats(export)
@@ -99,25 +96,11 @@ def show(
     if loaded.failure:
         terminal.note(f"failed: {loaded.failure}", "red", wrap=True)
     else:
-        change = _step_change(loaded)
-        for table in tables.trace_summary(loaded, change):
+        for table in tables.trace_summary(loaded):
             terminal.print(table)
-        if change is None or change.marked:
-            untried = "chattering was not compared with that of half the physics step: this run's law is not here"
-            terminal.note(untried if change is None else NOTE, "dim", wrap=True)
+        if depends_on_step(s):
+            terminal.note(f"{capital(UNTRIED)}.", "dim", wrap=True)
     terminal.wrote(*written)
-
-
-def _step_change(trace: "Trace") -> "StepChange | None":
-    """Return what half the physics step changes in a trace's chattering; None if it cannot be run again."""
-    from smc_mujoco.analysis.step_halving import step_halving
-    from smc_mujoco.common.errors import ScenarioError
-
-    try:
-        (change,) = step_halving([trace])
-    except ScenarioError:  # such as a law whose code is not here
-        return None
-    return change
 
 
 @errors_as_sentences()
