@@ -17,7 +17,6 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.jit import NotCompilable
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import gain_at
-from smc_mujoco.control.properties import read_by
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, native_coriolis, native_jacobian
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import Native
@@ -260,8 +259,7 @@ def _native_nominal(s: Resolved) -> Native | None:
         return s.plant.nominal.native(s.plant.parameters)
     if s.model == "none":
         return None
-    at_rest = "g" in read_by(s.law.function)
-    return s.plant.nominal.native_dynamics(s.plant.parameters, s.plant.tip, at_rest=at_rest)
+    return s.plant.nominal.native_dynamics(s.plant.parameters, s.plant.tip)
 
 
 def _frictions(prepared: Prepared, buffer: state.Buffer) -> list[dict[str, int]]:

@@ -28,7 +28,6 @@ import ctypes
 import dataclasses
 import functools
 import hashlib
-import math
 import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -38,7 +37,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 from llvmlite import binding
-from numba import carray, njit, types
+from numba import carray, types
 
 from smc_mujoco.common import jit, libmujoco
 from smc_mujoco.common.frozen import frozen
@@ -55,11 +54,10 @@ _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.
 NOMINAL = floats(
     ("n", "driven", "nv", "model", "data", "qpos", "qvel", "ctrl", "acceleration", "places", "x", "v", "unit", "moved")
 )
-# The same for M, h and g; then whether h is of passive forces alone, the tip's site or -1, whether to compute g.
+# The same for M, h and g; then the tip's site or -1.
 DYNAMICS = floats(
-    ("n", "nv", "model", "data", "qpos", "qvel", "bias", "passive", "actuator", "places", "dense", "v", "moves",
-     "alone", "site", "at_rest")
-)  # fmt: skip
+    ("n", "nv", "model", "data", "qpos", "qvel", "bias", "passive", "actuator", "places", "dense", "v", "moves", "site")
+)
 # Indices of a channel in qpos, qvel and ctrl; the last is -1 without an actuator.
 PLACE = np.dtype([(name, "i8") for name in ("qpos", "qvel", "ctrl")])
 nominal_at, dynamics_at, seen_at, place_at = map(record_at, (NOMINAL, DYNAMICS, SEEN, PLACE))
@@ -162,17 +160,17 @@ class NominalModel:
             mujoco.mj_jacSite(model, data, rows, None, model.site(tip).id)
         return rows[:, places.qvel]
 
-    def native_dynamics(self, parameters: Mapping[str, float], tip: str, at_rest: bool = True) -> Native:
-        """Return the C function of `dynamics` for one simulation; g is NaN unless at_rest. The tip is a site or ""."""
+    def native_dynamics(self, parameters: Mapping[str, float], tip: str) -> Native:
+        """Return the C function of `dynamics` for one simulation. The tip is a site or ""."""
         model, places, borrowed = self._borrow(parameters)
         data = borrowed.data
-        data.ctrl[:] = data.qfrc_actuator[:] = 0.0
+        data.ctrl[:] = 0.0
         dense, v, moves = np.zeros(model.nv**2), np.zeros(len(places.qpos)), np.zeros(3 * model.nv)
         forces = data.qfrc_bias, data.qfrc_passive, data.qfrc_actuator
         arrays = data.qpos, data.qvel, *forces, places.table, dense, v, moves
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
         site = model.site(tip).id if tip else -1
-        values = (len(places.qpos), model.nv, *addresses, passive_alone(model), site, at_rest)
+        values = (len(places.qpos), model.nv, *addresses, site)
         return Native(native_dynamics().address, tuple(map(float, values)), (model, borrowed, *arrays))
 
 
@@ -195,8 +193,6 @@ def prepared(
     model = compiled_for_runs(nominal.build(0), 0)
     model.opt.disableflags |= _DISABLED
     model.opt.enableflags &= ~_SLEEP
-    if passive_alone(model) and not model.opt.density and not model.opt.viscosity:
-        model.geom_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_BODY  # nothing here reads where geoms are
     write(model, iter(list(nominal.fields(model, Values(**parameters)))))
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
@@ -236,75 +232,33 @@ def _on_disk(native: Callable) -> Function:
     return Function(native, ("nominal-model", hashlib.sha256(sources).hexdigest()))
 
 
-def passive_alone(model: mujoco.MjModel) -> bool:
-    """Return whether h is of inertia and passive forces alone: without tendons, and actuators that act at ctrl = 0."""
-    moving = model.actuator_dyntype != mujoco.mjtDyn.mjDYN_NONE.value
-    biased = model.actuator_biastype != mujoco.mjtBias.mjBIAS_NONE.value
-    return not (np.any(moving | biased) or model.ntendon or np.any(model.jnt_actgravcomp))
-
-
-@functools.cache
-def _stages() -> tuple[Callable, Callable]:
-    """Return compiled functions of what MuJoCo computes from positions, and from velocities.
-
-    Both take model, data, the address of qfrc_bias, and whether h is of passive forces alone. They then leave out what
-    M and h do not need, half of the time: factors of M, collisions, lights, transmissions, actuators.
-    """
-    position, velocity, actuation = map(_mujoco, ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation"))
-    kinematics, centres, inertia = map(_mujoco, ("mj_kinematics", "mj_comPos", "mj_makeM"))
-    rates, passive, newton_euler = _mujoco("mj_comVel"), _mujoco("mj_passive"), _mujoco("mj_rne", 2)
-
-    @njit
-    def positions(model, data, bias, alone):
-        if alone:
-            kinematics(model, data)
-            centres(model, data)
-            inertia(model, data)
-        else:
-            position(model, data)
-
-    @njit
-    def velocities(model, data, bias, alone):
-        if alone:
-            rates(model, data)
-            passive(model, data)
-            newton_euler(model, data, 0, bias)
-        else:
-            velocity(model, data)
-            actuation(model, data)
-
-    return positions, velocities
-
-
 @functools.cache
 def native_dynamics() -> Function:
-    """Return the C function of M (n, n), h and g, (n,) each, from a record SEEN. Without `at_rest` g is NaN."""
-    positions, velocities = _stages()
+    """Return the C function of M (n, n), h and g, (n,) each, from a record SEEN."""
+    positions, velocities, actuation = map(_mujoco, ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation"))
     full = _mujoco("mj_fullM", 1)
 
     def native(y, p, m, out):
         at, read = dynamics_at(p, 0), seen_at(y, 0)
         n, nv, model, data = int(at.n), int(at.nv), int(at.model), int(at.data)
-        biases, alone = int(at.bias), at.alone != 0.0
         x, v, kept, places = pointer(read.x), pointer(read.v), pointer(int(at.v)), int(at.places)
         qpos, qvel = carray(pointer(int(at.qpos)), (1 << 40,)), carray(pointer(int(at.qvel)), (nv,))
-        bias, passive = carray(pointer(biases), (nv,)), carray(pointer(int(at.passive)), (nv,))
+        bias, passive = carray(pointer(int(at.bias)), (nv,)), carray(pointer(int(at.passive)), (nv,))
         actuator, dense = carray(pointer(int(at.actuator)), (nv,)), carray(pointer(int(at.dense)), (nv, nv))
         M, h, g = carray(pointer(out), (n, n)), pointer(out + 8 * n * n), pointer(out + 8 * (n * n + n))
         for j in range(n):
             kept[j] = v[j]
             qpos[place_at(places, j).qpos] = x[j]
-        positions(model, data, biases, alone)
+        positions(model, data)
         full(model, data, int(at.dense))
         for i in range(n):
             for j in range(n):
                 M[i, j] = dense[place_at(places, i).qvel, place_at(places, j).qvel]
-        for j in range(n):
-            g[j] = math.nan
-        for part in range(0 if at.at_rest else 1, 2):  # g, then h, so that the last velocities are those of the sample
+        for part in range(2):  # g, then h, so that the last velocities are those of the sample
             for j in range(n):
                 qvel[place_at(places, j).qvel] = part * v[j]
-            velocities(model, data, biases, alone)
+            velocities(model, data)
+            actuation(model, data)
             forces = h if part == 1 else g
             for j in range(n):
                 k = place_at(places, j).qvel
@@ -317,7 +271,7 @@ def native_dynamics() -> Function:
 @functools.cache
 def native_coriolis() -> Function:
     """Return the C function of C(x, v) w, at the state of the last call of `native_dynamics`. Its input is w, (n,)."""
-    rates, newton_euler, velocity = _mujoco("mj_comVel"), _mujoco("mj_rne", 2), _mujoco("mj_fwdVelocity")
+    velocities = _mujoco("mj_fwdVelocity")
 
     def native(y, p, m, out):
         at = dynamics_at(p, 0)
@@ -331,11 +285,7 @@ def native_coriolis() -> Function:
             sign = 1.0 - 2.0 * part
             for j in range(n):
                 qvel[place_at(places, j).qvel] = v[j] + sign * w[j]
-            if at.alone != 0.0:
-                rates(model, data)
-                newton_euler(model, data, 0, int(at.bias))
-            else:
-                velocity(model, data)
+            velocities(model, data)
             for j in range(n):
                 output[j] += sign * 0.25 * bias[place_at(places, j).qvel]
         return 0
