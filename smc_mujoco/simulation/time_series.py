@@ -11,8 +11,7 @@ from numba import njit
 
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown
 from smc_mujoco.common.files import csv_rows
-from smc_mujoco.mechanisms.hardware.part import joint_names
-from smc_mujoco.mechanisms.inverse_kinematics import Tip, solve
+from smc_mujoco.mechanisms.inverse_kinematics import solve
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.signals import EARLY, Signal
@@ -252,7 +251,6 @@ def cartesian_path(
     points: Sequence[Sequence[float]],
     site: str | None = None,
     body: str | None = None,
-    orientation: Sequence[float] | None = None,
     x0: Sequence[float] | None = None,
 ) -> list[Waypoints]:
     """Return a reference for each channel's joint, on which a tip moves through points in space with minimum jerk.
@@ -266,7 +264,6 @@ def cartesian_path(
       times: (N,), s, increasing.
       points: (N, 3), m, in the world.
       site, body: name of the site or body whose origin is the tip; one of them.
-      orientation: of the tip all along, a quaternion (w, x, y, z) in the world; None: any.
       x0: positions at which the search begins, one for each channel; None: the plant's.
 
     Raises:
@@ -295,6 +292,6 @@ def cartesian_path(
     start = plant.x0 if x0 is None else tuple(number("x0", x) for x in x0)
     if len(start) != plant.n:
         raise ScenarioError(f"x0 has {len(start)} values for {plant.n} channels: give {plant.n}")
-    tip = Tip(plant, joint_names(plant), site, body, orientation)
-    joints = solve(tip, positions, start)
+    kind, name = ("site", site) if site is not None else ("body", body)
+    joints = solve(plant, kind, str(name), positions, start)
     return [Waypoints(knots.tolist(), joints[:, i].tolist()) for i in range(plant.n)]
