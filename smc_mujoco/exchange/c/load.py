@@ -201,11 +201,11 @@ def law_from_c(
     return template_decorator("law", about.gains, about.memory, (), (), about.degree, None, plants, **words)(law)
 
 
-def _try(library: sandbox.Library, about: "About") -> list[str]:
+def _try(library: sandbox.Library, about: "About") -> None:
     """Call a law in a separate process, as `sandbox.call` does."""
     fields = ARRAYS if about.joints else Measurement._fields
     gains = [gain.default for gain in about.gains.values()]
-    return sandbox.call(library, fields, gains, about.memory, about.modelled, about.joints)
+    sandbox.call(library, fields, gains, about.memory, about.modelled, about.joints)
 
 
 def check(
@@ -216,11 +216,11 @@ def check(
     flags: Sequence[str],
     timeout: float,
 ) -> Iterator[str]:
-    """Try a law without loading it, and yield lines: warnings, limits of the trial, gains and memory."""
+    """Try a law without loading it, and yield lines: warnings, gains and memory."""
     library = _library(source, symbol, (*build.WARNING_FLAGS, *flags) if source.suffix == ".c" else flags, timeout)
     about = _about(library, gains, memory)
     yield from library.warnings
-    yield from _try(library, about)
+    _try(library, about)
     gains_text = ", ".join(f"{name} = {gain_text(gain.default)}" for name, gain in about.gains.items()) or "none"
     joints = f"{about.joints} joints; " * bool(about.joints)
     yield f"{source.name}: {symbol} passes; {joints}gains {gains_text}; memory {about.memory}"

@@ -41,10 +41,6 @@ TEXT_NAMES = ("smc_law_gains", "smc_law_shared")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 ON_REQUEST = ctypes.CFUNCTYPE(ctypes.c_int64, *[DOUBLES] * 4)  # C(x, v) w, or the Jacobian of the tip
 
-# Output of the sanitizers: undefined behaviour; a bad access, and the stack frames it happened in.
-UNDEFINED_LINE = re.compile(r"^(?P<file>.+?):(?P<line>\d+):\d+: runtime error: (?P<what>.*)$", re.MULTILINE)
-ACCESS_LINE = re.compile(r"AddressSanitizer: (?P<what>[\w-]+).*(?:\n(?P<size>(?:READ|WRITE) of size \d+))?")
-FRAME_LINE = re.compile(r"^ +#\d+ .* in \S+ (?P<file>.+?):(?P<line>\d+)(?::\d+)?$", re.MULTILINE)
 
 
 class Library(NamedTuple):
@@ -70,26 +66,16 @@ def call(
     memory: int,
     modelled: bool,
     joints: int = 0,
-) -> list[str]:
-    """Call a law in a separate process, then with sanitizers. Return sentences on checks that were not possible.
+) -> None:
+    """Call a law in a separate process.
 
     `fields`: names of the numbers in a measurement, or of the arrays in one of many `joints`. `gains`: each is one
     number, or one for each joint.
     """
     from smc_mujoco.control.component import gain_at
-    from smc_mujoco.exchange.c import build
 
-    calls, unseen, name, channels = build.fresh(".calls"), [], library.path.name, max(1, joints)
-    anchor, data = build.static_data(library.file, library.symbol)
-    if not data:
-        unseen.append(f"{name}: static data that it changes is not seen, as nm shows no names of it")
-    numbers = [gain_at(gain, i) for gain in gains for i in range(channels)]
-    order = {"fields": fields, "gains": numbers, "memory": memory, "modelled": modelled, "joints": joints}
-    _run(library, order | {"channels": channels, "calls": str(calls), "anchor": anchor, "data": data})
-    if why := _sanitize(library, calls, len(gains), memory):
-        unseen.append(f"{name} is tried without address and undefined-behaviour sanitizers: {why}")
-    calls.unlink()
-    return unseen
+    numbers = [gain_at(gain, i) for gain in gains for i in range(max(1, joints))]
+    _run(library, {"fields": fields, "gains": numbers, "memory": memory, "modelled": modelled, "joints": joints})
 
 
 def _run(library: Library, trial: dict | None) -> dict[str, Any]:
@@ -105,39 +91,6 @@ def _run(library: Library, trial: dict | None) -> dict[str, Any]:
         if library.symbol in why and failed.stage == "loading" and re.search("undefined symbol|not found", why):
             raise ScenarioError(build.undefined(library.path, library.symbol)) from None
         raise ScenarioError(f"{file} {why}" if why.startswith("cannot") else f"{file}: {why}") from None
-
-
-def _sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
-    """Repeat the calls of a trial with sanitizers. Return why this is not possible, or an empty text."""
-    from smc_mujoco.common.errors import ScenarioError
-    from smc_mujoco.common.process import TimedOut, timed
-    from smc_mujoco.exchange.c import build
-
-    compiler = build.compiler()
-    if library.path.suffix != ".c":
-        return "give its .c file"
-    if (program := build.replayer(tuple(compiler))) is None:
-        return f"{compiler[0]} has none that work here"
-    try:
-        file, _ = build.library(library.path, library.symbol, (*library.flags, *build.SANITIZER_FLAGS), library.timeout)
-    except ScenarioError:
-        return f"{compiler[0]} has none with these flags"
-    try:
-        done = timed([str(n) for n in (program, file, calls, gains, memory)], library.timeout)
-    except TimedOut:
-        late = f"{library.symbol} did not end within {library.timeout:g} s with sanitizers"
-        raise ScenarioError(f"{library.path.name}: {late}: give timeout=") from None
-    if done.returncode == 0:
-        return ""
-    what, places = "it does not end as without sanitizers", []
-    if report := UNDEFINED_LINE.search(done.stderr):
-        what, places = report["what"], [report]
-    elif report := ACCESS_LINE.search(done.stderr):
-        what = ", ".join(filter(None, report.group("what", "size")))
-        places = [frame for frame in FRAME_LINE.finditer(done.stderr) if Path(frame["file"]).exists()]
-    name = Path(places[0]["file"]).name if places else library.path.name
-    where = f"line {places[0]['line']}" if places else library.symbol
-    raise ScenarioError(f"{name} makes an error in {where}: {what}; fix it")
 
 
 # libraries through ctypes, in the script and in the process that runs the law
@@ -234,23 +187,17 @@ class Fenced:
 class Trial:
     """Runs of a law on a double integrator x'' = u for each channel, and calls far outside of them.
 
-    `order`: fields, memory, modelled and joints as in `call`; "channels", their number; "gains", each gain's number for
-    each channel; "data" and "anchor", the static data and the law's address in the file. `calls`: an open file for the
-    gains and the measurement of each call, which `replay.c` reads.
+    `order`: fields, memory, modelled and joints as in `call`; "gains", each gain's number for each channel.
     """
 
-    def __init__(self, law, library, order, calls):
-        self.law, self.library, self.calls = law, library, calls
+    def __init__(self, law, library, order):
+        self.law, self.library = law, library
         self.fields, self.size, self.modelled = order["fields"], order["memory"], order["modelled"]
-        self.joints, self.channels = order["joints"], order["channels"]
+        self.joints, self.channels = order["joints"], max(1, order["joints"])
         self.requests = Requests(self.joints, lambda w: [0.1 * element for element in w], self.jacobian)
-        base = ctypes.cast(law, ctypes.c_void_p).value - order["anchor"]
-        self.data = [(name, base + place, size) for name, place, size in order["data"]]
-        self.data_before = self.static_data()
         self.y, self.out = Fenced(self.measurement([{}] * self.channels)), Fenced([0.0] * (2 * self.channels))
         self.gains = Fenced(order["gains"], math.nan)  # u is NaN if the law reads more gains than it has
         self.gains_before = bytes(self.gains.whole)
-        calls.write(bytes(self.gains.values))
         self.random, self.arithmetic = random.Random(0), Arithmetic()
 
     def all(self) -> None:
@@ -264,7 +211,6 @@ class Trial:
             for de in (-1e6, 0.0, 1e6):
                 far = {"dt": 1e-3, "x": e, "v": de, "e": e, "de": de, "g": 1.0, "limit": 6.0, "model": 1.0}
                 self.call(self.measurement([far] * self.channels), self.state())
-        self.check_static_data()
 
     def run(self, model: float, surfaced: float, x0: float, steps: int) -> None:
         """Make a run with measurement noise and a sine as reference. After `steps` the time grows geometrically."""
@@ -287,10 +233,8 @@ class Trial:
                     what, joint = code or f"u = {u}, s = {s}", f" of joint {i}" * bool(self.joints and not code)
                     where = f"t = {t:g}, e = {channel['e']:g}, de = {channel['de']:g}"
                     raise Fault(f"returned {what}{joint} at {where}: fix it, or the gains")
-            if k % 50 == 0:
-                self.check_static_data()
-                if repr(self.law_at(y, self.state(before))) != repr((code, us, ss)):
-                    raise Fault(f"gave two answers to one measurement, as from state {SHARED_WORDS}: keep it in memory")
+            if k % 50 == 0 and repr(self.call(y, self.state(before))) != repr((code, us, ss)):
+                raise Fault(f"gave two answers to one measurement, as from state {SHARED_WORDS}: keep it in memory")
             for i, u in enumerate(us):
                 vs[i] += dt * min(max(u, -6.0), 6.0)
                 xs[i] += dt * vs[i]
@@ -316,11 +260,6 @@ class Trial:
         return Fenced(struct.unpack(f"{count}d", saved) if saved else [0.0] * count)
 
     def call(self, y: list[float], memory: Fenced) -> tuple[int, list[float], list[float]]:
-        """Call the law, and record the call for the sanitizers."""
-        self.calls.write(struct.pack(f"{len(y)}d", *y))
-        return self.law_at(y, memory)
-
-    def law_at(self, y: list[float], memory: Fenced) -> tuple[int, list[float], list[float]]:
         """Return the law's code, u and s. Raise Fault if it writes anything but memory and out."""
         self.y.values[:], self.out.values[:] = y, [math.nan] * len(self.out.values)
         y_before = bytes(self.y.whole)
@@ -337,17 +276,6 @@ class Trial:
         if bytes(self.gains.whole) != self.gains_before or bytes(self.y.whole) != y_before:
             raise Fault("changes its gains or its measurement: keep what changes in memory")
         return code, self.out.values[: self.channels], self.out.values[self.channels :]
-
-    def static_data(self) -> dict[str, bytes]:
-        """Return the current content of the static data."""
-        return {name: ctypes.string_at(place, size) for name, place, size in self.data}
-
-    def check_static_data(self) -> None:
-        """Raise Fault if the law has changed static data, which all simulations share."""
-        changed = [name for name, now in self.static_data().items() if now != self.data_before[name]]
-        if changed:
-            cure = "keep state in memory, and fill tables in smc_setup"
-            raise Fault(f"changes static data ({changed[0]}), {SHARED_WORDS}: {cure}")
 
     def check_gains(self, y: list[float], before: bytes) -> None:
         """Raise Fault if u becomes finite when additional gains are finite."""
@@ -382,10 +310,9 @@ def attempt(order: Mapping[str, Any], say: Callable) -> dict[str, str | int]:
     done("smc_setup")
     if trial := order["trial"]:
         say(symbol)
-        set_sizes(library, len(trial["gains"]) // trial["channels"], trial["memory"])
-        with Path(trial["calls"]).open("wb") as calls:
-            try:
-                Trial(law, library, trial, calls).all()
-            except Fault as fault:
-                raise Fault(f"{symbol} {fault}") from None
+        set_sizes(library, len(trial["gains"]) // max(1, trial["joints"]), trial["memory"])
+        try:
+            Trial(law, library, trial).all()
+        except Fault as fault:
+            raise Fault(f"{symbol} {fault}") from None
     return facts(library)
