@@ -172,8 +172,8 @@ def law_from_c(
       symbol: the function's name.
       flags: additional compiler flags or files: "-Ifirmware/include", "-DUNIT_TEST", "filter.c".
       isolate: whether to try the law first in a separate process, on short runs of a double integrator. The error is
-        one sentence that says where the law crashes, hangs, returns NaN, reads gains without a name, writes beyond its
-        memory or keeps state elsewhere.
+        one sentence that says where the law crashes, hangs, returns NaN, writes beyond its memory or keeps state
+        elsewhere.
       timeout: s, for each of compilation, set-up and trial.
       plants: as in `smc.law_function`.
 

@@ -22,7 +22,6 @@ LATER_STEPS, TIME_RATIO = 200, 1.06  # samples after those, and the ratio of suc
 MAX_POSITION = 3.0  # a stop for the double integrator, because a law need not stabilise it
 GUARD_VALUE, GUARD_COUNT = -7.25, 512  # a value that no law writes by chance, and its number on either side of an array
 MASS_COUPLING = 0.1  # elements of M off its diagonal
-EXTRA_GAINS = 16  # additional gains, which detect a law that reads them
 OVERRUN = 2**40  # code of glue.c: a law of floats wrote beyond its memory; one more: beyond out
 ALTERED_ARITHMETIC = OVERRUN + 2  # code of glue.c: a law changed the arithmetic of its thread
 FAULTS = {  # code -> fault, formatted with the size of memory, and cure
@@ -190,13 +189,12 @@ class Trial:
     `order`: fields, memory, modelled and joints as in `call`; "gains", each gain's number for each channel.
     """
 
-    def __init__(self, law, library, order):
-        self.law, self.library = law, library
-        self.fields, self.size, self.modelled = order["fields"], order["memory"], order["modelled"]
+    def __init__(self, law, order):
+        self.law, self.fields, self.size, self.modelled = law, order["fields"], order["memory"], order["modelled"]
         self.joints, self.channels = order["joints"], max(1, order["joints"])
         self.requests = Requests(self.joints, lambda w: [0.1 * element for element in w], self.jacobian)
         self.y, self.out = Fenced(self.measurement([{}] * self.channels)), Fenced([0.0] * (2 * self.channels))
-        self.gains = Fenced(order["gains"], math.nan)  # u is NaN if the law reads more gains than it has
+        self.gains = Fenced(order["gains"], math.nan)  # a gain without a name is NaN
         self.gains_before = bytes(self.gains.whole)
         self.random, self.arithmetic = random.Random(0), Arithmetic()
 
@@ -229,10 +227,10 @@ class Trial:
             code, us, ss = self.call(y, memory)
             for i, (channel, u, s) in enumerate(zip(seen, us, ss, strict=True)):
                 if code != 0 or not (math.isfinite(u) and math.isfinite(s)):
-                    self.check_gains(y, before)
                     what, joint = code or f"u = {u}, s = {s}", f" of joint {i}" * bool(self.joints and not code)
                     where = f"t = {t:g}, e = {channel['e']:g}, de = {channel['de']:g}"
-                    raise Fault(f"returned {what}{joint} at {where}: fix it, or the gains")
+                    cure = "fix it, or name all gains that it reads in smc_law_gains, or give gains="
+                    raise Fault(f"returned {what}{joint} at {where}: {cure}")
             if k % 50 == 0 and repr(self.call(y, self.state(before))) != repr((code, us, ss)):
                 raise Fault(f"gave two answers to one measurement, as from state {SHARED_WORDS}: keep it in memory")
             for i, u in enumerate(us):
@@ -277,18 +275,6 @@ class Trial:
             raise Fault("changes its gains or its measurement: keep what changes in memory")
         return code, self.out.values[: self.channels], self.out.values[self.channels :]
 
-    def check_gains(self, y: list[float], before: bytes) -> None:
-        """Raise Fault if u becomes finite when additional gains are finite."""
-        count, out = len(self.gains.values) // self.channels, Fenced([math.nan] * (2 * self.channels))
-        more = Fenced([*self.gains.values, *[1.0] * (EXTRA_GAINS * self.channels)])
-        set_sizes(self.library, count + EXTRA_GAINS, self.size)
-        code = self.law(Fenced(y).values, more.values, self.state(before).values, out.values)
-        set_sizes(self.library, count, self.size)
-        if code == 0 and all(map(math.isfinite, out.values)):
-            raise Fault(
-                f"reads more gains than the {count} that have names: name them in smc_law_gains, or give gains="
-            )
-
 
 def attempt(order: Mapping[str, Any], say: Callable) -> dict[str, str | int]:
     """Load, set up and on request call a law. Return the library's constants."""
@@ -312,7 +298,7 @@ def attempt(order: Mapping[str, Any], say: Callable) -> dict[str, str | int]:
         say(symbol)
         set_sizes(library, len(trial["gains"]) // max(1, trial["joints"]), trial["memory"])
         try:
-            Trial(law, library, trial).all()
+            Trial(law, trial).all()
         except Fault as fault:
             raise Fault(f"{symbol} {fault}") from None
     return facts(library)

@@ -349,7 +349,7 @@ def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
         ("memory[8] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
         ("memory[-1] = 1.0f; out[0] = 0.0f; /* of floats */", "smc_law writes beyond the 8 numbers of its memory"),
         ("out[2] = y->e; out[0] = 0.0;", "smc_law writes beyond the numbers of out"),
-        ("out[0] = -gains[1] * y->e;", "smc_law reads more gains than the 1 that have names: name them"),
+        ("out[0] = -gains[1] * y->e;", "smc_law returned u = nan, s = 1.00"),
         ("out[-1] = y->e; out[0] = 0.0;", "smc_law writes beyond the numbers of out"),
         ("((double *)gains)[0] = 1.0; out[0] = 0.0;", "smc_law changes its gains"),
         ("((double *)y)[4] = 0.0; out[0] = 0.0;", "smc_law changes its gains or its measurement"),
@@ -600,7 +600,7 @@ def test_check_c_names_its_own_options(call, file):
     wants = file(law("memory[20] = 1.0; out[0] = -gains[0] * y->e;"))
     for words, said in (
         ((), "writes beyond the 8 numbers of its memory: say more in smc_law_memory, or give --memory"),
-        (("--memory", 21), "reads more gains than the 0 that have names: name them in smc_law_gains, or give --gains"),
+        (("--memory", 21), "fix it, or name all gains that it reads in smc_law_gains, or give --gains"),
         (("--memory", 21, "--gains", "k=2", "--flag=-lnowhere"), "fix it, or give other --flag"),
     ):
         code, out, err = call("check-c", wants, *words)
