@@ -41,7 +41,6 @@ DOUBLES = ctypes.POINTER(ctypes.c_double)
 ON_REQUEST = ctypes.CFUNCTYPE(ctypes.c_int64, *[DOUBLES] * 4)  # C(x, v) w, or the Jacobian of the tip
 
 
-
 class Library(NamedTuple):
     """A law's library, not loaded into this process."""
 
