@@ -36,9 +36,9 @@ BESIDE_PACKAGE = ("models", "scenes")  # folders that lie in the package in a wh
 PRESENTATION = (
     "evidence/report",
     "evidence/commands",
-    "exchange/commands",
+    "exchange/commands.py",
     "cli",
-)  # folders that show results and do not change them
+)  # that show results and do not change them
 VERSIONED = {*sys.stdlib_module_names, "numpy", "numba", "llvmlite", "scipy", "mujoco"}  # identified by their version
 VALUES = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.ndarray)
 VALUES += (tuple, list, set, frozenset, Mapping)
