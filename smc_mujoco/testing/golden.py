@@ -50,8 +50,6 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[st
     """
     __tracebackhide__ = True
     tolerances = _checked(response, tolerances)
-    if response.failure is not None:
-        raise AssertionError(f"{response}: {response.failure}")
     known = read(file).get(key, {})
     if missing := [name for name in tolerances if name not in known] or ([] if known else ["metrics"]):
         raise AssertionError(f"{file.name} has no golden {', '.join(missing)} of {key}: {UPDATE}")
@@ -71,6 +69,7 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[st
 
 def _checked(response: object, tolerances: Mapping[str, float]) -> dict[str, float]:
     """Return tolerances as numbers; raise ScenarioError for others, and for anything but a response that has them."""
+    __tracebackhide__ = True
     if not isinstance(response, StepResponse):
         raise ScenarioError(f"golden is given {shown(response)}: give what step_response returned")
     response.check_names(tolerances)

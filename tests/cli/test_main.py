@@ -212,15 +212,16 @@ scene = smc.Scene(title="Fails", conditions={"calm": {"only": run}}, answer=lamb
     assert [path.name for path in (folder / "out" / "fails").iterdir()] == ["calm-only.npz"]
 
 
-def test_run_hands_the_camera_to_the_film(call, undrawn, scene, folder, monkeypatch):
+def test_run_hands_the_scene_s_camera_to_the_film(call, undrawn, folder, monkeypatch):
     asked = {}
     monkeypatch.setattr(film, "missing", lambda: None)
     monkeypatch.setattr(film, "film", lambda *args, **options: asked.update(options) or args[1])
-    assert call("run", scene, "--camera", "60,-20,3")[0] == 0
+    (folder / "seen.py").write_text("""import smc_mujoco as smc
+run = smc.Scenario(plant="duffing", law="none", duration=0.01)
+scene = smc.Scene(title="Seen", conditions={"calm": {"only": run}}, camera=(60, -20, 3))
+""")
+    assert call("run", "seen.py")[0] == 0
     assert asked["camera"] == (60.0, -20.0, 3.0)
-    code, _, err = call("run", scene, "--camera", "1,2,3,4")
-    assert code == 2
-    assert "give the name of a camera of the model, or (azimuth, elevation)" in err
 
 
 @pytest.mark.parametrize("plant", ["duffing", "pendulum_network"])

@@ -1,6 +1,5 @@
 """smc-mujoco run, show, view: the runs of a scene, a saved trace, and a run in a window."""
 
-import dataclasses
 import os
 import sys
 from pathlib import Path
@@ -21,13 +20,6 @@ def run(
         Path, typer.Option(metavar="FOLDER", help="For results; each scene has a folder of its name in it.")
     ] = Path("videos"),
     film: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
-    camera: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|AZIMUTH,ELEVATION[,DISTANCE]",
-            help="Camera of the film: one of the model, or a direction in degrees and a distance in m.",
-        ),
-    ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers; default the scene's.")] = None,
     threads: options.Threads = None,
     export: Annotated[
@@ -45,7 +37,6 @@ def run(
     clock = Clock()
     with clock("loading"), delay_ctrl_c():
         from smc_mujoco.cli.scene import perform
-        from smc_mujoco.draw.film.camera import from_text
         from smc_mujoco.simulation.trace import formats
         from smc_mujoco.studies import scene as scenes
 
@@ -54,8 +45,6 @@ def run(
     scene = scenes.read(path)
     if seed is not None:
         scene = scene.seeded(seed)
-    if camera is not None:
-        scene = dataclasses.replace(scene, camera=from_text(camera))
     terminal, folder = Terminal(), out / path.stem
     perform(scene, folder, film, threads, clock, terminal, endings, scenes.question(path))
     if timing:

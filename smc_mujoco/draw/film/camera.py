@@ -38,14 +38,6 @@ def checked(chosen: Camera | None) -> Camera | None:
     return *angles, *(number("camera's distance", distance, above=0.0) for distance in parts[2:])
 
 
-def from_text(text: str) -> Camera:
-    """Return the camera that a command line names, as "look", "90,-20" or "90,-20,3"."""
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        return text
-
-
 def turn(azimuth: float, elevation: float) -> np.ndarray:
     """Return the turn of a camera that looks as MuJoCo's free camera does.
 

@@ -52,13 +52,6 @@ def test_a_distance_is_that_of_a_usual_lens():
 
 
 @pytest.mark.parametrize(
-    ("text", "chosen"), [("look", "look"), ("90,-20", (90.0, -20.0)), ("0,-90,2.5", (0, -90, 2.5))]
-)
-def test_a_command_line_s_camera(text, chosen):
-    assert camera.checked(camera.from_text(text)) == chosen
-
-
-@pytest.mark.parametrize(
     ("chosen", "sentence"),
     [
         ((1.0,), "give the name of a camera"),
