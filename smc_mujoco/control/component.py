@@ -76,31 +76,21 @@ class GainWarning(UserWarning):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Component:
-    """A function bound to its gains.
-
-    Attributes:
-      gains: name -> value; of a law also a tuple with a value for each driven channel.
-      function: None if a loaded trace names one that is not available.
-      joint: whether it is a law of many joints.
-      shared: gains that are one number for all joints in a law of many joints.
-      each: the laws of the driven channels if they are different laws; then `function` is None.
-      template: the Template it was made from; None if that is not available.
-      source: where the gains come from. Laws with equal gains are equal, whatever their sources.
-    """
+    """A function bound to its gains. Laws with equal gains are equal, whatever their sources."""
 
     kind: str
     name: str
-    gains: Mapping[str, Any]  # of GainValue
-    memory: int
-    function: Callable | None
+    gains: Mapping[str, Any]  # name -> GainValue
+    memory: int  # floats per channel
+    function: Callable | None  # None if a loaded trace names one that is not available, and if there is `each`
     relative_degree: int = 1
     plants: tuple[str, ...] = ()
     requires_model: bool = False
-    joint: bool = False
-    shared: tuple[str, ...] = ()
-    each: "tuple[Component, ...]" = ()
-    template: "Template | None" = dataclasses.field(default=None, compare=False, repr=False)
-    source: Source = dataclasses.field(default=Source(), compare=False, repr=False)
+    joint: bool = False  # whether it is a law of many joints
+    shared: tuple[str, ...] = ()  # gains that are one number for all joints in a law of many joints
+    each: "tuple[Component, ...]" = ()  # the laws of the driven channels if they are different laws
+    template: "Template | None" = dataclasses.field(default=None, compare=False, repr=False)  # None if not available
+    source: Source = dataclasses.field(default=Source(), compare=False, repr=False)  # where the gains come from
 
     def __repr__(self) -> str:
         return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={gain_text(v)}' for k, v in self.gains.items())])})"

@@ -73,77 +73,49 @@ class Dynamics(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Plant:
-    """A mechanism with n channels obeying x'' = f(x, v) + g(x) (u + d).
+    """A mechanism with n channels obeying x'' = f(x, v) + g(x) (u + d)."""
 
-    Attributes:
-      name: as in `smc.plants()`.
-      parameters: name -> value, SI units; the nominal ones, which laws may know.
-      mass: parameter that is meant by "mass" in a mismatch or a jump.
-      added: name -> unit ("": none) of the parameters that are 0 by default, such as a payload: a mismatch or a jump
-        adds its number to such a parameter, in this unit, instead of multiplying it.
-      unit: unit of x, "rad" or "m"; that of the first channel if they differ.
-      mixed: units of all channels if they differ, (n,), else (); `units` has them in both cases.
-      x0: default initial positions, those of the paper study, (n,).
-      rest: positions that the default reference holds, (n,); empty: 0.
-      n: number of channels.
-      sizes: smallest and largest n that `smc.plant(name, n=...)` takes.
-      build: n -> MjSpec of the ideal mechanism with the default parameters.
-      fields: (model, parameters) -> the model fields which the parameters set.
-      nominal: f and g of the plant's equation.
-      lane: offset in metres between machines that stand side by side in a film, (3,).
-      contacts: kind of contact -> edit of the MjSpec that adds its obstacles and contact pairs.
-      mechanisms: name -> Variant, which realises the equation, or a part of it, by other means.
-      underactuated: whether it has channels without an actuator, which come after those with one.
-      goal: where its free joints should come to rest, (free,), rad or m; empty: at 0.
-      placed: parameter -> the only value that fits the geometry of the contacts.
-      direct: whether disturbances act on its joints, not on the bodies that they carry.
-      smooth: whether its model has no limits, contacts, dry friction and equality constraints.
-      uncertain: parameter -> lowest and highest value that a user may have, as factors or, of those in `added`, numbers
-        that are added: the parameters that `smc.worst_case` varies where no class is given.
-      dry: names of the parameters that are dry friction. A plant with one that is not 0 is not smooth.
-      unmodelled: why there is no nominal model, or "".
-      friction: that of its joints by its source, to give to a scenario, whose default is none; or None.
-      limits: largest force of each driven channel's motor, N m or N; empty: no limits.
-      label, short: long and short name in figures; "": made from its name.
-      scenery: what a film shows beside the machine, in words, such as "rail: a mark each 0.5 m"; "": nothing.
-      jumps: "mild" or "hard" -> parameter -> factor of the jump in the suite's condition of that size.
-      ranges: joint, least and largest position of each channel, rad or m; empty: no joint has limits.
-      tip: name of the site that the mechanism moves: where an arm's tool is; "": none.
-      suggested: "law", "u_max" or "reference" -> what each driven channel suggests to scenarios that are given none.
-    """
-
-    name: str
-    parameters: Mapping[str, float]
-    mass: str
-    unit: str
-    x0: tuple[float, ...]
-    rest: tuple[float, ...] = ()
-    n: int = 1
-    sizes: tuple[int, int] = (1, 1)
-    build: Callable[[int], mujoco.MjSpec]
-    fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
-    nominal: Nominal
-    lane: tuple[float, float, float]
+    name: str  # as in `smc.plants()`
+    parameters: Mapping[str, float]  # name -> value, SI units; the nominal ones, which laws may know
+    mass: str  # parameter that is meant by "mass" in a mismatch or a jump
+    unit: str  # of x, "rad" or "m"; that of the first channel if they differ
+    x0: tuple[float, ...]  # default initial positions, those of the paper study, (n,)
+    rest: tuple[float, ...] = ()  # positions that the default reference holds, (n,); empty: 0
+    n: int = 1  # number of channels
+    sizes: tuple[int, int] = (1, 1)  # smallest and largest n that `smc.plant(name, n=...)` takes
+    build: Callable[[int], mujoco.MjSpec]  # n -> the ideal mechanism with the default parameters
+    fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]  # the model fields which the parameters set
+    nominal: Nominal  # f and g of the plant's equation
+    lane: tuple[float, float, float]  # m, offset between machines that stand side by side in a film
+    # Kind of contact -> edit of the MjSpec that adds its obstacles and contact pairs
     contacts: Mapping[str, Callable[[mujoco.MjSpec], None]] = dataclasses.field(default_factory=dict)
+    # Name -> another mechanism, which realises the equation, or a part of it, by other means
     mechanisms: Mapping[str, Variant] = dataclasses.field(default_factory=dict)
-    mixed: tuple[str, ...] = ()
-    underactuated: bool = False
-    goal: tuple[float, ...] = ()
+    mixed: tuple[str, ...] = ()  # units of all channels if they differ, (n,); `units` has them in both cases
+    underactuated: bool = False  # whether it has channels without an actuator, which come after those with one
+    goal: tuple[float, ...] = ()  # where its free joints should come to rest, (free,), rad or m; empty: at 0
+    # Parameter -> the only value that fits the geometry of the contacts
     placed: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    # Name -> unit ("": none) of the parameters that are 0 by default, such as a payload: a mismatch or a jump adds its
+    # number to such a parameter, in this unit, instead of multiplying it
     added: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    direct: bool = False
-    smooth: bool = True
+    direct: bool = False  # whether disturbances act on its joints, not on the bodies that they carry
+    smooth: bool = True  # whether its model has no limits, contacts, dry friction and equality constraints
+    # Parameter -> lowest and highest value that a user may have, as factors or, of those in `added`, numbers that are
+    # added: the parameters that `smc.worst_case` varies where no class is given
     uncertain: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
-    dry: tuple[str, ...] = ()
-    unmodelled: str = ""
-    friction: Any = None  # a hardware.part.Friction
-    limits: tuple[float, ...] = ()
-    ranges: tuple[tuple[str, float, float], ...] = ()
-    label: str = ""
+    dry: tuple[str, ...] = ()  # parameters that are dry friction. A plant with one that is not 0 is not smooth
+    unmodelled: str = ""  # why there is no nominal model
+    friction: Any = None  # hardware.part.Friction of its joints by its source, to give to a scenario, or None
+    limits: tuple[float, ...] = ()  # N m or N, largest force of each driven channel's motor; empty: no limits
+    ranges: tuple[tuple[str, float, float], ...] = ()  # joint, lowest and highest x of each channel; empty: no limits
+    label: str = ""  # long and short name in figures; "": made from its name
     short: str = ""
-    scenery: str = ""
+    scenery: str = ""  # what a film shows beside the machine, such as "rail: a mark each 0.5 m"
+    # "mild" or "hard" -> parameter -> factor of the jump in the suite's condition of that size
     jumps: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
-    tip: str = ""
+    tip: str = ""  # site that the mechanism moves: where an arm's tool is
+    # "law", "u_max" or "reference" -> what each driven channel suggests to scenarios that are given none
     suggested: Mapping[str, tuple] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self):
