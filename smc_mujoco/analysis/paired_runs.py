@@ -14,7 +14,7 @@ from smc_mujoco.common.errors import ScenarioError, items_of, one_line, unknown
 from smc_mujoco.common.text import counted
 from smc_mujoco.control.source import Source, restore
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
-from smc_mujoco.metrics.channel_groups import groups as channel_groups
+from smc_mujoco.metrics.conventions import groups as channel_groups
 from smc_mujoco.simulation.scenario import Scenario
 
 MIN_COMMAND_SHARE = 1e-3  # of the bound on u: smaller differences of u matter on no machine; chosen

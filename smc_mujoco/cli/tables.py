@@ -17,8 +17,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.catalogue import scores as metric_scores
-from smc_mujoco.metrics.channel_groups import Group, groups
-from smc_mujoco.metrics.conventions import CATALOGUE, Metric
+from smc_mujoco.metrics.conventions import CATALOGUE, Group, Metric, groups
 from smc_mujoco.metrics.tip import tip_scores
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace

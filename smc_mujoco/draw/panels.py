@@ -20,8 +20,7 @@ from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import columns, end, line, smooth, window
 from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.metrics import tip
-from smc_mujoco.metrics.channel_groups import Group, group_trace
-from smc_mujoco.metrics.conventions import SETTLING_BAND, scale
+from smc_mujoco.metrics.conventions import SETTLING_BAND, Group, group_trace, scale
 from smc_mujoco.simulation.trace import ARRAYS, Trace
 
 COLUMNS = 360  # of pixels of a panel: traces of more samples are drawn as means and ranges

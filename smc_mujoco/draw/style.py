@@ -25,7 +25,7 @@ from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import known_laws
 from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
-from smc_mujoco.metrics.channel_groups import Group, group_trace, groups
+from smc_mujoco.metrics.conventions import Group, group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation.conditions import CONDITION_FIELDS
 from smc_mujoco.simulation.signals import Jump, Push

@@ -1,10 +1,11 @@
 """Conventions of all metrics, the refusal of broken traces, and the decorator `@metric`.
 
-Groups: a metric compares channels of one kind, a group of the plant's `groups`. Driven channels and free joints, which
-have no actuator, are different groups, even if their units agree. If a plant has several groups, `score` and each
-metric return the worst group for a time, a percentage or a share of the motion: a law that drops the pole has settled
-nothing. A metric with x's unit, or of the command, is that of the driven channels; if these have several units, a
-metric with x's or u's unit is refused. `scores` returns every group by itself.
+Groups: a metric compares channels of one kind and one unit, a group of the plant's `groups`, because metres and radians
+have no common maximum or sum. Driven channels and free joints, which have no actuator, are different groups, even if
+their units agree. If a plant has several groups, `score` and each metric return the worst group for a time, a
+percentage or a share of the motion: a law that drops the pole has settled nothing. A metric with x's unit, or of the
+command, is that of the driven channels; if these have several units, a metric with x's or u's unit is refused. `scores`
+returns every group by itself.
 
 Letters: t (K+1,) s, x (K+1, n) true position, r its reference, e = x - r, u the command, s the law's
 sliding variable; h the time between samples. The conventions, all chosen, one for the whole project:
@@ -39,7 +40,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.text import number
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
-from smc_mujoco.metrics.channel_groups import Group, group_trace, groups
+from smc_mujoco.simulation.state import LOGGED
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.scenario import Scenario
@@ -52,6 +53,44 @@ REST_SHARE = 1e-3  # of the run's largest |v|
 REST_SPEED = 1e-5  # rad/s or m/s: above the creep of stuck joints, see friction.py
 
 CATALOGUE: dict[str, Metric] = {}  # filled by @metric, in order of definition
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Group:
+    """Channels of one kind and one unit."""
+
+    name: str  # "driven" or "free"; "driven rad" if several groups are driven
+    unit: str  # of their x, "rad" or "m"
+    effort: str  # unit of their u: "N m", "N" or "V"
+    driven: bool  # whether they have actuators
+    channels: tuple[int, ...]  # their indices, ascending
+
+
+def groups(machine: Plant | Scenario) -> tuple[Group, ...]:
+    """Return the groups of a plant, or of a scenario's plant, driven groups first. A scenario's u may be a voltage."""
+    plant = machine if isinstance(machine, Plant) else machine.plant
+    members: dict[tuple[bool, str], list[int]] = {}
+    for i, unit in enumerate(plant.units):
+        members.setdefault((i < plant.driven, unit), []).append(i)
+    kinds = [driven for driven, _ in members]
+    return tuple(
+        Group(
+            name=("driven" if driven else "free") + (f" {unit}" if kinds.count(driven) > 1 else ""),
+            unit=unit,
+            effort=machine.efforts[channels[0]],
+            driven=driven,
+            channels=tuple(channels),
+        )
+        for (driven, unit), channels in members.items()
+    )
+
+
+def group_trace(trace: Trace, group: Group) -> Trace:
+    """Return the trace of a group's channels; the same trace if these are all. Its scenario has all channels."""
+    if len(group.channels) == trace.x.shape[1]:
+        return trace
+    columns = list(group.channels)
+    return dataclasses.replace(trace, **{name: getattr(trace, name)[:, columns] for name in LOGGED})
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -23,7 +23,7 @@ from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.mechanisms.hardware.part import drive_ids, initial_pose, joint_ids, joint_names
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
-from smc_mujoco.metrics.channel_groups import group_trace, groups
+from smc_mujoco.metrics.conventions import group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.reference import evaluate

@@ -12,8 +12,7 @@ from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import score, scores
-from smc_mujoco.metrics.channel_groups import groups
-from smc_mujoco.metrics.conventions import CATALOGUE
+from smc_mujoco.metrics.conventions import CATALOGUE, groups
 from smc_mujoco.simulation.conditions import DURATION, Condition, find_condition
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario

@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import Envelope, windows
 from smc_mujoco.mechanisms.plant import EFFORT, catalogue
-from smc_mujoco.metrics.channel_groups import Group, groups
+from smc_mujoco.metrics.conventions import Group, groups
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace

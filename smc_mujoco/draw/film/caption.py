@@ -14,7 +14,7 @@ from smc_mujoco.draw.film.arrows import Scale
 from smc_mujoco.draw.film.camera import Room
 from smc_mujoco.draw.film.scene import MAX_CHANNELS
 from smc_mujoco.draw.states import CALM, STRUCK, STUCK, State, backlash_gap, has_contact, has_dry_friction
-from smc_mujoco.metrics.channel_groups import Group
+from smc_mujoco.metrics.conventions import Group
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 

@@ -24,7 +24,7 @@ from smc_mujoco.draw.film.pace import Clock
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre
 from smc_mujoco.mechanisms.plant import Variant
-from smc_mujoco.metrics.channel_groups import groups
+from smc_mujoco.metrics.conventions import groups
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.trace import ARRAYS
 
