@@ -1,16 +1,11 @@
-"""Short tables, curves, pictures and films as HTML for notebooks, in the colour of the page; all text is escaped."""
+"""Short tables, pictures and films as HTML for notebooks, in the colour of the page. All text but `Html` is escaped."""
 
 import base64
 import html
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 MAX_ROWS = 12  # lines of a table: chosen, so that a cell's output stays short
-PIECES = 150  # of a long curve, each drawn by its lowest and its highest value: chosen, one for every 2 px of a panel
-WIDTH, HEIGHT = 300, 96  # px of a panel
 _CELL = "padding:2px 10px;vertical-align:top;text-align:"
-_MARGINS = 58, 6, 16, 18  # px at the left, right, top and bottom of a panel
 
 
 class Html(str):
@@ -63,56 +58,10 @@ def _cells(tag: str, values: Sequence[object], sides: Sequence[str], style: str)
     )
 
 
-def fields(values: Mapping[str, object], caption: object = "", note: object = "") -> Html:
+def fields(values: Mapping[str, object], caption: str) -> Html:
     """Return a table of names with their values."""
     rows = [(Html(f"<i>{text(name)}</i>"), value) for name, value in values.items()]
-    return table((), rows, caption, note, max_rows=99)
-
-
-def panel(t: np.ndarray, curves: Sequence[np.ndarray], heading: str, reference: np.ndarray | None = None) -> Html:
-    """Return curves and a dashed reference, (K,) each, over times t, s, as SVG, with their range at the axes."""
-    drawn = [curve for curve in (*curves, *([] if reference is None else [reference])) if np.isfinite(curve).any()]
-    if not drawn or len(t) < 2:
-        return Html("")
-    low, high = min(float(np.nanmin(c)) for c in drawn), max(float(np.nanmax(c)) for c in drawn)
-    span = (high - low) or abs(high) or 1.0
-    left, right, top, bottom = _MARGINS
-    x = left + (t - t[0]) / (t[-1] - t[0]) * (WIDTH - left - right)
-    lines = []
-    for curve in curves:
-        lines += _lines(x, top + (high - curve) / span * (HEIGHT - top - bottom), 'stroke-width="1.2"')
-    if reference is not None:
-        y = top + (high - reference) / span * (HEIGHT - top - bottom)
-        lines += _lines(x, y, 'stroke-width="1" stroke-dasharray="4 3" opacity="0.6"')
-    end = HEIGHT - bottom
-    letters = 'fill="currentColor" font-size="10" font-family="sans-serif"'
-    labels = [
-        f'<text x="{left}" y="11" {letters} font-weight="bold">{text(heading)}</text>',
-        f'<text x="{left - 4}" y="{top + 8}" {letters} text-anchor="end">{high:.3g}</text>',
-        f'<text x="{left - 4}" y="{end}" {letters} text-anchor="end">{low:.3g}</text>'
-        if f"{low:.3g}" != f"{high:.3g}"
-        else "",
-        f'<text x="{left}" y="{HEIGHT - 5}" {letters}>{t[0]:.3g}</text>',
-        f'<text x="{WIDTH - right}" y="{HEIGHT - 5}" {letters} text-anchor="end">{t[-1]:.3g} s</text>',
-    ]
-    axes = f'<path d="M{left} {top}V{end}H{WIDTH - right}" fill="none" stroke="currentColor" opacity="0.4"/>'
-    return Html(
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" '
-        f'role="img"><title>{text(heading)}</title>{axes}{"".join(lines)}{"".join(labels)}</svg>'
-    )
-
-
-def _lines(x: np.ndarray, y: np.ndarray, style: str) -> list[str]:
-    """Return a curve as a polyline, through the lowest and highest value of each of PIECES; [] if none is finite."""
-    known = np.isfinite(y)
-    x, y = x[known], y[known]
-    if len(x) > 2 * PIECES:
-        pieces = np.array_split(np.arange(len(x)), PIECES)
-        ends = [sorted({int(p[0] + np.argmin(y[p])), int(p[0] + np.argmax(y[p]))}) for p in pieces]
-        kept = np.array(sorted({0, len(x) - 1, *(k for pair in ends for k in pair)}))
-        x, y = x[kept], y[kept]
-    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x.tolist(), y.tolist(), strict=True))
-    return [f'<polyline points="{points}" fill="none" stroke="currentColor" {style}/>'] if len(x) else []
+    return table((), rows, caption, max_rows=99)
 
 
 def embedded(content: bytes, kind: str, width: float | None = None) -> Html:

@@ -1,17 +1,17 @@
 """Scenarios and traces as notebooks show them. Their classes import this module, so their types are not named here."""
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
 
 from smc_mujoco.common.errors import shown
-from smc_mujoco.common.html import Html, fields, panel
+from smc_mujoco.common.html import Html, fields
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.simulation.signals import Clock, Noise
 
 ABSENT = None, (), {}, Noise(), Clock(), Contact("none")  # values of fields that were left out
-MAX_CHANNELS = 8  # of one unit in a panel
 
 
 def scenario(s: Any) -> Html:
@@ -26,16 +26,15 @@ def scenario(s: Any) -> Html:
 
 
 def trace(run: Any) -> Html:
-    """Return what was run, how it failed if it did, and small figures of x with its reference, and of u."""
-    s, driven, panels = run.scenario, run.scenario.plant.driven, []
-    about = {"plant": s.plant.name, "law": s.law, "gains": s.law.source}
-    about["samples"] = f"{len(run.t)}, every {s.control_period:g} s"
+    """Return what was run, how it failed if it did, and the range of x and u in each unit."""
+    s = run.scenario
+    rows = {"plant": s.plant.name, "law": s.law, "gains": s.law.source}
+    rows["samples"] = f"{len(run.t)}, every {s.control_period:g} s"
     if run.failure:
-        about["failed"] = run.failure
-    for name, units in (("x", s.plant.units), ("u", s.efforts[:driven])):
+        rows["failed"] = run.failure
+    for name, units in (("x", s.plant.units), ("u", s.efforts[: s.plant.driven])):
         for unit in dict.fromkeys(units):
-            channels = [i for i, other in enumerate(units) if other == unit][:MAX_CHANNELS]
-            led = name == "x" and np.nan_to_num(run.r[:, channels]).any()
-            curves = list(getattr(run, name)[:, channels].T)
-            panels.append(panel(run.t, curves, f"{name} ({unit})", run.r[:, channels[0]] if led else None))
-    return Html(f"{fields(about, 'Trace')}<div>{''.join(panels)}</div>")
+            values = getattr(run, name)[:, [i for i, other in enumerate(units) if other == unit]]
+            known = values[np.isfinite(values)].tolist() or [math.nan]
+            rows[f"{name} ({unit})"] = f"{min(known):.3g} to {max(known):.3g}"
+    return fields(rows, "Trace")
