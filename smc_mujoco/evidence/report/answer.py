@@ -26,14 +26,14 @@ Cells = dict[tuple[str, str, str], list[Score]]  # (plant, condition, metric) ->
 
 
 class Pick(NamedTuple):
-    """The law to take for a metric on a plant, or on all plants, over the conditions."""
+    """The law to take for a metric on a plant, over the conditions."""
 
     law: str  # "" where all laws are level
-    median: float  # of the conditions' medians, NaN over all plants
-    wins: int  # as of a `Place`, with losses and of
-    losses: int
-    of: int
-    level: tuple[str, ...]  # the other laws that lose no more cells
+    median: float  # of the conditions' medians
+    wins: int  # conditions
+    losses: int  # conditions in which another law is better, it has runs that fail, or samples are too few to tell
+    of: int  # conditions
+    level: tuple[str, ...]  # the other laws that lose no more of them
 
     @property
     def sure(self) -> str:
@@ -107,25 +107,28 @@ def losses(by_cell: Cells, metrics: Sequence[str]) -> list[Loss]:
     return sorted(lost, key=lambda loss: -loss.times)
 
 
-def pick(findings: "Findings", metric: str, plant: str = "") -> Pick | None:
-    """Return the law that is beaten in the fewest conditions; "" for all plants.
+def pick(findings: "Findings", metric: str, plant: str) -> Pick | None:
+    """Return the law that is beaten in the fewest conditions.
 
     Of several such laws it is the one with the fewest runs that fail, then by mean rank. If no law is beaten anywhere,
     none is named. Laws that settle in less than half as many runs as the law that settles in the most are left out: a
     law that does nothing is calm. None for a metric without numbers.
     """
-    here = [place for place in findings.places if place.plant == plant]
-    settled = {place.law: place.median for place in here if place.metric == SETTLES}
+    boards = {board.metric: board for board in findings.boards if board.group["plant"] == plant}
+    settled = {entry.law: entry.interval.median for entry in boards[SETTLES].entries} if SETTLES in boards else {}
     enough = MIN_SETTLED * max(settled.values(), default=0.0)
-    rows = [place for place in here if place.metric == metric and settled.get(place.law, 1.0) >= enough]
-    if not rows:
+    if (board := boards.get(metric)) is None:
         return None
-    best = min(rows, key=lambda row: (row.losses, row.failed, row.mean))
-    level = tuple(row.law for row in sorted(rows, key=lambda row: row.mean) if row.losses == best.losses)
-    if len(rows) > 1 and not any(row.wins or row.losses for row in rows):
-        return Pick("", math.nan, 0, 0, best.of, level)
-    others = tuple(law for law in level if law != best.law)
-    return Pick(best.law, best.median, best.wins, best.losses, best.of, others)
+    entries = {entry.law: entry for entry in board.entries if settled.get(entry.law, 1.0) >= enough}
+    wins = {law: len(board.wins(law)) for law in entries}
+    losses = {law: sum(law not in block.best for block in board.blocks) for law in entries}
+    best = min(entries, key=lambda law: (losses[law], entries[law].failed, entries[law].rank.mean))
+    level = [law for law in sorted(entries, key=lambda law: entries[law].rank.mean) if losses[law] == losses[best]]
+    of = len(board.blocks)
+    if len(entries) > 1 and not any((*wins.values(), *losses.values())):
+        return Pick("", math.nan, 0, 0, of, tuple(level))
+    level.remove(best)
+    return Pick(best, entries[best].interval.median, wins[best], losses[best], of, tuple(level))
 
 
 def attacked(findings: "Findings") -> dict[str, WorstCases]:

@@ -1,10 +1,8 @@
 """Charts of a report, plotly's figures: small multiples with the same axes, one panel a plant, one colour a law.
 
-A value that is not on an axis (inf, or less than a logarithm shows) is a triangle at the end of the axis. Numbers have
-five digits.
+Numbers have five digits.
 """
 
-import itertools
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -16,22 +14,19 @@ from plotly.subplots import make_subplots
 from smc_mujoco.draw import region
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.films import Curve, Scene
-from smc_mujoco.evidence.report.scores import Score
 from smc_mujoco.evidence.report.words import style
 from smc_mujoco.mechanisms.plant import catalogue as known_plants
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.margins import Margin
     from smc_mujoco.analysis.region_of_attraction import Basin
-    from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
-    from smc_mujoco.evidence.accuracy.scaling import Accuracy
     from smc_mujoco.evidence.report.rigs import Repeated
     from smc_mujoco.evidence.report.stages import Field, Front
 
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
-LOG_SPAN, MAX_DECADES = 50.0, 5  # an axis of a wider span is logarithmic, and shows at most so many decades
 KEYS_PER_LINE = 5  # laws in a line of a legend
 LINE_HEIGHT = 21  # px, of a line of a legend
+NAME_FONT = {"size": 11.5, "color": style.INK}  # of laws beside their lines
 FALLS, RISES = "#DCEAF4", "#C05A21"  # of V; light and dark apart from hue
 # Of logarithmic axes. Plotly writes powers a quarter larger than this size.
 LOG_AXIS: dict[str, Any] = {"type": "log", "exponentformat": "power", "tickfont": {"size": 9}}
@@ -59,30 +54,22 @@ Panel = dict[str, Any]  # row and column
 
 
 def panels(
-    titles: Sequence[str],
-    height: int,
-    margin: tuple[int, int, int, int],
-    gaps: tuple[float, float],
-    rows: int = 1,
-    tops: Sequence[str] | None = None,
+    titles: Sequence[str], height: int, margin: tuple[int, int, int, int], gap: float, rows: int = 1
 ) -> tuple[go.Figure, list[Panel]]:
-    """Return a figure of panels with a title at the left of each, and `tops` above the columns; and the panels.
+    """Return a figure of panels, in one row or below each other, with a title at the left of each; and the panels.
 
-    Height and margin (left, right, top, bottom) are in px, gaps across and up shares of the whole.
+    Height and margin (left, right, top, bottom) are in px, the gap between panels is a share of the whole.
     """
-    places = list(itertools.product(range(1, rows + 1), range(1, len(titles) // rows + 1)))
-    across, up = gaps
-    fig = make_subplots(
-        *places[-1], subplot_titles=titles, column_titles=tops, horizontal_spacing=across, vertical_spacing=up
-    )
+    columns = len(titles) // rows
+    fig = make_subplots(rows, columns, subplot_titles=titles, horizontal_spacing=gap, vertical_spacing=gap)
     font = {"size": 12, "color": style.INK}
     fig.update_annotations(font=font, xanchor="left", align="left", yanchor="bottom", yshift=4)
-    axes = [*fig.select_xaxes()]
-    for title, axis in zip(fig.layout.annotations, axes * 2, strict=False):
+    for title, axis in zip(fig.layout.annotations, fig.select_xaxes(), strict=True):
         title.x = axis.domain[0]
     sides = dict(zip("lrtb", margin, strict=True))
-    fig.update_layout(template={"layout": STYLE}, height=height, margin=sides, showlegend=False)
-    return fig, [{"row": row, "col": column} for row, column in places]
+    fig.update_layout(height=height, margin=sides, showlegend=False)
+    fig.layout.template = {"layout": STYLE}  # in place of plotly's own, of 7 kB
+    return fig, [{"row": 1 + k // columns, "col": 1 + k % columns} for k in range(len(titles))]
 
 
 def _label(law: str) -> str:
@@ -101,74 +88,9 @@ def _quantity(value: float, unit: str) -> str:
     return f"{words.number(value)} {unit * math.isfinite(value)}".strip()
 
 
-def _law_axis(laws: Sequence[str], shown: bool) -> dict[str, Any]:
-    """Return a y axis with a line for each law, the first at the top; their names where shown."""
-    names = [_label(law) for law in reversed(laws)]
-    y = {"categoryarray": names, "categoryorder": "array", "range": [-0.6, len(laws) - 0.4], "showgrid": False}
-    return y | {"dtick": 1, "showticklabels": shown, "tickfont": {"size": 11.5, "color": style.INK}}
-
-
 def rounded(values: Sequence[float] | np.ndarray, digits: int = 5) -> list[float | None]:
     """Return numbers with few digits; None for what is not finite."""
     return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.asarray(values, float).tolist()]
-
-
-def scale(values: Sequence[float], logarithmic: bool | None = None) -> tuple[bool, float, float]:
-    """Return whether an axis for these values is logarithmic, and its ends; values beyond get room at the upper end.
-
-    With None it is logarithmic where values span more than LOG_SPAN, and shows at most MAX_DECADES.
-    """
-    finite = [v for v in values if math.isfinite(v)]
-    top = max([0.0, *finite]) or 1.0
-    above = [v for v in finite if v > top * 10.0**-MAX_DECADES]
-    if logarithmic is None:
-        logarithmic = min(finite, default=top) < top / LOG_SPAN and len(above) > 1
-    if logarithmic and above:
-        return True, min(above) / 2, top * 2.5
-    return False, 0.0, 1.15 * top
-
-
-def forest(scores: Sequence[Score], metrics: Sequence[str], plants: Sequence[str], laws: Sequence[str]) -> go.Figure:
-    """Draw medians with intervals in one condition: a row per metric, a column per plant, a line per law."""
-    cells = list(itertools.product(metrics, plants))
-    titles = [f"{words.metric(metric)}, {words.unit(metric, plant)}" for metric, plant in cells]
-    height = 84 + (32 + 16 * len(laws)) * len(metrics)
-    fig, places = panels(titles, height, (172, 14, 58, 34), (0.028, 0.08), len(metrics), _plants(plants))
-    for k, title in enumerate(fig.layout.annotations):
-        title.update({"font": {"size": 11}} if k < len(cells) else {"yshift": 17})
-    known = {(s.metric, s.plant, s.law): s for s in scores}
-    for place, cell in zip(places, cells, strict=True):
-        its = [known[*cell, law] for law in laws if (*cell, law) in known]
-        logarithmic, low, high = ends = scale([v for score in its for v in (score.low, score.median, score.high)])
-        for score in its:
-            fig.add_trace(_whisker(score, ends), **place)
-        x: dict[str, Any] = {"type": "linear", "range": [low, high], "nticks": 4}
-        if logarithmic:
-            ticks = max(1, math.ceil(math.log10(high / low) / 4))  # decades between ticks that leave at most four
-            x |= LOG_AXIS | {"range": [math.log10(low), math.log10(high)], "dtick": ticks}
-        fig.update_xaxes(x, **place).update_yaxes(_law_axis(laws, place["col"] == 1), **place)
-    return fig
-
-
-def _whisker(score: Score, ends: tuple[bool, float, float]) -> go.Scatter:
-    """Return a law's point with its interval, on an axis with these ends."""
-    logarithmic, low, high = ends
-    off = (high / low) ** 0.035 if logarithmic else 1.0  # off the ends, clear of the labels
-    inner = (low * off, high / off) if logarithmic else (low, high * 0.97)
-    low, high = (score.median if math.isnan(v) else v for v in (score.low, score.high))  # of a single run
-    at, left, right = (min(max(v, inner[0]), inner[1]) for v in (score.median, low, high))
-    symbol = "triangle-right" if score.median > inner[1] else "triangle-left" if score.median < inner[0] else "circle"
-    symbol += "" if score.best else "-open"
-    colour, name = words.colour(score.law), _label(score.law)
-    text = f"<b>{name}</b><br>{_quantity(score.median, words.unit(score.metric, score.plant))}"
-    spread = words.interval(score.median, score.low, score.high)
-    bar = {"type": "data", "symmetric": False, "array": [right - at], "arrayminus": [at - left]}
-    marker = {"size": 9, "color": colour, "symbol": symbol, "line": {"width": 2, "color": colour}}
-    return go.Scatter(
-        {"mode": "markers", "cliponaxis": False, "x": [at], "y": [name], "marker": marker},
-        error_x=bar | {"color": colour, "thickness": 2, "width": 0},
-        hovertemplate=text + (f"<br>95 %: {spread}" if spread else "") + "<extra></extra>",
-    )
 
 
 def fronts(drawn: "Sequence[Front]") -> go.Figure:
@@ -176,10 +98,11 @@ def fronts(drawn: "Sequence[Front]") -> go.Figure:
     plants = list(dict.fromkeys(front.plant for front in drawn))
     laws = list(dict.fromkeys(front.law for front in drawn))
     legend = LINE_HEIGHT * math.ceil(len(laws) / KEYS_PER_LINE)  # px that it takes above the panels
-    fig, places = panels(_plants(plants), 380 + legend, (60, 12, 62 + legend, 54), (0.035, 0))
+    fig, places = panels(_plants(plants), 380 + legend, (60, 12, 62 + legend, 54), 0.035)
     for place, plant in zip(places, plants, strict=True):
         on_plant = [front for front in drawn if front.plant == plant]
-        fig.add_traces([trace for front in on_plant for trace in _front(front)], **_each(place, 2 * len(on_plant)))
+        for trace in (trace for front in on_plant for trace in _front(front)):
+            fig.add_trace(trace, **place)
         across = _span([v for f in on_plant for v in (*f.variation, f.chosen[1])], 1e-3)
         up = _span([v for f in on_plant for v in (*f.tracking, f.chosen[0])], None)
         tick = max(1, math.ceil((across[1] - across[0]) / 4))
@@ -191,11 +114,6 @@ def fronts(drawn: "Sequence[Front]") -> go.Figure:
         key = {"name": _label(law), "legendgroup": law, "marker": {"size": 8, "color": colour}}
         fig.add_scatter(**key, x=[None], y=[None], mode="lines+markers", line={"color": colour, "width": 2})
     return fig.update_layout(showlegend=True, legend={"y": 1 + 52 / 264})
-
-
-def _each(place: Panel, count: int) -> dict[str, Any]:
-    """Return the places of several traces in one panel, as `add_traces` takes them."""
-    return {"rows": [place["row"]] * count, "cols": [place["col"]] * count}
 
 
 def _span(values: Sequence[float], floor: float | None) -> list[float]:
@@ -232,14 +150,17 @@ def margins(drawn: "Sequence[Margin]", kind: str) -> go.Figure:
     """
     plants = list(dict.fromkeys(margin.plant for margin in drawn))
     laws = list(dict.fromkeys(margin.law for margin in drawn))
-    fig, places = panels(_plants(plants), 98 + 19 * len(laws), (172, 14, 42, 28), (0.025, 0))
+    fig, places = panels(_plants(plants), 98 + 19 * len(laws), (172, 14, 42, 28), 0.025)
+    names = [_label(law) for law in reversed(laws)]  # the first at the top
+    fig.update_yaxes(categoryarray=names, categoryorder="array", range=[-0.6, len(laws) - 0.4], showgrid=False, dtick=1)
+    fig.update_yaxes(showticklabels=False).update_yaxes(showticklabels=True, tickfont=NAME_FONT, **places[0])
     for place, plant in zip(places, plants, strict=True):
         on_plant = [margin for margin in drawn if (margin.plant, margin.kind) == (plant, kind)]
-        _, _, end = scale([v for m in on_plant for v in (m.value, m.theory or 0.0)], False)
-        traces = [trace for margin in on_plant for trace in _margin(margin, end)]
-        fig.add_traces(traces, **_each(place, len(traces)))
+        sizes = [v for margin in on_plant for v in (margin.value, margin.theory or 0.0) if math.isfinite(v)]
+        end = 1.15 * (max(sizes, default=0.0) or 1.0)
+        for trace in (trace for margin in on_plant for trace in _margin(margin, end)):
+            fig.add_trace(trace, **place)
         fig.update_xaxes(range=[-0.03 * end, end], nticks=4, rangemode="tozero", **place)
-        fig.update_yaxes(_law_axis(laws, place["col"] == 1), **place)
     return fig
 
 
@@ -266,51 +187,18 @@ def _margin(margin: "Margin", end: float) -> list[go.Scatter]:
     return traces
 
 
-def accuracies(table: "AccuracyTable") -> go.Figure:
-    """Draw the largest error over the control period: a panel for each condition, and dashed theory's slope."""
-    laws = list(dict.fromkeys(row.law for row in table))
-    legend = LINE_HEIGHT * math.ceil(len(laws) / KEYS_PER_LINE)  # px that it takes above the panels
-    titles = [words.bold(f"{words.pretty(title)}, {rows[0].unit}") for title, rows in table.groups.items()]
-    fig, places = panels(titles, 380 + legend, (60, 12, 62 + legend, 54), (0.08, 0))
-    for place, rows in zip(places, table.groups.values(), strict=True):
-        for row in rows:
-            fig.add_traces(traces := _accuracy(row, place["col"] == 1), **_each(place, len(traces)))
-        errors = [error for row in rows for error in row.e.largest if row.floor < error < math.inf]
-        span = [math.log10(min(errors, default=1.0)) - 0.2, math.log10(max(errors, default=1.0)) + 0.2]
-        ticks = [1e3 * h for h in rows[0].periods]
-        fig.update_xaxes(type="log", title_text="control period, ms", tickvals=ticks, **place)
-        fig.update_yaxes(LOG_AXIS, range=span, dtick=1, **place)
-    return fig.update_layout(showlegend=True, legend={"y": 1 + 28 / 264})
-
-
-def _accuracy(row: "Accuracy", named: bool) -> list[go.Scatter]:
-    """Return the line of a law's errors over the control period in ms, and theory's slope through its middle."""
-    colour, name = words.colour(row.law), _label(row.law)
-    h = [1e3 * period for period in row.periods]
-    common = {"legendgroup": row.law, "x": rounded(h)}
-    hover = f"<b>{name}</b><br>%{{y:.2g}} {row.unit} at %{{x:g}} ms<br>order {row.e}<extra></extra>"
-    line = {"mode": "lines+markers", "line": {"color": colour, "width": 1.8}, "marker": {"size": 7, "color": colour}}
-    traces = [go.Scatter(common | line, y=rounded(row.e.largest), name=name, showlegend=named, hovertemplate=hover)]
-    if row.e.theory is not None and not math.isnan(row.e.order):
-        middle = len(h) // 2
-        bound = [row.e.largest[middle] * (ms / h[middle]) ** row.e.theory for ms in h]
-        dashed = {"mode": "lines", "line": {"color": colour, "width": 1, "dash": "dash"}, "hoverinfo": "skip"}
-        traces.append(go.Scatter(common | dashed, y=rounded(bound), showlegend=False))
-    return traces
-
-
 def curves(scene: Scene) -> go.Figure:
     """Draw x and u of every law over time. Where u chatters, a band is its range and the line its running mean."""
     angle, force = ("angle", "N·m") if scene.unit == "rad" else ("position", "N")
     titles = [words.bold(f"{angle} x, {scene.unit}"), words.bold(f"control u, {force}")]
-    fig, (left, right) = panels(titles, 305, (48, 12, 62, 46), (0.075, 0))
+    fig, (left, right) = panels(titles, 305, (48, 12, 62, 46), 0.075)
     extremes = [np.concatenate([c.u, c.low, c.high]) for c in scene.curves]
     bound = 1.08 * (max((float(np.abs(u).max()) for u in extremes if u.size), default=0.0) or scene.u_max)
     fig.update_xaxes(title_text="t, s").update_yaxes(zeroline=True, zerolinecolor=style.RULE)
     fig.update_xaxes(matches="x", **right).update_yaxes(range=[-bound, bound], **right)
     for curve in scene.curves:
-        x, *u = _curve(curve)
-        fig.add_trace(x, **left).add_traces(u, **_each(right, len(u)))
+        for trace, place in zip(_curve(curve), (left, right, right), strict=False):
+            fig.add_trace(trace, **place)
     return fig.update_layout(showlegend=True, legend={"y": 1.12})
 
 
@@ -332,7 +220,7 @@ def record(shown: "Repeated") -> go.Figure:
     """Draw the columns of a record over time, measured and as its twin repeats them: a panel for each, one below."""
     names = list(shown.measured)
     fig, places = panels(
-        [words.bold(name) for name in names], 120 + 120 * len(names), (56, 12, 62, 46), (0.0, 0.13), len(names)
+        [words.bold(name) for name in names], 120 + 120 * len(names), (56, 12, 62, 46), 0.13, rows=len(names)
     )
     for place, name in zip(places, names, strict=True):
         for label, values, line in (
@@ -358,7 +246,7 @@ def meanings(drawn: "Sequence[Basin]") -> dict[str, str]:
 
 def basins(drawn: "Sequence[Basin]", after: Sequence[float]) -> go.Figure:
     """Draw the maps of one plant: a panel a law, x across, x' up; `after` is from `convergence_times` of all maps."""
-    fig, places = panels([words.bold(words.law(basin.law)) for basin in drawn], 232, (54, 8, 24, 44), (0.02, 0))
+    fig, places = panels([words.bold(words.law(basin.law)) for basin in drawn], 232, (54, 8, 24, 44), 0.02)
     unit = drawn[0].unit
     for place, basin, title in zip(places, drawn, fig.layout.annotations, strict=True):
         title.font.color = words.colour(basin.law)
@@ -388,7 +276,7 @@ def fields(drawn: "Sequence[Field]") -> go.Figure:
     """Draw where V rises, dark, and the line s = 0: a panel per plant, x across, x' up."""
     titles = _plants([field.plant for field in drawn])
     titles = [f"{title}, {100 * field.share:.0f} %" for title, field in zip(titles, drawn, strict=True)]
-    fig, places = panels(titles, 246, (48, 8, 38, 44), (0.045, 0))
+    fig, places = panels(titles, 246, (48, 8, 38, 44), 0.045)
     lines = {"coloring": "none", "start": 0, "end": 0, "size": 1, "showlabels": False}
     zero = {"contours": lines, "hoverinfo": "skip", "showscale": False, "line": {"width": 1.5, "color": style.INK}}
     for place, field in zip(places, drawn, strict=True):

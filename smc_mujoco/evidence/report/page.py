@@ -17,8 +17,10 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, TypeVar
 
 from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.common.files import scratch
 from smc_mujoco.control.law import laws
 from smc_mujoco.draw import style
+from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.report import answer, charts, oscillation, rigs, words
@@ -88,6 +90,7 @@ def page(findings: Findings) -> str:
         "oscillation": oscillation,
         "link": link,
         "uri": uri,
+        "orders": orders(findings.accuracies),
         "plants": plants(),
     }
     return made.get_template("page.jinja").render(
@@ -97,7 +100,6 @@ def page(findings: Findings) -> str:
         sections=SECTIONS,
         # tables: what identifies a row -> column -> cell
         board=pivot(((s.plant, s.condition, s.law), s.metric, s) for s in findings.scores),
-        places=pivot(((p.plant, p.law), p.metric, p) for p in findings.places),
         set_margins=pivot(((m.kind, m.plant, m.law), name, m) for name, some in findings.by_set.items() for m in some),
         gains=pivot(((row.plant, row.law), row.set, row) for row in findings.about.gains),
         # how it was computed
@@ -109,6 +111,15 @@ def page(findings: Findings) -> str:
         relevance=relevance(share, ((s.metric, s.floor) for s in findings.scores)),
         metrics={metric.name: (inspect.getdoc(metric.formula) or "").split("\n\n") for metric in metrics()},
     )
+
+
+def orders(table: AccuracyTable) -> bytes:
+    """Return the figure of the orders of accuracy, an SVG file; nothing of no laws."""
+    if not table:
+        return b""
+    with scratch() as folder:
+        table.plot(folder / "orders.svg")
+        return (folder / "orders.svg").read_bytes()
 
 
 def pivot(cells: Iterable[tuple[Row, Column, Cell]]) -> dict[Row, dict[Column, Cell]]:

@@ -16,6 +16,7 @@ import numpy as np
 from smc_mujoco.analysis import margins as margin_search
 from smc_mujoco.analysis import region_of_attraction as regions
 from smc_mujoco.analysis.margins import Margin
+from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.region_of_attraction import Basin
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, write_json
@@ -28,12 +29,14 @@ from smc_mujoco.evidence.audit.verdict import Claim, Claims
 from smc_mujoco.evidence.papers.gaber import lyapunov, scenarios
 from smc_mujoco.evidence.report import about, films, oscillation, rigs, scores, words
 from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
-from smc_mujoco.evidence.report.scores import Place, Score
+from smc_mujoco.evidence.report.scores import Score
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.grid import grid as make_grid
 from smc_mujoco.simulation.run import run
+from smc_mujoco.studies.board import Board
 from smc_mujoco.studies.cache import cached
+from smc_mujoco.studies.leaderboard import leaderboard
 from smc_mujoco.studies.noise_key import DRAWN, has_user_code
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
@@ -81,7 +84,7 @@ class Findings:
     """Everything that a report shows."""
 
     scores: tuple[Score, ...]
-    places: tuple[Place, ...]
+    boards: Sequence[Board]  # of each plant and metric, over the conditions
     claims: Sequence[Claim]
     fields: tuple[Field, ...]
     fronts: tuple[Front, ...]
@@ -127,9 +130,10 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
     oscillations, accurate = oscillation.oscillations(work), accuracies(work)
     no_film = video.missing() if plan.filmed else None
     with bars.stage("statistics"):
+        boards = leaderboard(table, (SETTLES, *words.TABLE_METRICS), by=("plant",), relevant=plan.relevant)
         return Findings(
-            scores=scores.scores(table, plan.relevant),
-            places=scores.places(table, plan.relevant),
+            scores=scores.scores(table, boards),
+            boards=boards,
             claims=claims,
             fields=fields(plan),
             fronts=fronts(plan),

@@ -23,7 +23,6 @@ PAPER_LAW = "observer_free"  # the law that the suite was built to test
 # What the overview compares; the tables' columns.
 MAIN_METRICS = ("settling_time", "itae", "ultimate_bound", "tv_rate")
 TABLE_METRICS = ("settling_time", "overshoot", "itae", "ultimate_bound", "steady_error", "max_u", "tv_rate")
-RANKED_METRICS = ("settles", *MAIN_METRICS)  # columns of the ranking by plant
 # Mathematical signs and proper names for the audit's ASCII.
 SIGNS = {"<=": "≤", ">=": "≥", "!=": "≠", "^2": "²", "alphadot": "α′", "alpha": "α", "lambda": "λ", "eps": "ε"}
 SIGNS |= {"Vdot": "V′", "xdot": "x′"}

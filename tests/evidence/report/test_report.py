@@ -24,12 +24,14 @@ from smc_mujoco.analysis import chattering
 from smc_mujoco.common import gl
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.evidence.report import answer, charts, films, page, report, stages, words
+from smc_mujoco.evidence.report import answer, films, page, report, stages, words
 from smc_mujoco.evidence.report import scores as scores_of
 from smc_mujoco.evidence.report.plan import QUICK, Bars
-from smc_mujoco.evidence.report.scores import Place, Score
+from smc_mujoco.evidence.report.scores import Score
 from smc_mujoco.simulation.run import run
 from smc_mujoco.studies.cache import cached
+from smc_mujoco.studies.leaderboard import leaderboard
+from tests.evidence.report.test_page import Place, boards_of
 
 TINY = dataclasses.replace(
     QUICK,
@@ -195,7 +197,8 @@ def test_a_score_counts_its_law_s_failed_runs(made, folder):
     cells = list(zip(*(table.column(name) for name in ("plant", "condition", "law")), strict=True))
     at = table.data.schema.get_field_index("failure")
     failed = table.data.set_column(at, "failure", [["it failed", *[None] * (len(table) - 1)]])
-    rows = scores_of.scores(dataclasses.replace(table, data=failed))
+    table = dataclasses.replace(table, data=failed)
+    rows = scores_of.scores(table, leaderboard(table, words.TABLE_METRICS, by=("plant",)))
     assert {(s.plant, s.condition, s.law) for s in rows if s.failed == 1} == {cells[0]}
     assert {s.failed for s in rows} == {0, 1}
 
@@ -249,27 +252,18 @@ def test_thirteen_laws_have_colours_and_short_names_of_their_own(monkeypatch):
     assert min(words.style.distance(*pair) for pair in several) > words.style.MIN_DISTANCE
 
 
-def forest_of(findings):
-    return charts.forest(findings.scores, words.MAIN_METRICS, findings.plants, findings.laws)
-
-
-def test_a_page_of_thirteen_laws_has_a_line_for_each(findings):
+def test_a_page_of_thirteen_laws_names_each(findings):
     cell = [s for s in findings.scores if s.law == "classical"]
     many = tuple(s._replace(law=law) for law in THIRTEEN for s in cell)
-    place = tuple(p._replace(law=law) for law in THIRTEEN for p in findings.places if p.law == "classical")
-    shown = dataclasses.replace(findings, scores=many, places=place)
-    forest, here = forest_of(shown), forest_of(findings)
-    per_law = (forest.layout.height - here.layout.height) / (13 - 3) / len(words.MAIN_METRICS)
-    assert per_law >= 15  # px: a line of text
-    text = page.page(shown)
+    text = page.page(dataclasses.replace(findings, scores=many))
     assert all(words.law(law) in text for law in THIRTEEN)
 
 
 def test_what_comes_from_outside_is_escaped(findings):
     evil = "<script>alert(1)</script>"
     scores = tuple(s._replace(law=evil) if s.law == "classical" else s for s in findings.scores)
-    places = tuple(p._replace(law=evil) if p.law == "classical" else p for p in findings.places)
-    shown = page.page(dataclasses.replace(findings, scores=scores, places=places))
+    boards = boards_of([Place(evil, wins=2)], 2)
+    shown = page.page(dataclasses.replace(findings, scores=scores, boards=boards))
     assert evil not in shown
     assert "&lt;script&gt;alert(1)" in shown
 
@@ -279,9 +273,9 @@ def test_a_law_and_a_verdict_that_nobody_foresaw_are_shown(findings):
         findings.claims[0], verdict="not testable", numbers={}, beside={}, verdicts={}, note="x"
     )
     scores = tuple(s._replace(law="mine") for s in findings.scores if s.law == "classical")
-    places = tuple(p._replace(law="mine") for p in findings.places if p.law == "classical")
+    boards = boards_of([Place("mine")], 2)
     few = dataclasses.replace(
-        findings, claims=(claim,), scores=scores, places=places, margins=(), basins=(), fronts=(), scenes=(), fields=()
+        findings, claims=(claim,), scores=scores, boards=boards, margins=(), basins=(), fronts=(), scenes=(), fields=()
     )
     assert "mine" in page.page(few)
 
@@ -305,7 +299,7 @@ def scores(condition="nominal", plant="duffing", runs=16, **medians):
 
 def told(findings, *cells):
     """The answer, of these cells alone."""
-    few = dataclasses.replace(findings, scores=tuple(score for cell in cells for score in cell), places=())
+    few = dataclasses.replace(findings, scores=tuple(score for cell in cells for score in cell), boards=())
     return sentences(few, ["settling_time"])
 
 
@@ -329,18 +323,6 @@ def test_the_answer_says_where_seeds_change_nothing(findings):
     assert "seeds change nothing" not in told(findings, cells[1])
 
 
-def test_places_over_all_plants_count_the_cells_that_a_law_wins(made, folder):
-    from smc_mujoco.studies.table import Table
-
-    rows = scores_of.places(Table.read(folder / "study"))
-    own = [p for p in rows if (p.plant, p.metric) == ("duffing", "itae")]
-    overall = [p for p in rows if (p.plant, p.metric) == ("", "itae")]
-    assert {p.law: (p.mean, p.wins, p.losses, p.of, p.best) for p in own} == {
-        p.law: (p.mean, p.wins, p.losses, p.of, p.best) for p in overall
-    }
-    assert {p.of for p in overall} == {2}
-
-
 def test_where_the_papers_law_loses_is_listed_worst_first():
     lost = answer.losses(answer.cells(scores(observer_free=3.0, classical=1.0, adaptive=2.0)), ["settling_time"])
     assert [(loss.law, loss.times) for loss in lost] == [("classical", 3.0)]
@@ -359,37 +341,33 @@ def test_where_the_papers_law_loses_is_listed_worst_first():
     assert never[0].times == math.inf
 
 
-def place(law, losses=0, wins=0, mean=1.0, metric="itae", median=1.0, plant="duffing"):
-    return Place(plant, metric, law, mean, 0, not losses, median, wins, losses, 4)
-
-
 def picked(findings, *places):
-    one = answer.pick(dataclasses.replace(findings, places=places), "itae", "duffing")
+    one = answer.pick(dataclasses.replace(findings, boards=boards_of(places, 4)), "itae", "duffing")
     assert one
     return one
 
 
 def test_the_law_to_take_is_beaten_in_the_fewest_conditions_then_has_the_best_mean_rank(findings):
-    one = picked(findings, place("a", 2, 2, 1.0), place("b", 1, 0, 3.0), place("c", 1, 0, 2.0), place("d", plant="x"))
+    one = picked(findings, Place("a", 2, 2, 1.0), Place("b", 1, 0, 3.0), Place("c", 1, 0, 2.0), Place("d", plant="x"))
     assert (one.law, one.level) == ("c", ("b",))
     assert one.sure == "unbeaten in 3 of 4"
-    assert picked(findings, place("a", 4, median=2.0), place("b", 1, 1)).sure == "unbeaten in 3 of 4, wins in 1"
-    assert picked(findings, place("a", 0, 4)).sure == "wins in all 4"
-    failing = place("a", 1, mean=1.0)._replace(failed=2)
-    assert picked(findings, failing, place("b", 1, mean=2.0)).law == "b"
-    level = picked(findings, place("a"), place("b"), place("c"))
+    assert picked(findings, Place("a", 4, median=2.0), Place("b", 1, 1)).sure == "unbeaten in 3 of 4, wins in 1"
+    assert picked(findings, Place("a", 0, 4)).sure == "wins in all 4"
+    failing = Place("a", 1, mean=1.0)._replace(failed=2)
+    assert picked(findings, failing, Place("b", 1, mean=2.0)).law == "b"
+    level = picked(findings, Place("a"), Place("b"), Place("c"))
     assert (level.law, level.sure) == ("", "all 3 laws level in each of 4")  # none is named, by the alphabet or else
-    assert picked(findings, place("a", 4)).sure == "unbeaten in none of 4"
-    assert answer.pick(dataclasses.replace(findings, places=()), "itae", "duffing") is None
+    assert picked(findings, Place("a", 4)).sure == "unbeaten in none of 4"
+    assert answer.pick(dataclasses.replace(findings, boards=()), "itae", "duffing") is None
 
 
 def test_a_law_that_seldom_settles_is_not_one_to_take(findings):
     def settling(law, share):
-        return place(law, metric="settles", median=share)
+        return Place(law, metric="settles", median=share)
 
-    calm, other = place("idle"), place("pid", 3)
+    calm, other = Place("idle"), Place("pid", 3)
     assert picked(findings, calm, other, settling("idle", 0.39), settling("pid", 0.8)).law == "pid"
-    calm = place("idle", wins=1)
+    calm = Place("idle", wins=1)
     assert picked(findings, calm, other, settling("idle", 0.41), settling("pid", 0.8)).law == "idle"
 
 
@@ -557,7 +535,7 @@ def test_every_chart_is_drawn(seen, findings):
     counts = seen.page.eval_on_selector_all(
         ".plot", "plots => plots.map(p => p.querySelectorAll('.trace, .hm, .contour').length)"
     )
-    assert len(counts) == 1 + 1 + 1 + len(TINY.accurate) + len(TINY.kinds) + len(TINY.basins) + len(TINY.scenes)
+    assert len(counts) == 1 + 1 + len(TINY.kinds) + len(TINY.basins) + len(TINY.scenes)  # with field and fronts
     assert min(counts) > 0
 
 
@@ -670,7 +648,7 @@ def test_in_the_dark_letters_and_laws_are_legible_in_charts_too(browser, made):
     (back,) = colours(night.page, "body", "backgroundColor")
     letters = colours(night.page, ".plot text", "fill")
     assert min(contrast(colour, back) for colour in letters) > 4.5
-    marks = colours(night.page, ".plot .point", "stroke") - {back}  # a ring of the page's colour is about some dots
+    marks = colours(night.page, ".plot .point", "fill")
     assert min(contrast(colour, back) for colour in marks) > 2.5
     assert len(marks) >= len(TINY.laws)
     night.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")

@@ -15,10 +15,9 @@ import smc_mujoco as smc
 from smc_mujoco.common import extras
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
-from smc_mujoco.evidence.report import about, films, oscillation, paper, plan, rigs, scores, stages, words
+from smc_mujoco.evidence.report import about, films, oscillation, paper, plan, rigs, stages, words
 from smc_mujoco.evidence.report import report as make
 from smc_mujoco.evidence.report.plan import FULL, QUICK, Bars, Plan, Work
-from smc_mujoco.evidence.report.scores import Place
 from smc_mujoco.evidence.report.stages import Field
 
 
@@ -112,25 +111,6 @@ def test_a_report_needs_its_packages(tmp_path, monkeypatch):
     assert [given for given, _ in asked] == [("report", "a report", "jinja2", "plotly")] * 2
 
 
-def test_a_place_over_all_plants_weighs_every_cell_the_same():
-    one = Place(
-        plant="duffing",
-        metric="settles",
-        law="pid",
-        mean=1.0,
-        failed=1,
-        best=True,
-        median=0.5,
-        wins=2,
-        losses=0,
-        of=3,
-    )
-    two = one._replace(plant="van_der_pol", mean=2.0, failed=2, best=False, median=1.0, wins=1, losses=4, of=9)
-    both = scores._overall([one, two])
-    assert both == one._replace(plant="", mean=1.75, failed=3, best=False, median=0.875, wins=3, losses=4, of=12)
-    assert np.isnan(scores._overall([one._replace(metric="itae")]).median)
-
-
 def test_records_of_a_folder_are_read_in_the_order_of_their_names(tmp_path, monkeypatch):
     files = [tmp_path / name for name in ("b.npz", "c.txt", "a.csv")]
     monkeypatch.setattr(Path, "iterdir", lambda _: iter(files))
@@ -181,11 +161,13 @@ def test_findings_are_what_the_stages_give_in_their_order(tmp_path, monkeypatch,
     done, bars = [], Bars(False)
     names = (
         "rigs.repeated grid judged_claims worst_cases all_margins margins_by_set all_basins all_scenes rigs.machines "
-        "oscillation.oscillations accuracies scores.scores scores.places fields fronts about.about"
+        "oscillation.oscillations accuracies leaderboard scores.scores fields fronts about.about"
     )
 
     def stub(name):
-        return lambda *given: done.append(f"{name}({', '.join(map(shown, given))})") or f"of {name}"
+        return lambda *given, **named: (
+            done.append(f"{name}({', '.join(map(shown, (*given, *named.values())))})") or f"of {name}"
+        )
 
     def shown(value):
         return (
