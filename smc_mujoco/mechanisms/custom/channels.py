@@ -23,7 +23,7 @@ ONE_JOINT = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.
 FIXED, NO_BIAS = mujoco.mjtGain.mjGAIN_FIXED.value, mujoco.mjtBias.mjBIAS_NONE.value
 NO_DYNAMICS = mujoco.mjtDyn.mjDYN_NONE.value
 MOTOR_GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot turn off
-CURE = "give smc.Channel(motor=True) for an ideal motor in its place"
+CURE = "give smc.Channel(motor=True) for one ideal motor instead"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -31,9 +31,8 @@ class Channel:
     """How a joint of a user's model is driven.
 
     Attributes:
-      actuator: name of the motor that drives the joint; None: its only actuator.
       motor: whether to replace the joint's actuators, if it has any, by an ideal motor. It keeps their forcerange, and
-        the joint's actuatorfrcrange.
+        the joint's actuatorfrcrange. Without it, the joint needs one actuator, and that a motor.
       partner: a joint without an actuator that moves with this one, such as a pole on its cart. It is measured and
         scored as a separate channel, after the driven ones. The law of this channel reads it in y.q, y.dq, y.fq and
         y.gq. If it has an actuator, that stays at ctrl = 0: a motor then does nothing, a servo holds its position.
@@ -43,7 +42,6 @@ class Channel:
         channel a law, or none. None: the default bound, and rest at 0.
     """
 
-    actuator: str | None = None
     motor: bool = False
     partner: str | None = None
     x0: float | None = None
@@ -163,27 +161,18 @@ class Motor(NamedTuple):
 
 def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) -> Motor:
     """Return the motor that drives a joint."""
-    joint_id, wanted = model.joint(joint).id, channel.actuator
+    joint_id = model.joint(joint).id
     bounds = [tuple(map(float, model.jnt_actfrcrange[joint_id]))] if model.jnt_actfrclimited[joint_id] else []
     actuators = [i for i in range(model.nactuator) if model.actuator_trntype[i] in ONE_JOINT]
     actuators = [i for i in actuators if model.actuator_trnid[i, 0] == joint_id]
     if channel.motor:
-        if wanted is not None:
-            raise ScenarioError(f"channel {joint!r} has motor=True and actuator {shown(wanted)}: give one of the two")
         takes, cure = f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange"
         return Motor(joint, _limit(takes, cure, *bounds, _together(model, actuators)), tuple(actuators))
-    if wanted is not None:
-        chosen = pick(label, "actuator", wanted, [model.actuator(i).name for i in range(model.nactuator)])
-        if chosen not in actuators:
-            raise ScenarioError(f"actuator {wanted!r} of {label} does not drive joint {joint!r} alone: {CURE}")
-        actuators = [chosen]
     if not actuators:
         raise ScenarioError(f"no actuator of {label} drives joint {joint!r} alone: {CURE}")
     names = ", ".join(model.actuator(i).name or f"number {i}" for i in actuators)
     if len(actuators) > 1:
-        raise ScenarioError(
-            f"joint {joint!r} of {label} has the actuators {names}: name one with Channel(actuator=...)"
-        )
+        raise ScenarioError(f"joint {joint!r} of {label} has the actuators {names}: {CURE}")
     if why := _no_motor(model, actuators[0]):
         raise ScenarioError(f"actuator {names!r} of joint {joint!r} {why}, and a law commands a force: {CURE}")
     gives = f"actuator {names!r} gives joint {joint!r} of {label}"

@@ -67,7 +67,6 @@ class ServoFriction(Sliding):
     alpha: PerJoint = 1.0
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         self.check_numbers("kv", "kc", "kcs", *LOAD_FACTORS, low=0.0)
         self.check_numbers("vs", "alpha", above=0.0)
 

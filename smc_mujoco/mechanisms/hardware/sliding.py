@@ -47,24 +47,15 @@ class Sliding(Friction):
     """Base of frictions by a formula.
 
     A class states its numbers as fields. Each is one number for all channels, or a sequence with one for each channel.
-
-    Attributes:
-      stiffness: of a stuck joint, N m/rad (N/m), greater than 0. None: for BRISTLE_FREQUENCY, with each joint's
-        inertia at the start of the run, in MuJoCo's reference position qpos0.
     """
 
     bristles = True
     stateful = True  # its force is held over each physics step, so RK4 would not make it more accurate
 
-    stiffness: PerJoint | None = dataclasses.field(default=None, kw_only=True)
-
     @property
     def names(self) -> tuple[str, ...]:
-        """The fields that the formula reads as p: all that a class adds to this one."""
-        return tuple(field.name for field in dataclasses.fields(self) if field.name != "stiffness")
-
-    def __post_init__(self) -> None:
-        self.check_numbers("stiffness", above=0.0)
+        """The fields, which the formula reads as p."""
+        return tuple(field.name for field in dataclasses.fields(self))
 
     @staticmethod
     def value(v: float, motor: float, load: float, p: Any, /) -> tuple[float, float, float]:
@@ -84,7 +75,7 @@ class Sliding(Friction):
 
     def check(self, plant: Plant) -> None:
         """Raise ScenarioError if a field is a sequence and does not have one number for each channel of the plant."""
-        for name in (*self.names, "stiffness"):
+        for name in self.names:
             value = getattr(self, name)
             if isinstance(value, tuple) and len(value) != plant.n:
                 what, cure = f"{type(self).__name__}'s {name} is {shown(value)}", f"give one number, or {plant.n}"
@@ -95,11 +86,13 @@ class Sliding(Friction):
         return tuple(math.nan if (x := _of(getattr(self, name), i)) is None else x for name in self.names)
 
     def bristle(self, i: int, inertia: float) -> tuple[float, float]:
-        """Return stiffness and critical damping of channel i when it sticks, from its joint's inertia, kg m^2 (kg)."""
+        """Return stiffness and critical damping of channel i when it sticks.
+
+        The inertia of its joint, kg m^2 (kg), is that in MuJoCo's reference position qpos0, at the start of the run.
+        """
         if not inertia > 0.0:
             raise ScenarioError(f"the inertia of joint {i} is {inertia:g}, and friction needs one above 0: give others")
-        stiffness = _of(self.stiffness, i)
-        stiffness = inertia * BRISTLE_FREQUENCY**2 if stiffness is None else stiffness
+        stiffness = inertia * BRISTLE_FREQUENCY**2
         return stiffness, 2.0 * math.sqrt(stiffness * inertia)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
@@ -143,7 +136,6 @@ class Sigmoid(Sliding):
     hold: PerJoint | None = None
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         self.check_numbers("p1", "hold", low=0.0)
         self.check_numbers("p2", above=0.0)
         self.check_numbers("p3", low=-MAX_PARAMETER)

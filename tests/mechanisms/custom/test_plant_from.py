@@ -758,8 +758,6 @@ WRONG = {
     "tendon": {"channels": ["elbow"], "rest": TENDON},
     "several": {"rest": TWO},
     "servo": {"channels": ["shoulder"], "rest": SERVO},
-    "wrong actuator": {"channels": {"elbow": {"actuator": "a"}}},
-    "unknown actuator": {"channels": {"elbow": {"actuator": "z"}}},
     "unknown field": {"channels": {"elbow": {"gear": 2}}},
     "twice": {"channels": ["elbow", "elbow"]},
     "empty": {"channels": []},
@@ -768,7 +766,6 @@ WRONG = {
     "partner's x0": {"channels": {"elbow": {"partner_x0": 1.0}}},
     "set": {"channels": {"elbow"}},
     "motor": {"channels": {"elbow": {"motor": "no"}}},
-    "both": {"channels": {"elbow": {"motor": True, "actuator": "b"}}},
     "one way": {"channels": ["elbow"], "rest": '<actuator><motor name="m" joint="elbow" ctrlrange="0 2"/></actuator>'},
     "one way at the joint": {"channels": {"j": {"motor": True}}, "bodies": ONE_WAY},
     "slow motor": {"channels": ["elbow"], "rest": '<actuator><general joint="elbow" dyntype="filter"/></actuator>'},
@@ -776,7 +773,6 @@ WRONG = {
     "off": {"rest": ACTUATED + '<option actuatorgroupdisable="0"/>'},
     "rotor": {"channels": {"rotor:a": smc.Channel(motor=True)}, "bodies": ROTATING},
     "no keyframe": {"keyframe": "home"},
-    "no actuator": {"channels": {"elbow": {"actuator": "b"}}, "rest": ""},
     "no site": {"tip": "tip"},
     "half a law": {"channels": {"elbow": {"law": "none"}, "shoulder": None}},
     "half a partner": {"channels": {"elbow": {"partner": "shoulder"}, "j": None}, "bodies": ONE_WAY},
@@ -831,9 +827,9 @@ def test_a_law_gets_no_model_that_there_is_not(arm):
     across = '<tendon><fixed><joint joint="elbow" coef="1"/></fixed></tendon>' + ACTUATED  # couples, perhaps
     assert "a joint without a name moves with" in arm(rest=across, bodies=BALL.replace(' name="ball"', "")).unmodelled
     assert "make it a channel, or the partner of one if nothing drives it, or give a law" in plant.unmodelled
-    wound = '<dcmotor joint="elbow" motorconst="1 1" resistance="1" inductance="0.1 0"/></actuator>'
-    channels = {"shoulder": None, "elbow": smc.Channel(actuator="b")}
-    assert "dcmotor" in arm(channels, rest=ACTUATED.replace("</actuator>", wound)).unmodelled
+    wound = '<dcmotor joint="shoulder" motorconst="1 1" resistance="1" inductance="0.1 0"/>'
+    rest = f'<actuator><motor joint="elbow"/>{wound}</actuator>'
+    assert "dcmotor" in arm({"elbow": smc.Channel(partner="shoulder")}, rest=rest).unmodelled
 
 
 def test_a_force_on_a_body_is_refused(arm):
