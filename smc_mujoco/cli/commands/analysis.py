@@ -44,10 +44,9 @@ def tune(
 ) -> None:
     """Find a law's gains on a plant by a rule that is the same for every law.
 
-    Every law has the same bound on u, the same objective and the same search, from several starts. Each gain is
-    searched over the same number of decades about a scale that follows from its unit and the plant. The objective is
-    error times time, plus variation of u, summed over seven conditions in runs of 5 s: nominal, noise, delay, a sine
-    and a constant disturbance, 30 % more and 30 % less mass. The same seed gives the same gains.
+    Each gain is searched over the same number of decades about a scale that follows from its unit and the plant. The
+    objective is error times time, plus variation of u, summed over seven conditions in runs of 5 s: nominal, noise,
+    delay, a sine and a constant disturbance, 30 % more and 30 % less mass. The same seed gives the same gains.
 
     Example: smc-mujoco tune duffing observer_free --out duffing.json
     """
@@ -88,9 +87,8 @@ def margins(
 
     A constant disturbance and dry friction are in N or N m, mass is a multiple of the nominal one, noise is the
     standard deviation of the position (that of the velocity is 5/s times as large), and the delay of the command is in
-    s. The column theory has the limit that the loop has when it is linearised at rest, for example the delay at which
-    rest becomes unstable; not every law can be linearised. A law may tolerate more, with a small steady oscillation.
-    The module smc_mujoco.analysis.margins describes the search and its limits.
+    s. The column theory has the limit of the loop linearised at rest, such as the delay at which rest becomes unstable,
+    if the law can be linearised. A law may tolerate more, with a small steady oscillation.
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kinds delay
     """
@@ -285,12 +283,11 @@ def chatter(
 ) -> None:
     """Predict how much laws chatter, by harmonic balance, and measure it in runs.
 
-    If a law switches and the actuator lags, the loop oscillates without end. Frequency and amplitude follow from the
-    law's describing function N and the response L of the linearised mechanism: N L = 1. The column "±" is how far the
-    prediction may be off: s has harmonics, and the cycle may be locked to the control samples. A star marks a run that
-    changes by more than 10 % with half the physics step. The column "third" is the third harmonic over the first. If
-    the plant has several driven channels, the column "coupling" is how far this channel's command moves another one,
-    over how far it moves this one: the prediction is for a single channel, and fails if the coupling is not small.
+    If a law switches and the actuator lags, the loop oscillates without end, where the law's describing function N and
+    the response L of the linearised mechanism have N L = 1. The column "±" is how far the prediction may be off. A star
+    marks a run that changes by more than 10 % with half the physics step. The column "third" is the third harmonic over
+    the first. Of several driven channels, "coupling" is how far this channel's command moves another one, over how far
+    it moves this one: if that is not small, the prediction fails.
 
     Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --out chatter
     """

@@ -76,8 +76,6 @@ def laws(
 
     Example: smc-mujoco laws super_twisting
 
-    Example: smc-mujoco laws my_law.py
-
     Example: smc-mujoco laws --needs continuous,two-gains
     """
     with delay_ctrl_c():

@@ -103,13 +103,12 @@ def view(
     """Watch one run of a scene in MuJoCo's viewer, in real time, and change the gains of its law.
 
     - Pause and continue: the space bar.
-    - Change a gain: its slider gain:NAME in the panel "Control" at the right. It reaches from a tenth of the scene's
-      value to ten times that value. Changed gains are printed, as code that makes the law.
+    - Change a gain: its slider gain:NAME in the panel "Control" at the right, from a tenth of the scene's value to ten
+      times that value. Changed gains are printed, as code that makes the law.
     - Push a body: double-click it, hold Ctrl, and drag with the right mouse button.
     - Start again: Backspace. The run also starts again by itself when its duration is over. Changed gains are kept.
 
-    The run is the same as that of `smc-mujoco run`, but is simulated in Python. All other sliders and settings of the
-    viewer change only the picture.
+    All other sliders and settings of the viewer change only the picture.
 
     Example: smc-mujoco view inverted_pendulum --label super_twisting
     """

@@ -14,7 +14,6 @@ from smc_mujoco.common.text import counted
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.grid import Starts
-    from smc_mujoco.studies.compare import Compared
     from smc_mujoco.studies.table import Table
 
 
@@ -43,16 +42,12 @@ def which(
 ) -> None:
     """Advise a law for a plant: which to use, with which gains, why, the second choice, and how sure that is.
 
-    All laws that suit the plant are compared. Their gains are those that the package has for it, or else they are tuned
-    now by the same rule, which takes some seconds for each law. They run from the same starts, with the same noise, and
-    with all sets of gains that their tuning may end with. The rules are those of `compare`. If no law is better than
-    another, the answer says so. If you stop the command, it continues when you start it again.
-
-    For the need robust, an adversary attacks each law within --disturbance, see `smc-mujoco worst`.
+    All laws that suit the plant are compared by the rules of `compare`, with gains of the package or tuned now, some
+    seconds for each law. If no law is better than another, the answer says so. If you stop the command, it continues
+    when you start it again. For the need robust, an adversary attacks each law within --disturbance, see `smc-mujoco
+    worst`.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --needs calm,fast
-
-    Example: smc-mujoco which duffing --condition nominal --needs robust --disturbance 2
 
     Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition "worn: sensor=Encoder(counts=4096)" --needs accurate
     """
@@ -89,23 +84,16 @@ def compare(
     figure: Annotated[Path | None, options.picture("the medians")] = None,
     latex: Annotated[Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")] = None,
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
-    traces: Annotated[
-        str, typer.Option(help="Traces to save: none, all, or the worst per plant and condition.")
-    ] = "none",
-    rig: Annotated[
-        str | None, typer.Option(help="A real machine: its parameter sets replace plants and conditions.")
-    ] = None,
+    rig: Annotated[str | None, typer.Option(help="A machine: its sets replace plants and conditions.")] = None,
     noise_key: options.NoiseKey = None,
     threads: options.Threads = None,
 ) -> None:
     """Compare laws on plants in conditions: tune what has no gains, run, and say which law is better, and how sure.
 
     A law with gains in brackets keeps them. Any other law, that of your file too, has the gains of the package for the
-    plant, or is tuned by the same rule, which takes some seconds for each law on each plant. Gains and runs are kept in
-    the folder --out: you can stop the command at any time, and continue by starting it again. No law can know the
-    noise, and one run of each of your laws is replayed: a law must get its commands from its measurements alone.
-
-    --law all compares every general law. With --rig a line for each metric says if one law wins on all of its sets.
+    plant, or is tuned by the same rule, some seconds for each law on each plant. If you stop the command, it continues
+    when you start it again. One run of each of your laws is replayed: it must get its commands from its measurements
+    alone. --law all compares every general law. With --rig a line for each metric says if one law wins on all sets.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition friction,encoder
 
@@ -127,16 +115,8 @@ def compare(
     comparison = run(
         options.compared_laws(law, machines, gains), machines or None, options.conditions(condition) or None, seeds,
         tune, worst, executor, out=out, duration=duration, starts=start, gains=gains, quick=quick, defaults=defaults,
-        relevant=relevant, traces=traces, noise_key=key, threads=threads,
+        relevant=relevant, noise_key=key, threads=threads,
     )  # fmt: skip
-    _show(comparison, figure, latex, terminal)
-    _finish(comparison.table, out, terminal)
-
-
-def _show(comparison: "Compared", figure: Path | None, latex: Path | None, terminal: Terminal) -> None:
-    """Print a comparison, and write its figure and its tables."""
-    from smc_mujoco.draw.page import files
-
     terminal.print(comparison)
     if latex:
         comparison.to_latex(latex)
@@ -144,6 +124,7 @@ def _show(comparison: "Compared", figure: Path | None, latex: Path | None, termi
     if figure:
         comparison.plot(figure)
         terminal.wrote(*files(figure))
+    _finish(comparison.table, out, terminal)
 
 
 def _compare_on_rig(
