@@ -8,10 +8,10 @@ from collections.abc import Iterable, Sequence
 
 from rich.console import Console
 from rich.padding import Padding
-from rich.table import Column, Table
+from rich.table import Column
 from rich.text import Text
 
-from smc_mujoco.cli.tables import plain, titled
+from smc_mujoco.cli.tables import catalogue, listed, plain
 from smc_mujoco.common.errors import unknown
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Template
@@ -47,39 +47,33 @@ def print_pages(name: str, console: Console) -> None:
         print_page(template, console, package, name)
 
 
+def lists() -> dict[str, list[tuple[str, str]]]:
+    """Return heading -> name and formula of each law, surface and estimator, as the first line of its docstring."""
+    return {heading: listed(templates(), lambda template: template.doc) for heading, templates in CATALOGUES.items()}
+
+
 def print_lists(console: Console) -> None:
     """Print a line about each law, surface and estimator."""
-    for heading, templates in CATALOGUES.items():
-        known = [template for _, template in sorted(templates().items())]
-        console.print(_table(f"{heading} ({len(known)})", known, heading == "Laws"), "")
+    for heading, rows in lists().items():
+        console.print(catalogue(f"{heading} ({len(rows)})", rows), "")
     page, some = ("smc-mujoco laws NAME", "cyan"), ("smc-mujoco laws --needs continuous,two-gains", "cyan")
     console.print(Text.assemble("One law in full: ", page, ". Only some laws: ", some))
 
 
 def print_suitable(needs: Sequence[str], plant: Plant | str | None, console: Console) -> None:
     """Print a line about each law that has all these PROPERTIES and suits a plant."""
-    suitable_laws = suitable(needs, plant)
+    names = [law.name for law in suitable(needs, plant)]
     filters = " and ".join(PROPERTIES[need].words for need in needs)
     machine = plant if plant is None or isinstance(plant, str) else plant.name
-    title = f"{len(suitable_laws)} of {len(laws())} laws" + f" that {filters}" * bool(filters)
+    title = f"{len(names)} of {len(laws())} laws" + f" that {filters}" * bool(filters)
     title += f" for {machine}" * (machine is not None)
     if "no-velocity" in needs:
         text = 'Every law runs without a velocity sensor if the scenario estimates the velocity: velocity="levant".'
         console.print(text, highlight=False)
-    if suitable_laws:
-        console.print(_table(title, suitable_laws, True))
+    if names:
+        console.print(catalogue(title, [row for row in lists()["Laws"] if row[0] in names]))
     else:
         console.print(f"{title}: leave out a need, or --plant", highlight=False)
-
-
-def _table(title: str, templates: Iterable[Template], of_laws: bool) -> Table:
-    """Return a table of names and formulas, of laws with their relative degree."""
-    degree = [Column("deg", justify="right", style="dim")] * of_laws
-    columns = Column("name", no_wrap=True, style="cyan"), *degree, "formula"
-    table = titled(title, *columns, show_edge=False, padding=(0, 2, 0, 0), pad_edge=False)
-    for template in templates:
-        table.add_row(template.name, *[str(template.relative_degree)] * of_laws, Text(entry(template).formula))
-    return table
 
 
 def print_page(template: Template, console: Console, package: str, text: str) -> None:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich import box
 from rich.table import Column, Table
 from rich.text import Text
 
 from smc_mujoco.analysis.step_halving import MARK, NOTE
+from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.text import number
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw import style
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.margins import Margin
     from smc_mujoco.analysis.step_halving import StepChange
 
+T = TypeVar("T")
 TIP_COLUMNS = {  # of a table of an arm's tip: heading -> score, unit, factor on its SI value
     "largest\nerror": ("max_error", "mm", 1e3),
     "error at\nthe end": ("last_error", "mm", 1e3),
@@ -188,6 +190,13 @@ def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Table:
     for row in rows:
         table.add_row(*map(Text, row))
     return table
+
+
+def listed(known: Catalogue[T], doc: Callable[[T], str | None]) -> list[tuple[str, str]]:
+    """Return the name of every entry, with the first line of its docstring, and its package."""
+    lines = {name: (doc(entry) or "").strip().partition("\n")[0] for name, entry in known.items()}
+    # some lines end with a colon, because a formula follows
+    return [(name, with_package(line.rstrip(":"), known.package(name))) for name, line in lines.items()]
 
 
 def with_package(line: str, package: str) -> str:
