@@ -88,18 +88,18 @@ TENDON = """
 """
 PULL = """<tendon><fixed name="t" stiffness="3" damping="1">
   <joint joint="a" coef="1"/><joint joint="b" coef="-2"/></fixed></tendon>"""
-SERVO = '<position joint="b" kp="4" kv="0.5"/>'
+SERVO = '<position tendon="t" kp="4" kv="0.5"/>'
 
 
 @pytest.mark.parametrize(
     "parts",
-    [{}, {"tendon": PULL}, {"actuator": SERVO}, {"own": "true"}],
+    [{}, {"tendon": PULL}, {"tendon": PULL, "actuator": SERVO}, {"own": "true"}],
     ids=["bodies", "tendon", "another actuator", "gravity compensated by the actuator"],
 )
 def test_all_forces_of_the_model_are_in_h_also_after_runs_of_other_laws(parts):
     """Also those that MuJoCo computes elsewhere, and with data that a law of one channel has used before."""
     text = TENDON.format(**{"tendon": "", "actuator": "", "own": "false"} | parts)
-    channels = {name: smc.Channel(actuator=name, x0=0.3) for name in "ab"}
+    channels = {name: smc.Channel(x0=0.3) for name in "ab"}
     plant = smc.plant_from(text, channels=channels, name="pulled")
     common = {"plant": plant, "duration": 0.02, "model": "nominal", "v0": (1.0, -2.0), "u_max": 1e3}
     smc.run(smc.Scenario(law="computed_torque", **common))
