@@ -54,7 +54,6 @@ class Tabular:
     title: str = ""
     notes: Sequence[str] = ()  # paragraphs below the table
     left: int = 1  # columns of names, which are aligned to the left
-    stacked: bool = False  # whether a terminal shows these in one column, below each other
 
     def __str__(self) -> str:
         return plain(self)
@@ -65,15 +64,14 @@ class Tabular:
         from rich.text import Text
 
         columns = self._columns(options.max_width)
-        names = 1 if self.stacked else self.left
         if self.title:
             yield Text(self.title, "bold")
-        for part in _parts([_widest(column) for column in columns], options.max_width, names):
+        for part in _parts([_widest(column) for column in columns], options.max_width, self.left):
             table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False, show_edge=False)
             lines = max(columns[i][0].plain.count("\n") for i in part)
             for i in part:
                 head = Text("\n" * (lines - columns[i][0].plain.count("\n"))).append_text(columns[i][0])
-                table.add_column(head, justify="left" if i < names else "right", overflow="fold")
+                table.add_column(head, justify="left" if i < self.left else "right", overflow="fold")
             for row in zip(*(columns[i][1:] for i in part), strict=True):
                 table.add_row(*row)
             yield table
@@ -82,7 +80,7 @@ class Tabular:
 
     def _columns(self, width: int) -> "list[list[Text]]":
         """Return the columns of names, then those of numbers, with wide intervals on two lines where space is short."""
-        names = [self._stacked()] if self.stacked else [self._names(i) for i in range(self.left)]
+        names = [self._names(i) for i in range(self.left)]
         numbers = range(self.left, len(self.headings))
         columns, narrow = [self._column(i) for i in numbers], [self._column(i, narrow=True) for i in numbers]
         while sum(_widest(column) + 1 for column in [*names, *columns]) - 1 > width:
@@ -94,20 +92,13 @@ class Tabular:
         return [*names, *columns]
 
     def _names(self, i: int) -> "list[Text]":
-        """Return a column of names."""
+        """Return the heading and the cells of a column of names."""
         from rich.text import Text
 
-        cells = [_cell(row[i]) for row in self.rows]
-        return [Text(self.headings[i]), *(Text(folded(cell.text, NAME_WIDTH), cell.colour) for cell in cells)]
-
-    def _stacked(self) -> "list[Text]":
-        """Return the columns of names as one: the heading, then the first name, and below it the others."""
-        from rich.text import Text
-
-        texts = [Text(self.headings[0])]
-        for first, *others in (map(_cell, row[: self.left]) for row in self.rows):
-            name = Text(folded(first.text, NAME_WIDTH), first.colour)
-            texts.append(name.append("".join(f"\n{other.text}" for other in others if other.text), "dim"))
+        texts = [Text(self.headings[i])]
+        for cell in (_cell(row[i]) for row in self.rows):
+            name = Text(folded(cell.text, NAME_WIDTH), cell.colour)
+            texts.append(name.append("".join(f"\n{line}" for line in cell.below.splitlines()), "dim"))
         return texts
 
     def _column(self, i: int, narrow: bool = False) -> "list[Text]":

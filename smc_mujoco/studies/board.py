@@ -314,29 +314,26 @@ def heading(board: Board) -> str:
 def _table(name: str, boards: Sequence[Board], worst: Mapping[str, WorstCase]) -> Tabular:
     """Return the table of one group of runs. Laws stand by place in the first metric, then in the next ones."""
     sources_of = sources(boards)
-    known = ["gains"] * any(sources_of.values())
     cells = {(i, entry.law): _cell(board, entry) for i, board in enumerate(boards) for entry in board.entries}
     places: dict[str, list[float]] = {}
     for entry in (entry for board in boards for entry in board.entries):
         places.setdefault(entry.law, []).append(entry.rank.place)
     rows: list[list[Cell | str]] = []
     for law in sorted(places, key=lambda law: (places[law], law)):
-        left = [Cell(law, colour=style.law_colour(law)), *([kinds(sources_of[law])] * len(known))]
+        name_cell = Cell(law, kinds(sources_of[law]), colour=style.law_colour(law))
         found = worst.get(law)
         case = [Cell(found.shown(found.value), f"median {found.shown(found.median)}") if found else ""] * bool(worst)
-        rows.append([*left, *(cells.get((i, law), "") for i in range(len(boards))), *case])
+        rows.append([name_cell, *(cells.get((i, law), "") for i in range(len(boards))), *case])
     units = [f"worst found ({case.unit})" for case in worst.values()][:1]
     largest = max(boards, key=lambda board: len(board.blocks))
     name = ", ".join(filter(None, [name, largest.name(largest.blocks[0]) if len(largest.blocks) == 1 else ""]))
     samples = {block.sample: largest.name(block) for block in reversed(largest.blocks)}
     several = "; ".join(f"{sample} ({block}{' ...' * (len(largest.blocks) > 2)})" for sample, block in samples.items())
     return Tabular(
-        headings=["law", *known, *map(heading, boards), *units],
+        headings=["law", *map(heading, boards), *units],
         rows=rows,
         title=f"{name}: {several if len(samples) > 1 else largest.blocks[0].sample}",
         notes=_verdicts(boards),
-        left=1 + len(known),
-        stacked=True,
     )
 
 
