@@ -170,10 +170,6 @@ def _with_noise(base: Scenario, level: float) -> Scenario:
     return dataclasses.replace(base, noise=Noise(position=level, velocity=VELOCITY_NOISE_RATIO * level))
 
 
-def _with_delay(base: Scenario, level: float) -> Scenario:
-    return dataclasses.replace(base, input_delay=level)
-
-
 def _with_force(base: Scenario, level: float) -> Scenario:
     return dataclasses.replace(base, disturbance=(*base.disturbance, Constant(level)))
 
@@ -187,7 +183,7 @@ MARGIN_KINDS: dict[str, Kind] = {
         label="input delay",
         unit="s",
         levels=DELAYS,
-        put=_with_delay,
+        put=lambda base, level: dataclasses.replace(base, input_delay=level),
         quantum=lambda base: base.control_period,
         theory=_critical_delay,
     ),

@@ -52,7 +52,6 @@ class WorstCase(Tables):
     scenario: Scenario  # the worst run, an ordinary scenario that gives this value to the last bit
     found_by: str  # the strategy that made the member, or the one from which it was changed
     tried: int  # number of runs, half of them of random members
-    strategies: Mapping[str, float]  # strategy -> largest value among its members, changed ones included
     nominal: Scenario  # the scenario that was given
     within: Uncertainty  # the class
     metric: str  # its name
@@ -98,29 +97,17 @@ class WorstCase(Tables):
     def about(self) -> dict[str, Any]:
         """Return it as JSON data, with the scenario as in a trace's file."""
         names = "value", "median", "unit", "found_by", "tried", "metric", "outside", "seed", "sets"
-        values: dict[str, Any] = {name: getattr(self, name) for name in names}
-        values |= {"strategies": dict(self.strategies), "within": dataclasses.asdict(self.within)}
-        return values | {"scenario": serialise.describe(self.scenario)}
+        values = {name: getattr(self, name) for name in names}
+        return values | {"within": dataclasses.asdict(self.within), "scenario": serialise.describe(self.scenario)}
 
     @property
     def tables(self) -> list[Tabular]:
-        """One table: the largest value among the members that each strategy made."""
-        unit = f" ({self.unit})" * bool(self.unit)
-        table = Tabular(
-            headings=["strategy", f"largest {CATALOGUE[self.metric].label}{unit}"],
-            rows=[(kind, self.shown(v)) for kind, v in sorted(self.strategies.items(), key=lambda pair: -pair[1])],
-            title=str(self),
-            notes=[f"{self.tried} runs, half of them random", *([self.outside] if self.outside else [])],
-        )
-        return [table]
+        """That of `WorstCases`, with one line."""
+        return WorstCases([self]).tables
 
     def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
         """Draw the worst run beside the scenario as it was given; arguments as in `smc.figure`."""
-        from smc_mujoco.draw.figure import figure
-
-        labels = "as given", f"worst found, {CATALOGUE[self.metric].label} {self.words}"
-        options = {"title": self.heading, "panels": PANELS} | options
-        return figure(run([self.nominal, self.scenario]), path, labels, **options)
+        return WorstCases([self]).figure(path, **options)
 
     plot = figure
 
@@ -166,14 +153,16 @@ class WorstCases(Tables, list[WorstCase]):
         return [*key, *tau, *beyond, *untuned_laws({law: case.nominal.law.source.kind for law, case in laws.items()})]
 
     def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
-        """Draw the worst runs of all laws; arguments as in `smc.figure`."""
+        """Draw the worst runs of all laws, that of one beside its scenario; arguments as in `smc.figure`."""
         from smc_mujoco.draw.figure import figure
 
+        first = self[0]
+        runs = {f"{case.nominal.law.name}: {case.words}": case.scenario for case in self}
         if len(self) == 1:
-            return self[0].figure(path, **options)
-        options = {"title": self[0].heading, "panels": PANELS} | options
-        labels = [f"{case.nominal.law.name}: {case.words}" for case in self]
-        return figure(run([case.scenario for case in self]), path, labels, **options)
+            worst = f"worst found, {CATALOGUE[first.metric].label} {first.words}"
+            runs = {"as given": first.nominal, worst: first.scenario}
+        options = {"title": first.heading, "panels": PANELS} | options
+        return figure(run([*runs.values()]), path, [*runs], **options)
 
 
 def worst_case(
@@ -220,7 +209,6 @@ def worst_case(
         early = sorted(drawing.tried[:MIN_RUNS], key=lambda tried: tried.key, reverse=True)
         search.search(np.random.default_rng([seed, 1]), early[:FIRST_MEMBERS])
     worst = max(search.worst, drawing.worst, key=lambda tried: tried.key)
-    values = [(tried.member.kind, tried.key[0]) for tried in (*drawing.tried, *search.tried)]
     return WorstCase(
         value=float(worst.key[0]),
         median=float(np.median([tried.key[0] for tried in drawing.tried])),
@@ -228,7 +216,6 @@ def worst_case(
         scenario=members.scenario_of(worst.member),
         found_by=worst.member.kind,
         tried=drawing.runs + search.runs,
-        strategies={kind: max(value for other, value in values if other == kind) for kind in dict(values)},
         nominal=scenario,
         within=within,
         metric=metric,

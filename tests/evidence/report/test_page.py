@@ -201,7 +201,6 @@ def worst_cases():
             scenario=scenario,
             found_by="steps",
             tried=40,
-            strategies={"steps": 0.2},
             nominal=scenario,
             within=smc.Uncertainty(disturbance=2.0),
             metric="rms_error",
