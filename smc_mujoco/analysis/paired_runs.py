@@ -1,7 +1,6 @@
 """Paired runs: the runs of a table in groups, and in each the cells (plant, condition, seed) in which every law ran."""
 
 import contextlib
-import dataclasses
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -77,16 +76,26 @@ class Scores(NamedTuple):
     sets: dict[str, np.ndarray]  # as `Group.sets`
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class Group:
     """The runs that share a plant, a condition, or both. Arrays are (laws, blocks, seeds), -1 where there is no run."""
 
-    name: Mapping[str, str]  # the plant or condition that they share, or both, as column -> value
-    laws: tuple[str, ...]  # names of the laws that ran
-    blocks: tuple[tuple[str, str], ...]  # (plant, condition), in the table's order
-    rows: np.ndarray  # the row of each run in the table
-    outcome: np.ndarray  # equal for runs of a law that differ only by rounding
-    sets: np.ndarray  # equal for runs with the same gains
+    def __init__(self, name: Mapping[str, str], rows: np.ndarray, columns: Mapping[str, np.ndarray]):
+        self.name = name  # the plant or condition that they share, or both, as column -> value
+        laws, law = np.unique(columns["law"], return_inverse=True)
+        keys = list(zip(columns["plant"].tolist(), columns["condition"].tolist(), strict=True))
+        self.laws, self.blocks = tuple(laws.tolist()), tuple(dict.fromkeys(keys))  # names; (plant, condition)
+        index = {key: i for i, key in enumerate(self.blocks)}
+        numbers, seed = np.unique(columns["seed"], return_inverse=True)
+        cells = law, np.array([index[key] for key in keys]), seed
+        # the row of each run in the table; equal for runs of a law that differ only by rounding; equal for equal gains
+        self.rows, self.outcome, self.sets = np.full((3, len(laws), len(self.blocks), len(numbers)), -1)
+        if (twice := np.bincount(np.ravel_multi_index(cells, self.rows.shape)) > 1).any():
+            a, b, c = np.unravel_index(int(np.argmax(twice)), self.rows.shape)
+            cell = f"{laws[a]} on {', '.join(self.blocks[b])}, seed {numbers[c]}"
+            raise ScenarioError(
+                f"the table has several runs of {cell}: give those of one set of gains and one duration"
+            )
+        self.rows[cells], self.outcome[cells], self.sets[cells] = rows, columns["outcome"], columns["sets"]
 
     @property
     def common(self) -> np.ndarray:
@@ -134,7 +143,7 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
         rows_of.setdefault(tuple(str(columns[name][row]) for name in by), []).append(row)
     for key, rows in rows_of.items():
         of_group = {name: values[rows] for name, values in columns.items()}
-        yield _group(dict(zip(by, key, strict=True)), np.array(rows), of_group)
+        yield Group(dict(zip(by, key, strict=True)), np.array(rows), of_group)
 
 
 def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -169,23 +178,6 @@ def _outcomes(table: Columns) -> np.ndarray:
     numbers = np.ascontiguousarray(without_rounding(np.stack(columns, axis=1)))
     numbers[np.isnan(numbers)] = math.nan  # a single bit pattern
     return np.unique(numbers.view(f"V{numbers.shape[1] * numbers.itemsize}"), return_inverse=True)[1].ravel()
-
-
-def _group(name: dict[str, str], rows: np.ndarray, columns: dict[str, np.ndarray]) -> Group:
-    laws, law = np.unique(columns["law"], return_inverse=True)
-    keys = list(zip(columns["plant"].tolist(), columns["condition"].tolist(), strict=True))
-    blocks = tuple(dict.fromkeys(keys))
-    index = {key: i for i, key in enumerate(blocks)}
-    block = np.array([index[key] for key in keys])
-    numbers, seed = np.unique(columns["seed"], return_inverse=True)
-    place, outcome, sets = np.full((3, len(laws), len(blocks), len(numbers)), -1)
-    if (twice := np.bincount(np.ravel_multi_index((law, block, seed), place.shape)) > 1).any():
-        a, b, c = np.unravel_index(int(np.argmax(twice)), place.shape)
-        cell = f"{laws[a]} on {', '.join(blocks[b])}, seed {numbers[c]}"
-        raise ScenarioError(f"the table has several runs of {cell}: give those of one set of gains and one duration")
-    for part, numbers in ((place, rows), (outcome, columns["outcome"]), (sets, columns["sets"])):
-        part[law, block, seed] = numbers
-    return Group(name=name, laws=tuple(laws.tolist()), blocks=blocks, rows=place, outcome=outcome, sets=sets)
 
 
 def scenarios(table: Columns, group: Group) -> list[Scenario | None]:

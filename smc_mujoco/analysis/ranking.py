@@ -34,7 +34,6 @@ A law is among the best if no other is better. One exception: where another law'
 laws have too few samples for any verdict, the law is undecided, and not among the best.
 """
 
-import dataclasses
 import functools
 import math
 from collections.abc import Mapping, Sequence
@@ -79,27 +78,63 @@ class Limits(NamedTuple):
     winner: float
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Comparison:
-    """Laws compared in blocks."""
+    """Every law compared with every other in every block.
 
-    laws: tuple[str, ...]  # names, in alphabetical order
-    cells: np.ndarray  # (laws, blocks, seeds), the scores; NaN where there is no run
-    shares: bool  # whether scores are 0.0 or 1.0, and means are compared instead of medians
-    floors: np.ndarray  # (blocks,), lower bound on the least relevant difference
-    relevant: float  # share of a value that is relevant
-    differences: np.ndarray  # (blocks, laws, laws, seeds), second law's value minus the first's by sample, then NaN
-    relative: np.ndarray  # (blocks, laws, laws), whether differences are logarithms of ratios
-    shifts: np.ndarray  # (blocks, laws, laws), the least relevant difference of a law that is better than another
-    p: np.ndarray  # (blocks, laws, laws), one-sided p-value, not corrected, that a law is better; 1 of itself
-    sets: np.ndarray  # (laws, blocks), number of sets of gains of a law's runs
-    untested: np.ndarray  # (blocks,), whether a value is no sample, such as a worst case: p is 0 or 1, without a test
-    limits: Limits  # of the p-values, after the correction
+    Scores are law -> (blocks, n) or (n,), lower is better, inf for never, NaN where no law has a run. If they are
+    `shares`, 0.0 or 1.0, means are compared instead of medians. Floors are lower bounds on the least relevant
+    difference, and `untested` says whether a value is no sample, such as a worst case: one for all blocks, or one for
+    each. Outcomes and sets are law -> a number per cell, equal if two seeds gave the same result, or had the same
+    gains; default: all results differ, and all gains are the same. Limits are given where the blocks belong to a larger
+    family.
+    """
+
+    def __init__(
+        self,
+        scores: Mapping[str, ArrayLike],
+        floors: ArrayLike = 0.0,
+        shares: bool = False,
+        outcomes: Mapping[str, ArrayLike] | None = None,
+        sets: Mapping[str, ArrayLike] | None = None,
+        relevant: float = RELEVANT,
+        limits: Limits | None = None,
+        untested: ArrayLike = False,
+    ):
+        def stacked(by_law: Mapping[str, ArrayLike], kind: type) -> np.ndarray:
+            return np.array([np.atleast_2d(by_law[law]) for law in self.laws]).astype(kind)
+
+        self.laws, self.shares, self.relevant = tuple(sorted(scores)), shares, checked_share(relevant)
+        self.cells = cells = stacked(scores, float)  # (laws, blocks, seeds)
+        blocks = range(cells.shape[1])
+        self.floors = np.broadcast_to(np.asarray(floors, float), len(blocks))
+        self.untested = np.broadcast_to(np.asarray(untested, bool), len(blocks))
+        gains = np.zeros(cells.shape, np.int64) if sets is None else stacked(sets, np.int64)
+        results = None if outcomes is None else stacked(outcomes, np.int64)
+        ran = ~np.isnan(cells[0])
+        # (laws, blocks), number of sets of gains of a law's runs
+        self.sets = np.array([[np.unique(of_law[k, ran[k]]).size for k in blocks] for of_law in gains])
+        # (blocks, laws, laws), whether differences are logarithms of ratios
+        ratios = [_ratios_make_sense(cells[:, k], self.floors[k], self.relevant) for k in blocks]
+        self.relative = np.array(ratios) & (not shares)
+        # (blocks, laws, laws, seeds), second law's value minus the first's by sample, then NaN
+        of_block = [None] * len(blocks) if results is None else results.swapaxes(0, 1)
+        self.differences = np.stack(
+            [_differences(cells[:, k], self.relative[k], of_block[k], gains[:, k]) for k in blocks]
+        )
+        # (blocks, laws, laws), the least relevant difference of a law that is better than another
+        absolute = least_difference(self.centres.T[:, None, :], self.floors[:, None, None], self.relevant)
+        absolute = self.relevant if shares else absolute
+        self.shifts = np.where(self.relative, -math.log1p(-self.relevant), absolute)
+        # (blocks, laws, laws), one-sided p-value, not corrected, that a law is better; 1 of itself; 0 or 1 if untested
+        beyond = self.differences - self.shifts[..., None]
+        self.p = np.where(self.untested[:, None, None], 1.0 - np.any(beyond > 0.0, axis=3), p_values(beyond))
+        self.p[:, *np.diag_indices(len(self.laws))] = 1.0
+        self.limits = limits or corrected_limits([self])  # of the p-values, after the correction
 
     @functools.cached_property
     def centres(self) -> np.ndarray:
         """The medians, or means, over the seeds, (laws, blocks)."""
-        return _centres_of(self.cells, self.shares)
+        return np.nanmean(self.cells, axis=2) if self.shares else middle(self.cells)
 
     @functools.cached_property
     def without_value(self) -> np.ndarray:
@@ -191,64 +226,6 @@ class Comparison:
         )
 
 
-def compare(
-    scores: Mapping[str, ArrayLike],
-    floors: ArrayLike = 0.0,
-    shares: bool = False,
-    outcomes: Mapping[str, ArrayLike] | None = None,
-    sets: Mapping[str, ArrayLike] | None = None,
-    relevant: float = RELEVANT,
-    limits: Limits | None = None,
-    untested: ArrayLike = False,
-) -> Comparison:
-    """Compare every law with every other in every block; see `Comparison`.
-
-    Scores are law -> (blocks, n) or (n,), lower is better, inf for never, NaN where no law has a run. Floors and
-    `untested` are one for all blocks, or one for each. Outcomes and sets are law -> a number per cell, equal if two
-    seeds gave the same result, or had the same gains; default: all results differ, and all gains are the same. Limits
-    are given where the blocks belong to a larger family.
-    """
-    laws = tuple(sorted(scores))
-    cells = _stacked(scores, laws).astype(float)
-    blocks, relevant = range(cells.shape[1]), checked_share(relevant)
-    floors = np.broadcast_to(np.asarray(floors, float), len(blocks))
-    untested = np.broadcast_to(np.asarray(untested, bool), len(blocks))
-    gain_sets = np.zeros(cells.shape, np.int64) if sets is None else _stacked(sets, laws).astype(np.int64)
-    results = None if outcomes is None else _stacked(outcomes, laws)
-    ran = ~np.isnan(cells[0])
-    counts = [[np.unique(of_law[k, ran[k]]).size for k in blocks] for of_law in gain_sets]
-    relative = np.array([_ratios_make_sense(cells[:, k], floors[k], relevant) for k in blocks]) & (not shares)
-    differences = np.stack(
-        [
-            _differences(cells[:, k], relative[k], None if results is None else results[:, k], gain_sets[:, k])
-            for k in blocks
-        ]
-    )
-    shifts = _shifts(_centres_of(cells, shares), floors, relative, relevant, shares)
-    beyond = differences - shifts[..., None]
-    p = np.where(untested[:, None, None], 1.0 - np.any(beyond > 0.0, axis=3), p_values(beyond))
-    p[:, *np.diag_indices(len(laws))] = 1.0
-    comparison = Comparison(
-        laws=laws,
-        cells=cells,
-        shares=shares,
-        floors=floors,
-        relevant=relevant,
-        differences=differences,
-        relative=relative,
-        shifts=shifts,
-        p=p,
-        sets=np.array(counts),
-        untested=untested,
-        limits=limits or Limits(0.0, 0.0),
-    )
-    return comparison if limits else dataclasses.replace(comparison, limits=corrected_limits([comparison]))
-
-
-def _stacked(by_law: Mapping[str, ArrayLike], laws: Sequence[str]) -> np.ndarray:
-    return np.array([np.atleast_2d(by_law[law]) for law in laws])
-
-
 def _differences(cells: np.ndarray, relative: np.ndarray, results: np.ndarray | None, sets: np.ndarray) -> np.ndarray:
     """Return `Comparison.differences` of one block, (laws, laws, seeds); cells, sets and results are (laws, seeds)."""
     k, ran = len(cells), ~np.isnan(cells[:1])
@@ -261,17 +238,6 @@ def _differences(cells: np.ndarray, relative: np.ndarray, results: np.ndarray | 
             row[:] = _by_sample(row, sets[a], sets[b])
         differences[a, a + 1 :], differences[a + 1 :, a] = pairs, -pairs
     return differences
-
-
-def _centres_of(cells: np.ndarray, shares: bool) -> np.ndarray:
-    return np.nanmean(cells, axis=2) if shares else middle(cells)
-
-
-def _shifts(centres: np.ndarray, floors: np.ndarray, relative: np.ndarray, relevant: float, shares: bool) -> np.ndarray:
-    if shares:
-        return np.full(relative.shape, relevant)
-    absolute = least_difference(centres.T[:, None, :], floors[:, None, None], relevant)
-    return np.where(relative, -math.log1p(-relevant), absolute)
 
 
 def _ratios_make_sense(cells: np.ndarray, floor: float, relevant: float) -> np.ndarray:

@@ -7,14 +7,12 @@ of the comparison, so it changes when they do.
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.analysis import paired_runs
-from smc_mujoco.analysis.bootstrap import LEVEL, Interval, median_of
-from smc_mujoco.analysis.paired_runs import Group, Scores, failures
-from smc_mujoco.analysis.ranking import Comparison, Rank, linked, min_p
+from smc_mujoco.analysis.bootstrap import LEVEL, Interval
+from smc_mujoco.analysis.paired_runs import failures
+from smc_mujoco.analysis.ranking import Comparison, Rank, min_p
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, every, joined
 from smc_mujoco.control.component import Component
@@ -32,12 +30,13 @@ TIES = ("no-overshoot", "frugal")  # needs that order laws which tie
 MAX_ROWS = 12  # laws in the table; chosen
 
 
-class Runs(NamedTuple):
-    """Runs of laws on one plant."""
+NEEDS: Mapping[str, Metric] = {metric.need: metric for metric in metrics() if metric.need}
+NEEDS |= {ROBUST: dataclasses.replace(CATALOGUE[METRIC], need=ROBUST, label=f"worst found {CATALOGUE[METRIC].label}")}
 
-    table: Table
-    group: Group
-    worst: Mapping[str, Sequence[WorstCase]]  # law -> its worst case in each condition, for "robust"; else {}
+
+def ties(plant: Plant) -> list[Metric]:
+    """Return the metrics that order laws which tie on a plant."""
+    return [NEEDS[need] for need in TIES if not NEEDS[need].refusal(plant)]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -63,58 +62,12 @@ class Choice:
         """Where the gains come from, in words."""
         return f"gains: {self.law.source}" + f"; {self.remark}" * bool(self.remark)
 
-
-@dataclasses.dataclass(frozen=True)
-class Need:
-    """A metric that is to be small in the runs of a law."""
-
-    metric: Metric
-    tested: ClassVar[bool] = True  # whether laws are compared by a test over runs, see `ranking`
-
-    def scores(self, runs: Runs) -> Scores:
-        """Return the scores of the laws."""
-        return runs.group.scores(paired_runs.values(runs.table, self.metric.name))
-
-    def median(self, scores: Scores, law: str) -> Interval:
-        """Return a law's median over the conditions."""
-        return median_of(scores.values[law], linked(*scores.sets[law]))
-
-    def below(self, choice: Choice) -> str:
-        """Return the text below the median of a law in a table: its interval, if that has a width."""
-        median = choice.medians[self.metric.need]
-        return spread(median, self.metric.name) * (median.low < median.high)
-
-
-class Robust(Need):
-    """The metric of the worst case: one value of a law in a condition, so laws are compared without a test."""
-
-    tested = False
-
-    def scores(self, runs: Runs) -> Scores:
-        """Return the value of each law, (conditions, 1)."""
-        values = {law: np.array([[case.value] for case in cases]) for law, cases in runs.worst.items()}
-        zeros = dict.fromkeys(values, np.zeros((len(runs.group.blocks), 1), np.int64))
-        return Scores([*range(len(runs.group.blocks))], values, zeros, zeros)
-
-    def median(self, scores: Scores, law: str) -> Interval:
-        """Return the largest value over the conditions."""
-        return Interval(float(scores.values[law].max()), math.nan, math.nan, 1)
-
-    def below(self, choice: Choice) -> str:
-        """Return the median of the random members of the class."""
-        worst = choice.worst_found
-        return f"median {worst.shown(worst.median)}"
-
-
-NEEDS: Mapping[str, Need] = {metric.need: Need(metric) for metric in metrics() if metric.need}
-NEEDS |= {
-    ROBUST: Robust(dataclasses.replace(CATALOGUE[METRIC], need=ROBUST, label=f"worst found {CATALOGUE[METRIC].label}"))
-}
-
-
-def ties(plant: Plant) -> list[Metric]:
-    """Return the metrics that order laws which tie on a plant."""
-    return [NEEDS[need].metric for need in TIES if not NEEDS[need].metric.refusal(plant)]
+    def below(self, need: str) -> str:
+        """Return the text below a median in a table: its interval, if it has a width; of "robust" the random median."""
+        if need == ROBUST:
+            return f"median {self.worst_found.shown(self.worst_found.median)}"
+        median = self.medians[need]
+        return spread(median, NEEDS[need].name) * (median.low < median.high)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -191,7 +144,7 @@ class Advice(Tables):
     @property
     def tables(self) -> list[Tabular]:
         """One table with a row for each of the first laws, above the answer; marked where no law is better."""
-        metrics = [NEEDS[need].metric for need in self.needs]
+        metrics = [NEEDS[need] for need in self.needs]
         units = [f"{m.need}: {m.label} ({m.unit_for(self.plant.unit, self.effort)})" for m in metrics]
         rows = []
         for choice in self.choices[:MAX_ROWS]:
@@ -205,10 +158,10 @@ class Advice(Tables):
 
     def _cell(self, choice: Choice, need: str) -> Cell:
         """Return a median, marked if no law is better in any condition and no run fails."""
-        name, entry = choice.law.name, NEEDS[need]
+        name = choice.law.name
         rivalled = len(self.compared) > 1 and name in self.compared
         doubted = rivalled and self._any(self.comparison.undecided | self.comparison.beaten, name, need)
-        return Cell(entry.metric.text(choice.medians[need].median), entry.below(choice), rivalled and not doubted)
+        return Cell(NEEDS[need].text(choice.medians[need].median), choice.below(need), rivalled and not doubted)
 
     def _any(self, flags: np.ndarray, law: str, need: str) -> bool:
         """Return whether flags of the comparison, (laws, blocks), are true of a law in some block of a need."""
@@ -224,14 +177,14 @@ class Advice(Tables):
         text = "place by failed runs, then by mean rank, behind laws that dominate: better somewhere, worse nowhere."
         text += medians + f" {counted(len(more), 'more law')}: {first_of(more)}." * bool(more)
         text += " *: no law is better in any condition, every run has a value, and samples are enough to tell."
-        bare = any(not NEEDS[need].below(choice) for choice in shown for need in self.needs)
+        bare = any(not choice.below(need) for choice in shown for need in self.needs)
         text += " No interval: its ends are equal, or one is a run without a value." * bare
         if self._shared and len(self._shared) < len(self.comparison.laws):
             text += f" Sets of gains, which are the sample of a law that has several: {first_of(self._shared)}."
         if sources := in_words({choice.law.name: [choice.law.source] for choice in shown}):
             text += f" {capital(sources)}."
         text += " –: settles too seldom to be advised." * any(not choice.fit for choice in shown)
-        metrics = [NEEDS[need].metric.name for need, _ in self.blocks]
+        metrics = [NEEDS[need].name for need, _ in self.blocks]
         floors = zip(metrics, self.comparison.floors.tolist(), strict=True)
         relevant = relevance(self.comparison.relevant, floors, self.plant.unit)
         return f"{text} Ahead: by more than the least relevant difference, {relevant}."
@@ -324,7 +277,7 @@ class Advice(Tables):
 
     def _standing(self, choice: Choice, need: str) -> str:
         """Return the median of a law on a need, and who is better."""
-        name, value = choice.law.name, f"{NEEDS[need].metric.label} {self._number(choice, need)}"
+        name, value = choice.law.name, f"{NEEDS[need].label} {self._number(choice, need)}"
         rivals = {rival: [block for block in self.wins(rival, name) if block[0] == need] for rival in self.compared}
         better = [rival + self._where(blocks) for rival, blocks in rivals.items() if blocks]
         said = "no law is better" + ", as far as so few samples tell" * self._any(self.comparison.undecided, name, need)
@@ -387,7 +340,7 @@ class Advice(Tables):
         a, b = (self.comparison.laws.index(name) for name in (first, rival))
         for need in self.needs:
             blocks = [k for k, block in enumerate(self.blocks) if block[0] == need]
-            if not NEEDS[need].tested:
+            if need == ROBUST:
                 values = [self._number(choice, need) for choice in self.choices if choice.law.name in (first, rival)]
                 parts.append(f"{need} {' to '.join(values)}")
                 continue
@@ -395,7 +348,7 @@ class Advice(Tables):
             effect = self.comparison.effect(worst, first, rival, winner=False)
             where = f" under {self.blocks[worst][1]}, where it does worst," * (len(blocks) > 1)
             if math.isfinite(effect.value):
-                unit = NEEDS[need].metric.unit_for(self.plant.unit, self.effort)
+                unit = NEEDS[need].unit_for(self.plant.unit, self.effort)
                 parts.append(f"{need}{where} {size_in_words(effect, unit)}, {ahead_in_words(effect)}")
         return f"{first} against {rival}: {'; '.join(parts)}" if parts else ""
 
@@ -412,7 +365,7 @@ class Advice(Tables):
 
     def _number(self, choice: Choice, need: str) -> str:
         """Return a median with its unit."""
-        metric, median = NEEDS[need].metric, choice.medians[need].median
+        metric, median = NEEDS[need], choice.medians[need].median
         unit = f" {metric.unit_for(self.plant.unit, self.effort)}" if math.isfinite(median) else ""
         return metric.text(median) + unit
 

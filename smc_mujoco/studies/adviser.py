@@ -25,8 +25,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
-from smc_mujoco.analysis.paired_runs import SETTLES
-from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Rank, checked_share, compare, ranked, ranks
+from smc_mujoco.analysis.bootstrap import Interval, median_of
+from smc_mujoco.analysis.paired_runs import SETTLES, Group, Scores
+from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Rank, checked_share, linked, ranked, ranks
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, default_class
 from smc_mujoco.common.errors import ScenarioError, number, unknown, whole
 from smc_mujoco.control import gain_sets, source
@@ -36,7 +37,7 @@ from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
 from smc_mujoco.simulation.grid import Starts, case, check_moving, listed, listed_laws
-from smc_mujoco.studies.advice import NEEDS, ROBUST, Advice, Choice, Need, Runs, ties
+from smc_mujoco.studies.advice import NEEDS, ROBUST, Advice, Choice, ties
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.table import Table
@@ -135,9 +136,9 @@ def _needs(needs: str | Sequence[str], plant: Plant) -> tuple[tuple[str, ...], t
             raise unknown("need", name, [*NEEDS, *PROPERTIES])
     compared = [name for name in names if name in NEEDS]
     for name in compared:
-        if why := NEEDS[name].metric.refusal(plant):
+        if why := NEEDS[name].refusal(plant):
             raise ScenarioError(f"need {name!r} cannot be compared on {plant.name}: {why}")
-    compared = compared or [name for name in DEFAULT_NEEDS if not NEEDS[name].metric.refusal(plant)]
+    compared = compared or [name for name in DEFAULT_NEEDS if not NEEDS[name].refusal(plant)]
     return tuple(compared), tuple(name for name in names if name in PROPERTIES)
 
 
@@ -232,27 +233,26 @@ def _contest(
 ) -> tuple[Comparison, tuple[Choice, ...]]:
     """Compare laws over all needs and conditions; those that are not fit come last, with NaN for a rank."""
     (group,) = paired_runs.groups(table, by=("plant",))
-    runs = Runs(table, group, worst)
     rows = paired_runs.values(table, SETTLES)[group.rows]
     settled = 1.0 - np.nanmean(np.where(group.rows >= 0, rows, np.nan), axis=2)  # (laws, conditions)
     enough = np.all(settled >= MIN_SETTLED * settled.max(axis=0), axis=1)
     fit = {law for law, settles in zip(group.laws, enough.tolist(), strict=True) if settles}
     laws = [law for law in group.laws if law in fit] or group.laws
-    scores = {need: NEEDS[need].scores(runs) for need in needs}
+    scores = {need: _scores(need, table, group, worst) for need in needs}
     for need, its in scores.items():
         if not its.blocks:
             raise ScenarioError(f"need {need!r} has no number in any run on {plant.name}: leave it out")
-    blocks = [(NEEDS[need], k) for need, its in scores.items() for k in its.blocks]
+    blocks = [(need, k) for need, its in scores.items() for k in its.blocks]
     ran = paired_runs.scenarios(table, group)
-    comparison = compare(
+    comparison = Comparison(
         _stacked([its.values for its in scores.values()], laws, math.nan),
-        [paired_runs.floor(ran[k], need.metric.unit) for need, k in blocks],
+        [paired_runs.floor(ran[k], NEEDS[need].unit) for need, k in blocks],
         outcomes=_stacked([its.outcomes for its in scores.values()], laws),
         sets=_stacked([its.sets for its in scores.values()], laws),
         relevant=relevant,
-        untested=[not need.tested for need, _ in blocks],
+        untested=[need == ROBUST for need, _ in blocks],
     )
-    order = _order(comparison, _restraint(runs, ran, plant))
+    order = _order(comparison, _restraint(table, group, ran, plant))
     order += [Rank(law, math.nan, math.nan, best=False) for law in group.laws if law not in laws]
     shares = dict(zip(group.laws, settled, strict=True))
     return comparison, tuple(
@@ -263,11 +263,27 @@ def _contest(
             settles=float(shares[rank.law].mean()),
             reliable=bool((shares[rank.law] >= RELIABLE).all()),
             fit=rank.law in fit,
-            medians={need: NEEDS[need].median(its, rank.law) for need, its in scores.items()},
+            medians={need: _median(need, its, rank.law) for need, its in scores.items()},
             worst=tuple(worst.get(rank.law, ())),
         )
         for rank in order
     )
+
+
+def _scores(need: str, table: Table, group: Group, worst: Mapping[str, Sequence[WorstCase]]) -> Scores:
+    """Return the scores of all laws on a need; for "robust" the values of their worst cases, (conditions, 1)."""
+    if need != ROBUST:
+        return group.scores(paired_runs.values(table, NEEDS[need].name))
+    values = {law: np.array([[case.value] for case in cases]) for law, cases in worst.items()}
+    zeros = dict.fromkeys(values, np.zeros((len(group.blocks), 1), np.int64))
+    return Scores([*range(len(group.blocks))], values, zeros, zeros)
+
+
+def _median(need: str, scores: Scores, law: str) -> Interval:
+    """Return a law's median over the conditions; for "robust" its largest value."""
+    if need == ROBUST:
+        return Interval(float(scores.values[law].max()), math.nan, math.nan, 1)
+    return median_of(scores.values[law], linked(*scores.sets[law]))
 
 
 def _stacked(parts: Sequence[Mapping[str, np.ndarray]], laws: Sequence[str], fill: float = -1) -> dict[str, np.ndarray]:
@@ -280,11 +296,11 @@ def _stacked(parts: Sequence[Mapping[str, np.ndarray]], laws: Sequence[str], fil
     return {law: np.concatenate([filled(part[law]) for part in parts]) for law in laws}
 
 
-def _restraint(runs: Runs, ran: Sequence, plant: Plant) -> dict[str, tuple[float, ...]]:
+def _restraint(table: Table, group: Group, ran: Sequence, plant: Plant) -> dict[str, tuple[float, ...]]:
     """Return law -> its mean rank on each of the metrics of `ties`."""
-    mean_ranks, laws = [], runs.group.laws
+    mean_ranks, laws = [], group.laws
     for metric in ties(plant):
-        scores = Need(metric).scores(runs)
+        scores = group.scores(paired_runs.values(table, metric.name))
         if scores.blocks:
             centres = np.array([np.nanmedian(scores.values[law], axis=1) for law in laws])
             floors = np.array([paired_runs.floor(ran[k], metric.unit) for k in scores.blocks])

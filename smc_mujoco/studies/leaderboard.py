@@ -16,7 +16,7 @@ import numpy as np
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import Interval, median_of, share_interval
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns, Group, Scores
-from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Limits, compare, corrected_limits, linked, ranks
+from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Limits, corrected_limits, linked, ranks
 from smc_mujoco.analysis.step_halving import depends_on_step
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.control.source import DEFAULT, Source
@@ -128,7 +128,7 @@ def _compared(
 ) -> Comparison:
     """Compare the scores of laws in a metric; `ran` has a scenario of each block of the group."""
     floors = [paired_runs.floor(ran[k], UNITS[metric]) for k in scores.blocks]
-    return compare(scores.values, floors, metric == SETTLES, scores.outcomes, scores.sets, relevant, limits)
+    return Comparison(scores.values, floors, metric == SETTLES, scores.outcomes, scores.sets, relevant, limits)
 
 
 def _family(

@@ -8,7 +8,7 @@ than another. `analysis.worst_case` describes both. The worst run that is found 
 import dataclasses
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 

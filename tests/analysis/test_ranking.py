@@ -15,10 +15,10 @@ from smc_mujoco.analysis import paired_runs as cells
 from smc_mujoco.analysis.bootstrap import Interval, median_of, share_interval
 from smc_mujoco.analysis.ranking import (
     RELEVANT,
+    Comparison,
     Effect,
     Rank,
     _holm,
-    compare,
     exceeds,
     least_difference,
     linked,
@@ -74,7 +74,7 @@ def by_law(found):
 
 
 def ranks(scores, **options) -> list[Rank]:
-    return places(compare(scores, **options))
+    return places(Comparison(scores, **options))
 
 
 def within(count: int, runs: int, probability: float) -> bool:
@@ -217,7 +217,7 @@ def test_a_law_better_by_little_in_every_run_wins_although_the_medians_intervals
     assert a.high > b.low
     found = by_law(ranks(scores))
     assert (found["a"].best, found["b"].best) == (True, False)
-    effect = compare(scores).effect(0, "a", "b")
+    effect = Comparison(scores).effect(0, "a", "b")
     assert effect[:4] == pytest.approx((1 / 1.05, 1 / 1.05, 1 / 1.05, True))
     assert (effect.ahead, effect.samples, effect.sets) == (20, 20, False)
     shuffled = {"a": blocks(1.0), "b": np.random.default_rng(1).permutation(blocks(1.05)[0])}  # the same, unpaired
@@ -226,10 +226,10 @@ def test_a_law_better_by_little_in_every_run_wins_although_the_medians_intervals
 
 @pytest.mark.parametrize(("factor", "relevant", "wins"), [(1.02, 0.03, False), (1.04, 0.03, True), (1.04, 0.05, False)])
 def test_less_than_the_least_relevant_difference_is_a_tie_however_sure_it_is(factor, relevant, wins):
-    found = compare({"a": blocks(1.0), "b": blocks(factor)}, relevant=relevant)
+    found = Comparison({"a": blocks(1.0), "b": blocks(factor)}, relevant=relevant)
     assert found.best == [("a",) if wins else ("a", "b")]
     assert (1 - 1 / factor > relevant) == wins
-    floored = compare({"a": blocks(1.0), "b": blocks(factor)}, floors=1.0, relevant=relevant)
+    floored = Comparison({"a": blocks(1.0), "b": blocks(factor)}, floors=1.0, relevant=relevant)
     assert floored.best == [("a", "b")]
     assert not floored.effect(0, "a", "b").relative
 
@@ -238,7 +238,7 @@ def test_a_law_ahead_in_nearly_every_seed_does_not_win_with_the_worse_median():
     a = np.geomspace(1.0, 1e4, 25)
     b = np.roll(a, -1)  # a is ahead in 24 of 25
     b[11] *= 0.9  # the median
-    found = compare({"a": a, "b": b})
+    found = Comparison({"a": a, "b": b})
     assert found.p[0, 0, 1] < 1e-4  # the test alone
     assert np.median(b) < 0.95 * np.median(a)
     assert found.best == [("a", "b")]
@@ -246,8 +246,8 @@ def test_a_law_ahead_in_nearly_every_seed_does_not_win_with_the_worse_median():
 
 def test_a_law_that_is_always_last_does_not_hide_that_another_is_beaten():
     scores = {"a": blocks(1.0), "b": blocks(1.1), "z": blocks(9.0), "never": blocks(INF)}
-    assert compare({law: scores[law] for law in "ab"}).best == [("a",)]
-    assert compare(scores).best == [("a",)]
+    assert Comparison({law: scores[law] for law in "ab"}).best == [("a",)]
+    assert Comparison(scores).best == [("a",)]
 
 
 @pytest.mark.parametrize(("seeds", "wins"), [(1, False), (6, False), (7, True)])
@@ -281,7 +281,7 @@ def simulated(laws: int, seeds: int, bad: int, rng: np.random.Generator) -> dict
 def test_equal_laws_are_seldom_separated_in_any_block(laws, seeds, bad):
     rng, runs, wrong = np.random.default_rng(laws + seeds), 400, 0
     for _ in range(runs):
-        wrong += bool(compare(simulated(laws, seeds, bad, rng)).better[:, :laws, :laws].any())
+        wrong += bool(Comparison(simulated(laws, seeds, bad, rng)).better[:, :laws, :laws].any())
     assert stats.binomtest(wrong, runs, 0.05, alternative="greater").pvalue > 1e-3
 
 
@@ -309,7 +309,7 @@ def test_equal_laws_whose_gains_spread_have_a_false_winner_in_at_most_five_perce
     for spread in (0.0, 0.05, 0.15):
         for _ in range(runs):
             cells = spreading(laws, conditions, spread, rng, shape)
-            found = compare({f"law{i}": own for i, own in enumerate(cells)})
+            found = Comparison({f"law{i}": own for i, own in enumerate(cells)})
             wrong += any(found.winners)
     assert stats.binomtest(wrong, 3 * runs, 0.05, alternative="greater").pvalue > 1e-3
 
@@ -321,7 +321,7 @@ def test_two_laws_apart_by_the_least_relevant_difference_have_a_false_winner_in_
     rng, wrong, runs = np.random.default_rng(1), 0, 800
     for _ in range(runs):
         a, b, c = spreading(3, 1, 0.15, rng, shape)
-        wrong += any(compare({"a": (1 - RELEVANT) * a, "b": b, "c": 9 * c}).winners)
+        wrong += any(Comparison({"a": (1 - RELEVANT) * a, "b": b, "c": 9 * c}).winners)
     assert stats.binomtest(wrong, runs, 0.05, alternative="greater").pvalue > 1e-3
     assert wrong > 0.01 * runs  # the test is not idle: one of its two sides is exact
 
@@ -332,7 +332,7 @@ def test_a_lead_of_ten_percent_over_ten_laws_is_seen_with_a_probability_of_eight
     for _ in range(runs):
         cells = spreading(11, 5, 0.05, rng)
         cells[0] *= 0.9
-        seen += compare({f"law{i}": own for i, own in enumerate(cells)}).winners[0] == "law0"
+        seen += Comparison({f"law{i}": own for i, own in enumerate(cells)}).winners[0] == "law0"
     assert seen / runs >= 0.8
 
 
@@ -341,7 +341,7 @@ def test_a_winner_is_one_whose_intervals_of_the_ratio_end_beyond_the_least_relev
     for _ in range(100):
         cells = spreading(3, 2, 0.1, rng)
         cells[0] *= rng.choice([0.8, 0.9, 1.0])
-        found = compare({f"law{i}": own for i, own in enumerate(cells)})
+        found = Comparison({f"law{i}": own for i, own in enumerate(cells)})
         for block, winner in enumerate(found.winners):
             for law in found.laws:
                 rivals = [found.effect(block, law, rival) for rival in found.laws if rival != law]
@@ -356,12 +356,12 @@ def test_a_winner_is_one_whose_intervals_of_the_ratio_end_beyond_the_least_relev
 @pytest.mark.parametrize("sets", [np.arange(24) % 3, np.arange(24) // 8])
 def test_three_sets_of_gains_are_three_samples_whatever_the_seeds(sets):
     scores = {"a": blocks(1.0, seeds=24), "b": blocks(2.0, seeds=24)}
-    found = compare(scores, sets={"a": sets[None], "b": 10 + sets[None]})
+    found = Comparison(scores, sets={"a": sets[None], "b": 10 + sets[None]})
     assert found.samples[0, 0, 1] == 3
     assert found.winners == [None]
-    one = compare(scores, sets={"a": np.zeros((1, 24), int), "b": np.zeros((1, 24), int)})
-    each = compare(scores, sets={"a": np.arange(24)[None], "b": np.arange(24)[None]})
-    paper = compare(scores, sets={"a": np.arange(24)[None], "b": np.zeros((1, 24), int)})
+    one = Comparison(scores, sets={"a": np.zeros((1, 24), int), "b": np.zeros((1, 24), int)})
+    each = Comparison(scores, sets={"a": np.arange(24)[None], "b": np.arange(24)[None]})
+    paper = Comparison(scores, sets={"a": np.arange(24)[None], "b": np.zeros((1, 24), int)})
     assert [(c.samples[0, 0, 1], c.winners) for c in (one, each, paper)] == [(24, ["a"])] * 3
     assert [c.effect(0, "a", "b").sets for c in (one, each, paper)] == [False, True, True]
 
@@ -371,27 +371,27 @@ def test_a_law_that_is_unbeaten_only_as_its_sets_are_few_is_not_among_the_best()
     rng = np.random.default_rng(5)
     scores = {law: size * np.exp(rng.normal(0.0, 0.01, 24)) for law, size in (("a", 1.0), ("b", 1.2), ("c", 10.0))}
     own, few = np.arange(24), np.arange(24) % 3
-    found = compare(scores, sets={"a": own, "b": own, "c": few})
+    found = Comparison(scores, sets={"a": own, "b": own, "c": few})
     assert found.beaten[:, 0].tolist() == [False, True, False]
     assert found.undecided[:, 0].tolist() == [False, False, True]
     assert found.best == [("a",)]
     assert [rank.best for rank in places(found)] == [True, False, False]
-    assert not compare(scores, sets={"a": own, "b": own, "c": own}).undecided.any()
-    assert compare(scores | {"c": 1.01 * scores["a"]}, sets={"a": own, "b": own, "c": few}).best == [("a", "c")]
+    assert not Comparison(scores, sets={"a": own, "b": own, "c": own}).undecided.any()
+    assert Comparison(scores | {"c": 1.01 * scores["a"]}, sets={"a": own, "b": own, "c": few}).best == [("a", "c")]
 
 
 def test_runs_linked_by_sets_of_gains_of_either_law_are_one_sample():
     scores = {"a": blocks(1.0, seeds=12), "b": blocks(2.0, seeds=12)}
     a, b = np.arange(12) // 4, np.arange(12) // 6  # 0001 1122: the second set of a is linked to both of b
-    assert compare(scores, sets={"a": a[None], "b": b[None]}).samples[0, 0, 1] == 1
-    assert compare(scores, sets={"a": a[None], "b": a[None]}).samples[0, 0, 1] == 3
+    assert Comparison(scores, sets={"a": a[None], "b": b[None]}).samples[0, 0, 1] == 1
+    assert Comparison(scores, sets={"a": a[None], "b": a[None]}).samples[0, 0, 1] == 3
     assert linked(*np.array([[5, 5, 7, 7], [5, -1, 7, 8]])) == (0, 0, 1, 1)
     assert linked(*np.array([[5, 5, -1, 5]])) is None
 
 
 def test_the_difference_of_a_sample_is_the_median_of_its_runs():
     a, b = np.ones((1, 9)), np.array([[1.1, 1.2, 9.0, 1.0, 1.3, INF, 2.0, 3.0, 1.0]])
-    found = compare({"a": a, "b": b}, sets={"a": np.arange(9)[None] // 3, "b": np.zeros((1, 9), int)})
+    found = Comparison({"a": a, "b": b}, sets={"a": np.arange(9)[None] // 3, "b": np.zeros((1, 9), int)})
     assert np.exp(found.differences[0, 0, 1, :3]) == pytest.approx([1.2, 1.3, 2.0])
     assert np.isnan(found.differences[0, 0, 1, 3:]).all()
 
@@ -443,7 +443,7 @@ def test_a_law_that_is_clearly_better_wins():
         scores = simulated(4, 20, 0, rng)
         scores["better"] = 0.02 * scores.pop("law0")
         scores["better"][np.isinf(scores["better"])] = 0.01
-        wins += compare(scores).best == [("better",)] * 3
+        wins += Comparison(scores).best == [("better",)] * 3
     assert wins >= 45
 
 
@@ -776,9 +776,9 @@ def test_a_seed_that_changes_a_third_law_is_no_sample_of_two():
 def test_compare_counts_distinct_runs_of_each_pair():
     low, high = blocks(1.0, 2.0, seeds=20)
     did = {"a": np.arange(20), "b": np.arange(20) // 2, "c": np.arange(20) % 2}
-    found = compare({"a": low, "b": high, "c": 2 * high}, outcomes={law: own[None] for law, own in did.items()})
+    found = Comparison({"a": low, "b": high, "c": 2 * high}, outcomes={law: own[None] for law, own in did.items()})
     assert found.samples[0].tolist() == [[0, 20, 20], [20, 0, 20], [20, 20, 0]]
-    found = compare({"a": low, "b": high, "c": 2 * high}, outcomes=did | {"a": did["b"]})
+    found = Comparison({"a": low, "b": high, "c": 2 * high}, outcomes=did | {"a": did["b"]})
     assert found.samples[0, 0, 1] == found.samples[0, 1, 0] == 10
     assert found.p[0, 0, 2] == found.p[0, 1, 2] < found.p[0, 0, 1] == pytest.approx(0.5**10)
 
@@ -885,8 +885,8 @@ def test_a_real_scenario_without_randomness_is_one_run_from_any_seed(tmp_path):
 
 def test_a_law_that_fails_more_often_does_not_tie():
     failing = np.r_[np.full(7, np.inf), np.full(9, 0.5)]
-    assert compare({"fails": failing, "works": np.linspace(0.9, 1.1, 16)}).best == [("works",)]
-    found = compare({"fails": np.where(np.isinf(failing), np.inf, 1.0), "works": np.ones(16)})
+    assert Comparison({"fails": failing, "works": np.linspace(0.9, 1.1, 16)}).best == [("works",)]
+    found = Comparison({"fails": np.where(np.isinf(failing), np.inf, 1.0), "works": np.ones(16)})
     assert not found.tied[0, 1]
 
 
@@ -896,9 +896,9 @@ def test_a_block_without_a_test_is_decided_by_the_least_relevant_difference_and_
     scores = {law: np.full((2, 16), math.nan) for law in tested}
     for law, rows in scores.items():
         rows[0], rows[1, :1] = tested[law], alone[law]
-    found = compare(scores, untested=[False, True])
-    assert found.limits == compare(tested).limits
+    found = Comparison(scores, untested=[False, True])
+    assert found.limits == Comparison(tested).limits
     better = [(found.laws[i], found.laws[k]) for i, k in np.argwhere(found.better[1])]
     assert better == [("a", "c")]  # 3 % of the larger value are relevant
-    assert compare(alone, untested=True).better.sum() == 1
-    assert not compare(alone).better.any()
+    assert Comparison(alone, untested=True).better.sum() == 1
+    assert not Comparison(alone).better.any()

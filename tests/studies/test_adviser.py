@@ -27,7 +27,7 @@ from smc_mujoco.control.law import catalogue, law_function
 from smc_mujoco.control.properties import searched
 from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, Gain
 from smc_mujoco.studies import adviser, fair_gains
-from smc_mujoco.studies.advice import NEEDS, Runs
+from smc_mujoco.studies.advice import NEEDS
 
 FAST, SLOW = smc.law("observer_free", lam=6.0, k1=2.0), smc.law("observer_free", lam=6.0, k1=5.0).named("slow")
 COMMON = {"duration": 2.5, "seeds": 16, "conditions": ["nominal", "noise"]}
@@ -131,7 +131,7 @@ def test_robust_goes_by_the_worst_found_and_tells_the_median_too(folder, monkeyp
     assert f"The median of the random runs {median}" in said
     assert made.tables[0].rows[0][3][:3] == (number(alone[first].value), f"median {number(alone[first].median)}", True)
     both = smc.which("duffing", needs="fast,robust", conditions="nominal", duration=2.5, seeds=6, **options)
-    tested = ranking.compare({law: both.comparison.cells[i, :1] for i, law in enumerate(both.comparison.laws)})
+    tested = ranking.Comparison({law: both.comparison.cells[i, :1] for i, law in enumerate(both.comparison.laws)})
     assert both.comparison.limits == tested.limits  # what has no test is in no family of tests
     assert text(made).endswith("There is no test, as the worst found is one value of a law and no sample.")
     assert "Except for robust, these comparisons hold over sets of gains, for these gains of" in text(both)
@@ -145,7 +145,7 @@ def with_cells(advice, restraint=None, **cells):
     """Advice on the same runs with other scores: law -> medians of fast and calm, each under nominal and noise."""
     spread = np.linspace(0.99, 1.01, 24)
     scores = {law: np.outer(own, spread) if np.ndim(own) == 1 else np.array(own) for law, own in cells.items()}
-    comparison = ranking.compare(scores)
+    comparison = ranking.Comparison(scores)
     names = {choice.law.name: choice for choice in advice.choices}
     choices = []
     for rank in adviser._order(comparison, restraint or dict.fromkeys(cells, ())):
@@ -238,7 +238,7 @@ def test_an_answer_over_sets_of_gains_counts_them(advice):
     scores["observer_free"][2:, 9:] = 1.1
     scores["observer_free"][2:, :9] = 0.7
     sets = {law: np.tile(np.arange(24) + 24 * i, (4, 1)) for i, law in enumerate(scores)}
-    comparison = ranking.compare(scores, sets=sets)
+    comparison = ranking.Comparison(scores, sets=sets)
     assert comparison.winners == ["observer_free", "observer_free", None, None]
     choices = [
         dataclasses.replace(choice, rank=rank)
@@ -256,7 +256,7 @@ def test_an_answer_over_sets_of_gains_counts_them(advice):
 def test_restraint_ranks_laws_by_overshoot_and_by_energy_of_u(advice):
     (group,) = adviser.paired_runs.groups(advice.table, by=("plant",))
     ran = adviser.paired_runs.scenarios(advice.table, group)
-    found = adviser._restraint(Runs(advice.table, group, {}), ran, advice.plant)
+    found = adviser._restraint(advice.table, group, ran, advice.plant)
     assert set(found) == set(group.laws)
     energies = {law: np.median(advice.table.select(law=law).column("energy")) for law in group.laws}
     overshoots = {law: np.median(advice.table.select(law=law).column("overshoot")) for law in group.laws}
@@ -458,7 +458,7 @@ def test_needs_are_metrics_to_compare_and_properties_to_have():
     assert "observer_free" in names
     assert not names & {"none", "classical", "observer_free_q15", "hierarchical"}
     assert all(law.continuous and len(searched(law)) in (1, 2) for law in map(catalogue().__getitem__, names))
-    assert (NEEDS["fast"].metric.name, NEEDS["calm"].metric.name) == ("settling_time", "tv_rate")
+    assert (NEEDS["fast"].name, NEEDS["calm"].name) == ("settling_time", "tv_rate")
 
 
 def test_without_a_velocity_sensor_velocity_is_differentiated(folder):

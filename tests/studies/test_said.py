@@ -34,7 +34,7 @@ from smc_mujoco.studies import (
     study,
     worst_case,
 )
-from smc_mujoco.studies.advice import NEEDS, Choice, ties
+from smc_mujoco.studies.advice import Choice, ties
 from smc_mujoco.studies.scene import slug
 from smc_mujoco.studies.worst_case import WorstCase, WorstCases, default_budget
 
@@ -152,7 +152,7 @@ def test_needs_and_choices_say_as_recorded(snapshot):
         fit=True, worst=cases, medians={"fast": Interval(0.5, 0.4, 0.6, 8), "calm": Interval(1.0, 1.0, 1.0, 8)},
     )  # fmt: skip
     other = dataclasses.replace(first, law=smc.law("pid"), remark="a remark")
-    said = [NEEDS[need].below(first) for need in ("fast", "calm", "robust")] + [first.gains, other.gains]
+    said = [first.below(need) for need in ("fast", "calm", "robust")] + [first.gains, other.gains]
     said += [
         str([metric.name for metric in ties(smc.plant(plant))]) for plant in ("duffing", "pendulum_network", "panda")
     ]
