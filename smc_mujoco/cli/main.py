@@ -22,28 +22,17 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
 )
-GROUPS = {  # heading in the help -> name -> command; the annexes add theirs
-    "Run and look": {
-        "list": catalogue.list_,
-        "laws": catalogue.laws,
-        "run": runs.run,
-        "show": runs.show,
-        "view": runs.view,
-    },
-    "Compare": {"compare": studies.compare, "which": studies.which},
-    "Tune and analyse": {
-        "tune": analysis.tune,
-        "margins": analysis.margins,
-        "worst": analysis.worst,
-        "basin": analysis.basin,
-        "chatter": analysis.chatter,
-    },
+GROUPS: dict[str, list[Callable[..., None]]] = {  # heading in the help -> commands; the annexes add theirs
+    "Run and look": [catalogue.list_, catalogue.laws, runs.run, runs.show, runs.view],
+    "Compare": [studies.compare, studies.which],
+    "Tune and analyse": [analysis.tune, analysis.margins, analysis.worst, analysis.basin, analysis.chatter],
 }
 for annex in sorted(filter(annexes.installed, annexes.ANNEXES)):
     for group, commands in annexes.module(f"smc_mujoco.{annex}.commands", "the command line").GROUPS.items():
-        GROUPS[group] = GROUPS.get(group, {}) | commands
+        GROUPS.setdefault(group, []).extend(commands)
 for group, commands in GROUPS.items():
-    for name, command in commands.items():
+    for command in commands:
+        name = command.__name__.strip("_").replace("_", "-")  # list_ -> list, export_c -> export-c
         app.command(name, rich_help_panel=group)(command)
 
 

@@ -206,7 +206,5 @@ def live(
     terminal.note(f"serve it: python -m http.server --directory {page.parent}")
 
 
-GROUPS = {  # heading in the help -> name -> command
-    "Run and look": {"live": live},
-    "Exchange": {"export-c": export_c, "check-c": check_c, "export-fmu": export_fmu, "check-fmu": check_fmu},
-}
+# heading in the help -> commands
+GROUPS = {"Run and look": [live], "Exchange": [export_c, check_c, export_fmu, check_fmu]}
