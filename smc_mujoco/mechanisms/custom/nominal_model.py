@@ -81,14 +81,11 @@ class NominalModel:
 
     build: Callable[[int], mujoco.MjSpec]
     fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
-    why_not: str = ""  # why there is no nominal model
 
     def __call__(
         self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /, u: np.ndarray | None = None
     ) -> tuple[float, float]:
-        """Return f and g of channel i, given the last commands u, (n,), of the others; NaN without a nominal model."""
-        if self.why_not:
-            return np.nan, np.nan
+        """Return f and g of channel i, given the last commands u, (n,), of the others."""
         with self._placed(x, p) as (model, places, data):
             data.qvel[places.qvel], driven = v, len(places.ctrl)
             data.ctrl[places.ctrl] = 0.0 if u is None else np.asarray(u)[:driven]
@@ -113,8 +110,6 @@ class NominalModel:
 
     def native(self, parameters: Mapping[str, float]) -> Native:
         """Return the C function, and the addresses of one simulation's model, data and arrays."""
-        if self.why_not:
-            return Native(unknown().address, (), ())
         model, places, borrowed = self._borrow(parameters)
         data, seen, solved = borrowed.data, np.full((2, len(places.qpos)), np.nan), np.zeros((2, model.nv))
         arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, places.table, *seen, *solved
@@ -203,18 +198,6 @@ def prepared(
     table = np.full(len(joints), -1, PLACE)
     table["qpos"], table["qvel"], table["ctrl"][: len(columns[2])] = columns
     return model, Places(*columns, table), data, []
-
-
-@functools.cache
-def unknown() -> Function:
-    """Return the C function for plants without a nominal model: f and g are NaN."""
-
-    def native(y, p, m, out):
-        output = carray(pointer(out), (2,))
-        output[0], output[1] = np.nan, np.nan
-        return 0
-
-    return _on_disk(native)
 
 
 def _mujoco(name: str, more: int = 0) -> Callable:

@@ -176,7 +176,7 @@ def _plant(source: Source, pairs: Pairs, name: str | None, keyframe: str | None,
         sizes=(len(joints), len(joints)),
         build=build,
         fields=fields,
-        nominal=NominalModel(build, fields, why_not),
+        nominal=without_model if why_not else NominalModel(build, fields),
         lane=(1.2 * float(model.stat.extent), 0.0, 0.0),
         underactuated=len(joints) > len(pairs),
         direct=True,
@@ -188,6 +188,11 @@ def _plant(source: Source, pairs: Pairs, name: str | None, keyframe: str | None,
         suggested=scenarios,
         label=title if plant_name == file and title != UNNAMED else "",
     )
+
+
+def without_model(x, v, i, p):
+    """Return the f and g of a plant that has no nominal model: NaN."""
+    return math.nan, math.nan
 
 
 def smooth(model: mujoco.MjModel) -> bool:
