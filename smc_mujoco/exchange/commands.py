@@ -131,39 +131,6 @@ def export_fmu(
 
 
 @errors_as_sentences()
-def check_fmu(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="An .fmu file of FMI 2.0 or 3.0 for Co-Simulation.")],
-    variables: Annotated[
-        str,
-        typer.Option(
-            metavar="NAME=VARIABLE,...",
-            help="Its variables for x, v, r, u, ..., as x=theta,u=torque; default by their names.",
-        ),
-    ] = "",
-    constants: Annotated[
-        str, typer.Option(metavar="VARIABLE=VALUE,...", help="Inputs that keep one value, as enable=1.")
-    ] = "",
-    period: Annotated[float | None, typer.Option(help="Seconds between its steps; default its own period.")] = None,
-    timeout: Annotated[float, typer.Option(help="Seconds that the trial may take.")] = 30.0,
-) -> None:
-    """Try a controller in an FMU in a separate process, and show its inputs, outputs, period and gains.
-
-    The trial runs it for 500 steps on a double integrator. A failure, a crash, an endless step or a command that is not
-    finite ends in one sentence and exit code 2. An FMU that passes can be used as a law: smc.law_from_fmu(FILE). The
-    command needs FMPy: `pip install 'smc-mujoco[fmu]'`.
-
-    Example: smc-mujoco check-fmu controller.fmu --variables x=theta,v=omega,u=torque --constants enable=1
-    """
-    with delay_ctrl_c():
-        from smc_mujoco.exchange.fmu.load import check
-
-    values = options.numbers(constants or None, "--constants", "enable=1")
-    meanings = options.pairs(variables or None, "--variables", "x=theta,u=torque")
-    for line in check(file, timeout, variables=meanings, constants=values, period=period):
-        print(line)
-
-
-@errors_as_sentences()
 def live(
     plants: Annotated[
         list[str] | None,
@@ -207,4 +174,4 @@ def live(
 
 
 # heading in the help -> commands
-GROUPS = {"Run and look": [live], "Exchange": [export_c, check_c, export_fmu, check_fmu]}
+GROUPS = {"Run and look": [live], "Exchange": [export_c, check_c, export_fmu]}

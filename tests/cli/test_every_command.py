@@ -76,10 +76,6 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "export-fmu pid": ["exchange.fmu.export.export_fmu"],
     "export-fmu pid --gains kp=50 --surface linear(c=4) --velocity levant --period 0.002 --u-max 6 --model nominal "
     "--joint slide --no-binary --out p.fmu": ["exchange.fmu.export.export_fmu"],
-    "check-fmu law.fmu": ["exchange.fmu.load.check"],
-    "check-fmu law.fmu --variables x=theta,u=torque --constants enable=1 --period 0.002 --timeout 4": [
-        "exchange.fmu.load.check"
-    ],
 }
 
 

@@ -17,7 +17,7 @@ import os
 import re
 import weakref
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -226,30 +226,6 @@ def law_from_fmu(
     return law_function(gains={ours: gain for ours, (_, gain) in gains.items()}, memory=1)(law)
 
 
-def check(path: str | os.PathLike[str], timeout: float, **settings: Any) -> Iterator[str]:
-    """Try an FMU as a law, and yield lines: what its variables mean, its step, its gains."""
-    template = law_from_fmu(path, timeout=timeout, **settings)
-    law: FmuLaw = template.function  # pyright: ignore[reportAssignmentType]
-    yield "inputs   " + ", ".join(f"{theirs} is {ours}" for ours, theirs in law.inputs)
-    yield "outputs  " + ", ".join(f"{theirs} is {ours}" for ours, theirs in zip(OUTPUTS, law.outputs, strict=False))
-    if law.constants:
-        yield "held     " + ", ".join(f"{theirs} = {value:g}" for theirs, value in law.constants)
-    yield f"step     {_pace(law)}"
-    yield "gains    " + (", ".join(f"{name} = {gain.default:g}" for name, gain in template.gains.items()) or "none")
-    yield f"{Path(path).name} passes"
-
-
-def _pace(law: FmuLaw) -> str:
-    """Return words for how often a run steps an FMU, and for its own period if it has one that it keeps inside."""
-    import fmpy
-
-    if law.period is not None:
-        return f"{law.period:g} s"
-    about = fmpy.read_model_description(str(extracted(law.path, law.digest)), validate=False)
-    inside = getattr(about.coSimulation, "fixedInternalStepSize", None)
-    return f"every control period{f'; inside, it runs every {float(inside):g} s' if inside else ''}"
-
-
 def _description(file: Path, digest: str) -> Any:
     """Return FMPy's description of an FMU."""
     import fmpy
@@ -308,11 +284,10 @@ def _meanings(
     inputs |= _by_name([n for n in ins if n not in taken], [n for n in INPUT_FIELDS if n not in chosen])
     if strange := [n for n in ins if n not in {*inputs.values(), *constants}]:
         first = strange[0]
-        meaning = f"say which it is, variables={{'x': {first!r}}} (--variables x={first}), or "
+        meaning = f"say which it is, variables={{'x': {first!r}}}, or "
         raise ScenarioError(
             f"{file} has inputs that mean nothing that a law measures, {', '.join(strange[:4])}: "
-            f"{meaning * (known[first].type in REAL_TYPES)}hold each, constants={{{first!r}: 0.0}} "
-            f"(--constants {first}=0)"
+            f"{meaning * (known[first].type in REAL_TYPES)}hold each, constants={{{first!r}: 0.0}}"
         )
     outputs = {ours: theirs for ours, theirs in chosen.items() if ours in OUTPUTS}
     outputs |= _by_name([n for n in outs if n not in taken], [n for n in OUTPUTS if n not in chosen])
@@ -322,7 +297,7 @@ def _meanings(
         free = next((n for n in outs if n not in outputs.values()), outs[0])
         raise ScenarioError(
             f"{file} has no output that is named as a command ({', '.join(outs)}): "
-            f"say which it is, as in variables={{'u': {free!r}}} (--variables u={free})"
+            f"say which it is, as in variables={{'u': {free!r}}}"
         )
     outputs.setdefault("u", outs[0])
     real = dict.fromkeys((*inputs.values(), *outputs.values()), REAL_TYPES)

@@ -19,11 +19,9 @@ import pytest
 fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', is not installed")
 
 from helpers import fmu as helper  # noqa: E402
-from helpers.commands import assert_refused  # noqa: E402
 from helpers.compiler import needs_compiler  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
-from smc_mujoco.cli import main as cli  # noqa: E402
 from smc_mujoco.common.guard import Fault  # noqa: E402
 from smc_mujoco.control.law import Measurement  # noqa: E402
 from smc_mujoco.exchange.fmu import load, slave  # noqa: E402
@@ -80,7 +78,6 @@ def test_gains_are_the_fmu_s_parameters(folder):
     path = smc.export_fmu(smc.law("observer_free", lam=4.0, k1=2.0), folder / "gains.fmu", u_max=5.0)
     template = smc.law_from_fmu(path, isolate=False)
     assert template.defaults == {"u_max": 5.0, "law_lam": 4.0, "law_k1": 2.0}
-    assert load._pace(template.function) == "every control period; inside, it runs every 0.001 s"
     with pytest.raises(smc.ScenarioError, match="law_lam"):
         template(law_lam=-1.0)
     with pytest.raises(smc.ScenarioError, match="unknown gain of gains 'lam'"):
@@ -204,7 +201,7 @@ def test_inputs_that_are_not_real_may_be_held(folder):
             smc.law_from_fmu(path, constants=held)
         assert str(error.value) == (
             f"servo.fmu has inputs that mean nothing that a law measures, {said}: hold each, "
-            f"constants={{{first!r}: 0.0}} (--constants {first}=0)"
+            f"constants={{{first!r}: 0.0}}"
         )
     laws = [smc.law_from_fmu(path, constants={"enable": on, "mode": 2}) for on in (1, 0)]
     trace, off = smc.run([scenario(law(), noise=None, u_max=100.0, reference=None) for law in laws])
@@ -291,7 +288,7 @@ def test_an_fmu_that_changes_the_rounding_fails_and_other_runs_keep_their_bits(f
         (
             {},
             "controller.fmu has inputs that mean nothing that a law measures, mode: say which it is, "
-            "variables={'x': 'mode'} (--variables x=mode), or hold each, constants={'mode': 0.0} (--constants mode=0)",
+            "variables={'x': 'mode'}, or hold each, constants={'mode': 0.0}",
         ),
         ({"constants": {"mod": 1.0}}, "unknown input of controller.fmu 'mod': did you mean 'mode'?"),
         ({"variables": {"x": "theta"}}, "unknown input of controller.fmu 'theta': did you mean 'Plant.Theta'?"),
@@ -335,7 +332,7 @@ def changed(foreign: Path, folder: Path, *pairs: tuple[str, str]) -> Path:
          "changed.fmu has no output: export it with the command as an output"),
         (('name="torque"', 'name="s" valueReference="9" causality="output"><Real/></ScalarVariable>'
           '<ScalarVariable name="kraft"'), "changed.fmu has no output that is named as a command (s, kraft): "
-         "say which it is, as in variables={'u': 'kraft'} (--variables u=kraft)"),
+         "say which it is, as in variables={'u': 'kraft'}"),
         (('name="mode" valueReference="3" causality="input"><Real start="0"/>',
           'name="mode" valueReference="3" causality="input"><String start=""/>'),
          "'mode' of changed.fmu is not one number: export it without this input"),
@@ -407,29 +404,6 @@ def test_without_fmpy_the_cure_is_said(foreign, monkeypatch):
     monkeypatch.setitem(sys.modules, "fmpy", None)
     with pytest.raises(smc.ScenarioError, match=r"smc\.law_from_fmu needs an optional package .*smc-mujoco\[fmu\]"):
         smc.law_from_fmu(foreign, **RENAMED)
-
-
-def test_the_command_says_what_the_variables_mean(foreign, capsys):
-    with pytest.raises(SystemExit) as end:
-        cli.main(["check-fmu", str(foreign), "--constants", "mode=0", "--variables", "u=torque"])
-    assert not end.value.code
-    lines = capsys.readouterr().out.splitlines()
-    assert lines == [
-        "inputs   Plant.Theta is x, omega is v, setpoint is r",
-        "outputs  torque is u",
-        "held     mode = 0",
-        "step     0.01 s",
-        "gains    gain_k = 8",
-        "controller.fmu passes",
-    ]
-
-
-def test_the_command_ends_in_one_sentence(foreign, capsys):
-    for words, said in (
-        (["--constants", "mode=4"], "controller.fmu: the step from t = 0 s fails (the licence has ended)"),
-        (["--constants", "mode=on"], "--constants mode=on is no number: write it as enable=1"),
-    ):
-        assert_refused(capsys, ["check-fmu", str(foreign), *words], said)
 
 
 @pytest.mark.parametrize(("step", "h"), [(None, 1e-3), (0.02, 0.02)])
