@@ -10,7 +10,6 @@ the command line calls it. Only Linux has a choice of backends. This module impo
 
 import atexit
 import ctypes
-import dataclasses
 import functools
 import importlib
 import os
@@ -42,21 +41,13 @@ _LOCK = threading.Lock()  # one renderer is made at a time
 _RENDERERS: "weakref.WeakSet[mujoco.Renderer]" = weakref.WeakSet()  # to be closed at exit
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class Choice:
-    """The backend that MUJOCO_GL names ("" when unset) and the backend that is used."""
-
-    wish: str
-    backend: str
-
-
 @functools.cache
-def choice() -> Choice:
-    """Return the backend for this process. The first call decides."""
+def choice() -> tuple[str, str]:
+    """Return what MUJOCO_GL names ("" when unset), and the backend of this process. The first call decides."""
     wish = os.environ.get("MUJOCO_GL", "").strip().lower()
     if sys.platform != "linux":
-        return Choice(wish=wish, backend=wish)
-    return Choice(wish=wish, backend=next((name for name in (wish, "egl", "osmesa") if usable(name)), "disabled"))
+        return wish, wish
+    return wish, next((name for name in (wish, "egl", "osmesa") if usable(name)), "disabled")
 
 
 def choose_gl() -> str:
@@ -65,7 +56,7 @@ def choose_gl() -> str:
     Call it before you import mujoco if you make your own renderers. After the import, and on systems other than Linux,
     it sets nothing. Films, stills and environments of this package do not need it.
     """
-    backend = choice().backend
+    _, backend = choice()
     if sys.platform == "linux" and "mujoco" not in sys.modules:
         os.environ["MUJOCO_GL"] = backend
     return backend
@@ -91,30 +82,29 @@ def loads(library: str) -> bool:
 
 def note() -> str | None:
     """Return one sentence if MUJOCO_GL names a backend that cannot be used, else None."""
-    chosen = choice()
-    if chosen.wish in ("", chosen.backend):
+    wish, backend = choice()
+    if wish in ("", backend):
         return None
-    why = "does not load here" if chosen.wish in LIBRARIES else "is not a backend of MuJoCo"
-    then = "films are off" if chosen.backend in OFF_VALUES else f"{chosen.backend} is used instead"
-    return f"MUJOCO_GL={chosen.wish} {why}: {then}"
+    why = "does not load here" if wish in LIBRARIES else "is not a backend of MuJoCo"
+    return f"MUJOCO_GL={wish} {why}: {'films are off' if backend in OFF_VALUES else f'{backend} is used instead'}"
 
 
 @functools.cache
 def missing() -> str | None:
     """Return None if pictures can be rendered, as a child process tries, else a sentence with the cure."""
-    chosen = choice()
-    if chosen.wish in OFF_VALUES:
-        return f"no film: MUJOCO_GL={chosen.wish} turns rendering off: unset it"
-    unusable = f" (and MUJOCO_GL={chosen.wish} cannot be used)" if note() else ""
-    if chosen.backend in OFF_VALUES:
+    wish, backend = choice()
+    if wish in OFF_VALUES:
+        return f"no film: MUJOCO_GL={wish} turns rendering off: unset it"
+    unusable = f" (and MUJOCO_GL={wish} cannot be used)" if note() else ""
+    if backend in OFF_VALUES:
         if platform := os.environ.get("PYOPENGL_PLATFORM"):
             return f"no film: PYOPENGL_PLATFORM={platform} rules out what is installed{unusable}: unset it"
         return f"no film: neither libEGL with libGL nor libOSMesa is here{unusable}: {CURE}"
-    error = probe(chosen.backend)
+    error = probe(backend)
     if error is None:
         return None
-    if chosen.backend in LIBRARIES:
-        return f"no film: {chosen.backend} does not render{unusable} ({error}): {CURE}"
+    if backend in LIBRARIES:
+        return f"no film: {backend} does not render{unusable} ({error}): {CURE}"
     cure = "set MUJOCO_GL=egl" if sys.platform == "linux" else "unset MUJOCO_GL"
     return f"no film: MuJoCo cannot open a window to render in ({error}): {cure}"
 
@@ -145,14 +135,13 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
 
     if sys.platform != "linux":
         return mujoco.Renderer(model, height, width)
-    backend = choice().backend
+    _, backend = choice()
     module = sys.modules[mujoco.Renderer.__module__].gl_context  # from which a Renderer takes its context class
     with _LOCK:
         before = getattr(module, "GLContext", None)  # absent if MUJOCO_GL turned rendering off
         try:
-            module.GLContext = importlib.import_module(
-                f"mujoco.{backend if backend in LIBRARIES else 'glfw'}"
-            ).GLContext
+            name = backend if backend in LIBRARIES else "glfw"
+            module.GLContext = importlib.import_module(f"mujoco.{name}").GLContext
             made = mujoco.Renderer(model, height, width)
         finally:
             if before is not None:

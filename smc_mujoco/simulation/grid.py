@@ -96,20 +96,10 @@ def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by
 
     Raises:
       ScenarioError: a number out of its range.
-
-    Warns:
-      ScenarioWarning: a spread of more than 1, which may be percent.
     """
-    if number("spread", spread, low=0.0) > 1.0:
-        warnings.warn(
-            f"spread is {spread:g}, which moves starts by {spread:g} times x0: if it is {spread:g} %, give "
-            f"{spread / 100:g}",
-            ScenarioWarning,
-            users_stacklevel(),
-        )
     items = items_of("x0", x0) if isinstance(x0, Sequence) and not isinstance(x0, str) else [x0]
     middle = None if x0 is None else tuple(number("x0", item) for item in items)
-    return Starts(x0=middle, spread=spread, by=number("by", by, low=0.0))
+    return Starts(x0=middle, spread=number("spread", spread, low=0.0), by=number("by", by, low=0.0))
 
 
 def grid(

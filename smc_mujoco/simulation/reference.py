@@ -97,7 +97,6 @@ class Loop:
             self.first, self.second = self.drive_step.start(self.data.qvel[self.channels["shaft"]])
         self.limits = np.array(scenario.limits)
         inertia, formula = self.model.dof_M0[self.channels["qvel"]], self.scenario.formula_friction
-        self.sliding = [] if formula is None else [PythonFriction(formula, i) for i in range(n)]
         self.bristles = [] if formula is None else [formula.bristle(i, inertia[i]) for i in range(n)]
         self.stuck_at, self.speed = [math.nan] * n, [0.0] * n  # positions of joints that stick, or NaN; last speeds
         self.delayed = np.zeros(n)  # the commands whose delay has passed
@@ -131,8 +130,8 @@ class Loop:
             k, within = divmod(step, self.scenario.steps)
             t = k * self.scenario.control_period + (within + fraction) * self.scenario.physics_step
             d = self.apply_disturbances(data, t)
-            if self.sliding:
-                self.apply_friction(data, d)
+            if self.scenario.formula_friction:
+                self.apply_friction(data, d, self.scenario.formula_friction)
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.channels["qpos"]], data.qvel[self.channels["qvel"]]
                 delayed = self.delayed if self.drive_step else data.ctrl[self.channels["ctrl"]] / self.scale
@@ -315,15 +314,15 @@ class Loop:
         for body, push in zip(bodies, pushes, strict=True):
             data.xfrc_applied[body, :3] += evaluate(push, t)[0] * np.array([push.x, push.y, push.z])
 
-    def apply_friction(self, data: mujoco.MjData, d: np.ndarray) -> None:
+    def apply_friction(self, data: mujoco.MjData, d: np.ndarray, formula: Sliding) -> None:
         """Give the joints their friction by a formula for a physics step; d are the disturbances, (n,)."""
         at = self.channels
-        for i, formula in enumerate(self.sliding):
-            dof = at["qvel"][i]
+        for i, dof in enumerate(at["qvel"]):
             x, v = float(data.qpos[at["qpos"][i]]), float(data.qvel[dof])
             motor = float(data.actuator_force[at["force"][i]]) if self.has_drive[i] else 0.0
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof])
-            friction, low, high = formula(v, motor, load + float(data.qfrc_constraint[dof] + d[i]))
+            load += float(data.qfrc_constraint[dof] + d[i])
+            friction, low, high = sliding_friction(formula, i, v, motor, load)
             stuck, before = not math.isnan(self.stuck_at[i]), self.speed[i]
             slows = abs(v) < STICKING_SPEED and abs(v) <= abs(before)
             if not stuck and (slows or v * before < 0.0):
@@ -349,10 +348,8 @@ def gains_of(c: Component, n: int = 1) -> tuple:
     """Return the gains of a component as the record that its function reads: vectors (n,) for a law of many joints."""
     values: list[Any] = list(c.gains.values())
     if c.joint:
-        values = [
-            gain_at(value, 0) if name in c.shared else np.array([gain_at(value, i) for i in range(n)])
-            for name, value in c.gains.items()
-        ]
+        each = [[gain_at(value, i) for i in range(n)] for value in values]
+        values = [one[0] if name in c.shared else np.array(one) for name, one in zip(c.gains, each, strict=True)]
     return jit.named(tuple(c.gains))(*(values or [0.0]))
 
 
@@ -396,20 +393,14 @@ class PythonComponent:
         return u, s
 
 
-class PythonFriction:
-    """The formula of a friction, for one channel."""
-
-    def __init__(self, friction: Sliding, i: int):
-        self.name, self.value = type(friction).__name__, type(friction).value
-        self.parameters = jit.named(friction.names)(*(friction.parameters(i) or [0.0]))
-
-    def __call__(self, v: float, motor: float, load: float) -> list[float]:
-        """Return the sliding friction, and both bounds of the static friction."""
-        try:
-            out = self.value(v, motor, load, self.parameters)
-        except USER_EXCEPTIONS as error:
-            raise failure_of(f"friction {self.name}", error) from error
-        return as_floats(f"friction {self.name}", out, "a force and two bounds", 3)
+def sliding_friction(formula: Sliding, i: int, v: float, motor: float, load: float) -> list[float]:
+    """Return the sliding friction of channel i by a formula, and both bounds of its static friction."""
+    name, parameters = f"friction {type(formula).__name__}", jit.named(formula.names)(*(formula.parameters(i) or [0.0]))
+    try:
+        out = type(formula).value(v, motor, load, parameters)
+    except USER_EXCEPTIONS as error:
+        raise failure_of(name, error) from error
+    return as_floats(name, out, "a force and two bounds", 3)
 
 
 class NominalDynamics:

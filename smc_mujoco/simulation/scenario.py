@@ -49,9 +49,7 @@ MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
 MAX_ANGLE = 3.0 * math.pi  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
 MAX_DEGREES = 720.0  # chosen; a number above this is not taken for degrees
-MIN_PERCENT = 10.0  # factor of a mismatch: chosen; multiples of five from here on may be percent
 MAX_CONDITION_NUMBER = 1e12  # of a mass matrix; chosen: its inverse has 4 digits
-MAX_INPUT_DELAY = 1.0  # s: chosen; no plant here tolerates as much, so a longer one may be in ms
 
 Out = TypeVar("Out")
 
@@ -115,8 +113,8 @@ class Scenario:
       ScenarioError: a value out of its range, or values that do not fit together, in one sentence.
 
     Warns:
-      ScenarioWarning: a value that may be in another unit: a start or a reference in degrees, a mismatch in percent,
-        a delay in ms; or a DCMotor that cannot hold a joint where it starts, though a force of u_max could.
+      ScenarioWarning: a start or a reference that may be in degrees; or a DCMotor that cannot hold a joint where it
+        starts, though a force of u_max could.
     """
 
     # converted in this order
@@ -599,19 +597,13 @@ def mechanism_model(plant: Plant, name: str) -> mujoco.MjModel:
 
 
 def _doubts(s: Resolved) -> Iterator[str]:
-    """Yield a sentence about each number that may be in degrees, percent or ms, and each motor that is too weak."""
+    """Yield a sentence about each number that may be in degrees, and each motor that is too weak."""
     amplitudes = [signal.parameters().get("amplitude", 0.0) for signal in s.references]  # ramps may have many turns
     for what, values in (("x0", s.x0), ("the reference's amplitude", amplitudes)):
         for unit, value in zip(s.plant.units, values, strict=False):
             if unit == "rad" and MAX_ANGLE < abs(value) <= MAX_DEGREES:
                 fact = f"{what} is {value:g} rad, {abs(value) / math.tau:.1f} turns"
                 yield f"{fact}: if it is {value:g} degrees, give math.radians({value:g})"
-    for name, factor in s.mismatch.items():
-        if name not in s.plant.added and MIN_PERCENT <= factor <= 100.0 and factor % 5.0 == 0.0:
-            fact = f"mismatch makes {name} {factor:g} times the nominal one"
-            yield f"{fact}: if it is {factor:g} % more, give {1 + factor / 100:g}"
-    if s.input_delay >= MAX_INPUT_DELAY:
-        yield f"input_delay is {s.input_delay:g} s: if it is {s.input_delay:g} ms, give {s.input_delay / 1e3:g}"
     for motor in [part for part in s.actuator if isinstance(part, DCMotor)]:
         for i, limit in enumerate(s.limits):
             with np.errstate(all="ignore"):

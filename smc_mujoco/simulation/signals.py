@@ -59,10 +59,6 @@ class Signal:
         """Return parameter name -> value."""
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
 
-    def bounds(self) -> tuple[float, float] | None:
-        """Return bounds of |d| and |d'|, inf where d jumps, or None if none are known."""
-        return None
-
 
 @dataclasses.dataclass(frozen=True)
 class PerChannel(Signal):
@@ -80,9 +76,6 @@ class Constant(Signal):
 
     amplitude: float = 0.0
 
-    def bounds(self) -> tuple[float, float]:
-        return abs(self.amplitude), 0.0
-
     @staticmethod
     def value(t, p):
         return p.amplitude, 0.0, 0.0
@@ -95,9 +88,6 @@ class Sine(Signal):
     amplitude: float
     omega: float
     phase: float = 0.0
-
-    def bounds(self) -> tuple[float, float]:
-        return abs(self.amplitude), abs(self.amplitude * self.omega)
 
     @staticmethod
     def value(t, p):
@@ -112,9 +102,6 @@ class Step(Signal):
 
     amplitude: float
     time: float = 0.0
-
-    def bounds(self) -> tuple[float, float]:
-        return abs(self.amplitude), math.inf
 
     @staticmethod
     def value(t, p):
@@ -150,9 +137,6 @@ class MinimumJerk(Signal):
 
     positive = ("duration",)
 
-    def bounds(self) -> tuple[float, float]:
-        return abs(self.amplitude), 1.875 * abs(self.amplitude) / self.duration
-
     @staticmethod
     def value(t, p):
         a = min(max((t - p.time) / p.duration, 0.0), 1.0)
@@ -170,9 +154,6 @@ class Pulse(Signal):
     width: float
 
     positive = ("width",)
-
-    def bounds(self) -> tuple[float, float]:
-        return abs(self.amplitude), math.inf
 
     @staticmethod
     def value(t, p):
@@ -295,9 +276,6 @@ class Relay(Signal):
     natural = ("slope", "start")
     sees = True
 
-    def bounds(self) -> tuple[float, float]:
-        return abs(self.amplitude), math.inf
-
     @staticmethod
     def value(t, p, memory, e, de, s):
         goal = p.amplitude if p.s * s + p.rate * de + p.error * e > 0.0 else -p.amplitude
@@ -382,6 +360,20 @@ def _band_limited(t, sigma, low, high, memory, seed, channel, stream):
     for i in range(SINUSOIDS):
         total += math.cos(memory[i] * t + memory[SINUSOIDS + i])
     return sigma * math.sqrt(2.0 / SINUSOIDS) * total
+
+
+def bounds_of(signal: Signal) -> tuple[float, float] | None:
+    """Return bounds of |d| and |d'|, inf where d jumps, or None if none are known."""
+    match signal:
+        case Constant(amplitude=a):
+            return abs(a), 0.0
+        case Sine(amplitude=a, omega=omega):
+            return abs(a), abs(a * omega)
+        case MinimumJerk(amplitude=a, duration=T):
+            return abs(a), 1.875 * abs(a) / T
+        case Step(amplitude=a) | Pulse(amplitude=a) | Relay(amplitude=a):
+            return abs(a), math.inf
+    return None
 
 
 @dataclasses.dataclass(frozen=True)

@@ -23,7 +23,7 @@ from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Noise, Relay, Signal
+from smc_mujoco.simulation.signals import Noise, Relay, Signal, bounds_of
 from smc_mujoco.simulation.time_series import Held, TimeSeries
 
 KNOT_SPACING = 0.5  # s between the knots of a random disturbance, straight lines in between; chosen
@@ -135,7 +135,7 @@ def strength(scenario: Scenario) -> float:
 def outside(scenario: Scenario, within: Uncertainty) -> str:
     """Return how a class around a scenario goes beyond the theorem of its law, in words; "" if nothing is known."""
     reasons, u = [], EFFORT[scenario.plant.units[0]]
-    known = [bounds for signal in scenario.disturbance if (bounds := signal.bounds())]
+    known = [its for signal in scenario.disturbance if (its := bounds_of(signal))]
     of_class = within.disturbance, (within.slope or math.inf) if within.disturbance else 0.0
     d, slope = map(sum, zip(of_class, *known, strict=True))
     if d >= (largest := strength(scenario)):

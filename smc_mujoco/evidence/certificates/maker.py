@@ -26,7 +26,7 @@ from smc_mujoco.evidence.certificates import search
 from smc_mujoco.evidence.certificates.certificate import Certificate, finite, holds
 from smc_mujoco.evidence.certificates.loops import Loop, loop_of
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.signals import Constant
+from smc_mujoco.simulation.signals import Constant, bounds_of
 
 GRID_REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 3.0 * max(map(abs, plant.x0))}  # in x: chosen
 MARGIN_SHARE = 1e-4  # share by which a margin is stated below the true one
@@ -134,11 +134,11 @@ def _bounds(scenario: Scenario) -> tuple[float, float]:
     """Return bounds of |d| and |d'| of a scenario's disturbance."""
     bound = slope = 0.0
     for signal in scenario.disturbance:
-        if (bounds := signal.bounds()) is None:
+        if (its := bounds_of(signal)) is None:
             raise ScenarioError(
                 f"{type(signal).__name__} has no bound: leave it out, and give within=smc.Uncertainty(disturbance=...)"
             )
-        bound, slope = bound + bounds[0], slope + bounds[1]
+        bound, slope = bound + its[0], slope + its[1]
     return bound, slope
 
 
