@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import analysis, catalogue, runs, studies
+from smc_mujoco.cli.terminal import errors_as_sentences
 from smc_mujoco.common import annexes
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.gl import choose_gl
@@ -33,7 +34,7 @@ for annex in sorted(filter(annexes.installed, annexes.ANNEXES)):
 for group, commands in GROUPS.items():
     for command in commands:
         name = command.__name__.strip("_").replace("_", "-")  # list_ -> list, export_c -> export-c
-        app.command(name, rich_help_panel=group)(command)
+        app.command(name, rich_help_panel=group)(errors_as_sentences()(command))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

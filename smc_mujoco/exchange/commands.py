@@ -8,14 +8,13 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 ARGUMENT_AT_END = re.compile(r"\b(gains|memory|timeout|flag)s?=$")  # of law_from_c, at the end of its error sentences
 
 
-@errors_as_sentences()
 def check_c(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A .c file with smc_law in it, or a .so.")],
     gains: Annotated[
@@ -54,7 +53,6 @@ def check_c(
         raise ScenarioError(ARGUMENT_AT_END.sub(r"--\1", str(error))) from None
 
 
-@errors_as_sentences()
 def export_c(
     law: options.LawText,
     gains: options.GainValues = "",
@@ -88,7 +86,6 @@ def export_c(
     print(text, end="")
 
 
-@errors_as_sentences()
 def export_fmu(
     law: options.LawText,
     gains: options.GainValues = "",
@@ -130,7 +127,6 @@ def export_fmu(
     print(f"{path}, {path.stat().st_size / 1024:.0f} kB; FMI 3.0, Co-Simulation, every {period:g} s")
 
 
-@errors_as_sentences()
 def live(
     plants: Annotated[
         list[str] | None,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.text import counted
@@ -24,7 +24,6 @@ QUICK_MARGINS = {  # defaults of `margins --quick`
 }
 
 
-@errors_as_sentences()
 def tune(
     plant: options.PlantName,
     law: options.LawText,
@@ -64,7 +63,6 @@ def tune(
         terminal.wrote(tuned.save(out))
 
 
-@errors_as_sentences()
 def margins(
     plants: options.Plants = None,
     law: options.Laws = None,
@@ -116,7 +114,6 @@ def margins(
         terminal.wrote(save(results, json))
 
 
-@errors_as_sentences()
 def worst(
     plant: Annotated[
         str,
@@ -220,7 +217,6 @@ def _attacked_cases(
     return chosen, [[case(options.plant(plant), attacked, condition, duration, gains)] for attacked in chosen]
 
 
-@errors_as_sentences()
 def basin(
     plant: options.PlantName,
     law: options.OneLaw = "observer_free",
@@ -265,7 +261,6 @@ def basin(
         terminal.wrote(*pictures)
 
 
-@errors_as_sentences()
 def chatter(
     plant: options.PlantName,
     law: options.Laws = None,

@@ -6,11 +6,10 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
-@errors_as_sentences()
 def list_() -> None:
     """List plants, laws, surfaces, velocity estimators, scenes, and conditions.
 
@@ -36,7 +35,6 @@ def list_() -> None:
         terminal.print(tables.catalogue(title, rows), "")
 
 
-@errors_as_sentences()
 def laws(
     name: Annotated[
         str | None,

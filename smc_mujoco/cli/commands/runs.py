@@ -9,11 +9,10 @@ import typer
 from rich.text import Text
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Clock, Terminal, errors_as_sentences
+from smc_mujoco.cli.terminal import Clock, Terminal
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
-@errors_as_sentences()
 def run(
     name: options.SceneName,
     out: Annotated[
@@ -51,7 +50,6 @@ def run(
         terminal.note(str(clock), "dim")
 
 
-@errors_as_sentences()
 def show(
     trace: Annotated[Path, typer.Argument(metavar="TRACE", help="A .npz file from `smc-mujoco run` or Trace.save.")],
     figure: Annotated[Path | None, options.picture("it")] = None,
@@ -92,7 +90,6 @@ def show(
     terminal.wrote(*written)
 
 
-@errors_as_sentences()
 def view(
     name: options.SceneName,
     condition: Annotated[

@@ -7,7 +7,7 @@ import typer
 
 from smc_mujoco.analysis.ranking import RELEVANT
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.text import counted
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from smc_mujoco.studies.table import Table
 
 
-@errors_as_sentences()
 def which(
     plant: options.PlantName,
     needs: Annotated[
@@ -66,7 +65,6 @@ def which(
     terminal.note(f"{runs}; {terminal.seconds:.0f} s", "dim")
 
 
-@errors_as_sentences()
 def compare(
     plants: options.Plants = None,
     law: options.Laws = None,

@@ -6,12 +6,11 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
-@errors_as_sentences()
 def accuracy(
     plants: Annotated[
         list[str],

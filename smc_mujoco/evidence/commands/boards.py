@@ -6,11 +6,10 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
-@errors_as_sentences()
 def board(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="acrobot or pendubot.")],
     robustness: Annotated[

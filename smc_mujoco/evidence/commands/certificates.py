@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.text import capital
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 METRIC = "ultimate_bound"  # largest |x| in the last fifth of a run
 
 
-@errors_as_sentences()
 def certify(
     plant: Annotated[
         str | None,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from smc_mujoco.evidence.audit.audit import Audit
 
 
-@errors_as_sentences()
 def claims(
     ids: Annotated[
         list[str] | None, typer.Argument(metavar="ID", help="Of claims, as 3 18; by default all.", show_default=False)
@@ -92,7 +91,6 @@ def _kept(done: "Audit", asked: tuple, terminal: Terminal) -> bool:
     return bool(kept)
 
 
-@errors_as_sentences()
 def papers(
     new: Annotated[
         Path | None, typer.Option("--new", metavar="FOLDER", help="Write a template of your own paper into a folder.")

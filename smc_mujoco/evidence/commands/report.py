@@ -7,12 +7,10 @@ import typer
 
 from smc_mujoco.analysis.ranking import RELEVANT
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import errors_as_sentences
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
-@errors_as_sentences()
 def report(
     quick: Annotated[bool, typer.Option("--quick", help="A small report, in two minutes: less of everything.")] = False,
     out: Annotated[Path, typer.Option(help="Folder for the report and its data.")] = Path("report"),

@@ -6,11 +6,10 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
+from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
-@errors_as_sentences()
 def identify(
     rig: Annotated[
         str, typer.Argument(metavar="RIG", help="A rig, such as qube_servo, a plant, or FILE.xml:joint+joint.")
@@ -71,7 +70,6 @@ def identify(
         terminal.wrote(*identified.figure(figure))
 
 
-@errors_as_sentences()
 def replay(
     rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig, such as qube_servo or simple_pendulum_ak80.")],
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A record: CSV or npz file of columns.")],

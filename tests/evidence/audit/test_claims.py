@@ -7,11 +7,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import typer
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.linear_theory import critical_delay
+from smc_mujoco.cli import main
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.audit import audit
 from smc_mujoco.evidence.audit import runs as claim_runs
@@ -35,7 +35,6 @@ from smc_mujoco.evidence.audit.verdict import (
     ratio,
     verdict,
 )
-from smc_mujoco.evidence.commands.papers import claims as command
 from smc_mujoco.evidence.papers.gaber import claims as measured
 from smc_mujoco.evidence.papers.gaber import lyapunov
 from smc_mujoco.evidence.papers.gaber.claims import OURS
@@ -430,9 +429,7 @@ def test_the_wrong_sign_converges_just_where_the_plant_has_it_too():
 @pytest.fixture
 def terminal(monkeypatch):
     monkeypatch.setenv("COLUMNS", "100")
-    app = typer.Typer()
-    app.command()(command)
-    return lambda *arguments: CliRunner().invoke(app, list(arguments))
+    return lambda *arguments: CliRunner().invoke(main.app, ["claims", *arguments])
 
 
 def test_a_folder_is_no_file_to_write(terminal, tmp_path):

@@ -9,17 +9,17 @@ import sys
 from pathlib import Path
 
 import pytest
-import typer
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
+from smc_mujoco.cli import main
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import from_json
 from smc_mujoco.draw import style
 from smc_mujoco.evidence.audit import evidence, figure
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import ANSWERS, REFUTED, VERDICTS
-from smc_mujoco.evidence.commands import papers, tables
+from smc_mujoco.evidence.commands import tables
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies.run_key import portable_key
 
@@ -213,26 +213,23 @@ def test_verdicts_have_colours_of_their_own_from_green_to_red_and_answers_anothe
 
 
 def test_the_command_writes_evidence_and_badge_and_checks_the_seal(folder, tmp_path):
-    app = typer.Typer()
-    app.command("claims")(papers.claims)
-    app.command("papers")(papers.papers)
     files = tmp_path / "evidence.json", tmp_path / "badge.svg"
     words = ["claims", "--paper", str(folder), "--evidence", str(files[0]), "--badge", str(files[1])]
-    written = CliRunner().invoke(app, words)
+    written = CliRunner().invoke(main.app, words)
     assert written.exit_code == 0, written.output
     assert "the law is calm" in written.stdout
     assert all(file.is_file() for file in files)
-    asked = CliRunner().invoke(app, ["claims", "1", "--paper", str(folder), "--mutants"])
+    asked = CliRunner().invoke(main.app, ["claims", "1", "--paper", str(folder), "--mutants"])
     assert (asked.exit_code, "Every claim is lost by a mutant" in asked.stdout) == (0, True), asked.output
-    without = CliRunner().invoke(app, ["claims", "2", "--paper", str(folder), "--mutants"])
+    without = CliRunner().invoke(main.app, ["claims", "2", "--paper", str(folder), "--mutants"])
     assert (without.exit_code, "claim 2 names no law" in without.stderr) == (2, True)
-    checked = CliRunner().invoke(app, ["papers", "--check", str(files[0])])
+    checked = CliRunner().invoke(main.app, ["papers", "--check", str(files[0])])
     assert "the seal is whole: A. Nobody, Small: 1 refuted" in " ".join(checked.stdout.split())
-    listed = CliRunner().invoke(app, ["papers"])
+    listed = CliRunner().invoke(main.app, ["papers"])
     assert "gaber" in listed.stdout
-    begun = CliRunner().invoke(app, ["papers", "--new", str(tmp_path / "mine")])
+    begun = CliRunner().invoke(main.app, ["papers", "--new", str(tmp_path / "mine")])
     assert begun.exit_code == 0
     assert (tmp_path / "mine" / "claims.py").is_file()
-    broken = CliRunner().invoke(app, ["claims", "--paper", str(tmp_path)])
+    broken = CliRunner().invoke(main.app, ["claims", "--paper", str(tmp_path)])
     assert broken.exit_code == 2
     assert "no paper at" in broken.stderr
